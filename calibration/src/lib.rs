@@ -1,0 +1,1 @@
+//! Calibrations, certificates and inverse analysis.

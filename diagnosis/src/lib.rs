@@ -1,0 +1,1 @@
+//! Where simulation and reality part, and why.

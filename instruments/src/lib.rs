@@ -1,0 +1,1 @@
+//! Instrument profiles, codecs and golden vectors.

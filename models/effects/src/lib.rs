@@ -1,0 +1,1 @@
+//! Candidate effects that nest the baseline model.

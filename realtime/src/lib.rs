@@ -1,0 +1,1 @@
+//! The cyclic loop: ports, safety, estimation, comparison, recording.

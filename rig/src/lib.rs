@@ -1,0 +1,1 @@
+//! muprime: the controller of a hardware-in-the-loop tribometer.

@@ -1,0 +1,2 @@
+//! The `muprime` command.
+fn main() {}

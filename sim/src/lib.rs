@@ -1,0 +1,1 @@
+//! The virtual rig: an independent time-domain world.
