@@ -1,0 +1,156 @@
+//! What every friction law answers, and the laws that are ready to ask.
+
+use crate::condition::{Condition, OutOfDomain};
+use crate::finger::Finger;
+use crate::psi::{self, PsiEq17};
+use crate::spring_slider;
+use serde::{Deserialize, Serialize};
+
+/// How finger and plate meet over a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Regime {
+    /// The reaction force never reaches zero: `w/2 <= F_n/k_n`.
+    FullContact,
+    /// Contact is lost and the slider sticks during part of it.
+    Intermittent,
+    /// Contact is lost and the slider never sticks: `mu' = 1`.
+    FullSlip,
+}
+
+/// Whether a prediction rests on the conditions that its law was made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Validity {
+    /// Inside the range that the law was fitted on or derived for.
+    Inside,
+    /// Outside it: an extrapolation, to be shown as such.
+    Extrapolated,
+}
+
+/// A law's answer at one condition.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Relative friction `mu' = mu / mu_0` (Eq. 5).
+    pub mu_relative: f64,
+    /// Standard uncertainty of `mu_relative` from the law and its parameters (not from the condition).
+    pub mu_relative_sd: f64,
+    /// Magnitude of the mean lateral force in N, `mu' mu_0 F_n`.
+    pub lateral_force_n: f64,
+    /// Contact regime.
+    pub regime: Regime,
+    /// Inside or outside the law's range.
+    pub validity: Validity,
+}
+
+/// A law of friction under ultrasonic vibration. `predict` allocates nothing: the real-time loop calls it.
+pub trait FrictionModel: Send + Sync {
+    /// A short name for records and reports.
+    fn name(&self) -> &str;
+
+    /// The prediction at a condition.
+    ///
+    /// # Errors
+    /// A condition outside the domain of the law, by name.
+    fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain>;
+}
+
+/// The spring-slider with a finger's stiffnesses and their uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpringSlider {
+    finger: Finger,
+}
+
+impl SpringSlider {
+    /// The law for a finger.
+    ///
+    /// # Errors
+    /// A finger outside the domain of the model, by name.
+    pub fn new(finger: Finger) -> Result<Self, OutOfDomain> {
+        finger.check()?;
+        Ok(SpringSlider { finger })
+    }
+
+    /// The finger it was made for.
+    pub fn finger(&self) -> &Finger {
+        &self.finger
+    }
+}
+
+impl FrictionModel for SpringSlider {
+    fn name(&self) -> &str {
+        "spring-slider"
+    }
+
+    fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
+        condition.check()?;
+        let cycle = spring_slider::solve_checked(condition, &self.finger);
+        let sd = self.finger.stiffness_relative_sd;
+        let mu_relative_sd = if sd > 0.0 && condition.amplitude.metres() > 0.0 {
+            let at = |kn: f64, kl: f64| {
+                let finger = Finger {
+                    normal_stiffness_n_per_m: self.finger.normal_stiffness_n_per_m * kn,
+                    lateral_stiffness_n_per_m: self.finger.lateral_stiffness_n_per_m * kl,
+                    ..self.finger
+                };
+                spring_slider::solve_checked(condition, &finger).mu_relative
+            };
+            // Half the spread at one standard deviation either way: exact to second order.
+            let normal = 0.5 * (at(1.0 + sd, 1.0) - at(1.0 - sd, 1.0));
+            let lateral = 0.5 * (at(1.0, 1.0 + sd) - at(1.0, 1.0 - sd));
+            normal.hypot(lateral)
+        } else {
+            0.0
+        };
+        Ok(Prediction {
+            mu_relative: cycle.mu_relative,
+            mu_relative_sd,
+            lateral_force_n: cycle.lateral_force_n,
+            regime: cycle.regime,
+            validity: Validity::Inside,
+        })
+    }
+}
+
+/// The empirical law of Eq. 20 with the paper's fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmpiricalPsi {
+    finger: Finger,
+    psi_star: f64,
+    psi_star_sd: f64,
+}
+
+impl EmpiricalPsi {
+    /// Eq. 20 with `Psi* = 2.38 +- 0.21`.
+    ///
+    /// # Errors
+    /// A finger outside the domain of the model, by name.
+    pub fn paper(finger: Finger) -> Result<Self, OutOfDomain> {
+        finger.check()?;
+        Ok(EmpiricalPsi { finger, psi_star: psi::PSI_STAR, psi_star_sd: psi::PSI_STAR_UNCERTAINTY })
+    }
+}
+
+impl FrictionModel for EmpiricalPsi {
+    fn name(&self) -> &str {
+        "psi"
+    }
+
+    fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
+        condition.check()?;
+        let still = condition.amplitude.metres() == 0.0;
+        let group = PsiEq17::at(condition, self.finger.poisson_ratio);
+        let mu_relative = if still { 1.0 } else { psi::relative_friction(group, self.psi_star) };
+        let fit = psi::sensitivity_to_psi_star(group, self.psi_star) * self.psi_star_sd;
+        let collapse = if still { 0.0 } else { psi::COLLAPSE_RMSE };
+        let cycle = spring_slider::solve_checked(condition, &self.finger);
+        let inside = still || psi::within_fitted_range(condition);
+        Ok(Prediction {
+            mu_relative,
+            mu_relative_sd: fit.hypot(collapse),
+            lateral_force_n: mu_relative * condition.mu0 * condition.normal_force_n,
+            regime: cycle.regime,
+            validity: if inside { Validity::Inside } else { Validity::Extrapolated },
+        })
+    }
+}

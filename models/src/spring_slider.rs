@@ -1,0 +1,255 @@
+//! The massless spring-Coulomb slider of section 4 (Eqs. 6-15) with section 5.3's finite lateral recovery.
+//!
+//! Over one period the plate's phase is `phi = 2 pi f t`, zero where the plate presses most. The reaction
+//! force, in units of `k_n a` (`a = w/2`, [`PeakToPeak::sine_amplitude_m`]), is
+//! `g(phi) = cos(phi) + s` where that is positive and zero elsewhere (Eq. 14). The offset `s` follows from the
+//! force balance of Eq. 15 by root finding, never from a table.
+//!
+//! The lateral stretch, in units of `mu_0 k_n a / k_l`, grows at `kappa = k_l U / (2 pi f mu_0 k_n a)` while the
+//! slider sticks, and slips where it would exceed `g` (Eqs. 9-13). While it lies above `g` or contact is lost it
+//! falls at no more than `rho`, the same group with the recovery speed `v_r` for `U`. The rate limit therefore
+//! also binds the slip-back at and after touch-down: without that the effect of section 5.3 vanishes.
+//!
+//! Exact regimes: full contact where `w/2 <= F_n/k_n`; full slip (`mu' = 1`) where the slider never sticks,
+//! always so for `kappa >= 1`, which is `k_l U >= pi mu_0 k_n w f`.
+
+mod stretch;
+
+use crate::condition::{Condition, OutOfDomain};
+use crate::finger::Finger;
+use crate::prediction::Regime;
+use crate::quantity::PeakToPeak;
+use crate::root;
+use std::f64::consts::PI;
+use stretch::Stretch;
+
+/// Static compression of the normal spring `h = F_n / k_n` in m (Eq. 6).
+pub fn static_compression_m(normal_force_n: f64, normal_stiffness_n_per_m: f64) -> f64 {
+    normal_force_n / normal_stiffness_n_per_m
+}
+
+/// The critical amplitude above which contact becomes intermittent (Eq. 7).
+///
+/// Eq. 7 reads `w_c = F_nc / k_n` with `w` the sine's amplitude of Eq. 14; as a peak-to-peak value it is
+/// twice that, `2 F_n / k_n`.
+pub fn critical_amplitude(normal_force_n: f64, normal_stiffness_n_per_m: f64) -> PeakToPeak {
+    PeakToPeak::from_metres(2.0 * static_compression_m(normal_force_n, normal_stiffness_n_per_m))
+}
+
+/// The half contact angle `alpha` in (0, pi): the solution of Eq. 15, which for a sine reads
+/// `sin(alpha) - alpha cos(alpha) = pi h / a`. Contact lasts `alpha / (pi f)`.
+///
+/// `compression_ratio` is `h / a`; 1 or more is full contact and gives `pi`.
+pub fn half_contact_angle_rad(compression_ratio: f64) -> f64 {
+    if compression_ratio >= 1.0 {
+        return PI;
+    }
+    let target = PI * compression_ratio;
+    // For short contact the leading term alpha^3/3 is nearly exact: bracket it closely, for speed and digits.
+    let upper = if target < 0.1 { (3.0 * target).cbrt() * 1.1 } else { PI };
+    root::bracketed(|alpha| contact_area(alpha) - target, 0.0, upper)
+}
+
+/// `sin(alpha) - alpha cos(alpha)` without cancellation at small `alpha`.
+fn contact_area(alpha: f64) -> f64 {
+    if alpha < 0.2 {
+        let a2 = alpha * alpha;
+        alpha * a2 / 3.0 * (1.0 - a2 / 10.0 * (1.0 - a2 / 28.0 * (1.0 - a2 / 54.0)))
+    } else {
+        alpha.sin() - alpha * alpha.cos()
+    }
+}
+
+/// The periodic steady state of the slider at one condition.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cycle {
+    /// Relative friction `mu'` (Eq. 5), in [0, 1].
+    pub mu_relative: f64,
+    /// Mean lateral force of the cycle in N, `mu' mu_0 F_n`.
+    pub lateral_force_n: f64,
+    /// Mean reaction force in N; equals the applied normal force (Eq. 8).
+    pub mean_reaction_force_n: f64,
+    /// Contact time over period, `t_c / T`, in (0, 1].
+    pub contact_fraction: f64,
+    /// Time from touch-down to the slip that lasts to separation, `t_s` of Eq. 10, in s.
+    /// `None` where the slider never sticks, or in full contact.
+    pub slip_onset_s: Option<f64>,
+    /// Eq. 1 with the slider's acceleration, which peaks just before it separates (Fig. 10), in [0, 360).
+    pub phase_shift_deg: f64,
+    /// Eq. 1 with the time of touch-down, the other reading of section 4.1, in [0, 360).
+    pub touch_down_deg: f64,
+    /// Full contact, intermittent or full slip.
+    pub regime: Regime,
+    groups: Groups,
+}
+
+/// The dimensionless numbers that fix a cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Groups {
+    /// Half contact angle, pi in full contact.
+    alpha: f64,
+    /// Offset of the reaction force in units of `k_n a`: `-cos(alpha)`, or `h/a` in full contact.
+    offset: f64,
+    /// Growth of the stretch per radian.
+    kappa: f64,
+    /// Largest fall of the stretch per radian; infinite for instant recovery.
+    rho: f64,
+    /// `h / a`.
+    compression_ratio: f64,
+}
+
+impl Groups {
+    fn at(c: &Condition, finger: &Finger) -> Self {
+        let a = c.amplitude.sine_amplitude_m();
+        let kn = finger.normal_stiffness_n_per_m;
+        let compression_ratio = static_compression_m(c.normal_force_n, kn) / a;
+        let alpha = half_contact_angle_rad(compression_ratio);
+        let offset = if compression_ratio >= 1.0 { compression_ratio } else { -alpha.cos() };
+        let rate = finger.lateral_stiffness_n_per_m / (2.0 * PI * c.frequency_hz * c.mu0 * kn * a);
+        let rho = finger.lateral_recovery_m_per_s.map_or(f64::INFINITY, |v| rate * v);
+        Groups { alpha, offset, kappa: rate * c.speed_m_s, rho, compression_ratio }
+    }
+
+    fn stretch(&self) -> Stretch {
+        Stretch {
+            offset: self.offset,
+            alpha: self.alpha,
+            always_touching: self.compression_ratio >= 1.0,
+            kappa: self.kappa,
+            rho: self.rho,
+        }
+    }
+
+    /// Whether the slider sticks at some instant of a cycle in the instant-recovery limit.
+    fn sticks(&self) -> bool {
+        let steepest = if self.alpha >= PI / 2.0 { 1.0 } else { self.alpha.sin() };
+        self.kappa < steepest
+    }
+}
+
+/// Solves the slider at a condition (Eqs. 6-15; section 5.3 where the finger has a recovery speed).
+///
+/// ```
+/// use models::{condition::Condition, finger::Finger, spring_slider};
+/// let cycle = spring_slider::solve(&Condition::paper(), &Finger::paper())?;
+/// assert!(cycle.mu_relative > 0.2 && cycle.mu_relative < 0.3);
+/// # Ok::<(), models::condition::OutOfDomain>(())
+/// ```
+///
+/// # Errors
+/// A condition or finger outside the domain of the model, by name.
+pub fn solve(c: &Condition, finger: &Finger) -> Result<Cycle, OutOfDomain> {
+    c.check()?;
+    finger.check()?;
+    Ok(solve_checked(c, finger))
+}
+
+/// [`solve`] for values that were checked before: no branch for bad input.
+pub(crate) fn solve_checked(c: &Condition, finger: &Finger) -> Cycle {
+    if c.amplitude.metres() == 0.0 {
+        return still(c);
+    }
+    let groups = Groups::at(c, finger);
+    let stretch = groups.stretch();
+    let steady = stretch.steady();
+    let mu_relative = (steady.mean_force / groups.compression_ratio).clamp(0.0, 1.0);
+    let full_contact = groups.compression_ratio >= 1.0;
+    let regime = if full_contact {
+        Regime::FullContact
+    } else if groups.sticks() {
+        Regime::Intermittent
+    } else {
+        Regime::FullSlip
+    };
+    let lead = PI + groups.alpha;
+    let slip_onset_s = match regime {
+        Regime::Intermittent => {
+            steady.slip_onset.map(|phi| (phi + groups.alpha) / (2.0 * PI * c.frequency_hz))
+        }
+        _ => None,
+    };
+    Cycle {
+        mu_relative,
+        lateral_force_n: mu_relative * c.mu0 * c.normal_force_n,
+        mean_reaction_force_n: c.normal_force_n,
+        contact_fraction: groups.alpha / PI,
+        slip_onset_s,
+        phase_shift_deg: if full_contact { 0.0 } else { lead.to_degrees() },
+        touch_down_deg: if full_contact { 0.0 } else { (PI - groups.alpha).to_degrees() },
+        regime,
+        groups,
+    }
+}
+
+/// Without vibration: Coulomb friction.
+fn still(c: &Condition) -> Cycle {
+    Cycle {
+        mu_relative: 1.0,
+        lateral_force_n: c.mu0 * c.normal_force_n,
+        mean_reaction_force_n: c.normal_force_n,
+        contact_fraction: 1.0,
+        slip_onset_s: None,
+        phase_shift_deg: 0.0,
+        touch_down_deg: 0.0,
+        regime: Regime::FullContact,
+        groups: Groups {
+            alpha: PI,
+            offset: f64::INFINITY,
+            kappa: 0.0,
+            rho: f64::INFINITY,
+            compression_ratio: f64::INFINITY,
+        },
+    }
+}
+
+/// One instant of a cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instant {
+    /// Time from touch-down in units of the period.
+    pub time_over_period: f64,
+    /// Reaction force of the plate in units of the mean normal force.
+    pub reaction_over_normal: f64,
+    /// Lateral force in units of `mu_0` times the mean normal force.
+    pub lateral_over_coulomb: f64,
+}
+
+impl Cycle {
+    /// The forces over one period in `n` steps from touch-down, as in Figs. 8 and 10.
+    pub fn waveform(&self, n: usize) -> Vec<Instant> {
+        let groups = self.groups;
+        if !groups.compression_ratio.is_finite() {
+            let at = |i| i as f64 / n as f64;
+            let still =
+                |i| Instant { time_over_period: at(i), reaction_over_normal: 1.0, lateral_over_coulomb: 1.0 };
+            return (0..n).map(still).collect();
+        }
+        let stretch = groups.stretch();
+        let start = stretch.steady().at_touch_down;
+        stretch.sample(start, n, |turn, reaction, lateral| Instant {
+            time_over_period: turn,
+            reaction_over_normal: reaction / groups.compression_ratio,
+            lateral_over_coulomb: lateral / groups.compression_ratio,
+        })
+    }
+}
+
+/// Mean relative friction of each of the first `cycles` periods after the slider was last unstretched (Fig. 13).
+///
+/// # Errors
+/// As [`solve`]; also an amplitude of zero, which has no cycles.
+pub fn transient(c: &Condition, finger: &Finger, cycles: usize) -> Result<Vec<f64>, OutOfDomain> {
+    c.check()?;
+    finger.check()?;
+    if c.amplitude.metres() == 0.0 {
+        return Err(OutOfDomain { name: "amplitude_pp_m", value: 0.0, needed: "a number above zero" });
+    }
+    let groups = Groups::at(c, finger);
+    let stretch = groups.stretch();
+    let mut x = 0.0;
+    let run = |_| {
+        let turn = stretch.turn(x);
+        x = turn.left_over;
+        turn.mean_force / groups.compression_ratio
+    };
+    Ok((0..cycles).map(run).collect())
+}

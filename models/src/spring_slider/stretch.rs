@@ -1,0 +1,224 @@
+//! The lateral stretch over one turn of the plate, piece by piece.
+//!
+//! Everything is in units of `k_n a` (forces) and radians (time). On each piece the stretch is a straight line
+//! or follows the reaction force, so pieces end at roots that are bracketed by known extrema, and their
+//! integrals are closed forms.
+
+use crate::root;
+use std::f64::consts::PI;
+
+/// The driven stretch: `g(phi) = cos(phi) + offset` while touching.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    pub offset: f64,
+    /// Half contact angle; pi where contact is never lost.
+    pub alpha: f64,
+    pub always_touching: bool,
+    /// Growth per radian while sticking.
+    pub kappa: f64,
+    /// Largest fall per radian, possibly infinite.
+    pub rho: f64,
+}
+
+/// One turn of the plate.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Turn {
+    /// Mean lateral force over the turn.
+    pub mean_force: f64,
+    /// Stretch at the next touch-down.
+    pub left_over: f64,
+    /// Phase where the last stick of the turn ended in slip.
+    pub slip_onset: Option<f64>,
+}
+
+/// The periodic steady state.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Steady {
+    pub mean_force: f64,
+    pub at_touch_down: f64,
+    pub slip_onset: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Piece {
+    /// On a line below the limit: force is the line.
+    Stick,
+    /// On the limit: force is the limit.
+    Slip,
+    /// Above the limit, falling at `rho`: force is the limit.
+    Recover,
+}
+
+impl Stretch {
+    fn g(&self, phi: f64) -> f64 {
+        phi.cos() + self.offset
+    }
+
+    fn start(&self) -> f64 {
+        -self.alpha
+    }
+
+    /// Area under `g` between two phases.
+    fn area(&self, from: f64, to: f64) -> f64 {
+        to.sin() - from.sin() + self.offset * (to - from)
+    }
+
+    pub(super) fn steady(&self) -> Steady {
+        let from = |turn: Turn, at_touch_down| Steady {
+            mean_force: turn.mean_force,
+            at_touch_down,
+            slip_onset: turn.slip_onset,
+        };
+        // Instant recovery forgets everything at separation. In full contact the stretch can be no less than the
+        // smallest limit, which is where the turn starts: exact for instant recovery, even infinitely slow.
+        let mut x = if self.always_touching { self.g(self.start()) } else { 0.0 };
+        let mut turn = self.turn(x);
+        for _ in 0..3 {
+            if (turn.left_over - x).abs() <= 1e-14 * (1.0 + x) {
+                return from(turn, x);
+            }
+            x = turn.left_over;
+            turn = self.turn(x);
+        }
+        // The map from one touch-down to the next is monotone with slope at most one, so what is left grows
+        // towards the fixed point. Bisection finds it where iteration would take thousands of turns.
+        let top = self.offset + 1.0;
+        let fixed = root::bracketed(|x| self.turn(x).left_over - x, x, top);
+        from(self.turn(fixed), fixed)
+    }
+
+    /// One turn that starts at touch-down with the stretch `x`.
+    pub(super) fn turn(&self, x: f64) -> Turn {
+        let mut turn = Turn::default();
+        let mut sum = 0.0;
+        let end = self.alpha;
+        let left = self.walk(x, |piece, from, to, at_start| match piece {
+            Piece::Stick => {
+                let length = to - from;
+                sum += length * (at_start + 0.5 * self.kappa * length);
+                if to < end {
+                    turn.slip_onset = Some(to);
+                }
+            }
+            Piece::Slip | Piece::Recover => sum += self.area(from, to),
+        });
+        turn.mean_force = sum / (2.0 * PI);
+        turn.left_over = if self.always_touching {
+            left
+        } else {
+            let fall = self.rho * 2.0 * (PI - self.alpha);
+            if fall.is_finite() { (left - fall).max(0.0) } else { 0.0 }
+        };
+        turn
+    }
+
+    /// Walks the pieces of one contact, calls `visit(piece, from, to, stretch at from)`, and returns the
+    /// stretch at its end.
+    fn walk(&self, x: f64, mut visit: impl FnMut(Piece, f64, f64, f64)) -> f64 {
+        let end = self.alpha;
+        let (mut phi, mut x) = (self.start(), x);
+        // Each extremum of g - line ends at most one piece, so a turn has only a handful.
+        for _ in 0..16 {
+            if phi >= end {
+                break;
+            }
+            let gap = self.g(phi) - x;
+            let tolerance = 1e-13 * (1.0 + self.offset.abs());
+            let slope = -phi.sin();
+            let piece = if gap < -tolerance {
+                Piece::Recover
+            } else if gap > tolerance || slope > self.kappa {
+                Piece::Stick
+            } else if slope < -self.rho {
+                Piece::Recover
+            } else {
+                Piece::Slip
+            };
+            let to = match piece {
+                Piece::Stick => self.crossing(phi, x, self.kappa, end, true),
+                Piece::Recover if self.rho.is_finite() => self.crossing(phi, x, -self.rho, end, false),
+                Piece::Recover => {
+                    // Instant recovery: drop onto the limit and look again.
+                    x = self.g(phi).max(0.0);
+                    continue;
+                }
+                Piece::Slip => self.leave(phi, end),
+            };
+            visit(piece, phi, to, x);
+            x = match piece {
+                Piece::Stick => x + self.kappa * (to - phi),
+                Piece::Recover => x - self.rho * (to - phi),
+                Piece::Slip => self.g(to),
+            };
+            if to < end && !matches!(piece, Piece::Slip) {
+                x = self.g(to);
+            }
+            phi = to;
+        }
+        x.max(0.0)
+    }
+
+    /// Where the line from (`phi`, `x`) with the given slope next meets `g`, coming from below or above.
+    fn crossing(&self, phi: f64, x: f64, slope: f64, end: f64, from_below: bool) -> f64 {
+        let sign = if from_below { 1.0 } else { -1.0 };
+        let ahead = |p: f64| sign * (self.g(p) - x - slope * (p - phi));
+        // Extrema of g - line, where -sin(p) = slope, cut the way into monotone stretches.
+        let mut cuts = [end; 5];
+        if slope.abs() < 1.0 {
+            let s = slope.asin();
+            cuts = [-s, -PI + s, PI + s, 2.0 * PI - s, end];
+            cuts.sort_unstable_by(f64::total_cmp);
+        }
+        let mut from = phi;
+        for cut in cuts {
+            let to = cut.min(end);
+            if to <= from {
+                continue;
+            }
+            if ahead(to) < 0.0 {
+                // The first point of the bracket may itself be a zero (touch-down): step off it.
+                let inside = if ahead(from) <= 0.0 { from + (to - from) * 1e-9 } else { from };
+                if ahead(inside) <= 0.0 {
+                    return inside;
+                }
+                return root::bracketed(ahead, inside, to);
+            }
+            from = to;
+        }
+        end
+    }
+
+    /// Where slip along `g` next becomes impossible: `g` rises faster than `kappa` or falls faster than `rho`.
+    fn leave(&self, phi: f64, end: f64) -> f64 {
+        let mut first = end;
+        let mut consider = |p: f64| {
+            if p > phi + 1e-12 && p < first {
+                first = p;
+            }
+        };
+        if self.kappa < 1.0 {
+            consider(-PI + self.kappa.asin());
+        }
+        if self.rho < 1.0 {
+            consider(self.rho.asin());
+        }
+        first
+    }
+
+    /// Samples a turn: `make(time from touch-down over period, reaction, lateral)`.
+    pub(super) fn sample<T>(&self, x: f64, n: usize, make: impl Fn(f64, f64, f64) -> T) -> Vec<T> {
+        let mut pieces = Vec::new();
+        self.walk(x, |piece, from, to, at| pieces.push((piece, from, to, at)));
+        let value = |i: usize| {
+            let turn = i as f64 / n as f64;
+            let phi = self.start() + 2.0 * PI * turn;
+            let here = pieces.iter().find(|(_, from, to, _)| phi >= *from && phi <= *to);
+            match here {
+                None => make(turn, 0.0, 0.0),
+                Some((Piece::Stick, from, _, at)) => make(turn, self.g(phi), at + self.kappa * (phi - from)),
+                Some(_) => make(turn, self.g(phi), self.g(phi)),
+            }
+        };
+        (0..n).map(value).collect()
+    }
+}
