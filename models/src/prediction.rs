@@ -53,6 +53,27 @@ pub trait FrictionModel: Send + Sync {
     /// # Errors
     /// A condition outside the domain of the law, by name.
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain>;
+
+    /// Relative standard deviations of the two parameters that a calibration leaves uncertain (normal and lateral
+    /// stiffness, or what takes their place). Zero: the law has none.
+    fn parameter_relative_sd(&self) -> [f64; 2] {
+        [0.0; 2]
+    }
+
+    /// `mu'` with those parameters multiplied by `exp(deviation)`.
+    ///
+    /// # Errors
+    /// As [`FrictionModel::predict`].
+    fn mu_relative_with(&self, condition: &Condition, deviation: [f64; 2]) -> Result<f64, OutOfDomain> {
+        let _ = deviation;
+        self.predict(condition).map(|p| p.mu_relative)
+    }
+
+    /// Standard deviation of `mu'` from the law itself: what no choice of its parameters mends.
+    fn form_sd(&self, condition: &Condition) -> f64 {
+        let _ = condition;
+        0.0
+    }
 }
 
 /// The spring-slider with a finger's stiffnesses and their uncertainty.
@@ -110,6 +131,19 @@ impl FrictionModel for SpringSlider {
             validity: Validity::Inside,
         })
     }
+
+    fn parameter_relative_sd(&self) -> [f64; 2] {
+        [self.finger.stiffness_relative_sd; 2]
+    }
+
+    fn mu_relative_with(&self, condition: &Condition, deviation: [f64; 2]) -> Result<f64, OutOfDomain> {
+        let finger = Finger {
+            normal_stiffness_n_per_m: self.finger.normal_stiffness_n_per_m * deviation[0].exp(),
+            lateral_stiffness_n_per_m: self.finger.lateral_stiffness_n_per_m * deviation[1].exp(),
+            ..self.finger
+        };
+        spring_slider::solve(condition, &finger).map(|cycle| cycle.mu_relative)
+    }
 }
 
 /// The empirical law of Eq. 20 with the paper's fit.
@@ -152,5 +186,9 @@ impl FrictionModel for EmpiricalPsi {
             regime: cycle.regime,
             validity: if inside { Validity::Inside } else { Validity::Extrapolated },
         })
+    }
+
+    fn form_sd(&self, condition: &Condition) -> f64 {
+        self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
     }
 }

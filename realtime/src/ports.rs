@@ -94,7 +94,7 @@ pub enum NoData {
 pub type Channel = Result<Reading, NoData>;
 
 /// What a force sensor delivers. The two axes may come from two instruments: each has its own time and sequence.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Forces {
     /// Lateral force in N, signed in the sensor's frame.
     pub lateral: Channel,
@@ -116,7 +116,7 @@ pub trait ForceSensor: Send {
 }
 
 /// What the amplifier says of itself.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AmplifierState {
     /// Peak-to-peak amplitude as the amplifier (or a plate sensor behind it) measures it, in m.
     pub amplitude: Channel,
@@ -158,7 +158,7 @@ pub trait Amplifier: Send {
 }
 
 /// What the stage says of itself.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StageState {
     /// Position along the stroke in m.
     pub position_m: f64,

@@ -1,0 +1,240 @@
+//! One cycle of the loop: a pure function of configuration, state, inputs and the time passed in.
+//!
+//! Order: commands, safety, estimate, comparison. Everything that a cycle can reach is `Copy` (checked below), so it
+//! holds no lock, no heap and no handle; the model is reached through `&`, and models hold plain tables.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods)]
+
+use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
+use crate::ports::Nanos;
+use crate::safety::{
+    Controls, Decision, DriveCommand, Limits, Observation, Request, Safety, StageCommand, State, Trip,
+};
+use models::condition::Condition;
+use models::prediction::FrictionModel;
+use models::quantity::{Direction, PeakToPeak};
+use serde::{Deserialize, Serialize};
+
+/// What the loop is doing, as the sweep sees it. It goes into the record with every cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// Nothing is asked for.
+    #[default]
+    Idle,
+    /// Going to the start of a pass.
+    Approach,
+    /// Loaded and sliding; amplitude and transients settle.
+    Settle,
+    /// The steady part that is averaged.
+    Measure,
+    /// Lifted off: the force zeros are read.
+    Zero,
+}
+
+/// Which pass a cycle belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Marker {
+    /// Number of the point in the plan.
+    pub point: u32,
+    /// Phase of it.
+    pub phase: Phase,
+}
+
+/// What reaches the loop from outside, in the order it was sent.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Command {
+    /// New set-points, and what they are for.
+    Set(Request, Marker),
+    /// A reset edge.
+    Reset,
+    /// Stop and latch.
+    Stop,
+    /// The dead-man input changed.
+    DeadMan(bool),
+    /// `mu_0` as known now.
+    Mu0(Mu0),
+}
+
+/// Commands taken in one cycle at most; the rest wait for the next.
+pub const COMMANDS_PER_CYCLE: usize = 4;
+
+/// What does not change while the loop runs.
+#[derive(Clone, Copy, Debug)]
+pub struct Config {
+    /// Limits and timing.
+    pub limits: Limits,
+    /// The running estimate.
+    pub estimate: EstimateConfig,
+}
+
+/// What changes from cycle to cycle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CycleState {
+    safety: Safety,
+    window: Window,
+    request: Request,
+    marker: Marker,
+    dead_man: bool,
+    mu0: Option<Mu0>,
+}
+
+impl CycleState {
+    /// Safety's state.
+    pub const fn safety(&self) -> State {
+        self.safety.state()
+    }
+}
+
+/// Everything a cycle sees.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Inputs {
+    /// Commands, oldest first.
+    pub commands: [Option<Command>; COMMANDS_PER_CYCLE],
+    /// Forces, amplifier, stage and lateness.
+    pub seen: Observation,
+}
+
+/// The online comparison of one cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Online {
+    /// Predicted `mu'` at the measured condition.
+    pub predicted: f64,
+    /// Its standard uncertainty.
+    pub predicted_sd: f64,
+    /// Measured less predicted, in standard deviations of the difference.
+    pub z: f64,
+}
+
+/// Everything a cycle says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outputs {
+    /// For the amplifier.
+    pub drive: DriveCommand,
+    /// For the stage.
+    pub stage: StageCommand,
+    /// Whether the second switch-off channel is to be opened.
+    pub cut_supply: bool,
+    /// A trip latched in this cycle.
+    pub tripped: Option<Trip>,
+    /// Whether the rig is armed after this cycle.
+    pub armed: bool,
+    /// Which pass the cycle belongs to.
+    pub marker: Marker,
+    /// Running `mu'`, or why there is none.
+    pub mu_relative: Result<MuRelative, NoMu>,
+    /// Comparison with the model, where there is a `mu'` and the model has an answer.
+    pub online: Option<Online>,
+    /// Both forces fit for use in this cycle.
+    pub usable: bool,
+}
+
+const fn assert_copy<T: Copy>() {}
+const _: () = {
+    assert_copy::<Config>();
+    assert_copy::<CycleState>();
+    assert_copy::<Inputs>();
+    assert_copy::<Outputs>();
+};
+
+/// One cycle. No clock: `now` is passed in.
+pub fn step(
+    config: &Config,
+    model: &dyn FrictionModel,
+    state: &mut CycleState,
+    inputs: &Inputs,
+    now: Nanos,
+) -> Outputs {
+    let controls = take_commands(state, inputs);
+    let seen = &inputs.seen;
+    let decision = state.safety.step(&config.limits, seen, &state.request, controls, now);
+
+    let usable = decision.lateral_usable && decision.normal_usable;
+    if let (true, Ok(lateral), Ok(normal)) = (usable, &seen.forces.lateral, &seen.forces.normal) {
+        state.window.push(&config.estimate, lateral, normal);
+    }
+    let direction = direction_of(state.request.velocity_m_s);
+    let age = [&seen.forces.lateral, &seen.forces.normal]
+        .into_iter()
+        .filter_map(|c| c.as_ref().ok())
+        .map(|r| r.age(now))
+        .max()
+        .unwrap_or_default();
+    let mu_relative = state.window.mu_relative(&config.estimate, direction, state.mu0, age);
+    let online = mu_relative.ok().and_then(|mu| compare(config, model, state, seen, &mu, now));
+
+    let Decision { drive, stage, cut_supply, tripped, .. } = decision;
+    Outputs {
+        drive,
+        stage,
+        cut_supply,
+        tripped,
+        armed: state.safety.is_armed(),
+        marker: state.marker,
+        mu_relative,
+        online,
+        usable,
+    }
+}
+
+fn take_commands(state: &mut CycleState, inputs: &Inputs) -> Controls {
+    let mut controls = Controls::default();
+    for command in inputs.commands.iter().flatten() {
+        match command {
+            Command::Set(request, marker) => {
+                if *marker != state.marker || *request != state.request {
+                    state.window.clear();
+                }
+                (state.request, state.marker) = (*request, *marker);
+            }
+            Command::Reset => controls.reset = true,
+            Command::Stop => controls.stop = true,
+            Command::DeadMan(held) => state.dead_man = *held,
+            Command::Mu0(mu0) => state.mu0 = Some(*mu0),
+        }
+    }
+    controls.dead_man = state.dead_man;
+    controls
+}
+
+fn direction_of(velocity_m_s: f64) -> Direction {
+    if velocity_m_s < 0.0 { Direction::Backward } else { Direction::Forward }
+}
+
+/// The prediction at what is measured now: amplitude and speed as read back, normal force as sensed.
+fn compare(
+    config: &Config,
+    model: &dyn FrictionModel,
+    state: &CycleState,
+    seen: &Observation,
+    mu: &MuRelative,
+    now: Nanos,
+) -> Option<Online> {
+    let amplifier = seen.amplifier.ok()?;
+    let stage = seen.stage.ok()?;
+    let mu0 = state.mu0?;
+    let (_, normal_force_n, _) = state.window.means()?;
+    let amplitude = if amplifier.output_on { amplifier.amplitude.ok()?.value } else { 0.0 };
+    let condition = Condition {
+        amplitude: PeakToPeak::from_metres(amplitude.max(0.0)),
+        frequency_hz: if amplitude > 0.0 {
+            amplifier.echoed_frequency_hz
+        } else {
+            config.limits.frequency_hz.0
+        },
+        speed_m_s: stage.velocity_m_s.abs(),
+        direction: direction_of(stage.velocity_m_s),
+        normal_force_n,
+        mu0: mu0.value,
+        position_m: stage.position_m,
+        time_s: now.seconds(),
+        ambient_pressure_pa: None,
+    };
+    let prediction = model.predict(&condition).ok()?;
+    let sd = mu.sd.hypot(prediction.mu_relative_sd);
+    Some(Online {
+        predicted: prediction.mu_relative,
+        predicted_sd: prediction.mu_relative_sd,
+        z: (mu.value - prediction.mu_relative) / sd,
+    })
+}

@@ -1,0 +1,232 @@
+//! The thread of the loop: absolute deadlines, priority, locked memory, lateness histogram.
+//!
+//! Overrun policy: a cycle that ends past the next deadline skips the deadlines it has missed (they are counted), so
+//! the loop never runs two cycles back to back to catch up.
+
+use crate::cycle::{Command, Config, CycleState};
+use crate::ports::Nanos;
+use crate::turn::{Ports, Row, Tick, turn};
+use crossbeam_queue::ArrayQueue;
+use hdrhistogram::Histogram;
+use models::prediction::FrictionModel;
+use ringbuf::HeapProd;
+use ringbuf::traits::Producer;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// What the thread asked of the machine and what it got, told truthfully.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Grants {
+    /// Scheduling policy as read back: `fifo`, `other`, or a number.
+    pub policy: String,
+    /// Priority as read back.
+    pub priority: i32,
+    /// Why SCHED_FIFO was not granted.
+    pub policy_refused: Option<String>,
+    /// Whether all memory is locked.
+    pub memory_locked: bool,
+    /// Why memory could not be locked.
+    pub lock_refused: Option<String>,
+}
+
+/// What a loop has to tell when it ends. Stored in every run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct LoopReport {
+    /// Scheduling and memory.
+    pub grants: Grants,
+    /// Period in ns.
+    pub period_ns: u64,
+    /// Cycles run.
+    pub cycles: u64,
+    /// Deadlines skipped because a cycle ended too late.
+    pub overruns: u64,
+    /// Rows lost because the record's ring was full.
+    pub ring_drops: u64,
+    /// Minor page faults of the thread after its first cycle.
+    pub minor_faults: i64,
+    /// Major page faults of the thread after its first cycle.
+    pub major_faults: i64,
+    /// Lateness quantiles in ns: 0.5, 0.9, 0.99, 0.999, maximum.
+    pub lateness_ns: [u64; 5],
+    /// Lateness counts: upper bound of a bucket in ns, cycles in it.
+    pub histogram: Vec<(u64, u64)>,
+}
+
+/// Shared between the loop's thread and its supervisor.
+#[derive(Debug, Default)]
+pub struct Lifeline {
+    /// Set to end the loop after its present cycle.
+    pub end: AtomicBool,
+    /// Counts cycles: the supervisor sees that the loop lives.
+    pub heartbeat: AtomicU64,
+}
+
+/// What the loop needs besides its ports.
+pub struct LoopParts {
+    /// Limits, timing, estimate.
+    pub config: Config,
+    /// The model to compare with.
+    pub model: Arc<dyn FrictionModel>,
+    /// The rig.
+    pub ports: Ports,
+    /// Commands in.
+    pub commands: Arc<ArrayQueue<Command>>,
+    /// Rows out.
+    pub rows: HeapProd<Row>,
+    /// End and heartbeat.
+    pub life: Arc<Lifeline>,
+    /// CLOCK_MONOTONIC in ns that counts as loop time zero. Drivers stamp with the same origin.
+    pub origin_ns: u64,
+}
+
+/// CLOCK_MONOTONIC in ns.
+pub fn monotonic_ns() -> u64 {
+    let mut t = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `t` is a valid timespec for the kernel to write, and CLOCK_MONOTONIC always exists on Linux.
+    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut t) };
+    t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64
+}
+
+fn sleep_until(absolute_ns: u64) {
+    let t = libc::timespec {
+        tv_sec: (absolute_ns / 1_000_000_000) as libc::time_t,
+        tv_nsec: (absolute_ns % 1_000_000_000) as libc::c_long,
+    };
+    // SAFETY: `t` is a valid timespec; no remainder is asked for with an absolute deadline, so null is allowed.
+    // A signal may end the sleep early: then sleep again until the same deadline.
+    while unsafe {
+        libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &t, std::ptr::null_mut())
+    } == libc::EINTR
+    {}
+}
+
+/// Asks for SCHED_FIFO, locked memory and a small timer slack for the calling thread, and reads back what it got.
+pub fn ask_for_real_time(priority: i32) -> Grants {
+    let mut grants = Grants::default();
+    let refused = || std::io::Error::last_os_error().to_string();
+    let wanted = libc::sched_param { sched_priority: priority };
+    // SAFETY: plain calls on the calling thread (pid 0) with a valid parameter struct. SCHED_RESET_ON_FORK keeps
+    // threads that are spawned later from inheriting the class.
+    let got = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, &wanted) };
+    if got != 0 {
+        grants.policy_refused = Some(refused());
+    }
+    let mut param = libc::sched_param { sched_priority: 0 };
+    // SAFETY: reading back the calling thread's policy and parameters into a valid struct.
+    let policy = unsafe {
+        libc::sched_getparam(0, &mut param);
+        libc::sched_getscheduler(0) & !libc::SCHED_RESET_ON_FORK
+    };
+    grants.policy = match policy {
+        libc::SCHED_FIFO => "fifo".into(),
+        libc::SCHED_OTHER => "other".into(),
+        other => other.to_string(),
+    };
+    grants.priority = param.sched_priority;
+    // SAFETY: raising one's own limit as far as the hard limit allows, then locking; no pointers outlive the calls.
+    let locked = unsafe {
+        let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+        libc::getrlimit(libc::RLIMIT_MEMLOCK, &mut limit);
+        limit.rlim_cur = limit.rlim_max;
+        libc::setrlimit(libc::RLIMIT_MEMLOCK, &limit);
+        libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0
+    };
+    grants.memory_locked = locked;
+    if !locked {
+        grants.lock_refused = Some(refused());
+    }
+    // SAFETY: sets the calling thread's timer slack to 1 ns; takes no pointers.
+    unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1, 0, 0, 0) };
+    touch_stack();
+    grants
+}
+
+/// Touches the stack that the loop will use, so that its pages are there before the first deadline.
+#[inline(never)]
+fn touch_stack() {
+    let mut pages = [0u8; 256 * 1024];
+    for i in (0..pages.len()).step_by(4096) {
+        // SAFETY: `i` is inside `pages`; volatile so that the write is not optimised away.
+        unsafe { std::ptr::write_volatile(pages.as_mut_ptr().add(i), 1) };
+    }
+}
+
+fn thread_faults() -> (i64, i64) {
+    // SAFETY: rusage is plain data, valid when zeroed, and the kernel fills it for the calling thread.
+    let usage = unsafe {
+        let mut usage: libc::rusage = std::mem::zeroed();
+        libc::getrusage(libc::RUSAGE_THREAD, &mut usage);
+        usage
+    };
+    (usage.ru_minflt, usage.ru_majflt)
+}
+
+/// Runs the loop on the calling thread until its lifeline says to end. Call it on a thread of its own.
+///
+/// `real_time` is the FIFO priority to ask for; `None` leaves scheduling and memory alone.
+pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
+    let LoopParts { config, model, mut ports, commands, mut rows, life, origin_ns } = parts;
+    let period = config.limits.timing.cycle.0;
+    // 1 us to 10 s at two digits: some 40 kB, allocated here and never again.
+    let mut lateness_histogram =
+        Histogram::<u64>::new_with_bounds(1_000, 10_000_000_000, 2).expect("the bounds are constants");
+    let grants = match real_time {
+        Some(priority) => ask_for_real_time(priority),
+        None => Grants { policy: "unchanged".into(), ..Grants::default() },
+    };
+    let mut state = CycleState::default();
+    let mut take = || commands.pop();
+    let (mut cycles, mut overruns, mut ring_drops) = (0u64, 0u64, 0u64);
+    let mut faults_at_start = (0, 0);
+    let mut deadline = monotonic_ns() + period;
+    loop {
+        sleep_until(deadline);
+        let begun = monotonic_ns();
+        let late = begun.saturating_sub(deadline);
+        lateness_histogram.saturating_record(late);
+        cycles += 1;
+        let now = Nanos(begun.saturating_sub(origin_ns));
+        let tick = Tick { number: cycles, lateness: Nanos(late), now };
+        let row = turn(&config, &*model, &mut state, &mut ports, &mut take, tick);
+        if rows.try_push(row).is_err() {
+            ring_drops += 1;
+        }
+        life.heartbeat.store(cycles, Ordering::Relaxed);
+        if life.end.load(Ordering::Relaxed) {
+            break;
+        }
+        deadline += period;
+        let ended = monotonic_ns();
+        if ended > deadline {
+            let missed = (ended - deadline) / period + 1;
+            overruns += missed;
+            deadline += missed * period;
+        }
+        if cycles == 1 {
+            faults_at_start = thread_faults();
+        }
+    }
+    let faults = thread_faults();
+    let quantile = |q| lateness_histogram.value_at_quantile(q);
+    LoopReport {
+        grants,
+        period_ns: period,
+        cycles,
+        overruns,
+        ring_drops,
+        minor_faults: faults.0 - faults_at_start.0,
+        major_faults: faults.1 - faults_at_start.1,
+        lateness_ns: [
+            quantile(0.5),
+            quantile(0.9),
+            quantile(0.99),
+            quantile(0.999),
+            lateness_histogram.max(),
+        ],
+        histogram: lateness_histogram
+            .iter_log(1_000, 2.0)
+            .map(|step| (step.value_iterated_to(), step.count_since_last_iteration()))
+            .collect(),
+    }
+}

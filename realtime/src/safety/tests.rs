@@ -1,0 +1,356 @@
+//! The state machine by itself. Faults over whole runs are in the workspace's `tests/faults.rs`.
+#![allow(clippy::disallowed_types)]
+
+use super::*;
+use crate::ports::{Quality, Reading};
+use proptest::prelude::*;
+
+const T: Nanos = Nanos(1_000_000);
+
+fn limits() -> Limits {
+    Limits::paper(T).checked().unwrap()
+}
+
+fn reading(value: f64, sequence: u32, taken_at: Nanos) -> Reading {
+    let raw = (value * 1e4).round() as i64 * 7 + i64::from(sequence % 5);
+    Reading { value, raw, taken_at, sequence, quality: Quality::Good }
+}
+
+/// A healthy rig in cycle `n`, driven as commanded.
+fn healthy(n: u32, drive: &DriveCommand) -> Observation {
+    let now = Nanos(u64::from(n) * T.0);
+    let amplifier = AmplifierState {
+        amplitude: Ok(reading(drive.amplitude().metres(), n, now)),
+        echoed_amplitude: drive.amplitude(),
+        echoed_frequency_hz: drive.frequency_hz(),
+        output_on: drive.enable(),
+        watchdog_tripped: false,
+        fault: false,
+        temperature_c: Ok(reading(25.0, n, now)),
+        taken_at: now,
+        sequence: n,
+    };
+    let stage = StageState {
+        position_m: 0.0,
+        velocity_m_s: 0.0,
+        at_limit: false,
+        fault: false,
+        taken_at: now,
+        sequence: n,
+    };
+    Observation {
+        forces: Forces { lateral: Ok(reading(0.1, n, now)), normal: Ok(reading(0.25, n, now)) },
+        amplifier: Ok(amplifier),
+        stage: Ok(stage),
+        lateness: Nanos(0),
+    }
+}
+
+struct Bench {
+    safety: Safety,
+    limits: Limits,
+    request: Request,
+    n: u32,
+    last: DriveCommand,
+}
+
+impl Bench {
+    fn armed() -> Self {
+        let mut bench = Bench {
+            safety: Safety::new(),
+            limits: limits(),
+            request: Request::default(),
+            n: 0,
+            last: DriveCommand::off(0, T),
+        };
+        bench.cycle(|_| {}, Controls::default());
+        let decision = bench.cycle(|_| {}, Controls { reset: true, ..Controls::default() });
+        assert!(decision.armed_now, "{:?}", decision.blocking);
+        bench.request = Request {
+            amplitude: PeakToPeak::from_metres(2e-6),
+            frequency_hz: 27_500.0,
+            velocity_m_s: 0.02,
+            normal_force_n: 0.25,
+        };
+        for _ in 0..60 {
+            bench.cycle(|_| {}, Controls::default());
+        }
+        assert!(bench.last.enable());
+        bench
+    }
+
+    fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> Decision {
+        self.n += 1;
+        let mut seen = healthy(self.n, &self.last);
+        spoil(&mut seen);
+        let now = Nanos(u64::from(self.n) * T.0);
+        let decision = self.safety.step(&self.limits, &seen, &self.request, controls, now);
+        self.last = decision.drive;
+        decision
+    }
+
+    /// Spoils every cycle from now on; the cause and the number of cycles until the drive is off.
+    fn until_off(&mut self, mut spoil: impl FnMut(&mut Observation)) -> (Cause, u32) {
+        for cycles in 1..2000 {
+            let decision = self.cycle(&mut spoil, Controls::default());
+            if let Some(trip) = decision.tripped {
+                assert!(!decision.drive.enable() && decision.drive.amplitude() == PeakToPeak::ZERO);
+                return (trip.cause, cycles);
+            }
+        }
+        panic!("no trip in 2000 cycles");
+    }
+}
+
+fn amplifier(seen: &mut Observation) -> &mut AmplifierState {
+    seen.amplifier.as_mut().unwrap()
+}
+
+#[test]
+fn starts_faulted_and_arms_only_on_an_edge_with_all_clear() {
+    let mut safety = Safety::new();
+    let limits = limits();
+    let off = DriveCommand::off(0, T);
+    let request =
+        Request { amplitude: PeakToPeak::from_metres(1e-6), frequency_hz: 3e4, ..Request::default() };
+    let reset = Controls { reset: true, ..Controls::default() };
+    let mut bad = healthy(1, &off);
+    bad.forces.normal = Err(NoData::NeverRead);
+    let decision = safety.step(&limits, &bad, &request, reset, Nanos(T.0));
+    assert!(!decision.armed_now && decision.blocking == Some(Cause::NormalStale));
+    // The cause clears while the button is held: still no edge.
+    let decision = safety.step(&limits, &healthy(2, &off), &request, reset, Nanos(2 * T.0));
+    assert!(!decision.armed_now && !decision.drive.enable());
+    safety.step(&limits, &healthy(3, &off), &request, Controls::default(), Nanos(3 * T.0));
+    let decision = safety.step(&limits, &healthy(4, &off), &request, reset, Nanos(4 * T.0));
+    assert!(decision.armed_now && decision.drive.enable());
+}
+
+#[test]
+fn a_trip_latches_with_cause_value_bound_and_cycle() {
+    let mut bench = Bench::armed();
+    let before = bench.n;
+    let over = |seen: &mut Observation| {
+        let (n, now) = match seen.forces.normal {
+            Ok(r) => (r.sequence, r.taken_at),
+            Err(_) => unreachable!(),
+        };
+        seen.forces.normal = Ok(reading(1.6, n, now));
+    };
+    let (cause, cycles) = bench.until_off(over);
+    assert_eq!((cause, cycles), (Cause::NormalOverforce, 2), "a step is confirmed by its second sample");
+    let State::Faulted(trip) = bench.safety.state() else { panic!("not faulted") };
+    assert_eq!((trip.value, trip.bound, trip.cycle), (1.6, 1.5, u64::from(before) + 2));
+    for _ in 0..100 {
+        assert!(
+            !bench.cycle(|_| {}, Controls::default()).drive.enable(),
+            "it stays off after the cause is gone"
+        );
+    }
+}
+
+#[test]
+fn each_fault_trips_with_its_own_cause_within_its_bound() {
+    type Spoil = fn(&mut Observation);
+    let lateral_age = limits().timing.lateral.age_limit().0 / T.0;
+    let amplifier_age = limits().timing.amplifier.age_limit().0 / T.0;
+    let frozen = u64::from(limits().frozen_after);
+    let cases: &[(Cause, u64, Spoil)] = &[
+        (Cause::LateralInvalid, 4, |s| s.forces.lateral = Err(NoData::Invalid)),
+        (Cause::NormalInvalid, 4, |s| s.forces.normal.as_mut().unwrap().value = f64::NAN),
+        (Cause::LateralSaturated, 2, |s| s.forces.lateral.as_mut().unwrap().quality = Quality::Saturated),
+        (Cause::NormalSaturated, 2, |s| s.forces.normal.as_mut().unwrap().quality = Quality::Saturated),
+        (Cause::LateralFrozen, frozen + 2, |s| s.forces.lateral.as_mut().unwrap().raw = 77),
+        (Cause::NormalFrozen, frozen + 2, |s| s.forces.normal.as_mut().unwrap().raw = 77),
+        (Cause::LateralOverforce, 2, |s| s.forces.lateral.as_mut().unwrap().value = -2.5),
+        (Cause::AmplifierFault, 1, |s| amplifier(s).fault = true),
+        (Cause::AmplifierWatchdog, 1, |s| amplifier(s).watchdog_tripped = true),
+        (Cause::OverAmplitude, 1, |s| amplifier(s).amplitude.as_mut().unwrap().value = 7e-6),
+        (Cause::AmplitudeRunaway, 2, |s| amplifier(s).amplitude.as_mut().unwrap().value = 3.5e-6),
+        (Cause::OverTemperature, 1, |s| amplifier(s).temperature_c = Err(NoData::Invalid)),
+        (Cause::DriveNoResponse, 2, |s| amplifier(s).amplitude.as_mut().unwrap().value = 0.0),
+        (Cause::EchoMismatch, 2, |s| amplifier(s).echoed_frequency_hz = 27_600.0),
+        (Cause::StageFault, 1, |s| s.stage.as_mut().unwrap().fault = true),
+        (Cause::OverTravel, 1, |s| s.stage.as_mut().unwrap().position_m = 0.061),
+        (Cause::StageStale, 1, |s| s.stage = Err(NoData::Disconnected)),
+        (Cause::Overrun, 3, |s| s.lateness = Nanos(2 * T.0)),
+    ];
+    for (cause, bound, spoil) in cases {
+        let mut bench = Bench::armed();
+        let (got, cycles) = bench.until_off(spoil);
+        assert_eq!(got, *cause);
+        assert!(u64::from(cycles) <= *bound, "{cause:?} took {cycles} cycles, bound {bound}");
+    }
+    let mut bench = Bench::armed();
+    let last = healthy(bench.n, &bench.last);
+    let (got, cycles) = bench.until_off(|s| s.forces.lateral = last.forces.lateral);
+    assert_eq!((got, u64::from(cycles)), (Cause::LateralStale, lateral_age + 1));
+    let mut bench = Bench::armed();
+    let last = healthy(bench.n, &bench.last);
+    let (got, cycles) = bench.until_off(|s| s.amplifier = last.amplifier);
+    assert_eq!((got, u64::from(cycles)), (Cause::AmplifierStale, amplifier_age + 1));
+}
+
+#[test]
+fn a_single_spike_is_rejected_and_five_in_fifty_cycles_trip() {
+    let mut bench = Bench::armed();
+    let decision = bench.cycle(|s| s.forces.lateral.as_mut().unwrap().value *= 100.0, Controls::default());
+    assert!(decision.tripped.is_none() && !decision.lateral_usable);
+    let decision = bench.cycle(|_| {}, Controls::default());
+    assert!(decision.tripped.is_none() && decision.lateral_usable);
+    let mut bench = Bench::armed();
+    let mut i = 0;
+    let (cause, cycles) = bench.until_off(|s| {
+        i += 1;
+        if i % 9 == 0 {
+            s.forces.lateral.as_mut().unwrap().value *= 100.0;
+        }
+    });
+    assert_eq!(cause, Cause::Noisy);
+    assert!(cycles <= 51);
+}
+
+#[test]
+fn an_amplifier_that_refuses_off_is_cut_from_its_supply() {
+    let mut bench = Bench::armed();
+    bench.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
+    let age = (limits().timing.amplifier.age_limit().0 / T.0) as u32;
+    let cut =
+        (0..100).find(|_| bench.cycle(|s| amplifier(s).output_on = true, Controls::default()).cut_supply);
+    assert!(cut.is_some_and(|n| n <= age + 11), "{cut:?}");
+}
+
+#[test]
+fn the_dead_man_and_the_exposure_limit_bind_with_a_human_finger() {
+    let human = |held| Controls { dead_man: held, ..Controls::default() };
+    let mut bench = Bench::armed();
+    bench.limits.human_contact = true;
+    bench.limits.exposure_max_s = 0.2;
+    let tripped = (0..400).find_map(|_| bench.cycle(|_| {}, human(true)).tripped).unwrap();
+    assert_eq!(tripped.cause, Cause::Exposure);
+    let mut bench = Bench::armed();
+    bench.limits.human_contact = true;
+    assert_eq!(bench.cycle(|_| {}, human(false)).tripped.unwrap().cause, Cause::DeadMan);
+}
+
+#[test]
+fn a_request_beyond_a_limit_is_a_trip_not_a_smaller_request() {
+    let spoil: [fn(&mut Request); 6] = [
+        |r| r.amplitude = PeakToPeak::from_metres(6.1e-6),
+        |r| r.amplitude = PeakToPeak::from_metres(f64::NAN),
+        |r| r.frequency_hz = 9_000.0,
+        |r| r.velocity_m_s = -0.3,
+        |r| r.normal_force_n = -0.1,
+        |r| r.normal_force_n = 1.6,
+    ];
+    for spoil in spoil {
+        let mut bench = Bench::armed();
+        spoil(&mut bench.request);
+        let decision = bench.cycle(|_| {}, Controls::default());
+        assert_eq!(decision.tripped.unwrap().cause, Cause::RequestRefused);
+        assert!(!decision.drive.enable());
+    }
+}
+
+#[test]
+fn no_setup_can_raise_a_hard_limit() {
+    let mut limits = Limits::paper(T);
+    limits.normal_force_max_n = HARD.normal_force_max_n * 1.01;
+    assert!(limits.checked().unwrap_err().to_string().contains("above the hard limit"));
+    let mut limits = Limits::paper(T);
+    limits.temperature_max_c = f64::NAN;
+    assert!(limits.checked().is_err());
+    let mut limits = Limits::paper(T);
+    limits.frozen_after = 19;
+    assert!(limits.checked().is_err());
+}
+
+#[test]
+fn every_rule_has_its_own_identifier_and_cause() {
+    let mut ids: Vec<_> = RULES.iter().map(|r| r.id).collect();
+    ids.dedup();
+    assert_eq!(ids.len(), RULES.len());
+    for (i, rule) in RULES.iter().enumerate() {
+        assert_eq!(rule.id, format!("SR-{:02}", i + 1));
+        assert!(RULES.iter().filter(|r| r.cause == rule.cause).count() == 1);
+    }
+}
+
+fn any_channel() -> impl Strategy<Value = Result<Reading, NoData>> {
+    let value = prop_oneof![any::<f64>(), -3.0..3.0f64];
+    let quality = prop_oneof![Just(Quality::Good), Just(Quality::Degraded), Just(Quality::Saturated)];
+    prop_oneof![
+        (value, any::<i64>(), any::<u64>(), any::<u32>(), quality).prop_map(
+            |(value, raw, at, sequence, quality)| Ok(Reading {
+                value,
+                raw,
+                taken_at: Nanos(at),
+                sequence,
+                quality
+            })
+        ),
+        Just(Err(NoData::Invalid)),
+        Just(Err(NoData::NeverRead)),
+    ]
+}
+
+proptest! {
+    /// In the faulted state, without a reset, no inputs and no requests yield a drive or a motion.
+    #[test]
+    fn faulted_never_drives(
+        seen in prop::collection::vec((any_channel(), any_channel(), any_channel(), any::<bool>(), any::<u64>()), 1..40),
+        requests in prop::collection::vec((any::<f64>(), any::<f64>(), any::<f64>(), any::<f64>()), 40),
+        times in prop::collection::vec(any::<u64>(), 40),
+    ) {
+        let mut safety = Safety::new();
+        let limits = limits();
+        for (i, (lateral, normal, amplitude, flag, late)) in seen.into_iter().enumerate() {
+            let mut observation = healthy(i as u32, &DriveCommand::off(0, T));
+            observation.forces = Forces { lateral, normal };
+            observation.lateness = Nanos(late);
+            if let Ok(a) = &mut observation.amplifier {
+                a.amplitude = amplitude;
+                a.output_on = flag;
+            }
+            let (w, f, u, n) = requests[i];
+            let request = Request {
+                amplitude: PeakToPeak::from_metres(w),
+                frequency_hz: f,
+                velocity_m_s: u,
+                normal_force_n: n,
+            };
+            let controls = Controls { reset: false, stop: flag, dead_man: !flag };
+            let decision = safety.step(&limits, &observation, &request, controls, Nanos(times[i]));
+            prop_assert!(!decision.drive.enable());
+            prop_assert_eq!(decision.drive.amplitude(), PeakToPeak::ZERO);
+            prop_assert_eq!(decision.stage.velocity_m_s(), 0.0);
+            prop_assert_eq!(decision.stage.normal_force_n(), 0.0);
+        }
+    }
+
+    /// Whatever happens, no command exceeds the limits.
+    #[test]
+    fn no_command_exceeds_the_limits(
+        requests in prop::collection::vec((0.0..2e-5f64, 0.0..2e5f64, -1.0..1.0f64, -1.0..3.0f64), 1..60),
+        resets in prop::collection::vec(any::<bool>(), 60),
+    ) {
+        let mut safety = Safety::new();
+        let limits = limits();
+        let mut last = DriveCommand::off(0, T);
+        for (i, (w, f, u, n)) in requests.into_iter().enumerate() {
+            let request = Request {
+                amplitude: PeakToPeak::from_metres(w),
+                frequency_hz: f,
+                velocity_m_s: u,
+                normal_force_n: n,
+            };
+            let controls = Controls { reset: resets[i], ..Controls::default() };
+            let now = Nanos(i as u64 * T.0);
+            let decision = safety.step(&limits, &healthy(i as u32, &last), &request, controls, now);
+            last = decision.drive;
+            prop_assert!(last.amplitude() <= limits.amplitude_max);
+            prop_assert!(decision.stage.velocity_m_s().abs() <= limits.speed_max_m_s);
+            prop_assert!((0.0..=limits.normal_force_max_n).contains(&decision.stage.normal_force_n()));
+        }
+    }
+}

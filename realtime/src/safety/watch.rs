@@ -1,0 +1,222 @@
+//! What must be remembered of each channel to judge it: spikes, repeats, gaps, rates.
+
+use super::{DriveCommand, Limits, Observation};
+use crate::ports::{Channel, Nanos, Quality, Reading};
+
+/// Memory of one force channel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ForceWatch {
+    /// The last sample that was believed.
+    pub believed: Option<Reading>,
+    /// The value before it, for rates.
+    earlier: Option<Reading>,
+    /// A far-off sample that the next one must confirm.
+    suspect: bool,
+    /// New samples in a row with the same raw counts.
+    pub equal_in_a_row: u32,
+    /// Cycles in a row without valid data.
+    pub invalid_in_a_row: u32,
+    /// Cycles in a row at the end of the range.
+    pub saturated_in_a_row: u32,
+    /// One bit a cycle, newest lowest: was it a spike?
+    spikes: u64,
+    /// N/s over the last two believed samples, and how often in a row it was above the limit.
+    pub rate_n_s: f64,
+    pub fast_in_a_row: u32,
+    /// Whether this cycle's value may enter an estimate.
+    pub usable: bool,
+    last_sequence: u32,
+    last_raw: i64,
+}
+
+/// Cycles that the rule for repeated spikes looks back on.
+const SPIKE_WINDOW: u32 = 50;
+
+impl ForceWatch {
+    const fn new() -> Self {
+        ForceWatch {
+            believed: None,
+            earlier: None,
+            suspect: false,
+            equal_in_a_row: 0,
+            invalid_in_a_row: 0,
+            saturated_in_a_row: 0,
+            spikes: 0,
+            rate_n_s: 0.0,
+            fast_in_a_row: 0,
+            usable: false,
+            last_sequence: 0,
+            last_raw: 0,
+        }
+    }
+
+    pub(super) const fn spikes_in_window(&self) -> u32 {
+        (self.spikes & ((1 << SPIKE_WINDOW) - 1)).count_ones()
+    }
+
+    fn look(&mut self, channel: &Channel, limits: &Limits, age_limit: Nanos, now: Nanos) {
+        self.spikes <<= 1;
+        self.usable = false;
+        let reading = match channel {
+            Ok(reading) if reading.value.is_finite() && !reading.value.is_subnormal() => reading,
+            _ => {
+                self.invalid_in_a_row = self.invalid_in_a_row.saturating_add(1);
+                return;
+            }
+        };
+        self.invalid_in_a_row = 0;
+        if reading.quality == Quality::Saturated {
+            self.saturated_in_a_row = self.saturated_in_a_row.saturating_add(1);
+            return;
+        }
+        self.saturated_in_a_row = 0;
+        let fresh = reading.age(now) <= age_limit;
+        // Every channel counts its samples: the same count is the same sample, not a frozen value.
+        if self.believed.is_some() && reading.sequence == self.last_sequence {
+            self.usable = fresh && !self.suspect;
+            return;
+        }
+        let repeats = self.believed.is_some() && reading.raw == self.last_raw;
+        self.equal_in_a_row = if repeats { self.equal_in_a_row.saturating_add(1) } else { 0 };
+        (self.last_sequence, self.last_raw) = (reading.sequence, reading.raw);
+
+        let far = self.believed.is_some_and(|b| (reading.value - b.value).abs() > limits.force_step_max_n);
+        if far && !self.suspect {
+            // One far-off sample is a spike until a second one confirms it.
+            self.suspect = true;
+            self.spikes |= 1;
+            return;
+        }
+        self.suspect = false;
+        self.earlier = self.believed;
+        self.believed = Some(*reading);
+        if let Some(before) = self.earlier {
+            let dt = reading.taken_at.since(before.taken_at).seconds();
+            self.rate_n_s = if dt > 0.0 { (reading.value - before.value) / dt } else { 0.0 };
+            let fast = self.rate_n_s.abs() > limits.force_rate_max_n_s;
+            self.fast_in_a_row = if fast { self.fast_in_a_row.saturating_add(1) } else { 0 };
+        }
+        self.usable = fresh;
+    }
+}
+
+/// Cycles of overrun bookkeeping: a thousand cycles in buckets of a hundred.
+const BUCKETS: usize = 10;
+const BUCKET_CYCLES: u32 = 100;
+
+/// Everything safety remembers. `Copy`: no heap, no lock.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Watch {
+    pub lateral: ForceWatch,
+    pub normal: ForceWatch,
+    /// Cycles in a row that began more than a period late.
+    pub late_in_a_row: u32,
+    late: [u32; BUCKETS],
+    filled: u32,
+    bucket: usize,
+    /// The drive as last commanded, and since when it has been that (to the micrometre of amplitude).
+    pub commanded_pp_m: f64,
+    pub commanded_hz: f64,
+    pub commanded_since: Nanos,
+    pub enabled: bool,
+    /// When the output was commanded off; `None` while it is commanded on.
+    pub off_since: Option<Nanos>,
+    /// When vibration on the finger began; `None` while there is none.
+    pub exposed_since: Option<Nanos>,
+    amplitude: Option<Reading>,
+    /// m/s over the last two amplitude samples.
+    pub amplitude_rate_m_s: f64,
+    pub amplitude_fast_in_a_row: u32,
+    /// What the amplifier last said of its output.
+    amplifier_on: bool,
+    /// Highest amplitude commanded within the last ring-down: measured may still be that high.
+    pub ringing_pp_m: f64,
+}
+
+impl Watch {
+    pub(super) const fn new() -> Self {
+        Watch {
+            lateral: ForceWatch::new(),
+            normal: ForceWatch::new(),
+            late_in_a_row: 0,
+            late: [0; BUCKETS],
+            filled: 0,
+            bucket: 0,
+            commanded_pp_m: 0.0,
+            commanded_hz: 0.0,
+            commanded_since: Nanos(0),
+            enabled: false,
+            off_since: Some(Nanos(0)),
+            exposed_since: None,
+            amplitude: None,
+            amplitude_rate_m_s: 0.0,
+            amplitude_fast_in_a_row: 0,
+            amplifier_on: false,
+            ringing_pp_m: 0.0,
+        }
+    }
+
+    /// Late cycles among the last thousand or so.
+    pub(super) fn late_in_window(&self) -> u32 {
+        self.late.iter().sum()
+    }
+
+    pub(super) fn look(&mut self, limits: &Limits, seen: &Observation, now: Nanos) {
+        let timing = &limits.timing;
+        self.lateral.look(&seen.forces.lateral, limits, timing.lateral.age_limit(), now);
+        self.normal.look(&seen.forces.normal, limits, timing.normal.age_limit(), now);
+
+        let late = seen.lateness > timing.cycle;
+        self.late_in_a_row = if late { self.late_in_a_row.saturating_add(1) } else { 0 };
+        if self.filled == BUCKET_CYCLES {
+            self.bucket = (self.bucket + 1) % BUCKETS;
+            self.late[self.bucket] = 0;
+            self.filled = 0;
+        }
+        self.filled += 1;
+        self.late[self.bucket] += u32::from(late);
+
+        let amplitude = match seen.amplifier {
+            Ok(state) => state.amplitude,
+            Err(reason) => Err(reason),
+        };
+        if let Ok(state) = seen.amplifier {
+            self.amplifier_on = state.output_on;
+        }
+        if let Ok(reading) = amplitude {
+            if let Some(before) = self.amplitude
+                && reading.sequence != before.sequence
+            {
+                let dt = reading.taken_at.since(before.taken_at).seconds();
+                self.amplitude_rate_m_s = if dt > 0.0 { (reading.value - before.value) / dt } else { 0.0 };
+                let fast = self.amplitude_rate_m_s > limits.amplitude_rate_max_m_s;
+                self.amplitude_fast_in_a_row = if fast { self.amplitude_fast_in_a_row + 1 } else { 0 };
+            }
+            self.amplitude = Some(reading);
+        }
+        // The plate rings down with its own time constant; judge the measured amplitude against that.
+        let decay = (-(timing.cycle.seconds()) / timing.ring_time.seconds().max(1e-9)).exp();
+        self.ringing_pp_m = (self.ringing_pp_m * decay).max(self.commanded_pp_m);
+    }
+
+    pub(super) fn commanded(&mut self, drive: &DriveCommand, now: Nanos) {
+        let amplitude = drive.amplitude().metres();
+        if amplitude != self.commanded_pp_m || drive.frequency_hz() != self.commanded_hz {
+            self.commanded_since = now;
+        }
+        self.commanded_pp_m = amplitude;
+        self.commanded_hz = drive.frequency_hz();
+        self.ringing_pp_m = self.ringing_pp_m.max(amplitude);
+        self.enabled = drive.enable();
+        self.off_since = if drive.enable() { None } else { self.off_since.or(Some(now)) };
+        self.exposed_since = if drive.enable() { self.exposed_since.or(Some(now)) } else { None };
+    }
+
+    /// Whether the amplifier stays on although it has long been told to be off: ten cycles after a fresh state
+    /// should have shown it.
+    pub(super) fn refuses_off(&self, limits: &Limits, now: Nanos) -> bool {
+        let grace = Nanos(limits.timing.amplifier.age_limit().0 + 10 * limits.timing.cycle.0);
+        let long_off = self.off_since.is_some_and(|since| now.since(since) > grace);
+        long_off && self.amplifier_on
+    }
+}

@@ -1,0 +1,127 @@
+//! One turn of the loop over ports, and the row that it leaves for the record.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods)]
+
+use crate::cycle::{self, COMMANDS_PER_CYCLE, Config, CycleState, Inputs, Marker, Online, Outputs};
+use crate::estimate::{MuRelative, NoMu};
+use crate::ports::{Amplifier, ForceSensor, Nanos, Stage};
+use crate::safety::{Observation, Trip};
+use models::prediction::FrictionModel;
+use serde::{Deserialize, Serialize};
+
+/// The rig as the loop holds it.
+pub struct Ports {
+    /// Reads the forces.
+    pub force: Box<dyn ForceSensor>,
+    /// Drives the plate.
+    pub amplifier: Box<dyn Amplifier>,
+    /// Moves and loads the finger.
+    pub stage: Box<dyn Stage>,
+}
+
+/// One cycle for the record: what came in, what was decided. Plain data, `Copy`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Number of the cycle, from 1.
+    pub cycle: u64,
+    /// Loop time.
+    pub now: Nanos,
+    /// Everything the cycle saw; enough to run it again.
+    pub inputs: Inputs,
+    /// Drive amplitude commanded, peak-to-peak in m; zero is off.
+    pub drive_pp_m: f64,
+    /// Drive frequency commanded in Hz.
+    pub drive_hz: f64,
+    /// Velocity commanded in m/s.
+    pub velocity_m_s: f64,
+    /// Normal load commanded in N.
+    pub load_n: f64,
+    /// Which pass the cycle belongs to.
+    pub marker: Marker,
+    /// Whether the rig is armed.
+    pub armed: bool,
+    /// A trip latched in this cycle.
+    pub tripped: Option<Trip>,
+    /// Running `mu'`, or why there is none.
+    pub mu_relative: Result<MuRelative, NoMu>,
+    /// Comparison with the model.
+    pub online: Option<Online>,
+    /// Both forces fit for use.
+    pub usable: bool,
+}
+
+impl Row {
+    /// The row of a cycle.
+    pub fn of(cycle: u64, now: Nanos, inputs: &Inputs, out: &Outputs) -> Self {
+        Row {
+            cycle,
+            now,
+            inputs: *inputs,
+            drive_pp_m: out.drive.amplitude().metres(),
+            drive_hz: out.drive.frequency_hz(),
+            velocity_m_s: out.stage.velocity_m_s(),
+            load_n: out.stage.normal_force_n(),
+            marker: out.marker,
+            armed: out.armed,
+            tripped: out.tripped,
+            mu_relative: out.mu_relative,
+            online: out.online,
+            usable: out.usable,
+        }
+    }
+}
+
+/// Where commands come from, oldest first.
+pub trait Commands {
+    /// The next command, if one waits.
+    fn next(&mut self) -> Option<cycle::Command>;
+}
+
+impl<F: FnMut() -> Option<cycle::Command>> Commands for F {
+    fn next(&mut self) -> Option<cycle::Command> {
+        self()
+    }
+}
+
+/// The time of a turn.
+#[derive(Clone, Copy, Debug)]
+pub struct Tick {
+    /// Number of the cycle, from 1.
+    pub number: u64,
+    /// How late it began.
+    pub lateness: Nanos,
+    /// Loop time now.
+    pub now: Nanos,
+}
+
+/// One turn: read the ports, step, command the ports.
+pub fn turn(
+    config: &Config,
+    model: &dyn FrictionModel,
+    state: &mut CycleState,
+    ports: &mut Ports,
+    commands: &mut dyn Commands,
+    tick: Tick,
+) -> Row {
+    let Tick { number, lateness, now } = tick;
+    let mut taken = [None; COMMANDS_PER_CYCLE];
+    for slot in &mut taken {
+        *slot = commands.next();
+        if slot.is_none() {
+            break;
+        }
+    }
+    let seen = Observation {
+        forces: ports.force.read(now),
+        amplifier: ports.amplifier.state(now),
+        stage: ports.stage.state(now),
+        lateness,
+    };
+    let inputs = Inputs { commands: taken, seen };
+    let out = cycle::step(config, model, state, &inputs, now);
+    ports.amplifier.command(out.drive, now);
+    ports.stage.command(out.stage, now);
+    if out.cut_supply {
+        ports.amplifier.cut_supply(now);
+    }
+    Row::of(number, now, &inputs, &out)
+}
