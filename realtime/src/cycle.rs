@@ -7,7 +7,7 @@
 use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
 use crate::ports::Nanos;
 use crate::safety::{
-    Controls, Decision, DriveCommand, Limits, Observation, Request, Safety, StageCommand, State, Trip,
+    Cause, Controls, Decision, DriveCommand, Limits, Observation, Request, Safety, StageCommand, State, Trip,
 };
 use models::condition::Condition;
 use models::prediction::FrictionModel;
@@ -117,6 +117,8 @@ pub struct Outputs {
     pub cut_supply: bool,
     /// A trip latched in this cycle.
     pub tripped: Option<Trip>,
+    /// The first rule that is broken now, latched or not.
+    pub blocking: Option<Cause>,
     /// Whether the rig is armed after this cycle.
     pub armed: bool,
     /// Which pass the cycle belongs to.
@@ -163,12 +165,13 @@ pub fn step(
     let mu_relative = state.window.mu_relative(&config.estimate, direction, state.mu0, age);
     let online = mu_relative.ok().and_then(|mu| compare(config, model, state, seen, &mu, now));
 
-    let Decision { drive, stage, cut_supply, tripped, .. } = decision;
+    let Decision { drive, stage, cut_supply, tripped, blocking, .. } = decision;
     Outputs {
         drive,
         stage,
         cut_supply,
         tripped,
+        blocking,
         armed: state.safety.is_armed(),
         marker: state.marker,
         mu_relative,

@@ -9,6 +9,7 @@
 //! | [`compare`] | residuals against the model; the test that says when it has left the measurement |
 //! | [`turn`] | one turn of the loop over real ports; the row that it leaves behind |
 //! | [`pacing`] | the thread: absolute deadlines, priority, memory lock, lateness histogram |
+//! | [`recorder`] | rows, passes and events as MCAP; tolerant reading and recovery |
 //!
 //! The wall clock is forbidden here, and the monotonic clock is read in `pacing` alone.
 
@@ -17,5 +18,6 @@ pub mod cycle;
 pub mod estimate;
 pub mod pacing;
 pub mod ports;
+pub mod recorder;
 pub mod safety;
 pub mod turn;

@@ -43,6 +43,8 @@ pub struct LoopReport {
     pub overruns: u64,
     /// Rows lost because the record's ring was full.
     pub ring_drops: u64,
+    /// Rows that the sweep did not see because its ring was full.
+    pub watch_drops: u64,
     /// Minor page faults of the thread after its first cycle.
     pub minor_faults: i64,
     /// Major page faults of the thread after its first cycle.
@@ -72,8 +74,10 @@ pub struct LoopParts {
     pub ports: Ports,
     /// Commands in.
     pub commands: Arc<ArrayQueue<Command>>,
-    /// Rows out.
+    /// Rows out, to the record.
     pub rows: HeapProd<Row>,
+    /// The same rows, to the sweep: so that a slow disk cannot hold the sweep up.
+    pub watch: HeapProd<Row>,
     /// End and heartbeat.
     pub life: Arc<Lifeline>,
     /// CLOCK_MONOTONIC in ns that counts as loop time zero. Drivers stamp with the same origin.
@@ -166,7 +170,7 @@ fn thread_faults() -> (i64, i64) {
 ///
 /// `real_time` is the FIFO priority to ask for; `None` leaves scheduling and memory alone.
 pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
-    let LoopParts { config, model, mut ports, commands, mut rows, life, origin_ns } = parts;
+    let LoopParts { config, model, mut ports, commands, mut rows, mut watch, life, origin_ns } = parts;
     let period = config.limits.timing.cycle.0;
     // 1 us to 10 s at two digits: some 40 kB, allocated here and never again.
     let mut lateness_histogram =
@@ -177,7 +181,7 @@ pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
     };
     let mut state = CycleState::default();
     let mut take = || commands.pop();
-    let (mut cycles, mut overruns, mut ring_drops) = (0u64, 0u64, 0u64);
+    let (mut cycles, mut overruns, mut ring_drops, mut watch_drops) = (0u64, 0u64, 0u64, 0u64);
     let mut faults_at_start = (0, 0);
     let mut deadline = monotonic_ns() + period;
     loop {
@@ -191,6 +195,9 @@ pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
         let row = turn(&config, &*model, &mut state, &mut ports, &mut take, tick);
         if rows.try_push(row).is_err() {
             ring_drops += 1;
+        }
+        if watch.try_push(row).is_err() {
+            watch_drops += 1;
         }
         life.heartbeat.store(cycles, Ordering::Relaxed);
         if life.end.load(Ordering::Relaxed) {
@@ -215,6 +222,7 @@ pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
         cycles,
         overruns,
         ring_drops,
+        watch_drops,
         minor_faults: faults.0 - faults_at_start.0,
         major_faults: faults.1 - faults_at_start.1,
         lateness_ns: [

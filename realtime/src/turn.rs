@@ -4,7 +4,7 @@
 use crate::cycle::{self, COMMANDS_PER_CYCLE, Config, CycleState, Inputs, Marker, Online, Outputs};
 use crate::estimate::{MuRelative, NoMu};
 use crate::ports::{Amplifier, ForceSensor, Nanos, Stage};
-use crate::safety::{Observation, Trip};
+use crate::safety::{Cause, Observation, Trip};
 use models::prediction::FrictionModel;
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +41,8 @@ pub struct Row {
     pub armed: bool,
     /// A trip latched in this cycle.
     pub tripped: Option<Trip>,
+    /// The first rule that is broken now, latched or not.
+    pub blocking: Option<Cause>,
     /// Running `mu'`, or why there is none.
     pub mu_relative: Result<MuRelative, NoMu>,
     /// Comparison with the model.
@@ -63,6 +65,7 @@ impl Row {
             marker: out.marker,
             armed: out.armed,
             tripped: out.tripped,
+            blocking: out.blocking,
             mu_relative: out.mu_relative,
             online: out.online,
             usable: out.usable,
