@@ -1,0 +1,6 @@
+//! The drivers against emulators and misbehaving servers, over real sockets.
+
+#[path = "wire/bench.rs"]
+mod bench;
+#[path = "wire/modbus_tcp.rs"]
+mod modbus_tcp;
