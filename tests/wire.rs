@@ -4,3 +4,5 @@
 mod bench;
 #[path = "wire/modbus_tcp.rs"]
 mod modbus_tcp;
+#[path = "wire/peers.rs"]
+mod peers;

@@ -28,8 +28,8 @@ pub trait Plant: Send {
     /// The value of a quantity at the time last advanced to; a truth is 0 or 1.
     fn measure(&mut self, quantity: Quantity) -> f64;
 
-    /// Hands over an absolute set-point at the time last advanced to.
-    fn command(&mut self, command: Command, value: f64);
+    /// Hands over absolute set-points that take effect together, at the time last advanced to.
+    fn command(&mut self, commands: &[(Command, f64)]);
 }
 
 /// One world, shared by the emulators that serve it. Emulators are not the control loop: they may lock.

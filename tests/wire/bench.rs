@@ -55,27 +55,29 @@ impl Plant for BenchPlant {
     fn measure(&mut self, quantity: Quantity) -> f64 {
         let sample = self.now.0 / 1_000_000;
         match quantity {
-            Quantity::ForceSample => sample as f64,
-            Quantity::ForceTime => sample as f64 * 1e-3,
+            Quantity::ForceSample | Quantity::DriveCount | Quantity::StageCount => sample as f64,
+            Quantity::ForceTime | Quantity::DriveTime | Quantity::StageTime => sample as f64 * 1e-3,
             _ => self.bench.0.lock().unwrap().quantities.get(&quantity).copied().unwrap_or(0.0),
         }
     }
 
-    fn command(&mut self, command: Command, value: f64) {
+    fn command(&mut self, commands: &[(Command, f64)]) {
         let mut state = self.bench.0.lock().unwrap();
-        let echo = match command {
-            Command::Amplitude => Quantity::AmplitudeSetPoint,
-            Command::Frequency => Quantity::FrequencySetPoint,
-            Command::Enable => Quantity::OutputOn,
-            Command::DriveHeartbeat => Quantity::Heartbeat,
-            Command::Velocity => Quantity::VelocitySetPoint,
-            Command::NormalForce => Quantity::LoadSetPoint,
-            Command::StageHeartbeat => Quantity::StageFault,
-        };
-        if command != Command::StageHeartbeat {
-            state.quantities.insert(echo, value);
+        for &(command, value) in commands {
+            let echo = match command {
+                Command::Amplitude => Some(Quantity::AmplitudeSetPoint),
+                Command::Frequency => Some(Quantity::FrequencySetPoint),
+                Command::Enable => Some(Quantity::OutputOn),
+                Command::DriveHeartbeat => Some(Quantity::Heartbeat),
+                Command::Velocity => Some(Quantity::VelocitySetPoint),
+                Command::NormalForce => Some(Quantity::LoadSetPoint),
+                Command::StageHeartbeat => None,
+            };
+            if let Some(echo) = echo {
+                state.quantities.insert(echo, value);
+            }
+            state.commands.push((command, value));
         }
-        state.commands.push((command, value));
     }
 }
 

@@ -3,18 +3,20 @@
 //! A transport hands over each frame with the time of its arrival, and asks what is due to be sent.
 //! Everything that decides whether a number may become a force stands here, once for all transports.
 
+mod view;
+
 use super::health::Health;
 use super::ports::{self, AmplifierLink, AmplifierPort, ForcePort, StageLink, StagePort};
 use super::setup::{AxisSetup, InstrumentSetup};
 use super::timebase::{Counter, DeviceClock, Step};
-use instruments::profile::Refusal;
 use instruments::schema::{Severity, Stamp};
 use instruments::{FrameId, Profile, SetId, SignalId, Values};
 use models::quantity::PeakToPeak;
-use realtime::ports::{AmplifierState, Channel, Forces, Nanos, NoData, Quality, Reading, StageState};
+use realtime::ports::{AmplifierState, Forces, Nanos, NoData, Reading, StageState};
 use ringbuf::HeapProd;
 use ringbuf::traits::{Consumer, Producer};
 use std::sync::Arc;
+use view::View;
 
 /// A frame that must not become a sample.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -458,53 +460,6 @@ impl Endpoint {
     }
 }
 
-/// A decoded frame and what is needed to make readings of it.
-struct View<'a> {
-    profile: &'a Profile,
-    values: &'a Values,
-    bytes: &'a [u8],
-    frame: FrameId,
-    mark: SampleMark,
-}
-
-impl View<'_> {
-    fn si(&self, signal: SignalId) -> f64 {
-        self.profile.si(signal, self.values)
-    }
-
-    fn severity(&self) -> Option<Severity> {
-        self.profile.fault(self.values).map(|fault| self.profile.description.fault[fault].severity)
-    }
-
-    fn channel(&self, signal: SignalId) -> Channel {
-        let fault = self.profile.fault(self.values).map(|fault| &self.profile.description.fault[fault]);
-        let quality = match (self.profile.refusal(signal, self.values), fault) {
-            (Some(Refusal::NotANumber | Refusal::MarkedInvalid), _) => return Err(NoData::Invalid),
-            (_, Some(fault)) if fault.severity == Severity::Stop => return Err(NoData::Invalid),
-            (Some(Refusal::OutOfRange), _) => Quality::Saturated,
-            (None, Some(fault)) if fault.overrange => Quality::Saturated,
-            (None, Some(fault)) if fault.severity == Severity::Degrade => Quality::Degraded,
-            (None, _) => Quality::Good,
-        };
-        let raw = if self.profile.frame_of(signal) == self.frame {
-            self.profile.raw(signal, self.bytes)
-        } else {
-            0
-        };
-        Ok(Reading {
-            value: self.si(signal),
-            raw,
-            taken_at: self.mark.taken_at,
-            sequence: self.mark.sequence,
-            quality,
-        })
-    }
-
-    fn optional(&self, signal: Option<SignalId>) -> Channel {
-        signal.map_or(Err(NoData::NotFitted), |signal| self.channel(signal))
-    }
-}
-
 fn need(profile: &Profile, name: &str) -> Result<SignalId, String> {
     profile.signal(name).ok_or_else(|| {
         let known: Vec<&str> = profile.signals().map(|(name, _)| name).collect();
@@ -520,3 +475,6 @@ fn safe_set_points(profile: &Profile) -> Vec<(SetId, f64)> {
     let sets = profile.description.set.iter().enumerate();
     sets.filter_map(|(i, set)| set.safe.map(|safe| (SetId(i), safe))).collect()
 }
+
+#[cfg(test)]
+mod tests;

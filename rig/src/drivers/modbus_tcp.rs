@@ -150,6 +150,9 @@ impl Line {
         self.within(limit, async move {
             let stream = tokio::net::TcpStream::connect(address).await?;
             stream.set_nodelay(true)?;
+            // When the connection is dropped, what the kernel still holds is discarded: a command
+            // queued before an outage must not be delivered after it.
+            stream.set_zero_linger()?;
             Ok(tcp::attach_slave(stream, Slave(unit)))
         })?
         .map_err(|error: std::io::Error| Ended::Io(error.to_string()))

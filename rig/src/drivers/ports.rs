@@ -147,10 +147,17 @@ pub fn amplifier() -> (AmplifierLink, AmplifierPort) {
     (AmplifierLink { states: into_loop, commands: from_loop }, port)
 }
 
+impl AmplifierPort {
+    /// Hands a set-point to the link. A full ring means that the link takes nothing: what waits there
+    /// expires, and so would this.
+    pub(crate) fn push(&mut self, set_point: DriveSetPoint) {
+        let _ = self.commands.try_push(set_point);
+    }
+}
+
 impl Amplifier for AmplifierPort {
     fn command(&mut self, command: DriveCommand, _now: Nanos) {
-        // A full ring means that the link takes nothing: what waits there expires, and so would this.
-        let _ = self.commands.try_push(command.into());
+        self.push(command.into());
     }
 
     fn state(&mut self, _now: Nanos) -> Result<AmplifierState, NoData> {

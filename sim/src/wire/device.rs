@@ -65,6 +65,10 @@ impl Device {
                     quantity,
                     Quantity::ForceSample
                         | Quantity::ForceTime
+                        | Quantity::DriveCount
+                        | Quantity::DriveTime
+                        | Quantity::StageCount
+                        | Quantity::StageTime
                         | Quantity::DeviceTime
                         | Quantity::DeviceReads
                         | Quantity::Heartbeat
@@ -178,8 +182,8 @@ impl Device {
             taken.extend(self.commands[set.0].map(|(command, si)| (command, value * si)));
         }
         self.blocks[index] = block;
-        for (command, value) in taken {
-            plant.command(command, value);
+        if !taken.is_empty() {
+            plant.command(&taken);
         }
         Ok(())
     }

@@ -58,6 +58,10 @@ named! {
         DriveFault = "drive.fault",
         /// Last heartbeat that the amplifier took.
         Heartbeat = "drive.heartbeat",
+        /// Count of the amplifier's states.
+        DriveCount = "drive.count",
+        /// When the amplifier took its state, in s.
+        DriveTime = "drive.time_s",
         /// Position along the stroke, in m.
         Position = "stage.position_m",
         /// Velocity along the stroke as measured, in m/s.
@@ -70,6 +74,10 @@ named! {
         AtLimit = "stage.at_limit",
         /// Whether the stage reports a fault.
         StageFault = "stage.fault",
+        /// Count of the stage's states.
+        StageCount = "stage.count",
+        /// When the stage took its state, in s.
+        StageTime = "stage.time_s",
         /// The emulated instrument's own time, in s.
         DeviceTime = "device.time_s",
         /// How often the emulated instrument was read.
