@@ -1,0 +1,130 @@
+//! Golden vectors: bytes beside the values that they stand for.
+//!
+//! A vector is decoded and compared; where the frame's bytes are all covered by signals it is
+//! encoded again as well. The same vectors are put to independent peers by the system tests.
+
+use crate::error::ProfileError;
+use crate::field::NumberType;
+use crate::profile::{FrameId, Profile};
+use crate::schema::Vector;
+
+/// Relative error that a vector's value may have: decimal numbers are not exact in binary.
+const TOLERANCE: f64 = 1e-12;
+/// The same where the instrument sends single precision.
+const TOLERANCE_SINGLE: f64 = 1e-7;
+
+impl Profile {
+    /// Runs every golden vector, and demands one for every frame and every block.
+    ///
+    /// # Errors
+    /// The first vector that does not come out, or the first frame without one.
+    pub fn check(&self, text: &str) -> Result<(), ProfileError> {
+        let d = &self.description;
+        let mut seen = vec![false; d.poll.len() + d.write.len()];
+        for vector in &d.vector {
+            seen[self.check_vector(vector, text)?] = true;
+        }
+        for (name, seen) in d.poll.iter().map(|p| &p.name).chain(d.write.iter().map(|w| &w.name)).zip(seen) {
+            if !seen {
+                let message = format!("`{}` has no golden vector", name.as_ref());
+                return Err(
+                    ProfileError::at(text, Some(name.span()), message).with_help("add a [[vector]] for it")
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs one vector; returns the index of what it is for: polls first, then blocks.
+    fn check_vector(&self, vector: &Vector, text: &str) -> Result<usize, ProfileError> {
+        let d = &self.description;
+        let place = || Some(vector.expect.span());
+        let error = |message: String| ProfileError::at(text, place(), message);
+        let names: Vec<&String> =
+            d.poll.iter().map(|p| p.name.as_ref()).chain(d.write.iter().map(|w| w.name.as_ref())).collect();
+        let which = match &vector.frame {
+            Some(frame) => names
+                .iter()
+                .position(|name| *name == frame)
+                .ok_or_else(|| error(format!("no frame is called `{frame}`")))?,
+            None if names.len() == 1 => 0,
+            None => return Err(error("the vector needs `frame`: the profile has several".into())),
+        };
+        let bytes = bytes_of(vector).map_err(error)?;
+        let mut values = self.values();
+        if which < d.poll.len() {
+            self.decode(FrameId(which), &bytes, &mut values).map_err(|e| error(e.to_string()))?;
+        } else if bytes.len() != 2 * usize::from(d.write[which - d.poll.len()].count) {
+            return Err(error(format!(
+                "the block has {} registers, the vector {} bytes",
+                d.write[which - d.poll.len()].count,
+                bytes.len()
+            )));
+        }
+        for (name, &expected) in vector.expect.as_ref() {
+            let found = if which < d.poll.len() {
+                self.signal(name).filter(|&s| self.frame_of(s).0 == which).map(|signal| values.get(signal))
+            } else {
+                self.sets_of(which - d.poll.len())
+                    .find(|set| d.set[set.0].name.as_ref() == name)
+                    .and_then(|set| self.decode_set(set, &bytes))
+            };
+            let found =
+                found.ok_or_else(|| error(format!("`{name}` does not stand in `{}`", names[which])))?;
+            let single = d.signal.iter().any(|s| s.name.as_ref() == name && s.number == NumberType::F32);
+            let tolerance = if single { TOLERANCE_SINGLE } else { TOLERANCE };
+            let close = (found - expected).abs() <= tolerance * expected.abs().max(1.0);
+            if !close {
+                return Err(error(format!(
+                    "the vector says {name} = {expected}; its bytes decode to {found}"
+                )));
+            }
+        }
+        self.check_encoding(which, &bytes, &values).map_err(error)?;
+        Ok(which)
+    }
+
+    /// The decoded values, encoded over the vector's bytes, must leave them as they are.
+    fn check_encoding(&self, which: usize, bytes: &[u8], values: &crate::Values) -> Result<(), String> {
+        let mut again = bytes.to_vec();
+        let polls = self.description.poll.len();
+        if which < polls {
+            self.encode(FrameId(which), &mut again, &mut |signal| {
+                Some(values.get(signal)).filter(|v| !v.is_nan())
+            });
+        } else {
+            for set in self.sets_of(which - polls) {
+                let value = self.decode_set(set, bytes).ok_or("the block is too short")?;
+                self.encode_set(set, value, &mut again).map_err(|e| e.to_string())?;
+            }
+        }
+        if again == bytes {
+            Ok(())
+        } else {
+            Err(format!("encoding the values again gives {again:02x?}, not {bytes:02x?}"))
+        }
+    }
+}
+
+fn bytes_of(vector: &Vector) -> Result<Vec<u8>, String> {
+    match (&vector.registers, &vector.hex) {
+        (Some(registers), None) => Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect()),
+        (None, Some(hex)) => from_hex(hex).ok_or_else(|| format!("`{hex}` is not hexadecimal bytes")),
+        _ => Err("a vector needs either `registers` or `hex`".into()),
+    }
+}
+
+/// Bytes from hexadecimal digits; spaces are allowed anywhere.
+#[must_use]
+pub fn from_hex(text: &str) -> Option<Vec<u8>> {
+    let digits: Option<Vec<u8>> = text
+        .chars()
+        .filter(|c| !c.is_whitespace())
+        .map(|c| c.to_digit(16).and_then(|d| u8::try_from(d).ok()))
+        .collect();
+    let digits = digits?;
+    digits
+        .len()
+        .is_multiple_of(2)
+        .then(|| digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
+}

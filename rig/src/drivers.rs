@@ -1,0 +1,250 @@
+//! Drivers: the instruments of a rig behind the loop's ports.
+//!
+//! One thread a link does all the talking. It decodes frames by the instrument's profile and hands
+//! finished samples to the loop through a ring; commands come back through another. The loop's side
+//! ([`ports`]) never blocks, locks or allocates.
+//!
+//! ```no_run
+//! use rig::drivers::{self, InstrumentsSetup};
+//! let setup: InstrumentsSetup = toml::from_str(r#"
+//!     [[force]]
+//!     profile = "muprime-force2"
+//!     address = "127.0.0.1:1502"
+//!     [amplifier]
+//!     profile = "muprime-amplifier"
+//!     address = "127.0.0.1:1502"
+//!     [stage]
+//!     profile = "muprime-stage"
+//!     address = "127.0.0.1:1502"
+//! "#)?;
+//! // `epoch` is the moment that the loop calls zero.
+//! let rig = drivers::open(&setup, std::time::Instant::now())?;
+//! // rig.force, rig.amplifier, rig.stage go to the loop; rig.links stays with the supervisor: its
+//! // health counters can be read at any time, and dropping it sends the safe set-points and ends
+//! // the threads.
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`setup`] | the `[[force]]`, `[amplifier]` and `[stage]` sections of a setup |
+//! | [`ports`] | the loop's side: port objects over rings |
+//! | [`endpoint`] | the wire's side, whatever the wire: frames to samples, commands to set-points |
+//! | [`timebase`] | an instrument's clock and counter, mapped to the loop's |
+//! | [`health`] | what a link counts |
+//! | [`bundled`] | the profiles that come with the program |
+//! | [`modbus_tcp`] | the session over Modbus TCP |
+
+pub mod bundled;
+pub mod endpoint;
+pub mod health;
+pub mod modbus_tcp;
+pub mod ports;
+pub mod setup;
+pub mod timebase;
+
+pub use health::{Health, HealthReport};
+pub use setup::{AxisSetup, InstrumentSetup, InstrumentsSetup};
+
+use endpoint::Endpoint;
+use instruments::Profile;
+use instruments::schema::LinkKind;
+use realtime::ports::{Amplifier, ForceSensor, Stage};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+/// The ports of a rig, connected.
+pub struct Rig {
+    /// Both axes of force; they may come from two instruments.
+    pub force: Box<dyn ForceSensor>,
+    /// The ultrasonic drive.
+    pub amplifier: Box<dyn Amplifier>,
+    /// The stage.
+    pub stage: Box<dyn Stage>,
+    /// The threads beside the loop.
+    pub links: Links,
+}
+
+/// Why a rig could not be connected. Nothing was commanded then.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The setup names a profile that does not exist.
+    #[error("no profile is called `{id}`; there are: {known}")]
+    UnknownProfile {
+        /// The name.
+        id: String,
+        /// Names that exist.
+        known: String,
+    },
+    /// The profile cannot be used.
+    #[error("profile `{id}`: {error}")]
+    Profile {
+        /// Its name.
+        id: String,
+        /// What is wrong.
+        error: instruments::ProfileError,
+    },
+    /// The setup and the profile do not fit.
+    #[error("instrument `{id}` at {address}: {problem}")]
+    Mismatch {
+        /// The profile's name.
+        id: String,
+        /// The address.
+        address: String,
+        /// What does not fit.
+        problem: String,
+    },
+    /// The instrument did not answer, or is not what the profile says.
+    #[error("instrument `{id}` at {address}: {problem}")]
+    Link {
+        /// The profile's name.
+        id: String,
+        /// The address.
+        address: String,
+        /// What happened.
+        problem: String,
+    },
+}
+
+/// The threads that talk to the instruments. Dropping it sends safe set-points and ends them.
+pub struct Links {
+    stop: Arc<AtomicBool>,
+    links: Vec<Link>,
+}
+
+struct Link {
+    name: String,
+    health: Arc<Health>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Links {
+    /// Each instrument's name and counters.
+    pub fn health(&self) -> impl Iterator<Item = (&str, HealthReport)> {
+        self.links.iter().map(|link| (link.name.as_str(), link.health.report()))
+    }
+}
+
+impl Drop for Links {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        for link in &mut self.links {
+            if let Some(thread) = link.thread.take() {
+                let _ = thread.join();
+            }
+        }
+    }
+}
+
+/// Connects every instrument of a setup. Returns once each has answered with its signature and a
+/// first sample.
+///
+/// # Errors
+/// The first instrument that is unknown, does not fit the setup, does not answer, or is another
+/// than the profile says. Nothing was commanded then.
+pub fn open(setup: &InstrumentsSetup, epoch: Instant) -> Result<Rig, OpenError> {
+    let mut links = Links { stop: Arc::new(AtomicBool::new(false)), links: Vec::new() };
+    let mut force = Vec::new();
+    for instrument in &setup.force {
+        let profile = profile(&instrument.profile)?;
+        let (endpoint, port) =
+            Endpoint::force(profile, instrument).map_err(|problem| mismatch(instrument, problem))?;
+        start(&mut links, instrument, endpoint, epoch)?;
+        force.push(port);
+    }
+    let force = ports::compose(force).map_err(|problem| mismatch(&setup.force[0], problem))?;
+
+    let (endpoint, amplifier) = Endpoint::amplifier(profile(&setup.amplifier.profile)?)
+        .map_err(|problem| mismatch(&setup.amplifier, problem))?;
+    start(&mut links, &setup.amplifier, endpoint, epoch)?;
+
+    let (endpoint, stage) =
+        Endpoint::stage(profile(&setup.stage.profile)?).map_err(|problem| mismatch(&setup.stage, problem))?;
+    start(&mut links, &setup.stage, endpoint, epoch)?;
+    Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), links })
+}
+
+/// The bundled profile of that name, its golden vectors run.
+///
+/// # Errors
+/// Where there is none, or it does not hold.
+pub fn profile(id: &str) -> Result<Profile, OpenError> {
+    let text = bundled::text(id).ok_or_else(|| OpenError::UnknownProfile {
+        id: id.into(),
+        known: bundled::ids().collect::<Vec<_>>().join(", "),
+    })?;
+    Profile::parse(text)
+        .and_then(|profile| profile.check(text).map(|()| profile))
+        .map_err(|error| OpenError::Profile { id: id.into(), error })
+}
+
+fn mismatch(instrument: &InstrumentSetup, problem: String) -> OpenError {
+    OpenError::Mismatch { id: instrument.profile.clone(), address: instrument.address.clone(), problem }
+}
+
+/// Starts the thread of one instrument and waits for its first sample.
+fn start(
+    links: &mut Links,
+    instrument: &InstrumentSetup,
+    endpoint: Endpoint,
+    epoch: Instant,
+) -> Result<(), OpenError> {
+    let health = endpoint.health();
+    let (ready, opened) = std::sync::mpsc::sync_channel(1);
+    let session = Session { endpoint, epoch, stop: Arc::clone(&links.stop), ready: Some(ready) };
+    let failed = |problem: String| OpenError::Link {
+        id: instrument.profile.clone(),
+        address: instrument.address.clone(),
+        problem,
+    };
+    let thread = match session.endpoint.profile().description.link.kind {
+        LinkKind::ModbusTcp => modbus_tcp::spawn(instrument, session).map_err(failed)?,
+        LinkKind::ModbusRtu => {
+            return Err(mismatch(instrument, "Modbus RTU is not built into this version".into()));
+        }
+    };
+    links.links.push(Link { name: instrument.profile.clone(), health, thread: Some(thread) });
+    match opened.recv() {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(problem)) => Err(failed(problem)),
+        Err(_) => Err(failed("its thread ended before the first sample".into())),
+    }
+}
+
+/// What every transport's thread starts from.
+pub struct Session {
+    /// Frames to samples, commands to set-points.
+    pub endpoint: Endpoint,
+    /// The moment that the loop calls zero.
+    pub epoch: Instant,
+    /// Set when the thread is to send the safe set-points and end.
+    pub stop: Arc<AtomicBool>,
+    /// Takes the outcome of the first connection, once.
+    pub ready: Option<std::sync::mpsc::SyncSender<Result<(), String>>>,
+}
+
+impl Session {
+    /// Nanoseconds since the epoch.
+    #[must_use]
+    pub fn now(&self) -> realtime::ports::Nanos {
+        realtime::ports::Nanos(u64::try_from(self.epoch.elapsed().as_nanos()).unwrap_or(u64::MAX))
+    }
+
+    /// Tells whoever opened the rig how the first connection went. Returns whether it was the first.
+    pub fn tell(&mut self, outcome: Result<(), String>) -> bool {
+        let first = self.ready.take();
+        let was_first = first.is_some();
+        if let Some(ready) = first {
+            let _ = ready.send(outcome);
+        }
+        was_first
+    }
+
+    /// Whether the thread is to end.
+    #[must_use]
+    pub fn stopping(&self) -> bool {
+        self.stop.load(Ordering::Acquire)
+    }
+}

@@ -1,0 +1,480 @@
+//! The wire's side of a driver, whatever the wire: frames become samples, commands become set-points.
+//!
+//! A transport hands over each frame with the time of its arrival, and asks what is due to be sent.
+//! Everything that decides whether a number may become a force stands here, once for all transports.
+
+mod view;
+
+use super::health::Health;
+use super::ports::{self, AmplifierLink, AmplifierPort, ForcePort, StageLink, StagePort};
+use super::setup::{AxisSetup, InstrumentSetup};
+use super::timebase::{Counter, DeviceClock, Step};
+use instruments::schema::{Severity, Stamp};
+use instruments::{FrameId, Profile, SetId, SignalId, Values};
+use models::quantity::PeakToPeak;
+use realtime::ports::{AmplifierState, Forces, Nanos, NoData, Reading, StageState};
+use ringbuf::HeapProd;
+use ringbuf::traits::{Consumer, Producer};
+use std::sync::Arc;
+use view::View;
+
+/// A frame that must not become a sample.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum BadFrame {
+    /// It failed a check.
+    #[error("{0}")]
+    Corrupt(String),
+    /// The instrument is another than the profile says.
+    #[error("{0}")]
+    WrongInstrument(String),
+}
+
+/// What a transport is to send now.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Due {
+    /// Nothing new.
+    Nothing,
+    /// These set-points, in their units.
+    SetPoints(Vec<(SetId, f64)>),
+}
+
+/// One axis of force out of one signal.
+#[derive(Debug, Clone)]
+struct Axis {
+    signal: SignalId,
+    gain: f64,
+    offset_n: f64,
+}
+
+/// The signals of an amplifier, by the names that profiles use for them.
+#[derive(Debug, Clone)]
+struct AmplifierSignals {
+    echo_amplitude: SignalId,
+    echo_frequency: SignalId,
+    output_on: SignalId,
+    amplitude: Option<SignalId>,
+    temperature: Option<SignalId>,
+    watchdog_tripped: Option<SignalId>,
+    fault: Option<SignalId>,
+}
+
+#[derive(Debug, Clone)]
+struct StageSignals {
+    position: SignalId,
+    velocity: SignalId,
+    at_limit: Option<SignalId>,
+    fault: Option<SignalId>,
+}
+
+enum Part {
+    Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: HeapProd<Forces> },
+    Amplifier { signals: AmplifierSignals, link: AmplifierLink },
+    Stage { signals: StageSignals, link: StageLink },
+}
+
+/// The clock and the counter of one frame.
+struct FrameTime {
+    clock: Option<(SignalId, DeviceClock)>,
+    counter: Option<(SignalId, Counter)>,
+    counted: u32,
+}
+
+/// When and as which a frame's sample counts.
+#[derive(Debug, Clone, Copy)]
+struct SampleMark {
+    taken_at: Nanos,
+    sequence: u32,
+}
+
+/// What was wanted last, until it expires.
+#[derive(Debug, Clone, PartialEq)]
+struct Wanted {
+    set_points: Vec<(SetId, f64)>,
+    expires_at: Nanos,
+    sent: bool,
+}
+
+/// One instrument, seen from its wire.
+pub struct Endpoint {
+    profile: Profile,
+    values: Values,
+    seen: Vec<bool>,
+    times: Vec<FrameTime>,
+    part: Part,
+    wanted: Option<Wanted>,
+    safe_sent: bool,
+    health: Arc<Health>,
+}
+
+impl Endpoint {
+    /// A force instrument, its port, and which axes it gives (lateral, normal).
+    ///
+    /// # Errors
+    /// Where the setup names a signal that the profile does not have, or the instrument gives no axis.
+    #[allow(clippy::type_complexity)]
+    pub fn force(
+        profile: Profile,
+        setup: &InstrumentSetup,
+    ) -> Result<(Self, (ForcePort, (bool, bool))), String> {
+        let axis = |wanted: &Option<AxisSetup>, name: &str| match wanted {
+            Some(axis) => {
+                let signal = need(&profile, &axis.signal)?;
+                if !(axis.gain.is_finite() && axis.gain != 0.0 && axis.offset_n.is_finite()) {
+                    return Err(format!(
+                        "the gain of axis `{name}` must not be zero, and both numbers must be finite"
+                    ));
+                }
+                Ok(Some(Axis { signal, gain: axis.gain, offset_n: axis.offset_n }))
+            }
+            // An axis that the setup leaves out is fitted only where the profile calls it so.
+            None => Ok(profile.signal(name).map(|signal| Axis { signal, gain: 1.0, offset_n: 0.0 })),
+        };
+        let (lateral, normal) = (axis(&setup.lateral, "lateral")?, axis(&setup.normal, "normal")?);
+        if lateral.is_none() && normal.is_none() {
+            let signals: Vec<&str> = profile.signals().map(|(name, _)| name).collect();
+            return Err(format!(
+                "say which signal is `lateral` or `normal`; the profile has {}",
+                signals.join(", ")
+            ));
+        }
+        let axes = (lateral.is_some(), normal.is_some());
+        let (ring, port) = ports::force();
+        let part = Part::Force { lateral, normal, last: Forces::missing(NoData::NotFitted), ring };
+        Ok((Self::new(profile, part), (port, axes)))
+    }
+
+    /// An amplifier and its port.
+    ///
+    /// # Errors
+    /// Where the profile lacks a signal or set-point that an amplifier must have.
+    pub fn amplifier(profile: Profile) -> Result<(Self, AmplifierPort), String> {
+        let signals = AmplifierSignals {
+            echo_amplitude: need(&profile, "echo_amplitude")?,
+            echo_frequency: need(&profile, "echo_frequency")?,
+            output_on: need(&profile, "output_on")?,
+            amplitude: profile.signal("amplitude"),
+            temperature: profile.signal("temperature"),
+            watchdog_tripped: profile.signal("watchdog_tripped"),
+            fault: profile.signal("fault"),
+        };
+        for set in ["amplitude", "frequency", "enable"] {
+            need_set(&profile, set)?;
+        }
+        let (link, port) = ports::amplifier();
+        Ok((Self::new(profile, Part::Amplifier { signals, link }), port))
+    }
+
+    /// A stage and its port.
+    ///
+    /// # Errors
+    /// Where the profile lacks a signal or set-point that a stage must have.
+    pub fn stage(profile: Profile) -> Result<(Self, StagePort), String> {
+        let signals = StageSignals {
+            position: need(&profile, "position")?,
+            velocity: need(&profile, "velocity")?,
+            at_limit: profile.signal("at_limit"),
+            fault: profile.signal("fault"),
+        };
+        need_set(&profile, "velocity")?;
+        let (link, port) = ports::stage();
+        Ok((Self::new(profile, Part::Stage { signals, link }), port))
+    }
+
+    fn new(profile: Profile, part: Part) -> Self {
+        let d = &profile.description;
+        let modulo = |signal: SignalId| {
+            let signal = &d.signal[signal.0];
+            (signal.number.limits().1 + 1.0, signal.scale * signal.si.factor)
+        };
+        let by_name = |name: &Option<String>| name.as_deref().and_then(|name| profile.signal(name));
+        let times = d.poll.iter().map(|poll| FrameTime {
+            clock: by_name(&poll.device_time)
+                .filter(|_| d.time.stamp == Stamp::Device)
+                .map(|signal| (signal, DeviceClock::new(modulo(signal).0 * modulo(signal).1))),
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 2^32 at most
+            counter: by_name(&poll.sequence).map(|signal| (signal, Counter::new(modulo(signal).0 as u64))),
+            counted: 0,
+        });
+        let times = times.collect();
+        let seen = vec![false; d.poll.len()];
+        let values = profile.values();
+        Self { values, seen, times, part, wanted: None, safe_sent: true, health: Arc::default(), profile }
+    }
+
+    /// The instrument's profile.
+    #[must_use]
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// The counters, for whoever wants to look.
+    #[must_use]
+    pub fn health(&self) -> Arc<Health> {
+        Arc::clone(&self.health)
+    }
+
+    /// The latest value of a signal in its unit; NaN where there was none.
+    #[must_use]
+    pub fn value(&self, signal: SignalId) -> f64 {
+        self.values.get(signal)
+    }
+
+    /// Takes a frame that arrived, whole and checked by its transport, and hands its sample to the loop.
+    ///
+    /// # Errors
+    /// A frame of the wrong length, or an instrument that is not what the profile says; no sample then.
+    pub fn frame(&mut self, frame: FrameId, bytes: &[u8], arrived: Nanos) -> Result<(), BadFrame> {
+        self.profile.decode(frame, bytes, &mut self.values).map_err(|error| {
+            self.health.count(&self.health.corrupt_frames);
+            BadFrame::Corrupt(error.to_string())
+        })?;
+        self.seen[frame.0] = true;
+        if self.seen.iter().all(|&seen| seen)
+            && let Some(broken) = self.profile.broken_signature(&self.values)
+        {
+            self.health.count(&self.health.corrupt_frames);
+            let signature = &self.profile.description.signature[broken];
+            return Err(BadFrame::WrongInstrument(format!(
+                "{} (`{}` does not hold)",
+                signature.text,
+                signature.when.as_ref()
+            )));
+        }
+        let Some(mark) = self.mark(frame, arrived) else { return Ok(()) };
+        self.publish(frame, bytes, mark);
+        Ok(())
+    }
+
+    /// When and as which the frame's sample counts; `None` where it is no new sample.
+    fn mark(&mut self, frame: FrameId, arrived: Nanos) -> Option<SampleMark> {
+        let (time, health) = (&mut self.times[frame.0], &self.health);
+        if let Some((signal, counter)) = &mut time.counter {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a count of 32 bits at most
+            let count = self.values.get(*signal).max(0.0) as u64;
+            match counter.step(count) {
+                Step::New { lost } => {
+                    health.lost_samples.fetch_add(lost, std::sync::atomic::Ordering::Relaxed);
+                }
+                Step::Same => {
+                    health.count(&health.repeats);
+                    return None;
+                }
+                Step::Old => {
+                    health.count(&health.out_of_order);
+                    return None;
+                }
+                Step::Reset => health.count(&health.clock_resets),
+            }
+            #[allow(clippy::cast_possible_truncation)]
+            {
+                time.counted = count as u32;
+            }
+        } else {
+            time.counted = time.counted.wrapping_add(1);
+        }
+        let mut taken_at = arrived;
+        if let Some((signal, clock)) = &mut time.clock {
+            let signal_s = self.profile.si(*signal, &self.values);
+            let (taken, reset) = clock.taken_at(signal_s, arrived);
+            taken_at = taken;
+            if reset {
+                health.count(&health.clock_resets);
+            }
+        }
+        let latency = Nanos::from_seconds(self.profile.description.time.latency_ms * 1e-3);
+        Some(SampleMark { taken_at: taken_at.since(latency), sequence: time.counted })
+    }
+
+    fn publish(&mut self, frame: FrameId, bytes: &[u8], mark: SampleMark) {
+        let view = View { profile: &self.profile, values: &self.values, bytes, frame, mark };
+        let full = match &mut self.part {
+            Part::Force { lateral, normal, last, ring } => {
+                let mut touched = false;
+                for (axis, kept) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
+                    if let Some(axis) =
+                        axis.as_ref().filter(|axis| view.profile.frame_of(axis.signal) == frame)
+                    {
+                        *kept = view.channel(axis.signal).map(|reading| Reading {
+                            value: axis.gain * reading.value - axis.offset_n,
+                            ..reading
+                        });
+                        touched = true;
+                    }
+                }
+                touched && ring.try_push(*last).is_err()
+            }
+            Part::Amplifier { signals, link } if view.profile.frame_of(signals.output_on) == frame => {
+                let flag =
+                    |signal: Option<SignalId>| signal.is_some_and(|signal| view.values.get(signal) != 0.0);
+                let state = AmplifierState {
+                    amplitude: view.optional(signals.amplitude),
+                    echoed_amplitude: PeakToPeak::from_metres(view.si(signals.echo_amplitude)),
+                    echoed_frequency_hz: view.si(signals.echo_frequency),
+                    output_on: flag(Some(signals.output_on)),
+                    watchdog_tripped: flag(signals.watchdog_tripped),
+                    fault: flag(signals.fault) || view.severity() == Some(Severity::Stop),
+                    temperature_c: view.optional(signals.temperature),
+                    taken_at: mark.taken_at,
+                    sequence: mark.sequence,
+                };
+                link.states.try_push(Ok(state)).is_err()
+            }
+            Part::Stage { signals, link } if view.profile.frame_of(signals.position) == frame => {
+                let flag =
+                    |signal: Option<SignalId>| signal.is_some_and(|signal| view.values.get(signal) != 0.0);
+                let state = StageState {
+                    position_m: view.si(signals.position),
+                    velocity_m_s: view.si(signals.velocity),
+                    at_limit: flag(signals.at_limit),
+                    fault: flag(signals.fault) || view.severity() == Some(Severity::Stop),
+                    taken_at: mark.taken_at,
+                    sequence: mark.sequence,
+                };
+                link.states.try_push(Ok(state)).is_err()
+            }
+            Part::Amplifier { .. } | Part::Stage { .. } => return,
+        };
+        self.health.count(if full { &self.health.ring_full } else { &self.health.samples });
+    }
+
+    /// Tells the loop at once that nothing will come, and why. Commands that wait are dropped: what
+    /// was wanted before the link went down must not be sent when it comes back.
+    pub fn link_down(&mut self, reason: NoData) {
+        self.seen.fill(false);
+        self.discard_commands();
+        let _ = match &mut self.part {
+            Part::Force { lateral, normal, last, ring } => {
+                for (axis, kept) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
+                    *kept = Err(if axis.is_some() { reason } else { NoData::NotFitted });
+                }
+                ring.try_push(*last).is_ok()
+            }
+            Part::Amplifier { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+            Part::Stage { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+        };
+    }
+
+    /// Drops all commands that wait.
+    pub fn discard_commands(&mut self) {
+        match &mut self.part {
+            Part::Force { .. } => {}
+            Part::Amplifier { link, .. } => while link.commands.try_pop().is_some() {},
+            Part::Stage { link, .. } => while link.commands.try_pop().is_some() {},
+        }
+        self.wanted = None;
+    }
+
+    /// What is due to be sent at `now`: the newest command, if its time has not passed; the safe
+    /// set-points once, where commands were sent and none is valid any more.
+    pub fn due(&mut self, now: Nanos) -> Due {
+        if let Some(newest) = self.newest_command() {
+            self.wanted = Some(newest);
+        }
+        match &mut self.wanted {
+            Some(wanted) if now <= wanted.expires_at => {
+                if wanted.sent {
+                    return Due::Nothing;
+                }
+                if let Some(refused) =
+                    wanted.set_points.iter().find_map(|(set, value)| self.profile.allows(*set, *value).err())
+                {
+                    self.health.count(&self.health.commands_refused);
+                    self.health.problem(refused.to_string());
+                    self.wanted = None;
+                    return self.safe_once();
+                }
+                wanted.sent = true;
+                self.safe_sent = false;
+                self.health.count(&self.health.commands_sent);
+                Due::SetPoints(wanted.set_points.clone())
+            }
+            Some(wanted) => {
+                if !wanted.sent {
+                    self.health.count(&self.health.commands_expired);
+                }
+                self.wanted = None;
+                self.safe_once()
+            }
+            None => Due::Nothing,
+        }
+    }
+
+    /// The set-points that make the rig safe; they may be sent at any time.
+    #[must_use]
+    pub fn safe_set_points(&self) -> Vec<(SetId, f64)> {
+        safe_set_points(&self.profile)
+    }
+
+    fn safe_once(&mut self) -> Due {
+        if self.safe_sent {
+            return Due::Nothing;
+        }
+        self.safe_sent = true;
+        self.health.count(&self.health.safe_sent);
+        Due::SetPoints(self.safe_set_points())
+    }
+
+    fn newest_command(&mut self) -> Option<Wanted> {
+        let profile = &self.profile;
+        let set = |name: &str, si: f64| {
+            profile.set(name).map(|set| (set, si / profile.description.set[set.0].si.factor))
+        };
+        let heartbeat = |sequence: u32| {
+            profile.set("heartbeat").map(|set| {
+                let counts = profile.description.set[set.0].number.limits().1 + 1.0;
+                (set, f64::from(sequence) % counts)
+            })
+        };
+        match &mut self.part {
+            Part::Force { .. } => None,
+            Part::Amplifier { link, .. } => {
+                let command = std::iter::from_fn(|| link.commands.try_pop()).last()?;
+                let mut set_points = if command.enable {
+                    let wanted = [
+                        set("amplitude", command.amplitude_pp_m),
+                        set("frequency", command.frequency_hz),
+                        set("enable", 1.0),
+                    ];
+                    wanted.into_iter().flatten().collect()
+                } else {
+                    // Off leaves the frequency as it is: there may be no valid one.
+                    safe_set_points(profile)
+                };
+                set_points.extend(heartbeat(command.sequence));
+                Some(Wanted { set_points, expires_at: command.expires_at, sent: false })
+            }
+            Part::Stage { link, .. } => {
+                let command = std::iter::from_fn(|| link.commands.try_pop()).last()?;
+                let wanted = [
+                    set("velocity", command.velocity_m_s),
+                    set("load", command.normal_force_n),
+                    heartbeat(command.sequence),
+                ];
+                Some(Wanted {
+                    set_points: wanted.into_iter().flatten().collect(),
+                    expires_at: command.expires_at,
+                    sent: false,
+                })
+            }
+        }
+    }
+}
+
+fn need(profile: &Profile, name: &str) -> Result<SignalId, String> {
+    profile.signal(name).ok_or_else(|| {
+        let known: Vec<&str> = profile.signals().map(|(name, _)| name).collect();
+        format!("the profile has no signal `{name}`; it has {}", known.join(", "))
+    })
+}
+
+fn need_set(profile: &Profile, name: &str) -> Result<SetId, String> {
+    profile.set(name).ok_or_else(|| format!("the profile has no set-point `{name}`"))
+}
+
+fn safe_set_points(profile: &Profile) -> Vec<(SetId, f64)> {
+    let sets = profile.description.set.iter().enumerate();
+    sets.filter_map(|(i, set)| set.safe.map(|safe| (SetId(i), safe))).collect()
+}
+
+#[cfg(test)]
+mod tests;

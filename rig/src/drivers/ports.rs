@@ -1,0 +1,203 @@
+//! The loop's side of the drivers: port objects over single-producer, single-consumer rings.
+//!
+//! Nothing here blocks, locks or allocates after it was made.
+
+use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Stage, StageState};
+use realtime::safety::{DriveCommand, StageCommand};
+use ringbuf::traits::{Consumer, Producer, Split};
+use ringbuf::{HeapCons, HeapProd, HeapRb};
+
+/// Samples that wait for the loop at most: a quarter of a second at 1 kHz.
+const SAMPLES: usize = 256;
+/// Commands that wait for the link at most; older ones expire there anyway.
+const COMMANDS: usize = 64;
+
+/// What the loop wants of the amplifier, as the link's thread takes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriveSetPoint {
+    /// Peak-to-peak amplitude in m.
+    pub amplitude_pp_m: f64,
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+    /// Output on.
+    pub enable: bool,
+    /// Count of commands, and heartbeat.
+    pub sequence: u32,
+    /// It must not leave after this.
+    pub expires_at: Nanos,
+}
+
+impl From<DriveCommand> for DriveSetPoint {
+    fn from(command: DriveCommand) -> Self {
+        Self {
+            amplitude_pp_m: command.amplitude().metres(),
+            frequency_hz: command.frequency_hz(),
+            enable: command.enable(),
+            sequence: command.sequence(),
+            expires_at: command.expires_at(),
+        }
+    }
+}
+
+/// What the loop wants of the stage, as the link's thread takes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StageSetPoint {
+    /// Velocity along the stroke in m/s.
+    pub velocity_m_s: f64,
+    /// Normal load in N.
+    pub normal_force_n: f64,
+    /// Count of commands, and heartbeat.
+    pub sequence: u32,
+    /// It must not leave after this.
+    pub expires_at: Nanos,
+}
+
+impl From<StageCommand> for StageSetPoint {
+    fn from(command: StageCommand) -> Self {
+        Self {
+            velocity_m_s: command.velocity_m_s(),
+            normal_force_n: command.normal_force_n(),
+            sequence: command.sequence(),
+            expires_at: command.expires_at(),
+        }
+    }
+}
+
+/// Takes everything that waits and keeps the last.
+fn latest<T>(ring: &mut HeapCons<T>, kept: &mut T) {
+    while let Some(newer) = ring.try_pop() {
+        *kept = newer;
+    }
+}
+
+/// One force instrument.
+pub struct ForcePort {
+    ring: HeapCons<Forces>,
+    last: Forces,
+}
+
+/// A force port, and the end into which the link pushes.
+#[must_use]
+pub fn force() -> (HeapProd<Forces>, ForcePort) {
+    let (producer, ring) = HeapRb::new(SAMPLES).split();
+    (producer, ForcePort { ring, last: Forces::missing(NoData::NeverRead) })
+}
+
+impl ForceSensor for ForcePort {
+    fn read(&mut self, _now: Nanos) -> Forces {
+        latest(&mut self.ring, &mut self.last);
+        self.last
+    }
+}
+
+/// Two force instruments with one axis each. They sample on their own: each axis has its own age.
+struct Pair {
+    lateral: ForcePort,
+    normal: ForcePort,
+}
+
+impl ForceSensor for Pair {
+    fn read(&mut self, now: Nanos) -> Forces {
+        Forces { lateral: self.lateral.read(now).lateral, normal: self.normal.read(now).normal }
+    }
+}
+
+/// The rig's force sensor out of one or two instruments, each with which axes it gives
+/// (lateral, normal).
+///
+/// # Errors
+/// Where an axis is given by no instrument or by two.
+pub fn compose(mut ports: Vec<(ForcePort, (bool, bool))>) -> Result<Box<dyn ForceSensor>, String> {
+    let axes: Vec<(bool, bool)> = ports.iter().map(|(_, axes)| *axes).collect();
+    match axes.as_slice() {
+        [(true, true)] => Ok(Box::new(ports.remove(0).0)),
+        [(true, false), (false, true)] => {
+            let normal = ports.remove(1).0;
+            Ok(Box::new(Pair { lateral: ports.remove(0).0, normal }))
+        }
+        [(false, true), (true, false)] => {
+            let lateral = ports.remove(1).0;
+            Ok(Box::new(Pair { lateral, normal: ports.remove(0).0 }))
+        }
+        _ => Err("the [[force]] instruments must give each of the axes `lateral` and `normal` once".into()),
+    }
+}
+
+/// The amplifier.
+pub struct AmplifierPort {
+    states: HeapCons<Result<AmplifierState, NoData>>,
+    commands: HeapProd<DriveSetPoint>,
+    last: Result<AmplifierState, NoData>,
+}
+
+/// The ends of an amplifier's rings that the link holds.
+pub struct AmplifierLink {
+    /// Into the loop.
+    pub states: HeapProd<Result<AmplifierState, NoData>>,
+    /// Out of the loop.
+    pub commands: HeapCons<DriveSetPoint>,
+}
+
+/// An amplifier port, and the ends that the link holds.
+#[must_use]
+pub fn amplifier() -> (AmplifierLink, AmplifierPort) {
+    let (into_loop, states) = HeapRb::new(SAMPLES).split();
+    let (commands, from_loop) = HeapRb::new(COMMANDS).split();
+    let port = AmplifierPort { states, commands, last: Err(NoData::NeverRead) };
+    (AmplifierLink { states: into_loop, commands: from_loop }, port)
+}
+
+impl AmplifierPort {
+    /// Hands a set-point to the link. A full ring means that the link takes nothing: what waits there
+    /// expires, and so would this.
+    pub(crate) fn push(&mut self, set_point: DriveSetPoint) {
+        let _ = self.commands.try_push(set_point);
+    }
+}
+
+impl Amplifier for AmplifierPort {
+    fn command(&mut self, command: DriveCommand, _now: Nanos) {
+        self.push(command.into());
+    }
+
+    fn state(&mut self, _now: Nanos) -> Result<AmplifierState, NoData> {
+        latest(&mut self.states, &mut self.last);
+        self.last
+    }
+}
+
+/// The stage.
+pub struct StagePort {
+    states: HeapCons<Result<StageState, NoData>>,
+    commands: HeapProd<StageSetPoint>,
+    last: Result<StageState, NoData>,
+}
+
+/// The ends of a stage's rings that the link holds.
+pub struct StageLink {
+    /// Into the loop.
+    pub states: HeapProd<Result<StageState, NoData>>,
+    /// Out of the loop.
+    pub commands: HeapCons<StageSetPoint>,
+}
+
+/// A stage port, and the ends that the link holds.
+#[must_use]
+pub fn stage() -> (StageLink, StagePort) {
+    let (into_loop, states) = HeapRb::new(SAMPLES).split();
+    let (commands, from_loop) = HeapRb::new(COMMANDS).split();
+    let port = StagePort { states, commands, last: Err(NoData::NeverRead) };
+    (StageLink { states: into_loop, commands: from_loop }, port)
+}
+
+impl Stage for StagePort {
+    fn command(&mut self, command: StageCommand, _now: Nanos) {
+        // As for the amplifier: what finds no room would have expired.
+        let _ = self.commands.try_push(command.into());
+    }
+
+    fn state(&mut self, _now: Nanos) -> Result<StageState, NoData> {
+        latest(&mut self.states, &mut self.last);
+        self.last
+    }
+}

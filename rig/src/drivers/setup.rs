@@ -1,0 +1,70 @@
+//! The instruments' part of a setup.
+
+use serde::{Deserialize, Serialize};
+
+/// Which instruments make up the rig.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstrumentsSetup {
+    /// One instrument with both axes, or two with one each.
+    pub force: Vec<InstrumentSetup>,
+    /// The ultrasonic drive.
+    pub amplifier: InstrumentSetup,
+    /// The stage.
+    pub stage: InstrumentSetup,
+}
+
+/// One instrument: its profile, and where it is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstrumentSetup {
+    /// Id of the profile.
+    pub profile: String,
+    /// Where it is: `host` or `host:port` for TCP, a path for a serial line, an interface for CAN.
+    pub address: String,
+    /// Modbus unit, where it is not the profile's.
+    #[serde(default)]
+    pub unit: Option<u8>,
+    /// Reads per second, where they are not the profile's.
+    #[serde(default)]
+    pub rate_hz: Option<f64>,
+    /// What gives the lateral force. Left out: the signal `lateral`, if the profile has it.
+    #[serde(default)]
+    pub lateral: Option<AxisSetup>,
+    /// What gives the normal force. Left out: the signal `normal`, if the profile has it.
+    #[serde(default)]
+    pub normal: Option<AxisSetup>,
+}
+
+impl InstrumentSetup {
+    /// An instrument of that profile at that address, all else by the profile.
+    #[must_use]
+    pub fn new(profile: &str, address: &str) -> Self {
+        Self {
+            profile: profile.into(),
+            address: address.into(),
+            unit: None,
+            rate_hz: None,
+            lateral: None,
+            normal: None,
+        }
+    }
+}
+
+/// How one axis of the rig comes out of an instrument's signal: `force = gain * signal - offset`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisSetup {
+    /// Name of the signal in the profile.
+    pub signal: String,
+    /// Sign of the mounting and gain of the certificate; -1 turns the axis round.
+    #[serde(default = "one")]
+    pub gain: f64,
+    /// Tare in N, taken off after the gain. It is never found silently at start.
+    #[serde(default)]
+    pub offset_n: f64,
+}
+
+const fn one() -> f64 {
+    1.0
+}

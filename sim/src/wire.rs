@@ -1,0 +1,56 @@
+//! The virtual rig behind real protocols.
+//!
+//! An emulator stands on the same profile as the driver and on one [`Plant`], the virtual world.
+//! It knows bytes and registers; the world knows forces and motion; a [`Quantity`] is all that they
+//! share. Several emulators of several protocols may serve one world at once.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`quantity`] | what of the world a profile may name |
+//! | [`device`] | one emulated instrument: registers from the world, commands into it |
+//! | [`modbus_tcp`] | a Modbus TCP server over devices |
+
+pub mod device;
+pub mod modbus_tcp;
+pub mod quantity;
+
+pub use quantity::{Command, Quantity};
+
+use realtime::ports::Nanos;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Instant;
+
+/// The world as instruments meet it. All quantities are in SI units.
+pub trait Plant: Send {
+    /// Brings the world up to `now`; a time in the past changes nothing.
+    fn advance(&mut self, now: Nanos);
+
+    /// The value of a quantity at the time last advanced to; a truth is 0 or 1.
+    fn measure(&mut self, quantity: Quantity) -> f64;
+
+    /// Hands over absolute set-points that take effect together, at the time last advanced to.
+    fn command(&mut self, commands: &[(Command, f64)]);
+}
+
+/// One world, shared by the emulators that serve it. Emulators are not the control loop: they may lock.
+#[derive(Clone)]
+pub struct SharedPlant {
+    plant: Arc<Mutex<dyn Plant>>,
+    epoch: Instant,
+}
+
+impl SharedPlant {
+    /// A world whose time zero is `epoch`.
+    pub fn new(plant: impl Plant + 'static, epoch: Instant) -> Self {
+        Self { plant: Arc::new(Mutex::new(plant)), epoch }
+    }
+
+    /// The world, brought up to now.
+    pub fn now(&self) -> (MutexGuard<'_, dyn Plant + 'static>, Nanos) {
+        // A panic in one emulator must not silence the others: the world itself is still whole.
+        let mut plant = self.plant.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let now = Nanos(u64::try_from(self.epoch.elapsed().as_nanos()).unwrap_or(u64::MAX));
+        plant.advance(now);
+        (plant, now)
+    }
+}

@@ -1,0 +1,190 @@
+//! One emulated instrument: registers out of the world, commands into it.
+
+use super::{Command, Plant, Quantity};
+use instruments::schema::Table;
+use instruments::{FrameId, Profile, SetId, SignalId};
+use realtime::ports::Nanos;
+
+/// Where a signal's value comes from.
+#[derive(Debug, Clone, Copy)]
+enum Source {
+    Constant(f64),
+    World { quantity: Quantity, per_si: f64, modulo: f64 },
+}
+
+/// An emulator cannot be made from a profile.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("profile `{profile}`: [emulator] names `{quantity}`, which the virtual world does not have")]
+pub struct UnknownQuantity {
+    /// Id of the profile.
+    pub profile: String,
+    /// The name that nothing answers to.
+    pub quantity: String,
+}
+
+/// Why an instrument refused a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Refused {
+    /// Some register of the range does not exist.
+    #[error("no such register")]
+    Address,
+    /// A set-point lies outside what the instrument takes.
+    #[error("the value is out of range")]
+    Value,
+}
+
+/// One emulated instrument.
+#[derive(Debug, Clone)]
+pub struct Device {
+    profile: Profile,
+    sources: Vec<Option<Source>>,
+    commands: Vec<Option<(Command, f64)>>,
+    blocks: Vec<Vec<u8>>,
+    reads: u32,
+}
+
+impl Device {
+    /// An instrument by its profile.
+    ///
+    /// # Errors
+    /// Where the profile names a quantity that the world does not have.
+    pub fn new(profile: Profile) -> Result<Self, UnknownQuantity> {
+        let d = &profile.description;
+        let unknown =
+            |quantity: &str| UnknownQuantity { profile: profile.id().into(), quantity: quantity.into() };
+        let mut sources = Vec::with_capacity(d.signal.len());
+        for signal in &d.signal {
+            let name = signal.name.as_ref();
+            sources.push(if let Some(raw) = d.emulator.constant.get(name) {
+                Some(Source::Constant(*raw))
+            } else if let Some(quantity) = d.emulator.measure.get(name) {
+                let quantity = Quantity::from_name(quantity).ok_or_else(|| unknown(quantity))?;
+                // Counters and clocks run round at the width of their register.
+                let counts = signal.number.limits().1 + 1.0;
+                let wraps = matches!(
+                    quantity,
+                    Quantity::ForceSample
+                        | Quantity::ForceTime
+                        | Quantity::DriveCount
+                        | Quantity::DriveTime
+                        | Quantity::StageCount
+                        | Quantity::StageTime
+                        | Quantity::DeviceTime
+                        | Quantity::DeviceReads
+                        | Quantity::Heartbeat
+                );
+                let modulo = if wraps { counts * signal.scale } else { f64::INFINITY };
+                Some(Source::World { quantity, per_si: 1.0 / signal.si.factor, modulo })
+            } else {
+                None
+            });
+        }
+        let mut commands = Vec::with_capacity(d.set.len());
+        for set in &d.set {
+            commands.push(match d.emulator.command.get(set.name.as_ref()) {
+                Some(name) => Some((Command::from_name(name).ok_or_else(|| unknown(name))?, set.si.factor)),
+                None => None,
+            });
+        }
+        let blocks = d.write.iter().map(|block| vec![0; 2 * usize::from(block.count)]).collect();
+        Ok(Self { sources, commands, blocks, reads: 0, profile })
+    }
+
+    /// The profile.
+    #[must_use]
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// The bytes of one frame, all of one moment of the world.
+    pub fn frame(&mut self, frame: FrameId, plant: &mut dyn Plant, now: Nanos) -> Vec<u8> {
+        let mut bytes = vec![0; self.profile.frame_bytes(frame)];
+        let (sources, reads) = (&self.sources, self.reads);
+        self.profile.encode(frame, &mut bytes, &mut |signal: SignalId| match sources[signal.0]? {
+            Source::Constant(raw) => Some(raw),
+            Source::World { quantity, per_si, modulo } => {
+                let value = per_si
+                    * match quantity {
+                        Quantity::DeviceTime => now.seconds(),
+                        Quantity::DeviceReads => f64::from(reads),
+                        _ => plant.measure(quantity),
+                    };
+                Some(if modulo.is_finite() { value.rem_euclid(modulo) } else { value })
+            }
+        });
+        bytes
+    }
+
+    /// Registers `address..address + count` of a table, all of one moment of the world.
+    ///
+    /// # Errors
+    /// [`Refused::Address`] where a register of the range does not exist.
+    pub fn read(
+        &mut self,
+        table: Table,
+        address: u16,
+        count: u16,
+        plant: &mut dyn Plant,
+        now: Nanos,
+    ) -> Result<Vec<u16>, Refused> {
+        self.reads = self.reads.wrapping_add(1);
+        let (from, to) = (usize::from(address), usize::from(address) + usize::from(count));
+        let mut registers = vec![None; to - from];
+        let mut put = |start: u16, bytes: &[u8]| {
+            for (i, pair) in bytes.chunks_exact(2).enumerate() {
+                let at = usize::from(start) + i;
+                if (from..to).contains(&at) {
+                    registers[at - from] = Some(u16::from_be_bytes([pair[0], pair[1]]));
+                }
+            }
+        };
+        let overlaps = |start: u16, length: u16| {
+            usize::from(start) < to && usize::from(start) + usize::from(length) > from
+        };
+        for index in 0..self.profile.description.poll.len() {
+            let poll = &self.profile.description.poll[index];
+            if poll.table == table && overlaps(poll.address, poll.count) {
+                let start = poll.address;
+                let bytes = self.frame(FrameId(index), plant, now);
+                put(start, &bytes);
+            }
+        }
+        if table == Table::Holding {
+            for (block, bytes) in self.profile.description.write.iter().zip(&self.blocks) {
+                put(block.address, bytes);
+            }
+        }
+        registers.into_iter().collect::<Option<Vec<u16>>>().ok_or(Refused::Address)
+    }
+
+    /// Writes neighbouring holding registers; the set-points that they touch take effect together.
+    ///
+    /// # Errors
+    /// [`Refused`], and then nothing was changed.
+    pub fn write(&mut self, address: u16, registers: &[u16], plant: &mut dyn Plant) -> Result<(), Refused> {
+        let writes = &self.profile.description.write;
+        let inside = |block: &instruments::schema::Write| {
+            address >= block.address
+                && usize::from(address) + registers.len()
+                    <= usize::from(block.address) + usize::from(block.count)
+        };
+        let index = writes.iter().position(inside).ok_or(Refused::Address)?;
+        let first = 2 * usize::from(address - writes[index].address);
+        let mut block = self.blocks[index].clone();
+        for (i, register) in registers.iter().enumerate() {
+            block[first + 2 * i..first + 2 * i + 2].copy_from_slice(&register.to_be_bytes());
+        }
+        let sets: Vec<SetId> = self.profile.sets_of(index).collect();
+        let mut taken = Vec::with_capacity(sets.len());
+        for set in sets {
+            let value = self.profile.decode_set(set, &block).ok_or(Refused::Value)?;
+            self.profile.encode_set(set, value, &mut block.clone()).map_err(|_| Refused::Value)?;
+            taken.extend(self.commands[set.0].map(|(command, si)| (command, value * si)));
+        }
+        self.blocks[index] = block;
+        if !taken.is_empty() {
+            plant.command(&taken);
+        }
+        Ok(())
+    }
+}

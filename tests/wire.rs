@@ -1,0 +1,8 @@
+//! The drivers against emulators and misbehaving servers, over real sockets.
+
+#[path = "wire/bench.rs"]
+mod bench;
+#[path = "wire/modbus_tcp.rs"]
+mod modbus_tcp;
+#[path = "wire/peers.rs"]
+mod peers;
