@@ -1,1 +1,2 @@
 //! The virtual rig: an independent time-domain world.
+pub mod contact;
