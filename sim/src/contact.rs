@@ -46,7 +46,8 @@ impl Limit {
         if self.adhesion_n != 0.0 {
             load += self.adhesion_n * (1.0 - (-normal_n / self.adhesion_scale_n).exp());
         }
-        let aged = if self.dwell_s > 0.0 && dwell_s.is_finite() { dwell_s / (dwell_s + self.dwell_s) } else { 1.0 };
+        let aged =
+            if self.dwell_s > 0.0 && dwell_s.is_finite() { dwell_s / (dwell_s + self.dwell_s) } else { 1.0 };
         friction * load * aged
     }
 }
@@ -219,7 +220,8 @@ impl Contact {
         let count = HEIGHTS.len() as f64;
         let target = self.normal_force_n / unit;
         let normal = |preload: f64| {
-            HEIGHTS.iter().map(|h| element::cycle(preload + h * spread, 1.0).normal).sum::<f64>() / (2.0 * PI * count)
+            HEIGHTS.iter().map(|h| element::cycle(preload + h * spread, 1.0).normal).sum::<f64>()
+                / (2.0 * PI * count)
         };
         let (mut low, mut high) = (-1.0 - 1.5 * spread, target + 1.0 + 1.5 * spread);
         for _ in 0..48 {

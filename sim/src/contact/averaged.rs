@@ -129,7 +129,8 @@ mod tests {
         for i in 0..60 {
             let t = i as f64 / 60.0;
             let a = 0.3e-6 * (7.0_f64).powf((t * 7.0).fract());
-            let mut contact = Contact::ideal(3.9e6, 1.5e6, 0.5, 0.15 + 0.6 * (t * 3.0).fract(), a, 27_500.0, 0.0);
+            let mut contact =
+                Contact::ideal(3.9e6, 1.5e6, 0.5, 0.15 + 0.6 * (t * 3.0).fract(), a, 27_500.0, 0.0);
             contact.speed_m_s = 0.01 * 20.0_f64.powf((t * 11.0).fract());
             contact.ridge.mass_kg = 1e-6;
             contact.ridge.damping_n_s_per_m = 0.6 * (3.9e6_f64 * 1e-6).sqrt();

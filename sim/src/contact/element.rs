@@ -69,7 +69,11 @@ fn slip_angle(start: f64, stretch: f64, drag: f64, preload: f64, crest: f64, end
     let mut theta = 0.5 * (low + high);
     for _ in 0..60 {
         let value = excess(theta);
-        if value > 0.0 { low = theta } else { high = theta }
+        if value > 0.0 {
+            low = theta
+        } else {
+            high = theta
+        }
         let newton = theta + value / (theta.sin() + drag);
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         let moved = (next - theta).abs();
@@ -96,7 +100,11 @@ pub fn preload_for(mean: f64) -> f64 {
     for _ in 0..60 {
         let (sin, cos) = alpha.sin_cos();
         let value = sin - alpha * cos - target;
-        if value < 0.0 { low = alpha } else { high = alpha }
+        if value < 0.0 {
+            low = alpha
+        } else {
+            high = alpha
+        }
         let newton = alpha - value / (alpha * sin);
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         let moved = (next - alpha).abs();
