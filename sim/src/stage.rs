@@ -158,9 +158,8 @@ impl Stage {
         let before = self.velocity_m_s;
         self.velocity_m_s =
             if wanted.abs() < 1e-9 && change == wanted - before { 0.0 } else { before + change };
-        if self.velocity_m_s != 0.0 && self.velocity_m_s.signum() != before.signum()
-            || before == 0.0 && self.velocity_m_s != 0.0
-        {
+        let turned = before == 0.0 || self.velocity_m_s.signum() != before.signum();
+        if self.velocity_m_s != 0.0 && turned {
             self.strokes += 1;
         }
         self.position_m += 0.5 * (before + self.velocity_m_s) * dt;
