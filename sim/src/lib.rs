@@ -1,2 +1,27 @@
-//! The virtual rig: an independent time-domain world.
+//! The virtual rig: an independent world in the time domain, with what can be wrong with it.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`world`] | composes the bodies and steps them, in virtual or wall-clock time |
+//! | [`finger`], [`plate`], [`amplifier`], [`sensor`], [`stage`] | one body each |
+//! | [`contact`] | ridge on vibrating plate: exact, sampled, resolved, averaged |
+//! | [`channel`] | the way from an instrument to its reader, and its faults |
+//! | [`defects`] | what can be wrong with this world, one kind a file |
+//! | [`virtual_rig`] | the loop's three ports in process and in virtual time |
+//! | [`noise`] | named streams of random numbers |
+//! | [`wire`] | the same world behind real protocols |
+//!
+//! It shares nouns with `models` and nothing else: no friction law of the project's is called here.
+
+pub mod amplifier;
+pub mod channel;
+pub mod contact;
+pub mod defects;
+pub mod finger;
+pub mod noise;
+pub mod plate;
+pub mod sensor;
+pub mod stage;
+pub mod virtual_rig;
+pub mod world;
 pub mod wire;

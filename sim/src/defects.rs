@@ -1,0 +1,226 @@
+//! What can be wrong with this world.
+//!
+//! A defect is a [`Kind`]: a name, a place, its parameters, and what it does at up to four points: to the world's
+//! set-up, to the plate's amplitude under the finger, to the contact, to the forces on their way to the sensor.
+//! Its formulae are this world's own. Where a library effect bears the same name, the cause is the same and the
+//! formula another.
+//!
+//! To add one: a file in this folder with a `KIND`, and its line in the list below.
+
+mod file;
+
+use crate::contact::Contact;
+use crate::noise::Noise;
+use crate::world::WorldConfig;
+
+pub use file::{Defects, DefectsError};
+
+/// Where a defect sits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// Between finger and plate.
+    Contact,
+    /// In the fingertip.
+    Finger,
+    /// Plate and amplifier.
+    Plate,
+    /// Sensor, stage, timing.
+    Instrument,
+}
+
+/// How a parameter is drawn between its bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Draw {
+    /// Evenly.
+    Linear,
+    /// Evenly in its logarithm.
+    Log,
+    /// Evenly in its logarithm, with a random sign.
+    Signed,
+    /// Evenly in its logarithm, and then perhaps its reciprocal: a factor.
+    Factor,
+}
+
+/// A parameter of a defect. The first one is its size: towards `none` the defect vanishes.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter {
+    /// Name, with its unit.
+    pub name: &'static str,
+    /// Lowest value drawn.
+    pub low: f64,
+    /// Highest value drawn.
+    pub high: f64,
+    /// How it is drawn.
+    pub draw: Draw,
+}
+
+/// Values of a defect's parameters, in their order; unused ones are zero.
+pub type Values = [f64; 4];
+
+/// The circumstances of an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surroundings {
+    /// Time from the start of the run [s].
+    pub time_s: f64,
+    /// Time since the finger was put on [s].
+    pub contact_time_s: f64,
+    /// Position along the stroke [m].
+    pub position_m: f64,
+    /// 1 or -1.
+    pub direction: f64,
+    /// Frequency of the plate [Hz].
+    pub frequency_hz: f64,
+    /// True normal force [N].
+    pub normal_force_n: f64,
+    /// Ambient pressure [Pa].
+    pub ambient_pressure_pa: f64,
+    /// Temperature of the plate [deg C].
+    pub temperature_c: f64,
+}
+
+/// The two forces in the sensor's frame [N].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forces {
+    /// Lateral, signed.
+    pub lateral_n: f64,
+    /// Normal, positive in compression.
+    pub normal_n: f64,
+}
+
+/// What a defect does; each hook may be left out.
+#[derive(Clone, Copy, Default)]
+pub struct Act {
+    /// Changes the world before it starts.
+    pub setup: Option<fn(&Values, &mut WorldConfig)>,
+    /// Peak-to-peak amplitude under the finger [m] from the one the amplifier knows of.
+    pub plate: Option<fn(&Values, &Surroundings, f64) -> f64>,
+    /// Changes the contact.
+    pub contact: Option<fn(&Values, &Surroundings, &mut Contact)>,
+    /// Changes the forces on their way to the sensor.
+    pub forces: Option<fn(&Values, &Surroundings, &mut Forces)>,
+}
+
+/// A kind of defect.
+pub struct Kind {
+    /// Its name: the effect's, where the library has one for the same cause.
+    pub name: &'static str,
+    /// Where it sits.
+    pub place: Place,
+    /// Whether an effect of that name exists.
+    pub in_library: bool,
+    /// Whether a table of steady passes can show it.
+    pub in_tables: bool,
+    /// What it is, and its source.
+    pub summary: &'static str,
+    /// Its parameters, the size first; at most four.
+    pub parameters: &'static [Parameter],
+    /// What it does.
+    pub act: Act,
+}
+
+impl Kind {
+    /// The kind of a name.
+    pub fn named(name: &str) -> Option<&'static Kind> {
+        ALL.iter().copied().find(|kind| kind.name == name)
+    }
+
+    /// Draws its parameters.
+    pub fn draw(&self, noise: &mut Noise) -> Values {
+        let mut values = Values::default();
+        for (value, parameter) in values.iter_mut().zip(self.parameters) {
+            *value = parameter.draw(noise);
+        }
+        values
+    }
+}
+
+impl Parameter {
+    fn draw(&self, noise: &mut Noise) -> f64 {
+        match self.draw {
+            Draw::Linear => noise.between(self.low, self.high),
+            Draw::Log => noise.log_between(self.low, self.high),
+            Draw::Signed => {
+                noise.log_between(self.low, self.high) * if noise.chance(0.5) { 1.0 } else { -1.0 }
+            }
+            Draw::Factor => {
+                let size = noise.log_between(self.low, self.high);
+                if noise.chance(0.5) { 1.0 + size } else { 1.0 / (1.0 + size) }
+            }
+        }
+    }
+}
+
+/// One defect with its parameters' values.
+#[derive(Clone, Copy)]
+pub struct Defect {
+    /// What kind.
+    pub kind: &'static Kind,
+    /// Its parameters' values, in the kind's order.
+    pub values: Values,
+}
+
+impl PartialEq for Defect {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self.kind, other.kind) && self.values == other.values
+    }
+}
+
+impl std::fmt::Debug for Defect {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}{:?}", self.kind.name, &self.values[..self.kind.parameters.len()])
+    }
+}
+
+impl Defects {
+    /// Peak-to-peak amplitude under the finger [m].
+    pub fn plate(&self, at: &Surroundings, mut pp_m: f64) -> f64 {
+        for defect in &self.defects {
+            if let Some(act) = defect.kind.act.plate {
+                pp_m = act(&defect.values, at, pp_m);
+            }
+        }
+        pp_m
+    }
+
+    /// Changes the contact.
+    pub fn contact(&self, at: &Surroundings, contact: &mut Contact) {
+        for defect in &self.defects {
+            if let Some(act) = defect.kind.act.contact {
+                act(&defect.values, at, contact);
+            }
+        }
+    }
+
+    /// Changes the forces on their way to the sensor.
+    pub fn forces(&self, at: &Surroundings, forces: &mut Forces) {
+        for defect in &self.defects {
+            if let Some(act) = defect.kind.act.forces {
+                act(&defect.values, at, forces);
+            }
+        }
+    }
+
+    /// Changes the world before it starts.
+    pub fn setup(&self, config: &mut WorldConfig) {
+        for defect in &self.defects {
+            if let Some(act) = defect.kind.act.setup {
+                act(&defect.values, config);
+            }
+        }
+    }
+}
+
+/// Declares the rooms of this folder and lists their kinds.
+macro_rules! kinds {
+    ($($room:ident)*) => {
+        $(mod $room;)*
+        /// Every kind of defect.
+        pub static ALL: &[&Kind] = &[$(&$room::KIND),*];
+    };
+}
+
+kinds! {
+    squeeze_film
+    amplitude_droop
+}

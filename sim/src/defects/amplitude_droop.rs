@@ -1,0 +1,20 @@
+//! The finger loads the plate and its amplitude droops: the more contact area, the more.
+//!
+//! The area of a soft sphere grows as the 2/3 power of the load (Hertz); each area of skin takes power from the
+//! plate in proportion to the square of its speed, and to how much of the cycle it touches.
+
+use super::{Act, Draw, Kind, Parameter, Place, Surroundings, Values};
+
+pub(super) static KIND: Kind = Kind {
+    name: "amplitude_droop",
+    place: Place::Plate,
+    in_library: true,
+    in_tables: true,
+    summary: "the plate's amplitude droops under the finger's load",
+    parameters: &[Parameter { name: "load_ratio_at_1_n", low: 0.01, high: 3.0, draw: Draw::Log }],
+    act: Act { setup: None, plate: Some(act), contact: None, forces: None },
+};
+
+fn act(v: &Values, at: &Surroundings, pp_m: f64) -> f64 {
+    pp_m / (1.0 + v[0] * at.normal_force_n.max(0.0).cbrt().powi(2))
+}

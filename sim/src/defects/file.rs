@@ -1,0 +1,208 @@
+//! The defects file: TOML, unknown keys refused with their place.
+
+use serde::Deserialize;
+
+use super::{Defect, Kind, Values};
+use crate::channel::ChannelFault;
+use crate::noise::Noise;
+
+/// The defects of one world.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Defects {
+    /// Defects of bodies and instruments, in the order in which they act.
+    pub defects: Vec<Defect>,
+    /// Faults of communication.
+    pub channels: Vec<ChannelFault>,
+}
+
+/// Why a defects file was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum DefectsError {
+    /// Not TOML, or a key or value that has no place there.
+    #[error("{0}")]
+    Toml(#[from] toml::de::Error),
+    /// No such kind of defect.
+    #[error("line {line}: no defect is called '{name}'; known: {known}")]
+    UnknownKind {
+        /// Line in the file.
+        line: usize,
+        /// What stands there.
+        name: String,
+        /// The known names.
+        known: String,
+    },
+    /// A parameter the defect does not have.
+    #[error("line {line}: '{defect}' has no parameter '{parameter}'; it has: {known}")]
+    UnknownParameter {
+        /// Line in the file.
+        line: usize,
+        /// The defect.
+        defect: &'static str,
+        /// What stands there.
+        parameter: String,
+        /// The defect's parameters.
+        known: String,
+    },
+    /// A parameter that is missing, without a seed to draw it from.
+    #[error("line {line}: '{defect}' needs its parameter '{parameter}' (or a seed to draw it from)")]
+    MissingParameter {
+        /// Line in the file.
+        line: usize,
+        /// The defect.
+        defect: &'static str,
+        /// Which one.
+        parameter: &'static str,
+    },
+    /// A number that cannot be.
+    #[error("line {line}: '{parameter}' is {value}; a finite number is needed")]
+    NotFinite {
+        /// Line in the file.
+        line: usize,
+        /// Which one.
+        parameter: String,
+        /// What stands there.
+        value: f64,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    defect: Vec<Entry>,
+    #[serde(default)]
+    channel: Vec<ChannelFault>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    name: toml::Spanned<String>,
+    seed: Option<u64>,
+    #[serde(default)]
+    parameters: std::collections::BTreeMap<String, toml::Spanned<f64>>,
+}
+
+impl Defects {
+    /// No defect at all.
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// One defect, its parameters drawn from a seed: sealed by name and seed.
+    ///
+    /// # Errors
+    /// An unknown name.
+    pub fn sealed(name: &str, seed: u64) -> Result<Self, DefectsError> {
+        let kind = Kind::named(name).ok_or_else(|| unknown(1, name))?;
+        Ok(Self { defects: vec![drawn(kind, seed)], channels: Vec::new() })
+    }
+
+    /// Reads a defects file's text.
+    ///
+    /// # Errors
+    /// What is wrong with it, and in which line.
+    pub fn parse(text: &str) -> Result<Self, DefectsError> {
+        let file: File = toml::from_str(text)?;
+        let line = |offset: usize| 1 + text[..offset.min(text.len())].matches('\n').count();
+        let mut defects = Vec::with_capacity(file.defect.len());
+        for entry in &file.defect {
+            let at = line(entry.name.span().start);
+            let name = entry.name.get_ref();
+            let kind = Kind::named(name).ok_or_else(|| unknown(at, name))?;
+            let mut defect = drawn(kind, entry.seed.unwrap_or(0));
+            let mut given = [false; 4];
+            for (parameter, value) in &entry.parameters {
+                let at = line(value.span().start);
+                let known = || kind.parameters.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
+                let index = kind.parameters.iter().position(|p| p.name == parameter).ok_or_else(|| {
+                    DefectsError::UnknownParameter {
+                        line: at,
+                        defect: kind.name,
+                        parameter: parameter.clone(),
+                        known: known(),
+                    }
+                })?;
+                let value = *value.get_ref();
+                if !value.is_finite() {
+                    return Err(DefectsError::NotFinite { line: at, parameter: parameter.clone(), value });
+                }
+                defect.values[index] = value;
+                given[index] = true;
+            }
+            if entry.seed.is_none()
+                && let Some(missing) = (0..kind.parameters.len()).find(|i| !given[*i])
+            {
+                let parameter = kind.parameters[missing].name;
+                return Err(DefectsError::MissingParameter { line: at, defect: kind.name, parameter });
+            }
+            defects.push(defect);
+        }
+        Ok(Self { defects, channels: file.channel })
+    }
+
+    /// The file that reads back as these defects.
+    pub fn to_toml(&self) -> String {
+        let mut out = String::new();
+        for defect in &self.defects {
+            out.push_str(&format!("[[defect]]\nname = \"{}\"\n[defect.parameters]\n", defect.kind.name));
+            for (parameter, value) in defect.kind.parameters.iter().zip(defect.values) {
+                out.push_str(&format!("{} = {value:e}\n", parameter.name));
+            }
+            out.push('\n');
+        }
+        for channel in &self.channels {
+            let text = toml::to_string(channel).unwrap_or_default();
+            out.push_str(&format!("[[channel]]\n{text}\n"));
+        }
+        out
+    }
+}
+
+fn drawn(kind: &'static Kind, seed: u64) -> Defect {
+    let values: Values = kind.draw(&mut Noise::new(seed, kind.name));
+    Defect { kind, values }
+}
+
+fn unknown(line: usize, name: &str) -> DefectsError {
+    let known = super::ALL.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
+    DefectsError::UnknownKind { line, name: name.to_string(), known }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_reads_back_as_itself() {
+        let text = "[[defect]]\nname = \"squeeze_film\"\nseed = 7\n\n[[channel]]\nchannel = \"force\"\nfault = \"stuck\"\nfrom_s = 2.5\nuntil_s = 3.0\n";
+        let defects = Defects::parse(text).unwrap();
+        assert_eq!(defects.defects[0], Defects::sealed("squeeze_film", 7).unwrap().defects[0]);
+        assert_eq!(Defects::parse(&defects.to_toml()).unwrap(), defects);
+    }
+
+    #[test]
+    fn every_fault_of_a_file_is_told_with_its_place() {
+        for (text, expected) in [
+            ("[[defect]]\nname = \"gremlin\"\nseed = 1\n", "line 2: no defect is called 'gremlin'"),
+            (
+                "[[defect]]\nname = \"squeeze_film\"\nparameters = { area = 1.0 }\n",
+                "line 3: 'squeeze_film' has no parameter 'area'",
+            ),
+            (
+                "[[defect]]\nname = \"squeeze_film\"\n",
+                "line 2: 'squeeze_film' needs its parameter 'film_area_m2'",
+            ),
+            (
+                "[[defect]]\nname = \"amplitude_droop\"\nparameters = { load_ratio_at_1_n = nan }\n",
+                "line 3: 'load_ratio_at_1_n' is NaN",
+            ),
+            ("[[defect]]\nname = \"squeeze_film\"\nsees = 3\n", "line 3"),
+            ("[[channel]]\nchannel = \"force\"\nfault = \"tired\"\n", "line 3"),
+            ("colour = 3\n", "line 1"),
+        ] {
+            let error = Defects::parse(text).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

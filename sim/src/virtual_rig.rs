@@ -1,0 +1,181 @@
+//! The three ports of the loop on a world in this process, in virtual time.
+//!
+//! [`VirtualRig`] is all three ports on one world: nothing is shared, nothing locked. Where three separate ports are
+//! wanted, [`VirtualRig::split`] shares the world between them behind a mutex: for threads beside the loop, not
+//! for its real-time path. Each call first moves the world to the time it is given.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use realtime::ports::{
+    Amplifier, AmplifierState, Channel, ForceSensor, Forces, Nanos, NoData, Quality, Reading, Stage,
+    StageState,
+};
+use realtime::safety::{DriveCommand, StageCommand};
+
+use crate::amplifier::AmplifierInput;
+use crate::sensor::ForceSample;
+use crate::stage::StageInput;
+use crate::world::{ConfigError, World, WorldConfig};
+
+/// A world with the loop's three ports.
+pub struct VirtualRig {
+    world: World,
+}
+
+impl VirtualRig {
+    /// A rig of a configuration and a seed.
+    ///
+    /// # Errors
+    /// A configuration that cannot be, by name.
+    pub fn new(config: &WorldConfig, seed: u64) -> Result<Self, ConfigError> {
+        Ok(Self { world: World::new(config, seed)? })
+    }
+
+    /// The world behind the ports.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The world behind the ports, to change the room or to repair something.
+    pub fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// Three ports that share the world.
+    pub fn split(self) -> [SharedRig; 3] {
+        let shared = SharedRig(Arc::new(Mutex::new(self)));
+        [shared.clone(), shared.clone(), shared]
+    }
+}
+
+fn reading(sample: &ForceSample, axis: usize) -> Channel {
+    if !sample.force_n[axis].is_finite() {
+        return Err(NoData::Invalid);
+    }
+    Ok(Reading {
+        value: sample.force_n[axis],
+        raw: i64::from(sample.counts[axis]),
+        taken_at: sample.taken_at,
+        sequence: sample.sequence,
+        quality: if sample.saturated[axis] { Quality::Saturated } else { Quality::Good },
+    })
+}
+
+impl ForceSensor for VirtualRig {
+    fn read(&mut self, now: Nanos) -> Forces {
+        self.world.advance_to(now);
+        match self.world.force_sample() {
+            None => Forces::missing(NoData::NeverRead),
+            Some(sample) => Forces { lateral: reading(&sample, 0), normal: reading(&sample, 1) },
+        }
+    }
+}
+
+impl Amplifier for VirtualRig {
+    fn command(&mut self, command: DriveCommand, now: Nanos) {
+        self.world.advance_to(now);
+        if now > command.expires_at() {
+            return;
+        }
+        self.world.command_amplifier(AmplifierInput {
+            amplitude: command.amplitude(),
+            frequency_hz: command.frequency_hz(),
+            enable: command.enable(),
+            heartbeat: command.sequence(),
+        });
+    }
+
+    fn state(&mut self, now: Nanos) -> Result<AmplifierState, NoData> {
+        self.world.advance_to(now);
+        let status = self.world.amplifier_status().ok_or(NoData::NeverRead)?;
+        let channel = |value: f64, raw: i64| {
+            let (taken_at, sequence) = (status.taken_at, status.sequence);
+            Ok(Reading { value, raw, taken_at, sequence, quality: Quality::Good })
+        };
+        Ok(AmplifierState {
+            amplitude: channel(status.measured_pp_m, status.measured_counts),
+            echoed_amplitude: status.echoed_amplitude,
+            echoed_frequency_hz: status.echoed_frequency_hz,
+            output_on: status.output_on,
+            watchdog_tripped: status.watchdog_tripped,
+            fault: status.fault || !status.supply_closed,
+            temperature_c: channel(status.temperature_c, (status.temperature_c * 10.0).round() as i64),
+            taken_at: status.taken_at,
+            sequence: status.sequence,
+        })
+    }
+
+    fn cut_supply(&mut self, now: Nanos) -> bool {
+        self.world.advance_to(now);
+        self.world.cut_supply();
+        true
+    }
+}
+
+impl Stage for VirtualRig {
+    fn command(&mut self, command: StageCommand, now: Nanos) {
+        self.world.advance_to(now);
+        if now > command.expires_at() {
+            return;
+        }
+        self.world.command_stage(StageInput {
+            velocity_m_s: command.velocity_m_s(),
+            normal_force_n: command.normal_force_n(),
+        });
+    }
+
+    fn state(&mut self, now: Nanos) -> Result<StageState, NoData> {
+        self.world.advance_to(now);
+        let status = self.world.stage_status().ok_or(NoData::NeverRead)?;
+        Ok(StageState {
+            position_m: status.position_m,
+            velocity_m_s: status.velocity_m_s,
+            at_limit: status.at_limit,
+            fault: status.fault,
+            taken_at: status.taken_at,
+            sequence: status.sequence,
+        })
+    }
+}
+
+/// One of three ports on a shared world.
+#[derive(Clone)]
+pub struct SharedRig(Arc<Mutex<VirtualRig>>);
+
+impl SharedRig {
+    /// The rig, for as long as the guard lives.
+    pub fn rig(&self) -> MutexGuard<'_, VirtualRig> {
+        // A world has no half-made states that outlive a panic in another port's reader.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl ForceSensor for SharedRig {
+    fn read(&mut self, now: Nanos) -> Forces {
+        self.rig().read(now)
+    }
+}
+
+impl Amplifier for SharedRig {
+    fn command(&mut self, command: DriveCommand, now: Nanos) {
+        Amplifier::command(&mut *self.rig(), command, now);
+    }
+
+    fn state(&mut self, now: Nanos) -> Result<AmplifierState, NoData> {
+        Amplifier::state(&mut *self.rig(), now)
+    }
+
+    fn cut_supply(&mut self, now: Nanos) -> bool {
+        self.rig().cut_supply(now)
+    }
+}
+
+impl Stage for SharedRig {
+    fn command(&mut self, command: StageCommand, now: Nanos) {
+        Stage::command(&mut *self.rig(), command, now);
+    }
+
+    fn state(&mut self, now: Nanos) -> Result<StageState, NoData> {
+        Stage::state(&mut *self.rig(), now)
+    }
+}
