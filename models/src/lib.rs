@@ -18,5 +18,6 @@ pub mod prediction;
 pub mod psi;
 pub mod quantity;
 pub mod record;
+pub mod ridge;
 pub mod root;
 pub mod spring_slider;

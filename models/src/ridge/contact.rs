@@ -1,0 +1,125 @@
+//! The rigid plate: penalty contact with Coulomb friction on the surface row.
+//!
+//! Where the surface is below the plate, a spring of the node pushes it back; along the plate a second
+//! spring of the same stiffness stretches with the sliding until Coulomb's limit. Out of contact the
+//! stretch is forgotten at once. The springs are free of inertia.
+
+use super::RidgeError;
+use super::kernel::Surface;
+use serde::{Deserialize, Serialize};
+
+/// Where Coulomb's limit holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FrictionRule {
+    /// For the whole ridge, as in the paper: a finely rough surface.
+    Global,
+    /// At each node by itself.
+    Local,
+}
+
+/// Forces between plate and surface in one step, N per metre of depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactForce {
+    /// Normal force, on the skin upwards, never negative.
+    pub normal: f64,
+    /// Lateral force on the skin along the plate's motion.
+    pub lateral: f64,
+    /// Power given to the skin in W per metre.
+    pub power: f64,
+    /// Nodes in contact.
+    pub nodes: usize,
+}
+
+/// A rigid plate under the surface row.
+#[derive(Clone, Debug)]
+pub struct Plate {
+    penalty: Vec<f64>,
+    stretch: Vec<f64>,
+    load: Vec<f64>,
+    rule: FrictionRule,
+    mu0: f64,
+}
+
+impl Plate {
+    /// `penalty`: spring of each surface node, N/m per metre of depth (zero: the node never touches).
+    pub fn new(penalty: Vec<f64>, rule: FrictionRule, mu0: f64) -> Result<Plate, RidgeError> {
+        if !(0.0..=10.0).contains(&mu0) {
+            return Err(RidgeError::Input {
+                what: "coefficient of friction".into(),
+                value: mu0,
+                range: "0 to 10".into(),
+            });
+        }
+        if let Some(bad) = penalty.iter().find(|k| !(**k >= 0.0 && k.is_finite())) {
+            return Err(RidgeError::Input {
+                what: "contact penalty in Pa".into(),
+                value: *bad,
+                range: "0 or above".into(),
+            });
+        }
+        let n = penalty.len();
+        Ok(Plate { penalty, stretch: vec![0.0; n], load: vec![0.0; n], rule, mu0 })
+    }
+
+    /// Springs of the surface nodes, N/m per metre of depth.
+    pub fn penalty(&self) -> &[f64] {
+        &self.penalty
+    }
+
+    /// Normal force on each surface node in the last step, N per metre of depth.
+    pub fn node_load(&self) -> &[f64] {
+        &self.load
+    }
+
+    /// Energy stored in the contact springs, J per metre of depth.
+    pub fn stored_energy(&self) -> f64 {
+        let each = self.penalty.iter().zip(&self.stretch).zip(&self.load);
+        each.map(|((k, s), f)| if *k > 0.0 { 0.5 * k * s * s + 0.5 * f * f / k } else { 0.0 }).sum()
+    }
+
+    /// Presses and drags the surface: the plate stands at `height` (m) and moves along +x at `speed` (m/s).
+    #[inline]
+    pub fn touch(&mut self, surface: &mut Surface<'_>, height: f64, speed: f64) -> ContactForce {
+        let half = 0.5 * surface.dt;
+        let mut sum = ContactForce::default();
+        for (i, k) in self.penalty.iter().enumerate() {
+            let depth = height - (surface.y[i] + half * surface.vy[i]);
+            if depth > 0.0 && *k > 0.0 {
+                let load = k * depth;
+                let limit = self.mu0 * load;
+                let mut stretch = self.stretch[i] + (speed - surface.vx[i]) * surface.dt;
+                if self.rule == FrictionRule::Local {
+                    stretch = stretch.clamp(-limit / k, limit / k);
+                }
+                self.stretch[i] = stretch;
+                self.load[i] = load;
+                sum.normal += load;
+                sum.lateral += k * stretch;
+                sum.nodes += 1;
+            } else {
+                self.stretch[i] = 0.0;
+                self.load[i] = 0.0;
+            }
+        }
+        if sum.nodes == 0 {
+            return sum;
+        }
+        let limit = self.mu0 * sum.normal;
+        if self.rule == FrictionRule::Global && sum.lateral.abs() > limit {
+            // Slip: all springs give way alike.
+            let share = limit / sum.lateral.abs();
+            self.stretch.iter_mut().for_each(|s| *s *= share);
+            sum.lateral *= share;
+        }
+        for (i, k) in self.penalty.iter().enumerate() {
+            if self.load[i] > 0.0 {
+                let pull = k * self.stretch[i];
+                surface.fx[i] -= pull;
+                surface.fy[i] -= self.load[i];
+                sum.power += pull * surface.vx[i] + self.load[i] * surface.vy[i];
+            }
+        }
+        sum
+    }
+}

@@ -1,0 +1,53 @@
+//! The paper's finite element model of one fingerprint ridge on a vibrating plate (section 3).
+//!
+//! | file | holds |
+//! |---|---|
+//! | `mesh.rs` | the structured mesh and the ridge's sizes (Table 1) |
+//! | `material.rs` | elastic and viscoelastic tissue |
+//! | `lanes.rs`, `kernel.rs` | one step of all elements and nodes in SIMD |
+//! | `body.rs` | the fields the kernel works on, energies |
+//! | `contact.rs` | the rigid plate, penalty and friction |
+//! | `stability.rs` | the stable time step |
+//!
+//! Forces and masses are per metre of depth (plane strain). `docs/ridge.md` states every assumption and
+//! how it was checked.
+
+pub mod body;
+pub mod contact;
+mod kernel;
+mod lanes;
+pub mod material;
+pub mod mesh;
+pub mod stability;
+
+pub use body::{Body, Energy, Strain, Work};
+pub use contact::{ContactForce, FrictionRule, Plate};
+pub use kernel::Surface;
+pub use material::Material;
+pub use mesh::{Mesh, RidgeGeometry, RidgeMesh, RidgeProfile};
+
+/// Why a ridge could not be built or computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RidgeError {
+    /// A value that makes no sense, with what it may be.
+    #[error("{what} is {value}: must be {range}")]
+    Input {
+        /// The quantity, with its unit.
+        what: String,
+        /// What was given.
+        value: f64,
+        /// What is allowed.
+        range: String,
+    },
+    /// A time step above the stable one was asked for.
+    #[error("a time step of {asked_s:e} s is unstable here: at most {stable_s:e} s (or leave it out)")]
+    UnstableStep {
+        /// What was asked for, s.
+        asked_s: f64,
+        /// The largest stable step, s.
+        stable_s: f64,
+    },
+    /// The run has run away; its numbers mean nothing.
+    #[error("the run diverged: velocities beyond 1e6 m/s or not numbers; use a smaller time step")]
+    Diverged,
+}
