@@ -238,3 +238,21 @@ pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
             .collect(),
     }
 }
+
+/// Lateness in ns of a bare absolute sleep of that period, for so long: what the machine itself gives.
+pub fn lateness_of_sleep(during: std::time::Duration, period: std::time::Duration) -> Vec<u64> {
+    let period_ns = (period.as_nanos() as u64).max(1);
+    let count = (during.as_nanos() as u64 / period_ns).max(1);
+    let mut late = Vec::with_capacity(count as usize);
+    let mut deadline = monotonic_ns() + period_ns;
+    for _ in 0..count {
+        sleep_until(deadline);
+        let begun = monotonic_ns();
+        late.push(begun.saturating_sub(deadline));
+        deadline += period_ns;
+        if begun > deadline {
+            deadline = begun + period_ns;
+        }
+    }
+    late
+}

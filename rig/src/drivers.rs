@@ -248,3 +248,35 @@ impl Session {
         self.stop.load(Ordering::Acquire)
     }
 }
+
+/// Samples per second of a profile's first regular poll, or of the instrument behind it where that is slower.
+/// `None` for a profile that is not bundled or has no regular poll.
+#[must_use]
+pub fn nominal_rate_hz(id: &str) -> Option<f64> {
+    let profile = profile(id).ok()?;
+    let polled = profile.description.poll.iter().find_map(|poll| poll.rate_hz)?;
+    Some(polled)
+}
+
+/// Emulators of a setup's instruments by Modbus unit, for a virtual rig behind Modbus TCP.
+///
+/// # Errors
+/// A profile that is not bundled or names what the world does not have, or two instruments of one unit.
+pub fn emulators(
+    setup: &InstrumentsSetup,
+) -> miette::Result<std::collections::BTreeMap<u8, sim::wire::device::Device>> {
+    let mut devices = std::collections::BTreeMap::new();
+    for instrument in setup.force.iter().chain([&setup.amplifier, &setup.stage]) {
+        let profile = profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
+        let unit = instrument.unit.or(profile.description.link.unit).unwrap_or(1);
+        let device = sim::wire::device::Device::new(profile)
+            .map_err(|e| miette::miette!("{}: {e}", instrument.profile))?;
+        if devices.insert(unit, device).is_some() {
+            miette::bail!(
+                help = "give one of them another `unit`",
+                "two instruments of the virtual rig have Modbus unit {unit}"
+            );
+        }
+    }
+    Ok(devices)
+}

@@ -1,2 +1,25 @@
 //! muprime: the controller of a hardware-in-the-loop tribometer.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`setup`], [`plan`], [`fingertip`] | what people write: rigs, plans, fingertips, all checked with the place in the file |
+//! | [`drivers`] | instruments behind the loop's ports |
+//! | [`sequence`] | the order of a sweep, a pure state machine over rows |
+//! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
+//! | [`run_dir`], [`catalogue`] | a run's folder and the catalogue of runs |
+//! | [`report`], [`export`] | what people look at and take elsewhere |
+//! | [`cli`] | one file a subcommand |
+
+pub mod catalogue;
+pub mod cli;
 pub mod drivers;
+pub mod export;
+pub mod fingertip;
+pub mod input;
+pub mod model_file;
+pub mod plan;
+pub mod report;
+pub mod run_dir;
+pub mod sequence;
+pub mod session;
+pub mod setup;

@@ -1,6 +1,7 @@
 //! The `muprime` command: parses its arguments and hands over to one file per subcommand in `cli/`.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+use rig::cli;
 use std::process::ExitCode;
 
 /// Controller of a hardware-in-the-loop tribometer: ultrasonic friction reduction, measured and explained.
@@ -15,10 +16,60 @@ struct Cli {
 }
 
 #[derive(Subcommand)]
-enum Verb {}
+enum Verb {
+    /// An automated friction sweep; without arguments on the bundled virtual rig
+    Run(cli::run::Args),
+    /// Serve the simulated rig behind real protocols until interrupted
+    VirtualRig(cli::virtual_rig::Args),
+    /// Read setups, plans, profiles; say what is wrong, with the place in the file
+    Check(cli::check::Args),
+    /// Judge this machine, and the instruments of a setup
+    Doctor(cli::doctor::Args),
+    /// Write the report of a run
+    Report(cli::report::Args),
+    /// Convert the passes of a run
+    Export(cli::export::Args),
+    /// Make a cut record whole again
+    Recover(cli::recover::Args),
+    /// List the runs
+    Runs(cli::runs::Args),
+    /// Follow a run
+    Watch(cli::watch::Args),
+    /// Print a completion script for a shell
+    Completions(cli::completions::Args),
+}
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let _ = cli.json;
-    match cli.verb {}
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { cli::REFUSED } else { cli::DONE });
+        }
+    };
+    let filter = tracing_subscriber::EnvFilter::try_from_env("MUPRIME_LOG")
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let json = cli.json;
+    // A panic is a fault of this program: status 3, after the threads have put the rig in its safe state.
+    let outcome = std::panic::catch_unwind(|| match cli.verb {
+        Verb::Run(args) => cli::run::run(args, json),
+        Verb::VirtualRig(args) => cli::virtual_rig::run(args, json),
+        Verb::Check(args) => cli::check::run(args, json),
+        Verb::Doctor(args) => cli::doctor::run(args, json),
+        Verb::Report(args) => cli::report::run(args, json),
+        Verb::Export(args) => cli::export::run(args, json),
+        Verb::Recover(args) => cli::recover::run(args, json),
+        Verb::Runs(args) => cli::runs::run(args, json),
+        Verb::Watch(args) => cli::watch::run(args, json),
+        Verb::Completions(args) => cli::completions::run(&args, &mut Cli::command()),
+    });
+    match outcome {
+        Ok(Ok(code)) => code,
+        Ok(Err(report)) => {
+            eprintln!("{report:?}");
+            ExitCode::from(cli::REFUSED)
+        }
+        Err(_) => ExitCode::from(cli::INTERNAL),
+    }
 }

@@ -31,6 +31,11 @@ impl VirtualRig {
         Ok(Self { world: World::new(config, seed)? })
     }
 
+    /// A rig on a world that is there already.
+    pub fn of(world: World) -> Self {
+        Self { world }
+    }
+
     /// The world behind the ports.
     pub fn world(&self) -> &World {
         &self.world

@@ -9,10 +9,12 @@
 //! | [`quantity`] | what of the world a profile may name |
 //! | [`device`] | one emulated instrument: registers from the world, commands into it |
 //! | [`modbus_tcp`] | a Modbus TCP server over devices |
+//! | [`world`] | the virtual world as the emulators meet it |
 
 pub mod device;
 pub mod modbus_tcp;
 pub mod quantity;
+pub mod world;
 
 pub use quantity::{Command, Quantity};
 

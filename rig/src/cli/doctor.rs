@@ -1,0 +1,228 @@
+//! `muprime doctor`: judges this machine truthfully, and talks to the instruments of a setup.
+
+use crate::setup::Setup;
+use realtime::pacing;
+use serde::Serialize;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Setup whose instruments are talked to
+    #[arg(long)]
+    setup: Option<String>,
+    /// How long lateness is measured, in s
+    #[arg(long, default_value_t = 3.0)]
+    seconds: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Finding {
+    subject: &'static str,
+    good: bool,
+    found: String,
+    advice: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Judgement {
+    findings: Vec<Finding>,
+    lateness_us: Lateness,
+    instruments: Vec<Finding>,
+}
+
+/// Lateness of a bare 1 kHz sleep, without load and with every core busy, in us.
+#[derive(Debug, Serialize)]
+struct Lateness {
+    idle: [f64; 4],
+    loaded: [f64; 4],
+    quantiles: [f64; 4],
+}
+
+/// Judges.
+///
+/// # Errors
+/// A setup that cannot be used.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let setup = args.setup.as_deref().map(Setup::load).transpose()?;
+    let seconds = args.seconds.clamp(0.1, 60.0);
+    let (grants, idle) = measure(seconds, 0);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let (_, loaded) = measure(seconds, cores);
+    let mut findings = machine(&grants);
+    let worst = loaded[3];
+    findings.push(Finding {
+        subject: "lateness under load",
+        good: loaded[2] < 500.0,
+        found: format!("99.9 % {:.0} us, worst {worst:.0} us", loaded[2]),
+        advice: "use a PREEMPT_RT kernel, isolate a core (isolcpus, nohz_full), no virtual machine".into(),
+    });
+    let instruments = setup.as_ref().map(talk).unwrap_or_default();
+    let good = findings.iter().chain(&instruments).all(|f| f.good);
+    let judgement = Judgement {
+        findings,
+        lateness_us: Lateness { idle, loaded, quantiles: [0.5, 0.99, 0.999, 1.0] },
+        instruments,
+    };
+    if json {
+        println!("{}", serde_json::json!({ "good": good, "judgement": judgement }));
+    } else {
+        for f in judgement.findings.iter().chain(&judgement.instruments) {
+            let mark = if f.good { "good" } else { "POOR" };
+            println!("{mark}  {}: {}", f.subject, f.found);
+            if !f.good {
+                println!("      {}", f.advice);
+            }
+        }
+        let [p50, p99, p999, max] = judgement.lateness_us.idle;
+        println!("      lateness idle: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us");
+        let [p50, p99, p999, max] = judgement.lateness_us.loaded;
+        println!("      lateness loaded: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us");
+    }
+    super::exit(if good { super::DONE } else { super::FAILED })
+}
+
+/// Lateness quantiles of a 1 kHz sleep in us, with so many busy threads beside it.
+fn measure(seconds: f64, busy: usize) -> (pacing::Grants, [f64; 4]) {
+    let until = Instant::now() + Duration::from_secs_f64(seconds);
+    let loads: Vec<_> = (0..busy)
+        .map(|i| {
+            std::thread::spawn(move || {
+                let mut x = i as f64;
+                while Instant::now() < until {
+                    for _ in 0..10_000 {
+                        x = (x + 1.0).sqrt();
+                    }
+                }
+                std::hint::black_box(x)
+            })
+        })
+        .collect();
+    let looping = std::thread::spawn(move || {
+        let grants = pacing::ask_for_real_time(80);
+        (grants, pacing::lateness_of_sleep(Duration::from_secs_f64(seconds), Duration::from_millis(1)))
+    });
+    let (grants, mut late) = looping.join().unwrap_or_default();
+    for load in loads {
+        let _ = load.join();
+    }
+    late.sort_unstable();
+    let at = |q: f64| {
+        let i = ((late.len() as f64 * q) as usize).min(late.len().saturating_sub(1));
+        late.get(i).map_or(0.0, |ns| *ns as f64 / 1e3)
+    };
+    (grants, [at(0.5), at(0.99), at(0.999), at(1.0)])
+}
+
+fn machine(grants: &pacing::Grants) -> Vec<Finding> {
+    let read = |path: &str| std::fs::read_to_string(path).ok().map(|s| s.trim().to_string());
+    let fifo = grants.policy == "fifo";
+    let throttle = read("/proc/sys/kernel/sched_rt_runtime_us");
+    let kernel = read("/proc/sys/kernel/osrelease").unwrap_or_default();
+    let preempt_rt = read("/sys/kernel/realtime").as_deref() == Some("1");
+    let governor = read("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
+    let group = std::path::Path::new("/sys/fs/cgroup/cpu/cpu.rt_runtime_us").exists();
+    let slack = read("/proc/self/timerslack_ns");
+    let virtual_machine = read("/proc/cpuinfo").is_some_and(|c| c.contains("hypervisor"));
+    vec![
+        Finding {
+            subject: "scheduling class",
+            good: fifo,
+            found: match &grants.policy_refused {
+                None => format!("{} at priority {}, read back", grants.policy, grants.priority),
+                Some(why) => format!("{}; SCHED_FIFO was refused: {why}", grants.policy),
+            },
+            advice: "give the user RLIMIT_RTPRIO (limits.d: '@realtime - rtprio 98') or CAP_SYS_NICE".into(),
+        },
+        Finding {
+            subject: "memory lock",
+            good: grants.memory_locked,
+            found: match &grants.lock_refused {
+                None => "granted".into(),
+                Some(why) => format!("refused: {why}"),
+            },
+            advice: "give the user RLIMIT_MEMLOCK (limits.d: '@realtime - memlock unlimited')".into(),
+        },
+        Finding {
+            subject: "kernel",
+            good: preempt_rt,
+            found: format!("{kernel}, {}", if preempt_rt { "PREEMPT_RT" } else { "not PREEMPT_RT" }),
+            advice: "install a PREEMPT_RT kernel (Debian: linux-image-rt-amd64)".into(),
+        },
+        Finding {
+            subject: "real-time throttling",
+            good: throttle.as_deref() != Some("0"),
+            found: throttle.map_or("not readable".into(), |t| format!("sched_rt_runtime_us = {t}")),
+            advice: "0 forbids real-time threads; set kernel.sched_rt_runtime_us to 950000".into(),
+        },
+        Finding {
+            subject: "real-time group scheduling",
+            good: !group,
+            found: if group { "in force" } else { "not in force" }.into(),
+            advice: "outside the root group SCHED_FIFO may be taken away silently: give the group rt_runtime".into(),
+        },
+        Finding {
+            subject: "timer slack",
+            good: true,
+            found: slack.map_or("not readable".into(), |s| {
+                format!("{s} ns for ordinary threads; the loop sets its own to 1 ns")
+            }),
+            advice: String::new(),
+        },
+        Finding {
+            subject: "CPU frequency",
+            good: governor.as_deref().is_none_or(|g| g == "performance"),
+            found: governor.unwrap_or_else(|| "no frequency governor is visible".into()),
+            advice: "set the governor to 'performance'".into(),
+        },
+        Finding {
+            subject: "virtual machine",
+            good: !virtual_machine,
+            found: if virtual_machine { "yes: its host may hold it up for milliseconds" } else { "no" }.into(),
+            advice: "run a real rig on a machine of its own".into(),
+        },
+        Finding {
+            subject: "CAN",
+            good: true,
+            found: if std::path::Path::new("/proc/net/can").exists() {
+                "the kernel has SocketCAN".into()
+            } else {
+                "the kernel has no SocketCAN (slcan over a serial port needs none)".into()
+            },
+            advice: String::new(),
+        },
+    ]
+}
+
+/// Talks to every instrument of a setup and says what it found.
+fn talk(setup: &Setup) -> Vec<Finding> {
+    if setup.file.virtual_rig.is_some() {
+        return vec![Finding {
+            subject: "instruments",
+            good: true,
+            found: format!("'{}' is a virtual rig: it is started by 'muprime run'", setup.file.name),
+            advice: String::new(),
+        }];
+    }
+    match crate::drivers::open(&setup.instruments(), Instant::now()) {
+        Err(error) => vec![Finding {
+            subject: "instruments",
+            good: false,
+            found: error.to_string(),
+            advice: "check address, wiring, power, and that no other program holds the link".into(),
+        }],
+        Ok(rig) => {
+            std::thread::sleep(Duration::from_secs(1));
+            rig.links
+                .health()
+                .map(|(name, health)| Finding {
+                    subject: "instrument",
+                    good: health.last_problem.is_empty(),
+                    found: format!("{name}: {} samples in a second; {}", health.samples, health.last_problem),
+                    advice: "see 'last problem'".into(),
+                })
+                .collect()
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! `muprime export RUN --to csv|parquet|arrow`.
+
+use crate::export::{Format, export};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of the run
+    run: PathBuf,
+    /// Format
+    #[arg(long, value_enum)]
+    to: Format,
+    /// Where to write it [default: passes.<format> in the run's folder]
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+/// Converts.
+///
+/// # Errors
+/// A folder that holds no run, or a place that cannot be written.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let run = crate::report::read(&args.run)?;
+    let out = args.out.unwrap_or_else(|| args.run.join(format!("passes.{}", args.to.ending())));
+    export(&run, args.to, &out)?;
+    if json {
+        println!("{}", serde_json::json!({ "file": out, "passes": run.passes.len() }));
+    } else {
+        eprintln!("{} passes: {}", run.passes.len(), out.display());
+    }
+    super::exit(super::DONE)
+}

@@ -1,0 +1,225 @@
+//! `muprime run`: an automated friction sweep.
+
+use crate::catalogue::runs_folder;
+use crate::plan::Plan;
+use crate::sequence::{Event, Outcome};
+use crate::session::{Job, News, Signals, Summary};
+use crate::setup::Setup;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use miette::IntoDiagnostic;
+use models::prediction::{FrictionModel, SpringSlider};
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Plan: a file, or a bundled name (first-sweep, fig9-artificial, part2-validation)
+    #[arg(default_value = "first-sweep")]
+    plan: String,
+    /// Setup: a file, or a bundled name (virtual, virtual-ideal)
+    #[arg(long, default_value = "virtual")]
+    setup: String,
+    /// Folder of the run; an unfinished run there is taken up again [default: a new one in ./runs]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// A corrected model, as 'muprime diagnose --save-model' writes it
+    #[arg(long)]
+    model: Option<PathBuf>,
+    /// Seed of the order (and of the virtual rig) [default: the plan's]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Defects of the virtual rig, in place of its own
+    #[arg(long)]
+    defects: Option<PathBuf>,
+    /// In virtual time: a minute's sweep in a second or so
+    #[arg(long)]
+    fast: bool,
+}
+
+/// Runs the sweep.
+///
+/// # Errors
+/// A refusal: bad input, a busy rig, an instrument that does not answer.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let job = job(args)?;
+    let signals = Signals::default();
+    watch_signals(&signals)?;
+    let bar = progress_bar(json);
+    let planned = job.points()?.len();
+    bar.set_length(planned as u64);
+    if !json {
+        let clock = if job.fast { "virtual time" } else { "wall-clock time" };
+        bar.println(format!(
+            "{} on {}: {planned} passes in {clock}, into {}",
+            job.plan.file.name,
+            job.setup.file.name,
+            job.out.display()
+        ));
+    }
+    let summary = job.run(&signals, &mut |news| match news {
+        News::Pass(pass) => {
+            if json {
+                print_line(&serde_json::json!({ "pass": pass }));
+            }
+        }
+        News::Event(event) => {
+            if json {
+                print_line(&serde_json::json!({ "event": event }));
+            } else {
+                bar.println(describe(event));
+            }
+        }
+        News::Progress(made, _, left_s) => {
+            let resumed = planned as u64 - bar.length().unwrap_or(0).min(planned as u64);
+            bar.set_position(made as u64 + resumed);
+            bar.set_message(format!("{left_s:.0} s to go"));
+        }
+    })?;
+    bar.finish_and_clear();
+    tell(&summary, json);
+    super::exit(match summary.outcome {
+        Outcome::Complete | Outcome::Stopped => super::DONE,
+        _ => super::FAILED,
+    })
+}
+
+fn job(args: Args) -> miette::Result<Job> {
+    let setup = Setup::load(&args.setup)?;
+    let plan = Plan::load(&args.plan)?;
+    let defects = match &args.defects {
+        None => None,
+        Some(path) => {
+            if setup.file.virtual_rig.is_none() {
+                miette::bail!("--defects belongs to a virtual rig; '{}' is a real one", setup.file.name);
+            }
+            let text = crate::input::text_of(path)?;
+            let defects = sim::defects::Defects::parse(&text);
+            Some(defects.map_err(|e| miette::miette!("{}: {e}", path.display()))?)
+        }
+    };
+    let model_file = match &args.model {
+        None => None,
+        Some(path) => Some(("model.toml".to_string(), crate::input::text_of(path)?)),
+    };
+    let model: Arc<dyn FrictionModel> = match &model_file {
+        None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
+        Some((_, text)) => crate::model_file::load(text)?,
+    };
+    let seed = args.seed.unwrap_or(plan.file.seed);
+    let out = args.out.unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
+    Ok(Job { setup, plan, seed, model, model_file, defects, out, fast: args.fast })
+}
+
+/// Name of a new run: UTC date and time, and the plan.
+fn new_name(plan: &str) -> String {
+    let unix = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (days, second) = ((unix / 86_400) as i64, unix % 86_400);
+    // Civil date from days since 1970 (Howard Hinnant, 'chrono-compatible low-level date algorithms').
+    let z = days + 719_468;
+    let era = z.div_euclid(146_097);
+    let day_of_era = z.rem_euclid(146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month_shifted = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month_shifted + 2) / 5 + 1;
+    let month = if month_shifted < 10 { month_shifted + 3 } else { month_shifted - 9 };
+    let year = year_of_era + era * 400 + i64::from(month <= 2);
+    let (h, m, s) = (second / 3600, second / 60 % 60, second % 60);
+    format!("{year:04}{month:02}{day:02}-{h:02}{m:02}{s:02}-{plan}")
+}
+
+/// SIGINT, SIGTERM and SIGHUP ask for a stop; a second one leaves within two seconds whatever happens.
+fn watch_signals(signals: &Signals) -> miette::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let stops = Arc::clone(&signals.stops);
+    let mut caught = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]).into_diagnostic()?;
+    std::thread::Builder::new()
+        .name("signals".into())
+        .spawn(move || {
+            for (i, _) in caught.forever().enumerate() {
+                stops.fetch_add(1, Ordering::Relaxed);
+                if i > 0 {
+                    // The first one has sent the stop; the amplifier's watchdog covers the rest.
+                    std::thread::sleep(std::time::Duration::from_millis(1500));
+                    std::process::exit(i32::from(super::FAILED));
+                }
+            }
+        })
+        .into_diagnostic()?;
+    Ok(())
+}
+
+fn progress_bar(json: bool) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    if json || !std::io::stderr().is_terminal() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} passes, {msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}
+
+fn print_line(value: &serde_json::Value) {
+    let mut out = std::io::stdout().lock();
+    // A reader that has gone away is no reason to stop a sweep.
+    let _ = writeln!(out, "{value}");
+    let _ = out.flush();
+}
+
+fn describe(event: &Event) -> String {
+    match event {
+        Event::Armed => "armed".into(),
+        Event::Zeros { lateral_n, normal_n, after } => {
+            let mn = |v: &Option<f64>| v.map_or("none".into(), |v| format!("{:+.2} mN", v * 1e3));
+            let when = if *after { "after" } else { "before" };
+            format!("force zeros {when} the sweep: lateral {}, normal {}", mn(lateral_n), mn(normal_n))
+        }
+        Event::Tripped(trip) => {
+            format!(
+                "TRIP {:?}: {} against {} at {:.3} s (cycle {})",
+                trip.cause,
+                trip.value,
+                trip.bound,
+                trip.at.seconds(),
+                trip.cycle
+            )
+        }
+        Event::ModelDeparted { point, log_evidence } => {
+            let odds = (log_evidence / std::f64::consts::LN_10).floor();
+            format!("the model has left the measurement at point {point} (evidence beyond 10^{odds:.0} to 1)")
+        }
+        Event::StopRequested => "stopping: the rig goes to its safe state first".into(),
+        Event::PassRepeated { point } => format!("point {point}: no contact, once more"),
+    }
+}
+
+fn tell(summary: &Summary, json: bool) {
+    if json {
+        print_line(&serde_json::json!({ "summary": summary }));
+        return;
+    }
+    let mut err = std::io::stderr().lock();
+    let _ = writeln!(err, "{} of {} passes", summary.passes, summary.planned);
+    if let Some(report) = &summary.loop_report {
+        let [p50, _, p99, _, max] = report.lateness_ns.map(|ns| ns as f64 / 1e3);
+        let _ = writeln!(
+            err,
+            "loop: {} cycles, lateness median {p50:.0} us, 99 % {p99:.0} us, worst {max:.0} us; {} overruns, {} rows lost",
+            report.cycles, report.overruns, summary.record_lost
+        );
+    }
+    let finding = if summary.model_departed {
+        format!(
+            "the model has left the measurement: 'muprime diagnose {}' says where and why",
+            summary.folder.display()
+        )
+    } else {
+        "the measurement agrees with the model".into()
+    };
+    let _ = writeln!(err, "{finding}");
+    let _ = writeln!(err, "report: {}", summary.folder.join("report.html").display());
+}

@@ -1,0 +1,187 @@
+//! A plan: which passes to make, in which order, and how each is made.
+
+mod bundled;
+mod points;
+
+use crate::input::{self, BadInput};
+use models::quantity::PeakToPeak;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+pub use bundled::{BUNDLED, text as bundled_text};
+pub use points::{PlanProblem, Point, Resolution};
+
+/// A plan file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanFile {
+    /// Name, for records and reports.
+    pub name: String,
+    /// What the plan is for.
+    #[serde(default)]
+    pub about: String,
+    /// Seed of the order. `--seed` overrides it.
+    #[serde(default)]
+    pub seed: u64,
+    /// Whether the order of conditions is randomised.
+    #[serde(default = "yes")]
+    pub randomise: bool,
+    /// Repeats of every condition.
+    #[serde(default = "one")]
+    pub replicates: u32,
+    /// Directions of every condition, in turn: 1, -1 or both.
+    #[serde(default = "both")]
+    pub directions: Vec<i8>,
+    /// A reference without vibration before every so many conditions, and at the end; 0 for none.
+    #[serde(default = "eight")]
+    pub reference_every: u32,
+    /// How a pass is made.
+    #[serde(default)]
+    pub pass: PassTimes,
+    /// Values of everything that a series does not vary.
+    pub base: Base,
+    /// Series: each is the product of its lists, everything else at its base value.
+    #[serde(default)]
+    pub series: Vec<Series>,
+    /// Preparation and environment, as section 2.2 of the paper records them: copied into the record.
+    #[serde(default)]
+    pub protocol: BTreeMap<String, toml::Value>,
+}
+
+/// Times of a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PassTimes {
+    /// s from loading and starting until the average begins.
+    pub settle_s: f64,
+    /// s that are averaged.
+    pub measure_s: f64,
+    /// m/s of the lifted travel to the start of a pass.
+    pub approach_speed_m_s: f64,
+}
+
+impl Default for PassTimes {
+    fn default() -> Self {
+        PassTimes { settle_s: 0.15, measure_s: 0.25, approach_speed_m_s: 0.15 }
+    }
+}
+
+/// Base values of a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Base {
+    /// m, peak-to-peak.
+    pub amplitude_pp_m: f64,
+    /// Hz.
+    pub frequency_hz: f64,
+    /// m/s.
+    pub speed_m_s: f64,
+    /// N.
+    pub normal_force_n: f64,
+    /// m, where the middle of every pass lies.
+    #[serde(default)]
+    pub position_m: f64,
+}
+
+/// One series: the product of its lists.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Series {
+    /// Name, for reports.
+    pub name: String,
+    /// m, peak-to-peak.
+    pub amplitude_pp_m: Vec<f64>,
+    /// Hz.
+    pub frequency_hz: Vec<f64>,
+    /// m/s.
+    pub speed_m_s: Vec<f64>,
+    /// N.
+    pub normal_force_n: Vec<f64>,
+    /// m.
+    pub position_m: Vec<f64>,
+    /// Pa: needs a chamber; passes are grouped by pressure.
+    pub ambient_pressure_pa: Vec<f64>,
+}
+
+const fn yes() -> bool {
+    true
+}
+const fn one() -> u32 {
+    1
+}
+const fn eight() -> u32 {
+    8
+}
+fn both() -> Vec<i8> {
+    vec![1, -1]
+}
+
+/// A plan that was read.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The file's contents.
+    pub file: PlanFile,
+    /// The file's text, for the record.
+    pub text: String,
+    /// Where it came from.
+    pub origin: String,
+}
+
+impl Plan {
+    /// The bundled plan of that name, or the file at that path.
+    ///
+    /// # Errors
+    /// What is wrong, with the place in the file.
+    pub fn load(name_or_path: &str) -> miette::Result<Self> {
+        if let Some(text) = bundled::text(name_or_path) {
+            return Self::parse(name_or_path, text);
+        }
+        let path = Path::new(name_or_path);
+        if !path.exists() {
+            let known: Vec<_> = BUNDLED.iter().map(|(name, _)| *name).collect();
+            miette::bail!(
+                help = format!("bundled plans: {}", known.join(", ")),
+                "there is no plan '{name_or_path}', neither bundled nor as a file"
+            );
+        }
+        Self::parse(name_or_path, &input::text_of(path)?)
+    }
+
+    /// Parses and checks a plan by itself. Against limits it is checked by [`Plan::points`].
+    ///
+    /// # Errors
+    /// What is wrong, with the place in the file.
+    pub fn parse(origin: &str, text: &str) -> miette::Result<Self> {
+        let file: PlanFile = input::parse_toml(origin, text)?;
+        let bad = |path: &[&str], problem: &str| {
+            BadInput::new(origin, text, input::place_of(text, path), problem, None)
+        };
+        if file.series.is_empty() {
+            return Err(bad(&["name"], "a plan needs at least one [[series]]").into());
+        }
+        if file.directions.is_empty() || file.directions.iter().any(|d| *d != 1 && *d != -1) {
+            return Err(bad(&["directions"], "directions are 1, -1 or both").into());
+        }
+        if !(1..=1000).contains(&file.replicates) {
+            return Err(bad(&["replicates"], "replicates are 1 to 1000").into());
+        }
+        let times = [
+            ("settle_s", file.pass.settle_s),
+            ("measure_s", file.pass.measure_s),
+            ("approach_speed_m_s", file.pass.approach_speed_m_s),
+        ];
+        for (name, value) in times {
+            if !(value.is_finite() && value > 0.0 && value < 3600.0) {
+                return Err(bad(&["pass", name], &format!("{name} = {value}: a number above zero is needed")).into());
+            }
+        }
+        Ok(Plan { file, text: text.to_string(), origin: origin.to_string() })
+    }
+
+    /// Amplitudes of the plan, for axes of figures.
+    pub fn amplitudes(&self) -> Vec<PeakToPeak> {
+        let listed = self.file.series.iter().flat_map(|s| s.amplitude_pp_m.iter().copied());
+        listed.chain([self.file.base.amplitude_pp_m]).map(PeakToPeak::from_metres).collect()
+    }
+}

@@ -1,0 +1,71 @@
+//! The report of a run: one self-contained HTML page. No script, no font, no picture from elsewhere.
+
+mod page;
+pub mod plots;
+
+use crate::run_dir::{passes_in, records_in};
+use crate::sequence::MeasuredPass;
+use crate::session::Summary;
+use miette::{IntoDiagnostic, WrapErr};
+use models::finger::Finger;
+use realtime::recorder;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+pub use page::escape;
+
+/// Everything a report is made of, read from a run's folder.
+pub struct RunData {
+    /// Facts of the record's first words.
+    pub facts: BTreeMap<String, String>,
+    /// The passes with their comparisons.
+    pub passes: Vec<MeasuredPass>,
+    /// Events with loop time in s.
+    pub events: Vec<(f64, serde_json::Value)>,
+    /// How it ended; `None` for a run that was killed or is still going.
+    pub summary: Option<Summary>,
+    /// The finger of rig.toml.
+    pub finger: Finger,
+}
+
+#[derive(serde::Deserialize)]
+struct RigToml {
+    finger: Finger,
+}
+
+/// Reads a run's folder.
+///
+/// # Errors
+/// A folder that holds no run.
+pub fn read(folder: &Path) -> miette::Result<RunData> {
+    let passes = passes_in(folder).wrap_err_with(|| format!("{} holds no run", folder.display()))?;
+    let mut facts = BTreeMap::new();
+    let mut events = Vec::new();
+    for path in records_in(folder)? {
+        let bytes = std::fs::read(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        let contents = recorder::read(&bytes);
+        if let Some(found) = contents.facts(recorder::HEADER) {
+            facts.clone_from(found);
+        }
+        let start: u64 = facts.get("start_unix_ns").and_then(|s| s.parse().ok()).unwrap_or(0);
+        for (topic, at, text) in &contents.messages {
+            if topic == recorder::EVENTS
+                && let Ok(event) = serde_json::from_slice(text)
+            {
+                events.push((at.saturating_sub(start) as f64 * 1e-9, event));
+            }
+        }
+    }
+    let summary = std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
+    let rig = std::fs::read_to_string(folder.join("rig.toml")).into_diagnostic().wrap_err("rig.toml")?;
+    let rig: RigToml = toml::from_str(&rig).into_diagnostic().wrap_err("rig.toml")?;
+    Ok(RunData { facts, passes, events, summary, finger: rig.finger })
+}
+
+/// The report of a run as HTML.
+///
+/// # Errors
+/// A folder that holds no run.
+pub fn html(folder: &Path) -> miette::Result<String> {
+    page::page(&read(folder)?)
+}

@@ -1,0 +1,470 @@
+//! The order of a sweep: a pure state machine that eats rows and gives commands. It runs in virtual time and in
+//! wall-clock time alike, beside the loop, never in it.
+//!
+//! ```text
+//! Arm -> Zero -> [ Approach -> Settle -> Measure ]* -> Zero -> Done
+//!  any -> Failed(trip)      Stopped by request at any time
+//! ```
+
+use crate::plan::{PassTimes, Point};
+use models::condition::Condition;
+use models::prediction::{FrictionModel, Regime};
+use models::psi::PsiEq17;
+use models::quantity::PeakToPeak;
+use models::record::Pass;
+use realtime::compare::{Comparator, PassComparison, PassNoise};
+use realtime::cycle::{Command, Marker, Phase};
+use realtime::estimate::Moments;
+use realtime::ports::Nanos;
+use realtime::safety::{Cause, Request, Trip};
+use realtime::turn::Row;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// A finished pass with its comparison: what the record, the catalogue and the report hold.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeasuredPass {
+    /// The row of the point table.
+    pub pass: Pass,
+    /// A reference without vibration.
+    pub reference: bool,
+    /// Held against the model; `None` where the condition is outside the model's domain.
+    pub comparison: Option<PassComparison>,
+    /// Regime that the model predicts.
+    pub regime: Option<Regime>,
+    /// Psi of Eq. 17 at the measured condition; `None` without vibration or without `mu_0`.
+    pub psi_eq17: Option<f64>,
+}
+
+/// Something worth a line in the record and on the terminal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum Event {
+    /// The rig was armed.
+    Armed,
+    /// Force zeros, lifted off, in N: mean of each axis. They are recorded, never taken off silently.
+    Zeros {
+        /// Lateral.
+        lateral_n: Option<f64>,
+        /// Normal.
+        normal_n: Option<f64>,
+        /// Before or after the sweep.
+        after: bool,
+    },
+    /// Safety tripped.
+    Tripped(Trip),
+    /// The model has left the measurement, after so many passes.
+    ModelDeparted {
+        /// Point after which.
+        point: u64,
+        /// ln of the evidence.
+        log_evidence: f64,
+    },
+    /// A stop was asked for (signal or operator).
+    StopRequested,
+    /// A pass was started again because contact was lost.
+    PassRepeated {
+        /// Which.
+        point: u32,
+    },
+}
+
+/// How a sweep ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "outcome", rename_all = "snake_case")]
+pub enum Outcome {
+    /// Every pass was made.
+    Complete,
+    /// Stopped on request; what was measured is kept.
+    Stopped,
+    /// A safety trip ended it.
+    Tripped(Trip),
+    /// The rig would not arm; the cause that stood in the way.
+    WouldNotArm {
+        /// What stood in the way.
+        blocking: Option<Cause>,
+    },
+    /// No finger: normal force never came.
+    NoContact {
+        /// At which point.
+        point: u32,
+    },
+    /// Nothing was heard of the loop.
+    LoopLost,
+}
+
+/// What a row led to.
+#[derive(Debug, Default)]
+pub struct Reaction {
+    /// For the loop, in this order.
+    pub commands: Vec<Command>,
+    /// A pass that was finished.
+    pub pass: Option<MeasuredPass>,
+    /// Events.
+    pub events: Vec<Event>,
+    /// The end.
+    pub outcome: Option<Outcome>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Arm { since: Option<Nanos>, asked: Option<Nanos> },
+    Zero { since: Option<Nanos>, after: bool },
+    Approach { since: Nanos },
+    Settle { since: Nanos },
+    Measure { since: Nanos },
+    Over,
+}
+
+/// Time to wait for the rig to arm.
+const ARM_WITHIN: Nanos = Nanos(10_000_000_000);
+/// Time between two reset edges.
+const ASK_EVERY: Nanos = Nanos(50_000_000);
+/// Length of a zero reading.
+const ZERO_FOR: Nanos = Nanos(200_000_000);
+/// Time that a plate may ring on after the zero began: left out of the zero.
+const ZERO_SETTLE: Nanos = Nanos(150_000_000);
+/// Time to wait for a start position.
+const APPROACH_WITHIN: Nanos = Nanos(20_000_000_000);
+/// A pass without contact is made again so often before the sweep gives up.
+const TRIES: u32 = 3;
+
+/// Sums over the steady part of a pass.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    lateral: Moments,
+    normal: Moments,
+    amplitude: Moments,
+    speed: Moments,
+    position: Moments,
+    temperature: Moments,
+    lateral_sequence: Option<u32>,
+    frequency_hz: f64,
+}
+
+/// The sweep.
+pub struct Sequence {
+    points: Vec<Point>,
+    next: usize,
+    times: PassTimes,
+    stage: Stage,
+    sums: Sums,
+    tries: u32,
+    model: Arc<dyn FrictionModel>,
+    comparator: Comparator,
+    stopping: bool,
+    departed: bool,
+    started: bool,
+    poisson_ratio: f64,
+}
+
+impl Sequence {
+    /// A sweep over `points` (those of a resumed run that are still to be made).
+    pub fn new(
+        points: Vec<Point>,
+        times: PassTimes,
+        model: Arc<dyn FrictionModel>,
+        tip: &crate::fingertip::Fingertip,
+        noise: PassNoise,
+    ) -> Self {
+        let comparator = Comparator::new(&*model, tip.mu0, noise);
+        Sequence {
+            points,
+            next: 0,
+            times,
+            stage: Stage::Arm { since: None, asked: None },
+            sums: Sums::default(),
+            tries: 0,
+            model,
+            comparator,
+            stopping: false,
+            departed: false,
+            started: false,
+            poisson_ratio: tip.finger.poisson_ratio,
+        }
+    }
+
+    /// Takes in a pass of an earlier session of the same run: `mu_0` and the evidence go on from there.
+    pub fn remember(&mut self, pass: &Pass) {
+        if let Some(friction) = pass.friction_force_n() {
+            let condition = pass.condition(1.0);
+            // A condition outside the model's domain has no comparison, now as then.
+            let _ = self.comparator.pass(&*self.model, &condition, friction);
+            self.departed = self.comparator.departed();
+        }
+    }
+
+    /// Passes made and to be made.
+    pub fn progress(&self) -> (usize, usize) {
+        (self.next, self.points.len())
+    }
+
+    /// Time that the rest should take in s, by the plan.
+    pub fn remaining_s(&self) -> f64 {
+        let each = self.times.settle_s + self.times.measure_s + 0.15;
+        each * (self.points.len() - self.next) as f64
+    }
+
+    /// Asks for a stop: the rig goes to its safe state with the next row.
+    pub fn stop(&mut self) {
+        self.stopping = true;
+    }
+
+    /// Whether the model has left the measurement.
+    pub fn departed(&self) -> bool {
+        self.departed
+    }
+
+    /// Takes a row.
+    pub fn on_row(&mut self, row: &Row) -> Reaction {
+        let mut out = Reaction::default();
+        if self.stage == Stage::Over {
+            return out;
+        }
+        if let Some(trip) = row.tripped {
+            out.events.push(Event::Tripped(trip));
+            let stopped = trip.cause == Cause::Stopped;
+            self.finish(&mut out, if stopped { Outcome::Stopped } else { Outcome::Tripped(trip) });
+            return out;
+        }
+        if self.stopping {
+            self.stopping = false;
+            out.events.push(Event::StopRequested);
+            out.commands.push(Command::Stop);
+            if !row.armed {
+                self.finish(&mut out, Outcome::Stopped);
+            }
+            return out;
+        }
+        match self.stage {
+            Stage::Arm { since, asked } => self.arm(row, since, asked, &mut out),
+            Stage::Zero { since, after } => self.zero(row, since, after, &mut out),
+            Stage::Approach { since } => self.approach(row, since, &mut out),
+            Stage::Settle { since } => self.settle(row, since, &mut out),
+            Stage::Measure { since } => self.measure(row, since, &mut out),
+            Stage::Over => {}
+        }
+        out
+    }
+
+    fn finish(&mut self, out: &mut Reaction, outcome: Outcome) {
+        self.stage = Stage::Over;
+        out.outcome = Some(outcome);
+    }
+
+    fn arm(&mut self, row: &Row, since: Option<Nanos>, asked: Option<Nanos>, out: &mut Reaction) {
+        let since = since.unwrap_or(row.now);
+        if row.armed {
+            out.events.push(Event::Armed);
+            out.commands.push(Command::Set(Request::default(), self.marker(Phase::Zero)));
+            self.stage = Stage::Zero { since: None, after: false };
+            return;
+        }
+        if row.now.since(since) > ARM_WITHIN {
+            self.finish(out, Outcome::WouldNotArm { blocking: row.blocking });
+            return;
+        }
+        let ask = asked.is_none_or(|at| row.now.since(at) >= ASK_EVERY);
+        // A few cycles first, so that every channel has spoken.
+        if ask && row.now.since(since) >= ASK_EVERY {
+            out.commands.push(Command::Reset);
+            self.stage = Stage::Arm { since: Some(since), asked: Some(row.now) };
+        } else {
+            self.stage = Stage::Arm { since: Some(since), asked };
+        }
+    }
+
+    fn zero(&mut self, row: &Row, since: Option<Nanos>, after: bool, out: &mut Reaction) {
+        let since = since.unwrap_or(row.now);
+        self.stage = Stage::Zero { since: Some(since), after };
+        if row.marker.phase != Phase::Zero || row.now.since(since) < ZERO_SETTLE {
+            return;
+        }
+        self.take(row);
+        if row.now.since(since) < Nanos(ZERO_SETTLE.0 + ZERO_FOR.0) {
+            return;
+        }
+        let event = Event::Zeros {
+            lateral_n: self.sums.lateral.mean(),
+            normal_n: self.sums.normal.mean(),
+            after,
+        };
+        out.events.push(event);
+        self.sums = Sums::default();
+        if after {
+            out.commands.push(Command::Stop);
+            self.finish(out, Outcome::Complete);
+        } else {
+            self.begin_next(row, out);
+        }
+    }
+
+    fn marker(&self, phase: Phase) -> Marker {
+        Marker { point: self.points.get(self.next).map_or(u32::MAX, |p| p.number), phase }
+    }
+
+    /// Length of the stroke of a pass in m, half of it either side of its position.
+    fn half_stroke_m(&self, c: &Condition) -> f64 {
+        0.5 * (c.speed_m_s * (self.times.settle_s + self.times.measure_s) * 1.05)
+    }
+
+    fn begin_next(&mut self, row: &Row, out: &mut Reaction) {
+        if self.next == self.points.len() {
+            out.commands.push(Command::Set(Request::default(), self.marker(Phase::Zero)));
+            self.stage = Stage::Zero { since: None, after: true };
+            return;
+        }
+        self.sums = Sums::default();
+        self.stage = Stage::Approach { since: row.now };
+        self.approach(row, row.now, out);
+    }
+
+    fn approach(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
+        let point = self.points[self.next];
+        let c = &point.condition;
+        let Ok(stage) = row.inputs.seen.stage else { return };
+        let start = c.position_m - c.direction.sign() * self.half_stroke_m(c);
+        let away = start - stage.position_m;
+        // Close enough, or already past the start in the sense of the pass but not by more than a millimetre.
+        if away.abs() < 2e-4 {
+            let request = Request {
+                amplitude: c.amplitude,
+                frequency_hz: if c.amplitude > PeakToPeak::ZERO { c.frequency_hz } else { 0.0 },
+                velocity_m_s: c.direction.sign() * c.speed_m_s,
+                normal_force_n: c.normal_force_n,
+            };
+            out.commands.push(Command::Set(request, self.marker(Phase::Settle)));
+            self.stage = Stage::Settle { since: row.now };
+            return;
+        }
+        if row.now.since(since) > APPROACH_WITHIN {
+            self.stopping = true;
+            return;
+        }
+        // Slow down towards the goal: the stage has its own acceleration, the way here is a first-order approach.
+        let fast = self.times.approach_speed_m_s;
+        let velocity = (away * 25.0).clamp(-fast, fast);
+        let velocity = if velocity.abs() < 2e-3 { 2e-3 * away.signum() } else { velocity };
+        let request = Request { velocity_m_s: velocity, ..Request::default() };
+        // Only news goes to the loop, and not more often than it can matter.
+        if !self.started || row.cycle.is_multiple_of(5) {
+            self.started = true;
+            out.commands.push(Command::Set(request, self.marker(Phase::Approach)));
+        }
+    }
+
+    fn settle(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
+        if row.now.since(since) < Nanos::from_seconds(self.times.settle_s) {
+            return;
+        }
+        let c = self.points[self.next].condition;
+        let request = Request {
+            amplitude: c.amplitude,
+            frequency_hz: if c.amplitude > PeakToPeak::ZERO { c.frequency_hz } else { 0.0 },
+            velocity_m_s: c.direction.sign() * c.speed_m_s,
+            normal_force_n: c.normal_force_n,
+        };
+        out.commands.push(Command::Set(request, self.marker(Phase::Measure)));
+        self.sums = Sums::default();
+        self.stage = Stage::Measure { since: row.now };
+    }
+
+    /// Adds a row's fresh samples to the sums.
+    fn take(&mut self, row: &Row) {
+        let seen = &row.inputs.seen;
+        if let (true, Ok(lateral), Ok(normal)) = (row.usable, &seen.forces.lateral, &seen.forces.normal)
+            && self.sums.lateral_sequence != Some(lateral.sequence)
+        {
+            self.sums.lateral_sequence = Some(lateral.sequence);
+            self.sums.lateral.push(lateral.value);
+            self.sums.normal.push(normal.value);
+        }
+        if let Ok(amplifier) = &seen.amplifier {
+            if let Ok(amplitude) = &amplifier.amplitude {
+                self.sums.amplitude.push(amplitude.value);
+            }
+            if let Ok(temperature) = &amplifier.temperature_c {
+                self.sums.temperature.push(temperature.value);
+            }
+            self.sums.frequency_hz = amplifier.echoed_frequency_hz;
+        }
+        if let Ok(stage) = &seen.stage {
+            self.sums.speed.push(stage.velocity_m_s.abs());
+            self.sums.position.push(stage.position_m);
+        }
+    }
+
+    fn measure(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
+        if row.marker.phase == Phase::Measure {
+            self.take(row);
+        }
+        if row.now.since(since) < Nanos::from_seconds(self.times.measure_s) {
+            return;
+        }
+        let point = self.points[self.next];
+        let normal = self.sums.normal.mean().unwrap_or(0.0);
+        // A pass that was never in contact says nothing about friction.
+        if normal < 0.3 * point.condition.normal_force_n {
+            self.tries += 1;
+            if self.tries >= TRIES {
+                out.commands.push(Command::Stop);
+                self.finish(out, Outcome::NoContact { point: point.number });
+                return;
+            }
+            out.events.push(Event::PassRepeated { point: point.number });
+            self.begin_next(row, out);
+            return;
+        }
+        self.tries = 0;
+        let pass = self.pass_of(&point, since, normal);
+        let measured = self.compare(pass, point.reference);
+        if let Some(comparison) = &measured.comparison {
+            if let Some(mu0) = self.comparator.mu0() {
+                out.commands.push(Command::Mu0(mu0));
+            }
+            if comparison.departed && !self.departed {
+                self.departed = true;
+                let log_evidence = comparison.log_evidence;
+                out.events.push(Event::ModelDeparted { point: measured.pass.point, log_evidence });
+            }
+        }
+        out.pass = Some(measured);
+        self.next += 1;
+        self.begin_next(row, out);
+    }
+
+    fn pass_of(&self, point: &Point, since: Nanos, normal: f64) -> Pass {
+        let sums = &self.sums;
+        let still = point.condition.amplitude == PeakToPeak::ZERO;
+        let measured = sums.amplitude.mean().unwrap_or(point.condition.amplitude.metres());
+        let condition = Condition {
+            amplitude: if still { PeakToPeak::ZERO } else { PeakToPeak::from_metres(measured.max(0.0)) },
+            frequency_hz: if still { point.condition.frequency_hz } else { sums.frequency_hz },
+            speed_m_s: sums.speed.mean().unwrap_or(point.condition.speed_m_s),
+            position_m: sums.position.mean().unwrap_or(point.condition.position_m),
+            normal_force_n: normal,
+            time_s: since.seconds(),
+            ..point.condition
+        };
+        Pass {
+            normal_force_sd_n: sums.normal.sd(),
+            lateral_force_sd_n: sums.lateral.sd(),
+            samples: Some(sums.lateral.count()),
+            temperature_c: sums.temperature.mean(),
+            replicate: Some(u64::from(point.replicate)),
+            ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
+        }
+    }
+
+    fn compare(&mut self, pass: Pass, reference: bool) -> MeasuredPass {
+        let condition = pass.condition(self.comparator.mu0().map_or(1.0, |m| m.value));
+        let comparison =
+            pass.friction_force_n().and_then(|f| self.comparator.pass(&*self.model, &condition, f).ok());
+        let regime = self.model.predict(&condition).ok().map(|p| p.regime);
+        let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
+        let psi_eq17 = known.map(|m| {
+            PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0
+        });
+        MeasuredPass { pass, reference, comparison, regime, psi_eq17 }
+    }
+}

@@ -1,0 +1,161 @@
+//! A sweep from beginning to end: opens the rig, runs the loop, keeps what comes of it.
+//!
+//! Two ways, one sequence: in wall-clock time with the loop on a thread of its own and instruments behind drivers, or in
+//! virtual time in this thread with the virtual rig's ports.
+
+mod fast;
+mod keeper;
+mod live;
+
+use crate::plan::{Plan, Point, Resolution};
+use crate::run_dir::{Identity, RunDir};
+use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
+use crate::setup::Setup;
+use models::prediction::FrictionModel;
+use realtime::pacing::LoopReport;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
+
+/// What is to be run.
+pub struct Job {
+    /// The rig.
+    pub setup: Setup,
+    /// The passes.
+    pub plan: Plan,
+    /// Seed of the order and of the virtual world.
+    pub seed: u64,
+    /// The model to compare with.
+    pub model: Arc<dyn FrictionModel>,
+    /// Text and name of the model file, where one was given.
+    pub model_file: Option<(String, String)>,
+    /// Defects of the virtual rig in place of its own.
+    pub defects: Option<sim::defects::Defects>,
+    /// Folder of the run.
+    pub out: PathBuf,
+    /// In virtual time.
+    pub fast: bool,
+}
+
+/// What happened, for whoever watches.
+pub enum News<'a> {
+    /// A pass was kept: it is safe on the disk.
+    Pass(&'a MeasuredPass),
+    /// Something worth a line.
+    Event(&'a Event),
+    /// Passes made, planned, s to go.
+    Progress(usize, usize, f64),
+}
+
+/// What a run comes to. Its JSON form is what `muprime run --json` ends with.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Summary {
+    /// How it ended.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+    /// Folder of the run.
+    pub folder: PathBuf,
+    /// Passes made in all sessions.
+    pub passes: usize,
+    /// Passes planned.
+    pub planned: usize,
+    /// Whether the model has left the measurement.
+    pub model_departed: bool,
+    /// The loop; `None` in virtual time.
+    pub loop_report: Option<LoopReport>,
+    /// Rows that the record lost.
+    pub record_lost: u64,
+    /// What the links counted, by instrument.
+    pub links: BTreeMap<String, serde_json::Value>,
+}
+
+/// Signals that a run looks at: how often a stop was asked for, and whether to leave at once.
+#[derive(Clone, Debug, Default)]
+pub struct Signals {
+    /// SIGINT, SIGTERM or SIGHUP so far.
+    pub stops: Arc<AtomicUsize>,
+    /// For tests: pretend the process dies.
+    pub abandon: Arc<AtomicBool>,
+}
+
+/// Hex SHA-256 of a text.
+pub fn sha256(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+impl Job {
+    /// What the run is of.
+    pub fn identity(&self) -> Identity {
+        let model = self.model_file.as_ref().map_or_else(|| self.model.name().to_string(), |(_, text)| sha256(text));
+        Identity {
+            setup_sha256: sha256(&self.setup.text),
+            plan_sha256: sha256(&self.plan.text),
+            seed: self.seed,
+            model,
+        }
+    }
+
+    /// The passes of the plan, checked.
+    ///
+    /// # Errors
+    /// The first value that the rig cannot do, with its place in the plan.
+    pub fn points(&self) -> miette::Result<Vec<Point>> {
+        self.plan.points(self.seed, &self.setup.config.limits, &self.resolution()?)
+    }
+
+    /// What the setup's amplifier can set, by its profile.
+    fn resolution(&self) -> miette::Result<Resolution> {
+        let id = &self.setup.file.amplifier.profile;
+        let profile = crate::drivers::profile(id).map_err(|e| miette::miette!("{e}"))?;
+        let step = |name: &str| {
+            profile.set(name).map_or(0.0, |set| {
+                let described = &profile.description.set[set.0];
+                described.scale * described.si.factor
+            })
+        };
+        Ok(Resolution { amplitude_pp_m: step("amplitude"), frequency_hz: step("frequency") })
+    }
+
+    /// Runs the job.
+    ///
+    /// # Errors
+    /// Whatever prevents it before anything was commanded (a refusal), or a fault of this program.
+    pub fn run(self, signals: &Signals, news: &mut dyn FnMut(News<'_>)) -> miette::Result<Summary> {
+        let points = self.points()?;
+        let planned = points.len();
+        let dir = RunDir::open(&self.out, &self.identity())?;
+        let left = dir.left_of(points);
+        let mut sequence = Sequence::new(
+            left,
+            self.plan.file.pass,
+            Arc::clone(&self.model),
+            &self.setup.tip,
+            self.setup.file.noise,
+        );
+        for pass in &dir.made {
+            sequence.remember(pass);
+        }
+        if self.fast {
+            fast::run(self, dir, sequence, planned, signals, news)
+        } else {
+            live::run(self, dir, sequence, planned, signals, news)
+        }
+    }
+
+    /// The world of the virtual rig.
+    fn world(&self) -> miette::Result<sim::world::World> {
+        let virtual_rig = self.setup.file.virtual_rig.clone().unwrap_or_default();
+        let mut config = if virtual_rig.ideal {
+            sim::world::WorldConfig::ideal()
+        } else {
+            sim::world::WorldConfig::bundled()
+        };
+        if let Some(defects) = &self.defects {
+            config.defects = defects.clone();
+        }
+        sim::world::World::new(&config, self.seed).map_err(|e| miette::miette!("the virtual rig: {e}"))
+    }
+}

@@ -1,0 +1,88 @@
+//! A sweep in virtual time: one thread, no clock, the same bytes for the same seed.
+
+use super::keeper::{self, Keeper};
+use super::{Job, News, Signals, Summary};
+use crate::run_dir::RunDir;
+use crate::sequence::{Outcome, Sequence};
+use miette::{IntoDiagnostic, WrapErr};
+use realtime::cycle::{Command, CycleState};
+use realtime::ports::Nanos;
+use realtime::recorder::Recorder;
+use realtime::turn::{Ports, Tick, turn};
+use sim::virtual_rig::VirtualRig;
+use std::collections::{BTreeMap, VecDeque};
+use std::io::BufWriter;
+use std::sync::atomic::Ordering;
+
+/// A record in virtual time starts at this wall-clock time (2000-01-01), so that equal seeds give equal files.
+const EPOCH_UNIX_NS: u64 = 946_684_800_000_000_000;
+/// Rows between two flushes of the record: 50 ms at 1 kHz.
+const FLUSH_EVERY: u64 = 50;
+
+/// Runs a job in virtual time.
+pub fn run(
+    job: Job,
+    dir: RunDir,
+    mut sequence: Sequence,
+    planned: usize,
+    signals: &Signals,
+    news: &mut dyn FnMut(News<'_>),
+) -> miette::Result<Summary> {
+    if job.setup.file.virtual_rig.is_none() {
+        miette::bail!(
+            help = "leave --fast out, or give the setup a [virtual] section",
+            "'{}' is a real rig: it cannot run in virtual time",
+            job.setup.file.name
+        );
+    }
+    let mut kept = Keeper::begin(&job, dir, planned, EPOCH_UNIX_NS)?;
+    let [force, amplifier, stage] = VirtualRig::of(job.world()?).split();
+    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let file = BufWriter::new(kept.new_record()?);
+    let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
+    let config = job.setup.config;
+    let mut state = CycleState::default();
+    let mut queue: VecDeque<Command> = VecDeque::new();
+    let mut number = 0u64;
+    let outcome = loop {
+        number += 1;
+        let now = Nanos(number * config.limits.timing.cycle.0);
+        let tick = Tick { number, lateness: Nanos(0), now };
+        let row = turn(&config, &*job.model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
+        recorder.row(&row).into_diagnostic()?;
+        if signals.stops.swap(0, Ordering::Relaxed) > 0 {
+            sequence.stop();
+        }
+        let reaction = sequence.on_row(&row);
+        keeper::record(&mut recorder, now, &reaction.events, reaction.pass.as_ref())?;
+        kept.keep(&reaction, news)?;
+        if reaction.pass.is_some() {
+            let (done, all) = sequence.progress();
+            news(News::Progress(done, all, sequence.remaining_s()));
+        }
+        queue.extend(reaction.commands);
+        if number.is_multiple_of(FLUSH_EVERY) {
+            recorder.flush().into_diagnostic()?;
+        }
+        if let Some(outcome) = reaction.outcome {
+            break outcome;
+        }
+    };
+    // Let the stop reach the rig, so that the record shows the safe state.
+    for _ in 0..20 {
+        number += 1;
+        let now = Nanos(number * config.limits.timing.cycle.0);
+        let tick = Tick { number, lateness: Nanos(0), now };
+        let row = turn(&config, &*job.model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
+        recorder.row(&row).into_diagnostic()?;
+    }
+    let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
+    recorder.end(last).into_diagnostic().wrap_err("the record")?;
+    let departed = sequence.departed();
+    kept.end(outcome, departed, None, 0, BTreeMap::new())
+}
+
+/// An outcome as JSON, for the record's last words.
+pub fn words(outcome: &Outcome) -> miette::Result<String> {
+    serde_json::to_string(outcome).into_diagnostic()
+}

@@ -1,0 +1,258 @@
+//! A setup: which instruments make up the rig, its limits, its fingertip, its noise.
+
+mod bundled;
+
+use crate::drivers::{InstrumentSetup, InstrumentsSetup};
+use crate::fingertip::{Fingertip, FingertipSetup};
+use crate::input::{self, BadInput};
+use miette::IntoDiagnostic;
+use models::quantity::PeakToPeak;
+use realtime::compare::PassNoise;
+use realtime::cycle::Config;
+use realtime::estimate::EstimateConfig;
+use realtime::ports::Nanos;
+use realtime::safety::{ChannelTiming, LimitError, Limits};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+pub use bundled::{BUNDLED, text as bundled_text};
+
+/// A setup file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SetupFile {
+    /// Name of the rig, for records and reports.
+    pub name: String,
+    /// The loop.
+    #[serde(default, rename = "loop")]
+    pub pace: Pace,
+    /// Force instruments: one with both axes, or two with one each.
+    pub force: Vec<InstrumentSetup>,
+    /// The ultrasonic amplifier.
+    pub amplifier: InstrumentSetup,
+    /// The stage.
+    pub stage: InstrumentSetup,
+    /// Soft limits; what is left out keeps its default.
+    #[serde(default)]
+    pub limits: LimitsFile,
+    /// The fingertip: a name of the library, or its numbers.
+    pub finger: FingertipSetup,
+    /// Noise of a pass.
+    pub noise: PassNoise,
+    /// The running estimate.
+    #[serde(default = "default_estimate")]
+    pub estimate: EstimateConfig,
+    /// Certificates by path, relative to the setup file.
+    #[serde(default)]
+    pub certificates: Vec<PathBuf>,
+    /// Present: this is a virtual rig, served on its instruments' loopback addresses by `muprime run` itself.
+    #[serde(default, rename = "virtual")]
+    pub virtual_rig: Option<VirtualRig>,
+}
+
+/// Pace of the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Pace {
+    /// Cycles per second.
+    pub rate_hz: f64,
+    /// SCHED_FIFO priority to ask for, 1 to 98; 0 asks for none.
+    pub priority: i32,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Pace { rate_hz: 1000.0, priority: 80 }
+    }
+}
+
+/// The embedded virtual rig.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct VirtualRig {
+    /// No departure from the model at all. Otherwise the bundled world, which departs by one sealed effect.
+    pub ideal: bool,
+}
+
+/// Soft limits as a setup states them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LimitsFile {
+    /// N.
+    pub normal_force_max_n: Option<f64>,
+    /// N.
+    pub lateral_force_max_n: Option<f64>,
+    /// N between two samples.
+    pub force_step_max_n: Option<f64>,
+    /// N/s.
+    pub force_rate_max_n_s: Option<f64>,
+    /// m, peak-to-peak.
+    pub amplitude_max_pp_m: Option<f64>,
+    /// m/s.
+    pub amplitude_rate_max_m_s: Option<f64>,
+    /// Hz.
+    pub frequency_min_hz: Option<f64>,
+    /// Hz.
+    pub frequency_max_hz: Option<f64>,
+    /// m/s.
+    pub speed_max_m_s: Option<f64>,
+    /// m.
+    pub travel_min_m: Option<f64>,
+    /// m.
+    pub travel_max_m: Option<f64>,
+    /// Degrees Celsius.
+    pub temperature_max_c: Option<f64>,
+    /// Whether a temperature is read.
+    pub temperature_fitted: Option<bool>,
+    /// Equal raw samples in a row.
+    pub frozen_after: Option<u32>,
+    /// A human finger is in the rig.
+    pub human_contact: Option<bool>,
+    /// s.
+    pub exposure_max_s: Option<f64>,
+    /// s, `Q / (pi f)` of the plate.
+    pub plate_ring_time_s: Option<f64>,
+}
+
+const fn default_estimate() -> EstimateConfig {
+    EstimateConfig { window: 50, normal_force_min_n: 0.02, sample_sd_n: 0.002 }
+}
+
+/// A setup that passed every check.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// The file's contents.
+    pub file: SetupFile,
+    /// The file's text, for the record.
+    pub text: String,
+    /// Where it came from.
+    pub origin: String,
+    /// The fingertip.
+    pub tip: Fingertip,
+    /// Loop configuration.
+    pub config: Config,
+}
+
+impl Setup {
+    /// The bundled setup of that name, or the file at that path.
+    ///
+    /// # Errors
+    /// What is wrong, with the place in the file.
+    pub fn load(name_or_path: &str) -> miette::Result<Self> {
+        if let Some(text) = bundled::text(name_or_path) {
+            return Self::parse(name_or_path, text, Path::new("."));
+        }
+        let path = Path::new(name_or_path);
+        if !path.exists() {
+            let known: Vec<_> = BUNDLED.iter().map(|(name, _)| *name).collect();
+            miette::bail!(
+                help = format!("bundled setups: {}", known.join(", ")),
+                "there is no setup '{name_or_path}', neither bundled nor as a file"
+            );
+        }
+        Self::parse(name_or_path, &input::text_of(path)?, path.parent().unwrap_or(Path::new(".")))
+    }
+
+    /// Parses and checks a setup.
+    ///
+    /// # Errors
+    /// What is wrong, with the place in the file.
+    pub fn parse(origin: &str, text: &str, folder: &Path) -> miette::Result<Self> {
+        let file: SetupFile = input::parse_toml(origin, text)?;
+        let bad = |path: &[&str], problem: String| BadInput::new(origin, text, input::place_of(text, path), problem, None);
+        if !(10.0..=4000.0).contains(&file.pace.rate_hz) {
+            return Err(bad(&["loop", "rate_hz"], "the loop runs at 10 to 4000 Hz".into()).into());
+        }
+        if !(0..=98).contains(&file.pace.priority) {
+            return Err(bad(&["loop", "priority"], "a priority is 0 (none) to 98".into()).into());
+        }
+        if !(1..=realtime::estimate::WINDOW_MAX).contains(&file.estimate.window) {
+            let most = realtime::estimate::WINDOW_MAX;
+            return Err(bad(&["estimate", "window"], format!("a window has 1 to {most} samples")).into());
+        }
+        for (name, value) in [
+            ("pass_relative_sd", file.noise.pass_relative_sd),
+            ("force_sd_n", file.noise.force_sd_n),
+        ] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(bad(&["noise", name], format!("{name} = {value}: a finite number above zero is needed")).into());
+            }
+        }
+        let tip = Fingertip::resolve(&file.finger, folder).map_err(|p| bad(&["finger"], p))?;
+        let cycle = Nanos((1e9 / file.pace.rate_hz).round() as u64);
+        let limits = limits(&file, cycle).map_err(|error| {
+            let name = match error {
+                LimitError::AboveHard { name, .. } | LimitError::Unusable { name, .. } => name,
+            };
+            bad(&["limits", name], error.to_string())
+        })?;
+        let config = Config { limits, estimate: file.estimate };
+        Ok(Setup { file, text: text.to_string(), origin: origin.to_string(), tip, config })
+    }
+
+    /// The instruments' part, for the drivers.
+    pub fn instruments(&self) -> InstrumentsSetup {
+        InstrumentsSetup {
+            force: self.file.force.clone(),
+            amplifier: self.file.amplifier.clone(),
+            stage: self.file.stage.clone(),
+        }
+    }
+
+    /// The `rig.toml` that goes beside a point table (contract).
+    ///
+    /// # Errors
+    /// Only if TOML cannot express a number.
+    pub fn rig_toml(&self) -> miette::Result<String> {
+        #[derive(Serialize)]
+        struct Rig<'a> {
+            finger: &'a models::finger::Finger,
+            noise: &'a PassNoise,
+        }
+        let finger = models::finger::Finger { lateral_recovery_m_per_s: None, ..self.tip.finger };
+        toml::to_string(&Rig { finger: &finger, noise: &self.file.noise }).into_diagnostic()
+    }
+}
+
+/// Soft limits over the paper's, timing from the instruments' profiles.
+fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
+    let l = &file.limits;
+    let mut limits = Limits::paper(cycle);
+    let set = |slot: &mut f64, value: Option<f64>| *slot = value.unwrap_or(*slot);
+    set(&mut limits.normal_force_max_n, l.normal_force_max_n);
+    set(&mut limits.lateral_force_max_n, l.lateral_force_max_n);
+    set(&mut limits.force_step_max_n, l.force_step_max_n);
+    set(&mut limits.force_rate_max_n_s, l.force_rate_max_n_s);
+    set(&mut limits.amplitude_rate_max_m_s, l.amplitude_rate_max_m_s);
+    set(&mut limits.frequency_hz.0, l.frequency_min_hz);
+    set(&mut limits.frequency_hz.1, l.frequency_max_hz);
+    set(&mut limits.speed_max_m_s, l.speed_max_m_s);
+    set(&mut limits.travel_m.0, l.travel_min_m);
+    set(&mut limits.travel_m.1, l.travel_max_m);
+    set(&mut limits.temperature_max_c, l.temperature_max_c);
+    set(&mut limits.exposure_max_s, l.exposure_max_s);
+    limits.amplitude_max = l.amplitude_max_pp_m.map_or(limits.amplitude_max, PeakToPeak::from_metres);
+    limits.temperature_fitted = l.temperature_fitted.unwrap_or(limits.temperature_fitted);
+    limits.frozen_after = l.frozen_after.unwrap_or(limits.frozen_after);
+    limits.human_contact = l.human_contact.unwrap_or(limits.human_contact);
+    limits.timing.ring_time = l.plate_ring_time_s.map_or(limits.timing.ring_time, Nanos::from_seconds);
+    limits.timing.command_expiry = Nanos((2 * cycle.0).max(20_000_000));
+
+    // A channel is stale after a number of its own periods, never of the loop's cycles. On a general-purpose kernel a
+    // link thread may be held up for some milliseconds: the latency allows for that and is stated.
+    let stall = Nanos(20_000_000);
+    let timing = |instrument: &InstrumentSetup| -> ChannelTiming {
+        let rate = instrument.rate_hz.or_else(|| crate::drivers::nominal_rate_hz(&instrument.profile)).unwrap_or(100.0);
+        let period = Nanos((1e9 / rate) as u64).0.max(cycle.0);
+        ChannelTiming { period: Nanos(period), latency: stall, periods: 3 }
+    };
+    if let (Some(first), Some(last)) = (file.force.first(), file.force.last()) {
+        let normal_first = file.force.len() == 2 && first.normal.is_some() && first.lateral.is_none();
+        let (lateral, normal) = if normal_first { (last, first) } else { (first, last) };
+        limits.timing.lateral = timing(lateral);
+        limits.timing.normal = timing(normal);
+    }
+    limits.timing.amplifier = timing(&file.amplifier);
+    limits.timing.stage = timing(&file.stage);
+    limits.checked()
+}

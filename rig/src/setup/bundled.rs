@@ -1,0 +1,12 @@
+//! Setups that come with the program.
+
+/// Name and text of every bundled setup. Add one: a file in `rig/setups/` and a line here.
+pub const BUNDLED: &[(&str, &str)] = &[
+    ("virtual", include_str!("../../setups/virtual.toml")),
+    ("virtual-ideal", include_str!("../../setups/virtual-ideal.toml")),
+];
+
+/// Text of the bundled setup of that name.
+pub fn text(name: &str) -> Option<&'static str> {
+    BUNDLED.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
+}

@@ -1,0 +1,97 @@
+//! The virtual rig's world as the emulators meet it.
+
+use super::{Command, Plant, Quantity};
+use crate::amplifier::AmplifierInput;
+use crate::stage::StageInput;
+use crate::world::World;
+use models::quantity::PeakToPeak;
+use realtime::ports::Nanos;
+
+/// A world behind the wire. Set-points arrive in blocks; what a block leaves out keeps its last value.
+pub struct WorldPlant {
+    world: World,
+    drive: AmplifierInput,
+    motion: StageInput,
+}
+
+impl WorldPlant {
+    /// Puts a world behind the wire.
+    pub fn new(world: World) -> Self {
+        let drive =
+            AmplifierInput { amplitude: PeakToPeak::ZERO, frequency_hz: 0.0, enable: false, heartbeat: 0 };
+        WorldPlant { world, drive, motion: StageInput { velocity_m_s: 0.0, normal_force_n: 0.0 } }
+    }
+}
+
+impl Plant for WorldPlant {
+    fn advance(&mut self, now: Nanos) {
+        self.world.advance_to(now);
+    }
+
+    fn measure(&mut self, quantity: Quantity) -> f64 {
+        let truth = |is: bool| f64::from(u8::from(is));
+        let unknown = f64::NAN;
+        let force = self.world.force_sample();
+        let drive = self.world.amplifier_status();
+        let stage = self.world.stage_status();
+        let of_force = |f: fn(&crate::sensor::ForceSample) -> f64| force.as_ref().map_or(unknown, f);
+        let of_drive = |f: fn(&crate::amplifier::AmplifierStatus) -> f64| drive.as_ref().map_or(unknown, f);
+        let of_stage = |f: fn(&crate::stage::StageStatus) -> f64| stage.as_ref().map_or(unknown, f);
+        match quantity {
+            Quantity::LateralForce => of_force(|s| s.force_n[0]),
+            Quantity::NormalForce => of_force(|s| s.force_n[1]),
+            Quantity::ForceSample => of_force(|s| f64::from(s.sequence)),
+            Quantity::ForceTime => of_force(|s| s.device_time.seconds()),
+            Quantity::ForceSaturated => truth(force.is_some_and(|s| s.saturated[0] || s.saturated[1])),
+            Quantity::ForceFault => 0.0,
+            Quantity::Amplitude => of_drive(|s| s.measured_pp_m),
+            Quantity::Frequency | Quantity::FrequencySetPoint => of_drive(|s| s.echoed_frequency_hz),
+            Quantity::AmplitudeSetPoint => of_drive(|s| s.echoed_amplitude.metres()),
+            Quantity::Temperature => of_drive(|s| s.temperature_c),
+            Quantity::OutputOn => truth(drive.is_some_and(|s| s.output_on)),
+            Quantity::WatchdogTripped => truth(drive.is_some_and(|s| s.watchdog_tripped)),
+            Quantity::DriveFault => truth(drive.is_some_and(|s| s.fault || !s.supply_closed)),
+            Quantity::Heartbeat => f64::from(self.drive.heartbeat),
+            Quantity::DriveCount => of_drive(|s| f64::from(s.sequence)),
+            Quantity::DriveTime => of_drive(|s| s.taken_at.seconds()),
+            Quantity::Position => of_stage(|s| s.position_m),
+            Quantity::Velocity => of_stage(|s| s.velocity_m_s),
+            Quantity::VelocitySetPoint => self.motion.velocity_m_s,
+            Quantity::LoadSetPoint => self.motion.normal_force_n,
+            Quantity::AtLimit => truth(stage.is_some_and(|s| s.at_limit)),
+            Quantity::StageFault => truth(stage.is_some_and(|s| s.fault)),
+            Quantity::StageCount => of_stage(|s| f64::from(s.sequence)),
+            Quantity::StageTime => of_stage(|s| s.taken_at.seconds()),
+            Quantity::DeviceTime => self.world.now().seconds(),
+            // The emulator counts its own reads; the world knows nothing of them.
+            Quantity::DeviceReads => 0.0,
+        }
+    }
+
+    fn command(&mut self, commands: &[(Command, f64)]) {
+        let (mut drives, mut moves) = (false, false);
+        for &(command, value) in commands {
+            match command {
+                Command::Amplitude => self.drive.amplitude = PeakToPeak::from_metres(value),
+                Command::Frequency => self.drive.frequency_hz = value,
+                Command::Enable => self.drive.enable = value != 0.0,
+                Command::DriveHeartbeat => self.drive.heartbeat = value as u32,
+                Command::Velocity => self.motion.velocity_m_s = value,
+                Command::NormalForce => self.motion.normal_force_n = value,
+                Command::StageHeartbeat => {}
+            }
+            let of_drive = matches!(
+                command,
+                Command::Amplitude | Command::Frequency | Command::Enable | Command::DriveHeartbeat
+            );
+            drives |= of_drive;
+            moves |= !of_drive;
+        }
+        if drives {
+            self.world.command_amplifier(self.drive);
+        }
+        if moves {
+            self.world.command_stage(self.motion);
+        }
+    }
+}
