@@ -13,6 +13,7 @@
 //! Sources: the paper's section 4 (a Coulombic slider on two springs), section 5.3 (finite lateral recovery).
 
 pub mod averaged;
+mod compliant;
 pub mod element;
 pub mod lateral;
 pub mod resolved;
@@ -91,6 +92,10 @@ pub struct Ridge {
     pub mass_kg: f64,
     /// Damping to the immobile tissue behind [N s/m].
     pub damping_n_s_per_m: f64,
+    /// Stiffness of the skin's surface over the normal stiffness [-]; 0: rigid, landings without rebound.
+    pub skin_ratio: f64,
+    /// Damping ratio of that surface under the ridge's mass [-].
+    pub skin_loss: f64,
     /// Standard deviation of the heights of the ridges' tops [m].
     pub height_sd_m: f64,
 }

@@ -136,7 +136,24 @@ impl Kind {
 }
 
 impl Parameter {
-    fn draw(&self, noise: &mut Noise) -> f64 {
+    const fn linear(name: &'static str, low: f64, high: f64) -> Self {
+        Self { name, low, high, draw: Draw::Linear }
+    }
+
+    const fn log(name: &'static str, low: f64, high: f64) -> Self {
+        Self { name, low, high, draw: Draw::Log }
+    }
+
+    const fn signed(name: &'static str, low: f64, high: f64) -> Self {
+        Self { name, low, high, draw: Draw::Signed }
+    }
+
+    const fn factor(name: &'static str, low: f64, high: f64) -> Self {
+        Self { name, low, high, draw: Draw::Factor }
+    }
+
+    /// Draws a value.
+    pub fn draw(&self, noise: &mut Noise) -> f64 {
         match self.draw {
             Draw::Linear => noise.between(self.low, self.high),
             Draw::Log => noise.log_between(self.low, self.high),
@@ -170,6 +187,17 @@ impl std::fmt::Debug for Defect {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}{:?}", self.kind.name, &self.values[..self.kind.parameters.len()])
     }
+}
+
+/// Kinds that make ridges fly, which this world solves for one ridge on a plain sine only.
+const FLYING: [&str; 2] = ["ridge_inertia", "normal_damping"];
+/// Kinds that need many ridges or a plate that does not move as a plain sine.
+const SHAPED: [&str; 3] = ["multi_asperity", "second_harmonic", "in_plane_motion"];
+
+/// Whether this world can solve two kinds at once.
+pub fn compatible(one: &Kind, other: &Kind) -> bool {
+    let clash = |a: &Kind, b: &Kind| FLYING.contains(&a.name) && SHAPED.contains(&b.name);
+    !clash(one, other) && !clash(other, one)
 }
 
 impl Defects {
@@ -221,6 +249,38 @@ macro_rules! kinds {
 }
 
 kinds! {
-    squeeze_film
+    adhesion
     amplitude_droop
+    amplitude_miscalibration
+    amplitude_saturation
+    contact_ageing
+    contaminated_patch
+    force_crosstalk
+    frictional_heating
+    in_plane_motion
+    lateral_gain
+    lateral_offset_drift
+    lateral_recovery
+    lateral_resonance
+    load_dependent_friction
+    mains_modulation
+    mode_shape
+    moisture_drift
+    multi_asperity
+    normal_damping
+    normal_offset
+    plate_tilt
+    rate_dependent_friction
+    resonance_detuning
+    ridge_anisotropy
+    ridge_inertia
+    second_harmonic
+    sensor_lag
+    speed_error
+    speed_ripple
+    squeeze_film
+    stiffness_error
+    subsurface_relaxation
+    time_misalignment
+    triboelectric_attraction
 }

@@ -81,7 +81,7 @@ impl Finger {
             ridge: Ridge {
                 mass_kg: config.ridge_mass_kg,
                 damping_n_s_per_m: config.ridge_damping_ratio * critical,
-                height_sd_m: 0.0,
+                ..Ridge::default()
             },
             recovery: match config.lateral_recovery_m_s {
                 speed if speed > 0.0 => Recovery::Rate(speed),

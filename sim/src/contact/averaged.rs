@@ -6,7 +6,6 @@
 //! of fixed size: nothing is allocated while the world runs, and what is read does not depend on what was read
 //! before. [`CELL`] sets the error; `averaging_error` in the tests measures it.
 
-use super::resolved::{self, Settings};
 use super::{Contact, Steady};
 
 /// Width of a cell in the logarithm of each variable.
@@ -56,14 +55,17 @@ fn with(contact: &Contact, ln: [f64; SLOPES]) -> Contact {
 }
 
 fn share(contact: &Contact) -> [f64; 2] {
-    let steady = resolved::steady(contact, Settings::default()).steady;
+    let steady = contact.steady();
     [steady.lateral_force_n / (contact.friction * contact.normal_force_n), steady.contact_fraction]
 }
 
 impl Averager {
-    /// The cycle-averaged contact; exact solvers are asked directly, only a ridge with mass is remembered.
+    /// The cycle-averaged contact; cheap solvers are asked directly.
     pub fn steady(&mut self, contact: &Contact) -> Steady {
-        let remembered = contact.has_inertia()
+        let dear = contact.has_inertia()
+            || contact.recovery != super::Recovery::Instant
+            || contact.motion != super::Motion::default();
+        let remembered = dear
             && contact.sine_amplitude_m > 1e-10
             && contact.normal_force_n > 1e-4
             && contact.motion.modulation == 0.0;

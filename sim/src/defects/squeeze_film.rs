@@ -5,7 +5,7 @@
 //! given: the asperities that hold it open yield by a power law of their approach, so a lighter load on them
 //! opens it. Rarefaction lets the air out where its free path nears the gap. Only the rest of the load is rubbed.
 
-use super::{Act, Draw, Kind, Parameter, Place, Surroundings, Values};
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;
 
 pub(super) static KIND: Kind = Kind {
@@ -15,9 +15,9 @@ pub(super) static KIND: Kind = Kind {
     in_tables: true,
     summary: "air trapped between ridges and plate carries part of the load",
     parameters: &[
-        Parameter { name: "film_area_m2", low: 2e-7, high: 4e-5, draw: Draw::Log },
-        Parameter { name: "open_gap_m", low: 3e-6, high: 6e-6, draw: Draw::Log },
-        Parameter { name: "asperity_load_n", low: 0.5, high: 3.0, draw: Draw::Log },
+        Parameter::log("film_area_m2", 2e-7, 4e-5),
+        Parameter::log("open_gap_m", 3e-6, 6e-6),
+        Parameter::log("asperity_load_n", 0.5, 3.0),
     ],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },
 };
