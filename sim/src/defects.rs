@@ -61,25 +61,25 @@ pub type Values = [f64; 4];
 /// The circumstances of an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
-    /// Time from the start of the run [s].
+    /// Time from the start of the run (s).
     pub time_s: f64,
-    /// Time since the finger was put on [s].
+    /// Time since the finger was put on (s).
     pub contact_time_s: f64,
-    /// Position along the stroke [m].
+    /// Position along the stroke (m).
     pub position_m: f64,
     /// 1 or -1.
     pub direction: f64,
-    /// Frequency of the plate [Hz].
+    /// Frequency of the plate (Hz).
     pub frequency_hz: f64,
-    /// True normal force [N].
+    /// True normal force (N).
     pub normal_force_n: f64,
-    /// Ambient pressure [Pa].
+    /// Ambient pressure (Pa).
     pub ambient_pressure_pa: f64,
-    /// Temperature of the plate [deg C].
+    /// Temperature of the plate (deg C).
     pub temperature_c: f64,
 }
 
-/// The two forces in the sensor's frame [N].
+/// The two forces in the sensor's frame (N).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forces {
     /// Lateral, signed.
@@ -93,7 +93,7 @@ pub struct Forces {
 pub struct Act {
     /// Changes the world before it starts.
     pub setup: Option<fn(&Values, &mut WorldConfig)>,
-    /// Peak-to-peak amplitude under the finger [m] from the one the amplifier knows of.
+    /// Peak-to-peak amplitude under the finger (m) from the one the amplifier knows of.
     pub plate: Option<fn(&Values, &Surroundings, f64) -> f64>,
     /// Changes the contact.
     pub contact: Option<fn(&Values, &Surroundings, &mut Contact)>,
@@ -201,7 +201,7 @@ pub fn compatible(one: &Kind, other: &Kind) -> bool {
 }
 
 impl Defects {
-    /// Peak-to-peak amplitude under the finger [m].
+    /// Peak-to-peak amplitude under the finger (m).
     pub fn plate(&self, at: &Surroundings, mut pp_m: f64) -> f64 {
         for defect in &self.defects {
             if let Some(act) = defect.kind.act.plate {

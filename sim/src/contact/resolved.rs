@@ -34,16 +34,16 @@ impl Default for Settings {
 pub struct Resolved {
     /// Means over the averaged cycles.
     pub steady: Steady,
-    /// Mean normal force over the averaged cycles [N]: how well the balance was met.
+    /// Mean normal force over the averaged cycles (N): how well the balance was met.
     pub normal_force_n: f64,
-    /// Static compression [m].
+    /// Static compression (m).
     pub preload_m: f64,
-    /// Relative difference of the normal impulse between odd and even cycles [-]: over zero where the period
+    /// Relative difference of the normal impulse between odd and even cycles (-): over zero where the period
     /// has doubled.
     pub doubling: f64,
 }
 
-/// Lightest ridge marched [kg]: lighter ones move as if they had this mass.
+/// Lightest ridge marched (kg): lighter ones move as if they had this mass.
 pub(super) const LIGHTEST_KG: f64 = 1e-8;
 
 /// Transition matrix of a mass on spring and dashpot over one step.
@@ -98,9 +98,9 @@ pub fn steady(contact: &Contact, settings: Settings) -> Resolved {
 /// Means over one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cycle {
-    /// Lateral force [N].
+    /// Lateral force (N).
     pub lateral_n: f64,
-    /// Normal force, impulses included [N].
+    /// Normal force, impulses included (N).
     pub normal_n: f64,
     /// Share of the cycle in contact.
     pub contact: f64,

@@ -41,7 +41,7 @@ pub fn steady(contact: &Contact) -> Steady {
     sum
 }
 
-/// Static compression [m] at which the mean normal force is the one asked for.
+/// Static compression (m) at which the mean normal force is the one asked for.
 fn preload_m(contact: &Contact, heights: &[f64]) -> f64 {
     let a = contact.sine_amplitude_m;
     let target = contact.normal_force_n / (contact.normal_stiffness_n_per_m * a);

@@ -12,7 +12,7 @@ pub(super) static KIND: Kind = Kind {
     act: Act { setup: None, plate: Some(act), contact: None, forces: None },
 };
 
-/// Swing at which the pick-up is compressed by 5 % [m peak-to-peak].
+/// Swing at which the pick-up is compressed by 5 % (m peak-to-peak).
 const BEND_M: f64 = 5e-6;
 
 fn act(v: &Values, _: &Surroundings, pp_m: f64) -> f64 {

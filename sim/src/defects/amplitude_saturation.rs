@@ -12,7 +12,7 @@ pub(super) static KIND: Kind = Kind {
     act: Act { setup: None, plate: Some(act), contact: None, forces: None },
 };
 
-/// How sharp the bend is [-].
+/// How sharp the bend is (-).
 const SHARPNESS: f64 = 6.0;
 
 fn act(v: &Values, _: &Surroundings, pp_m: f64) -> f64 {

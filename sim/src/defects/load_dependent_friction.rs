@@ -15,7 +15,7 @@ pub(super) static KIND: Kind = Kind {
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },
 };
 
-/// Force at which the share leaves the friction as it was [N].
+/// Force at which the share leaves the friction as it was (N).
 const REFERENCE_N: f64 = 0.25;
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
