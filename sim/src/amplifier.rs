@@ -12,25 +12,25 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AmplifierConfig {
-    /// Step of the amplitude set-point, peak-to-peak [m].
+    /// Step of the amplitude set-point, peak-to-peak (m).
     pub amplitude_step_m: f64,
-    /// Step of the frequency set-point [Hz].
+    /// Step of the frequency set-point (Hz).
     pub frequency_step_hz: f64,
-    /// Largest amplitude set-point taken, peak-to-peak [m]; larger ones are clipped and echoed so.
+    /// Largest amplitude set-point taken, peak-to-peak (m); larger ones are clipped and echoed so.
     pub amplitude_max_m: f64,
-    /// Lowest and highest frequency taken [Hz].
+    /// Lowest and highest frequency taken (Hz).
     pub frequency_range_hz: [f64; 2],
-    /// Heartbeat timeout of its watchdog [s].
+    /// Heartbeat timeout of its watchdog (s).
     pub watchdog_s: f64,
-    /// Relative noise of the amplitude read back [-].
+    /// Relative noise of the amplitude read back (-).
     pub readback_relative_sd: f64,
-    /// Absolute noise of the amplitude read back, peak-to-peak [m].
+    /// Absolute noise of the amplitude read back, peak-to-peak (m).
     pub readback_sd_m: f64,
-    /// Time between two states that it publishes [s].
+    /// Time between two states that it publishes (s).
     pub state_period_s: f64,
-    /// Temperature at which it reports a fault and switches off [deg C].
+    /// Temperature at which it reports a fault and switches off (deg C).
     pub temperature_max_c: f64,
-    /// Warming over the plate's warming [-].
+    /// Warming over the plate's warming (-).
     pub warming_ratio: f64,
     /// Fault: the enable input is ignored once the output is on; only the supply relay stops it.
     pub refuses_off: bool,
@@ -59,7 +59,7 @@ impl Default for AmplifierConfig {
 pub struct AmplifierInput {
     /// Amplitude, peak-to-peak.
     pub amplitude: PeakToPeak,
-    /// Frequency [Hz]; not positive: the frequency stays as it is.
+    /// Frequency (Hz); not positive: the frequency stays as it is.
     pub frequency_hz: f64,
     /// Output on.
     pub enable: bool,
@@ -70,13 +70,13 @@ pub struct AmplifierInput {
 /// What the amplifier publishes of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AmplifierStatus {
-    /// Amplitude as it measures it [m], peak-to-peak.
+    /// Amplitude as it measures it (m), peak-to-peak.
     pub measured_pp_m: f64,
     /// The same in its own counts (amplitude steps).
     pub measured_counts: i64,
     /// Set-point after quantisation.
     pub echoed_amplitude: PeakToPeak,
-    /// Frequency after quantisation [Hz].
+    /// Frequency after quantisation (Hz).
     pub echoed_frequency_hz: f64,
     /// Output on.
     pub output_on: bool,
@@ -86,7 +86,7 @@ pub struct AmplifierStatus {
     pub fault: bool,
     /// The supply relay is closed.
     pub supply_closed: bool,
-    /// Temperature [deg C].
+    /// Temperature (deg C).
     pub temperature_c: f64,
     /// When this was taken, in the world's time.
     pub taken_at: Nanos,
@@ -171,7 +171,7 @@ impl Amplifier {
         self.fault = false;
     }
 
-    /// Moves on to `now`; returns the drive [m peak-to-peak at resonance] and its frequency [Hz].
+    /// Moves on to `now`; returns the drive (m peak-to-peak at resonance) and its frequency (Hz).
     pub fn step(&mut self, now: Nanos, room_c: f64, plate_warming_k: f64) -> (f64, f64) {
         if self.output_on && now.since(self.fed_at) > Nanos::from_seconds(self.config.watchdog_s) {
             self.output_on = false;

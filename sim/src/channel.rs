@@ -67,10 +67,10 @@ pub struct ChannelFault {
     pub channel: ChannelName,
     /// What is wrong.
     pub fault: FaultMode,
-    /// From this time on [s].
+    /// From this time on (s).
     #[serde(default)]
     pub from_s: f64,
-    /// Until this time [s]; without it: for ever.
+    /// Until this time (s); without it: for ever.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until_s: Option<f64>,
     /// How much: see the fault.

@@ -13,6 +13,7 @@
 //! Sources: the paper's section 4 (a Coulombic slider on two springs), section 5.3 (finite lateral recovery).
 
 pub mod averaged;
+mod compliant;
 pub mod element;
 pub mod lateral;
 pub mod resolved;
@@ -23,20 +24,20 @@ use std::f64::consts::PI;
 /// The friction limit beyond Coulomb's: every term is zero in the ideal world.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Limit {
-    /// Share of the limit carried by a contact area that grows as the 2/3 power of the force [-], 0 to 1.
+    /// Share of the limit carried by a contact area that grows as the 2/3 power of the force (-), 0 to 1.
     pub area_share: f64,
-    /// Force at which that share leaves the limit as it was [N]; positive where the share is not zero.
+    /// Force at which that share leaves the limit as it was (N); positive where the share is not zero.
     pub area_reference_n: f64,
-    /// Attraction fully developed under load [N]; it adds to the force in the limit.
+    /// Attraction fully developed under load (N); it adds to the force in the limit.
     pub adhesion_n: f64,
-    /// Load at which 63 % of the attraction has developed [N]; positive where `adhesion_n` is not zero.
+    /// Load at which 63 % of the attraction has developed (N); positive where `adhesion_n` is not zero.
     pub adhesion_scale_n: f64,
-    /// Contact time after which half of the limit is there [s]; 0: at once.
+    /// Contact time after which half of the limit is there (s); 0: at once.
     pub dwell_s: f64,
 }
 
 impl Limit {
-    /// Friction limit [N] for a normal force [N] and a time in contact [s].
+    /// Friction limit (N) for a normal force (N) and a time in contact (s).
     pub fn at(&self, friction: f64, normal_n: f64, dwell_s: f64) -> f64 {
         let mut load = normal_n;
         if self.area_share > 0.0 {
@@ -58,13 +59,13 @@ pub enum Recovery {
     /// At once: the paper's section 4.
     #[default]
     Instant,
-    /// At a constant speed [m/s]: the paper's section 5.3 (Figs. 13 and 14).
+    /// At a constant speed (m/s): the paper's section 5.3 (Figs. 13 and 14).
     Rate(f64),
-    /// Towards a speed [m/s] for large stretches, exponentially below the given stretch [m].
+    /// Towards a speed (m/s) for large stretches, exponentially below the given stretch (m).
     Soft {
-        /// Speed of a large stretch [m/s].
+        /// Speed of a large stretch (m/s).
         speed_m_s: f64,
-        /// Stretch below which recovery is exponential [m].
+        /// Stretch below which recovery is exponential (m).
         knee_m: f64,
     },
 }
@@ -72,45 +73,49 @@ pub enum Recovery {
 /// How the plate moves beyond `a cos(theta)`: all zero in the ideal world.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Motion {
-    /// Second harmonic of the normal motion over the fundamental [-].
+    /// Second harmonic of the normal motion over the fundamental (-).
     pub second_harmonic: f64,
-    /// Its phase at the top of the fundamental [rad].
+    /// Its phase at the top of the fundamental (rad).
     pub second_phase_rad: f64,
-    /// In-plane motion along the sliding direction over the normal amplitude [-].
+    /// In-plane motion along the sliding direction over the normal amplitude (-).
     pub in_plane: f64,
-    /// Its phase at the top of the normal motion [rad].
+    /// Its phase at the top of the normal motion (rad).
     pub in_plane_phase_rad: f64,
-    /// Slow modulation of the amplitude, depth [-], 0 to 1; averaged over its period.
+    /// Slow modulation of the amplitude, depth (-), 0 to 1; averaged over its period.
     pub modulation: f64,
 }
 
 /// The ridges beyond massless ideal springs: all zero in the ideal world.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Ridge {
-    /// Mass that follows the plate [kg].
+    /// Mass that follows the plate (kg).
     pub mass_kg: f64,
-    /// Damping to the immobile tissue behind [N s/m].
+    /// Damping to the immobile tissue behind (N s/m).
     pub damping_n_s_per_m: f64,
-    /// Standard deviation of the heights of the ridges' tops [m].
+    /// Stiffness of the skin's surface over the normal stiffness (-); 0: rigid, landings without rebound.
+    pub skin_ratio: f64,
+    /// Damping ratio of that surface under the ridge's mass (-).
+    pub skin_loss: f64,
+    /// Standard deviation of the heights of the ridges' tops (m).
     pub height_sd_m: f64,
 }
 
 /// A contact under steady conditions: everything its cycle depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// Normal stiffness [N/m].
+    /// Normal stiffness (N/m).
     pub normal_stiffness_n_per_m: f64,
-    /// Lateral stiffness [N/m].
+    /// Lateral stiffness (N/m).
     pub lateral_stiffness_n_per_m: f64,
-    /// Intrinsic coefficient of friction [-].
+    /// Intrinsic coefficient of friction (-).
     pub friction: f64,
-    /// Mean normal force [N].
+    /// Mean normal force (N).
     pub normal_force_n: f64,
-    /// Zero-to-peak amplitude of the plate [m]: half of w.
+    /// Zero-to-peak amplitude of the plate (m): half of w.
     pub sine_amplitude_m: f64,
-    /// Frequency of the plate [Hz].
+    /// Frequency of the plate (Hz).
     pub frequency_hz: f64,
-    /// Sliding speed [m/s], not negative.
+    /// Sliding speed (m/s), not negative.
     pub speed_m_s: f64,
     /// Friction limit beyond Coulomb's.
     pub limit: Limit,
@@ -125,9 +130,9 @@ pub struct Contact {
 /// What a cycle of steady contact yields.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steady {
-    /// Mean lateral force [N].
+    /// Mean lateral force (N).
     pub lateral_force_n: f64,
-    /// Share of the cycle in contact [-].
+    /// Share of the cycle in contact (-).
     pub contact_fraction: f64,
 }
 
@@ -163,7 +168,7 @@ impl Contact {
         }
     }
 
-    /// Lateral force at rest of the plate [N]: the friction limit of the mean normal force.
+    /// Lateral force at rest of the plate (N): the friction limit of the mean normal force.
     pub fn limit_at_rest_n(&self) -> f64 {
         self.limit.at(self.friction, self.normal_force_n, f64::INFINITY)
     }

@@ -61,25 +61,25 @@ pub type Values = [f64; 4];
 /// The circumstances of an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
-    /// Time from the start of the run [s].
+    /// Time from the start of the run (s).
     pub time_s: f64,
-    /// Time since the finger was put on [s].
+    /// Time since the finger was put on (s).
     pub contact_time_s: f64,
-    /// Position along the stroke [m].
+    /// Position along the stroke (m).
     pub position_m: f64,
     /// 1 or -1.
     pub direction: f64,
-    /// Frequency of the plate [Hz].
+    /// Frequency of the plate (Hz).
     pub frequency_hz: f64,
-    /// True normal force [N].
+    /// True normal force (N).
     pub normal_force_n: f64,
-    /// Ambient pressure [Pa].
+    /// Ambient pressure (Pa).
     pub ambient_pressure_pa: f64,
-    /// Temperature of the plate [deg C].
+    /// Temperature of the plate (deg C).
     pub temperature_c: f64,
 }
 
-/// The two forces in the sensor's frame [N].
+/// The two forces in the sensor's frame (N).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forces {
     /// Lateral, signed.
@@ -93,7 +93,7 @@ pub struct Forces {
 pub struct Act {
     /// Changes the world before it starts.
     pub setup: Option<fn(&Values, &mut WorldConfig)>,
-    /// Peak-to-peak amplitude under the finger [m] from the one the amplifier knows of.
+    /// Peak-to-peak amplitude under the finger (m) from the one the amplifier knows of.
     pub plate: Option<fn(&Values, &Surroundings, f64) -> f64>,
     /// Changes the contact.
     pub contact: Option<fn(&Values, &Surroundings, &mut Contact)>,
@@ -136,7 +136,24 @@ impl Kind {
 }
 
 impl Parameter {
-    fn draw(&self, noise: &mut Noise) -> f64 {
+    const fn linear(name: &'static str, low: f64, high: f64) -> Self {
+        Self { name, low, high, draw: Draw::Linear }
+    }
+
+    const fn log(name: &'static str, low: f64, high: f64) -> Self {
+        Self { name, low, high, draw: Draw::Log }
+    }
+
+    const fn signed(name: &'static str, low: f64, high: f64) -> Self {
+        Self { name, low, high, draw: Draw::Signed }
+    }
+
+    const fn factor(name: &'static str, low: f64, high: f64) -> Self {
+        Self { name, low, high, draw: Draw::Factor }
+    }
+
+    /// Draws a value.
+    pub fn draw(&self, noise: &mut Noise) -> f64 {
         match self.draw {
             Draw::Linear => noise.between(self.low, self.high),
             Draw::Log => noise.log_between(self.low, self.high),
@@ -172,8 +189,19 @@ impl std::fmt::Debug for Defect {
     }
 }
 
+/// Kinds that make ridges fly, which this world solves for one ridge on a plain sine only.
+const FLYING: [&str; 2] = ["ridge_inertia", "normal_damping"];
+/// Kinds that need many ridges or a plate that does not move as a plain sine.
+const SHAPED: [&str; 3] = ["multi_asperity", "second_harmonic", "in_plane_motion"];
+
+/// Whether this world can solve two kinds at once.
+pub fn compatible(one: &Kind, other: &Kind) -> bool {
+    let clash = |a: &Kind, b: &Kind| FLYING.contains(&a.name) && SHAPED.contains(&b.name);
+    !clash(one, other) && !clash(other, one)
+}
+
 impl Defects {
-    /// Peak-to-peak amplitude under the finger [m].
+    /// Peak-to-peak amplitude under the finger (m).
     pub fn plate(&self, at: &Surroundings, mut pp_m: f64) -> f64 {
         for defect in &self.defects {
             if let Some(act) = defect.kind.act.plate {
@@ -221,6 +249,38 @@ macro_rules! kinds {
 }
 
 kinds! {
-    squeeze_film
+    adhesion
     amplitude_droop
+    amplitude_miscalibration
+    amplitude_saturation
+    contact_ageing
+    contaminated_patch
+    force_crosstalk
+    frictional_heating
+    in_plane_motion
+    lateral_gain
+    lateral_offset_drift
+    lateral_recovery
+    lateral_resonance
+    load_dependent_friction
+    mains_modulation
+    mode_shape
+    moisture_drift
+    multi_asperity
+    normal_damping
+    normal_offset
+    plate_tilt
+    rate_dependent_friction
+    resonance_detuning
+    ridge_anisotropy
+    ridge_inertia
+    second_harmonic
+    sensor_lag
+    speed_error
+    speed_ripple
+    squeeze_film
+    stiffness_error
+    subsurface_relaxation
+    time_misalignment
+    triboelectric_attraction
 }

@@ -12,25 +12,25 @@ use crate::noise::Noise;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FingerConfig {
-    /// Nominal normal stiffness at ultrasonic frequencies [N/m].
+    /// Nominal normal stiffness at ultrasonic frequencies (N/m).
     pub normal_stiffness_n_per_m: f64,
-    /// Nominal lateral stiffness at ultrasonic frequencies [N/m].
+    /// Nominal lateral stiffness at ultrasonic frequencies (N/m).
     pub lateral_stiffness_n_per_m: f64,
-    /// Relative standard deviation of each true stiffness about its nominal one [-]; drawn from the seed.
+    /// Relative standard deviation of each true stiffness about its nominal one (-); drawn from the seed.
     pub stiffness_relative_sd: f64,
-    /// Intrinsic coefficient of friction [-].
+    /// Intrinsic coefficient of friction (-).
     pub mu0: f64,
-    /// Mass of the ridges [kg]; 0: massless.
+    /// Mass of the ridges (kg); 0: massless.
     pub ridge_mass_kg: f64,
-    /// Damping ratio of the ridges on their normal spring [-]; acts with a mass only.
+    /// Damping ratio of the ridges on their normal spring (-); acts with a mass only.
     pub ridge_damping_ratio: f64,
-    /// Lateral recovery speed [m/s]; 0: at once.
+    /// Lateral recovery speed (m/s); 0: at once.
     pub lateral_recovery_m_s: f64,
-    /// Lateral stiffness of the pad at the stage's pace [N/m].
+    /// Lateral stiffness of the pad at the stage's pace (N/m).
     pub pad_stiffness_n_per_m: f64,
-    /// Poisson's ratio of the ridges, for rig.toml [-].
+    /// Poisson's ratio of the ridges, for rig.toml (-).
     pub poisson_ratio: f64,
-    /// Young's modulus of the ridges, for rig.toml [Pa].
+    /// Young's modulus of the ridges, for rig.toml (Pa).
     pub young_modulus_pa: f64,
 }
 
@@ -55,11 +55,11 @@ impl Default for FingerConfig {
 /// The one fingertip on this rig: its true properties.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Finger {
-    /// True normal stiffness [N/m].
+    /// True normal stiffness (N/m).
     pub normal_stiffness_n_per_m: f64,
-    /// True lateral stiffness [N/m].
+    /// True lateral stiffness (N/m).
     pub lateral_stiffness_n_per_m: f64,
-    /// True coefficient of friction [-].
+    /// True coefficient of friction (-).
     pub mu0: f64,
     ridge: Ridge,
     recovery: Recovery,
@@ -81,7 +81,7 @@ impl Finger {
             ridge: Ridge {
                 mass_kg: config.ridge_mass_kg,
                 damping_n_s_per_m: config.ridge_damping_ratio * critical,
-                height_sd_m: 0.0,
+                ..Ridge::default()
             },
             recovery: match config.lateral_recovery_m_s {
                 speed if speed > 0.0 => Recovery::Rate(speed),
@@ -120,7 +120,7 @@ pub struct Pad {
 }
 
 impl Pad {
-    /// The pad's lateral force [N] after `dt` seconds at a velocity, the contact carrying at most `limit_n`.
+    /// The pad's lateral force (N) after `dt` seconds at a velocity, the contact carrying at most `limit_n`.
     pub fn step(&mut self, stiffness_n_per_m: f64, velocity_m_s: f64, limit_n: f64, dt: f64) -> f64 {
         let bound = limit_n / stiffness_n_per_m;
         self.stretch_m = (self.stretch_m + velocity_m_s * dt).clamp(-bound, bound);

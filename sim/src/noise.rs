@@ -75,7 +75,7 @@ pub struct Wander {
 }
 
 impl Wander {
-    /// A stationary wander with a standard deviation and a correlation time [s], started at random.
+    /// A stationary wander with a standard deviation and a correlation time (s), started at random.
     pub fn new(sd: f64, time_s: f64, noise: &mut Noise) -> Self {
         Self { sd, time_s, step_s: -1.0, decay: 1.0, kick: 0.0, value: sd * noise.normal() }
     }

@@ -12,15 +12,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlateConfig {
-    /// Quality factor [-].
+    /// Quality factor (-).
     pub quality_factor: f64,
-    /// Resonance [Hz]; 0: the bench tunes the plate to whatever frequency is set (a set of horns).
+    /// Resonance (Hz); 0: the bench tunes the plate to whatever frequency is set (a set of horns).
     pub resonance_hz: f64,
-    /// Relative fall of the resonance a kelvin of warming [1/K].
+    /// Relative fall of the resonance a kelvin of warming (1/K).
     pub resonance_per_k: f64,
-    /// Warming in the steady state at 1 um peak-to-peak and 27.5 kHz [K]; grows as the square of both.
+    /// Warming in the steady state at 1 um peak-to-peak and 27.5 kHz (K); grows as the square of both.
     pub warming_k: f64,
-    /// Time constant of warming [s].
+    /// Time constant of warming (s).
     pub warming_time_s: f64,
 }
 
@@ -65,13 +65,13 @@ impl Plate {
         Self { config, re: 0.0, im: 0.0, warming_k: 0.0, map: Transition::default() }
     }
 
-    /// Time constant of the amplitude [s] at a frequency [Hz].
+    /// Time constant of the amplitude (s) at a frequency (Hz).
     pub fn time_constant_s(&self, frequency_hz: f64) -> f64 {
         self.config.quality_factor / (PI * frequency_hz)
     }
 
     /// Moves on by `dt` seconds under a drive that would settle at `drive_pp_m` at resonance.
-    /// Returns the peak-to-peak amplitude [m].
+    /// Returns the peak-to-peak amplitude (m).
     pub fn step(&mut self, drive_pp_m: f64, frequency_hz: f64, dt: f64) -> f64 {
         let nominal = if self.config.resonance_hz > 0.0 { self.config.resonance_hz } else { frequency_hz };
         let resonance = nominal * (1.0 - self.config.resonance_per_k * self.warming_k);
@@ -111,14 +111,14 @@ impl Plate {
         }
     }
 
-    /// Peak-to-peak amplitude [m].
+    /// Peak-to-peak amplitude (m).
     pub fn amplitude_pp_m(&self) -> f64 {
         // Far below a picometre nothing is left to feel; a true zero spares the contact its smallest numbers.
         let pp = self.re.hypot(self.im);
         if pp < 1e-13 { 0.0 } else { pp }
     }
 
-    /// Warming above the room [K].
+    /// Warming above the room (K).
     pub fn warming_k(&self) -> f64 {
         self.warming_k
     }

@@ -10,27 +10,27 @@ use crate::noise::{Noise, Wander};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorConfig {
-    /// Time between two samples [s].
+    /// Time between two samples (s).
     pub sample_period_s: f64,
-    /// Time from a sample's instant to its delivery [s]; at most 1 s.
+    /// Time from a sample's instant to its delivery (s); at most 1 s.
     pub latency_s: f64,
-    /// -3 dB bandwidth of its second-order Bessel-like filter [Hz].
+    /// -3 dB bandwidth of its second-order Bessel-like filter (Hz).
     pub bandwidth_hz: f64,
-    /// White noise of a sample, lateral and normal [N].
+    /// White noise of a sample, lateral and normal (N).
     pub white_sd_n: [f64; 2],
-    /// Slow wander of the zero, lateral and normal [N].
+    /// Slow wander of the zero, lateral and normal (N).
     pub wander_sd_n: [f64; 2],
-    /// Correlation time of the wander [s].
+    /// Correlation time of the wander (s).
     pub wander_time_s: f64,
     /// Gain error, lateral and normal: 1 is right.
     pub gain: [f64; 2],
-    /// Lateral reading a newton of normal force, and normal reading a newton of lateral force [-].
+    /// Lateral reading a newton of normal force, and normal reading a newton of lateral force (-).
     pub cross_talk: [f64; 2],
-    /// Force of one count [N].
+    /// Force of one count (N).
     pub count_n: f64,
-    /// Full scale, both axes [N]: beyond it the counts stand still and the sample says so.
+    /// Full scale, both axes (N): beyond it the counts stand still and the sample says so.
     pub full_scale_n: f64,
-    /// Relative error of its clock [-].
+    /// Relative error of its clock (-).
     pub clock_drift: f64,
 }
 
@@ -57,13 +57,13 @@ impl Default for SensorConfig {
 pub struct ForceSample {
     /// Lateral, normal force in counts.
     pub counts: [i32; 2],
-    /// Lateral, normal force [N]: counts times the count.
+    /// Lateral, normal force (N): counts times the count.
     pub force_n: [f64; 2],
     /// Which axis is at the end of its range.
     pub saturated: [bool; 2],
     /// Sample counter; wraps.
     pub sequence: u32,
-    /// The sensor's own clock [ns].
+    /// The sensor's own clock (ns).
     pub device_time: Nanos,
     /// When the sample was taken, in the world's time.
     pub taken_at: Nanos,
@@ -126,7 +126,7 @@ impl Sensor {
         Self { config, filter, wander, noise, tick_s, sequence: 0 }
     }
 
-    /// Takes in the true forces [N] of one tick; returns what the filter shows.
+    /// Takes in the true forces (N) of one tick; returns what the filter shows.
     pub fn feel(&mut self, lateral_n: f64, normal_n: f64) -> [f64; 2] {
         let [xz, zx] = self.config.cross_talk;
         let felt = [lateral_n + xz * normal_n, normal_n + zx * lateral_n];
@@ -157,7 +157,7 @@ impl Sensor {
         }
     }
 
-    /// Time of one tick [s].
+    /// Time of one tick (s).
     pub fn tick_s(&self) -> f64 {
         self.tick_s
     }

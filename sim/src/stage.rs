@@ -10,33 +10,33 @@ use crate::noise::{Noise, Wander};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct StageConfig {
-    /// Acceleration [m/s2].
+    /// Acceleration (m/s2).
     pub acceleration_m_s2: f64,
-    /// Fastest speed [m/s].
+    /// Fastest speed (m/s).
     pub speed_max_m_s: f64,
-    /// Ends of the travel [m].
+    /// Ends of the travel (m).
     pub travel_m: [f64; 2],
-    /// Resolution of its encoder [m].
+    /// Resolution of its encoder (m).
     pub encoder_m: f64,
-    /// Relative noise of the velocity that it reports [-].
+    /// Relative noise of the velocity that it reports (-).
     pub velocity_relative_sd: f64,
-    /// Relative ripple of the true speed [-].
+    /// Relative ripple of the true speed (-).
     pub ripple: f64,
-    /// Pitch of the ripple [m].
+    /// Pitch of the ripple (m).
     pub ripple_pitch_m: f64,
-    /// Time constant of the normal-force controller [s].
+    /// Time constant of the normal-force controller (s).
     pub load_time_s: f64,
-    /// Gap when lifted off [m].
+    /// Gap when lifted off (m).
     pub lift_gap_m: f64,
-    /// Speed of the approach over the gap [m/s].
+    /// Speed of the approach over the gap (m/s).
     pub approach_m_s: f64,
-    /// Largest normal-force set-point taken [N].
+    /// Largest normal-force set-point taken (N).
     pub load_max_n: f64,
-    /// Relative unsteadiness of the true normal force [-].
+    /// Relative unsteadiness of the true normal force (-).
     pub load_relative_sd: f64,
-    /// Correlation time of that unsteadiness [s].
+    /// Correlation time of that unsteadiness (s).
     pub load_wander_s: f64,
-    /// Time between two states that it publishes [s].
+    /// Time between two states that it publishes (s).
     pub state_period_s: f64,
 }
 
@@ -64,18 +64,18 @@ impl Default for StageConfig {
 /// A set-point as the stage's inputs take it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageInput {
-    /// Velocity [m/s], signed.
+    /// Velocity (m/s), signed.
     pub velocity_m_s: f64,
-    /// Normal force [N]; not positive: lift off.
+    /// Normal force (N); not positive: lift off.
     pub normal_force_n: f64,
 }
 
 /// What the stage publishes of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageStatus {
-    /// Position [m].
+    /// Position (m).
     pub position_m: f64,
-    /// Velocity [m/s].
+    /// Velocity (m/s).
     pub velocity_m_s: f64,
     /// At an end of its travel.
     pub at_limit: bool,
@@ -92,11 +92,11 @@ pub struct StageStatus {
 pub struct Stage {
     config: StageConfig,
     input: StageInput,
-    /// True position [m].
+    /// True position (m).
     pub position_m: f64,
-    /// True velocity without ripple [m/s].
+    /// True velocity without ripple (m/s).
     pub velocity_m_s: f64,
-    /// True normal force [N].
+    /// True normal force (N).
     pub normal_force_n: f64,
     /// Counts strokes: one more whenever it starts moving or turns round.
     pub strokes: u64,
@@ -188,7 +188,7 @@ impl Stage {
         self.normal_force_n = (self.load_n * (1.0 + unsteady)).max(0.0);
     }
 
-    /// True velocity with the ripple of the drive [m/s].
+    /// True velocity with the ripple of the drive (m/s).
     pub fn true_velocity_m_s(&self) -> f64 {
         if self.config.ripple == 0.0 {
             return self.velocity_m_s;

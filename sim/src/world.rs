@@ -30,25 +30,25 @@ use crate::stage::{Stage, StageInput, StageStatus};
 /// What is true of the world at an instant: for scoring, never for a reader on the rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
-    /// Peak-to-peak amplitude under the finger [m].
+    /// Peak-to-peak amplitude under the finger (m).
     pub amplitude_pp_m: f64,
-    /// Frequency of the drive [Hz].
+    /// Frequency of the drive (Hz).
     pub frequency_hz: f64,
-    /// True normal force [N].
+    /// True normal force (N).
     pub normal_force_n: f64,
-    /// Lateral force on the sensor's side of the pad, before the sensor [N], signed.
+    /// Lateral force on the sensor's side of the pad, before the sensor (N), signed.
     pub lateral_force_n: f64,
-    /// The contact's mean friction limit under steady sliding [N].
+    /// The contact's mean friction limit under steady sliding (N).
     pub friction_n: f64,
-    /// Velocity of the stage [m/s].
+    /// Velocity of the stage (m/s).
     pub velocity_m_s: f64,
-    /// Position of the stage [m].
+    /// Position of the stage (m).
     pub position_m: f64,
-    /// Share of the plate's cycle in contact [-].
+    /// Share of the plate's cycle in contact (-).
     pub contact_fraction: f64,
 }
 
-/// Speeds below this are standing still [m/s].
+/// Speeds below this are standing still (m/s).
 const STILL_M_S: f64 = 1e-7;
 /// Steps a period when every cycle is marched.
 const MARCH_STEPS: usize = 400;
@@ -214,7 +214,7 @@ impl World {
         }
     }
 
-    /// The contact of this tick: amplitude under the finger [m] and the friction it yields.
+    /// The contact of this tick: amplitude under the finger (m) and the friction it yields.
     fn meet(&mut self, at: &Surroundings, known_pp: f64, speed: f64, dt: f64) -> (f64, Steady) {
         let nothing = Steady { lateral_force_n: 0.0, contact_fraction: 0.0 };
         if at.normal_force_n <= 0.0 {
@@ -286,19 +286,24 @@ impl World {
         self.amplifier.restore_supply();
     }
 
-    /// Sets the pressure around the rig (a chamber) [Pa].
+    /// Sets the pressure around the rig (a chamber) (Pa).
     pub fn set_ambient_pressure_pa(&mut self, pressure_pa: f64) {
         self.config.room.ambient_pressure_pa = pressure_pa.max(0.0);
     }
 
-    /// Pressure around the rig [Pa].
+    /// Pressure around the rig (Pa).
     pub fn ambient_pressure_pa(&self) -> f64 {
         self.config.room.ambient_pressure_pa
     }
 
-    /// Temperature of the plate [deg C].
+    /// Temperature of the plate (deg C).
     pub fn plate_temperature_c(&self) -> f64 {
         self.config.room.temperature_c + self.plate.warming_k()
+    }
+
+    /// Averages computed so far.
+    pub fn computed(&self) -> u64 {
+        self.averager.computed()
     }
 
     /// What is true now: for scoring only.

@@ -1,16 +1,17 @@
 //! The resolved contact, averaged over cycles and remembered.
 //!
-//! A control loop at 1 kHz sees some thirty cycles of the plate a step; marching them all costs more than the
-//! step may. The mean friction of a ridge with mass is therefore computed once for each cell of its operating
-//! space, with its slopes in amplitude, speed, load and friction, and read from there. Cells are kept in a table
-//! of fixed size: nothing is allocated while the world runs, and what is read does not depend on what was read
-//! before. [`CELL`] sets the error; `averaging_error` in the tests measures it.
+//! A control loop at 1 kHz sees some thirty cycles of the plate a step; solving them anew at every step costs more than
+//! the step may. The mean friction is therefore computed once for each cell of the contact's operating space, with
+//! its slopes in amplitude, speed, load and friction, and read from there. A cell is computed when it is asked for
+//! twice running; what is passed through (a plate ringing up, a stiffness that drifts) is solved directly. Cells are kept
+//! in a table of fixed size: nothing is allocated while the world runs, and what a cell holds does not depend on what
+//! was read before. [`CELL`] sets the error; `averaging_error` in the tests measures it.
 
 use super::resolved::{self, Settings};
 use super::{Contact, Steady};
 
 /// Width of a cell in the logarithm of each variable.
-pub const CELL: f64 = 0.04;
+pub const CELL: f64 = 0.02;
 /// Cells remembered.
 const CELLS: usize = 1024;
 /// Variables with a slope.
@@ -28,12 +29,13 @@ struct Cell {
 /// A memory of cycle averages.
 pub struct Averager {
     cells: Vec<Option<Cell>>,
+    last: Option<([i64; SLOPES], Contact)>,
     computed: u64,
 }
 
 impl Default for Averager {
     fn default() -> Self {
-        Self { cells: vec![None; CELLS], computed: 0 }
+        Self { cells: vec![None; CELLS], last: None, computed: 0 }
     }
 }
 
@@ -56,35 +58,46 @@ fn with(contact: &Contact, ln: [f64; SLOPES]) -> Contact {
 }
 
 fn share(contact: &Contact) -> [f64; 2] {
-    let steady = resolved::steady(contact, Settings::default()).steady;
+    let steady = contact.steady();
     [steady.lateral_force_n / (contact.friction * contact.normal_force_n), steady.contact_fraction]
 }
 
+/// The contact of an instant that is passed through: a ridge with mass is marched for fewer cycles.
+fn passing(contact: &Contact) -> Steady {
+    if contact.has_inertia() && contact.motion.modulation == 0.0 {
+        let settings = Settings { settle: 18, average: 6, ..Settings::default() };
+        return resolved::steady(contact, settings).steady;
+    }
+    contact.steady()
+}
+
 impl Averager {
-    /// The cycle-averaged contact; exact solvers are asked directly, only a ridge with mass is remembered.
+    /// The cycle-averaged contact.
     pub fn steady(&mut self, contact: &Contact) -> Steady {
-        let remembered = contact.has_inertia()
-            && contact.sine_amplitude_m > 1e-10
-            && contact.normal_force_n > 1e-4
-            && contact.motion.modulation == 0.0;
-        if !remembered {
+        if contact.sine_amplitude_m < 1e-9 || contact.normal_force_n < 1e-3 {
             return contact.steady();
         }
         let ln = variables(contact);
         let key = ln.map(|x| (x / CELL).round() as i64);
-        let rest = with(contact, [0.0; SLOPES]);
-        let mixed = key.iter().fold(0x9e37_79b9_7f4a_7c15_u64, |h, k| {
-            (h ^ (*k as u64)).wrapping_mul(0x0100_0000_01b3).rotate_left(23)
-        });
-        let slot = (mixed % CELLS as u64) as usize;
+        let mut rest = *contact;
+        rest.sine_amplitude_m = 1.0;
+        rest.speed_m_s = 1.0;
+        rest.normal_force_n = 1.0;
+        rest.friction = 1.0;
+        let mixed = key
+            .iter()
+            .fold(0_u64, |h, k| (h ^ (*k as u64)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29));
+        let slot = (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 54) as usize % CELLS;
+        let again = self.last.replace((key, rest)) == Some((key, rest));
         let cell = match self.cells[slot] {
             Some(cell) if cell.key == key && cell.rest == rest => cell,
-            _ => {
+            _ if again => {
                 self.computed += 1;
                 let cell = Self::compute(contact, key, rest);
                 self.cells[slot] = Some(cell);
                 cell
             }
+            _ => return passing(contact),
         };
         let mut ratio = cell.centre[0];
         for i in 0..SLOPES {
@@ -119,29 +132,38 @@ impl Averager {
 mod tests {
     use super::*;
 
-    #[test]
-    fn averaging_error() {
-        // Over the operating space of the bundled sweep, relative to the friction limit mu0 F_n.
+    /// Rms and worst error over the operating space of a sweep, relative to the friction limit mu0 F_n.
+    fn error(n: usize, change: impl Fn(&mut Contact)) -> (f64, f64) {
         let mut averager = Averager::default();
-        let mut worst = 0.0_f64;
-        let mut square = 0.0;
-        let mut count = 0.0;
-        for i in 0..60 {
-            let t = i as f64 / 60.0;
-            let a = 0.3e-6 * (7.0_f64).powf((t * 7.0).fract());
+        let (mut worst, mut square) = (0.0_f64, 0.0);
+        for i in 0..n {
+            let t = i as f64 / n as f64;
+            let a = 0.2e-6 * 12.0_f64.powf((t * 7.0).fract());
             let mut contact =
                 Contact::ideal(3.9e6, 1.5e6, 0.5, 0.15 + 0.6 * (t * 3.0).fract(), a, 27_500.0, 0.0);
             contact.speed_m_s = 0.01 * 20.0_f64.powf((t * 11.0).fract());
-            contact.ridge.mass_kg = 1e-6;
-            contact.ridge.damping_n_s_per_m = 0.6 * (3.9e6_f64 * 1e-6).sqrt();
-            let error = (averager.steady(&contact).lateral_force_n - contact.steady().lateral_force_n)
-                / (contact.friction * contact.normal_force_n);
+            change(&mut contact);
+            let exact = contact.steady().lateral_force_n;
+            averager.steady(&contact);
+            let averaged = averager.steady(&contact).lateral_force_n;
+            let error = (averaged - exact) / (contact.friction * contact.normal_force_n);
             worst = worst.max(error.abs());
             square += error * error;
-            count += 1.0;
         }
-        let rms = f64::sqrt(square / count);
-        println!("averaged against resolved: rms {rms:.2e}, worst {worst:.2e} of mu0 Fn, n {count}");
-        assert!(rms < 4e-3 && worst < 2e-2, "rms {rms}, worst {worst}");
+        assert_eq!(averager.computed(), n as u64);
+        let rms = f64::sqrt(square / n as f64);
+        println!("averaged against solved: rms {rms:.2e}, worst {worst:.2e} of mu0 Fn, n {n}");
+        (rms, worst)
+    }
+
+    #[test]
+    fn averaging_error() {
+        let (rms, worst) = error(400, |_| {});
+        assert!(rms < 2e-4 && worst < 2e-3, "massless: rms {rms}, worst {worst}");
+        let (rms, worst) = error(80, |contact| {
+            contact.ridge.mass_kg = 1e-6;
+            contact.ridge.damping_n_s_per_m = 0.6 * (3.9e6_f64 * 1e-6).sqrt();
+        });
+        assert!(rms < 4e-3 && worst < 2e-2, "with mass: rms {rms}, worst {worst}");
     }
 }

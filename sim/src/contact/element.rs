@@ -17,11 +17,11 @@ pub struct Integrals {
     pub normal: f64,
     /// Of the lateral force, in units of the friction limit.
     pub lateral: f64,
-    /// Angle spent in contact [rad], 0 to 2 pi.
+    /// Angle spent in contact (rad), 0 to 2 pi.
     pub contact: f64,
 }
 
-/// Half the angle spent in contact [rad]: 0 where the plate never reaches the element, pi where it never leaves.
+/// Half the angle spent in contact (rad): 0 where the plate never reaches the element, pi where it never leaves.
 pub fn half_contact_angle(preload: f64) -> f64 {
     (-preload).clamp(-1.0, 1.0).acos()
 }

@@ -11,14 +11,14 @@ use super::{Contact, Recovery};
 /// State of one lateral spring.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Lateral {
-    /// Stretch [m].
+    /// Stretch (m).
     pub stretch_m: f64,
-    /// Time since touch-down [s]; infinite in persistent contact.
+    /// Time since touch-down (s); infinite in persistent contact.
     pub dwell_s: f64,
 }
 
 impl Recovery {
-    /// A stretch [m] after `dt` seconds of free recovery towards zero.
+    /// A stretch (m) after `dt` seconds of free recovery towards zero.
     pub fn relax(&self, stretch_m: f64, dt: f64) -> f64 {
         match *self {
             Recovery::Instant => 0.0,
@@ -42,7 +42,7 @@ impl Recovery {
 }
 
 impl Lateral {
-    /// One step in contact: the lateral force [N] at its end.
+    /// One step in contact: the lateral force (N) at its end.
     ///
     /// `normal_n` is the contact force at the end of the step, `drag_m_s` the plate's speed along the sliding
     /// direction during it.

@@ -34,23 +34,22 @@ impl Default for Settings {
 pub struct Resolved {
     /// Means over the averaged cycles.
     pub steady: Steady,
-    /// Mean normal force over the averaged cycles [N]: how well the balance was met.
+    /// Mean normal force over the averaged cycles (N): how well the balance was met.
     pub normal_force_n: f64,
-    /// Static compression [m].
+    /// Static compression (m).
     pub preload_m: f64,
-    /// Relative difference of the normal impulse between odd and even cycles [-]: over zero where the period
+    /// Relative difference of the normal impulse between odd and even cycles (-): over zero where the period
     /// has doubled.
     pub doubling: f64,
 }
 
-/// Lightest ridge marched [kg]: lighter ones move as if they had this mass.
-const LIGHTEST_KG: f64 = 1e-8;
+/// Lightest ridge marched (kg): lighter ones move as if they had this mass.
+pub(super) const LIGHTEST_KG: f64 = 1e-8;
 
-/// Transition matrix of the free ridge over one step.
-fn transition(contact: &Contact, dt: f64) -> [f64; 4] {
-    let m = contact.ridge.mass_kg.max(LIGHTEST_KG);
-    let gamma = contact.ridge.damping_n_s_per_m / (2.0 * m);
-    let w2 = contact.normal_stiffness_n_per_m / m;
+/// Transition matrix of a mass on spring and dashpot over one step.
+pub(super) fn transition(stiffness: f64, damping: f64, m: f64, dt: f64) -> [f64; 4] {
+    let gamma = damping / (2.0 * m);
+    let w2 = stiffness / m;
     let disc = gamma * gamma - w2;
     // e^(-gamma t) cosh and e^(-gamma t) sinh / root, in the form that overflows nowhere.
     let (c, s) = if disc < -1e-9 * w2 {
@@ -70,7 +69,8 @@ fn transition(contact: &Contact, dt: f64) -> [f64; 4] {
 
 /// Marches until the averages are there.
 pub fn steady(contact: &Contact, settings: Settings) -> Resolved {
-    let mut march = March::new(contact, settings.steps);
+    let finer = if contact.ridge.skin_ratio > 0.0 { 2 } else { 1 };
+    let mut march = March::new(contact, settings.steps * finer);
     for _ in 0..settings.settle {
         march.cycle(contact);
     }
@@ -98,9 +98,9 @@ pub fn steady(contact: &Contact, settings: Settings) -> Resolved {
 /// Means over one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cycle {
-    /// Lateral force [N].
+    /// Lateral force (N).
     pub lateral_n: f64,
-    /// Normal force, impulses included [N].
+    /// Normal force, impulses included (N).
     pub normal_n: f64,
     /// Share of the cycle in contact.
     pub contact: f64,
@@ -109,14 +109,14 @@ pub struct Cycle {
 /// The moving ridge.
 #[derive(Clone, Copy, Debug)]
 pub struct March {
-    steps: usize,
-    preload_m: f64,
-    height_m: f64,
-    speed_m_s: f64,
-    touching: bool,
-    last_normal_n: f64,
-    last_lateral_n: f64,
-    spring: Lateral,
+    pub(super) steps: usize,
+    pub(super) preload_m: f64,
+    pub(super) height_m: f64,
+    pub(super) speed_m_s: f64,
+    pub(super) touching: bool,
+    pub(super) last_normal_n: f64,
+    pub(super) last_lateral_n: f64,
+    pub(super) spring: Lateral,
 }
 
 impl March {
@@ -138,14 +138,17 @@ impl March {
 
     /// One period, from the plate's top; then the static compression is corrected.
     pub fn cycle(&mut self, contact: &Contact) -> Cycle {
+        if contact.ridge.skin_ratio > 0.0 {
+            return self.compliant_cycle(contact);
+        }
         let omega = 2.0 * PI * contact.frequency_hz;
         let dt = 1.0 / (contact.frequency_hz * self.steps as f64);
-        let map = transition(contact, dt);
         let (m, c, k) = (
             contact.ridge.mass_kg.max(LIGHTEST_KG),
             contact.ridge.damping_n_s_per_m,
             contact.normal_stiffness_n_per_m,
         );
+        let map = transition(k, c, m, dt);
         let a = contact.sine_amplitude_m;
         let (turn_s, turn_c) = (omega * dt).sin_cos();
         let (mut cos, mut sin) = (1.0_f64, 0.0_f64);
@@ -218,14 +221,12 @@ mod tests {
 
     #[test]
     fn the_free_ridge_rings_at_its_own_frequency_and_decays() {
-        let mut contact = Contact::ideal(1e6, 1e6, 0.5, 0.25, 1e-6, 27_500.0, 0.02);
-        contact.ridge.mass_kg = 8e-6;
         let period = 2.0 * PI * (8e-6_f64 / 1e6).sqrt();
-        let map = transition(&contact, period);
+        let map = transition(1e6, 0.0, 8e-6, period);
         assert!((map[0] - 1.0).abs() < 1e-9 && map[2].abs() < 1.0, "{map:?}");
         // Damping ratio 0.1: one period shrinks the swing by exp(-2 pi 0.1 / sqrt(0.99)).
-        contact.ridge.damping_n_s_per_m = 0.1 * 2.0 * (1e6_f64 * 8e-6).sqrt();
-        let damped = transition(&contact, period / 0.99_f64.sqrt());
+        let damping = 0.1 * 2.0 * (1e6_f64 * 8e-6).sqrt();
+        let damped = transition(1e6, damping, 8e-6, period / 0.99_f64.sqrt());
         assert!((damped[0] - (-2.0 * PI * 0.1 / 0.99_f64.sqrt()).exp()).abs() < 1e-9);
     }
 

@@ -13,7 +13,9 @@ use super::{Contact, HEIGHTS, Motion, Recovery, Steady, element};
 /// Steps over the contact phase of a pure sine.
 const CONTACT_STEPS: usize = 320;
 /// Steps over the whole cycle where the plate's motion is not a sine.
-const CYCLE_STEPS: usize = 1600;
+const CYCLE_STEPS: usize = 800;
+/// Points of the force balance over such a cycle.
+const BALANCE_POINTS: usize = 400;
 /// Plain repetitions before bisection.
 const REPETITIONS: usize = 12;
 
@@ -39,7 +41,7 @@ pub fn steady(contact: &Contact) -> Steady {
     sum
 }
 
-/// Static compression [m] at which the mean normal force is the one asked for.
+/// Static compression (m) at which the mean normal force is the one asked for.
 fn preload_m(contact: &Contact, heights: &[f64]) -> f64 {
     let a = contact.sine_amplitude_m;
     let target = contact.normal_force_n / (contact.normal_stiffness_n_per_m * a);
@@ -47,14 +49,19 @@ fn preload_m(contact: &Contact, heights: &[f64]) -> f64 {
         return a * element::preload_for(target);
     }
     let spread = contact.ridge.height_sd_m / a;
+    let pure = contact.motion.second_harmonic == 0.0;
+    let mut waves = [0.0; BALANCE_POINTS];
+    if !pure {
+        for (i, z) in waves.iter_mut().enumerate() {
+            *z = wave(&contact.motion, 2.0 * PI * i as f64 / BALANCE_POINTS as f64);
+        }
+    }
     let mean = |preload: f64| {
         let one = |p: f64| {
-            if contact.motion.second_harmonic == 0.0 {
+            if pure {
                 return element::cycle(p, 1.0).normal / (2.0 * PI);
             }
-            let n = CYCLE_STEPS / 2;
-            (0..n).map(|i| (wave(&contact.motion, 2.0 * PI * i as f64 / n as f64) + p).max(0.0)).sum::<f64>()
-                / n as f64
+            waves.iter().map(|z| (z + p).max(0.0)).sum::<f64>() / BALANCE_POINTS as f64
         };
         heights.iter().map(|h| one(preload + h * spread)).sum::<f64>() / heights.len() as f64
     };

@@ -3,7 +3,7 @@
 //! The area of a soft sphere grows as the 2/3 power of the load (Hertz); each area of skin takes power from the
 //! plate in proportion to the square of its speed, and to how much of the cycle it touches.
 
-use super::{Act, Draw, Kind, Parameter, Place, Surroundings, Values};
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 
 pub(super) static KIND: Kind = Kind {
     name: "amplitude_droop",
@@ -11,7 +11,7 @@ pub(super) static KIND: Kind = Kind {
     in_library: true,
     in_tables: true,
     summary: "the plate's amplitude droops under the finger's load",
-    parameters: &[Parameter { name: "load_ratio_at_1_n", low: 0.01, high: 3.0, draw: Draw::Log }],
+    parameters: &[Parameter::log("load_ratio_at_1_n", 0.01, 3.0)],
     act: Act { setup: None, plate: Some(act), contact: None, forces: None },
 };
 

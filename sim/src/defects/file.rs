@@ -53,6 +53,16 @@ pub enum DefectsError {
         /// Which one.
         parameter: &'static str,
     },
+    /// Two defects that this world cannot solve at once.
+    #[error("line {line}: '{one}' and '{other}' cannot act together in this world; leave one out")]
+    Together {
+        /// Line in the file.
+        line: usize,
+        /// One of them.
+        one: &'static str,
+        /// The other.
+        other: &'static str,
+    },
     /// A number that cannot be.
     #[error("line {line}: '{parameter}' is {value}; a finite number is needed")]
     NotFinite {
@@ -136,6 +146,9 @@ impl Defects {
                 let parameter = kind.parameters[missing].name;
                 return Err(DefectsError::MissingParameter { line: at, defect: kind.name, parameter });
             }
+            if let Some(clash) = defects.iter().find(|d: &&Defect| !super::compatible(d.kind, kind)) {
+                return Err(DefectsError::Together { line: at, one: clash.kind.name, other: kind.name });
+            }
             defects.push(defect);
         }
         Ok(Self { defects, channels: file.channel })
@@ -199,6 +212,10 @@ mod tests {
             ),
             ("[[defect]]\nname = \"squeeze_film\"\nsees = 3\n", "line 3"),
             ("[[channel]]\nchannel = \"force\"\nfault = \"tired\"\n", "line 3"),
+            (
+                "[[defect]]\nname = \"ridge_inertia\"\nseed = 1\n[[defect]]\nname = \"multi_asperity\"\nseed = 1\n",
+                "line 5: 'ridge_inertia' and 'multi_asperity' cannot act together",
+            ),
             ("colour = 3\n", "line 1"),
         ] {
             let error = Defects::parse(text).unwrap_err().to_string();

@@ -5,7 +5,7 @@
 //! given: the asperities that hold it open yield by a power law of their approach, so a lighter load on them
 //! opens it. Rarefaction lets the air out where its free path nears the gap. Only the rest of the load is rubbed.
 
-use super::{Act, Draw, Kind, Parameter, Place, Surroundings, Values};
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;
 
 pub(super) static KIND: Kind = Kind {
@@ -15,14 +15,14 @@ pub(super) static KIND: Kind = Kind {
     in_tables: true,
     summary: "air trapped between ridges and plate carries part of the load",
     parameters: &[
-        Parameter { name: "film_area_m2", low: 2e-7, high: 4e-5, draw: Draw::Log },
-        Parameter { name: "open_gap_m", low: 3e-6, high: 6e-6, draw: Draw::Log },
-        Parameter { name: "asperity_load_n", low: 0.5, high: 3.0, draw: Draw::Log },
+        Parameter::log("film_area_m2", 2e-7, 4e-5),
+        Parameter::log("open_gap_m", 3e-6, 6e-6),
+        Parameter::log("asperity_load_n", 0.5, 3.0),
     ],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },
 };
 
-/// Mean free path of air at one atmosphere [m].
+/// Mean free path of air at one atmosphere (m).
 const FREE_PATH_M: f64 = 68e-9;
 const ATMOSPHERE_PA: f64 = 101_325.0;
 
@@ -43,13 +43,43 @@ fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {
     // Find the gap at which asperities and film share the load: asperities carry W (1 - u/u0)^2, none beyond u0.
     let carried = |gap: f64| {
         let solid = asperity * (1.0 - gap / open).max(0.0).powi(2);
-        (solid, solid + area * overpressure_pa(at.ambient_pressure_pa, a, gap))
+        solid + area * overpressure_pa(at.ambient_pressure_pa, a, gap)
     };
-    let (mut low, mut high) = (0.02 * open, 3.0 * open);
-    for _ in 0..40 {
-        let middle = 0.5 * (low + high);
-        if carried(middle).1 > load { low = middle } else { high = middle }
-    }
-    let film = area * overpressure_pa(at.ambient_pressure_pa, a, 0.5 * (low + high));
+    let excess = |gap: f64| carried(gap) - load;
+    let gap = falling_root(0.02 * open, 3.0 * open, excess);
+    let film = area * overpressure_pa(at.ambient_pressure_pa, a, gap);
     contact.normal_force_n = (load - film).max(0.01 * load);
+}
+
+/// Root of a falling function by the Illinois method; an end of the bracket where there is none.
+fn falling_root(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let (mut at_low, mut at_high) = (f(low), f(high));
+    if at_low <= 0.0 {
+        return low;
+    }
+    if at_high >= 0.0 {
+        return high;
+    }
+    let mut side = 0;
+    for _ in 0..60 {
+        let middle = (low * at_high - high * at_low) / (at_high - at_low);
+        let value = f(middle);
+        if value.abs() < 1e-9 || (high - low) < 1e-13 {
+            return middle;
+        }
+        if value > 0.0 {
+            (low, at_low) = (middle, value);
+            if side == 1 {
+                at_high *= 0.5;
+            }
+            side = 1;
+        } else {
+            (high, at_high) = (middle, value);
+            if side == -1 {
+                at_low *= 0.5;
+            }
+            side = -1;
+        }
+    }
+    0.5 * (low + high)
 }

@@ -13,9 +13,9 @@ use crate::stage::StageConfig;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RoomConfig {
-    /// Ambient pressure [Pa].
+    /// Ambient pressure (Pa).
     pub ambient_pressure_pa: f64,
-    /// Temperature [deg C].
+    /// Temperature (deg C).
     pub temperature_c: f64,
 }
 
@@ -29,9 +29,9 @@ impl Default for RoomConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct WorldConfig {
-    /// Step of the world [ns]. Bodies are stepped exactly for inputs that are constant over it.
+    /// Step of the world (ns). Bodies are stepped exactly for inputs that are constant over it.
     pub tick_ns: u64,
-    /// Repeatability: relative standard deviation of the lateral force from stroke to stroke [-].
+    /// Repeatability: relative standard deviation of the lateral force from stroke to stroke (-).
     pub pass_relative_sd: f64,
     /// Whether the contact is marched cycle by cycle or averaged over cycles.
     pub contact: ContactMode,
@@ -183,7 +183,7 @@ impl WorldConfig {
         Ok(())
     }
 
-    /// Standard deviation of a pass's mean force [N]: the sensor's wander and what is left of its white noise.
+    /// Standard deviation of a pass's mean force (N): the sensor's wander and what is left of its white noise.
     /// `seconds` is the length of the pass's steady part.
     pub fn pass_force_sd_n(&self, axis: usize, seconds: f64) -> f64 {
         let s = &self.sensor;

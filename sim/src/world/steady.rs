@@ -9,9 +9,9 @@ use crate::finger::Finger;
 pub struct Point {
     /// The circumstances.
     pub at: Surroundings,
-    /// Peak-to-peak amplitude that the amplifier knows of [m].
+    /// Peak-to-peak amplitude that the amplifier knows of (m).
     pub known_pp_m: f64,
-    /// Speed that the stage knows of [m/s].
+    /// Speed that the stage knows of (m/s).
     pub speed_m_s: f64,
 }
 

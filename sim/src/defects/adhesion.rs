@@ -1,0 +1,20 @@
+//! Attraction between skin and plate adds to the load that friction feels; it is there only as far as the surfaces have
+//! been pressed into each other: Fa (1 - exp(-F/F0)).
+
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use crate::contact::Contact;
+
+pub(super) static KIND: Kind = Kind {
+    name: "adhesion",
+    place: Place::Contact,
+    in_library: true,
+    in_tables: true,
+    summary: "attraction adds to the load that friction feels",
+    parameters: &[Parameter::log("attraction_n", 5e-4, 0.2), Parameter::log("development_n", 0.01, 0.1)],
+    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+};
+
+fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
+    contact.limit.adhesion_n = v[0];
+    contact.limit.adhesion_scale_n = v[1];
+}

@@ -1,0 +1,22 @@
+//! Rubbing warms the interface and lowers its shear strength: friction falls with the power rubbed, mu F U, found where heat
+//! made and friction left agree.
+
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use crate::contact::Contact;
+
+pub(super) static KIND: Kind = Kind {
+    name: "frictional_heating",
+    place: Place::Contact,
+    in_library: false,
+    in_tables: true,
+    summary: "friction falls with the power that it dissipates",
+    parameters: &[Parameter::log("inverse_power_per_w", 1.0, 400.0)],
+    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+};
+
+fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
+    // mu = mu0 / (1 + mu F U / P): the positive root.
+    let q = v[0] * contact.normal_force_n * contact.speed_m_s;
+    let mu0 = contact.friction;
+    contact.friction = if q * mu0 < 1e-9 { mu0 } else { ((1.0 + 4.0 * q * mu0).sqrt() - 1.0) / (2.0 * q) };
+}

@@ -1,0 +1,20 @@
+//! Ridges that recover late: skin springs back fast from a large stretch and ever more slowly towards rest.
+//!
+//! The speed saturates for stretches beyond a knee (yielding bonds, Eyring) and is proportional to them below it.
+
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use crate::contact::Contact;
+
+pub(super) static KIND: Kind = Kind {
+    name: "lateral_recovery",
+    place: Place::Contact,
+    in_library: true,
+    in_tables: true,
+    summary: "ridges recover their lateral stretch at a finite speed",
+    parameters: &[Parameter::log("slowness_s_per_m", 10.0, 1000.0), Parameter::log("knee_m", 3e-8, 3e-7)],
+    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+};
+
+fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
+    contact.recovery = crate::contact::Recovery::Soft { speed_m_s: 1.0 / v[0], knee_m: v[1] };
+}

@@ -1,0 +1,24 @@
+//! Part of the friction is carried by an area that grows as the 2/3 power of the force (Bowden and Tabor on a Hertzian
+//! junction), the rest is Coulomb's. It acts on the force of each instant, so it lowers friction under vibration even
+//! where nothing sticks.
+
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use crate::contact::Contact;
+
+pub(super) static KIND: Kind = Kind {
+    name: "load_dependent_friction",
+    place: Place::Contact,
+    in_library: true,
+    in_tables: true,
+    summary: "part of the friction limit grows as the 2/3 power of the force",
+    parameters: &[Parameter::log("area_share", 0.01, 0.95)],
+    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+};
+
+/// Force at which the share leaves the friction as it was (N).
+const REFERENCE_N: f64 = 0.25;
+
+fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
+    contact.limit.area_share = v[0].min(1.0);
+    contact.limit.area_reference_n = REFERENCE_N;
+}

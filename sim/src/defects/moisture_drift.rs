@@ -1,0 +1,24 @@
+//! Moisture gathers under the finger: friction grows with the time in contact, by a second-order uptake t/(t + tau) and a
+//! slow tail, and the ridges soften a little with it. Lifting off starts it anew; a table counts the run as one contact.
+
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use crate::contact::Contact;
+
+pub(super) static KIND: Kind = Kind {
+    name: "moisture_drift",
+    place: Place::Contact,
+    in_library: true,
+    in_tables: true,
+    summary: "friction and softness change with the time in contact",
+    parameters: &[Parameter::signed("relative_gain", 0.006, 0.8), Parameter::log("half_time_s", 15.0, 400.0), Parameter::linear("softening", 0.0, 0.15)],
+    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+};
+
+fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {
+    let t = at.contact_time_s;
+    let uptake = 0.8 * t / (t + v[1]) + 0.2 * (1.0 - (-t / (8.0 * v[1])).exp());
+    contact.friction *= (1.0 + v[0] * uptake).max(0.05);
+    let soft = 1.0 - v[2] * uptake * v[0].abs().min(1.0);
+    contact.normal_stiffness_n_per_m *= soft;
+    contact.lateral_stiffness_n_per_m *= soft;
+}

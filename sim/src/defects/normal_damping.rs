@@ -1,0 +1,22 @@
+//! Ridges that are damped on their normal spring: they follow the falling plate late and let go early.
+//!
+//! A light mass (0.1 mg) on spring and dashpot, landing without rebound; the damping is given by the ridge's retardation
+//! time.
+
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use crate::contact::Contact;
+
+pub(super) static KIND: Kind = Kind {
+    name: "normal_damping",
+    place: Place::Contact,
+    in_library: true,
+    in_tables: true,
+    summary: "ridges are damped on their normal spring",
+    parameters: &[Parameter::log("retardation_s", 3e-8, 1e-5)],
+    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+};
+
+fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
+    contact.ridge.mass_kg = contact.ridge.mass_kg.max(1e-7);
+    contact.ridge.damping_n_s_per_m += v[0] * contact.normal_stiffness_n_per_m;
+}

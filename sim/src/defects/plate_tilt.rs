@@ -1,0 +1,21 @@
+//! The plate is tilted against the sensor, and bent: the tilt changes a little along the stroke.
+
+use super::{Act, Forces, Kind, Parameter, Place, Surroundings, Values};
+
+pub(super) static KIND: Kind = Kind {
+    name: "plate_tilt",
+    place: Place::Instrument,
+    in_library: true,
+    in_tables: true,
+    summary: "the plate is tilted against the sensor",
+    parameters: &[Parameter::signed("tilt_rad", 0.0015, 0.12), Parameter::linear("bend_rad_per_m", -0.3, 0.3)],
+    act: Act { setup: None, plate: None, contact: None, forces: Some(act) },
+};
+
+fn act(v: &Values, at: &Surroundings, forces: &mut Forces) {
+    let tilt = v[0] * (1.0 + v[1] * at.position_m);
+    let (sin, cos) = tilt.sin_cos();
+    let Forces { lateral_n, normal_n } = *forces;
+    forces.lateral_n = lateral_n * cos + normal_n * sin;
+    forces.normal_n = normal_n * cos - lateral_n * sin;
+}

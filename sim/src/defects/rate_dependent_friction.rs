@@ -1,0 +1,23 @@
+//! Friction that depends on the sliding speed as a thermally activated process does (Eyring): by asinh(U/U0), which is
+//! linear below U0 and logarithmic above. Unchanged at 20 mm/s.
+
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use crate::contact::Contact;
+
+pub(super) static KIND: Kind = Kind {
+    name: "rate_dependent_friction",
+    place: Place::Contact,
+    in_library: true,
+    in_tables: true,
+    summary: "the coefficient of friction depends on the sliding speed",
+    parameters: &[Parameter::signed("relative_slope", 0.004, 0.3), Parameter::log("knee_m_s", 2e-3, 2e-2)],
+    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+};
+
+const REFERENCE_M_S: f64 = 0.02;
+
+fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
+    let rise = |speed: f64| (speed / v[1]).asinh();
+    let factor = 1.0 + v[0] * (rise(contact.speed_m_s) - rise(REFERENCE_M_S));
+    contact.friction *= factor.clamp(0.2, 3.0);
+}

@@ -1,0 +1,21 @@
+//! The amplifier distorts: the plate carries a second harmonic, which sharpens or broadens each contact. It grows with the
+//! swing, as a distortion does.
+
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use crate::contact::Contact;
+
+pub(super) static KIND: Kind = Kind {
+    name: "second_harmonic",
+    place: Place::Plate,
+    in_library: false,
+    in_tables: true,
+    summary: "the plate also vibrates at twice the frequency",
+    parameters: &[Parameter::log("ratio_at_2_um", 0.01, 0.6), Parameter::linear("phase_rad", 0.0, 6.2)],
+    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+};
+
+fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
+    let swing = 2.0 * contact.sine_amplitude_m / 2e-6;
+    contact.motion.second_harmonic = (v[0] * swing.min(2.0)).min(0.9);
+    contact.motion.second_phase_rad = v[1];
+}

@@ -1,0 +1,20 @@
+//! The spindle's eccentricity makes the speed rise and fall along the stroke, with a second harmonic.
+
+use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use crate::contact::Contact;
+
+pub(super) static KIND: Kind = Kind {
+    name: "speed_ripple",
+    place: Place::Instrument,
+    in_library: true,
+    in_tables: true,
+    summary: "the speed rises and falls along the stroke",
+    parameters: &[Parameter::log("ripple", 0.01, 0.7), Parameter::log("pitch_m", 3e-3, 1.2e-2), Parameter::linear("phase_rad", 0.0, 6.2)],
+    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+};
+
+fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {
+    let phase = 2.0 * std::f64::consts::PI * at.position_m / v[1] + v[2];
+    let wave = phase.sin() + 0.2 * (2.0 * phase).sin();
+    contact.speed_m_s *= (1.0 + v[0] * wave).max(0.02);
+}
