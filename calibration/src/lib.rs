@@ -1,1 +1,4 @@
 //! Calibrations, certificates and inverse analysis.
+
+pub mod regression;
+pub mod uncertainty;
