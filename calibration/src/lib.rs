@@ -1,4 +1,5 @@
 //! Calibrations, certificates and inverse analysis.
 
+pub mod certificate;
 pub mod regression;
 pub mod uncertainty;

@@ -96,6 +96,9 @@ pub struct Budget {
     correlation: DMatrix<f64>,
 }
 
+/// A measurement model: the result as a function of the inputs.
+pub type Model<'a> = dyn Fn(&[f64]) -> f64 + 'a;
+
 /// One line of an uncertainty budget.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contribution {
@@ -201,7 +204,7 @@ impl Budget {
     }
 
     /// Several results of the same inputs with their covariance matrix (GUM H.2.3).
-    pub fn propagate_jointly(&self, models: &[&dyn Fn(&[f64]) -> f64]) -> (Vec<Uncertain>, DMatrix<f64>) {
+    pub fn propagate_jointly(&self, models: &[&Model]) -> (Vec<Uncertain>, DMatrix<f64>) {
         let results: Vec<Uncertain> = models.iter().map(|m| self.propagate(m)).collect();
         let part = |i: usize, a: usize| {
             results[i].contributions[a].sensitivity * self.inputs[a].standard_uncertainty
