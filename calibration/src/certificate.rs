@@ -190,6 +190,82 @@ pub struct Certificate {
     pub budget: Vec<BudgetLine>,
 }
 
+/// The circumstances of a calibration: what only its operator knows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Occasion {
+    /// When, in seconds since 1970 (UTC).
+    pub unix_s: i64,
+    /// By whom.
+    pub operator: String,
+    /// On what.
+    pub instrument: Instrument,
+    /// From which data.
+    pub raw_data: RawData,
+    /// For how many days it shall hold.
+    pub valid_days: f64,
+}
+
+impl Occasion {
+    /// Validity from this occasion on.
+    pub fn validity(&self, temperature_c: Option<[f64; 2]>, range: BTreeMap<String, [f64; 2]>) -> Validity {
+        Validity {
+            from: date::format(self.unix_s),
+            until: date::format(self.unix_s + (self.valid_days * 86_400.0) as i64),
+            temperature_c,
+            range,
+        }
+    }
+}
+
+/// What a calibration found, in the terms that every certificate shares.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// What was calibrated.
+    pub kind: Kind,
+    /// The model in words and symbols.
+    pub model: String,
+    /// Choices that its use depends on.
+    pub settings: BTreeMap<String, String>,
+    /// Findings.
+    pub remarks: Vec<String>,
+    /// Parameters with their intervals.
+    pub parameters: Vec<Parameter>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// What the model left.
+    pub residuals: Residuals,
+    /// Temperature range in degrees Celsius.
+    pub temperature_c: Option<[f64; 2]>,
+    /// Range of each quantity.
+    pub range: BTreeMap<String, [f64; 2]>,
+    /// The uncertainty budget.
+    pub budget: Vec<BudgetLine>,
+}
+
+impl Outcome {
+    /// The sealed certificate of this outcome.
+    pub fn certify(self, occasion: &Occasion) -> Certificate {
+        Certificate {
+            schema: SCHEMA.into(),
+            kind: self.kind,
+            date: date::format(occasion.unix_s),
+            operator: occasion.operator.clone(),
+            model: self.model,
+            settings: self.settings,
+            remarks: self.remarks,
+            covariance: rows(&self.covariance),
+            content_sha256: String::new(),
+            instrument: occasion.instrument.clone(),
+            raw_data: occasion.raw_data.clone(),
+            residuals: self.residuals,
+            validity: occasion.validity(self.temperature_c, self.range),
+            parameters: self.parameters,
+            budget: self.budget,
+        }
+        .seal()
+    }
+}
+
 /// Why a file is no certificate.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ReadError {
@@ -258,7 +334,7 @@ impl Certificate {
 
 /// Parameters with their 95 % intervals from estimates, covariance and degrees of freedom.
 pub fn parameters(
-    names_and_units: &[(&str, &str)],
+    names_and_units: &[(String, &str)],
     estimates: &[f64],
     covariance: &DMatrix<f64>,
     degrees_of_freedom: &[f64],
@@ -271,7 +347,7 @@ pub fn parameters(
             let u = covariance[(i, i)].max(0.0).sqrt();
             let half = u * crate::uncertainty::student::coverage_factor(0.95, degrees_of_freedom[i]);
             Parameter {
-                name: (*name).into(),
+                name: name.clone(),
                 value,
                 unit: (*unit).into(),
                 standard_uncertainty: u,
