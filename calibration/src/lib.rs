@@ -1,1 +1,27 @@
-//! Calibrations, certificates and inverse analysis.
+//! Calibrations, certificates and inverse analysis: what makes counts newtons, set-points micrometres and
+//! arrivals instants, each with an uncertainty that can be defended.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`force`] | dead weights to a matrix; zeros; noise; dynamics |
+//! | [`amplitude`] | drive to peak-to-peak amplitude; resonance; mode shape; droop |
+//! | [`latency`] | delay and jitter of a channel; clocks |
+//! | [`phase`] | contact phase shift of Eq. 1 from waveforms; the phase table |
+//! | [`finger`] | stiffness and friction of a fingertip |
+//! | [`certificate`] | the file that a calibration leaves, and the gate before its use |
+//! | [`prior`] | what certificates leave open, for the diagnosis |
+//! | [`regression`], [`uncertainty`] | least squares; GUM and its Supplement 1 |
+//!
+//! The way through: data file -> a room's fit, which refuses what is unfit -> [`certificate::Outcome`] ->
+//! [`certificate::Certificate`] (a sealed TOML file) -> [`certificate::Certificate::verify`] ->
+//! [`force::apply::ForceCalibration`] or [`amplitude::apply::AmplitudeCalibration`] in the loop.
+
+pub mod amplitude;
+pub mod certificate;
+pub mod finger;
+pub mod force;
+pub mod latency;
+pub mod phase;
+pub mod prior;
+pub mod regression;
+pub mod uncertainty;

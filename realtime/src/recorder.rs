@@ -62,10 +62,15 @@ impl<W: Write + Seek> Recorder<W> {
         let mut writer = options.create(to)?;
         let mut channels = [0; 3];
         for (channel, topic) in channels.iter_mut().zip([CYCLES, PASSES, EVENTS]) {
-            let schema = writer.add_schema(&format!("muprime{}", topic.replace('/', ".")), "jsonschema", b"{\"type\":\"object\"}")?;
+            let schema = writer.add_schema(
+                &format!("muprime{}", topic.replace('/', ".")),
+                "jsonschema",
+                b"{\"type\":\"object\"}",
+            )?;
             *channel = writer.add_channel(schema, topic, "json", &BTreeMap::new())?;
         }
-        let mut recorder = Recorder { writer, preamble, channels, sequence: [0; 3], text: Vec::with_capacity(4096) };
+        let mut recorder =
+            Recorder { writer, preamble, channels, sequence: [0; 3], text: Vec::with_capacity(4096) };
         recorder.metadata(HEADER, recorder.preamble.facts.clone())?;
         for (name, text) in recorder.preamble.files.clone() {
             recorder.writer.attach(&Attachment {

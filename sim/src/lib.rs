@@ -23,5 +23,5 @@ pub mod plate;
 pub mod sensor;
 pub mod stage;
 pub mod virtual_rig;
-pub mod world;
 pub mod wire;
+pub mod world;

@@ -152,7 +152,8 @@ pub fn recover(bytes: &[u8], to: impl Write + Seek) -> Result<Recovery, McapErro
 }
 
 fn rewrite(contents: &Contents, to: impl Write + Seek) -> Result<(), McapError> {
-    let options = WriteOptions::new().compression(Some(Compression::Lz4)).profile("").library("muprime recover");
+    let options =
+        WriteOptions::new().compression(Some(Compression::Lz4)).profile("").library("muprime recover");
     let mut writer: Writer<_> = options.create(to)?;
     for (name, facts) in &contents.metadata {
         writer.write_metadata(&mcap::records::Metadata { name: name.clone(), metadata: facts.clone() })?;
@@ -176,8 +177,12 @@ fn rewrite(contents: &Contents, to: impl Write + Seek) -> Result<(), McapError> 
         }
         let (channel_id, sequence) = channels.get_mut(topic.as_str()).expect("inserted above");
         *sequence += 1;
-        let header =
-            MessageHeader { channel_id: *channel_id, sequence: *sequence, log_time: *log_time, publish_time: *log_time };
+        let header = MessageHeader {
+            channel_id: *channel_id,
+            sequence: *sequence,
+            log_time: *log_time,
+            publish_time: *log_time,
+        };
         writer.write_to_known_channel(&header, data)?;
     }
     writer.finish()?;

@@ -1,0 +1,120 @@
+//! Amplitude: drive set-point to the peak-to-peak amplitude of the plate, where the finger touches it.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`vibrometer`] | waveform to amplitude and phase, with the vibrometer's own range and delay |
+//! | [`gain`] | set-point (or current) to amplitude |
+//! | [`resonance`] | resonance and quality factor from a sweep |
+//! | [`map`] | amplitude over position: the mode shape |
+//! | [`droop`] | amplitude under load |
+//! | [`apply`] | all of these in one certificate, and its use |
+//!
+//! Amplitudes are peak-to-peak throughout ([`models::quantity::PeakToPeak`]).
+
+pub mod apply;
+pub mod droop;
+pub mod gain;
+pub mod map;
+pub mod resonance;
+pub mod vibrometer;
+
+use crate::regression::FitError;
+
+/// One amplitude as a vibrometer measured it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AmplitudePoint {
+    /// What was set: set-point in m, drive current in A, frequency in Hz, position in m or load in N, as the
+    /// room that takes the point says.
+    pub at: f64,
+    /// Measured peak-to-peak amplitude in m.
+    pub amplitude_pp_m: f64,
+}
+
+/// Why points give no calibration.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum AmplitudeError {
+    /// Not enough points, or not spread enough.
+    #[error("{what}: {found} are too few, {needed} are needed")]
+    TooFew {
+        /// Of what.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many it takes.
+        needed: usize,
+    },
+    /// A value that cannot be.
+    #[error("point {row}: {reason}")]
+    Bad {
+        /// Number of the point, from 1.
+        row: usize,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The amplitude stops growing with the set-point.
+    #[error(
+        "the amplitude saturates: from set-point {from:.4e} to {to:.4e} it grows by {share:.0} % of what the points \
+         below predict; leave out what lies above, or lower the range"
+    )]
+    Saturated {
+        /// Last set-point that followed.
+        from: f64,
+        /// First that did not.
+        to: f64,
+        /// Share of the growth in per cent.
+        share: f64,
+    },
+    /// The sweep does not reach both flanks of the resonance.
+    #[error("the sweep does not hold the resonance: its maximum is at the {0} end; shift the range")]
+    OffRange(&'static str),
+    /// The model does not describe the points within their repeatability.
+    #[error("the points do not follow the model (lack of fit p = {p:.1e}): {remedy}")]
+    LackOfFit {
+        /// p value.
+        p: f64,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The regression itself failed.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+}
+
+/// Points with finite numbers and amplitudes that are not negative.
+fn check(points: &[AmplitudePoint], what: &'static str, needed: usize) -> Result<(), AmplitudeError> {
+    for (i, p) in points.iter().enumerate() {
+        if !p.at.is_finite() || !p.amplitude_pp_m.is_finite() || p.amplitude_pp_m < 0.0 {
+            let reason = format!("{} m at {} is no amplitude", p.amplitude_pp_m, p.at);
+            return Err(AmplitudeError::Bad { row: i + 1, reason });
+        }
+    }
+    let mut places: Vec<f64> = points.iter().map(|p| p.at).collect();
+    places.sort_by(f64::total_cmp);
+    places.dedup();
+    if places.len() < needed {
+        return Err(AmplitudeError::TooFew { what, found: places.len(), needed });
+    }
+    Ok(())
+}
+
+/// Weights for amplitudes whose scatter is proportional to them above a floor of a twentieth of the largest.
+fn relative_scatter(points: &[AmplitudePoint]) -> Vec<f64> {
+    let largest = points.iter().fold(0f64, |m, p| m.max(p.amplitude_pp_m));
+    points.iter().map(|p| p.amplitude_pp_m.hypot(0.05 * largest)).collect()
+}
+
+/// Lack of fit of weighted residuals against replicates at one place; `None` without enough replicates.
+fn lack_of_fit(points: &[AmplitudePoint], weighted: &[f64], parameters: usize) -> Option<f64> {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|a, b| points[*a].at.total_cmp(&points[*b].at));
+    let (mut between, mut within, mut groups) = (0.0, 0.0, 0usize);
+    for group in order.chunk_by(|a, b| points[*a].at == points[*b].at) {
+        let mean = group.iter().map(|i| weighted[*i]).sum::<f64>() / group.len() as f64;
+        between += group.len() as f64 * mean * mean;
+        within += group.iter().map(|i| (weighted[*i] - mean).powi(2)).sum::<f64>();
+        groups += 1;
+    }
+    let (b, w) = (groups as f64 - parameters as f64, (points.len() - groups) as f64);
+    (b >= 1.0 && w >= 3.0)
+        .then(|| crate::uncertainty::student::f_test_p_value(between / b / (within / w), b, w))
+}

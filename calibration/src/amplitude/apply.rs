@@ -1,0 +1,218 @@
+//! One certificate for the amplitude, and its use.
+
+use super::droop::{Droop, Exponent};
+use super::gain::GainFit;
+use super::map::ModeShape;
+use super::resonance::Resonance;
+use crate::certificate::{
+    BudgetLine, Evaluation, Kind, Outcome, Parameter, Refusal, Residuals, Verified, parameters,
+};
+use crate::uncertainty::student::coverage_factor;
+use models::quantity::PeakToPeak;
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+/// What was measured; the gain is always needed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AmplitudeFit {
+    /// Set-point to amplitude at the place of the table, without load.
+    pub gain: GainFit,
+    /// Unit of the set-point: `m` (peak-to-peak) or `A`.
+    pub set_point_unit: String,
+    /// Where on the stroke the table was taken, in m.
+    pub table_at_m: f64,
+    /// Relative standard uncertainty of the vibrometer.
+    pub vibrometer_relative_sd: f64,
+    /// Resonance, where a sweep was made.
+    pub resonance: Option<Resonance>,
+    /// Mode shape, where a map was made.
+    pub mode_shape: Option<ModeShape>,
+    /// Droop, where loads were put on.
+    pub droop: Option<Droop>,
+}
+
+impl AmplitudeFit {
+    /// Everything that the certificate states.
+    pub fn outcome(&self) -> Outcome {
+        let gain = &self.gain;
+        let covariance = &gain.fit.covariance + &gain.type_b;
+        let names = gain.form.names(&self.set_point_unit);
+        let named: Vec<(String, &str)> = names.iter().map(|(n, u)| (n.clone(), u.as_str())).collect();
+        let dof: Vec<f64> = (0..named.len())
+            .map(|i| gain.fit.degrees_of_freedom * (covariance[(i, i)] / gain.fit.covariance[(i, i)]).powi(2))
+            .collect();
+        let mut list: Vec<Parameter> = parameters(&named, gain.fit.estimates.as_slice(), &covariance, &dof);
+        let mut blocks = vec![covariance];
+        let mut single = |name: &str, unit: &str, [value, u]: [f64; 2], dof: f64| {
+            let half = u * coverage_factor(0.95, dof);
+            list.push(Parameter {
+                name: name.into(),
+                value,
+                unit: unit.into(),
+                standard_uncertainty: u,
+                degrees_of_freedom: dof,
+                ci95: [value - half, value + half],
+            });
+        };
+        let mut remarks = Vec::new();
+        let mut settings = BTreeMap::from([
+            ("set_point_unit".into(), self.set_point_unit.clone()),
+            ("table_at_m".into(), self.table_at_m.to_string()),
+        ]);
+        let mut range = BTreeMap::from([("set_point".into(), gain.range)]);
+        if let Some(r) = &self.resonance {
+            single("resonance_hz", "Hz", r.frequency_hz, r.degrees_of_freedom);
+            single("quality_factor", "1", r.quality_factor, r.degrees_of_freedom);
+            blocks.push(DMatrix::from_diagonal_element(1, 1, r.frequency_hz[1].powi(2)));
+            blocks.push(DMatrix::from_diagonal_element(1, 1, r.quality_factor[1].powi(2)));
+        } else {
+            remarks.push("no sweep: resonance and quality factor were not determined".into());
+        }
+        if let Some(m) = &self.mode_shape {
+            let dof = m.fit.degrees_of_freedom;
+            single("mode.antinode_at_m", "m", m.antinode_at_m, dof);
+            single("mode.wavelength_m", "m", m.wavelength_m, dof);
+            blocks.push(m.fit.covariance.view((1, 1), (2, 2)).into_owned());
+            range.insert("position_m".into(), m.range_m);
+        } else {
+            remarks.push("no map: the amplitude was measured at one place of the stroke only".into());
+        }
+        if let Some(d) = &self.droop {
+            let unit = if d.exponent == Exponent::Hertz { "1/N^(2/3)" } else { "1/N" };
+            single("droop", unit, d.coefficient, d.fit.degrees_of_freedom);
+            blocks.push(DMatrix::from_diagonal_element(1, 1, d.coefficient[1].powi(2)));
+            settings.insert("droop_exponent".into(), d.exponent.value().to_string());
+            range.insert("normal_force_n".into(), [0.0, d.largest_n]);
+        } else {
+            remarks.push("no loads: the amplitude was measured without a finger only".into());
+        }
+        let sd = gain.fit.residual_sd();
+        Outcome {
+            kind: Kind::Amplitude,
+            model:
+                "w(s, x, F) = (gain s [+ offset] [+ bend s^2]) |cos(k (x - x0))| / |cos(k (x_table - x0))| \
+                    / (1 + droop F^p), w peak-to-peak"
+                    .into(),
+            settings,
+            remarks,
+            parameters: list,
+            covariance: block_diagonal(&blocks),
+            residuals: Residuals {
+                count: gain.fit.residuals.len() as u64,
+                sd,
+                largest: gain.fit.residuals.amax(),
+                unit: "1 (relative to the amplitude)".into(),
+                lack_of_fit_p: gain.lack_of_fit_p,
+            },
+            temperature_c: None,
+            range,
+            budget: vec![
+                BudgetLine {
+                    source: "vibrometer, common to all points".into(),
+                    evaluation: Evaluation::B,
+                    standard_uncertainty: self.vibrometer_relative_sd,
+                    unit: "1".into(),
+                },
+                BudgetLine {
+                    source: "repeatability of the gain".into(),
+                    evaluation: Evaluation::A,
+                    standard_uncertainty: gain.fit.standard_uncertainty(0) / gain.fit.estimates[0].abs(),
+                    unit: "1".into(),
+                },
+            ],
+        }
+    }
+}
+
+/// Blocks along the diagonal: what was measured apart is independent.
+pub fn block_diagonal(blocks: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let n = blocks.iter().map(|b| b.nrows()).sum();
+    let mut whole = DMatrix::zeros(n, n);
+    let mut at = 0;
+    for block in blocks {
+        whole.view_mut((at, at), block.shape()).copy_from(block);
+        at += block.nrows();
+    }
+    whole
+}
+
+/// The calibration in use, from a verified certificate only, without allocation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AmplitudeCalibration {
+    gain: f64,
+    offset: f64,
+    bend: f64,
+    gain_relative_sd: f64,
+    wave_number: f64,
+    antinode_at_m: f64,
+    table_relative: f64,
+    droop: f64,
+    droop_exponent: f64,
+}
+
+impl AmplitudeCalibration {
+    /// Compiles a verified amplitude certificate.
+    ///
+    /// # Errors
+    /// A missing gain, or a table that was taken at a node.
+    pub fn compile(verified: Verified) -> Result<Self, Refusal> {
+        let c = verified.certificate();
+        let malformed = |reason: &str| Refusal::Malformed { reason: reason.into() };
+        let value = |name: &str| c.parameter(name).map(|p| p.value);
+        let gain = c
+            .parameter("gain")
+            .filter(|p| p.value > 0.0)
+            .ok_or_else(|| malformed("its gain is missing or not positive"))?;
+        let setting = |name: &str| c.settings.get(name).and_then(|s| s.parse::<f64>().ok());
+        let wave_number = value("mode.wavelength_m").map_or(0.0, |l| 2.0 * PI / l);
+        let antinode_at_m = value("mode.antinode_at_m").unwrap_or(0.0);
+        let table_at = setting("table_at_m").unwrap_or(0.0);
+        let table_relative = (wave_number * (table_at - antinode_at_m)).cos().abs();
+        if table_relative < 0.05 {
+            return Err(malformed("its table was taken at a node of the plate"));
+        }
+        Ok(AmplitudeCalibration {
+            gain: gain.value,
+            offset: value("offset").unwrap_or(0.0),
+            bend: value("bend").unwrap_or(0.0),
+            gain_relative_sd: gain.standard_uncertainty / gain.value,
+            wave_number,
+            antinode_at_m,
+            table_relative,
+            droop: value("droop").unwrap_or(0.0),
+            droop_exponent: setting("droop_exponent").unwrap_or(1.0),
+        })
+    }
+
+    /// Peak-to-peak amplitude under the finger for a set-point, a position and a normal force.
+    pub fn amplitude(&self, set_point: f64, position_m: f64, normal_force_n: f64) -> PeakToPeak {
+        let free = self.gain * set_point + self.offset + self.bend * set_point * set_point;
+        PeakToPeak::from_metres(free.max(0.0) * self.relative(position_m, normal_force_n))
+    }
+
+    /// The set-point for an amplitude under the finger: the inverse of [`AmplitudeCalibration::amplitude`].
+    /// `None` at a node, or beyond where a bent curve still rises.
+    pub fn set_point(&self, amplitude: PeakToPeak, position_m: f64, normal_force_n: f64) -> Option<f64> {
+        let relative = self.relative(position_m, normal_force_n);
+        let free = amplitude.metres() / relative - self.offset;
+        if relative < 1e-3 {
+            return None;
+        }
+        if self.bend == 0.0 {
+            return Some(free / self.gain);
+        }
+        let root = self.gain * self.gain + 4.0 * self.bend * free;
+        (root > 0.0).then(|| 2.0 * free / (self.gain + root.sqrt()))
+    }
+
+    /// Relative standard uncertainty of the gain: what the diagnosis takes as `amplitude_gain_sd`.
+    pub fn gain_relative_sd(&self) -> f64 {
+        self.gain_relative_sd
+    }
+
+    fn relative(&self, position_m: f64, normal_force_n: f64) -> f64 {
+        let shape = (self.wave_number * (position_m - self.antinode_at_m)).cos().abs() / self.table_relative;
+        shape / (1.0 + self.droop * normal_force_n.max(0.0).powf(self.droop_exponent))
+    }
+}

@@ -1,0 +1,96 @@
+//! Amplitude under load: `w = w_free / (1 + d F^p)` (physics.md 4.12).
+
+use super::{AmplitudeError, AmplitudePoint, check, lack_of_fit, relative_scatter};
+use crate::regression::Fit;
+use crate::regression::nonlinear::{Scatter, fit};
+
+/// Exponent of the load: the finger's impedance goes with its contact area.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Exponent {
+    /// 2/3, the area of a Hertz contact.
+    #[default]
+    Hertz,
+    /// 1.
+    Linear,
+}
+
+impl Exponent {
+    /// Its value.
+    pub fn value(self) -> f64 {
+        match self {
+            Exponent::Hertz => 2.0 / 3.0,
+            Exponent::Linear => 1.0,
+        }
+    }
+}
+
+/// A fitted droop.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Droop {
+    /// Peak-to-peak amplitude without load in m with its standard uncertainty.
+    pub free_pp_m: [f64; 2],
+    /// `d` in 1/N^p with its standard uncertainty.
+    pub coefficient: [f64; 2],
+    /// The exponent.
+    pub exponent: Exponent,
+    /// The fit; parameters ln w_free and d.
+    pub fit: Fit,
+    /// Largest load in N.
+    pub largest_n: f64,
+}
+
+/// Fits amplitudes at one set-point under loads: `at` is the normal force in N.
+///
+/// # Errors
+/// Fewer than four loads, points that do not follow the form.
+pub fn droop(points: &[AmplitudePoint], exponent: Exponent) -> Result<Droop, AmplitudeError> {
+    check(points, "loads", 4)?;
+    if let Some(i) = points.iter().position(|p| p.at < 0.0 || p.amplitude_pp_m == 0.0) {
+        let reason = "droop needs loads that press and amplitudes above zero".into();
+        return Err(AmplitudeError::Bad { row: i + 1, reason });
+    }
+    let scatter = relative_scatter(points);
+    let y: Vec<f64> = points.iter().zip(&scatter).map(|(p, s)| p.amplitude_pp_m / s).collect();
+    let model = |i: usize, b: &[f64], g: &mut [f64]| {
+        let power = points[i].at.powf(exponent.value());
+        let value = b[0].exp() / (1.0 + b[1] * power) / scatter[i];
+        g[0] = value;
+        g[1] = -value * power / (1.0 + b[1] * power);
+        value
+    };
+    let top = points.iter().fold(0f64, |m, p| m.max(p.amplitude_pp_m));
+    let fit = fit(&model, &y, Scatter::Unknown, &[top.ln(), 0.05])?;
+    if let Some(p) = lack_of_fit(points, fit.residuals.as_slice(), 2).filter(|p| *p < 1e-3) {
+        return Err(AmplitudeError::LackOfFit {
+            p,
+            remedy: "try the other exponent, and look at the drive's limit",
+        });
+    }
+    let free = fit.estimates[0].exp();
+    Ok(Droop {
+        free_pp_m: [free, free * fit.standard_uncertainty(0)],
+        coefficient: [fit.estimates[1], fit.standard_uncertainty(1)],
+        exponent,
+        largest_n: points.iter().fold(0f64, |m, p| m.max(p.at)),
+        fit,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_known_droop_comes_back() {
+        let points: Vec<AmplitudePoint> = (0..24)
+            .map(|i| {
+                let f = f64::from(i / 3) * 0.2;
+                let noise = [1.002, 0.998, 1.0][i as usize % 3];
+                AmplitudePoint { at: f, amplitude_pp_m: noise * 2e-6 / (1.0 + 0.15 * f.powf(2.0 / 3.0)) }
+            })
+            .collect();
+        let found = droop(&points, Exponent::Hertz).unwrap();
+        assert!((found.coefficient[0] - 0.15).abs() < 3.0 * found.coefficient[1], "{found:?}");
+        assert!(found.coefficient[1] < 5e-3);
+    }
+}

@@ -1,0 +1,156 @@
+//! A laser vibrometer's velocity signal: from volts to amplitude and phase.
+//!
+//! The waveform is analogue; the controller's serial line gives only the decoder's name, range and delay.
+//! The delay must be subtracted in phase: 8 us are 84 degrees at 29 kHz.
+
+use crate::regression::{Fit, FitError, linear};
+use models::quantity::PeakToPeak;
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::PI;
+
+/// What a velocity decoder is set to, as read back from the controller.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decoder {
+    /// Name: decoder numbers differ between instruments, so the name is what counts.
+    pub name: String,
+    /// Velocity per volt in (m/s)/V.
+    pub range_m_s_per_v: f64,
+    /// Delay of the signal in s.
+    pub delay_s: f64,
+}
+
+/// A setting that is not understood.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("`{text}` is no {what}: expected something like `{like}`")]
+pub struct SettingError {
+    /// What came back.
+    pub text: String,
+    /// What it should be.
+    pub what: &'static str,
+    /// An example.
+    pub like: &'static str,
+}
+
+impl Decoder {
+    /// From the texts of a Polytec controller: `VD-03`, `5mm/s/V`, `8.16 us`.
+    ///
+    /// # Errors
+    /// A text that is not a range or not a delay.
+    pub fn from_settings(name: &str, range: &str, delay: &str) -> Result<Self, SettingError> {
+        let (what, like) = ("range", "5mm/s/V");
+        let refused = || SettingError { text: range.into(), what, like };
+        let body = range.trim().strip_suffix("/s/V").ok_or_else(refused)?;
+        let range_m_s_per_v = scaled(body, 'm').filter(|r| *r > 0.0).ok_or_else(refused)?;
+        let (what, like) = ("signal delay", "8.16 us");
+        let delay_s = scaled(delay, 's').filter(|d| *d >= 0.0).ok_or(SettingError {
+            text: delay.into(),
+            what,
+            like,
+        })?;
+        Ok(Decoder { name: name.trim().into(), range_m_s_per_v, delay_s })
+    }
+}
+
+/// `5 mm` as 0.005: a number, an SI prefix, the unit.
+fn scaled(text: &str, unit: char) -> Option<f64> {
+    let text = text.trim().strip_suffix(unit)?;
+    let (number, factor) = match text.chars().last()? {
+        'n' => (&text[..text.len() - 1], 1e-9),
+        'u' => (&text[..text.len() - 1], 1e-6),
+        '\u{b5}' | '\u{3bc}' => (&text[..text.len() - 2], 1e-6),
+        'm' => (&text[..text.len() - 1], 1e-3),
+        'k' => (&text[..text.len() - 1], 1e3),
+        _ => (text, 1.0),
+    };
+    number.trim().parse().ok().filter(|x: &f64| x.is_finite()).map(|x| x * factor)
+}
+
+/// A sine in a waveform.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sine {
+    /// Amplitude of the velocity in m/s.
+    pub velocity_m_s: f64,
+    /// Its standard uncertainty from the residuals.
+    pub velocity_sd_m_s: f64,
+    /// Phase in rad at the first sample, the decoder's delay taken off: `v cos(2 pi f t + phase)`.
+    pub phase_rad: f64,
+    /// Its standard uncertainty in rad.
+    pub phase_sd_rad: f64,
+    /// What the sine leaves, in m/s.
+    pub residual_sd_m_s: f64,
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+}
+
+impl Sine {
+    /// Peak-to-peak displacement: `w = 2 v / (2 pi f)`.
+    pub fn amplitude(&self) -> PeakToPeak {
+        PeakToPeak::from_metres(self.velocity_m_s / (PI * self.frequency_hz))
+    }
+}
+
+/// Three-parameter sine fit at a known frequency (IEEE 1057) of a waveform in volts.
+///
+/// # Errors
+/// Too few samples, or fewer than a whole period.
+pub fn sine(volts: &[f64], rate_hz: f64, frequency_hz: f64, decoder: &Decoder) -> Result<Sine, FitError> {
+    if (volts.len() as f64) < rate_hz / frequency_hz {
+        return Err(FitError::TooFew { observations: volts.len(), parameters: 3 });
+    }
+    let angle = |i: usize| 2.0 * PI * frequency_hz * i as f64 / rate_hz;
+    let design = DMatrix::from_fn(volts.len(), 3, |i, k| [angle(i).cos(), -angle(i).sin(), 1.0][k]);
+    let fit: Fit = linear::ordinary(&design, &DVector::from_column_slice(volts))?;
+    let (c, s) = (fit.estimates[0], fit.estimates[1]);
+    let amplitude = c.hypot(s);
+    let k = decoder.range_m_s_per_v;
+    Ok(Sine {
+        velocity_m_s: amplitude * k,
+        velocity_sd_m_s: fit.standard_uncertainty_along(&[c / amplitude, s / amplitude, 0.0]) * k,
+        // The signal shows what the surface did one delay ago.
+        phase_rad: s.atan2(c) + 2.0 * PI * frequency_hz * decoder.delay_s,
+        phase_sd_rad: fit.standard_uncertainty_along(&[
+            -s / (amplitude * amplitude),
+            c / (amplitude * amplitude),
+            0.0,
+        ]),
+        residual_sd_m_s: fit.residual_sd() * k,
+        frequency_hz,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_as_a_polytec_sends_them() {
+        let decoder = Decoder::from_settings("VD-03", "5mm/s/V", "8.16 us").unwrap();
+        assert!((decoder.range_m_s_per_v - 5e-3).abs() < 1e-18);
+        assert!((decoder.delay_s - 8.16e-6).abs() < 1e-18);
+        assert_eq!(Decoder::from_settings("", "1 m/s/V", "0 s").unwrap().range_m_s_per_v, 1.0);
+        assert!(
+            (Decoder::from_settings("", "200\u{b5}m/s/V", "2\u{b5}s").unwrap().range_m_s_per_v - 2e-4).abs()
+                < 1e-16
+        );
+        for bad in ["5mm/V", "fast", "-5mm/s/V", ""] {
+            assert!(Decoder::from_settings("x", bad, "1 us").is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn amplitude_and_delay_are_taken_off() {
+        // 2 um peak-to-peak at 27.5 kHz is 172.8 mm/s; the decoder shows it 8.16 us late.
+        let (f, rate, w) = (27_500.0, 1e6, 2e-6);
+        let decoder = Decoder::from_settings("VD-02", "125mm/s/V", "8.16us").unwrap();
+        let volts: Vec<f64> = (0..4000)
+            .map(|i| {
+                let t = f64::from(i) / rate - decoder.delay_s;
+                PI * f * w * (2.0 * PI * f * t + 0.4).cos() / decoder.range_m_s_per_v
+            })
+            .collect();
+        let found = sine(&volts, rate, f, &decoder).unwrap();
+        assert!((found.amplitude().metres() / w - 1.0).abs() < 1e-9);
+        assert!(((found.phase_rad - 0.4 + PI).rem_euclid(2.0 * PI) - PI).abs() < 1e-6);
+        assert!((found.velocity_m_s - 0.1728).abs() < 1e-4);
+    }
+}

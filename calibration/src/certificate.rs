@@ -1,0 +1,369 @@
+//! Certificates: what a calibration leaves behind, as a TOML file.
+//!
+//! A [`Certificate`] read from a file can be looked at, but not used: only [`Certificate::verify`] makes
+//! the [`Verified`] that the loop and the diagnosis take. It refuses what is stale, foreign, out of its
+//! temperature, or changed since it was written. The content hash finds hand edits and broken copies; it is
+//! no signature and keeps nobody out who sets out to forge one.
+
+pub mod date;
+mod verify;
+
+pub use verify::{Circumstances, Refusal, Verified};
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+
+/// The schema that this version writes and reads.
+pub const SCHEMA: &str = "muprime.certificate/1";
+
+/// What was calibrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Counts of the force sensor to newtons.
+    Force,
+    /// Drive set-point to peak-to-peak amplitude.
+    Amplitude,
+    /// Delay and clock of a channel.
+    Latency,
+    /// Phase shift of the skin against the plate.
+    Phase,
+    /// Stiffness and friction of a fingertip.
+    Finger,
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Kind::Force => "force",
+            Kind::Amplitude => "amplitude",
+            Kind::Latency => "latency",
+            Kind::Phase => "phase",
+            Kind::Finger => "finger",
+        })
+    }
+}
+
+/// The instrument (or fingertip) that a certificate is about.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Instrument {
+    /// What it is, for people.
+    pub name: String,
+    /// Its serial number: a certificate of another serial is refused.
+    pub serial: String,
+}
+
+/// The data that was evaluated.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RawData {
+    /// File name or origin, for people.
+    pub origin: String,
+    /// SHA-256 of the bytes, in hexadecimal.
+    pub sha256: String,
+    /// Rows or samples.
+    pub rows: u64,
+}
+
+impl RawData {
+    /// Describes bytes that were read.
+    pub fn of(origin: &str, bytes: &[u8], rows: u64) -> Self {
+        RawData { origin: origin.into(), sha256: sha256_hex(bytes), rows }
+    }
+}
+
+/// One parameter of the model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameter {
+    /// Name, as the model names it.
+    pub name: String,
+    /// Best estimate.
+    pub value: f64,
+    /// Unit of the value.
+    pub unit: String,
+    /// Standard uncertainty, type A and B combined.
+    pub standard_uncertainty: f64,
+    /// Effective degrees of freedom (`inf` where the uncertainty is taken as known).
+    pub degrees_of_freedom: f64,
+    /// The 95 % interval.
+    pub ci95: [f64; 2],
+}
+
+/// What the model left of the data.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Residuals {
+    /// Number of residuals.
+    pub count: u64,
+    /// Residual standard deviation.
+    pub sd: f64,
+    /// The largest in magnitude.
+    pub largest: f64,
+    /// Unit of both.
+    pub unit: String,
+    /// Lack-of-fit p value against replicates, where there were replicates.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lack_of_fit_p: Option<f64>,
+}
+
+/// Where and for how long a certificate holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Validity {
+    /// From this instant, RFC 3339 in UTC.
+    pub from: String,
+    /// Until this instant, RFC 3339 in UTC.
+    pub until: String,
+    /// Temperature range in degrees Celsius.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<[f64; 2]>,
+    /// Range of each quantity, by its name with unit.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub range: BTreeMap<String, [f64; 2]>,
+}
+
+/// A line of the uncertainty budget: relative or absolute as its unit says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BudgetLine {
+    /// Where it comes from.
+    pub source: String,
+    /// `A` (statistics of the readings) or `B` (anything else), GUM 2.3.2 and 2.3.3.
+    pub evaluation: Evaluation,
+    /// Standard uncertainty.
+    pub standard_uncertainty: f64,
+    /// Its unit (`1` is relative).
+    pub unit: String,
+}
+
+/// Type of evaluation of an uncertainty (GUM 0.7).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Evaluation {
+    /// By statistics of observations.
+    A,
+    /// By any other means.
+    B,
+}
+
+/// The content of a certificate file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Certificate {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// What was calibrated.
+    pub kind: Kind,
+    /// When, RFC 3339 in UTC.
+    pub date: String,
+    /// By whom.
+    pub operator: String,
+    /// The model in words and symbols.
+    pub model: String,
+    /// Choices of the model that its use depends on, by name (tare policy, exponents, ...).
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub settings: BTreeMap<String, String>,
+    /// What a reader should know: findings, warnings, what was not tested.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
+    /// Covariance matrix of the parameters, in their order.
+    pub covariance: Vec<Vec<f64>>,
+    /// SHA-256 over everything else here, in hexadecimal.
+    #[serde(default)]
+    pub content_sha256: String,
+    /// The instrument.
+    pub instrument: Instrument,
+    /// The data.
+    pub raw_data: RawData,
+    /// What the model left.
+    pub residuals: Residuals,
+    /// Where it holds.
+    pub validity: Validity,
+    /// The parameters.
+    #[serde(rename = "parameter")]
+    pub parameters: Vec<Parameter>,
+    /// The uncertainty budget.
+    #[serde(rename = "budget", default, skip_serializing_if = "Vec::is_empty")]
+    pub budget: Vec<BudgetLine>,
+}
+
+/// The circumstances of a calibration: what only its operator knows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Occasion {
+    /// When, in seconds since 1970 (UTC).
+    pub unix_s: i64,
+    /// By whom.
+    pub operator: String,
+    /// On what.
+    pub instrument: Instrument,
+    /// From which data.
+    pub raw_data: RawData,
+    /// For how many days it shall hold.
+    pub valid_days: f64,
+}
+
+impl Occasion {
+    /// Validity from this occasion on.
+    pub fn validity(&self, temperature_c: Option<[f64; 2]>, range: BTreeMap<String, [f64; 2]>) -> Validity {
+        Validity {
+            from: date::format(self.unix_s),
+            until: date::format(self.unix_s + (self.valid_days * 86_400.0) as i64),
+            temperature_c,
+            range,
+        }
+    }
+}
+
+/// What a calibration found, in the terms that every certificate shares.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// What was calibrated.
+    pub kind: Kind,
+    /// The model in words and symbols.
+    pub model: String,
+    /// Choices that its use depends on.
+    pub settings: BTreeMap<String, String>,
+    /// Findings.
+    pub remarks: Vec<String>,
+    /// Parameters with their intervals.
+    pub parameters: Vec<Parameter>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// What the model left.
+    pub residuals: Residuals,
+    /// Temperature range in degrees Celsius.
+    pub temperature_c: Option<[f64; 2]>,
+    /// Range of each quantity.
+    pub range: BTreeMap<String, [f64; 2]>,
+    /// The uncertainty budget.
+    pub budget: Vec<BudgetLine>,
+}
+
+impl Outcome {
+    /// The sealed certificate of this outcome.
+    pub fn certify(self, occasion: &Occasion) -> Certificate {
+        Certificate {
+            schema: SCHEMA.into(),
+            kind: self.kind,
+            date: date::format(occasion.unix_s),
+            operator: occasion.operator.clone(),
+            model: self.model,
+            settings: self.settings,
+            remarks: self.remarks,
+            covariance: rows(&self.covariance),
+            content_sha256: String::new(),
+            instrument: occasion.instrument.clone(),
+            raw_data: occasion.raw_data.clone(),
+            residuals: self.residuals,
+            validity: occasion.validity(self.temperature_c, self.range),
+            parameters: self.parameters,
+            budget: self.budget,
+        }
+        .seal()
+    }
+}
+
+/// Why a file is no certificate.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ReadError {
+    /// Not TOML, or not of this shape; the message has the place.
+    #[error("not a certificate: {0}")]
+    Syntax(String),
+    /// Another version of the schema.
+    #[error("schema `{found}` is not known here (this version reads `{SCHEMA}`)")]
+    Schema {
+        /// What the file says.
+        found: String,
+    },
+}
+
+impl Certificate {
+    /// Reads the text of a certificate file. Nothing is verified yet but its shape.
+    ///
+    /// # Errors
+    /// Not TOML, unknown or missing fields, another schema.
+    pub fn from_toml(text: &str) -> Result<Self, ReadError> {
+        let certificate: Certificate = toml::from_str(text).map_err(|e| ReadError::Syntax(e.to_string()))?;
+        if certificate.schema != SCHEMA {
+            return Err(ReadError::Schema { found: certificate.schema });
+        }
+        Ok(certificate)
+    }
+
+    /// The text of the certificate file, with its content hash.
+    pub fn to_toml(&self) -> String {
+        let mut sealed = self.clone();
+        sealed.content_sha256 = self.content_hash();
+        sealed.canonical()
+    }
+
+    /// Writes the hash of the content into the certificate.
+    pub fn seal(mut self) -> Self {
+        self.content_sha256 = self.content_hash();
+        self
+    }
+
+    /// SHA-256 over the canonical text of everything but the hash. Comments and layout do not count.
+    pub fn content_hash(&self) -> String {
+        let mut open = self.clone();
+        open.content_sha256.clear();
+        sha256_hex(open.canonical().as_bytes())
+    }
+
+    /// The parameter of that name.
+    pub fn parameter(&self, name: &str) -> Option<&Parameter> {
+        self.parameters.iter().find(|p| p.name == name)
+    }
+
+    /// Covariance of the parameters, in their order.
+    pub fn covariance_matrix(&self) -> DMatrix<f64> {
+        let n = self.parameters.len();
+        DMatrix::from_fn(n, n, |i, j| {
+            self.covariance.get(i).and_then(|row| row.get(j)).copied().unwrap_or(f64::NAN)
+        })
+    }
+
+    fn canonical(&self) -> String {
+        // The types hold nothing that TOML cannot express, so this cannot fail on a certificate.
+        toml::to_string(self).unwrap_or_else(|e| format!("unserialisable: {e}"))
+    }
+}
+
+/// Parameters with their 95 % intervals from estimates, covariance and degrees of freedom.
+pub fn parameters(
+    names_and_units: &[(String, &str)],
+    estimates: &[f64],
+    covariance: &DMatrix<f64>,
+    degrees_of_freedom: &[f64],
+) -> Vec<Parameter> {
+    names_and_units
+        .iter()
+        .zip(estimates)
+        .enumerate()
+        .map(|(i, ((name, unit), &value))| {
+            let u = covariance[(i, i)].max(0.0).sqrt();
+            let half = u * crate::uncertainty::student::coverage_factor(0.95, degrees_of_freedom[i]);
+            Parameter {
+                name: name.clone(),
+                value,
+                unit: (*unit).into(),
+                standard_uncertainty: u,
+                degrees_of_freedom: degrees_of_freedom[i],
+                ci95: [value - half, value + half],
+            }
+        })
+        .collect()
+}
+
+/// A matrix as the rows that a certificate holds.
+pub fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+/// SHA-256 in hexadecimal.
+pub fn sha256_hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}

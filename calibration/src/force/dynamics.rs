@@ -1,0 +1,207 @@
+//! Dynamics of a force channel: bandwidth and delay from a step, resonance of the mount from a tap.
+
+use crate::regression::nonlinear::{Scatter, fit};
+use crate::regression::{Fit, FitError};
+use std::f64::consts::PI;
+
+/// A value with its standard uncertainty.
+pub type Estimate = [f64; 2];
+
+/// Response of a channel to a step of force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepResponse {
+    /// Time from the step to the start of the response in s (dead time, latency).
+    pub delay_s: Estimate,
+    /// Undamped natural frequency of the second-order low-pass in Hz.
+    pub natural_frequency_hz: Estimate,
+    /// Damping ratio.
+    pub damping_ratio: Estimate,
+    /// Frequency where the amplitude is down by the square root of two, in Hz.
+    pub bandwidth_hz: Estimate,
+    /// Height of the step, in the unit of the samples.
+    pub height: Estimate,
+}
+
+/// Fits a second-order low-pass with dead time to samples around one step at `step_at_s`.
+///
+/// # Errors
+/// Too few samples, no step in them, or no convergence.
+pub fn step_response(time_s: &[f64], samples: &[f64], step_at_s: f64) -> Result<StepResponse, FitError> {
+    let before: Vec<f64> =
+        time_s.iter().zip(samples).filter(|(t, _)| **t < step_at_s).map(|(_, x)| *x).collect();
+    let tail = &samples[samples.len() - samples.len() / 4..];
+    if before.len() < 5 || tail.len() < 5 {
+        return Err(FitError::TooFew { observations: samples.len(), parameters: 5 });
+    }
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let (low, high) = (mean(&before), mean(tail));
+    // Half way up: the first guess of delay and speed.
+    let half = time_s
+        .iter()
+        .zip(samples)
+        .find(|(t, x)| **t > step_at_s && (**x - low) * (high - low).signum() > 0.5 * (high - low).abs())
+        .map_or(step_at_s, |(t, _)| *t)
+        - step_at_s;
+    let rate = (time_s.len() - 1) as f64 / (time_s[time_s.len() - 1] - time_s[0]);
+    let half = half.max(0.5 / rate);
+    // Parameters: base, height, delay, ln natural angular frequency, damping ratio.
+    let model = |i: usize, b: &[f64], g: &mut [f64]| {
+        let value =
+            |b: &[f64]| b[0] + b[1] * second_order_step(time_s[i] - step_at_s - b[2], b[3].exp(), b[4]);
+        let r = second_order_step(time_s[i] - step_at_s - b[2], b[3].exp(), b[4]);
+        (g[0], g[1]) = (1.0, r);
+        let mut moved = b.to_vec();
+        for (k, h) in [(2, 1e-6 / b[3].exp()), (3, 1e-6), (4, 1e-6)] {
+            moved[k] = b[k] + h;
+            let up = value(&moved);
+            moved[k] = b[k] - h;
+            g[k] = (up - value(&moved)) / (2.0 * h);
+            moved[k] = b[k];
+        }
+        b[0] + b[1] * r
+    };
+    let best = [(0.2, 0.7), (0.5, 0.7), (0.8, 0.7), (0.5, 0.3), (0.5, 1.2)]
+        .iter()
+        .filter_map(|(share, zeta): &(f64, f64)| {
+            // A critically damped step is half way after 1.7 / omega.
+            let omega: f64 = 1.7 / ((1.0 - share) * half);
+            fit(&model, samples, Scatter::Unknown, &[low, high - low, share * half, omega.ln(), *zeta]).ok()
+        })
+        .filter(|f: &Fit| f.estimates[4] > 0.0 && f.estimates[2] > -2.0 / rate)
+        .min_by(|a, b| a.residual_sum_of_squares.total_cmp(&b.residual_sum_of_squares))
+        .ok_or(FitError::NotConverged { iterations: 0 })?;
+    let (omega, zeta) = (best.estimates[3].exp(), best.estimates[4]);
+    let ratio = bandwidth_ratio(zeta);
+    let natural = omega / (2.0 * PI);
+    let slope = (bandwidth_ratio(zeta + 1e-5) - bandwidth_ratio(zeta - 1e-5)) / 2e-5;
+    let bandwidth_u = best.standard_uncertainty_along(&[0.0, 0.0, 0.0, natural * ratio, natural * slope]);
+    Ok(StepResponse {
+        delay_s: [best.estimates[2], best.standard_uncertainty(2)],
+        natural_frequency_hz: [natural, natural * best.standard_uncertainty(3)],
+        damping_ratio: [zeta, best.standard_uncertainty(4)],
+        bandwidth_hz: [natural * ratio, bandwidth_u],
+        height: [best.estimates[1], best.standard_uncertainty(1)],
+    })
+}
+
+/// Unit step response of a second-order low-pass, zero before the step.
+pub fn second_order_step(t: f64, omega: f64, zeta: f64) -> f64 {
+    if t <= 0.0 {
+        return 0.0;
+    }
+    let d = 1.0 - zeta * zeta;
+    let decay = (-zeta * omega * t).exp();
+    let x = omega * t * d.abs().sqrt();
+    // sin(x)/x and sinh(x)/x join smoothly at critical damping.
+    let (c, s) = if x < 1e-4 {
+        (1.0, 1.0)
+    } else if d > 0.0 {
+        (x.cos(), x.sin() / x)
+    } else {
+        (x.cosh(), x.sinh() / x)
+    };
+    1.0 - decay * (c + zeta * omega * t * s)
+}
+
+/// -3 dB frequency over natural frequency of a second-order low-pass.
+fn bandwidth_ratio(zeta: f64) -> f64 {
+    let a = 1.0 - 2.0 * zeta * zeta;
+    (a + (a * a + 1.0).sqrt()).sqrt()
+}
+
+/// Resonance of a mount that rings after a tap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RingDown {
+    /// Frequency of the ringing in Hz.
+    pub frequency_hz: Estimate,
+    /// Damping ratio.
+    pub damping_ratio: Estimate,
+}
+
+/// Fits `x = c + exp(-zeta omega t) (p cos + q sin)` to a free decay.
+///
+/// # Errors
+/// Too few samples, nothing that rings, or no convergence.
+pub fn ring_down(time_s: &[f64], samples: &[f64]) -> Result<RingDown, FitError> {
+    let n = samples.len();
+    if n < 16 {
+        return Err(FitError::TooFew { observations: n, parameters: 5 });
+    }
+    let rate = (n - 1) as f64 / (time_s[n - 1] - time_s[0]);
+    // The largest line of a coarse spectrum is where to start.
+    let length = n.min(1024);
+    let spectrum = super::noise::Spectrum::welch(&samples[..length], rate, length)
+        .ok_or(FitError::TooFew { observations: n, parameters: 5 })?;
+    let peak = (1..spectrum.density.len())
+        .max_by(|a, b| spectrum.density[*a].total_cmp(&spectrum.density[*b]))
+        .unwrap_or(1);
+    let guess_hz = peak as f64 * spectrum.resolution_hz;
+    let mean = samples.iter().sum::<f64>() / n as f64;
+    let t0 = time_s[0];
+    let model = |i: usize, b: &[f64], g: &mut [f64]| {
+        let t = time_s[i] - t0;
+        let (omega, decay) = (b[3], (-b[4] * t).exp());
+        let (s, c) = (omega * t).sin_cos();
+        let wave = b[1] * c + b[2] * s;
+        g[0] = 1.0;
+        g[1] = decay * c;
+        g[2] = decay * s;
+        g[3] = decay * t * (b[2] * c - b[1] * s);
+        g[4] = -t * decay * wave;
+        b[0] + decay * wave
+    };
+    let best = [0.01, 0.03, 0.1, 0.3]
+        .iter()
+        .filter_map(|zeta| {
+            let omega = 2.0 * PI * guess_hz;
+            let start = [mean, samples[0] - mean, 0.0, omega, zeta * omega];
+            fit(&model, samples, Scatter::Unknown, &start).ok()
+        })
+        .filter(|f| f.estimates[3] > 0.0 && f.estimates[4] > 0.0)
+        .min_by(|a, b| a.residual_sum_of_squares.total_cmp(&b.residual_sum_of_squares))
+        .ok_or(FitError::NotConverged { iterations: 0 })?;
+    let (damped, sigma) = (best.estimates[3], best.estimates[4]);
+    let natural = damped.hypot(sigma);
+    let n3 = natural.powi(3);
+    Ok(RingDown {
+        frequency_hz: [damped / (2.0 * PI), best.standard_uncertainty(3) / (2.0 * PI)],
+        damping_ratio: [
+            sigma / natural,
+            best.standard_uncertainty_along(&[0.0, 0.0, 0.0, -sigma * damped / n3, damped * damped / n3]),
+        ],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_step_response_meets_its_limits() {
+        // Critically damped: 1 - (1 + wt) exp(-wt).
+        let (w, t) = (100.0_f64, 0.013);
+        let exact = 1.0 - (1.0 + w * t) * (-w * t).exp();
+        for zeta in [1.0 - 1e-7, 1.0, 1.0 + 1e-7] {
+            assert!((second_order_step(t, w, zeta) - exact).abs() < 1e-6);
+        }
+        // Butterworth: the bandwidth is the natural frequency.
+        assert!((bandwidth_ratio(0.5f64.sqrt()) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_mount_that_rings_at_55_hz_is_found() {
+        // physics.md, section 6: a leaf stage with a 55 Hz lateral mode.
+        let time: Vec<f64> = (0..1000).map(|i| f64::from(i) * 1e-3).collect();
+        let x: Vec<f64> = time
+            .iter()
+            .enumerate()
+            .map(|(i, t)| {
+                let noise = [0.01, -0.01, -0.01, 0.01, 0.01, -0.01][i % 6];
+                3.0 + (-0.02 * 2.0 * PI * 55.0 * t).exp() * (2.0 * PI * 55.0 * t).cos() + noise
+            })
+            .collect();
+        let found = ring_down(&time, &x).unwrap();
+        assert!((found.frequency_hz[0] - 55.0).abs() < 3.0 * found.frequency_hz[1] + 0.01, "{found:?}");
+        assert!((found.damping_ratio[0] - 0.02).abs() < 1e-3);
+    }
+}

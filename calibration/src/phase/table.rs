@@ -1,0 +1,125 @@
+//! The phase table of the contract (`PHASES.csv`): what `calibrate phase` writes and `calibrate finger` reads.
+
+use models::quantity::PeakToPeak;
+use serde::{Deserialize, Serialize};
+use std::io::{Read, Write};
+
+/// One row: the phase shift at one amplitude.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhasePoint {
+    /// Peak-to-peak amplitude.
+    pub amplitude: PeakToPeak,
+    /// Phase shift of Eq. 1 in degrees, [0, 360).
+    pub phase_shift_deg: f64,
+    /// Standard deviation of one repeat in degrees.
+    pub phase_shift_sd_deg: Option<f64>,
+    /// Number of repeats behind the mean.
+    pub repeats: Option<u32>,
+    /// Moist, dry or free text.
+    pub condition: Option<String>,
+    /// Frequency in Hz.
+    pub frequency_hz: Option<f64>,
+    /// Normal force in N.
+    pub normal_force_n: Option<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Row {
+    amplitude_pp_m: f64,
+    phase_shift_deg: f64,
+    #[serde(default)]
+    phase_shift_sd_deg: Option<f64>,
+    #[serde(default)]
+    repeats: Option<u32>,
+    #[serde(default)]
+    condition: Option<String>,
+    #[serde(default)]
+    frequency_hz: Option<f64>,
+    #[serde(default)]
+    normal_force_n: Option<f64>,
+}
+
+/// Why a table cannot be read or written.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("line {line}: {reason}")]
+pub struct TableError {
+    /// Line in the file, the header being line 1.
+    pub line: u64,
+    /// What is wrong.
+    pub reason: String,
+}
+
+/// Reads a phase table; unknown columns are ignored.
+///
+/// # Errors
+/// The first row that cannot be read or cannot be true, with its line.
+pub fn read_phases(input: impl Read) -> Result<Vec<PhasePoint>, TableError> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(input);
+    let at = |e: &csv::Error| e.position().map_or(0, csv::Position::line);
+    let headers = reader.headers().map_err(|e| TableError { line: 1, reason: e.to_string() })?.clone();
+    let mut points = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| TableError { line: at(&e), reason: e.to_string() })?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let fail = |reason: String| TableError { line, reason };
+        let row: Row = record.deserialize(Some(&headers)).map_err(|e| fail(e.to_string()))?;
+        if !(row.amplitude_pp_m.is_finite() && row.amplitude_pp_m >= 0.0) {
+            return Err(fail(format!("amplitude_pp_m = {} is no amplitude", row.amplitude_pp_m)));
+        }
+        if !(0.0..360.0).contains(&row.phase_shift_deg) {
+            return Err(fail(format!("phase_shift_deg = {} is not in [0, 360)", row.phase_shift_deg)));
+        }
+        if row.phase_shift_sd_deg.is_some_and(|sd| !(sd.is_finite() && sd >= 0.0)) {
+            return Err(fail("phase_shift_sd_deg is negative or not a number".into()));
+        }
+        points.push(PhasePoint {
+            amplitude: PeakToPeak::from_metres(row.amplitude_pp_m),
+            phase_shift_deg: row.phase_shift_deg,
+            phase_shift_sd_deg: row.phase_shift_sd_deg,
+            repeats: row.repeats,
+            condition: row.condition.filter(|c| !c.is_empty()),
+            frequency_hz: row.frequency_hz,
+            normal_force_n: row.normal_force_n,
+        });
+    }
+    Ok(points)
+}
+
+/// Writes a phase table.
+///
+/// # Errors
+/// The writer's own.
+pub fn write_phases(output: impl Write, points: &[PhasePoint]) -> Result<(), TableError> {
+    let mut writer = csv::Writer::from_writer(output);
+    for (i, p) in points.iter().enumerate() {
+        let row = Row {
+            amplitude_pp_m: p.amplitude.metres(),
+            phase_shift_deg: p.phase_shift_deg,
+            phase_shift_sd_deg: p.phase_shift_sd_deg,
+            repeats: p.repeats,
+            condition: p.condition.clone(),
+            frequency_hz: p.frequency_hz,
+            normal_force_n: p.normal_force_n,
+        };
+        writer.serialize(row).map_err(|e| TableError { line: i as u64 + 2, reason: e.to_string() })?;
+    }
+    writer.flush().map_err(|e| TableError { line: 0, reason: e.to_string() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_goes_round() {
+        let text = "amplitude_pp_m,phase_shift_deg,condition,other\n4.2e-7,3,moist,x\n1.35e-6,90,,y\n";
+        let points = read_phases(text.as_bytes()).unwrap();
+        assert_eq!(points[0].condition.as_deref(), Some("moist"));
+        assert_eq!(points[1].condition, None);
+        let mut out = Vec::new();
+        write_phases(&mut out, &points).unwrap();
+        assert_eq!(read_phases(out.as_slice()).unwrap(), points);
+        let bad = read_phases("amplitude_pp_m,phase_shift_deg\n1e-6,400\n".as_bytes()).unwrap_err();
+        assert_eq!((bad.line, bad.reason.contains("[0, 360)")), (2, true));
+    }
+}

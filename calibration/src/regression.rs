@@ -1,0 +1,83 @@
+//! Least squares: what every calibration here is made of.
+//!
+//! [`linear`] solves linear problems in double-double arithmetic, so that the answer carries the data's
+//! uncertainty and none of the solver's (checked against NIST StRD, see `tests/nist.rs`). [`nonlinear`]
+//! is a Levenberg-Marquardt for the few models that are not linear in their parameters.
+
+pub mod double_double;
+pub mod linear;
+pub mod nonlinear;
+
+use nalgebra::{DMatrix, DVector};
+
+/// The result of a fit: estimates, their covariance, and what the model left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// Parameter estimates, in the order of the design's columns.
+    pub estimates: DVector<f64>,
+    /// Covariance matrix of the estimates.
+    pub covariance: DMatrix<f64>,
+    /// Observation minus model, in the unit of the observations.
+    pub residuals: DVector<f64>,
+    /// Sum of squared residuals; of whitened residuals (chi squared) where a covariance was given.
+    pub residual_sum_of_squares: f64,
+    /// Observations minus parameters.
+    pub degrees_of_freedom: f64,
+}
+
+impl Fit {
+    /// Residual standard deviation `sqrt(RSS / nu)`; NaN without degrees of freedom.
+    pub fn residual_sd(&self) -> f64 {
+        (self.residual_sum_of_squares / self.degrees_of_freedom).sqrt()
+    }
+
+    /// Standard uncertainty of one parameter.
+    pub fn standard_uncertainty(&self, parameter: usize) -> f64 {
+        self.covariance[(parameter, parameter)].sqrt()
+    }
+
+    /// Correlation coefficient of two parameters.
+    pub fn correlation(&self, a: usize, b: usize) -> f64 {
+        self.covariance[(a, b)] / (self.standard_uncertainty(a) * self.standard_uncertainty(b))
+    }
+
+    /// Standard uncertainty of `gradient . estimates`, for example of a prediction (GUM H.3.4).
+    pub fn standard_uncertainty_along(&self, gradient: &[f64]) -> f64 {
+        let g = DVector::from_column_slice(gradient);
+        (g.transpose() * &self.covariance * &g)[(0, 0)].max(0.0).sqrt()
+    }
+}
+
+/// Why a fit gave no answer.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// Fewer observations than parameters (or as many, where the scatter must be estimated).
+    #[error("{observations} observations cannot determine {parameters} parameters and their scatter")]
+    TooFew {
+        /// Number of observations.
+        observations: usize,
+        /// Number of parameters.
+        parameters: usize,
+    },
+    /// Columns of the design depend on each other.
+    #[error("parameter {parameter} (counted from 0) cannot be told from the ones before it on this data")]
+    Singular {
+        /// The first column that depends on those before it.
+        parameter: usize,
+    },
+    /// A number that is not finite went in or came out.
+    #[error("a value is not finite ({place})")]
+    NotFinite {
+        /// Where.
+        place: &'static str,
+    },
+    /// The given covariance of the observations is not positive definite.
+    #[error("the covariance of the observations is not positive definite")]
+    Covariance,
+    /// The iteration of a non-linear fit did not settle.
+    #[error("the fit did not converge in {iterations} iterations")]
+    NotConverged {
+        /// Iterations made.
+        iterations: usize,
+    },
+}

@@ -1,0 +1,159 @@
+//! Linear least squares: ordinary, and generalised with a covariance of the observations.
+
+use super::double_double::DoubleDouble;
+use super::{Fit, FitError};
+use nalgebra::{DMatrix, DVector};
+
+/// Ordinary least squares `y = X b + e`; the scatter of `e` is estimated from the residuals.
+///
+/// # Errors
+/// Fewer than `parameters + 1` rows, dependent columns, values that are not finite.
+pub fn ordinary(design: &DMatrix<f64>, observations: &DVector<f64>) -> Result<Fit, FitError> {
+    if design.nrows() <= design.ncols() {
+        return Err(FitError::TooFew { observations: design.nrows(), parameters: design.ncols() });
+    }
+    let mut fit = solve(design, observations)?;
+    fit.covariance *= fit.residual_sum_of_squares / fit.degrees_of_freedom;
+    Ok(fit)
+}
+
+/// Least squares for observations of unit variance: the covariance is `(X'X)^-1`, not rescaled by the fit.
+///
+/// # Errors
+/// As [`ordinary`], but as many rows as parameters are allowed.
+pub fn unit_variance(design: &DMatrix<f64>, observations: &DVector<f64>) -> Result<Fit, FitError> {
+    if design.nrows() < design.ncols() {
+        return Err(FitError::TooFew { observations: design.nrows(), parameters: design.ncols() });
+    }
+    solve(design, observations)
+}
+
+/// Generalised least squares: the covariance of the observations is known and not rescaled by the fit.
+/// `residual_sum_of_squares` of the answer is the chi squared of the whitened residuals.
+///
+/// # Errors
+/// As [`ordinary`] (as many rows as parameters are allowed), or a covariance not positive definite.
+pub fn generalised(
+    design: &DMatrix<f64>,
+    observations: &DVector<f64>,
+    covariance: &DMatrix<f64>,
+) -> Result<Fit, FitError> {
+    if design.nrows() < design.ncols() {
+        return Err(FitError::TooFew { observations: design.nrows(), parameters: design.ncols() });
+    }
+    let lower = covariance.clone().cholesky().ok_or(FitError::Covariance)?.unpack();
+    let white = |m: &DMatrix<f64>| lower.solve_lower_triangular(m).ok_or(FitError::Covariance);
+    let white_design = white(design)?;
+    let white_observations =
+        white(&DMatrix::from_column_slice(observations.len(), 1, observations.as_slice()))?;
+    let mut fit = solve(&white_design, &white_observations.column(0).into_owned())?;
+    fit.residuals = observations - design * &fit.estimates;
+    Ok(fit)
+}
+
+/// The common part: estimates, `(X'X)^-1`, residuals.
+fn solve(design: &DMatrix<f64>, observations: &DVector<f64>) -> Result<Fit, FitError> {
+    let (n, p) = design.shape();
+    if design.iter().chain(observations.iter()).any(|x| !x.is_finite()) {
+        return Err(FitError::NotFinite { place: "design or observations" });
+    }
+    // Powers of two as column scales: exact, and the pivots become comparable with one another.
+    let scale: Vec<f64> = (0..p)
+        .map(|j| {
+            let norm = design.column(j).norm();
+            if norm > 0.0 { 2f64.powi(-norm.log2().round() as i32) } else { 1.0 }
+        })
+        .collect();
+    let x = |i: usize, j: usize| design[(i, j)] * scale[j];
+
+    let dot = |a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| {
+        (0..n).fold(DoubleDouble::ZERO, |sum, i| sum + DoubleDouble::product(a(i), b(i)))
+    };
+    let mut lower = vec![vec![DoubleDouble::ZERO; p]; p];
+    for j in 0..p {
+        for k in 0..=j {
+            let mut entry = dot(&|i| x(i, j), &|i| x(i, k));
+            let before = entry.value();
+            for (a, b) in lower[j][..k].iter().zip(&lower[k][..k]) {
+                entry = entry - *a * *b;
+            }
+            if j == k {
+                // Below 1e-22 of the column's own square nothing of it is left but its rounding to f64.
+                if entry.value() <= 1e-22 * before || before == 0.0 {
+                    return Err(FitError::Singular { parameter: j });
+                }
+                lower[j][k] = entry.sqrt();
+            } else {
+                lower[j][k] = entry / lower[k][k];
+            }
+        }
+    }
+    let solve_both = |right: Vec<DoubleDouble>| -> Vec<DoubleDouble> {
+        let mut z = right;
+        for j in 0..p {
+            for k in 0..j {
+                z[j] = z[j] - lower[j][k] * z[k];
+            }
+            z[j] = z[j] / lower[j][j];
+        }
+        for j in (0..p).rev() {
+            for k in j + 1..p {
+                z[j] = z[j] - lower[k][j] * z[k];
+            }
+            z[j] = z[j] / lower[j][j];
+        }
+        z
+    };
+    let scaled = solve_both((0..p).map(|j| dot(&|i| x(i, j), &|i| observations[i])).collect());
+    let residuals = DVector::from_fn(n, |i, _| {
+        (0..p)
+            .fold(DoubleDouble::from(observations[i]), |r, j| r - DoubleDouble::from(x(i, j)) * scaled[j])
+            .value()
+    });
+    let mut covariance = DMatrix::zeros(p, p);
+    for k in 0..p {
+        let unit = (0..p).map(|j| DoubleDouble::from(if j == k { 1.0 } else { 0.0 })).collect();
+        for (j, entry) in solve_both(unit).into_iter().enumerate() {
+            covariance[(j, k)] = entry.value() * scale[j] * scale[k];
+        }
+    }
+    let estimates = DVector::from_fn(p, |j, _| scaled[j].value() * scale[j]);
+    if estimates.iter().any(|x| !x.is_finite()) {
+        return Err(FitError::NotFinite { place: "estimates" });
+    }
+    let residual_sum_of_squares = residuals.dot(&residuals);
+    Ok(Fit { estimates, covariance, residuals, residual_sum_of_squares, degrees_of_freedom: (n - p) as f64 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dependent_columns_are_named_not_solved() {
+        let design = DMatrix::from_fn(6, 3, |i, j| [1.0, i as f64, 2.0 * i as f64 + 3.0][j]);
+        let y = DVector::from_fn(6, |i, _| i as f64);
+        assert_eq!(ordinary(&design, &y), Err(FitError::Singular { parameter: 2 }));
+    }
+
+    #[test]
+    fn generalised_with_equal_variances_equals_ordinary_estimates() {
+        let design = DMatrix::from_fn(8, 2, |i, j| if j == 0 { 1.0 } else { i as f64 });
+        let y = DVector::from_fn(8, |i, _| 3.0 + 0.5 * i as f64 + if i % 2 == 0 { 0.1 } else { -0.1 });
+        let plain = ordinary(&design, &y).unwrap();
+        let known = generalised(&design, &y, &(DMatrix::identity(8, 8) * 0.01)).unwrap();
+        assert!((plain.estimates - known.estimates).norm() < 1e-12);
+        // Closed form for a line: var(slope) = sigma^2 / sum (x - mean)^2, with sum = 42.
+        assert!((known.covariance[(1, 1)] - 0.01 / 42.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn correlated_observations_give_the_closed_form_mean() {
+        // Two readings of one quantity, sds 1 and 2, correlation 0.5: weights (v2 - c, v1 - c) / (v1 + v2 - 2c).
+        let cov = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 1.0, 4.0]);
+        let fit = generalised(&DMatrix::from_element(2, 1, 1.0), &DVector::from_vec(vec![10.0, 13.0]), &cov)
+            .unwrap();
+        assert!((fit.estimates[0] - 10.0).abs() < 1e-12, "all weight on the first");
+        assert!((fit.covariance[(0, 0)] - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,50 @@
+//! Coverage factors, and the binomial test by which stated coverage is judged.
+
+use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, FisherSnedecor, Normal, StudentsT};
+
+/// The factor `k` such that `value +- k u` has that coverage probability, for a t distribution.
+/// Degrees of freedom below one are taken as one; infinite ones give the Gaussian.
+pub fn coverage_factor(coverage: f64, degrees_of_freedom: f64) -> f64 {
+    let p = 0.5 + 0.5 * coverage;
+    if degrees_of_freedom > 1e6 {
+        return Normal::standard().inverse_cdf(p);
+    }
+    StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or(f64::NAN, |t| t.inverse_cdf(p))
+}
+
+/// Probability of an F ratio at least as large, where the hypothesis of no difference holds.
+pub fn f_test_p_value(ratio: f64, numerator_dof: f64, denominator_dof: f64) -> f64 {
+    FisherSnedecor::new(numerator_dof, denominator_dof).map_or(f64::NAN, |f| f.sf(ratio.max(0.0)))
+}
+
+/// Two-sided p value of `hits` of `trials` at probability `p`: twice the smaller tail, at most one.
+pub fn binomial_p_value(hits: u64, trials: u64, p: f64) -> f64 {
+    Binomial::new(p, trials).map_or(f64::NAN, |b| {
+        let lower = b.cdf(hits);
+        let upper = if hits == 0 { 1.0 } else { b.sf(hits - 1) };
+        (2.0 * lower.min(upper)).min(1.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coverage_factors_of_gum_table_g2() {
+        // GUM Table G.2, columns 95 % and 99 %.
+        for (nu, t95, t99) in [(1.0, 12.71, 63.66), (5.0, 2.57, 4.03), (16.0, 2.12, 2.92), (50.0, 2.01, 2.68)]
+        {
+            assert!((coverage_factor(0.95, nu) - t95).abs() < 0.006);
+            assert!((coverage_factor(0.99, nu) - t99).abs() < 0.006);
+        }
+        assert!((coverage_factor(0.95, f64::INFINITY) - 1.960).abs() < 5e-4);
+    }
+
+    #[test]
+    fn binomial_p_values_by_hand() {
+        // 10 fair coins: P(<= 1) = 11/1024, so two-sided 22/1024.
+        assert!((binomial_p_value(1, 10, 0.5) - 22.0 / 1024.0).abs() < 1e-12);
+        assert_eq!(binomial_p_value(5, 10, 0.5), 1.0);
+    }
+}
