@@ -133,6 +133,22 @@ impl Kind {
         }
         values
     }
+
+    /// Sets its size to a share of its range: 0 the smallest, 1 the largest; a sign or a factor's side is kept.
+    pub fn resize(&self, values: &mut Values, share: f64) {
+        if let Some(size) = self.parameters.first() {
+            values[0] = size.at(share, values[0]);
+        }
+    }
+
+    /// Sets the sign of its size, or whether a factor lies above one.
+    pub fn turn(&self, values: &mut Values, up: bool) {
+        match self.parameters.first().map(|p| p.draw) {
+            Some(Draw::Signed) if (values[0] > 0.0) != up => values[0] = -values[0],
+            Some(Draw::Factor) if (values[0] > 1.0) != up => values[0] = 1.0 / values[0],
+            _ => {}
+        }
+    }
 }
 
 impl Parameter {
@@ -150,6 +166,18 @@ impl Parameter {
 
     const fn factor(name: &'static str, low: f64, high: f64) -> Self {
         Self { name, low, high, draw: Draw::Factor }
+    }
+
+    /// The value at a share of the range, on the side on which `now` lies.
+    fn at(&self, share: f64, now: f64) -> f64 {
+        let log = (self.low.ln() + share * (self.high.ln() - self.low.ln())).exp();
+        match self.draw {
+            Draw::Linear => self.low + share * (self.high - self.low),
+            Draw::Log => log,
+            Draw::Signed => log.copysign(now),
+            Draw::Factor if now >= 1.0 => 1.0 + log,
+            Draw::Factor => 1.0 / (1.0 + log),
+        }
     }
 
     /// Draws a value.

@@ -7,6 +7,7 @@
 //! | [`contact`] | ridge on vibrating plate: exact, sampled, resolved, averaged |
 //! | [`channel`] | the way from an instrument to its reader, and its faults |
 //! | [`defects`] | what can be wrong with this world, one kind a file |
+//! | [`sealed`] | point tables whose cause only a label knows, and the oracle |
 //! | [`virtual_rig`] | the loop's three ports in process and in virtual time |
 //! | [`noise`] | named streams of random numbers |
 //! | [`wire`] | the same world behind real protocols |
@@ -20,6 +21,7 @@ pub mod defects;
 pub mod finger;
 pub mod noise;
 pub mod plate;
+pub mod sealed;
 pub mod sensor;
 pub mod stage;
 pub mod virtual_rig;

@@ -21,7 +21,7 @@ fn points(n: usize) -> Vec<Point> {
                     frequency_hz: if i % 3 == 0 { 40e3 } else { 27.5e3 },
                     normal_force_n: force,
                     ambient_pressure_pa: if i % 4 == 0 { 2e4 } else { 101_325.0 },
-                    temperature_c: 22.0,
+                    temperature_c: 22.0 + 6.0 * (1.0 - (-3.0 * i as f64 / 100.0).exp()),
                 },
                 known_pp_m: if still { 0.0 } else { noise.log_between(0.5e-6, 5e-6) },
                 speed_m_s: noise.log_between(5e-3, 0.2),

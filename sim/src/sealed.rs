@@ -1,0 +1,238 @@
+//! Sealed data sets: point tables whose cause is known to their label alone.
+//!
+//! [`generate`] makes one set from a seed and a [`Stratum`]: a design, a fingertip, perhaps a cause of a size drawn
+//! evenly in its logarithm through the limit of detection, forces from this world's own contact, and noise of its
+//! own. The set holds what a diagnoser may see (table, rig.toml, hidden conditions) apart from what only a scorer may
+//! (label and noise-free truth); [`Set::write`] puts them in two folders.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`design`] | which passes were made |
+//! | [`oracle`] | what the noise-free data could tell at best |
+//! | `bench` | fingertip, noise, sizes, and the measurement itself |
+//! | `files` | the folders |
+
+mod bench;
+pub mod design;
+mod files;
+pub mod oracle;
+
+use models::record::Pass;
+use serde::{Deserialize, Serialize};
+
+use crate::defects::{ALL, Defect, Defects, Kind};
+use crate::noise::Noise;
+use bench::Bench;
+pub use bench::SetNoise;
+use design::Design;
+use oracle::Imitator;
+
+/// What kind of truth a set holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stratum {
+    /// No cause.
+    None,
+    /// One cause that the library knows by name.
+    Single,
+    /// Two of them.
+    Pair,
+    /// One of the causes that others imitate exactly or nearly.
+    Alias,
+    /// One cause that the library does not know.
+    Outside,
+}
+
+/// Causes that others imitate by construction (gains of k_l, k_n, speed, amplitude; tilt and cross-talk).
+const ALIASES: [&str; 5] =
+    ["stiffness_error", "speed_error", "amplitude_miscalibration", "plate_tilt", "force_crosstalk"];
+
+impl Stratum {
+    /// The stratum of a seed: 20 % none, 35 % single, 10 % pairs, 15 % aliases, 20 % outside the library.
+    pub fn draw(seed: u64) -> Self {
+        match Noise::new(seed, "stratum").uniform() {
+            u if u < 0.20 => Stratum::None,
+            u if u < 0.55 => Stratum::Single,
+            u if u < 0.65 => Stratum::Pair,
+            u if u < 0.80 => Stratum::Alias,
+            _ => Stratum::Outside,
+        }
+    }
+
+    fn kinds(self, noise: &mut Noise) -> Vec<&'static Kind> {
+        let pool: Vec<&'static Kind> = ALL
+            .iter()
+            .copied()
+            .filter(|kind| kind.in_tables)
+            .filter(|kind| match self {
+                Stratum::None => false,
+                Stratum::Single => kind.in_library && !ALIASES.contains(&kind.name),
+                Stratum::Pair => kind.in_library,
+                Stratum::Alias => ALIASES.contains(&kind.name),
+                Stratum::Outside => !kind.in_library,
+            })
+            .collect();
+        if pool.is_empty() {
+            return pool;
+        }
+        let first = pool[noise.below(pool.len())];
+        if self != Stratum::Pair {
+            return vec![first];
+        }
+        loop {
+            let pair = vec![first, pool[noise.below(pool.len())]];
+            if pair[1].name != first.name && oracle::all_compatible(&pair) {
+                return pair;
+            }
+        }
+    }
+}
+
+/// A cause with its parameters, for the label.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cause {
+    /// Name.
+    pub name: String,
+    /// Whether the library has an effect of that name.
+    pub in_library: bool,
+    /// Parameters by name.
+    pub parameters: std::collections::BTreeMap<String, f64>,
+}
+
+/// What only the scorer may see.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Label {
+    /// Always `muprime.sealed/1`.
+    pub schema: String,
+    /// Seed of the set.
+    pub seed: u64,
+    /// Stratum.
+    pub stratum: Stratum,
+    /// chi2 by which the truth is better than the recalibrated baseline, from noise-free forces. 30 and more:
+    /// detectable.
+    pub chi2_gain: f64,
+    /// Share of the recalibrated gap that the best single cause of the truth leaves (pairs only; else 0).
+    pub best_single_leaves: f64,
+    /// Rms over the hidden passes of the nominal baseline's error over mu0 F.
+    pub hidden_before_rmse: f64,
+    /// The same for the recalibrated baseline.
+    pub hidden_recalibrated_rmse: f64,
+    /// What repeatability leaves there.
+    pub hidden_floor_rmse: f64,
+    /// True normal stiffness (N/m).
+    pub true_normal_stiffness_n_per_m: f64,
+    /// True lateral stiffness (N/m).
+    pub true_lateral_stiffness_n_per_m: f64,
+    /// True coefficient of friction.
+    pub true_mu0: f64,
+    /// The noise.
+    pub noise: SetNoise,
+    /// The design.
+    pub design: Design,
+    /// The causes, strongest first; none for `none`.
+    pub causes: Vec<Cause>,
+    /// Best imitations by other library causes, best first; empty where they were not asked for.
+    pub imitators: Vec<Imitator>,
+}
+
+/// One sealed set.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Set {
+    /// The table.
+    pub passes: Vec<Pass>,
+    /// The rig.toml beside it.
+    pub rig_toml: String,
+    /// Hidden conditions, without lateral forces.
+    pub conditions: Vec<Pass>,
+    /// Noise-free lateral forces at the hidden conditions (N): for the scorer.
+    pub truth_n: Vec<f64>,
+    /// The same without the causes (N): for the scorer.
+    pub without_n: Vec<f64>,
+    /// The label: for the scorer.
+    pub label: Label,
+}
+
+/// How much the oracle is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Ask {
+    /// The gain of the truth over the recalibrated baseline.
+    #[default]
+    Gain,
+    /// And which cheap library causes imitate it.
+    Imitators,
+    /// And the dear ones (ridges that fly or recover late): seconds a set.
+    AllImitators,
+}
+
+/// Passes hidden for scoring.
+const HIDDEN: usize = 100;
+
+/// The set of a seed.
+pub fn generate(seed: u64, stratum: Stratum, ask: Ask) -> Set {
+    let mut noise = Noise::new(seed, "sealed");
+    let design = Design::draw(&mut noise);
+    let planned = design.plan(&mut noise);
+    let hidden = design.hidden(&mut noise, &planned, HIDDEN);
+    let bench = Bench::draw(&mut noise, seed);
+    let kinds = stratum.kinds(&mut noise);
+    let seen = bench.circumstances(&planned, true, &mut noise);
+    let defects = bench.sized(&kinds, &seen, &mut noise);
+    let passes = bench.measure(&seen, &planned, &defects, &mut noise);
+
+    let data = bench.noise_free(&seen, &defects);
+    let case = bench.case(&data);
+    let base = case.fit(&Defects::none(), 8);
+    let truth = case.fit_from(&bench.finger, &defects, 2);
+    let gain = base.chi2 - truth.chi2;
+    let alone = |defect: &Defect| {
+        let one = Defects { defects: vec![*defect], channels: Vec::new() };
+        (case.fit(&one, 5).chi2 - truth.chi2).max(0.0) / gain.max(1e-9)
+    };
+    let best_single_leaves =
+        if kinds.len() > 1 { defects.defects.iter().map(alone).fold(1.0, f64::min) } else { 0.0 };
+    let imitators = match ask {
+        Ask::Gain => Vec::new(),
+        _ => case.imitators(&kinds, &base, ask == Ask::AllImitators),
+    };
+
+    let seen_hidden = bench.circumstances(&hidden, false, &mut noise);
+    let at_hidden = bench.noise_free(&seen_hidden, &defects);
+    let without = bench.noise_free(&seen_hidden, &Defects::none());
+    // Nominal baseline: the contract's mu0, from the table's passes without vibration.
+    let mut nominal = bench.nominal;
+    nominal.mu0 = models::record::coulomb_coefficient(&passes).unwrap_or(nominal.mu0);
+    let label = Label {
+        schema: "muprime.sealed/1".to_string(),
+        seed,
+        stratum,
+        chi2_gain: gain,
+        best_single_leaves,
+        hidden_before_rmse: bench.error(&at_hidden, &nominal),
+        hidden_recalibrated_rmse: bench.error(&at_hidden, &base.finger),
+        hidden_floor_rmse: bench.floor(&at_hidden),
+        true_normal_stiffness_n_per_m: bench.finger.normal_stiffness_n_per_m,
+        true_lateral_stiffness_n_per_m: bench.finger.lateral_stiffness_n_per_m,
+        true_mu0: bench.finger.mu0,
+        noise: bench.scatter,
+        design,
+        causes: defects.defects.iter().map(cause).collect(),
+        imitators,
+    };
+    Set {
+        conditions: bench.conditions(&at_hidden, &hidden),
+        rig_toml: bench.rig_toml(),
+        passes,
+        truth_n: at_hidden.lateral_n,
+        without_n: without.lateral_n,
+        label,
+    }
+}
+
+fn cause(defect: &Defect) -> Cause {
+    let names = defect.kind.parameters.iter().map(|p| p.name.to_string());
+    Cause {
+        name: defect.kind.name.to_string(),
+        in_library: defect.kind.in_library,
+        parameters: names.zip(defect.values).collect(),
+    }
+}
