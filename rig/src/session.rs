@@ -7,6 +7,8 @@ mod fast;
 mod keeper;
 mod live;
 
+pub use fast::{Rehearsal, rehearse};
+
 use crate::plan::{Plan, Point, Resolution};
 use crate::run_dir::{Identity, RunDir};
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
@@ -89,7 +91,8 @@ pub fn sha256(text: &str) -> String {
 impl Job {
     /// What the run is of.
     pub fn identity(&self) -> Identity {
-        let model = self.model_file.as_ref().map_or_else(|| self.model.name().to_string(), |(_, text)| sha256(text));
+        let model =
+            self.model_file.as_ref().map_or_else(|| self.model.name().to_string(), |(_, text)| sha256(text));
         Identity {
             setup_sha256: sha256(&self.setup.text),
             plan_sha256: sha256(&self.plan.text),

@@ -51,9 +51,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let bar = progress_bar(json);
     let planned = job.points()?.len();
     bar.set_length(planned as u64);
+    let say = |text: String| if bar.is_hidden() { eprintln!("{text}") } else { bar.println(text) };
     if !json {
         let clock = if job.fast { "virtual time" } else { "wall-clock time" };
-        bar.println(format!(
+        say(format!(
             "{} on {}: {planned} passes in {clock}, into {}",
             job.plan.file.name,
             job.setup.file.name,
@@ -70,7 +71,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             if json {
                 print_line(&serde_json::json!({ "event": event }));
             } else {
-                bar.println(describe(event));
+                say(describe(event));
             }
         }
         News::Progress(made, _, left_s) => {

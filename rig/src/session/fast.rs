@@ -2,9 +2,12 @@
 
 use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary};
+use crate::plan::{Plan, Resolution};
 use crate::run_dir::RunDir;
-use crate::sequence::{Outcome, Sequence};
+use crate::sequence::{MeasuredPass, Outcome, Sequence};
+use crate::setup::Setup;
 use miette::{IntoDiagnostic, WrapErr};
+use models::prediction::FrictionModel;
 use realtime::cycle::{Command, CycleState};
 use realtime::ports::Nanos;
 use realtime::recorder::Recorder;
@@ -12,6 +15,7 @@ use realtime::turn::{Ports, Tick, turn};
 use sim::virtual_rig::VirtualRig;
 use std::collections::{BTreeMap, VecDeque};
 use std::io::BufWriter;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 /// A record in virtual time starts at this wall-clock time (2000-01-01), so that equal seeds give equal files.
@@ -80,6 +84,56 @@ pub fn run(
     recorder.end(last).into_diagnostic().wrap_err("the record")?;
     let departed = sequence.departed();
     kept.end(outcome, departed, None, 0, BTreeMap::new())
+}
+
+/// What a sweep in memory comes to.
+#[derive(Clone, Debug)]
+pub struct Rehearsal {
+    /// The passes.
+    pub passes: Vec<MeasuredPass>,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Whether the model left the measurement.
+    pub departed: bool,
+    /// Cycles run.
+    pub cycles: u64,
+}
+
+/// Runs a plan on a world in virtual time and keeps nothing: for statistics, and to see beforehand what a plan shows.
+///
+/// # Errors
+/// A plan that the limits do not allow, or a world that cannot be.
+pub fn rehearse(
+    setup: &Setup,
+    plan: &Plan,
+    seed: u64,
+    world: &sim::world::WorldConfig,
+    model: Arc<dyn FrictionModel>,
+) -> miette::Result<Rehearsal> {
+    let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
+    let points = plan.points(seed, &setup.config.limits, &resolution)?;
+    let mut sequence =
+        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise);
+    let [force, amplifier, stage] =
+        VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
+    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let config = setup.config;
+    let mut state = CycleState::default();
+    let mut queue: VecDeque<Command> = VecDeque::new();
+    let mut passes = Vec::new();
+    for number in 1.. {
+        let now = Nanos(number * config.limits.timing.cycle.0);
+        let tick = Tick { number, lateness: Nanos(0), now };
+        let row = turn(&config, &*model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
+        let reaction = sequence.on_row(&row);
+        passes.extend(reaction.pass);
+        queue.extend(reaction.commands);
+        if let Some(outcome) = reaction.outcome {
+            let departed = sequence.departed();
+            return Ok(Rehearsal { passes, outcome, departed, cycles: number });
+        }
+    }
+    unreachable!("the sequence ends every sweep")
 }
 
 /// An outcome as JSON, for the record's last words.

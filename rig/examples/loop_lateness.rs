@@ -1,0 +1,60 @@
+//! Prints the lateness of the loop's thread with idle ports, as quantiles in us: `p50 p99 p99.9 max`.
+//! `benches/lateness` runs it in turn with cyclictest.
+
+use models::finger::Finger;
+use models::prediction::SpringSlider;
+use realtime::pacing::{self, Lifeline, LoopParts};
+use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Stage, StageState};
+use realtime::safety::{DriveCommand, StageCommand};
+use realtime::turn::Ports;
+use rig::setup::Setup;
+use ringbuf::HeapRb;
+use ringbuf::traits::Split;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+struct Idle;
+
+impl ForceSensor for Idle {
+    fn read(&mut self, _: Nanos) -> Forces {
+        Forces::missing(NoData::NeverRead)
+    }
+}
+
+impl Amplifier for Idle {
+    fn command(&mut self, _: DriveCommand, _: Nanos) {}
+    fn state(&mut self, _: Nanos) -> Result<AmplifierState, NoData> {
+        Err(NoData::NeverRead)
+    }
+}
+
+impl Stage for Idle {
+    fn command(&mut self, _: StageCommand, _: Nanos) {}
+    fn state(&mut self, _: Nanos) -> Result<StageState, NoData> {
+        Err(NoData::NeverRead)
+    }
+}
+
+fn main() {
+    let seconds: f64 = std::env::args().nth(1).and_then(|s| s.parse().ok()).unwrap_or(5.0);
+    let setup = Setup::load("virtual").expect("bundled");
+    let (rows, _keep) = HeapRb::new(16).split();
+    let (watch, _keep_too) = HeapRb::new(16).split();
+    let life = Arc::new(Lifeline::default());
+    let parts = LoopParts {
+        config: setup.config,
+        model: Arc::new(SpringSlider::new(Finger::paper()).expect("the paper's finger")),
+        ports: Ports { force: Box::new(Idle), amplifier: Box::new(Idle), stage: Box::new(Idle) },
+        commands: Arc::new(crossbeam_queue::ArrayQueue::new(4)),
+        rows,
+        watch,
+        life: Arc::clone(&life),
+        origin_ns: pacing::monotonic_ns(),
+    };
+    let looping = std::thread::spawn(move || pacing::run(parts, Some(80)));
+    std::thread::sleep(std::time::Duration::from_secs_f64(seconds));
+    life.end.store(true, Ordering::Relaxed);
+    let report = looping.join().expect("the loop does not panic");
+    let [p50, _, p99, p999, max] = report.lateness_ns.map(|ns| ns as f64 / 1e3);
+    println!("{p50:.1} {p99:.1} {p999:.1} {max:.1}");
+}

@@ -1,0 +1,92 @@
+//! The loop's promises that do not depend on the machine: no allocation, whatever the cycle does.
+
+use models::prediction::SpringSlider;
+use realtime::cycle::{Command, CycleState};
+use realtime::ports::Nanos;
+use realtime::turn::{Ports, Row, Tick, turn};
+use rig::plan::{Plan, Resolution};
+use rig::sequence::Sequence;
+use rig::setup::Setup;
+use ringbuf::HeapRb;
+use ringbuf::traits::{Consumer, Producer, Split};
+use sim::virtual_rig::VirtualRig;
+use sim::world::WorldConfig;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+
+thread_local! {
+    static COUNTING: Cell<bool> = const { Cell::new(false) };
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
+
+/// The system's allocator, counting on threads that ask for it.
+struct Counting;
+
+// SAFETY: every call is handed on to the system's allocator unchanged; counting touches thread-local cells only.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        if COUNTING.get() {
+            COUNT.set(COUNT.get() + 1);
+        }
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        if COUNTING.get() {
+            COUNT.set(COUNT.get() + 1);
+        }
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn no_allocation_in_a_hundred_thousand_cycles_of_a_sweep() {
+    let setup = Setup::load("virtual").unwrap();
+    let plan = Plan::load("first-sweep").unwrap();
+    let model: Arc<dyn models::prediction::FrictionModel> =
+        Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
+    let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
+    let config = setup.config;
+    let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::bundled(), 3).unwrap().split();
+    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let (mut rows, mut drain) = HeapRb::<Row>::new(64).split();
+    let queue = crossbeam_queue::ArrayQueue::<Command>::new(64);
+    let mut state = CycleState::default();
+    let mut sequence = None;
+    let (mut armed, mut driven) = (0u64, 0u64);
+    for number in 1..=100_000u64 {
+        let fresh = || {
+            let points = plan.points(number, &config.limits, &resolution).unwrap();
+            Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
+        };
+        let sequence_now = sequence.get_or_insert_with(fresh);
+        let now = Nanos(number * config.limits.timing.cycle.0);
+        let tick = Tick { number, lateness: Nanos(0), now };
+        // Exactly what the loop's thread does in a cycle, with the virtual rig behind the ports.
+        COUNTING.set(true);
+        let row = turn(&config, &*model, &mut state, &mut ports, &mut || queue.pop(), tick);
+        let pushed = rows.try_push(row).is_ok();
+        COUNTING.set(false);
+        assert!(pushed);
+        armed += u64::from(row.armed);
+        driven += u64::from(row.drive_pp_m > 0.0);
+        // What runs beside the loop may allocate.
+        let row = drain.try_pop().unwrap();
+        let reaction = sequence_now.on_row(&row);
+        for command in reaction.commands {
+            queue.push(command).unwrap();
+        }
+        if reaction.outcome.is_some() {
+            sequence = None;
+        }
+    }
+    println!("100000 cycles, {armed} armed, {driven} driving, {} allocations", COUNT.get());
+    assert!(driven > 30_000, "the cycles must be those of a real sweep: {driven}");
+    assert_eq!(COUNT.get(), 0);
+}

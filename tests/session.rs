@@ -1,0 +1,391 @@
+//! Whole runs of the real program: sweeps, refusals, kills, signals, resumption, exports.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+use tests::{documents, file, muprime, python, texts};
+
+/// A plan of a few seconds.
+const SHORT: &str = r#"
+name = "short"
+seed = 7
+reference_every = 4
+[pass]
+settle_s = 0.08
+measure_s = 0.1
+[base]
+amplitude_pp_m = 2e-6
+frequency_hz = 27500
+speed_m_s = 0.02
+normal_force_n = 0.25
+[[series]]
+amplitude_pp_m = [0.5e-6, 1e-6, 2e-6, 3e-6]
+speed_m_s = [0.01, 0.04]
+"#;
+
+fn short_plan(folder: &Path) -> String {
+    let path = folder.join("short.toml");
+    std::fs::write(&path, SHORT).unwrap();
+    path.display().to_string()
+}
+
+/// Point numbers in a run's table.
+fn points(run: &Path) -> Vec<u64> {
+    let table = std::fs::File::open(run.join("points.csv")).unwrap();
+    models::record::read_passes(table).unwrap().iter().map(|p| p.point).collect()
+}
+
+fn assert_each_once(points: &[u64], planned: u64) {
+    let mut seen = BTreeMap::<u64, u32>::new();
+    for p in points {
+        *seen.entry(*p).or_default() += 1;
+    }
+    assert_eq!(seen.len() as u64, planned, "{points:?}");
+    assert!(seen.values().all(|n| *n == 1), "{points:?}");
+}
+
+#[test]
+fn a_sweep_over_real_modbus_tcp_ends_with_table_record_and_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let plan = short_plan(folder.path());
+    let output = muprime()
+        .args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"])
+        .arg(&out)
+        .output()
+        .unwrap();
+    let (_, stderr) = texts(&output);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    let said = documents(&output);
+    let summary = &said.last().unwrap()["summary"];
+    assert_eq!(summary["outcome"], "complete");
+    assert_eq!(summary["passes"], summary["planned"]);
+    assert_eq!(
+        said.iter().filter(|d| d.get("pass").is_some()).count() as u64,
+        summary["planned"].as_u64().unwrap()
+    );
+    assert_each_once(&points(&out), summary["planned"].as_u64().unwrap());
+    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(
+        report.matches("<svg").count() >= 4 && !report.contains("http-equiv") && !report.contains("<script")
+    );
+    let histogram = summary["loop_report"]["histogram"].as_array().unwrap();
+    let counted: u64 = histogram.iter().map(|b| b[1].as_u64().unwrap()).sum();
+    assert_eq!(Some(counted), summary["loop_report"]["cycles"].as_u64(), "the histogram holds every cycle");
+    // The record says the same, with setup, plan and the loop's report inside.
+    let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
+    assert_eq!(record.cut, None);
+    assert_eq!(record.rows().count() as u64 + summary["record_lost"].as_u64().unwrap(), counted);
+    assert!(
+        record.files.iter().any(|f| f.0 == "plan.toml") && record.files.iter().any(|f| f.0 == "rig.toml")
+    );
+    assert!(record.facts("muprime.end").unwrap()["loop"].contains("lateness_ns"));
+    let passes = record.passes().count();
+    assert_eq!(passes as u64, summary["planned"].as_u64().unwrap());
+}
+
+#[test]
+fn in_virtual_time_equal_seeds_give_equal_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = short_plan(folder.path());
+    let run = |name: &str, seed: &str| {
+        let out = folder.path().join(name);
+        let status =
+            muprime().args(["run", &plan, "--fast", "--seed", seed, "--out"]).arg(&out).output().unwrap();
+        assert_eq!(status.status.code(), Some(0), "{}", texts(&status).1);
+        (std::fs::read(out.join("run-1.mcap")).unwrap(), std::fs::read(out.join("points.csv")).unwrap())
+    };
+    let (first, again, other) = (run("a", "11"), run("b", "11"), run("c", "12"));
+    assert!(first == again, "the same seed gives the same record");
+    assert!(first.1 != other.1, "another seed gives another run");
+}
+
+#[test]
+fn a_killed_sweep_resumes_without_a_lost_or_doubled_pass() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let plan = short_plan(folder.path());
+    let mut acknowledged = Vec::new();
+    let mut finished = false;
+    // Killed after one, three, five acknowledged passes, then left alone.
+    for kill_after in [1, 3, 5, usize::MAX] {
+        let mut child = muprime()
+            .args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"])
+            .arg(&out)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let mut heard = 0;
+        for line in lines {
+            let document: serde_json::Value = serde_json::from_str(&line.unwrap()).unwrap();
+            if let Some(pass) = document.get("pass") {
+                acknowledged.push(pass["pass"]["point"].as_u64().unwrap());
+                heard += 1;
+                if heard == kill_after {
+                    child.kill().unwrap();
+                }
+            }
+            if let Some(summary) = document.get("summary") {
+                finished = summary["outcome"] == "complete";
+            }
+        }
+        child.wait().unwrap();
+        for point in &acknowledged {
+            assert!(points(&out).contains(point), "point {point} was acknowledged and lost");
+        }
+    }
+    assert!(finished);
+    assert_each_once(&points(&out), 22);
+    let records = rig::run_dir::records_in(&out).unwrap();
+    assert_eq!(records.len(), 4);
+    for record in records {
+        let read = realtime::recorder::read(&std::fs::read(&record).unwrap());
+        assert!(read.facts("muprime.run").is_some() && read.rows().count() > 0, "{}", record.display());
+    }
+}
+
+#[test]
+fn a_killed_record_is_recovered_and_an_ordinary_reader_opens_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let plan = short_plan(folder.path());
+    let mut child = muprime()
+        .args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"])
+        .arg(&out)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let third = lines.by_ref().filter(|l| l.as_ref().unwrap().contains("\"pass\"")).nth(2);
+    assert!(third.is_some());
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let record = out.join("run-1.mcap");
+    let before = realtime::recorder::read(&std::fs::read(&record).unwrap());
+    assert!(before.cut.is_some());
+    let recovered = muprime().args(["--json", "recover"]).arg(&record).output().unwrap();
+    assert_eq!(recovered.status.code(), Some(0), "{}", texts(&recovered).1);
+    assert_eq!(documents(&recovered)[0]["messages"], before.messages.len());
+    assert!(record.with_extension("mcap.original").exists());
+    let script = "import sys; from mcap.reader import make_reader\n\
+                  with open(sys.argv[1], 'rb') as f: print(sum(1 for _ in make_reader(f).iter_messages()))";
+    let counted = python().args(["-c", script]).arg(&record).output().unwrap();
+    assert_eq!(texts(&counted).0.trim(), before.messages.len().to_string(), "{}", texts(&counted).1);
+    let again = muprime().args(["--json", "recover"]).arg(&record).output().unwrap();
+    assert_eq!(documents(&again)[0]["whole"], true);
+}
+
+#[test]
+fn an_interrupt_stops_safely_and_keeps_what_was_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let plan = short_plan(folder.path());
+    let mut child = muprime()
+        .args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"])
+        .arg(&out)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    lines.by_ref().find(|l| l.as_ref().unwrap().contains("\"pass\"")).unwrap().unwrap();
+    // SAFETY: sends SIGINT to the child that this test has started and not yet waited for.
+    unsafe { libc::kill(child.id() as libc::pid_t, libc::SIGINT) };
+    let rest: Vec<serde_json::Value> = lines.map(|l| serde_json::from_str(&l.unwrap()).unwrap()).collect();
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert_eq!(rest.last().unwrap()["summary"]["outcome"], "stopped");
+    assert!(!points(&out).is_empty());
+    let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
+    assert_eq!(record.cut, None, "the record was ended properly");
+    let last = record.rows().last().unwrap();
+    assert!(!last.armed && last.drive_pp_m == 0.0 && last.load_n == 0.0 && last.velocity_m_s == 0.0);
+}
+
+#[test]
+fn two_controllers_never_share_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let plan = short_plan(folder.path());
+    let mut first = muprime()
+        .args(["run", &plan, "--setup", "virtual-ideal", "--out"])
+        .arg(&out)
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let waited = Instant::now();
+    while !out.join(".lock").exists() {
+        assert!(waited.elapsed() < Duration::from_secs(20));
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let second =
+        muprime().args(["run", &plan, "--setup", "virtual-ideal", "--out"]).arg(&out).output().unwrap();
+    assert_eq!(second.status.code(), Some(2));
+    assert!(texts(&second).1.contains("another muprime"), "{}", texts(&second).1);
+    first.kill().unwrap();
+    first.wait().unwrap();
+}
+
+#[test]
+fn bad_input_is_refused_with_its_place_and_nothing_is_touched() {
+    let folder = tempfile::tempdir().unwrap();
+    let cases = [
+        ("[base]", "[bass]", "unknown field"),
+        ("speed_m_s = 0.02", "speed_m_s = 0.02\nspeed = 1", "unknown field"),
+        ("[0.5e-6, 1e-6, 2e-6, 3e-6]", "[0.5e-6, 1e-3]", "outside what this rig allows"),
+        ("frequency_hz = 27500", "frequency_hz = nan", "outside what this rig allows"),
+        ("measure_s = 0.1", "measure_s = 10.0", "needs"),
+        ("seed = 7", "seed = -7", "invalid"),
+        ("reference_every = 4", "reference_every = 4\ndirections = [2]", "directions are 1, -1 or both"),
+    ];
+    for (from, to, expected) in cases {
+        let path = folder.path().join("bad.toml");
+        assert!(SHORT.contains(from));
+        std::fs::write(&path, SHORT.replace(from, to)).unwrap();
+        let out = folder.path().join("never");
+        let output = muprime().args(["run", "--fast", "--out"]).arg(&out).arg(&path).output().unwrap();
+        let (stdout, stderr) = texts(&output);
+        assert_eq!(output.status.code(), Some(2), "{to}: {stderr}");
+        assert!(stderr.contains(expected), "{to}: {stderr}");
+        assert!(stderr.contains("bad.toml:"), "the place is shown: {stderr}");
+        assert!(stdout.is_empty() && !out.exists(), "nothing was touched");
+    }
+    let output = muprime().args(["run", "no-such-plan"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(muprime().args(["fly"]).output().unwrap().status.code(), Some(2));
+}
+
+#[test]
+fn everything_bundled_passes_its_own_check() {
+    let mut files = Vec::new();
+    for folder in ["rig/plans", "rig/setups", "rig/profiles"] {
+        let entries = std::fs::read_dir(file(folder)).unwrap();
+        files.extend(
+            entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "toml")),
+        );
+    }
+    assert!(files.len() >= 8);
+    let output = muprime().args(["--json", "check"]).args(&files).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", texts(&output).0);
+    assert_eq!(documents(&output).len(), files.len());
+}
+
+#[test]
+fn exports_are_read_by_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let plan = short_plan(folder.path());
+    let status = muprime().args(["run", &plan, "--fast", "--out"]).arg(&out).output().unwrap();
+    assert_eq!(status.status.code(), Some(0));
+    for format in ["csv", "parquet", "arrow"] {
+        let status = muprime().args(["export", "--to", format]).arg(&out).output().unwrap();
+        assert_eq!(status.status.code(), Some(0), "{}", texts(&status).1);
+    }
+    let script = "import sys, csv, pyarrow.parquet as p, pyarrow.ipc as i\n\
+                  r = sys.argv[1]; rows = list(csv.DictReader(open(r + '/passes.csv')))\n\
+                  a = p.read_table(r + '/passes.parquet'); b = i.open_file(r + '/passes.arrow').read_all()\n\
+                  want = [float(x['lateral_force_n']) for x in rows]\n\
+                  assert a['lateral_force_n'].to_pylist() == want == b['lateral_force_n'].to_pylist()\n\
+                  assert a.column_names == b.column_names == list(rows[0].keys())\n\
+                  assert a['ambient_pressure_pa'].null_count == len(rows)\n\
+                  print(len(rows))";
+    let read = python().args(["-c", script]).arg(&out).output().unwrap();
+    assert_eq!(texts(&read).0.trim(), "22", "{}", texts(&read).1);
+}
+
+/// A program that ends with the test.
+struct Peer(std::process::Child);
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn first_line(mut command: std::process::Command) -> (Peer, String) {
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+    assert!(!line.is_empty(), "the peer ended without a word");
+    (Peer(child), line.trim().to_string())
+}
+
+/// An instrument that nobody here wrote (pymodbus) replays a measured rock-friction trace; `muprime run` reads it, with
+/// amplifier and stage of the virtual rig. What the record holds must be what was replayed, with its age.
+#[test]
+fn a_foreign_instrument_replaying_a_measured_trace_is_recorded_as_it_was() {
+    const ROWS_PER_SECOND: f64 = 100.0;
+    let folder = tempfile::tempdir().unwrap();
+    let recording = file("tests/recordings/rock-velocity-steps/velstep4_excerpt.txt");
+    let mut replay = python();
+    replay.arg(file("tests/peers/replay_server.py")).arg(&recording).arg(ROWS_PER_SECOND.to_string());
+    let (_replay, port) = first_line(replay);
+    let mut rest = muprime();
+    rest.args(["--json", "virtual-rig", "--setup", "virtual-ideal", "--modbus-tcp", "127.0.0.1:0"]);
+    let (_rest, said) = first_line(rest);
+    let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+    let others = said["modbus_tcp"].as_str().unwrap();
+    let setup = folder.path().join("setup.toml");
+    let text = format!(
+        "name = \"replayed\"\n[[force]]\nprofile = \"muprime-force2\"\naddress = \"127.0.0.1:{port}\"\nrate_hz = 200\n\
+         [amplifier]\nprofile = \"muprime-amplifier\"\naddress = \"{others}\"\n\
+         [stage]\nprofile = \"muprime-stage\"\naddress = \"{others}\"\n\
+         [finger]\ntip = \"artificial-silicone\"\n[noise]\npass_relative_sd = 0.015\nforce_sd_n = 0.0008\n"
+    );
+    std::fs::write(&setup, text).unwrap();
+    let plan = folder.path().join("plan.toml");
+    let text = SHORT.replace("seed = 7", "directions = [1]").replace("[0.5e-6, 1e-6, 2e-6, 3e-6]", "[0.0]");
+    std::fs::write(&plan, text.replace("reference_every = 4", "reference_every = 0")).unwrap();
+    let out = folder.path().join("run");
+    let output = muprime()
+        .args(["--json", "run"])
+        .arg(&plan)
+        .arg("--setup")
+        .arg(&setup)
+        .arg("--out")
+        .arg(&out)
+        .output();
+    let output = output.unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}{}", texts(&output).0, texts(&output).1);
+
+    let rows: Vec<Vec<f64>> = std::fs::read_to_string(&recording)
+        .unwrap()
+        .lines()
+        .skip(1)
+        .map(|line| line.split_whitespace().map(|x| x.parse().unwrap()).collect())
+        .collect();
+    let count = |newton: f64| (newton / 1e-5).round_ties_even() as i64;
+    let replayed = |row: usize| {
+        let normal = 0.25 * rows[row][3] / rows[0][3];
+        (count(rows[row][2] * normal), count(normal))
+    };
+    let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
+    let (mut distinct, mut oldest) = (std::collections::BTreeSet::new(), 0.0f64);
+    for row in record.rows() {
+        let (Ok(lateral), Ok(normal)) = (row.inputs.seen.forces.lateral, row.inputs.seen.forces.normal)
+        else {
+            continue;
+        };
+        let expected = replayed(lateral.sequence as usize);
+        assert_eq!((lateral.raw, normal.raw), expected, "row {}", lateral.sequence);
+        assert!((lateral.value - expected.0 as f64 * 1e-5).abs() < 1e-12);
+        assert!((normal.value - expected.1 as f64 * 1e-5).abs() < 1e-12);
+        distinct.insert(lateral.sequence);
+        oldest = oldest.max(lateral.age(row.now).seconds());
+    }
+    println!(
+        "{} samples of the trace recorded, none changed; greatest age {:.1} ms",
+        distinct.len(),
+        oldest * 1e3
+    );
+    assert!(distinct.len() > 50);
+    assert!(
+        oldest > 1.0 / ROWS_PER_SECOND * 0.5,
+        "a sample is held until the next one comes: its age must show"
+    );
+}
