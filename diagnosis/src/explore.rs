@@ -91,8 +91,8 @@ pub fn optima(problem: &Problem, members: &[Member], held: &[f64], variance: &[f
             let residual = &y - part.predict(members, &u);
             let score = &project * &residual;
             let step = factor.solve(&score);
-            let cost: f64 = residual.iter().zip(&part_variance).map(|(r, v)| r * r / v).sum::<f64>()
-                - score.dot(&step);
+            let cost: f64 =
+                residual.iter().zip(&part_variance).map(|(r, v)| r * r / v).sum::<f64>() - score.dot(&step);
             for (k, s) in step.iter().enumerate() {
                 u[k] += s.clamp(-2.0, 2.0);
             }

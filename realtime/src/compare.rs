@@ -12,7 +12,6 @@ mod sequential;
 use crate::estimate::Mu0;
 use models::condition::{Condition, OutOfDomain};
 use models::prediction::{FrictionModel, Validity};
-use models::quantity::PeakToPeak;
 pub use sequential::{ALARM_LEVEL, Sequential};
 use serde::{Deserialize, Serialize};
 
@@ -86,8 +85,7 @@ impl Comparator {
     /// Lateral force in the direction of sliding in N that the model expects with parameters `at`.
     fn force(model: &dyn FrictionModel, c: &Condition, at: &[f64; 3]) -> Result<f64, OutOfDomain> {
         let c = Condition { mu0: at[0].max(1e-6), ..*c };
-        let mu =
-            if c.amplitude == PeakToPeak::ZERO { 1.0 } else { model.mu_relative_with(&c, [at[1], at[2]])? };
+        let mu = model.mu_relative_with(&c, [at[1], at[2]])?;
         Ok(mu * c.mu0 * c.normal_force_n)
     }
 
@@ -121,7 +119,7 @@ impl Comparator {
             / (2.0 * load_step);
 
         let coulomb = self.estimate[0] * c.normal_force_n;
-        let form = if c.amplitude == PeakToPeak::ZERO { 0.0 } else { model.form_sd(&nominal) * coulomb };
+        let form = model.form_sd(&nominal) * coulomb;
         let noise = (self.noise.pass_relative_sd * expected).powi(2)
             + self.noise.force_sd_n.powi(2) * (1.0 + load_slope * load_slope)
             + form * form;

@@ -210,13 +210,17 @@ impl Corrected {
 
     /// Signed mean lateral force that the sensor will read at a pass, N. Allocates nothing.
     pub fn lateral_force(&self, pass: &Operating) -> f64 {
+        self.lateral_force_from(&self.baseline, pass)
+    }
+
+    fn lateral_force_from(&self, baseline: &Baseline, pass: &Operating) -> f64 {
         let zero: [f64; 0] = [];
         let idle = Active { effect: &crate::sensor_lag::SensorLag, law: 0, theta: &zero };
         let mut active = [idle; MOST_EFFECTS];
         for (slot, c) in active.iter_mut().zip(&self.effects) {
             *slot = Active { effect: c.effect, law: c.law, theta: &c.theta[..c.count] };
         }
-        lateral_force(&self.baseline, &active[..self.effects.len()], pass, &self.design)
+        lateral_force(baseline, &active[..self.effects.len()], pass, &self.design)
     }
 
     /// The pass that a condition of the loop stands for.
@@ -247,7 +251,9 @@ impl FrictionModel for Corrected {
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
         condition.check()?;
         let pass = self.operating(condition);
-        let along = pass.direction * self.lateral_force(&pass);
+        // The finger of today may rub more or less than that of the diagnosis: the loop's mu_0 counts.
+        let baseline = Baseline { mu0: condition.mu0, ..self.baseline };
+        let along = pass.direction * self.lateral_force_from(&baseline, &pass);
         let full = condition.mu0 * condition.normal_force_n;
         let contact = self.baseline.contact(&pass, &self.design);
         let regime = if contact.amplitude_pp < crate::contact::STILL_PLATE_M || contact.load_ratio() >= 1.0 {

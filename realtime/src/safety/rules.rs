@@ -189,12 +189,7 @@ fn amplitude_pp_m(c: &Context<'_>) -> Option<f64> {
 }
 
 fn runaway(c: &Context<'_>) -> Option<(f64, f64)> {
-    let age = c.limits.timing.amplifier.age_limit().seconds() / c.limits.timing.ring_time.seconds().max(1e-9);
-    // A state that is a little old may still show what rang when it was taken.
-    let allowed = 1.3 * c.watch.ringing_pp_m * age.min(3.0).exp() + 0.3e-6;
-    let settled = c.now.since(c.watch.commanded_since) > c.limits.timing.amplifier.age_limit();
-    let bound = if settled { (1.3 * c.watch.ringing_pp_m + 0.3e-6).max(0.3e-6) } else { allowed };
-    above(amplitude_pp_m(c), bound)
+    above(amplitude_pp_m(c), 1.3 * c.watch.ringing_pp_m + 0.3e-6)
 }
 
 fn stale(channel: &Channel, limit: Nanos, now: Nanos) -> Option<(f64, f64)> {

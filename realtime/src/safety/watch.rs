@@ -194,9 +194,13 @@ impl Watch {
             }
             self.amplitude = Some(reading);
         }
-        // The plate rings down with its own time constant; judge the measured amplitude against that.
-        let decay = (-(timing.cycle.seconds()) / timing.ring_time.seconds().max(1e-9)).exp();
-        self.ringing_pp_m = (self.ringing_pp_m * decay).max(self.commanded_pp_m);
+        // A lower set-point is on its way for as long as it may be sent and its effect may be read; then the plate
+        // rings down with its own time constant. The measured amplitude is judged against that.
+        let on_its_way = Nanos(timing.command_expiry.0 + timing.amplifier.age_limit().0);
+        if now.since(self.commanded_since) > on_its_way {
+            let decay = (-timing.cycle.seconds() / timing.ring_time.seconds().max(1e-9)).exp();
+            self.ringing_pp_m = (self.ringing_pp_m * decay).max(self.commanded_pp_m);
+        }
     }
 
     pub(super) fn commanded(&mut self, drive: &DriveCommand, now: Nanos) {

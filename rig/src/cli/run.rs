@@ -108,7 +108,10 @@ fn job(args: Args) -> miette::Result<Job> {
     };
     let model: Arc<dyn FrictionModel> = match &model_file {
         None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
-        Some((_, text)) => crate::model_file::load(text)?,
+        Some((_, text)) => {
+            let path = args.model.as_ref().map_or_else(String::new, |p| p.display().to_string());
+            crate::model_file::load(&path, text)?
+        }
     };
     let seed = args.seed.unwrap_or(plan.file.seed);
     let out = args.out.unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
