@@ -82,6 +82,22 @@ fn an_ideal_stroke_shows_coulomb_friction_and_its_reduction() {
 }
 
 #[test]
+fn marching_every_cycle_and_averaging_agree_in_the_mean() {
+    let mut config = WorldConfig::ideal();
+    config.finger.stiffness_relative_sd = 0.0;
+    config.finger.ridge_mass_kg = 5e-7;
+    config.finger.ridge_damping_ratio = 0.5;
+    for (pp, speed) in [(1e-6, 0.03), (3e-6, 0.08)] {
+        let (_, averaged, _) = stroke(&config, 3, pp, speed, 0.3);
+        let every = WorldConfig { contact: sim::world::ContactMode::Resolved, ..config.clone() };
+        let (_, marched, normal) = stroke(&every, 3, pp, speed, 0.3);
+        let error = (averaged - marched) / (0.5 * normal);
+        println!("{pp:e} m, {speed} m/s: averaged less marched {error:.4} of mu0 Fn");
+        assert!(error.abs() < 0.01, "{averaged} against {marched}");
+    }
+}
+
+#[test]
 fn repeatability_and_pass_noise_are_those_of_rig_toml() {
     let config = WorldConfig::ideal();
     let text = config.rig_toml();

@@ -17,6 +17,7 @@ pub mod design;
 mod files;
 pub mod oracle;
 
+use models::condition::Condition;
 use models::record::Pass;
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +25,7 @@ use crate::defects::{ALL, Defect, Defects, Kind};
 use crate::noise::Noise;
 use bench::Bench;
 pub use bench::SetNoise;
-use design::Design;
+use design::{Design, Planned};
 use oracle::Imitator;
 
 /// What kind of truth a set holds.
@@ -148,6 +149,10 @@ pub struct Set {
     pub truth_n: Vec<f64>,
     /// The same without the causes (N): for the scorer.
     pub without_n: Vec<f64>,
+    /// Lateral forces of the recalibrated baseline there (N): for the scorer.
+    pub recalibrated_n: Vec<f64>,
+    /// Standard deviation of a measured pass there (N): for the scorer.
+    pub sd_n: Vec<f64>,
     /// The label: for the scorer.
     pub label: Label,
 }
@@ -167,8 +172,46 @@ pub enum Ask {
 /// Passes hidden for scoring.
 const HIDDEN: usize = 100;
 
+/// The bench behind a set, for further passes: what a designed next experiment is tried on.
+pub struct SealedRig {
+    bench: Bench,
+    defects: Defects,
+    noise: Noise,
+    pace_s: f64,
+    runs: usize,
+    points: usize,
+}
+
+impl SealedRig {
+    /// Measures further passes in a new run, in the order given. Of a condition, `time_s` and `mu0` are not used: passes
+    /// follow each other at the set's pace.
+    pub fn measure(&mut self, conditions: &[Condition]) -> Vec<Pass> {
+        let planned: Vec<Planned> = conditions
+            .iter()
+            .enumerate()
+            .map(|(i, condition)| {
+                let condition = Condition { time_s: 5.0 + i as f64 * self.pace_s, ..*condition };
+                Planned { condition, replicate: 0, run: self.runs }
+            })
+            .collect();
+        let points = self.bench.circumstances(&planned, true, &mut self.noise);
+        let mut passes = self.bench.measure(&points, &planned, &self.defects, &mut self.noise);
+        for pass in &mut passes {
+            pass.point += self.points as u64;
+        }
+        self.points += passes.len();
+        self.runs += 1;
+        passes
+    }
+}
+
 /// The set of a seed.
 pub fn generate(seed: u64, stratum: Stratum, ask: Ask) -> Set {
+    generate_with_rig(seed, stratum, ask).0
+}
+
+/// The set of a seed, and its rig.
+pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedRig) {
     let mut noise = Noise::new(seed, "sealed");
     let design = Design::draw(&mut noise);
     let planned = design.plan(&mut noise);
@@ -218,14 +261,25 @@ pub fn generate(seed: u64, stratum: Stratum, ask: Ask) -> Set {
         causes: defects.defects.iter().map(cause).collect(),
         imitators,
     };
-    Set {
-        conditions: bench.conditions(&at_hidden, &hidden),
-        rig_toml: bench.rig_toml(),
+    let rig = SealedRig {
+        noise: Noise::new(seed, "further passes"),
+        pace_s: label.design.pace_s,
+        runs: planned.iter().map(|p| p.run + 1).max().unwrap_or(0),
+        points: passes.len(),
+        defects,
+        bench,
+    };
+    let set = Set {
+        conditions: rig.bench.conditions(&at_hidden, &hidden),
+        rig_toml: rig.bench.rig_toml(),
+        recalibrated_n: rig.bench.ideal(&at_hidden, &base.finger),
+        sd_n: at_hidden.sd_n,
         passes,
         truth_n: at_hidden.lateral_n,
         without_n: without.lateral_n,
         label,
-    }
+    };
+    (set, rig)
 }
 
 fn cause(defect: &Defect) -> Cause {

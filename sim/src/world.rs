@@ -19,7 +19,7 @@ use crate::amplifier::{Amplifier, AmplifierInput, AmplifierStatus};
 use crate::channel::{ChannelName, Gate};
 use crate::contact::averaged::Averager;
 use crate::contact::resolved::March;
-use crate::contact::{Contact, Steady};
+use crate::contact::{Contact, Motion, Steady};
 use crate::defects::{Forces, Surroundings};
 use crate::finger::{Finger, Pad};
 use crate::noise::Noise;
@@ -225,7 +225,14 @@ impl World {
         let contact = steady_contact(&self.finger, &self.config.defects, &point);
         let pp = 2.0 * contact.sine_amplitude_m;
         let steady = match self.config.contact {
-            ContactMode::Resolved if contact.sine_amplitude_m > 1e-10 => self.march_tick(&contact, dt),
+            // The march knows one ridge on a plain sine; other shapes are averaged in either mode.
+            ContactMode::Resolved
+                if contact.sine_amplitude_m > 1e-10
+                    && contact.motion == Motion::default()
+                    && contact.ridge.height_sd_m == 0.0 =>
+            {
+                self.march_tick(&contact, dt)
+            }
             _ => {
                 self.march = None;
                 self.averager.steady(&contact)

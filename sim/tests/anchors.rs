@@ -1,5 +1,6 @@
 //! The contact against outside truths: published limits, and figures of an independent computation.
 
+use sim::contact::resolved::March;
 use sim::contact::{Contact, Recovery};
 
 /// w/h, then mu' at Psi (Eq. 17) = 0.1, 0.25, 0.5, 1, 2, 3, 4.5, 2 pi: a massless time-domain computation that
@@ -104,4 +105,22 @@ fn the_lighter_the_ridge_the_nearer_the_massless_one() {
         let got = at_mass(mass, zeta, 30.0);
         assert!((got - expected).abs() < 0.02, "{mass} {zeta}: {got} against {expected}");
     }
+}
+
+#[test]
+fn figure_13_friction_first_drops_and_then_climbs() {
+    // Recovery at 1.5 mm/s, Eq. 14 read literally: stretch is left over from contact to contact, and friction climbs over
+    // tens of cycles to slightly less than that of slip during the whole contact (0.957 by an independent computation).
+    let mut contact = Contact::ideal(3.9e6, 1.5e6, 0.5, 0.5, 5e-6, 27_500.0, 0.02);
+    contact.recovery = Recovery::Rate(1.5e-3);
+    contact.ridge.damping_n_s_per_m = 0.02;
+    let mut march = March::new(&contact, 1000);
+    let forces: Vec<f64> = (0..150).map(|_| march.cycle(&contact).lateral_n / 0.25).collect();
+    println!("{:?}", forces.iter().step_by(10).map(|f| (f * 1000.0).round() / 1000.0).collect::<Vec<_>>());
+    let lowest = forces[..5].iter().copied().fold(f64::MAX, f64::min);
+    let end = forces[140..].iter().sum::<f64>() / 10.0;
+    assert!(lowest < 0.3, "{lowest}");
+    assert!((end - 0.957).abs() < 0.02, "{end}");
+    let climbed = forces.iter().position(|f| *f > 0.9 * end).unwrap();
+    assert!((8..60).contains(&climbed), "{climbed} cycles");
 }

@@ -1,6 +1,6 @@
 //! Sealed sets: the same for the same seed, honest in their noise, spread through the limit of detection.
 
-use sim::sealed::{Ask, Label, Stratum, generate};
+use sim::sealed::{Ask, Label, Stratum, generate, generate_with_rig};
 
 #[test]
 fn a_set_is_its_seeds_and_reads_back_from_its_files() {
@@ -93,4 +93,24 @@ fn the_oracle_finds_the_imitators_that_are_known() {
         }
     }
     assert!(seen >= 2, "{seen}");
+}
+
+#[test]
+fn further_passes_come_from_the_same_rig() {
+    let (set, mut rig) = generate_with_rig(4, Stratum::Single, Ask::Gain);
+    // The hidden conditions, measured: apart from their noise they are the sealed truth.
+    let mu0 = set.label.true_mu0;
+    let conditions: Vec<_> = set.conditions.iter().map(|pass| pass.condition(mu0)).collect();
+    let further = rig.measure(&conditions);
+    assert_eq!(further[0].point, set.passes.len() as u64 + 1);
+    assert!(set.passes.iter().all(|pass| pass.run != further[0].run));
+    let cause = &set.label.causes[0].name;
+    println!("{cause}");
+    let still: Vec<f64> = (0..further.len())
+        .filter(|i| further[*i].amplitude.metres() == 0.0)
+        .map(|i| further[i].lateral_force_n.unwrap() / set.truth_n[i] - 1.0)
+        .collect();
+    assert!(!still.is_empty());
+    let rms = f64::sqrt(still.iter().map(|e| e * e).sum::<f64>() / still.len() as f64);
+    assert!(rms < 0.15, "{rms}");
 }

@@ -2,7 +2,7 @@
 //!
 //! The trapped film's mean overpressure is that of a strongly squeezed isothermal film (Langlois 1962; Salbu 1964):
 //! `p_a (sqrt((1 + 3/2 e^2) / (1 - e^2)) - 1)` with `e` the sine's amplitude over the mean gap. The gap is not
-//! given: the asperities that hold it open yield by a power law of their approach, so a lighter load on them
+//! given: asperities hold it open, with a force that falls as a power of the gap, so a lighter load on them
 //! opens it. Rarefaction lets the air out where its free path nears the gap. Only the rest of the load is rubbed.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
@@ -15,8 +15,8 @@ pub(super) static KIND: Kind = Kind {
     in_tables: true,
     summary: "air trapped between ridges and plate carries part of the load",
     parameters: &[
-        Parameter::log("film_area_m2", 2e-7, 4e-5),
-        Parameter::log("open_gap_m", 3e-6, 6e-6),
+        Parameter::log("film_area_m2", 3e-8, 1.5e-5),
+        Parameter::log("half_gap_m", 2e-6, 3.5e-6),
         Parameter::log("asperity_load_n", 0.5, 3.0),
     ],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },
@@ -27,28 +27,28 @@ const FREE_PATH_M: f64 = 68e-9;
 const ATMOSPHERE_PA: f64 = 101_325.0;
 
 fn overpressure_pa(pressure_pa: f64, amplitude_m: f64, gap_m: f64) -> f64 {
-    let e2 = (amplitude_m / gap_m).powi(2).min(0.95);
+    let e2 = (amplitude_m / gap_m).powi(2).min(0.9);
     let free_path = FREE_PATH_M * ATMOSPHERE_PA / pressure_pa.max(1.0);
     let tight = 1.0 / (1.0 + 6.0 * free_path / gap_m);
     pressure_pa * (((1.0 + 1.5 * e2) / (1.0 - e2)).sqrt() - 1.0) * tight
 }
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {
-    let [area, open, asperity, _] = *v;
+    let [area, half, asperity, _] = *v;
     let a = contact.sine_amplitude_m;
     let load = contact.normal_force_n;
     if a <= 0.0 || load <= 0.0 {
         return;
     }
-    // Find the gap at which asperities and film share the load: asperities carry W (1 - u/u0)^2, none beyond u0.
+    // Find the gap at which asperities and film share the load.
     let carried = |gap: f64| {
-        let solid = asperity * (1.0 - gap / open).max(0.0).powi(2);
+        let solid = asperity / (1.0 + (gap / half).powi(4));
         solid + area * overpressure_pa(at.ambient_pressure_pa, a, gap)
     };
     let excess = |gap: f64| carried(gap) - load;
-    let gap = falling_root(0.02 * open, 3.0 * open, excess);
+    let gap = falling_root(0.1 * half, 20.0 * half, excess);
     let film = area * overpressure_pa(at.ambient_pressure_pa, a, gap);
-    contact.normal_force_n = (load - film).max(0.01 * load);
+    contact.normal_force_n = (load - film).max(1e-3 * load);
 }
 
 /// Root of a falling function by the Illinois method; an end of the bracket where there is none.

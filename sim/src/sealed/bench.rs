@@ -45,7 +45,8 @@ pub(super) struct NoiseFree {
     pub(super) known: Vec<Point>,
     /// Lateral forces, sensor's frame (N).
     pub(super) lateral_n: Vec<f64>,
-    sd_n: Vec<f64>,
+    /// Standard deviation of each as measured (N).
+    pub(super) sd_n: Vec<f64>,
 }
 
 /// Rms of the recalibrated gap in standard deviations that sizes are drawn for, evenly in the logarithm.
@@ -220,13 +221,17 @@ impl Bench {
         rows.map(|(i, (point, plan))| self.row(i, plan, point, point.at.normal_force_n)).collect()
     }
 
+    /// Lateral forces of the ideal baseline of a fingertip (N).
+    pub(super) fn ideal(&self, data: &NoiseFree, finger: &Finger) -> Vec<f64> {
+        let none = Defects::none();
+        data.known.iter().map(|point| steady_forces(finger, &none, point).lateral_n).collect()
+    }
+
     /// Rms error over mu0 F of the ideal baseline of a fingertip.
     pub(super) fn error(&self, data: &NoiseFree, finger: &Finger) -> f64 {
-        let none = Defects::none();
-        let errors = data.known.iter().zip(&data.lateral_n).map(|(point, lateral)| {
-            (lateral - steady_forces(finger, &none, point).lateral_n) / (finger.mu0 * point.at.normal_force_n)
-        });
-        rms(errors)
+        let model = self.ideal(data, finger);
+        let pairs = data.known.iter().zip(data.lateral_n.iter().zip(&model));
+        rms(pairs.map(|(point, (lateral, m))| (lateral - m) / (finger.mu0 * point.at.normal_force_n)))
     }
 
     /// Rms over mu0 F of what repeatability leaves.

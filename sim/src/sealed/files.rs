@@ -23,9 +23,12 @@ impl Set {
         fs::write(open.join("rig.toml"), &self.rig_toml)?;
         let label = toml::to_string(&self.label).map_err(io::Error::other)?;
         fs::write(sealed.join("label.toml"), label)?;
-        let mut truth = String::from("point,lateral_force_n,lateral_force_without_n\n");
-        for (i, (with, without)) in self.truth_n.iter().zip(&self.without_n).enumerate() {
-            truth.push_str(&format!("{},{with:?},{without:?}\n", i + 1));
+        let mut truth = String::from(
+            "point,lateral_force_n,lateral_force_without_n,lateral_force_recalibrated_n,lateral_force_sd_n\n",
+        );
+        for (i, with) in self.truth_n.iter().enumerate() {
+            let (without, recalibrated, sd) = (self.without_n[i], self.recalibrated_n[i], self.sd_n[i]);
+            truth.push_str(&format!("{},{with:?},{without:?},{recalibrated:?},{sd:?}\n", i + 1));
         }
         fs::write(sealed.join("truth.csv"), truth)
     }
