@@ -135,10 +135,10 @@ impl Coverage {
         self.hits += u64::from((interval[0]..=interval[1]).contains(&truth));
     }
 
-    /// With the half-length that the Cramer-Rao bound (and the stated type B) would allow.
-    pub fn add_with_bound(&mut self, interval: [f64; 2], truth: f64, bound_sd: f64) {
+    /// With the half-length of the statistical part beside what the Cramer-Rao bound allows.
+    pub fn add_with_bound(&mut self, interval: [f64; 2], truth: f64, statistical_half: f64, bound_sd: f64) {
         self.add(interval, truth);
-        self.ratio += 0.5 * (interval[1] - interval[0]) / (1.959_964 * bound_sd);
+        self.ratio += statistical_half / (1.959_964 * bound_sd);
     }
 
     /// Two-sided binomial test at 0.001 against 95 %, and the 92-98 % that the issue asks for.
@@ -146,7 +146,7 @@ impl Coverage {
         let share = self.hits as f64 / self.trials as f64;
         let p = calibration::uncertainty::student::binomial_p_value(self.hits, self.trials, 0.95);
         let length = if self.ratio > 0.0 {
-            format!(", mean length {:.3} of the Cramer-Rao bound's", self.ratio / self.trials as f64)
+            format!(", statistical part {:.2} of the Cramer-Rao bound's", self.ratio / self.trials as f64)
         } else {
             String::new()
         };

@@ -81,8 +81,9 @@ fn gains_and_cross_talk_are_covered_as_stated() {
             for axis in AXES {
                 let k = found.index(channel, Term::Gain(axis)).unwrap();
                 let (i, j) = (channel as usize, axis as usize);
-                let sd = (bound[(j + 1, j + 1)] + found.type_b[(k, k)]).sqrt();
-                gains[2 * i + j].add_with_bound(outcome.parameters[k].ci95, truth[i][j], sd);
+                let half = coverage_factor(0.95, found.degrees_of_freedom) * found.type_a[(k, k)].sqrt();
+                let sd = bound[(j + 1, j + 1)].sqrt();
+                gains[2 * i + j].add_with_bound(outcome.parameters[k].ci95, truth[i][j], half, sd);
             }
         }
         // Through the file and the gate into the loop: a force that was not in the series.
