@@ -111,10 +111,8 @@ mod tests {
             .map(|i| {
                 let x = f64::from(i) * 1e-3 - 0.02;
                 let w = 2e-6 * (2.0 * PI * (x - 0.003) / 0.028).cos().abs();
-                AmplitudePoint {
-                    at: x,
-                    amplitude_pp_m: (w + [1e-8, -1e-8, -1e-8, 1e-8, 0.0][i as usize % 5]).max(0.0),
-                }
+                let noise = 0.005 * w.hypot(4e-7) * [1.0, -1.0, -1.0, 1.0, 0.0][i as usize % 5];
+                AmplitudePoint { at: x, amplitude_pp_m: (w + noise).max(0.0) }
             })
             .collect();
         let found = mode_shape(&points).unwrap();
