@@ -4,9 +4,11 @@
 //! `Phi = 360 |t_pa - t_sa| / T`, with the instants of maximum acceleration; ten repeats give its
 //! uncertainty. Each vibrometer's range and delay are applied first.
 
+pub mod outcome;
 pub mod table;
 pub mod waveform;
 
+pub use outcome::{Acquisition, outcome};
 pub use table::{PhasePoint, TableError, read_phases, write_phases};
 pub use waveform::{PhaseError, Shift, Waveforms, shift};
 

@@ -21,7 +21,9 @@ enum Verb {
     Run(cli::run::Args),
     /// Serve the simulated rig behind real protocols until interrupted
     VirtualRig(cli::virtual_rig::Args),
-    /// Read setups, plans, profiles; say what is wrong, with the place in the file
+    /// Data in, a dated and hashed certificate with uncertainties out
+    Calibrate(cli::calibrate::Args),
+    /// Read setups, plans, profiles, certificates; say what is wrong, with the place in the file
     Check(cli::check::Args),
     /// Judge this machine, and the instruments of a setup
     Doctor(cli::doctor::Args),
@@ -55,6 +57,7 @@ fn main() -> ExitCode {
     let outcome = std::panic::catch_unwind(|| match cli.verb {
         Verb::Run(args) => cli::run::run(args, json),
         Verb::VirtualRig(args) => cli::virtual_rig::run(args, json),
+        Verb::Calibrate(args) => cli::calibrate::run(args, json),
         Verb::Check(args) => cli::check::run(args, json),
         Verb::Doctor(args) => cli::doctor::run(args, json),
         Verb::Report(args) => cli::report::run(args, json),

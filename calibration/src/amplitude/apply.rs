@@ -73,7 +73,8 @@ impl AmplitudeFit {
             let dof = m.fit.degrees_of_freedom;
             single("mode.antinode_at_m", "m", m.antinode_at_m, dof);
             single("mode.wavelength_m", "m", m.wavelength_m, dof);
-            blocks.push(m.fit.covariance.view((1, 1), (2, 2)).into_owned());
+            single("mode.standing_share", "1", m.standing_share, dof);
+            blocks.push(m.fit.covariance.view((1, 1), (3, 3)).into_owned());
             range.insert("position_m".into(), m.range_m);
         } else {
             remarks.push("no map: the amplitude was measured at one place of the stroke only".into());
@@ -91,8 +92,8 @@ impl AmplitudeFit {
         Outcome {
             kind: Kind::Amplitude,
             model:
-                "w(s, x, F) = (gain s [+ offset] [+ bend s^2]) |cos(k (x - x0))| / |cos(k (x_table - x0))| \
-                    / (1 + droop F^p), w peak-to-peak"
+                "w(s, x, F) = (gain s [+ offset] [+ bend s^2]) shape(x) / shape(x_table) / (1 + droop F^p), \
+                    shape(x) = 1 - d + d |cos(2 pi (x - x0) / lambda)|, w peak-to-peak"
                     .into(),
             settings,
             remarks,
@@ -146,6 +147,7 @@ pub struct AmplitudeCalibration {
     gain_relative_sd: f64,
     wave_number: f64,
     antinode_at_m: f64,
+    standing_share: f64,
     table_relative: f64,
     droop: f64,
     droop_exponent: f64,
@@ -168,7 +170,9 @@ impl AmplitudeCalibration {
         let wave_number = value("mode.wavelength_m").map_or(0.0, |l| 2.0 * PI / l);
         let antinode_at_m = value("mode.antinode_at_m").unwrap_or(0.0);
         let table_at = setting("table_at_m").unwrap_or(0.0);
-        let table_relative = (wave_number * (table_at - antinode_at_m)).cos().abs();
+        let standing_share = value("mode.standing_share").unwrap_or(0.0);
+        let table_relative =
+            1.0 - standing_share * (1.0 - (wave_number * (table_at - antinode_at_m)).cos().abs());
         if table_relative < 0.05 {
             return Err(malformed("its table was taken at a node of the plate"));
         }
@@ -179,6 +183,7 @@ impl AmplitudeCalibration {
             gain_relative_sd: gain.standard_uncertainty / gain.value,
             wave_number,
             antinode_at_m,
+            standing_share,
             table_relative,
             droop: value("droop").unwrap_or(0.0),
             droop_exponent: setting("droop_exponent").unwrap_or(1.0),
@@ -212,7 +217,8 @@ impl AmplitudeCalibration {
     }
 
     fn relative(&self, position_m: f64, normal_force_n: f64) -> f64 {
-        let shape = (self.wave_number * (position_m - self.antinode_at_m)).cos().abs() / self.table_relative;
+        let wave = (self.wave_number * (position_m - self.antinode_at_m)).cos().abs();
+        let shape = (1.0 - self.standing_share * (1.0 - wave)) / self.table_relative;
         shape / (1.0 + self.droop * normal_force_n.max(0.0).powf(self.droop_exponent))
     }
 }

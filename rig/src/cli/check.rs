@@ -56,12 +56,15 @@ fn check(path: &Path) -> miette::Result<&'static str> {
     } else if has("series") || has("base") {
         Plan::parse(&name, &text)?;
         Ok("plan")
+    } else if has("content_sha256") || has("covariance") {
+        crate::cli::calibrate::check(&name, &text)?;
+        Ok("certificate")
     } else if has("defect") || has("channel") {
         sim::defects::Defects::parse(&text).map_err(|e| miette::miette!("{e}"))?;
         Ok("defects file")
     } else {
         miette::bail!(
-            help = "a profile has [profile], a setup [amplifier], a plan [base] and [[series]], defects [[defect]]",
+            help = "a profile has [profile], a setup [amplifier], a plan [base] and [[series]], defects [[defect]], a certificate content_sha256",
             "{name} is none of the files that muprime knows"
         )
     }

@@ -33,18 +33,28 @@ pub(super) fn refuse_unfit(readings: &[LoadReading], options: &Options) -> Resul
     plateau(readings)
 }
 
-/// A converter that stands still while the load still grows is saturated even if nobody said so.
+/// A converter that stands still while the load still grows, or that repeats its extreme value to the last
+/// digit where every other mean has a fraction, is saturated even if nobody said so.
 fn plateau(readings: &[LoadReading]) -> Result<(), ForceError> {
     for axis in AXES {
+        let a = axis as usize;
+        let fractions = readings.iter().any(|r| r.counts[a].fract() != 0.0);
         for sign in [1.0, -1.0] {
-            let side = |r: &&(usize, &LoadReading)| r.1.axis == Some(axis) && r.1.load_n * sign > 0.0;
-            let rows: Vec<(usize, &LoadReading)> = readings.iter().enumerate().collect();
-            let mut rows: Vec<&(usize, &LoadReading)> = rows.iter().filter(side).collect();
-            rows.sort_by(|a, b| (a.1.load_n * sign).total_cmp(&(b.1.load_n * sign)));
-            let [.., (_, below), (row, top)] = rows.as_slice() else { continue };
-            let grown = (top.load_n - below.load_n).abs() > 0.02 * top.load_n.abs();
-            if grown && top.counts[axis as usize] == below.counts[axis as usize] {
-                return Err(ForceError::Saturated { row: row + 1, axis, load_n: top.load_n });
+            let mut rows: Vec<(usize, &LoadReading)> = readings
+                .iter()
+                .enumerate()
+                .filter(|r| r.1.axis == Some(axis) && r.1.load_n * sign > 0.0)
+                .collect();
+            rows.sort_by(|p, q| (q.1.load_n * sign).total_cmp(&(p.1.load_n * sign)));
+            let Some(&(row, top)) = rows.first() else { continue };
+            let saturated = Err(ForceError::Saturated { row: row + 1, axis, load_n: top.load_n });
+            let lower = rows.iter().find(|r| (r.1.load_n - top.load_n).abs() > 0.02 * top.load_n.abs());
+            if lower.is_some_and(|r| r.1.counts[a] == top.counts[a]) {
+                return saturated;
+            }
+            let twins = rows.iter().filter(|r| r.1.counts[a] == top.counts[a]).count();
+            if fractions && twins > 1 && top.counts[a].fract() == 0.0 {
+                return saturated;
             }
         }
     }
@@ -71,17 +81,6 @@ pub(super) fn judge(
     let [start, end] = range(readings.iter().map(|r| r.time_s));
     let mut worst = None;
     for axis in AXES {
-        let span = range(readings.iter().map(|r| r.counts[axis as usize]));
-        let span = span[1] - span[0];
-        let drift = fit.value(axis, Term::Drift) * (end - start);
-        if drift.abs() > options.zero_drift_limit * span {
-            return Err(ForceError::DriftingZero {
-                axis,
-                counts: drift,
-                percent: 100.0 * drift.abs() / span,
-                limit: 100.0 * options.zero_drift_limit,
-            });
-        }
         let p = lack_of_fit(fit, readings, axis);
         if let Some(p) = p.filter(|p| *p < 1e-3) {
             let remedy = match options.linearity {
@@ -94,6 +93,17 @@ pub(super) fn judge(
             (Some(a), Some(b)) => Some(f64::min(a, b)),
             (a, b) => a.or(b),
         };
+        let span = range(readings.iter().map(|r| r.counts[axis as usize]));
+        let span = span[1] - span[0];
+        let drift = fit.value(axis, Term::Drift) * (end - start);
+        if drift.abs() > options.zero_drift_limit * span {
+            return Err(ForceError::DriftingZero {
+                axis,
+                counts: drift,
+                percent: 100.0 * drift.abs() / span,
+                limit: 100.0 * options.zero_drift_limit,
+            });
+        }
         let correlation = neighbours(fit, readings, axis);
         // For independent errors the lag-1 correlation has a standard deviation near 1 / sqrt(n).
         if correlation * (readings.len() as f64).sqrt() > 3.3 {

@@ -1,0 +1,79 @@
+//! The certificate of a phase calibration.
+
+use super::RepeatedShift;
+use crate::certificate::{BudgetLine, Evaluation, Kind, Outcome, Residuals, parameters};
+use models::quantity::PeakToPeak;
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+/// Circumstances that all repeats share.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Acquisition {
+    /// Frequency of the drive in Hz.
+    pub frequency_hz: f64,
+    /// Standard uncertainty of the difference of the decoders' delays in s.
+    pub delay_sd_s: f64,
+    /// Moist, dry or free text.
+    pub condition: Option<String>,
+    /// Normal force in N.
+    pub normal_force_n: Option<f64>,
+}
+
+/// Everything that a phase certificate states: one parameter an amplitude.
+pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outcome {
+    let names: Vec<(String, &str)> =
+        found.iter().map(|(w, _)| (format!("phase_at_{:.3}_um_pp", w.micrometres()), "deg")).collect();
+    let values: Vec<f64> = found.iter().map(|(_, f)| f.phase_deg.value).collect();
+    let dof: Vec<f64> = found.iter().map(|(_, f)| f.phase_deg.degrees_of_freedom).collect();
+    // The delays' doubt turns all phases alike.
+    let common = (360.0 * at.frequency_hz * at.delay_sd_s).powi(2);
+    let covariance = DMatrix::from_fn(found.len(), found.len(), |i, j| {
+        if i == j { found[i].1.phase_deg.standard_uncertainty.powi(2) } else { common }
+    });
+    let range =
+        found.iter().fold([f64::INFINITY, 0f64], |[a, b], (w, _)| [a.min(w.metres()), b.max(w.metres())]);
+    let largest = found.iter().map(|(_, f)| f.repeat_sd_deg).fold(0.0, f64::max);
+    let mut remarks: Vec<String> = found
+        .iter()
+        .filter(|(_, f)| f.period_doubled > 0)
+        .map(|(w, f)| {
+            format!(
+                "the period doubled at {:.3} um pp in {} of {} repeats",
+                w.micrometres(),
+                f.period_doubled,
+                f.repeats
+            )
+        })
+        .collect();
+    remarks.extend(
+        found.iter().filter(|(_, f)| f.repeats < 10).map(|(w, f)| {
+            format!("{} repeats at {:.3} um pp; the paper takes 10", f.repeats, w.micrometres())
+        }),
+    );
+    let mut settings = BTreeMap::from([("frequency_hz".to_string(), at.frequency_hz.to_string())]);
+    settings.extend(at.condition.iter().map(|c| ("condition".to_string(), c.clone())));
+    settings.extend(at.normal_force_n.iter().map(|f| ("normal_force_n".to_string(), f.to_string())));
+    Outcome {
+        kind: Kind::Phase,
+        model: "Phi = 360 |t_pa - t_sa| / T (Eq. 1), mean on the circle over repeats".into(),
+        settings,
+        remarks,
+        parameters: parameters(&names, &values, &covariance, &dof),
+        covariance,
+        residuals: Residuals {
+            count: found.iter().map(|(_, f)| f.repeats as u64).sum(),
+            sd: (found.iter().map(|(_, f)| f.repeat_sd_deg.powi(2)).sum::<f64>() / found.len() as f64).sqrt(),
+            largest,
+            unit: "deg (sd of a repeat)".into(),
+            lack_of_fit_p: None,
+        },
+        temperature_c: None,
+        range: BTreeMap::from([("amplitude_pp_m".into(), range)]),
+        budget: vec![BudgetLine {
+            source: "delays of the decoders, common to all".into(),
+            evaluation: Evaluation::B,
+            standard_uncertainty: common.sqrt(),
+            unit: "deg".into(),
+        }],
+    }
+}

@@ -1,0 +1,88 @@
+//! `muprime calibrate finger`.
+
+use super::Common;
+use super::tables::{Sources, columns};
+use calibration::finger::friction;
+use calibration::finger::stiffness::{Stiffness, UltrasonicPoint, quasi_static, ultrasonic};
+use calibration::finger::{FingerError, FingerFit};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Slow normal loop as CSV: displacement_m, force_n, up (1 or 0)
+    #[arg(long)]
+    normal_loop: Option<PathBuf>,
+    /// Slow lateral loop as CSV: displacement_m, force_n, up (1 or 0)
+    #[arg(long)]
+    lateral_loop: Option<PathBuf>,
+    /// Displacement about which the loops' stiffness is stated, in m
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    about_m: f64,
+    /// Ultrasonic normal data as CSV: amplitude_m (zero-to-peak), in_phase_n, quadrature_n
+    #[arg(long)]
+    normal_ultrasonic: Option<PathBuf>,
+    /// Ultrasonic lateral data as CSV: amplitude_m (zero-to-peak), in_phase_n, quadrature_n
+    #[arg(long)]
+    lateral_ultrasonic: Option<PathBuf>,
+    /// Normal force during the ultrasonic measurement: contact must not be lost
+    #[arg(long)]
+    normal_force_n: Option<f64>,
+    /// Passes without vibration as CSV: normal_force_n, speed_m_s, lateral_force_n, optional contact_time_s
+    #[arg(long)]
+    friction: Option<PathBuf>,
+    /// Relative standard uncertainty of force over displacement (from their certificates)
+    #[arg(long, default_value_t = 0.02)]
+    scale_relative_sd: f64,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Calibrates.
+pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+    let mut sources = Sources::default();
+    let mut found = FingerFit::default();
+    let said = |path: &PathBuf, e: FingerError| miette::miette!("{}: no certificate: {e}", path.display());
+    for (name, path) in
+        [("normal_quasi_static", &args.normal_loop), ("lateral_quasi_static", &args.lateral_loop)]
+    {
+        let Some(path) = path else { continue };
+        let rows = columns(&mut sources, path, ["displacement_m", "force_n", "up"], &["up"])?;
+        let points: Vec<(f64, f64, bool)> = rows.iter().map(|r| (r[0], r[1], r[2] != 0.0)).collect();
+        let stiffness =
+            quasi_static(&points, args.about_m, args.scale_relative_sd).map_err(|e| said(path, e))?;
+        found.stiffness.push((name.into(), stiffness));
+    }
+    for (name, path) in
+        [("normal_ultrasonic", &args.normal_ultrasonic), ("lateral_ultrasonic", &args.lateral_ultrasonic)]
+    {
+        let Some(path) = path else { continue };
+        let rows = columns(&mut sources, path, ["amplitude_m", "in_phase_n", "quadrature_n"], &[])?;
+        let points: Vec<UltrasonicPoint> = rows
+            .iter()
+            .map(|r| UltrasonicPoint { amplitude_m: r[0], in_phase_n: r[1], quadrature_n: r[2] })
+            .collect();
+        let load = if name == "normal_ultrasonic" {
+            args.normal_force_n.ok_or_else(|| {
+                miette::miette!(
+                    "--normal-ultrasonic needs --normal-force-n: whether contact was kept depends on it"
+                )
+            })?
+        } else {
+            f64::INFINITY
+        };
+        let stiffness: Stiffness =
+            ultrasonic(&points, load, args.scale_relative_sd).map_err(|e| said(path, e))?;
+        found.stiffness.push((name.into(), stiffness));
+    }
+    if let Some(path) = &args.friction {
+        let bytes = sources.read(path)?;
+        let points = friction::read(bytes.as_slice()).map_err(|e| said(path, e))?;
+        found.friction = Some(friction::friction(&points).map_err(|e| said(path, e))?);
+    }
+    if found.stiffness.is_empty() && found.friction.is_none() {
+        miette::bail!("nothing to calibrate: give a loop, ultrasonic data, or friction passes");
+    }
+    args.common.issue(found.outcome(), sources.raw_data(), json)
+}

@@ -1,0 +1,88 @@
+//! `muprime calibrate latency`.
+
+use super::Common;
+use super::tables::{Sources, columns};
+use calibration::force::dynamics::step_response;
+use calibration::latency::{channel_delay, clock, outcome};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments. Each file is given as CHANNEL=FILE and may be repeated.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Delays of single edges as CSV: delay_s
+    #[arg(long, value_name = "CHANNEL=FILE")]
+    edges: Vec<String>,
+    /// Step responses as CSV: edge (number), time_s (from the stage's event), value
+    #[arg(long, value_name = "CHANNEL=FILE")]
+    steps: Vec<String>,
+    /// Time stamps as CSV: host_s, device_s
+    #[arg(long, value_name = "CHANNEL=FILE")]
+    clock: Vec<String>,
+    /// Resolution of the events' times (stage time stamps) in s
+    #[arg(long, default_value_t = 0.0)]
+    resolution_s: f64,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Calibrates.
+pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+    if args.edges.is_empty() && args.steps.is_empty() && args.clock.is_empty() {
+        miette::bail!("give --edges, --steps or --clock at least once, as CHANNEL=FILE");
+    }
+    let mut sources = Sources::default();
+    let mut channels = Vec::new();
+    let mut remarks = Vec::new();
+    for given in &args.edges {
+        let (channel, path) = split(given)?;
+        let delays: Vec<f64> = columns(&mut sources, &path, ["delay_s"], &[])?.iter().map(|r| r[0]).collect();
+        channels.push(
+            channel_delay(channel, &delays, args.resolution_s)
+                .map_err(|e| miette::miette!("{given}: {e}"))?,
+        );
+    }
+    for given in &args.steps {
+        let (channel, path) = split(given)?;
+        let rows = columns(&mut sources, &path, ["edge", "time_s", "value"], &[])?;
+        let (mut delays, mut bandwidths) = (Vec::new(), Vec::new());
+        for edge in rows.chunk_by(|a, b| a[0] == b[0]) {
+            let (time, value): (Vec<f64>, Vec<f64>) = edge.iter().map(|r| (r[1], r[2])).unzip();
+            let found = step_response(&time, &value, 0.0)
+                .map_err(|e| miette::miette!("{}: edge {}: {e}", path.display(), edge[0][0]))?;
+            delays.push(found.delay_s[0]);
+            bandwidths.push(found.bandwidth_hz[0]);
+        }
+        channels.push(
+            channel_delay(channel, &delays, args.resolution_s)
+                .map_err(|e| miette::miette!("{given}: {e}"))?,
+        );
+        let n = bandwidths.len() as f64;
+        let mean = bandwidths.iter().sum::<f64>() / n;
+        let sd = (bandwidths.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+        remarks
+            .push(format!("{channel}: bandwidth {mean:.2} Hz, standard uncertainty {:.2} Hz", sd / n.sqrt()));
+    }
+    let mut clocks = Vec::new();
+    for given in &args.clock {
+        let (channel, path) = split(given)?;
+        let rows = columns(&mut sources, &path, ["host_s", "device_s"], &[])?;
+        let (host, device): (Vec<f64>, Vec<f64>) = rows.iter().map(|r| (r[0], r[1])).unzip();
+        let found = clock::compare(&host, &device).map_err(|e| miette::miette!("{given}: {e}"))?;
+        remarks.push(format!(
+            "{channel}: arrivals scatter by {:.2e} s about the device's clock",
+            found.arrival_sd_s
+        ));
+        clocks.push((channel.to_string(), found));
+    }
+    let mut found = outcome(&channels, &clocks);
+    found.remarks.extend(remarks);
+    args.common.issue(found, sources.raw_data(), json)
+}
+
+fn split(given: &str) -> miette::Result<(&str, PathBuf)> {
+    match given.split_once('=') {
+        Some((channel, path)) if !channel.is_empty() && !path.is_empty() => Ok((channel, path.into())),
+        _ => miette::bail!("`{given}`: write CHANNEL=FILE, for instance lateral=steps.csv"),
+    }
+}

@@ -1,0 +1,11 @@
+//! Calibrations on the virtual rig: what was withheld is recovered within the stated intervals, over trials
+//! whose seeds were fixed beforehand; what is unfit is refused with the reason.
+//!
+//! `cargo test --release -p tests --test calibration -- --nocapture` prints coverage and interval lengths.
+
+#[path = "calibration/amplitude.rs"]
+mod amplitude;
+#[path = "calibration/bench.rs"]
+mod bench;
+#[path = "calibration/force.rs"]
+mod force;
