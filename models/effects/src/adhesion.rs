@@ -1,0 +1,48 @@
+//! Adhesion loads the contact beyond what the normal force does, and holds it until it is pulled off.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct Adhesion;
+
+static LAWS: [Law; 2] = [
+    Law { name: "DMT", parameters: &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)] },
+    Law {
+        name: "constant shear on the touching time",
+        parameters: &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)],
+    },
+];
+
+impl Effect for Adhesion {
+    fn name(&self) -> &'static str {
+        "adhesion"
+    }
+    fn place(&self) -> Place {
+        Place::Contact
+    }
+    fn summary(&self) -> &'static str {
+        "The friction limit is mu0 (F + Fa), and contact is kept until the spring pulls with Fa."
+    }
+    fn source(&self) -> &'static str {
+        "Derjaguin, Muller, Toporov 1975; capillary and van der Waals pull of tens of mN on a finger"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Loads]
+    }
+    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+        if law == 0 {
+            c.adhesion = theta[0];
+        } else {
+            // Added friction for the share of the cycle in which the surfaces touch.
+            let touching = if c.amplitude_pp > crate::contact::STILL_PLATE_M {
+                crate::contact::half_contact_angle(c.load_ratio(), 0.0) / std::f64::consts::PI
+            } else {
+                1.0
+            };
+            c.mu0 *= 1.0 + theta[0] * touching / c.normal_force;
+        }
+    }
+}

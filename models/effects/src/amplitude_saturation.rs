@@ -1,0 +1,53 @@
+//! The amplifier cannot deliver the largest amplitudes.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct AmplitudeSaturation;
+
+static LAWS: [Law; 3] = [
+    Law { name: "hard limit", parameters: &[Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6)] },
+    Law { name: "soft limit", parameters: &[Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6)] },
+    Law { name: "compression", parameters: &[Parameter::positive("inverse_limit", "1/m", 0.2e6, 5e6)] },
+];
+
+impl Effect for AmplitudeSaturation {
+    fn name(&self) -> &'static str {
+        "amplitude_saturation"
+    }
+    fn place(&self) -> Place {
+        Place::Plate
+    }
+    fn summary(&self) -> &'static str {
+        "Above some command the amplitude no longer follows."
+    }
+    fn source(&self) -> &'static str {
+        "rail voltage and depolarisation limits of piezo drives"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration, Need::Amplitudes]
+    }
+    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+        let x = theta[0] * c.amplitude_pp;
+        c.amplitude_pp *= match law {
+            0 => {
+                if x > 1.0 {
+                    1.0 / x
+                } else {
+                    1.0
+                }
+            }
+            1 => (1.0 + x.powi(4)).powf(-0.25),
+            _ => {
+                if x > 1e-6 {
+                    x.tanh() / x
+                } else {
+                    1.0
+                }
+            }
+        };
+    }
+}

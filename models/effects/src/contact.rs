@@ -1,0 +1,221 @@
+//! One cycle of the massless slider under a vibrating plate, as every effect may have changed it.
+//!
+//! The plate moves as `(w/2) sin(2 pi f t)`. In units of `k_n w/2` the normal force is
+//! `cos(psi) - cos(phi)`, psi the phase from the highest point and phi the half contact angle. The lateral
+//! force is the largest that grows no faster than the drag of the spring and never passes the friction limit
+//! (a Skorokhod reflection), `L(x) = min over y <= x of [limit(y) + k_l U (x - y)]`. For a limit proportional
+//! to the normal force that minimum, and its mean over the cycle, are closed forms but for one root
+//! ([`mean_friction`]); laws that change the limit within the cycle take the sweep of [`crate::sweep`].
+
+use std::f64::consts::PI;
+
+/// What one pass presents to the contact after every effect has had its say. SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Intrinsic friction coefficient.
+    pub mu0: f64,
+    /// Normal stiffness, N/m.
+    pub normal_stiffness: f64,
+    /// Lateral stiffness, N/m.
+    pub lateral_stiffness: f64,
+    /// True vibration amplitude, peak to peak, m.
+    pub amplitude_pp: f64,
+    /// Vibration frequency, Hz.
+    pub frequency: f64,
+    /// True sliding speed (magnitude), m/s.
+    pub speed: f64,
+    /// True normal force on the finger, N.
+    pub normal_force: f64,
+    /// Share of the normal force that solid contact carries; the rest floats on air. 1 in the baseline.
+    pub solid_share: f64,
+    /// Factor on the mean friction force. 1 in the baseline.
+    pub friction_factor: f64,
+    /// Adhesive force of the whole contact (DMT), N. 0 in the baseline.
+    pub adhesion: f64,
+    /// Exponent by which the friction limit departs from Amontons within the cycle: the limit is
+    /// `mu0 F (F/reference_load)^load_exponent`. 0 in the baseline.
+    pub load_exponent: f64,
+    /// Load at which the limit is `mu0 F` whatever the exponent, N.
+    pub reference_load: f64,
+    /// Inverse of the largest speed of lateral recovery, s/m. 0 in the baseline (infinitely fast).
+    pub inverse_recovery_speed: f64,
+    /// Relaxation time of the lateral stretch out of contact, s. 0 in the baseline.
+    pub lateral_relaxation_time: f64,
+    /// Time in which bonds form after touch-down, s. 0 in the baseline.
+    pub bonding_time: f64,
+    /// Exponent of the growth of bonds: 1 first order, 0.5 stretched.
+    pub bonding_exponent: f64,
+    /// Scale of the heights of the asperities, m. 0 in the baseline (one height).
+    pub asperity_height: f64,
+    /// True: heights fall off exponentially; false: they are Gaussian.
+    pub asperity_exponential: bool,
+    /// Retardation time of the normal spring, s. 0 in the baseline.
+    pub normal_retardation_time: f64,
+    /// Mass of the ridges that follow the plate, kg. 0 in the baseline.
+    pub mass: f64,
+    /// Index into [`crate::impact::DAMPING_RATIOS`] where there is mass.
+    pub damping_class: usize,
+}
+
+impl Contact {
+    /// Half the peak-to-peak amplitude, m: the sine's amplitude.
+    pub fn half_amplitude(&self) -> f64 {
+        0.5 * self.amplitude_pp
+    }
+    /// The ratio `F / (k_n w/2)`: 1 or more keeps the plate touched for the whole cycle.
+    pub fn load_ratio(&self) -> f64 {
+        self.normal_force * self.solid_share / (self.normal_stiffness * self.half_amplitude())
+    }
+    /// Drag of the lateral spring per radian of phase in units of `mu0 k_n w/2`; 1 or more never sticks.
+    pub fn drag(&self) -> f64 {
+        self.lateral_stiffness * self.speed
+            / (2.0 * PI * self.frequency * self.mu0 * self.normal_stiffness * self.half_amplitude())
+    }
+    fn needs_sweep(&self) -> bool {
+        self.load_exponent != 0.0
+            || self.inverse_recovery_speed > 0.0
+            || self.lateral_relaxation_time > 0.0
+            || self.bonding_time > 0.0
+            || self.normal_retardation_time > 0.0
+    }
+}
+
+/// Below this amplitude (m, peak to peak) the plate is taken as still: far below any vibrometer's floor.
+pub const STILL_PLATE_M: f64 = 1e-12;
+
+/// Mean friction force over a cycle of the periodic steady state, N (unsigned).
+pub fn mean_friction(c: &Contact) -> f64 {
+    if !(c.normal_force > 0.0) {
+        return 0.0;
+    }
+    let base = if c.amplitude_pp < STILL_PLATE_M {
+        still_friction(c)
+    } else if c.asperity_height > 0.0 {
+        crate::asperities::mean_friction(c)
+    } else if c.needs_sweep() {
+        crate::sweep::mean_friction(c)
+    } else {
+        closed_form(c)
+    };
+    let inertia = if c.mass > 0.0 && c.amplitude_pp >= STILL_PLATE_M {
+        crate::impact::friction_ratio(c)
+    } else {
+        1.0
+    };
+    base * c.friction_factor * inertia
+}
+
+/// Steady sliding on a still plate, N.
+fn still_friction(c: &Contact) -> f64 {
+    let load = c.normal_force * c.solid_share + c.adhesion;
+    c.mu0 * load * (load / c.reference_load).powf(c.load_exponent)
+}
+
+/// Closed form for a limit proportional to the normal force, with adhesion.
+fn closed_form(c: &Contact) -> f64 {
+    let scale = c.normal_stiffness * c.half_amplitude();
+    let pull = c.adhesion / scale;
+    let load = c.load_ratio();
+    let phi = half_contact_angle(load, pull);
+    let carried = if phi >= PI { load + pull } else { arc_load(phi) };
+    (carried - lost_to_stick(phi, c.drag()) / (2.0 * PI)) * c.mu0 * scale
+}
+
+/// Mean of `(cos psi - cos phi)+` over a cycle.
+pub fn arc_load(phi: f64) -> f64 {
+    // The difference loses digits below about 1e-3 rad; its series is exact to 1e-12 there.
+    if phi < 1e-2 {
+        phi.powi(3) / (3.0 * PI) * (1.0 - 0.1 * phi * phi)
+    } else {
+        (phi.sin() - phi * phi.cos()) / PI
+    }
+}
+
+/// Half contact angle that balances the mean load: `arc_load(phi) - pull phi/pi = load`; pi for full contact.
+/// `pull` is the adhesive force in units of `k_n w/2`.
+pub fn half_contact_angle(load: f64, pull: f64) -> f64 {
+    if load >= 1.0 {
+        return PI;
+    }
+    // With pull, the balance first falls and then rises with phi; the loaded branch is the upper one.
+    let balance = |phi: f64| arc_load(phi) - pull * phi / PI - load;
+    if balance(PI) <= 0.0 {
+        return PI;
+    }
+    if pull == 0.0 {
+        // Newton from a start that is exact for short contacts and within 2 % elsewhere.
+        let mut phi = (3.0 * PI * load).cbrt() * (1.0 + 0.1 * load);
+        phi = phi.min(PI - 1e-6);
+        for _ in 0..8 {
+            let slope = phi * phi.sin() / PI;
+            let step = (arc_load(phi) - load) / slope.max(1e-12);
+            let next = (phi - step).clamp(0.5 * phi, 0.5 * (phi + PI));
+            let done = (next - phi).abs() < 1e-13 * phi;
+            phi = next;
+            if done {
+                break;
+            }
+        }
+        return phi;
+    }
+    let (mut low, mut high) = (half_contact_angle(load, 0.0), PI);
+    let mut phi = low;
+    for _ in 0..60 {
+        let value = balance(phi);
+        if value > 0.0 {
+            high = phi;
+        } else {
+            low = phi;
+        }
+        let slope = (phi * phi.sin() - pull) / PI;
+        let newton = phi - value / slope;
+        let next = if slope > 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if (next - phi).abs() < 1e-13 * phi {
+            return next;
+        }
+        phi = next;
+    }
+    phi
+}
+
+/// Integral over the cycle of friction limit minus lateral force, in units of `mu0 k_n w/2` radian.
+///
+/// `phi` is the half contact angle (pi: never leaves), `drag` the rate of stretch per radian.
+pub fn lost_to_stick(phi: f64, drag: f64) -> f64 {
+    // Sticking begins where the limit rises faster than the spring: at touch-down, or later if the finger
+    // touches on the lower half of the plate's motion, where the limit rises slowly at first.
+    let start = if phi <= 0.5 * PI {
+        if drag >= phi.sin() {
+            return 0.0;
+        }
+        -phi
+    } else {
+        if drag >= 1.0 {
+            return 0.0;
+        }
+        (-phi).max(-PI + drag.asin())
+    };
+    let rise = start.cos();
+    // The gap cos(x) - rise - drag (x - start) is concave past its maximum at x = -asin(drag): one root there.
+    let mut x = if phi < 1.0 { phi * (1.0 - 2.0 * drag / phi.sin()).max(-0.5) } else { 0.5 * PI };
+    let (mut low, mut high) = (-drag.min(1.0).asin(), phi);
+    x = x.clamp(low, high);
+    for _ in 0..60 {
+        let gap = x.cos() - rise - drag * (x - start);
+        if gap > 0.0 {
+            low = x;
+        } else {
+            high = x;
+        }
+        let slope = -x.sin() - drag;
+        let newton = x - gap / slope;
+        let next = if slope < 0.0 && newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
+        if (next - x).abs() < 1e-12 {
+            x = next;
+            break;
+        }
+        x = next;
+    }
+    let span = x - start;
+    (x.sin() - start.sin() - rise * span - 0.5 * drag * span * span).max(0.0)
+}

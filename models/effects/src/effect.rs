@@ -1,0 +1,170 @@
+//! What a candidate effect is.
+
+use crate::contact::Contact;
+use crate::operating::{Design, Operating, Reading};
+use serde::Serialize;
+
+/// Where an effect sits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// Between skin and plate.
+    Contact,
+    /// In the finger.
+    Finger,
+    /// In the plate or its amplifier.
+    Plate,
+    /// In a sensor, the stage, or the timing.
+    Instrument,
+}
+
+/// What the prior says about a parameter. The fit works in a coordinate `u` that is standard normal under it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Prior {
+    /// Size of either sign: normal about zero with this deviation.
+    Normal(f64),
+    /// Size that cannot be negative: the upper half of a normal with this deviation.
+    HalfNormal(f64),
+    /// Shape that is positive: median and standard deviation of the logarithm.
+    LogNormal(f64, f64),
+    /// Shape between two ends.
+    Uniform(f64, f64),
+}
+
+/// One parameter of one law.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Name.
+    pub name: &'static str,
+    /// Unit, SI; `1` for a number.
+    pub unit: &'static str,
+    /// The value at which the effect is absent; none for a shape parameter.
+    pub zero: Option<f64>,
+    /// Prior.
+    pub prior: Prior,
+    /// Smallest value that the fit may take.
+    pub lower: f64,
+    /// Largest value that the fit may take.
+    pub upper: f64,
+}
+
+impl Parameter {
+    /// A size of either sign, absent at zero.
+    pub const fn signed(name: &'static str, unit: &'static str, sd: f64, lower: f64, upper: f64) -> Self {
+        Self { name, unit, zero: Some(0.0), prior: Prior::Normal(sd), lower, upper }
+    }
+    /// A size that cannot be negative, absent at zero.
+    pub const fn positive(name: &'static str, unit: &'static str, sd: f64, upper: f64) -> Self {
+        Self { name, unit, zero: Some(0.0), prior: Prior::HalfNormal(sd), lower: 0.0, upper }
+    }
+    /// A positive shape parameter with a lognormal prior, bounded at three deviations.
+    pub const fn shape(name: &'static str, unit: &'static str, median: f64, sd_ln: f64) -> Self {
+        Self {
+            name,
+            unit,
+            zero: None,
+            prior: Prior::LogNormal(median, sd_ln),
+            lower: 0.0,
+            upper: f64::INFINITY,
+        }
+    }
+    /// A shape parameter anywhere between two ends.
+    pub const fn between(name: &'static str, unit: &'static str, lower: f64, upper: f64) -> Self {
+        Self { name, unit, zero: None, prior: Prior::Uniform(lower, upper), lower, upper }
+    }
+
+    /// The value at coordinate `u`.
+    pub fn value(&self, u: f64) -> f64 {
+        let raw = match self.prior {
+            Prior::Normal(sd) | Prior::HalfNormal(sd) => sd * u,
+            Prior::LogNormal(median, sd) => median * (sd * u).exp(),
+            // The ends are where u = -3 and 3; a wrapping parameter may pass them.
+            Prior::Uniform(low, high) => return low + (high - low) * (u + 3.0) / 6.0,
+        };
+        raw.clamp(self.lower, self.upper)
+    }
+
+    /// The coordinate of a value.
+    pub fn coordinate(&self, value: f64) -> f64 {
+        match self.prior {
+            Prior::Normal(sd) | Prior::HalfNormal(sd) => value / sd,
+            Prior::LogNormal(median, sd) => (value / median).ln() / sd,
+            Prior::Uniform(low, high) => 6.0 * (value - low) / (high - low) - 3.0,
+        }
+    }
+
+    /// Range of the coordinate that the fit may use.
+    pub fn coordinate_bounds(&self) -> (f64, f64) {
+        match self.prior {
+            Prior::Normal(sd) => ((self.lower / sd).max(-8.0), (self.upper / sd).min(8.0)),
+            Prior::HalfNormal(sd) => (0.0, (self.upper / sd).min(8.0)),
+            Prior::LogNormal(..) => (-3.0, 3.0),
+            Prior::Uniform(..) => (-3.0, 3.0),
+        }
+    }
+
+    /// Log prior density in the coordinate.
+    pub fn log_prior(&self, u: f64) -> f64 {
+        let normal = -0.5 * u * u - 0.918_938_533_204_672_8;
+        match self.prior {
+            Prior::HalfNormal(_) => normal + std::f64::consts::LN_2,
+            Prior::Uniform(..) => -(6f64.ln()),
+            _ => normal,
+        }
+    }
+}
+
+/// One functional form of an effect. A cause may follow more than one; all are forms of ONE effect.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Law {
+    /// Name of the form.
+    pub name: &'static str,
+    /// Its parameters, the size first.
+    pub parameters: &'static [Parameter],
+}
+
+/// What a table must hold before an effect can be seen on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Need {
+    /// Passes with the plate vibrating.
+    Vibration,
+    /// More than one amplitude.
+    Amplitudes,
+    /// More than one normal force.
+    Loads,
+    /// More than one speed.
+    Speeds,
+    /// Both directions.
+    Directions,
+    /// Passes at more than one place on the plate.
+    Positions,
+    /// Passes spread over time.
+    Time,
+    /// Signals within a pass: a run's record.
+    Record,
+    /// A calibration against an outside standard (dead weight).
+    OutsideStandard,
+}
+
+/// A candidate cause of the gap. It nests the baseline: at the zero of its size nothing changes, bit for bit.
+pub trait Effect: Sync {
+    /// Name as the contract has it.
+    fn name(&self) -> &'static str;
+    /// Where it sits.
+    fn place(&self) -> Place;
+    /// One sentence on the mechanism.
+    fn summary(&self) -> &'static str;
+    /// Where form and ranges come from.
+    fn source(&self) -> &'static str;
+    /// Its functional forms.
+    fn laws(&self) -> &'static [Law];
+    /// What a table must hold before it can be seen.
+    fn needs(&self) -> &'static [Need];
+    /// Changes what the contact is given. `theta` holds the parameters of the law in its order.
+    fn change(&self, _law: usize, _theta: &[f64], _pass: &Operating, _design: &Design, _contact: &mut Contact) {
+    }
+    /// Changes what the instruments make of the friction force.
+    fn read(&self, _law: usize, _theta: &[f64], _pass: &Operating, _design: &Design, _reading: &mut Reading) {}
+}

@@ -1,0 +1,42 @@
+//! The lateral channel of the force sensor feels the normal force, or the other way round.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct ForceCrosstalk;
+
+static LAWS: [Law; 2] = [
+    Law { name: "normal into lateral", parameters: &[Parameter::signed("crosstalk", "1", 0.03, -0.3, 0.3)] },
+    Law { name: "lateral into normal", parameters: &[Parameter::signed("crosstalk", "1", 0.08, -0.5, 0.5)] },
+];
+
+impl Effect for ForceCrosstalk {
+    fn name(&self) -> &'static str {
+        "force_crosstalk"
+    }
+    fn place(&self) -> Place {
+        Place::Instrument
+    }
+    fn summary(&self) -> &'static str {
+        "A share of the normal force is read as lateral force, the same in both directions (or the reverse)."
+    }
+    fn source(&self) -> &'static str {
+        "cross-talk of 0.3 to 13 % of uncalibrated multi-axis cells"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Directions]
+    }
+    fn change(&self, law: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
+        if law == 1 {
+            crate::plate_tilt::unload(c, pass.direction, -theta[0]);
+        }
+    }
+    fn read(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, reading: &mut Reading) {
+        if law == 0 {
+            reading.crosstalk += theta[0];
+        }
+    }
+}

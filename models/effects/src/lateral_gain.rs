@@ -1,0 +1,33 @@
+//! The lateral channel's sensitivity is wrong.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct LateralGain;
+
+static LAWS: [Law; 1] =
+    [Law { name: "gain", parameters: &[Parameter::signed("log_gain", "1", 0.1, -1.0, 1.0)] }];
+
+impl Effect for LateralGain {
+    fn name(&self) -> &'static str {
+        "lateral_gain"
+    }
+    fn place(&self) -> Place {
+        Place::Instrument
+    }
+    fn summary(&self) -> &'static str {
+        "Lateral force read by a constant factor: an exact alias of mu0 and lateral stiffness together."
+    }
+    fn source(&self) -> &'static str {
+        "calibration drift of force cells; told apart only by a dead weight on the lateral axis"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::OutsideStandard]
+    }
+    fn read(&self, _: usize, theta: &[f64], _: &Operating, _: &Design, reading: &mut Reading) {
+        reading.gain *= theta[0].exp();
+    }
+}

@@ -1,0 +1,47 @@
+//! The lateral channel's zero is off, or wanders.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct LateralOffsetDrift;
+
+static LAWS: [Law; 3] = [
+    Law { name: "constant", parameters: &[Parameter::signed("offset", "N", 0.01, -0.3, 0.3)] },
+    Law { name: "linear drift", parameters: &[Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4)] },
+    Law {
+        name: "settling",
+        parameters: &[
+            Parameter::signed("change", "N", 0.015, -0.4, 0.4),
+            Parameter::shape("time_constant_over_duration", "1", 0.3, 0.8),
+        ],
+    },
+];
+
+impl Effect for LateralOffsetDrift {
+    fn name(&self) -> &'static str {
+        "lateral_offset_drift"
+    }
+    fn place(&self) -> Place {
+        Place::Instrument
+    }
+    fn summary(&self) -> &'static str {
+        "An offset of the lateral force, constant or drifting, whatever the load and the direction."
+    }
+    fn source(&self) -> &'static str {
+        "thermal drift of 1 to 80 mN per stroke of strain-gauge and piezo cells"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Directions]
+    }
+    fn read(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, reading: &mut Reading) {
+        let s = pass.time_s / design.duration_s.max(1e-9);
+        reading.offset_n += match law {
+            0 => theta[0],
+            1 => theta[0] * s,
+            _ => -theta[0] * (-s / theta[1]).exp_m1(),
+        };
+    }
+}

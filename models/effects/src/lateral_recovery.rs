@@ -1,0 +1,44 @@
+//! The skin's lateral stretch does not vanish at lift-off but recovers at a finite rate.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct LateralRecovery;
+
+static LAWS: [Law; 2] = [
+    Law {
+        name: "rate limit",
+        parameters: &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)],
+    },
+    Law {
+        name: "exponential",
+        parameters: &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)],
+    },
+];
+
+impl Effect for LateralRecovery {
+    fn name(&self) -> &'static str {
+        "lateral_recovery"
+    }
+    fn place(&self) -> Place {
+        Place::Contact
+    }
+    fn summary(&self) -> &'static str {
+        "Stretch left from the last contact lets the friction force start higher in the next."
+    }
+    fn source(&self) -> &'static str {
+        "section 5.3 of the paper (recovery at 1.5 to 15 mm/s); Kelvin-Voigt as the second form"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration]
+    }
+    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+        match law {
+            0 => c.inverse_recovery_speed = theta[0],
+            _ => c.lateral_relaxation_time = theta[0],
+        }
+    }
+}

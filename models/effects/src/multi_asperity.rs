@@ -1,0 +1,36 @@
+//! Not one slider but many, of unequal height.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct MultiAsperity;
+
+static LAWS: [Law; 2] = [
+    Law { name: "Gaussian heights", parameters: &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)] },
+    Law { name: "exponential heights", parameters: &[Parameter::positive("height_scale", "m", 0.5e-6, 6e-6)] },
+];
+
+impl Effect for MultiAsperity {
+    fn name(&self) -> &'static str {
+        "multi_asperity"
+    }
+    fn place(&self) -> Place {
+        Place::Contact
+    }
+    fn summary(&self) -> &'static str {
+        "Asperities of unequal height touch for unequal times: no kink at the onset, a tail at large amplitude."
+    }
+    fn source(&self) -> &'static str {
+        "roughness scale of 0.5 to 3 um; independent sliders on shares of the springs"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration, Need::Amplitudes]
+    }
+    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+        c.asperity_height = theta[0];
+        c.asperity_exponential = law == 1;
+    }
+}

@@ -1,0 +1,36 @@
+//! The normal force that is read is not the one that loads the contact.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct NormalOffset;
+
+static LAWS: [Law; 2] = [
+    Law { name: "constant", parameters: &[Parameter::signed("offset", "N", 0.03, -0.5, 0.5)] },
+    Law { name: "drift over the table", parameters: &[Parameter::signed("offset", "N", 0.03, -0.5, 0.5)] },
+];
+
+impl Effect for NormalOffset {
+    fn name(&self) -> &'static str {
+        "normal_offset"
+    }
+    fn place(&self) -> Place {
+        Place::Instrument
+    }
+    fn summary(&self) -> &'static str {
+        "Measured normal force = true force + offset; the contact is loaded by the true one."
+    }
+    fn source(&self) -> &'static str {
+        "taring with something on the cell; offsets up to 8 % of range"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Loads]
+    }
+    fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
+        let share = if law == 0 { 1.0 } else { pass.time_s / design.duration_s.max(1e-9) };
+        c.normal_force = (c.normal_force - theta[0] * share).max(1e-4);
+    }
+}

@@ -1,0 +1,110 @@
+//! One pass as the table has it, and what the whole design says about scales.
+
+use crate::contact::Contact;
+
+/// The condition of one pass as measured. SI units; a covariate that was not measured is `None`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Operating {
+    /// Start of the pass from the start of the table, s.
+    pub time_s: f64,
+    /// Start of the pass from the first pass of its run, s (equal to `time_s` where runs are not told apart).
+    pub run_time_s: f64,
+    /// Commanded amplitude, peak to peak, m.
+    pub amplitude_pp_m: f64,
+    /// Vibration frequency, Hz.
+    pub frequency_hz: f64,
+    /// Commanded speed (magnitude), m/s.
+    pub speed_m_s: f64,
+    /// Direction of travel, 1 or -1.
+    pub direction: f64,
+    /// Mean position along the plate, m.
+    pub position_m: f64,
+    /// Measured mean normal force, N.
+    pub normal_force_n: f64,
+    /// Ambient pressure, Pa.
+    pub ambient_pressure_pa: Option<f64>,
+    /// Temperature of the plate, degrees Celsius.
+    pub temperature_c: Option<f64>,
+    /// Relative humidity, per cent.
+    pub relative_humidity_pct: Option<f64>,
+}
+
+/// Reference scales of a whole table: effects that need a zero of time, load or temperature take it from here.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Design {
+    /// Time from the first to the last pass, s.
+    pub duration_s: f64,
+    /// Geometric mean of the normal force, N.
+    pub reference_load_n: f64,
+    /// Geometric mean of the speed, m/s.
+    pub reference_speed_m_s: f64,
+    /// Geometric mean of the frequency, Hz.
+    pub reference_frequency_hz: f64,
+    /// Temperature of the first pass, degrees Celsius.
+    pub reference_temperature_c: f64,
+    /// Range of positions, m.
+    pub stroke_m: f64,
+    /// Largest commanded amplitude, peak to peak, m.
+    pub largest_amplitude_m: f64,
+}
+
+/// The parameters of the baseline: all that recalibration may move.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Baseline {
+    /// Intrinsic friction coefficient.
+    pub mu0: f64,
+    /// Normal stiffness, N/m.
+    pub normal_stiffness_n_per_m: f64,
+    /// Lateral stiffness, N/m.
+    pub lateral_stiffness_n_per_m: f64,
+}
+
+/// How the instruments turn the friction force into a reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Factor on the lateral force.
+    pub gain: f64,
+    /// Lateral force read per newton of normal force, the same in both directions.
+    pub crosstalk: f64,
+    /// Lateral force read without load, N.
+    pub offset_n: f64,
+}
+
+impl Baseline {
+    /// The contact that this baseline gives a pass before any effect.
+    pub fn contact(&self, pass: &Operating, design: &Design) -> Contact {
+        Contact {
+            mu0: self.mu0,
+            normal_stiffness: self.normal_stiffness_n_per_m,
+            lateral_stiffness: self.lateral_stiffness_n_per_m,
+            amplitude_pp: pass.amplitude_pp_m,
+            frequency: pass.frequency_hz,
+            speed: pass.speed_m_s,
+            normal_force: pass.normal_force_n,
+            solid_share: 1.0,
+            friction_factor: 1.0,
+            adhesion: 0.0,
+            load_exponent: 0.0,
+            reference_load: design.reference_load_n,
+            inverse_recovery_speed: 0.0,
+            lateral_relaxation_time: 0.0,
+            bonding_time: 0.0,
+            bonding_exponent: 1.0,
+            asperity_height: 0.0,
+            asperity_exponential: false,
+            normal_retardation_time: 0.0,
+            mass: 0.0,
+            damping_class: 0,
+        }
+    }
+
+    /// Signed mean lateral force of the baseline, N.
+    pub fn lateral_force(&self, pass: &Operating, design: &Design) -> f64 {
+        pass.direction * crate::contact::mean_friction(&self.contact(pass, design))
+    }
+}
+
+/// Pressure in units of one standard atmosphere; one where it was not measured.
+pub fn atmospheres(pass: &Operating) -> f64 {
+    pass.ambient_pressure_pa.map_or(1.0, |p| p / 101_325.0)
+}

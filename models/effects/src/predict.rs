@@ -1,0 +1,31 @@
+//! The lateral force of a pass under the baseline and any effects.
+
+use crate::contact::mean_friction;
+use crate::effect::Effect;
+use crate::operating::{Baseline, Design, Operating, Reading};
+
+/// An effect with the law and parameters at which it acts.
+#[derive(Clone, Copy)]
+pub struct Active<'a> {
+    /// Which effect.
+    pub effect: &'static dyn Effect,
+    /// Index of its law.
+    pub law: usize,
+    /// Parameters in the law's order and units.
+    pub theta: &'a [f64],
+}
+
+/// Signed mean lateral force that the sensor reads, N. Effects act in the library's order; allocates nothing.
+pub fn lateral_force(baseline: &Baseline, effects: &[Active<'_>], pass: &Operating, design: &Design) -> f64 {
+    let mut contact = baseline.contact(pass, design);
+    let mut reading = Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 };
+    for active in effects {
+        active.effect.change(active.law, active.theta, pass, design, &mut contact);
+        active.effect.read(active.law, active.theta, pass, design, &mut reading);
+    }
+    let friction = pass.direction * mean_friction(&contact);
+    if reading == (Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 }) {
+        return friction;
+    }
+    reading.gain * friction + reading.crosstalk * contact.normal_force + reading.offset_n
+}

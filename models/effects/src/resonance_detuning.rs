@@ -1,0 +1,67 @@
+//! The drive is off the plate's resonance: by warming up, with time, or at one of the frequencies.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct ResonanceDetuning;
+
+static LAWS: [Law; 4] = [
+    Law {
+        name: "warming (temperature)",
+        parameters: &[Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0)],
+    },
+    Law {
+        name: "drift with time",
+        parameters: &[
+            Parameter::positive("detuning", "1", 1.0, 12.0),
+            Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
+        ],
+    },
+    Law {
+        name: "fixed resonance",
+        parameters: &[
+            Parameter::positive("quality_factor", "1", 60.0, 600.0),
+            Parameter::between("resonance_over_reference", "1", 0.7, 1.4),
+        ],
+    },
+    Law {
+        name: "self-heating by amplitude",
+        parameters: &[Parameter::positive("detuning_at_largest_amplitude", "1", 1.0, 12.0)],
+    },
+];
+
+impl Effect for ResonanceDetuning {
+    fn name(&self) -> &'static str {
+        "resonance_detuning"
+    }
+    fn place(&self) -> Place {
+        Place::Plate
+    }
+    fn summary(&self) -> &'static str {
+        "Off resonance the plate moves less than commanded, by the Lorentzian of its quality factor."
+    }
+    fn source(&self) -> &'static str {
+        "Q 100 at 27.5 kHz: 138 Hz halve the power; temperature coefficient of the plate's modulus"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration]
+    }
+    fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
+        let off = match law {
+            0 => theta[0] * pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c),
+            1 => {
+                let tau = theta[1] * design.duration_s.max(1e-9);
+                -theta[0] * (-pass.time_s / tau).exp_m1()
+            }
+            2 => {
+                let r = pass.frequency_hz / (design.reference_frequency_hz * theta[1]);
+                theta[0] * (r - 1.0 / r)
+            }
+            _ => theta[0] * (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).powi(2),
+        };
+        c.amplitude_pp /= (1.0 + off * off).sqrt();
+    }
+}

@@ -1,0 +1,38 @@
+//! The stage does not move at the commanded speed.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct SpeedError;
+
+static LAWS: [Law; 2] = [
+    Law { name: "gain", parameters: &[Parameter::signed("log_gain", "1", 0.15, -1.0, 1.0)] },
+    Law { name: "constant", parameters: &[Parameter::signed("excess", "m/s", 0.003, -0.02, 0.05)] },
+];
+
+impl Effect for SpeedError {
+    fn name(&self) -> &'static str {
+        "speed_error"
+    }
+    fn place(&self) -> Place {
+        Place::Instrument
+    }
+    fn summary(&self) -> &'static str {
+        "True speed is a factor (or a constant) away from the commanded one."
+    }
+    fn source(&self) -> &'static str {
+        "wrong lead or step count; told apart from a stiffness only by an encoder"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration]
+    }
+    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+        match law {
+            0 => c.speed *= theta[0].exp(),
+            _ => c.speed = (c.speed + theta[0]).max(0.05 * c.speed),
+        }
+    }
+}

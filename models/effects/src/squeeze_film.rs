@@ -1,0 +1,94 @@
+//! Air trapped under the vibrating finger carries part of the load.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct SqueezeFilm;
+
+/// Load on solid contact without air that fades by 1/e over one film thickness unit, N (physics.md 4.1).
+const SOLID_SCALE_N: f64 = 1.1;
+/// Apparent area times one atmosphere, N (34 mm2, physics.md section 2).
+const AIR_SCALE_N: f64 = 3.4;
+
+static LAWS: [Law; 4] = [
+    Law {
+        name: "load shared with a film",
+        parameters: &[Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6)],
+    },
+    Law {
+        name: "rational share",
+        parameters: &[
+            Parameter::positive("share_per_amplitude_squared", "1/m^2", 0.4e12, 4e12),
+            Parameter::between("load_exponent", "1", 0.0, 1.0),
+        ],
+    },
+    Law {
+        name: "exponential on friction",
+        parameters: &[Parameter::positive("decay_per_amplitude_squared", "1/m^2", 0.3e12, 3e12)],
+    },
+    Law {
+        name: "power on friction",
+        parameters: &[
+            Parameter::positive("inverse_amplitude", "1/m", 0.5e6, 4e6),
+            Parameter::between("exponent", "1", 1.0, 3.0),
+        ],
+    },
+];
+
+impl Effect for SqueezeFilm {
+    fn name(&self) -> &'static str {
+        "squeeze_film"
+    }
+    fn place(&self) -> Place {
+        Place::Contact
+    }
+    fn summary(&self) -> &'static str {
+        "Compressed air carries a share of the load that grows with amplitude and ambient pressure."
+    }
+    fn source(&self) -> &'static str {
+        "Wiertlewski, Friesen, Colgate 2016 (partial levitation); infinite squeeze number, small-amplitude form"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration, Need::Amplitudes]
+    }
+    fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
+        let air = atmospheres(pass);
+        match law {
+            0 => c.solid_share *= film_share(theta[0] * c.half_amplitude(), air, c.normal_force),
+            1 => {
+                let eased = (design.reference_load_n / c.normal_force).powf(theta[1]);
+                c.solid_share /= 1.0 + theta[0] * c.amplitude_pp.powi(2) * air * eased;
+            }
+            2 => c.friction_factor *= (-theta[0] * c.amplitude_pp.powi(2) * air).exp(),
+            _ => c.friction_factor /= 1.0 + air * (theta[0] * c.amplitude_pp).powf(theta[1]),
+        }
+    }
+}
+
+/// Share left to solid contact when `Fn = solid exp(-u) + 1.25 p A (a/u)^2`, u in film thickness units.
+fn film_share(a: f64, air: f64, load: f64) -> f64 {
+    if a <= 0.0 {
+        return 1.0;
+    }
+    let rest = (SOLID_SCALE_N / load).ln().max(0.2);
+    let lift = 1.25 * AIR_SCALE_N * air * a * a / load;
+    // exp(rest - u) + lift/u^2 = 1, falling in u.
+    let (mut low, mut high) = (rest, rest + 40.0 + 2.0 * lift.sqrt());
+    let mut u = rest + lift.sqrt() * 0.5;
+    for _ in 0..60 {
+        let solid = (rest - u).exp();
+        let value = solid + lift / (u * u) - 1.0;
+        if value > 0.0 { low = u } else { high = u }
+        let newton = u + value / (solid + 2.0 * lift / (u * u * u));
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if (next - u).abs() < 1e-10 * u {
+            u = next;
+            break;
+        }
+        u = next;
+    }
+    (rest - u).exp().min(1.0)
+}

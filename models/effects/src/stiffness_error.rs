@@ -1,0 +1,48 @@
+//! A stiffness of the finger is not what its certificate says.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct StiffnessError;
+
+static LAWS: [Law; 3] = [
+    Law {
+        name: "lateral stiffness",
+        parameters: &[Parameter::signed("log_lateral_factor", "1", 0.5, -2.0, 2.0)],
+    },
+    Law {
+        name: "normal stiffness",
+        parameters: &[Parameter::signed("log_normal_factor", "1", 0.5, -2.0, 2.0)],
+    },
+    Law { name: "both", parameters: &[Parameter::signed("log_common_factor", "1", 0.5, -2.0, 2.0)] },
+];
+
+impl Effect for StiffnessError {
+    fn name(&self) -> &'static str {
+        "stiffness_error"
+    }
+    fn place(&self) -> Place {
+        Place::Finger
+    }
+    fn summary(&self) -> &'static str {
+        "Normal or lateral stiffness lies outside the range that its calibration states."
+    }
+    fn source(&self) -> &'static str {
+        "spread of ultrasonic stiffness in the paper (0.2 to 4 MN/m); rig.toml's prior is the nuisance"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration]
+    }
+    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+        let factor = theta[0].exp();
+        if law != 1 {
+            c.lateral_stiffness *= factor;
+        }
+        if law != 0 {
+            c.normal_stiffness *= factor;
+        }
+    }
+}

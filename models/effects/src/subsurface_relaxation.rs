@@ -1,0 +1,62 @@
+//! The tissue under the ridges creeps: the contact grows, and with it both stiffnesses, while mu0 stays.
+
+use crate::prelude::*;
+
+/// See the module.
+pub struct SubsurfaceRelaxation;
+
+static LAWS: [Law; 3] = [
+    Law {
+        name: "exponential creep",
+        parameters: &[
+            Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
+            Parameter::shape("time_constant", "s", 30.0, 1.5),
+        ],
+    },
+    Law {
+        name: "logarithmic creep",
+        parameters: &[
+            Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
+            Parameter::shape("onset_time", "s", 5.0, 1.2),
+        ],
+    },
+    Law {
+        name: "normal stiffness alone",
+        parameters: &[
+            Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
+            Parameter::shape("time_constant", "s", 30.0, 1.5),
+        ],
+    },
+];
+
+impl Effect for SubsurfaceRelaxation {
+    fn name(&self) -> &'static str {
+        "subsurface_relaxation"
+    }
+    fn place(&self) -> Place {
+        Place::Contact
+    }
+    fn summary(&self) -> &'static str {
+        "Creep of the soft tissue changes the stiffness of the contact with time, not its friction coefficient."
+    }
+    fn source(&self) -> &'static str {
+        "longest relaxation time of a finger pad about 3 s (the paper's introduction); area grows as log t"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration, Need::Time]
+    }
+    fn change(&self, law: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
+        let factor = match law {
+            1 => 1.0 + theta[0] * (1.0 + pass.time_s / theta[1]).ln(),
+            _ => 1.0 - theta[0] * (-pass.time_s / theta[1]).exp_m1(),
+        }
+        .max(0.05);
+        c.normal_stiffness *= factor;
+        if law != 2 {
+            c.lateral_stiffness *= factor;
+        }
+    }
+}

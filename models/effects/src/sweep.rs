@@ -1,0 +1,201 @@
+//! A sweep over one contact, for laws that change the friction limit or the recovery within the cycle.
+//!
+//! Semantics of finite recovery (section 5.3 of the paper, as its figures show it): in contact the stretch
+//! grows with the plate; where the spring's force passes the limit the slider slips and the force is the
+//! limit, while the stretch follows the limit down no faster than the recovery allows; out of contact the
+//! force is zero and the stretch recovers; the next contact starts from what is left.
+
+use crate::contact::{Contact, half_contact_angle};
+use std::f64::consts::PI;
+
+/// Points over the contact. The mean force is then within 1e-3 of the converged sweep (tested).
+pub const POINTS: usize = 96;
+
+/// Mean friction over the periodic steady state, N.
+pub fn mean_friction(c: &Contact) -> f64 {
+    let scale = c.normal_stiffness * c.half_amplitude();
+    let omega = 2.0 * PI * c.frequency;
+    let mut force = [0.0; POINTS + 1];
+    let pull = c.adhesion / scale;
+    let load = c.load_ratio();
+    let (arc, airborne) = if c.normal_retardation_time > 0.0 {
+        let lag = omega * c.normal_retardation_time;
+        let contact = retarded_contact(load, lag);
+        for (i, f) in force.iter_mut().enumerate() {
+            let theta = contact.start + contact.arc * i as f64 / POINTS as f64;
+            *f = scale * (theta.sin() + contact.depth + lag * theta.cos()).max(0.0) + c.adhesion;
+        }
+        (contact.arc, 2.0 * PI - contact.arc)
+    } else {
+        let phi = half_contact_angle(load, pull);
+        let offset = if phi >= PI { load + pull } else { -phi.cos() };
+        for (i, f) in force.iter_mut().enumerate() {
+            let psi = -phi + 2.0 * phi * i as f64 / POINTS as f64;
+            *f = scale * (psi.cos() + offset).max(0.0);
+        }
+        (2.0 * phi, 2.0 * (PI - phi))
+    };
+    let dt = arc / (POINTS as f64 * omega);
+    let always = airborne < 1e-9;
+    // The friction limit over the contact.
+    for (i, f) in force.iter_mut().enumerate() {
+        let mut limit = c.mu0 * *f;
+        if c.load_exponent != 0.0 {
+            limit *= (*f / c.reference_load).max(1e-6).powf(c.load_exponent);
+        }
+        if c.bonding_time > 0.0 && !always {
+            let age = i as f64 * dt / c.bonding_time;
+            let age = if c.bonding_exponent == 1.0 { age } else { age.powf(c.bonding_exponent) };
+            limit *= -(-age).exp_m1();
+        }
+        *f = limit;
+    }
+    let lateral = Lateral::new(c, dt, airborne / omega);
+    // The map from the stretch at touch-down to that at the next one rises with slope at most one: its
+    // fixed point is bracketed by zero and the stretch of the largest limit.
+    if c.inverse_recovery_speed == 0.0 && c.lateral_relaxation_time == 0.0 && !always {
+        return lateral.cycle(&force, 0.0).0 * arc / (2.0 * PI);
+    }
+    let (mut mean, mut left) = lateral.cycle(&force, 0.0);
+    let (mut x0, mut gap0) = (0.0, left);
+    if left > 0.0 {
+        let top = force.iter().fold(0.0f64, |a, &b| a.max(b)) / c.lateral_stiffness + c.speed * dt;
+        let (mut x1, mut gap1) = (top, lateral.cycle(&force, top).1 - top);
+        for _ in 0..40 {
+            if (x1 - x0).abs() < 1e-7 * top || gap0 == gap1 {
+                break;
+            }
+            // Regula falsi (Illinois) keeps the bracket: no cycle is iterated to death near the threshold.
+            let x = (x0 * gap1 - x1 * gap0) / (gap1 - gap0);
+            (mean, left) = lateral.cycle(&force, x);
+            let gap = left - x;
+            if gap.abs() < 1e-7 * top {
+                break;
+            }
+            if gap > 0.0 {
+                (x0, gap0) = (x, gap);
+                gap1 *= 0.5;
+            } else {
+                (x1, gap1) = (x, gap);
+                gap0 *= 0.5;
+            }
+        }
+    }
+    mean * arc / (2.0 * PI)
+}
+
+/// The lateral spring during one contact.
+struct Lateral {
+    stiffness: f64,
+    advance: f64,
+    rate_step: f64,
+    keep_step: f64,
+    rate_airborne: f64,
+    keep_airborne: f64,
+}
+
+impl Lateral {
+    fn new(c: &Contact, dt: f64, airborne: f64) -> Self {
+        let rate = if c.inverse_recovery_speed > 0.0 { 1.0 / c.inverse_recovery_speed } else { f64::INFINITY };
+        let keep = |time: f64| {
+            if c.lateral_relaxation_time > 0.0 {
+                (-time / c.lateral_relaxation_time).exp()
+            } else if rate.is_finite() {
+                1.0
+            } else {
+                0.0
+            }
+        };
+        let fall = |time: f64| if rate.is_finite() { rate * time } else { 0.0 };
+        Self {
+            stiffness: c.lateral_stiffness,
+            advance: c.speed * dt,
+            rate_step: fall(dt),
+            keep_step: keep(dt),
+            rate_airborne: fall(airborne),
+            keep_airborne: keep(airborne),
+        }
+    }
+
+    /// Mean force over the contact and the stretch at the next touch-down.
+    fn cycle(&self, limit: &[f64; POINTS + 1], start: f64) -> (f64, f64) {
+        let mut x = start;
+        let mut sum = 0.5 * (self.stiffness * x).min(limit[0]);
+        for (i, &q) in limit.iter().enumerate().skip(1) {
+            let pulled = x + self.advance;
+            let bound = q / self.stiffness;
+            let force;
+            if pulled <= bound {
+                x = pulled;
+                force = self.stiffness * x;
+            } else {
+                force = q;
+                x = if x <= bound { bound } else { self.recover(x, bound, self.rate_step, self.keep_step) };
+            }
+            sum += if i == POINTS { 0.5 * force } else { force };
+        }
+        (sum / POINTS as f64, self.recover(x, 0.0, self.rate_airborne, self.keep_airborne))
+    }
+
+    fn recover(&self, x: f64, floor: f64, rate: f64, keep: f64) -> f64 {
+        (floor + (x - floor) * keep - rate).max(floor)
+    }
+}
+
+/// A contact of the massless spring with a dashpot beside it (Kelvin-Voigt).
+struct Retarded {
+    start: f64,
+    arc: f64,
+    depth: f64,
+}
+
+/// Finds depth and contact interval (phases of the plate's sine) of the retarded spring for a mean load.
+fn retarded_contact(load: f64, lag: f64) -> Retarded {
+    let reach = (1.0 + lag * lag).sqrt();
+    let peak = 1f64.atan2(lag); // phase of the largest force
+    // Full contact: the force stays positive for the whole cycle.
+    if load >= reach {
+        return Retarded { start: peak - PI, arc: 2.0 * PI, depth: load };
+    }
+    let at = |depth: f64| -> (f64, Retarded) {
+        let end = peak + (-depth / reach).clamp(-1.0, 1.0).acos();
+        let left = end.sin() + depth; // compression at lift-off, recovering exponentially
+        // The skin meets the plate again on its way up: bracket between lift-off and the next peak of force.
+        let meet = |theta: f64| theta.sin() + depth - left * (-(theta - end) / lag).exp();
+        let (mut low, mut high) = (end + 1e-9, end);
+        // March until the plate is above the skin again.
+        let mut previous = low;
+        for k in 1..=24 {
+            let theta = end + (2.0 * PI) * k as f64 / 24.0;
+            if meet(theta) >= 0.0 && theta.cos() > 0.0 {
+                low = previous;
+                high = theta;
+                break;
+            }
+            previous = theta;
+        }
+        if high <= low {
+            return (load + 1.0, Retarded { start: peak - PI, arc: 2.0 * PI, depth });
+        }
+        for _ in 0..22 {
+            let middle = 0.5 * (low + high);
+            if meet(middle) >= 0.0 { high = middle } else { low = middle }
+        }
+        let start = 0.5 * (low + high) - 2.0 * PI;
+        let mean = (start.cos() - end.cos() + depth * (end - start) + lag * (end.sin() - start.sin()))
+            / (2.0 * PI);
+        (mean, Retarded { start, arc: end - start, depth })
+    };
+    let (mut low, mut high) = (-reach + 1e-9, reach);
+    let mut best = at(0.5 * (low + high)).1;
+    for _ in 0..34 {
+        let middle = 0.5 * (low + high);
+        let (mean, contact) = at(middle);
+        if mean > load { high = middle } else { low = middle }
+        best = contact;
+        if high - low < 1e-9 {
+            break;
+        }
+    }
+    best
+}

@@ -1,0 +1,138 @@
+//! The contact solver against figures that an independent time-domain simulation printed.
+use effects::contact::{Contact, mean_friction};
+use effects::{Baseline, Design, Operating};
+
+const DESIGN: Design = Design {
+    duration_s: 1000.0,
+    reference_load_n: 0.5,
+    reference_speed_m_s: 0.02,
+    reference_frequency_hz: 27_500.0,
+    reference_temperature_c: 20.0,
+    stroke_m: 0.03,
+    largest_amplitude_m: 5e-6,
+};
+
+fn pass(amplitude_pp_m: f64, speed_m_s: f64, normal_force_n: f64) -> Operating {
+    Operating {
+        time_s: 0.0,
+        run_time_s: 0.0,
+        amplitude_pp_m,
+        frequency_hz: 27_500.0,
+        speed_m_s,
+        direction: 1.0,
+        position_m: 0.0,
+        normal_force_n,
+        ambient_pressure_pa: None,
+        temperature_c: None,
+        relative_humidity_pct: None,
+    }
+}
+
+fn contact(w: f64, u: f64, f: f64, kn: f64, kl: f64) -> Contact {
+    Baseline { mu0: 0.5, normal_stiffness_n_per_m: kn, lateral_stiffness_n_per_m: kl }
+        .contact(&pass(w, u, f), &DESIGN)
+}
+
+fn relative(c: &Contact) -> f64 {
+    mean_friction(c) / (c.mu0 * c.normal_force)
+}
+
+/// mu' against Psi (Eq. 17) for three ratios of amplitude to preload: massless simulation of Eqs. 8 to 15.
+#[test]
+fn massless_slider_follows_the_published_simulation() {
+    let groups = [0.1, 0.25, 0.5, 1.0, 2.0, 3.0, 4.5, 2.0 * std::f64::consts::PI];
+    let table = [
+        (4.0, [0.036, 0.088, 0.170, 0.317, 0.555, 0.735, 0.914, 1.0]),
+        (8.0, [0.041, 0.099, 0.191, 0.354, 0.612, 0.793, 0.951, 1.0]),
+        (20.0, [0.051, 0.125, 0.238, 0.435, 0.720, 0.892, 0.993, 1.0]),
+    ];
+    let (f, w) = (27_500.0, 2e-6);
+    for (ratio, row) in table {
+        for (psi, expected) in groups.iter().zip(row) {
+            // Psi(17) = 2 kl U / (kn w f mu0).
+            let kn = 0.25 / (w / ratio);
+            let kl = kn / (2.0 * 1.33);
+            let u = psi * kn * w * f * 0.5 / (2.0 * kl);
+            let got = relative(&contact(w, u, 0.25, kn, kl));
+            assert!((got - expected).abs() < 6e-3, "w/h {ratio}, Psi {psi}: {got} against {expected}");
+        }
+    }
+}
+
+/// Fig. 14's steady values with w peak to peak, as the independent simulation gave them.
+#[test]
+fn finite_recovery_follows_figure_14() {
+    for (speed, expected) in [(1.5e-3, 0.979), (3e-3, 0.858), (5e-3, 0.494), (8e-3, 0.138)] {
+        let mut c = contact(5e-6, 0.02, 0.5, 3.9e6, 1.5e6);
+        c.inverse_recovery_speed = 1.0 / speed;
+        let got = relative(&c);
+        assert!((got - expected).abs() < 0.015, "v_r {speed}: {got} against {expected}");
+    }
+}
+
+/// Mass: mu' at the nominal point of physics, critically damped 8 mg and lightly damped 2 and 8 mg.
+#[test]
+fn inertia_reduces_friction_as_the_independent_simulation_has_it() {
+    let base = contact(2e-6, 0.02, 0.25, 1e6, 1e6 / 2.66);
+    assert!((relative(&base) - 0.208).abs() < 0.01, "base {}", relative(&base));
+    let heavy = Contact { mass: 8e-6, damping_class: 1, ..base };
+    let light = Contact { mass: 8e-6, damping_class: 0, ..base };
+    println!("8 mg: zeta 1 {} zeta .3 {}", relative(&heavy), relative(&light));
+    assert!(relative(&heavy) < 0.4 * relative(&base));
+    assert!(relative(&light) < 0.3 * relative(&heavy));
+}
+
+/// The sweep, asked for what the closed form knows, gives the closed form.
+#[test]
+fn sweep_agrees_with_the_closed_form() {
+    let mut worst = 0.0f64;
+    for w in [0.05e-6, 0.3e-6, 1e-6, 3e-6, 6e-6] {
+        for u in [1e-3, 5e-3, 0.02, 0.1, 0.3] {
+            for f in [0.1, 0.5, 1.5] {
+                let c = contact(w, u, f, 2e6, 0.8e6);
+                let swept = Contact { bonding_time: 1e-15, ..c };
+                let (a, b) = (relative(&c), relative(&swept));
+                worst = worst.max((a - b).abs());
+                let retarded = Contact { normal_retardation_time: 1e-12, ..c };
+                let d = relative(&retarded);
+                assert!((a - d).abs() < 5e-3, "w {w} u {u} f {f}: {a} {d}");
+            }
+        }
+    }
+    println!("largest difference of mu': {worst:e}");
+    assert!(worst < 1e-3, "{worst}");
+}
+
+/// Continuity across full contact, and the still plate.
+#[test]
+fn friction_is_continuous_at_the_onset() {
+    for u in [1e-3, 0.02, 0.2] {
+        let at = |w: f64| relative(&contact(w, u, 0.5, 1e6, 0.4e6));
+        let edge = 2.0 * 0.5 / 1e6;
+        assert!((at(edge * 0.9999) - at(edge * 1.0001)).abs() < 1e-3);
+        assert!((at(1e-11) - 1.0).abs() < 1e-3);
+        assert_eq!(at(0.0), 1.0);
+    }
+}
+
+/// A tall forest of asperities of nearly one height is one slider.
+#[test]
+fn asperities_of_one_height_are_one_slider() {
+    for w in [0.5e-6, 2e-6] {
+        let c = contact(w, 0.02, 0.25, 1e6, 0.4e6);
+        for asperity_exponential in [false, true] {
+            let many = Contact { asperity_height: 1e-12, asperity_exponential, ..c };
+            assert!((relative(&many) - relative(&c)).abs() < 1e-4);
+        }
+    }
+}
+
+/// Adhesion of zero is none, and on a still plate it adds mu0 Fa.
+#[test]
+fn adhesion_adds_to_the_limit() {
+    let c = Contact { adhesion: 0.1, ..contact(0.0, 0.02, 0.5, 1e6, 0.4e6) };
+    assert!((mean_friction(&c) - 0.5 * 0.6).abs() < 1e-12);
+    let moving = |adhesion| mean_friction(&Contact { adhesion, ..contact(2e-6, 0.02, 0.5, 1e6, 0.4e6) });
+    assert!((moving(1e-9) - moving(0.0)).abs() < 1e-6 * moving(0.0));
+    assert!(moving(0.1) > moving(0.0));
+}

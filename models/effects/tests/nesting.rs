@@ -1,0 +1,110 @@
+//! Every effect nests the baseline: at the zero of its size the prediction is the baseline's, bit for bit.
+use effects::{Active, Baseline, Design, Operating, library};
+
+fn passes() -> Vec<Operating> {
+    let mut list = Vec::new();
+    for (i, w) in [0.0, 0.1e-6, 0.8e-6, 2e-6, 5e-6].into_iter().enumerate() {
+        for (j, u) in [2e-3, 0.02, 0.2].into_iter().enumerate() {
+            for f in [0.15, 0.8] {
+                for direction in [1.0, -1.0] {
+                    list.push(Operating {
+                        time_s: 37.0 * i as f64,
+                        run_time_s: 11.0 * j as f64,
+                        amplitude_pp_m: w,
+                        frequency_hz: if j == 1 { 25_000.0 } else { 41_000.0 },
+                        speed_m_s: u,
+                        direction,
+                        position_m: 0.003 * (i + j) as f64,
+                        normal_force_n: f,
+                        ambient_pressure_pa: Some(50_000.0),
+                        temperature_c: Some(20.0 + i as f64),
+                        relative_humidity_pct: None,
+                    });
+                }
+            }
+        }
+    }
+    list
+}
+
+const DESIGN: Design = Design {
+    duration_s: 200.0,
+    reference_load_n: 0.35,
+    reference_speed_m_s: 0.02,
+    reference_frequency_hz: 35_000.0,
+    reference_temperature_c: 20.0,
+    stroke_m: 0.03,
+    largest_amplitude_m: 5e-6,
+};
+
+#[test]
+fn zero_is_the_baseline() {
+    let baseline =
+        Baseline { mu0: 0.6, normal_stiffness_n_per_m: 2e6, lateral_stiffness_n_per_m: 0.8e6 };
+    for effect in library() {
+        for (law, form) in effect.laws().iter().enumerate() {
+            assert!(form.parameters[0].zero == Some(0.0), "{}: the size comes first", effect.name());
+            for shape in [-2.0, 0.0, 1.7] {
+                let theta: Vec<f64> =
+                    form.parameters.iter().map(|p| p.zero.unwrap_or_else(|| p.value(shape))).collect();
+                for pass in passes() {
+                    let with =
+                        effects::lateral_force(&baseline, &[Active { effect: *effect, law, theta: &theta }], &pass, &DESIGN);
+                    let without = baseline.lateral_force(&pass, &DESIGN);
+                    assert!(
+                        with.to_bits() == without.to_bits(),
+                        "{} ({}): {with} is not {without} at {pass:?}",
+                        effect.name(),
+                        form.name
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn small_sizes_are_continuous_and_all_predictions_finite() {
+    let baseline =
+        Baseline { mu0: 0.6, normal_stiffness_n_per_m: 2e6, lateral_stiffness_n_per_m: 0.8e6 };
+    for effect in library() {
+        for (law, form) in effect.laws().iter().enumerate() {
+            for size in [1e-6, 0.1, 1.0, 4.0, 8.0] {
+                let theta: Vec<f64> = form
+                    .parameters
+                    .iter()
+                    .enumerate()
+                    .map(|(i, p)| p.value(if i == 0 { size } else { 0.3 }))
+                    .collect();
+                for pass in passes() {
+                    let active = [Active { effect: *effect, law, theta: &theta }];
+                    let with = effects::lateral_force(&baseline, &active, &pass, &DESIGN);
+                    assert!(with.is_finite(), "{} ({}) at {size}: {pass:?}", effect.name(), form.name);
+                    if size == 1e-6 {
+                        let without = baseline.lateral_force(&pass, &DESIGN);
+                        assert!(
+                            (with - without).abs() < 2e-3 * without.abs() + 1e-6,
+                            "{} ({}): {with} {without} {pass:?}",
+                            effect.name(),
+                            form.name
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_name_of_the_contract_is_there_once() {
+    let contract = "squeeze_film lateral_recovery ridge_inertia normal_damping load_dependent_friction \
+        contact_ageing rate_dependent_friction adhesion moisture_drift multi_asperity subsurface_relaxation \
+        stiffness_error amplitude_miscalibration amplitude_droop amplitude_saturation resonance_detuning \
+        mode_shape force_crosstalk lateral_offset_drift lateral_gain normal_offset plate_tilt sensor_lag \
+        time_misalignment speed_error speed_ripple";
+    let mut wanted: Vec<&str> = contract.split_whitespace().collect();
+    let mut names: Vec<&str> = library().iter().map(|e| e.name()).collect();
+    wanted.sort_unstable();
+    names.sort_unstable();
+    assert_eq!(wanted, names);
+}
