@@ -7,7 +7,10 @@ pub struct AmplitudeMiscalibration;
 
 static LAWS: [Law; 2] = [
     Law { name: "gain", parameters: &[Parameter::signed("log_gain", "1", 0.3, -1.5, 1.5)] },
-    Law { name: "dead zone", parameters: &[Parameter::signed("missing_amplitude", "m", 0.2e-6, -1e-6, 1e-6)] },
+    Law {
+        name: "dead zone",
+        parameters: &[Parameter::signed("missing_amplitude", "m", 0.2e-6, -1e-6, 1e-6)],
+    },
 ];
 
 impl Effect for AmplitudeMiscalibration {

@@ -53,7 +53,7 @@ pub struct Contact {
     pub normal_retardation_time: f64,
     /// Mass of the ridges that follow the plate, kg. 0 in the baseline.
     pub mass: f64,
-    /// Index into [`crate::impact::DAMPING_RATIOS`] where there is mass.
+    /// Index into [`crate::impact::CLASSES`] where there is mass.
     pub damping_class: usize,
 }
 
@@ -97,11 +97,8 @@ pub fn mean_friction(c: &Contact) -> f64 {
     } else {
         closed_form(c)
     };
-    let inertia = if c.mass > 0.0 && c.amplitude_pp >= STILL_PLATE_M {
-        crate::impact::friction_ratio(c)
-    } else {
-        1.0
-    };
+    let inertia =
+        if c.mass > 0.0 && c.amplitude_pp >= STILL_PLATE_M { crate::impact::friction_ratio(c) } else { 1.0 };
     base * c.friction_factor * inertia
 }
 

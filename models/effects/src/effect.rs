@@ -163,8 +163,16 @@ pub trait Effect: Sync {
     /// What a table must hold before it can be seen.
     fn needs(&self) -> &'static [Need];
     /// Changes what the contact is given. `theta` holds the parameters of the law in its order.
-    fn change(&self, _law: usize, _theta: &[f64], _pass: &Operating, _design: &Design, _contact: &mut Contact) {
+    fn change(
+        &self,
+        _law: usize,
+        _theta: &[f64],
+        _pass: &Operating,
+        _design: &Design,
+        _contact: &mut Contact,
+    ) {
     }
     /// Changes what the instruments make of the friction force.
-    fn read(&self, _law: usize, _theta: &[f64], _pass: &Operating, _design: &Design, _reading: &mut Reading) {}
+    fn read(&self, _law: usize, _theta: &[f64], _pass: &Operating, _design: &Design, _reading: &mut Reading) {
+    }
 }

@@ -10,10 +10,7 @@ static LAWS: [Law; 2] = [
         name: "rate limit",
         parameters: &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)],
     },
-    Law {
-        name: "exponential",
-        parameters: &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)],
-    },
+    Law { name: "exponential", parameters: &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)] },
 ];
 
 impl Effect for LateralRecovery {

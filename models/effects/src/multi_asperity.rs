@@ -7,7 +7,10 @@ pub struct MultiAsperity;
 
 static LAWS: [Law; 2] = [
     Law { name: "Gaussian heights", parameters: &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)] },
-    Law { name: "exponential heights", parameters: &[Parameter::positive("height_scale", "m", 0.5e-6, 6e-6)] },
+    Law {
+        name: "exponential heights",
+        parameters: &[Parameter::positive("height_scale", "m", 0.5e-6, 6e-6)],
+    },
 ];
 
 impl Effect for MultiAsperity {

@@ -6,14 +6,8 @@ use crate::prelude::*;
 pub struct NormalDamping;
 
 static LAWS: [Law; 2] = [
-    Law {
-        name: "Kelvin-Voigt",
-        parameters: &[Parameter::positive("retardation_time", "s", 4e-6, 1e-4)],
-    },
-    Law {
-        name: "constant loss factor",
-        parameters: &[Parameter::positive("loss_factor", "1", 0.6, 10.0)],
-    },
+    Law { name: "Kelvin-Voigt", parameters: &[Parameter::positive("retardation_time", "s", 4e-6, 1e-4)] },
+    Law { name: "constant loss factor", parameters: &[Parameter::positive("loss_factor", "1", 0.6, 10.0)] },
 ];
 
 impl Effect for NormalDamping {

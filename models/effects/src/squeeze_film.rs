@@ -81,7 +81,11 @@ fn film_share(a: f64, air: f64, load: f64) -> f64 {
     for _ in 0..60 {
         let solid = (rest - u).exp();
         let value = solid + lift / (u * u) - 1.0;
-        if value > 0.0 { low = u } else { high = u }
+        if value > 0.0 {
+            low = u
+        } else {
+            high = u
+        }
         let newton = u + value / (solid + 2.0 * lift / (u * u * u));
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         if (next - u).abs() < 1e-10 * u {

@@ -96,9 +96,12 @@ struct Lateral {
 
 impl Lateral {
     fn new(c: &Contact, dt: f64, airborne: f64) -> Self {
-        let rate = if c.inverse_recovery_speed > 0.0 { 1.0 / c.inverse_recovery_speed } else { f64::INFINITY };
+        let rate =
+            if c.inverse_recovery_speed > 0.0 { 1.0 / c.inverse_recovery_speed } else { f64::INFINITY };
         let keep = |time: f64| {
-            if c.lateral_relaxation_time > 0.0 {
+            if time < 1e-15 {
+                1.0
+            } else if c.lateral_relaxation_time > 0.0 {
                 (-time / c.lateral_relaxation_time).exp()
             } else if rate.is_finite() {
                 1.0
@@ -130,6 +133,14 @@ impl Lateral {
                 force = self.stiffness * x;
             } else {
                 force = q;
+                // Slip begins within the step: the trapezoid would cut that corner.
+                let (before, after) = (limit[i - 1] / self.stiffness - x, pulled - bound);
+                if before > 0.0 && after > 0.0 {
+                    let part = before / (before + after);
+                    let corner = self.stiffness * (x + part * self.advance);
+                    let first = (self.stiffness * x).min(limit[i - 1]);
+                    sum += 0.5 * (corner - part * q - (1.0 - part) * first);
+                }
                 x = if x <= bound { bound } else { self.recover(x, bound, self.rate_step, self.keep_step) };
             }
             sum += if i == POINTS { 0.5 * force } else { force };
@@ -182,8 +193,8 @@ fn retarded_contact(load: f64, lag: f64) -> Retarded {
             if meet(middle) >= 0.0 { high = middle } else { low = middle }
         }
         let start = 0.5 * (low + high) - 2.0 * PI;
-        let mean = (start.cos() - end.cos() + depth * (end - start) + lag * (end.sin() - start.sin()))
-            / (2.0 * PI);
+        let mean =
+            (start.cos() - end.cos() + depth * (end - start) + lag * (end.sin() - start.sin())) / (2.0 * PI);
         (mean, Retarded { start, arc: end - start, depth })
     };
     let (mut low, mut high) = (-reach + 1e-9, reach);
@@ -191,7 +202,11 @@ fn retarded_contact(load: f64, lag: f64) -> Retarded {
     for _ in 0..34 {
         let middle = 0.5 * (low + high);
         let (mean, contact) = at(middle);
-        if mean > load { high = middle } else { low = middle }
+        if mean > load {
+            high = middle
+        } else {
+            low = middle
+        }
         best = contact;
         if high - low < 1e-9 {
             break;

@@ -70,16 +70,18 @@ fn finite_recovery_follows_figure_14() {
     }
 }
 
-/// Mass: mu' at the nominal point of physics, critically damped 8 mg and lightly damped 2 and 8 mg.
+/// Mass: an explicit penalty simulation (contact stiffness 100 k_n, critically damped contact, 2000 steps a
+/// cycle, 100 cycles) gave these mu' for a finger of 1 MN/m at the nominal point.
 #[test]
-fn inertia_reduces_friction_as_the_independent_simulation_has_it() {
+fn inertia_agrees_with_a_penalty_simulation() {
     let base = contact(2e-6, 0.02, 0.25, 1e6, 1e6 / 2.66);
-    assert!((relative(&base) - 0.208).abs() < 0.01, "base {}", relative(&base));
-    let heavy = Contact { mass: 8e-6, damping_class: 1, ..base };
-    let light = Contact { mass: 8e-6, damping_class: 0, ..base };
-    println!("8 mg: zeta 1 {} zeta .3 {}", relative(&heavy), relative(&light));
-    assert!(relative(&heavy) < 0.4 * relative(&base));
-    assert!(relative(&light) < 0.3 * relative(&heavy));
+    assert!((relative(&base) - 0.204).abs() < 0.006, "base {}", relative(&base));
+    for (mass, damping_class, expected) in
+        [(2e-6, 0, 0.190), (2e-6, 1, 0.142), (8e-6, 1, 0.088), (8e-6, 0, 0.168)]
+    {
+        let got = relative(&Contact { mass, damping_class, ..base });
+        assert!((got - expected).abs() < 0.06 * expected + 0.004, "{mass} {damping_class}: {got}");
+    }
 }
 
 /// The sweep, asked for what the closed form knows, gives the closed form.
