@@ -69,7 +69,7 @@ fn build(zeta: f64, restitution: f64) -> Table {
                 let carried = if phi >= PI { load } else { arc_load(phi) };
                 let massless = carried - lost_to_stick(phi, drags[k]) / (2.0 * PI);
                 table[(i * RATIOS + j) * DRAGS + k] =
-                    (friction[k].max(1e-4 * massless) / massless).ln() as f32;
+                    (friction[k].max(0.02 * massless) / massless).ln() as f32;
             }
         }
     }
