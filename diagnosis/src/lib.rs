@@ -1,1 +1,16 @@
 //! Where simulation and reality part, and why.
+//!
+//! [`data`] takes the table, [`noise`] settles the variance of each pass, [`hypotheses`] fits every candidate
+//! cause and the open set, [`shrink`] asks how each does on passes it has not seen.
+
+pub mod attribute;
+pub mod data;
+pub mod evidence;
+pub mod explore;
+pub mod fit;
+pub mod hypotheses;
+pub mod linear;
+pub mod noise;
+pub mod shrink;
+pub mod smooth;
+pub mod wildcard;

@@ -96,6 +96,8 @@ def lateral(s, fo):
     x = np.zeros(n)
     age = np.zeros(n)
     touching_all = (fo > 0).all(1)
+    # A finger that never leaves starts fully stretched: it slips into its steady state within the cycle.
+    x = np.where(touching_all, s.mu * fo.max(1) / s.kl, x)
     mean = np.zeros(n)
     cycles = 60 if ("vr" in ex or "tau_l" in ex) else 3
     for c in range(cycles):

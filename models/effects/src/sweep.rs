@@ -21,17 +21,19 @@ pub fn mean_friction(c: &Contact) -> f64 {
     let (arc, airborne) = if c.normal_retardation_time > 0.0 {
         let lag = omega * c.normal_retardation_time;
         let contact = retarded_contact(load, lag);
-        for (i, f) in force.iter_mut().enumerate() {
-            let theta = contact.start + contact.arc * i as f64 / POINTS as f64;
-            *f = scale * (theta.sin() + contact.depth + lag * theta.cos()).max(0.0) + c.adhesion;
+        let mut turn = Turn::new(contact.start, contact.arc / POINTS as f64);
+        for f in &mut force {
+            *f = scale * (turn.sin + contact.depth + lag * turn.cos).max(0.0) + c.adhesion;
+            turn.step();
         }
         (contact.arc, 2.0 * PI - contact.arc)
     } else {
         let phi = half_contact_angle(load, pull);
         let offset = if phi >= PI { load + pull } else { -phi.cos() };
-        for (i, f) in force.iter_mut().enumerate() {
-            let psi = -phi + 2.0 * phi * i as f64 / POINTS as f64;
-            *f = scale * (psi.cos() + offset).max(0.0);
+        let mut turn = Turn::new(-phi, 2.0 * phi / POINTS as f64);
+        for f in &mut force {
+            *f = scale * (turn.cos + offset).max(0.0);
+            turn.step();
         }
         (2.0 * phi, 2.0 * (PI - phi))
     };
@@ -82,6 +84,24 @@ pub fn mean_friction(c: &Contact) -> f64 {
         }
     }
     mean * arc / (2.0 * PI)
+}
+
+/// Sine and cosine of equally spaced phases by rotation.
+struct Turn {
+    sin: f64,
+    cos: f64,
+    by: (f64, f64),
+}
+
+impl Turn {
+    fn new(start: f64, step: f64) -> Self {
+        let (sin, cos) = start.sin_cos();
+        Self { sin, cos, by: step.sin_cos() }
+    }
+    fn step(&mut self) {
+        let (s, c) = self.by;
+        (self.sin, self.cos) = (self.sin * c + self.cos * s, self.cos * c - self.sin * s);
+    }
 }
 
 /// The lateral spring during one contact.
@@ -171,46 +191,54 @@ fn retarded_contact(load: f64, lag: f64) -> Retarded {
     let at = |depth: f64| -> (f64, Retarded) {
         let end = peak + (-depth / reach).clamp(-1.0, 1.0).acos();
         let left = end.sin() + depth; // compression at lift-off, recovering exponentially
-        // The skin meets the plate again on its way up: bracket between lift-off and the next peak of force.
         let meet = |theta: f64| theta.sin() + depth - left * (-(theta - end) / lag).exp();
-        let (mut low, mut high) = (end + 1e-9, end);
-        // March until the plate is above the skin again.
-        let mut previous = low;
-        for k in 1..=24 {
-            let theta = end + (2.0 * PI) * k as f64 / 24.0;
-            if meet(theta) >= 0.0 && theta.cos() > 0.0 {
-                low = previous;
-                high = theta;
-                break;
-            }
-            previous = theta;
-        }
-        if high <= low {
-            return (load + 1.0, Retarded { start: peak - PI, arc: 2.0 * PI, depth });
-        }
-        for _ in 0..22 {
-            let middle = 0.5 * (low + high);
-            if meet(middle) >= 0.0 { high = middle } else { low = middle }
-        }
-        let start = 0.5 * (low + high) - 2.0 * PI;
-        let mean =
-            (start.cos() - end.cos() + depth * (end - start) + lag * (end.sin() - start.sin())) / (2.0 * PI);
+        // The skin meets the plate again between the plate's lowest point and its next highest.
+        let lowest = if meet(1.5 * PI) < 0.0 { 1.5 * PI } else { end + 1e-6 };
+        let Some(again) = root(lowest, 2.5 * PI, 1e-8, meet) else {
+            return (0.0, Retarded { start: end - 2.0 * PI, arc: 1e-6, depth });
+        };
+        let start = again - 2.0 * PI;
+        let mean = (start.cos() - end.cos() + depth * (end - start) + lag * (end.sin() - start.sin()))
+            / (2.0 * PI);
         (mean, Retarded { start, arc: end - start, depth })
     };
-    let (mut low, mut high) = (-reach + 1e-9, reach);
-    let mut best = at(0.5 * (low + high)).1;
-    for _ in 0..34 {
-        let middle = 0.5 * (low + high);
-        let (mean, contact) = at(middle);
-        if mean > load {
-            high = middle
-        } else {
-            low = middle
-        }
-        best = contact;
-        if high - low < 1e-9 {
+    match root(-reach + 1e-9, reach - 1e-9, 1e-9, |depth| at(depth).0 - load) {
+        Some(depth) => at(depth).1,
+        // Between a contact that lasts almost the whole cycle and one that never ends.
+        None => Retarded { start: peak - PI, arc: 2.0 * PI, depth: load },
+    }
+}
+
+/// Root of a function that rises through zero between two ends, by regula falsi (Illinois).
+fn root(low: f64, high: f64, width: f64, f: impl Fn(f64) -> f64) -> Option<f64> {
+    let (mut a, mut b) = (low, high);
+    let (mut fa, mut fb) = (f(a), f(b));
+    if !(fa <= 0.0 && fb >= 0.0) {
+        return None;
+    }
+    let mut side = 0;
+    for _ in 0..60 {
+        if b - a < width || fb == fa {
             break;
         }
+        let x = (a * fb - b * fa) / (fb - fa);
+        let fx = f(x);
+        if fx.abs() < 1e-10 {
+            return Some(x);
+        }
+        if fx > 0.0 {
+            (b, fb) = (x, fx);
+            if side == 1 {
+                fa *= 0.5;
+            }
+            side = 1;
+        } else {
+            (a, fa) = (x, fx);
+            if side == -1 {
+                fb *= 0.5;
+            }
+            side = -1;
+        }
     }
-    best
+    Some(0.5 * (a + b))
 }

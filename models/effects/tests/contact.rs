@@ -138,3 +138,14 @@ fn adhesion_adds_to_the_limit() {
     assert!((moving(1e-9) - moving(0.0)).abs() < 1e-6 * moving(0.0));
     assert!(moving(0.1) > moving(0.0));
 }
+
+/// The tabulated angle is the root of the load balance.
+#[test]
+fn tabulated_angle_balances_the_load() {
+    for i in 1..20_000 {
+        let load = (i as f64 / 20_000.0).powi(3);
+        let phi = effects::contact::half_contact_angle(load, 0.0);
+        let back = effects::contact::arc_load(phi);
+        assert!((back - load).abs() < 2e-7 * load + 1e-12, "{load}: {phi} gives {back}");
+    }
+}

@@ -1,0 +1,96 @@
+//! Which: from probabilities to a verdict, with what cannot be told apart said so.
+
+use crate::hypotheses::{Candidate, Fitted};
+use crate::shrink::{Gate, Region, gate, left_out_regions};
+
+/// The four answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The recalibrated baseline explains the table.
+    NoGap,
+    /// One effect, or one pair, causes most of the gap.
+    Named,
+    /// The leading hypotheses cannot be told apart on this table.
+    Ambiguous,
+    /// No effect of the library causes most of the gap.
+    Unknown,
+}
+
+/// The decision and what it rests on.
+pub struct Decision {
+    /// The answer.
+    pub verdict: Verdict,
+    /// Probability of no gap, after the regions have spoken.
+    pub none: f64,
+    /// Probability of the open set, after the regions have spoken.
+    pub unknown: f64,
+    /// Probabilities of the candidates, in their order, after the regions have spoken.
+    pub probabilities: Vec<f64>,
+    /// Indices of the leader's alias class among the candidates, the leader first.
+    pub class: Vec<usize>,
+    /// What the left-out regions say about the leader.
+    pub gate: Gate,
+    /// Those regions.
+    pub regions: Vec<Region>,
+}
+
+/// Nats within which the data does not tell two hypotheses apart (chi2 of 10).
+const ALIAS_NATS: f64 = 5.0;
+/// Probability that a name needs.
+const NAME: f64 = 0.9;
+/// Probability of no gap above which none is claimed.
+const NO_CLAIM: f64 = 0.1;
+/// Share of a candidate's probability that survives when its regions fail.
+const FAILED_GATE: f64 = 0.03;
+/// Share of the gap that the best single must leave before a pair is believed.
+const PAIR_GAIN: f64 = 0.2;
+
+/// Decides.
+pub fn decide(fitted: &Fitted) -> Decision {
+    let candidates = &fitted.candidates;
+    let mut probabilities: Vec<f64> = candidates.iter().map(|c| c.probability).collect();
+    let (none, mut unknown) = (fitted.none_probability, fitted.unknown_probability);
+    let leader = (0..candidates.len())
+        .max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)))
+        .expect("the library is not empty");
+    let regions = left_out_regions(fitted, &candidates[leader].best);
+    let judged = gate(&regions);
+    let claimed = none < NO_CLAIM;
+    if claimed && !judged.passes() {
+        // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
+        for p in &mut probabilities {
+            unknown += *p * (1.0 - FAILED_GATE);
+            *p *= FAILED_GATE;
+        }
+    }
+    let class = alias_class(candidates, leader);
+    let in_class: f64 = class.iter().map(|&i| probabilities[i]).sum();
+    let verdict = if !claimed || none >= in_class.max(unknown) {
+        Verdict::NoGap
+    } else if unknown >= in_class {
+        Verdict::Unknown
+    } else if in_class >= NAME && (class.len() == 1 || probabilities[leader] >= NAME) {
+        Verdict::Named
+    } else {
+        Verdict::Ambiguous
+    };
+    Decision { verdict, none, unknown, probabilities, class, gate: judged, regions }
+}
+
+/// The leader and every hypothesis of its size that the data does not tell from it.
+fn alias_class(candidates: &[Candidate], leader: usize) -> Vec<usize> {
+    let mut class = vec![leader];
+    let own = &candidates[leader];
+    class.extend((0..candidates.len()).filter(|&i| {
+        i != leader
+            && candidates[i].effects.len() == own.effects.len()
+            && own.log_evidence - candidates[i].log_evidence < ALIAS_NATS
+    }));
+    class
+}
+
+/// True where a pair earns its second name: the best single of its members leaves a fifth of the gap.
+pub fn pair_earns(single_left: f64, pair_left: f64, gap: f64) -> bool {
+    gap > 0.0 && (single_left - pair_left) / gap >= PAIR_GAIN * PAIR_GAIN
+}

@@ -1,0 +1,326 @@
+//! The table as the diagnosis sees it: what was measured, and what the design can show.
+
+use effects::{Design, Need, Operating};
+use models::record::Pass;
+use serde::{Deserialize, Serialize};
+
+/// What rig.toml states about the finger, the noise and the certificates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rig {
+    /// The finger's calibration.
+    pub finger: models::finger::Finger,
+    /// The repeatability.
+    #[serde(default)]
+    pub noise: Noise,
+    /// Certificates that narrow what can be blamed.
+    #[serde(default)]
+    pub calibration: Certificates,
+}
+
+/// Stated repeatability.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Noise {
+    /// Repeatability of the lateral force from pass to pass, relative.
+    pub pass_relative_sd: f64,
+    /// Noise of a pass's mean force, each axis, N.
+    pub force_sd_n: f64,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Noise { pass_relative_sd: 0.015, force_sd_n: 0.0008 }
+    }
+}
+
+/// Standard uncertainties from outside calibrations; `None` where there is no certificate.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Certificates {
+    /// Of the amplitude's gain (vibrometer), relative.
+    #[serde(default)]
+    pub amplitude_gain_sd: Option<f64>,
+    /// Of the lateral force's gain (dead weight), relative.
+    #[serde(default)]
+    pub lateral_gain_sd: Option<f64>,
+    /// Of the speed (encoder), relative.
+    #[serde(default)]
+    pub speed_gain_sd: Option<f64>,
+    /// Of the normal force's zero, N.
+    #[serde(default)]
+    pub normal_offset_sd_n: Option<f64>,
+    /// Of the level of the plate in the sensor's frame, rad.
+    #[serde(default)]
+    pub tilt_sd_rad: Option<f64>,
+    /// Of the cross-talk, as a share.
+    #[serde(default)]
+    pub crosstalk_sd: Option<f64>,
+}
+
+impl Rig {
+    /// The certificate that bounds the size of an effect's law, where there is one.
+    pub fn certified_sd(&self, effect: &str, law: usize) -> Option<f64> {
+        let c = &self.calibration;
+        match (effect, law) {
+            ("amplitude_miscalibration", 0) => c.amplitude_gain_sd,
+            ("lateral_gain", 0) => c.lateral_gain_sd,
+            ("speed_error", 0) => c.speed_gain_sd,
+            ("normal_offset", 0) => c.normal_offset_sd_n,
+            ("plate_tilt", 0) => c.tilt_sd_rad,
+            ("force_crosstalk", _) => c.crosstalk_sd,
+            _ => None,
+        }
+    }
+}
+
+/// A table that the diagnosis refuses, and what would mend it.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum DataError {
+    /// Too few passes to say anything.
+    #[error("{0} passes with a lateral force; at least 12 are needed")]
+    TooFew(usize),
+    /// A value no pass can have.
+    #[error("point {point}: {column} = {value}; {needed} is needed")]
+    BadValue {
+        /// Number of the point.
+        point: u64,
+        /// Column.
+        column: &'static str,
+        /// The value.
+        value: f64,
+        /// What would be accepted.
+        needed: &'static str,
+    },
+    /// A point number that stands twice.
+    #[error("point {0} stands twice; number the points apart")]
+    DoublePoint(u64),
+}
+
+/// Passes in the order of measurement, with the groups that are held out together.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// Numbers of the points.
+    pub points: Vec<u64>,
+    /// Conditions.
+    pub passes: Vec<Operating>,
+    /// Measured lateral force, N (zero in a table of conditions).
+    pub lateral: Vec<f64>,
+    /// Run of each pass, numbered in the order of appearance.
+    pub runs: Vec<usize>,
+    /// Number of runs that the table tells apart.
+    pub run_count: usize,
+    /// Reference scales.
+    pub design: Design,
+}
+
+impl Table {
+    /// Takes a table of measured passes.
+    ///
+    /// # Errors
+    /// Fewer than 12 passes, values that no pass can have, points that stand twice.
+    pub fn measured(passes: &[Pass]) -> Result<Self, DataError> {
+        let kept: Vec<&Pass> = passes.iter().filter(|p| p.lateral_force_n.is_some()).collect();
+        if kept.len() < 12 {
+            return Err(DataError::TooFew(kept.len()));
+        }
+        Self::build(kept, None)
+    }
+
+    /// Takes a table of conditions to predict, on the scales of the table that was diagnosed.
+    ///
+    /// # Errors
+    /// Values that no pass can have, points that stand twice.
+    pub fn conditions(passes: &[Pass], origin: &Origin) -> Result<Self, DataError> {
+        Self::build(passes.iter().collect(), Some(origin))
+    }
+
+    fn build(mut rows: Vec<&Pass>, origin: Option<&Origin>) -> Result<Self, DataError> {
+        // Row order carries no meaning: the order of measurement is time, ties by number.
+        rows.sort_by(|a, b| a.time_s.total_cmp(&b.time_s).then(a.point.cmp(&b.point)));
+        let mut numbers: Vec<u64> = rows.iter().map(|p| p.point).collect();
+        numbers.sort_unstable();
+        if let Some(pair) = numbers.windows(2).find(|w| w[0] == w[1]) {
+            return Err(DataError::DoublePoint(pair[0]));
+        }
+        for p in &rows {
+            check(p)?;
+        }
+        let start = origin.map_or_else(|| rows.first().map_or(0.0, |p| p.time_s), |o| o.time_s);
+        let mut names: Vec<(Option<&str>, f64)> = Vec::new();
+        let mut runs = Vec::with_capacity(rows.len());
+        for p in &rows {
+            let name = p.run.as_deref();
+            let index = names.iter().position(|(n, _)| *n == name).unwrap_or_else(|| {
+                names.push((name, p.time_s));
+                names.len() - 1
+            });
+            runs.push(index);
+        }
+        let starts: Vec<f64> = names
+            .iter()
+            .map(|(name, first)| {
+                origin
+                    .and_then(|o| o.runs.iter().find(|(n, _)| n.as_deref() == *name))
+                    .map_or(*first, |(_, t)| *t)
+            })
+            .collect();
+        let passes: Vec<Operating> = rows
+            .iter()
+            .zip(&runs)
+            .map(|(p, &run)| Operating {
+                time_s: p.time_s - start,
+                run_time_s: p.time_s - starts[run],
+                amplitude_pp_m: p.amplitude.metres(),
+                frequency_hz: p.frequency_hz,
+                speed_m_s: p.speed_m_s,
+                direction: p.direction.sign(),
+                position_m: p.position_m,
+                normal_force_n: p.normal_force_n,
+                ambient_pressure_pa: p.ambient_pressure_pa,
+                temperature_c: p.temperature_c,
+                relative_humidity_pct: p.relative_humidity_pct,
+            })
+            .collect();
+        let design = origin.map_or_else(|| scales(&passes), |o| o.design);
+        Ok(Table {
+            points: rows.iter().map(|p| p.point).collect(),
+            lateral: rows.iter().map(|p| p.lateral_force_n.unwrap_or(0.0)).collect(),
+            passes,
+            run_count: names.len(),
+            runs,
+            design,
+        })
+    }
+
+    /// Number of passes.
+    pub fn len(&self) -> usize {
+        self.passes.len()
+    }
+
+    /// True without passes.
+    pub fn is_empty(&self) -> bool {
+        self.passes.is_empty()
+    }
+
+    /// `sum(direction L F) / sum(F^2)` over the passes with the plate still; `None` without such passes.
+    pub fn still_coefficient(&self) -> Option<f64> {
+        let (mut top, mut bottom) = (0.0, 0.0);
+        for (p, l) in self.passes.iter().zip(&self.lateral) {
+            if p.amplitude_pp_m == 0.0 {
+                top += p.direction * l * p.normal_force_n;
+                bottom += p.normal_force_n * p.normal_force_n;
+            }
+        }
+        (bottom > 0.0 && top > 0.0).then(|| top / bottom)
+    }
+
+    /// The first need of an effect that this table does not meet, in words.
+    pub fn lacks(&self, needs: &[Need]) -> Option<String> {
+        let p = &self.passes;
+        let spread = |f: &dyn Fn(&Operating) -> f64| -> f64 {
+            let vibrating = p.iter().filter(|q| q.amplitude_pp_m > 0.0);
+            let (low, high) = vibrating.fold((f64::INFINITY, 0.0f64), |(a, b), q| (a.min(f(q)), b.max(f(q))));
+            if low > 0.0 { high / low } else { f64::INFINITY }
+        };
+        needs.iter().find_map(|need| {
+            let missing = match need {
+                Need::Vibration => !p.iter().any(|q| q.amplitude_pp_m > 0.0),
+                Need::Amplitudes => spread(&|q| q.amplitude_pp_m) < 1.2,
+                Need::Loads => spread(&|q| q.normal_force_n) < 1.25,
+                Need::Speeds => spread(&|q| q.speed_m_s) < 1.3,
+                Need::Directions => {
+                    !(p.iter().any(|q| q.direction > 0.0) && p.iter().any(|q| q.direction < 0.0))
+                }
+                Need::Positions => self.design.stroke_m < 1e-3,
+                Need::Time => self.design.duration_s <= 0.0,
+                Need::Record | Need::OutsideStandard => true,
+            };
+            missing.then(|| {
+                match need {
+                    Need::Vibration => "no pass has the plate vibrating",
+                    Need::Amplitudes => "a second amplitude is missing",
+                    Need::Loads => "normal forces differ by less than a quarter: a second load is missing",
+                    Need::Speeds => "speeds differ by less than a third: a second speed is missing",
+                    Need::Directions => "only one direction was measured: passes in reverse are missing",
+                    Need::Positions => "all passes lie at one position_m: a second place is missing",
+                    Need::Time => "all passes carry one time_s",
+                    Need::Record => "means over passes do not show it; a time-resolved run record is missing",
+                    Need::OutsideStandard => {
+                        "an exact alias of mu0 and lateral stiffness; a dead-weight certificate of the lateral axis is missing"
+                    }
+                }
+                .to_string()
+            })
+        })
+    }
+
+    /// Where time starts and what the scales are, for tables of conditions that belong to this one.
+    pub fn origin(&self, passes: &[Pass]) -> Origin {
+        let start = passes
+            .iter()
+            .filter(|p| p.lateral_force_n.is_some())
+            .map(|p| p.time_s)
+            .fold(f64::INFINITY, f64::min);
+        let mut runs: Vec<(Option<String>, f64)> = Vec::new();
+        for p in passes.iter().filter(|p| p.lateral_force_n.is_some()) {
+            match runs.iter_mut().find(|(n, _)| *n == p.run) {
+                Some((_, t)) => *t = t.min(p.time_s),
+                None => runs.push((p.run.clone(), p.time_s)),
+            }
+        }
+        Origin { time_s: start, runs, design: self.design }
+    }
+}
+
+/// Where the time of a table starts, and its scales.
+#[derive(Debug, Clone)]
+pub struct Origin {
+    time_s: f64,
+    runs: Vec<(Option<String>, f64)>,
+    design: Design,
+}
+
+fn check(p: &Pass) -> Result<(), DataError> {
+    let refuse = |column, value, needed| Err(DataError::BadValue { point: p.point, column, value, needed });
+    for (column, value) in [
+        ("frequency_hz", p.frequency_hz),
+        ("speed_m_s", p.speed_m_s),
+        ("normal_force_n", p.normal_force_n),
+    ] {
+        if !(value.is_finite() && value > 0.0) {
+            return refuse(column, value, "a finite number above zero");
+        }
+    }
+    let w = p.amplitude.metres();
+    if !(w.is_finite() && w >= 0.0) {
+        return refuse("amplitude_pp_m", w, "a finite number, zero or more");
+    }
+    if !p.time_s.is_finite() {
+        return refuse("time_s", p.time_s, "a finite number");
+    }
+    if let Some(l) = p.lateral_force_n.filter(|l| !l.is_finite()) {
+        return refuse("lateral_force_n", l, "a finite number");
+    }
+    Ok(())
+}
+
+fn scales(passes: &[Operating]) -> Design {
+    let mean = |f: &dyn Fn(&Operating) -> f64| {
+        (passes.iter().map(|p| f(p).ln()).sum::<f64>() / passes.len().max(1) as f64).exp()
+    };
+    let range = |f: &dyn Fn(&Operating) -> f64| {
+        let (low, high) = passes
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(f(p)), b.max(f(p))));
+        (high - low).max(0.0)
+    };
+    Design {
+        duration_s: range(&|p| p.time_s),
+        reference_load_n: mean(&|p| p.normal_force_n),
+        reference_speed_m_s: mean(&|p| p.speed_m_s),
+        reference_frequency_hz: mean(&|p| p.frequency_hz),
+        reference_temperature_c: passes.iter().find_map(|p| p.temperature_c).unwrap_or(20.0),
+        stroke_m: range(&|p| p.position_m),
+        largest_amplitude_m: passes.iter().map(|p| p.amplitude_pp_m).fold(0.0, f64::max),
+    }
+}

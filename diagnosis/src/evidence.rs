@@ -1,0 +1,218 @@
+//! The evidence of a hypothesis whose cause need not have exactly the library's form.
+//!
+//! `y = m(phi, theta) + s D delta + noise`: D is the effect's change net of what recalibrating the baseline
+//! could imitate, delta a smooth Gaussian process of unit variance over the operating space, s on a grid.
+//! The integral over the parameters is Laplace's, with the half-line of a size that cannot be negative.
+
+use crate::fit::{Fit, Member, NUISANCES, Problem, bounded_step};
+use crate::linear::{Covariance, log_sum_exp};
+use effects::Prior;
+use nalgebra::{DMatrix, DVector};
+use statrs::function::erf::erfc;
+
+/// Shares of its own change by which a cause may depart from its form, with their prior weights.
+pub const FORMS: [(f64, f64); 3] = [(0.05, 0.4), (0.15, 0.4), (0.35, 0.2)];
+
+/// One hypothesis at its best, with form uncertainty `share`.
+#[derive(Clone)]
+pub struct Explained {
+    /// Members and their laws.
+    pub members: Vec<Member>,
+    /// Coordinates.
+    pub u: Vec<f64>,
+    /// Share of form uncertainty.
+    pub share: f64,
+    /// Log evidence.
+    pub log_evidence: f64,
+    /// Prediction of the form itself, N.
+    pub prediction: DVector<f64>,
+    /// The effect's change net of recalibration, N.
+    pub change: DVector<f64>,
+    /// Posterior covariance of the coordinates.
+    pub covariance: DMatrix<f64>,
+    /// Weights of the smooth departure from the form, on the form basis.
+    pub departure: DVector<f64>,
+}
+
+/// The effect's change net of recalibration: `m - m0` less what the nuisances, under their priors, can take up.
+pub fn net_change(problem: &Problem, u: &[f64], prediction: &DVector<f64>) -> DVector<f64> {
+    let (raw, jacobian, shift) = recalibration(problem, u, prediction);
+    raw - jacobian * shift
+}
+
+/// Raw change, the baseline's nuisance Jacobian, and the recalibration that imitates the change best.
+pub fn recalibration(
+    problem: &Problem,
+    u: &[f64],
+    prediction: &DVector<f64>,
+) -> (DVector<f64>, DMatrix<f64>, DVector<f64>) {
+    let nuisance = &u[..NUISANCES];
+    let baseline = problem.predict(&[], nuisance);
+    let jacobian = problem.jacobian(&[], nuisance, &baseline);
+    let raw = prediction - &baseline;
+    let mut weighted = jacobian.clone();
+    for (i, v) in problem.variance.iter().enumerate() {
+        for k in 0..NUISANCES {
+            weighted[(i, k)] /= *v;
+        }
+    }
+    let t = weighted.transpose();
+    let hessian = &t * &jacobian + DMatrix::identity(NUISANCES, NUISANCES);
+    let target = &t * &raw - DVector::from_column_slice(nuisance);
+    let shift = hessian.cholesky().map_or_else(|| DVector::zeros(NUISANCES), |c| c.solve(&target));
+    (raw, jacobian, shift)
+}
+
+fn form_matrix(change: &DVector<f64>, basis: &DMatrix<f64>, share: f64) -> DMatrix<f64> {
+    let mut phi = basis.clone();
+    for mut column in phi.column_iter_mut() {
+        column.component_mul_assign(change);
+        column.scale_mut(share);
+    }
+    phi
+}
+
+/// Improves a fit under the covariance of one share and gives its evidence. `members` may be empty (no gap):
+/// then there is no form uncertainty.
+pub fn explain(
+    problem: &Problem,
+    members: &[Member],
+    start: &[f64],
+    basis: &DMatrix<f64>,
+    share: f64,
+    rounds: usize,
+) -> Explained {
+    let n = problem.len();
+    let bounds = problem.bounds(members);
+    let precision = problem.prior_precision(members);
+    let empty = DMatrix::zeros(n, 0);
+    let mut u = start.to_vec();
+    let mut m = problem.predict(members, &u);
+    let y = DVector::from_column_slice(&problem.lateral);
+    let zero = DVector::zeros(n);
+    let mut change = if members.is_empty() { zero.clone() } else { net_change(problem, &u, &m) };
+    let build = |change: &DVector<f64>| {
+        if members.is_empty() {
+            Covariance::new(&problem.variance, &empty)
+        } else {
+            Covariance::new(&problem.variance, &form_matrix(change, basis, share))
+        }
+    };
+    let penalty =
+        |u: &[f64]| -> f64 { u.iter().zip(&precision).map(|(x, p)| p * x * x).sum() };
+    let mut covariance = build(&change);
+    let mut cost = covariance.quadratic(&(&y - &m)) + covariance.log_det() + penalty(&u);
+    let mut damping = 1e-3;
+    let mut jacobian = problem.jacobian(members, &u, &m);
+    for _ in 0..rounds {
+        let (hessian, gradient) = equations(&covariance, &jacobian, &(&y - &m), &precision, &u);
+        let mut gained = 0.0;
+        for _ in 0..4 {
+            let Some(next) = bounded_step(&hessian, &gradient, damping, &u, &bounds) else { break };
+            let there = problem.predict(members, &next);
+            let moved = if members.is_empty() { zero.clone() } else { net_change(problem, &next, &there) };
+            let trial = build(&moved);
+            let value = trial.quadratic(&(&y - &there)) + trial.log_det() + penalty(&next);
+            if value < cost {
+                gained = cost - value;
+                (u, m, change, covariance, cost) = (next, there, moved, trial, value);
+                damping = (damping * 0.1).max(1e-9);
+                break;
+            }
+            damping = (damping * 20.0).min(1e6);
+        }
+        if gained == 0.0 {
+            break;
+        }
+        jacobian = problem.jacobian(members, &u, &m);
+        if gained < 0.05 {
+            break;
+        }
+    }
+    let residual = &y - &m;
+    let (hessian, gradient) = equations(&covariance, &jacobian, &residual, &precision, &u);
+    let log_2pi = 1.837_877_066_409_345_3;
+    let d = u.len() as f64;
+    let mut log_evidence = -0.5 * (covariance.quadratic(&residual) + covariance.log_det() + n as f64 * log_2pi)
+        + problem.log_prior(members, &u)
+        + 0.5 * d * log_2pi;
+    let posterior = match hessian.clone().cholesky() {
+        Some(factor) => {
+            log_evidence -= factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+            factor.inverse()
+        }
+        None => {
+            log_evidence = f64::NEG_INFINITY;
+            DMatrix::identity(u.len(), u.len())
+        }
+    };
+    let mut at = NUISANCES;
+    for member in members {
+        if let Prior::HalfNormal(_) = member.parameters()[0].prior {
+            // At the bound the optimum may lie beyond: the quadratic is integrated over the half line.
+            let sd = posterior[(at, at)].sqrt();
+            let beyond = if u[at] <= bounds[at].0 { gradient[at].max(0.0) * sd } else { 0.0 };
+            log_evidence += log_half_line(u[at] / sd, beyond);
+        }
+        at += member.parameters().len();
+    }
+    let departure =
+        if members.is_empty() { DVector::zeros(0) } else { covariance.weights(&residual) };
+    Explained {
+        members: members.to_vec(),
+        u,
+        share,
+        log_evidence,
+        prediction: m,
+        change,
+        covariance: posterior,
+        departure,
+    }
+}
+
+/// `ln` of the integral of a unit Gaussian with slope `beyond` over the half line from `-reach`.
+fn log_half_line(reach: f64, beyond: f64) -> f64 {
+    let z = reach - beyond;
+    // ln(exp(b^2/2) Phi(z)); for large b the two nearly cancel: Mills' ratio.
+    if z < -6.0 {
+        0.5 * beyond * beyond - 0.5 * z * z - (-z).ln() - 0.918_938_533_204_672_8 - (1.0 / (z * z))
+    } else {
+        0.5 * beyond * beyond + (0.5 * erfc(-z / std::f64::consts::SQRT_2)).max(1e-300).ln()
+    }
+}
+
+fn equations(
+    covariance: &Covariance,
+    jacobian: &DMatrix<f64>,
+    residual: &DVector<f64>,
+    precision: &[f64],
+    u: &[f64],
+) -> (DMatrix<f64>, DVector<f64>) {
+    let d = u.len();
+    let mut joined = jacobian.clone().insert_columns(d, 1, 0.0);
+    joined.set_column(d, residual);
+    let all = covariance.inner(&joined, &joined);
+    let mut hessian = all.view((0, 0), (d, d)).into_owned();
+    for k in 0..d {
+        hessian[(k, k)] += precision[k];
+    }
+    let gradient = DVector::from_fn(d, |k, _| -all[(k, d)] + precision[k] * u[k]);
+    (hessian, gradient)
+}
+
+/// Evidence of a hypothesis averaged over the shares of form uncertainty, with the best share's solution.
+pub fn over_forms(problem: &Problem, fit: &Fit, members: &[Member], basis: &DMatrix<f64>) -> (f64, Explained) {
+    if members.is_empty() {
+        let e = explain(problem, members, &fit.u, basis, 0.0, 4);
+        return (e.log_evidence, e);
+    }
+    let middle = explain(problem, members, &fit.u, basis, FORMS[1].0, 6);
+    let low = explain(problem, members, &middle.u, basis, FORMS[0].0, 4);
+    let high = explain(problem, members, &middle.u, basis, FORMS[2].0, 3);
+    let list = [low, middle, high];
+    let weighted: Vec<f64> = list.iter().zip(FORMS).map(|(e, (_, w))| e.log_evidence + w.ln()).collect();
+    let total = log_sum_exp(&weighted);
+    let best = (0..3).max_by(|&a, &b| weighted[a].total_cmp(&weighted[b])).expect("three shares");
+    let [a, b, c] = list;
+    (total, [a, b, c].into_iter().nth(best).expect("three shares"))
+}

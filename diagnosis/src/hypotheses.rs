@@ -1,0 +1,309 @@
+//! The hypotheses: no gap, each effect, pairs, and the open set; fitted, with their probabilities.
+
+use crate::data::{Rig, Table};
+use crate::evidence::{Explained, FORMS, explain, over_forms};
+use crate::explore::{held_nuisances, optima, tempered};
+use crate::fit::{Fit, Member, Problem, minimise};
+use crate::linear::log_sum_exp;
+use crate::noise::{PureError, settle};
+use crate::smooth::{Coordinates, Kernel, Lengths};
+use crate::wildcard::Wildcard;
+use effects::library;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// Prior probabilities of no gap, of one effect, of two, and of none in the library.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Priors {
+    /// No gap.
+    pub none: f64,
+    /// One effect of the library.
+    pub single: f64,
+    /// Two effects of the library.
+    pub pair: f64,
+    /// Something else.
+    pub unknown: f64,
+}
+
+impl Default for Priors {
+    fn default() -> Self {
+        Priors { none: 0.3, single: 0.5, pair: 0.1, unknown: 0.1 }
+    }
+}
+
+/// What a diagnosis may be told.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Prior probabilities.
+    pub priors: Priors,
+    /// Whether pairs are tried.
+    pub pairs: bool,
+    /// Effects that are left out of the library (for leave-one-effect-out tests).
+    pub without: Vec<String>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options { priors: Priors::default(), pairs: true, without: Vec::new() }
+    }
+}
+
+/// One hypothesis with effects: its evidence over laws and shares, and its best law.
+#[derive(Clone)]
+pub struct Candidate {
+    /// Indices in the library, ascending; one or two.
+    pub effects: Vec<usize>,
+    /// Log evidence averaged over laws and shares.
+    pub log_evidence: f64,
+    /// The best law and share.
+    pub best: Explained,
+    /// Each law's own log evidence and solution.
+    pub laws: Vec<(f64, Explained)>,
+    /// Probability given the data.
+    pub probability: f64,
+}
+
+impl Candidate {
+    /// Names in the library's order.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.effects.iter().map(|&e| library()[e].name()).collect()
+    }
+}
+
+/// Everything that was fitted to a table.
+pub struct Fitted {
+    /// The problem with its settled variances.
+    pub problem: Problem,
+    /// What the replicates said.
+    pub pure: PureError,
+    /// Recalibrated baseline.
+    pub none: Explained,
+    /// Probability of no gap.
+    pub none_probability: f64,
+    /// The open set.
+    pub wildcard: Wildcard,
+    /// Its probability.
+    pub unknown_probability: f64,
+    /// Single effects and pairs, most probable first.
+    pub candidates: Vec<Candidate>,
+    /// Effects that this table cannot show, with what is missing.
+    pub not_testable: Vec<(&'static str, String)>,
+    /// Covariates of the form uncertainty.
+    pub coordinates: Coordinates,
+    /// Kernel of the form uncertainty.
+    pub kernel: Kernel,
+    /// Its values at the table's passes.
+    pub basis: DMatrix<f64>,
+    /// The priors that were used.
+    pub priors: Priors,
+    /// Number of single effects that were tried.
+    pub singles_tried: usize,
+}
+
+/// Lengths of the form uncertainty in standard deviations of each covariate.
+pub const FORM_LENGTHS: Lengths = Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY };
+const FORM_RANK: usize = 40;
+/// Share of the smooth gap below which starts do not look.
+const START_SHARE: f64 = 0.15;
+/// Laws this many nats behind the best single keep the middle share only.
+const PRUNE: f64 = 15.0;
+/// A law whose tempered cost is beyond this factor of the best, plus this, is not refined.
+const HOPELESS: (f64, f64) = (1.5, 60.0);
+/// Single effects from which pairs are grown.
+const PAIR_SEEDS: usize = 6;
+/// Pairs that are fitted in full.
+const PAIRS_FITTED: usize = 24;
+
+/// Fits every hypothesis to a table.
+pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
+    let mut problem = Problem::new(table, rig);
+    let (wildcard, pure) = settle(table, rig, &mut problem);
+    let coordinates = Coordinates::of(table);
+    let places: Vec<_> = problem
+        .passes
+        .iter()
+        .map(|p| coordinates.place(p, problem.design.largest_amplitude_m, &FORM_LENGTHS))
+        .collect();
+    let kernel = Kernel::new(&places, FORM_RANK, 0.02);
+    let basis = kernel.matrix(&places);
+
+    let baseline = minimise(&problem, &[], &[0.0; 3], &problem.variance, 15);
+    let (none_evidence, none) = over_forms(&problem, &baseline, &[], &basis);
+    let gap = &wildcard.smooth - &none.prediction;
+    let loose = tempered(&problem, &gap, START_SHARE);
+    let held = held_nuisances(&minimise(&problem, &[], &none.u, &loose, 10));
+
+    let mut not_testable = Vec::new();
+    let mut members = Vec::new();
+    let mut tried = Vec::new();
+    for (index, effect) in library().iter().enumerate() {
+        if options.without.iter().any(|n| n == effect.name()) {
+            continue;
+        }
+        if let Some(because) = table.lacks(effect.needs()) {
+            not_testable.push((effect.name(), because));
+            continue;
+        }
+        tried.push(index);
+        for law in 0..effect.laws().len() {
+            if usable(index, law, table) {
+                members.push(Member { effect: index, law });
+            }
+        }
+    }
+
+    // Middle share first, for every law; the other shares where they could matter.
+    let starts: Vec<Vec<Fit>> =
+        members.par_iter().map(|member| optima(&problem, &[*member], &held, &loose)).collect();
+    let cheapest = starts.iter().flatten().map(|f| f.cost).fold(f64::INFINITY, f64::min);
+    let middle: Vec<Option<Explained>> = members
+        .par_iter()
+        .zip(&starts)
+        .map(|(member, fits)| {
+            let own = fits.first()?.cost;
+            // What lies far behind even on the tempered scale gets one look, not a search.
+            let rounds = if own > HOPELESS.0 * cheapest + HOPELESS.1 { 0 } else { 6 };
+            fits.iter()
+                .filter(|f| rounds > 0 || f.cost == own)
+                .filter(|f| f.cost < 1.2 * own + 10.0)
+                .map(|f| explain(&problem, &[*member], &f.u, &basis, FORMS[1].0, rounds))
+                .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+        })
+        .collect();
+    let top = middle.iter().flatten().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    let laws: Vec<Option<(f64, Explained)>> = middle
+        .into_par_iter()
+        .map(|found| {
+            found.map(|e| {
+                if e.log_evidence > top - PRUNE {
+                    let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
+                    over_forms(&problem, &fit, &e.members, &basis)
+                } else {
+                    (e.log_evidence + FORMS[1].1.ln(), e)
+                }
+            })
+        })
+        .collect();
+    let mut candidates: Vec<Candidate> = tried
+        .iter()
+        .filter_map(|&effect| {
+            let own: Vec<(f64, Explained)> = members
+                .iter()
+                .zip(&laws)
+                .filter(|(m, _)| m.effect == effect)
+                .filter_map(|(_, l)| l.clone())
+                .collect();
+            candidate(vec![effect], own)
+        })
+        .collect();
+    sort(&mut candidates);
+
+    if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + 3.0) {
+        let pairs = pairs(&problem, &candidates, &members, &loose, &basis);
+        candidates.extend(pairs);
+    }
+
+    let priors = options.priors;
+    let count = tried.len().max(1) as f64;
+    let pair_count = (count * (count - 1.0) / 2.0).max(1.0);
+    let prior_of = |c: &Candidate| {
+        if c.effects.len() == 1 { priors.single / count } else { priors.pair / pair_count }
+    };
+    let mut all: Vec<f64> = candidates.iter().map(|c| c.log_evidence + prior_of(c).ln()).collect();
+    all.push(none_evidence + priors.none.ln());
+    all.push(wildcard.log_evidence + priors.unknown.ln());
+    let total = log_sum_exp(&all);
+    for (c, v) in candidates.iter_mut().zip(&all) {
+        c.probability = (v - total).exp();
+    }
+    let k = candidates.len();
+    let (none_probability, unknown_probability) = ((all[k] - total).exp(), (all[k + 1] - total).exp());
+    candidates.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.effects.cmp(&b.effects)));
+    Fitted {
+        problem,
+        pure,
+        none,
+        none_probability,
+        wildcard,
+        unknown_probability,
+        candidates,
+        not_testable,
+        coordinates,
+        kernel,
+        basis,
+        priors,
+        singles_tried: tried.len(),
+    }
+}
+
+/// Laws whose covariate this table lacks are not tried.
+fn usable(effect: usize, law: usize, table: &Table) -> bool {
+    let form = &library()[effect].laws()[law];
+    let temperatures: Vec<f64> = table.passes.iter().filter_map(|p| p.temperature_c).collect();
+    let span = temperatures.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+        - temperatures.iter().copied().fold(f64::INFINITY, f64::min);
+    match form.name {
+        "warming (temperature)" => temperatures.len() == table.len() && span > 0.3,
+        "fixed resonance" => {
+            let first = table.passes[0].frequency_hz;
+            table.passes.iter().any(|p| (p.frequency_hz / first - 1.0).abs() > 1e-3)
+        }
+        "exponential approach in each run" => table.run_count > 1,
+        _ => true,
+    }
+}
+
+fn candidate(effects: Vec<usize>, laws: Vec<(f64, Explained)>) -> Option<Candidate> {
+    let best = laws.iter().max_by(|a, b| a.0.total_cmp(&b.0))?.1.clone();
+    let evidences: Vec<f64> = laws.iter().map(|l| l.0).collect();
+    let log_evidence = log_sum_exp(&evidences) - (laws.len() as f64).ln();
+    log_evidence.is_finite().then_some(Candidate { effects, log_evidence, best, laws, probability: 0.0 })
+}
+
+fn sort(candidates: &mut [Candidate]) {
+    candidates.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence).then(a.effects.cmp(&b.effects)));
+}
+
+/// Pairs grown from the best singles, each with every other effect in each of its laws.
+fn pairs(
+    problem: &Problem,
+    singles: &[Candidate],
+    members: &[Member],
+    loose: &[f64],
+    basis: &DMatrix<f64>,
+) -> Vec<Candidate> {
+    let seeds = &singles[..singles.len().min(PAIR_SEEDS)];
+    let jobs: Vec<(usize, Member)> = (0..seeds.len())
+        .flat_map(|s| members.iter().map(move |m| (s, *m)))
+        .filter(|(s, m)| m.effect != seeds[*s].effects[0])
+        .collect();
+    let mut fits: Vec<(f64, Vec<Member>, Fit)> = jobs
+        .par_iter()
+        .filter_map(|(s, m)| {
+            let seed = &seeds[*s].best;
+            let pair = vec![seed.members[0], *m];
+            optima(problem, &pair, &seed.u, loose).into_iter().next().map(|f| (f.cost, pair, f))
+        })
+        .collect();
+    fits.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut chosen: Vec<(Vec<usize>, Vec<Member>, Fit)> = Vec::new();
+    for (_, pair, fit) in fits {
+        let mut effects: Vec<usize> = pair.iter().map(|m| m.effect).collect();
+        effects.sort_unstable();
+        if !chosen.iter().any(|(e, ..)| *e == effects) {
+            chosen.push((effects, pair, fit));
+        }
+        if chosen.len() == PAIRS_FITTED {
+            break;
+        }
+    }
+    chosen
+        .into_par_iter()
+        .filter_map(|(effects, pair, fit)| {
+            let laws = pair.iter().map(|m| library()[m.effect].laws().len() as f64).product::<f64>();
+            let (evidence, explained) = over_forms(problem, &fit, &pair, basis);
+            // Only the best pair of laws was fitted: the others are taken to add nothing.
+            candidate(effects, vec![(evidence - laws.ln(), explained)])
+        })
+        .collect()
+}

@@ -1,0 +1,173 @@
+//! The open set: what any smooth departure from the baseline would look like, whatever its cause.
+//!
+//! `y = baseline + friction-like part + direction-odd part + white excess + noise`, each part Gaussian with its
+//! scale on a fixed grid, so that no scale is fitted. Its evidence is what a named effect has to beat.
+
+use crate::data::Table;
+use crate::fit::{NUISANCES, Problem};
+use crate::linear::{Covariance, log_sum_exp};
+use crate::smooth::{Coordinates, Kernel, Lengths};
+use effects::Operating;
+use nalgebra::{DMatrix, DVector};
+
+/// Lengths of the wildcard in standard deviations of each covariate.
+pub const LENGTHS: Lengths = Lengths { condition: 1.2, time: 0.8, position: 0.8 };
+const RANK: usize = 60;
+/// Scales of the friction-like part, of the direction-odd part, and of the white excess.
+const FRICTION: [f64; 5] = [0.0, 0.05, 0.15, 0.45, 1.3];
+const ODD: [f64; 4] = [0.0, 0.03, 0.12, 0.5];
+const WHITE: [f64; 4] = [0.0, 0.04, 0.12, 0.4];
+
+/// The wildcard fitted to a table.
+pub struct Wildcard {
+    coordinates: Coordinates,
+    kernel: Kernel,
+    /// Log evidence over the grid without the point where all scales vanish.
+    pub log_evidence: f64,
+    friction: f64,
+    odd: f64,
+    weights: DVector<f64>,
+    covariance: Covariance,
+    center: Vec<f64>,
+    /// Smooth estimate of the lateral force at the table's passes, N.
+    pub smooth: DVector<f64>,
+}
+
+/// Size on which a departure is measured at a pass: between the friction there and full friction, N.
+fn scale(baseline: f64, full: f64) -> f64 {
+    (baseline.abs() * full).sqrt()
+}
+
+fn rows(
+    problem: &Problem,
+    center: &[f64],
+    passes: &[Operating],
+    coordinates: &Coordinates,
+    kernel: &Kernel,
+    parts: (f64, f64),
+) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
+    let baseline = problem.predict_at(&[], center, passes);
+    let mu0 = problem.baseline(center).mu0;
+    let r = kernel.rank();
+    let mut phi = DMatrix::zeros(passes.len(), 2 * r + NUISANCES);
+    let mut sizes = Vec::with_capacity(passes.len());
+    for (i, p) in passes.iter().enumerate() {
+        let size = scale(baseline[i], mu0 * p.normal_force_n);
+        let basis = kernel.basis(&coordinates.place(p, problem.design.largest_amplitude_m, &LENGTHS));
+        for (j, b) in basis.iter().enumerate() {
+            phi[(i, j)] = parts.0 * p.direction * size * b;
+            phi[(i, r + j)] = parts.1 * size * b;
+        }
+        sizes.push(size);
+    }
+    let mut moved = center.to_vec();
+    for k in 0..NUISANCES {
+        moved[k] += 1e-3;
+        let there = problem.predict_at(&[], &moved, passes);
+        moved[k] = center[k];
+        for i in 0..passes.len() {
+            phi[(i, 2 * r + k)] = (there[i] - baseline[i]) / 1e-3;
+        }
+    }
+    (baseline, phi, sizes)
+}
+
+impl Wildcard {
+    /// Fits the wildcard about the baseline at `center` (nuisance coordinates).
+    pub fn fit(table: &Table, problem: &Problem, center: &[f64]) -> Self {
+        let coordinates = Coordinates::of(table);
+        let places: Vec<_> = problem
+            .passes
+            .iter()
+            .map(|p| coordinates.place(p, problem.design.largest_amplitude_m, &LENGTHS))
+            .collect();
+        let kernel = Kernel::new(&places, RANK, 0.02);
+        let r = kernel.rank();
+        let (baseline, phi, sizes) = rows(problem, center, &problem.passes, &coordinates, &kernel, (1.0, 1.0));
+        let n = problem.len();
+        let residual = DVector::from_fn(n, |i, _| problem.lateral[i] - baseline[i]);
+        // The nuisances' prior is centred on the nominal values, not on where the baseline was recalibrated.
+        let pull: DVector<f64> = DVector::from_fn(NUISANCES, |k, _| center[k]);
+        let nuisance = phi.columns(2 * r, NUISANCES).into_owned();
+        let residual = residual + nuisance * pull;
+        let mut all = Vec::new();
+        let mut best = (f64::NEG_INFINITY, 0.0, 0.0, 0.0);
+        for white in WHITE {
+            let variance: Vec<f64> =
+                (0..n).map(|i| problem.variance[i] + (white * sizes[i]).powi(2)).collect();
+            let sqrt: DVector<f64> = DVector::from_iterator(n, variance.iter().map(|v| 1.0 / v.sqrt()));
+            let mut whitened = phi.clone();
+            for mut c in whitened.column_iter_mut() {
+                c.component_mul_assign(&sqrt);
+            }
+            let z = residual.component_mul(&sqrt);
+            let t = whitened.transpose();
+            let gram = &t * &whitened;
+            let score = &t * &z;
+            let chi = z.norm_squared();
+            let log_det: f64 = variance.iter().map(|v| v.ln()).sum();
+            for friction in FRICTION {
+                for odd in ODD {
+                    if white == 0.0 && friction == 0.0 && odd == 0.0 {
+                        continue;
+                    }
+                    let size = |j: usize| if j < r { friction } else if j < 2 * r { odd } else { 1.0 };
+                    let active: Vec<usize> = (0..2 * r + NUISANCES).filter(|&j| size(j) > 0.0).collect();
+                    let a = active.len();
+                    let mut inner = DMatrix::from_fn(a, a, |i, j| {
+                        gram[(active[i], active[j])] * size(active[i]) * size(active[j])
+                    });
+                    for i in 0..a {
+                        inner[(i, i)] += 1.0;
+                    }
+                    let g = DVector::from_fn(a, |i, _| score[active[i]] * size(active[i]));
+                    let Some(factor) = inner.cholesky() else { continue };
+                    let inner_det: f64 =
+                        2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+                    let fitted = g.dot(&factor.solve(&g));
+                    let value = -0.5 * (chi - fitted + log_det + inner_det) - n as f64 * 0.918_938_533_204_672_8;
+                    all.push(value);
+                    if value > best.0 {
+                        best = (value, friction, odd, white);
+                    }
+                }
+            }
+        }
+        let log_evidence = log_sum_exp(&all) - (all.len() as f64).ln();
+        let (_, friction, odd, white) = best;
+        let mut scaled = phi;
+        for j in 0..r {
+            scaled.column_mut(j).scale_mut(friction);
+            scaled.column_mut(r + j).scale_mut(odd);
+        }
+        let variance: Vec<f64> = (0..n).map(|i| problem.variance[i] + (white * sizes[i]).powi(2)).collect();
+        let covariance = Covariance::new(&variance, &scaled);
+        let weights = covariance.weights(&residual);
+        let smooth = baseline - scaled.columns(2 * r, NUISANCES) * DVector::from_column_slice(&center[..NUISANCES])
+            + &scaled * &weights;
+        Wildcard {
+            coordinates,
+            kernel,
+            log_evidence,
+            friction,
+            odd,
+            weights,
+            covariance,
+            center: center.to_vec(),
+            smooth,
+        }
+    }
+
+    /// Predicted lateral force and its standard deviation (without pass scatter) at other conditions, N.
+    pub fn predict(&self, problem: &Problem, passes: &[Operating]) -> (Vec<f64>, Vec<f64>) {
+        let (baseline, phi, _) =
+            rows(problem, &self.center, passes, &self.coordinates, &self.kernel, (self.friction, self.odd));
+        let r = self.kernel.rank();
+        let shift = phi.columns(2 * r, NUISANCES) * DVector::from_column_slice(&self.center[..NUISANCES]);
+        let mean = baseline - shift + &phi * &self.weights;
+        let sd = (0..passes.len())
+            .map(|i| self.covariance.posterior_variance(&phi.row(i).transpose()).max(0.0).sqrt())
+            .collect();
+        (mean.iter().copied().collect(), sd)
+    }
+}
