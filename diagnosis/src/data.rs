@@ -192,6 +192,17 @@ impl Table {
         })
     }
 
+    /// Some rows of the table, on its own scales.
+    pub fn select(&self, rows: &[usize]) -> Self {
+        Table {
+            points: rows.iter().map(|&i| self.points[i]).collect(),
+            passes: rows.iter().map(|&i| self.passes[i]).collect(),
+            lateral: rows.iter().map(|&i| self.lateral[i]).collect(),
+            runs: rows.iter().map(|&i| self.runs[i]).collect(),
+            ..*self
+        }
+    }
+
     /// Number of passes.
     pub fn len(&self) -> usize {
         self.passes.len()

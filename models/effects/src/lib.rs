@@ -6,6 +6,7 @@
 
 pub mod asperities;
 pub mod contact;
+pub mod corrected;
 pub mod effect;
 pub mod impact;
 pub mod listing;

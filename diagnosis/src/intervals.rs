@@ -1,0 +1,177 @@
+//! Parameter intervals by profile likelihood, with their shape.
+
+use crate::evidence::Explained;
+use crate::fit::{NUISANCES, Problem, bounded_step};
+use crate::linear::Covariance;
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+/// Shape of a profile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// Both ends are inside the parameter's range.
+    Bounded,
+    /// One end only.
+    OneSided,
+    /// The data does not say.
+    Flat,
+}
+
+/// A parameter with its interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Name.
+    pub name: &'static str,
+    /// Most probable value.
+    pub value: f64,
+    /// 95 % interval of the library's form.
+    pub ci95: [f64; 2],
+    /// Unit.
+    pub unit: &'static str,
+    /// Shape of the interval.
+    pub shape: Shape,
+}
+
+/// Fall of twice the log posterior that bounds a 95 % interval.
+const FALL: f64 = 3.841;
+
+/// Profiles every parameter of the hypothesis.
+pub fn estimates(problem: &Problem, best: &Explained, basis: &DMatrix<f64>) -> Vec<Vec<Estimate>> {
+    let mut phi = basis.clone();
+    for mut column in phi.column_iter_mut() {
+        column.component_mul_assign(&best.change);
+        column.scale_mut(best.share);
+    }
+    let covariance = Covariance::new(&problem.variance, &phi);
+    let floor = cost(problem, best, &covariance, &best.u, &best.prediction);
+    let mut at = NUISANCES;
+    best.members
+        .iter()
+        .map(|member| {
+            member
+                .parameters()
+                .iter()
+                .map(|p| {
+                    let k = at;
+                    at += 1;
+                    let bounds = p.coordinate_bounds();
+                    let sd = best.covariance[(k, k)].max(1e-16).sqrt();
+                    let ends = [-1.0, 1.0].map(|side| end(problem, best, &covariance, floor, k, side, sd, bounds));
+                    let value = p.value(best.u[k]);
+                    let [low, high] = ends.map(|e| e.unwrap_or(f64::NAN));
+                    let shape = match (ends[0], ends[1]) {
+                        (Some(_), Some(_)) => Shape::Bounded,
+                        (None, None) => Shape::Flat,
+                        _ => Shape::OneSided,
+                    };
+                    let low = if low.is_nan() { bounds.0 } else { low };
+                    let high = if high.is_nan() { bounds.1 } else { high };
+                    Estimate { name: p.name, value, ci95: [p.value(low), p.value(high)], unit: p.unit, shape }
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn cost(problem: &Problem, best: &Explained, c: &Covariance, u: &[f64], m: &DVector<f64>) -> f64 {
+    let precision = problem.prior_precision(&best.members);
+    let y = DVector::from_column_slice(&problem.lateral);
+    c.quadratic(&(y - m)) + u.iter().zip(&precision).map(|(x, p)| p * x * x).sum::<f64>()
+}
+
+/// The coordinate at which the profile has fallen by [`FALL`]; `None` where it never does within the bounds.
+#[allow(clippy::too_many_arguments)]
+fn end(
+    problem: &Problem,
+    best: &Explained,
+    covariance: &Covariance,
+    floor: f64,
+    k: usize,
+    side: f64,
+    sd: f64,
+    bounds: (f64, f64),
+) -> Option<f64> {
+    let limit = if side < 0.0 { best.u[k] - bounds.0 } else { bounds.1 - best.u[k] };
+    if limit <= 0.0 {
+        return None;
+    }
+    let mut start = best.u.clone();
+    let mut fall = |distance: f64| -> f64 {
+        let (u, value) = profile(problem, best, covariance, &start, k, best.u[k] + side * distance);
+        start = u;
+        value - floor
+    };
+    let (mut near, mut far) = (0.0, (1.96 * sd).min(limit));
+    let mut value = fall(far);
+    while value < FALL {
+        if far >= limit {
+            return None;
+        }
+        near = far;
+        far = (far * 1.7 + 1e-6).min(limit);
+        value = fall(far);
+    }
+    let mut at_far = value.sqrt();
+    let mut at_near = if near == 0.0 { 0.0 } else { fall(near).max(0.0).sqrt() };
+    let goal = FALL.sqrt();
+    // The root of the fall is nearly straight: a few secants suffice.
+    let mut x = far;
+    for _ in 0..4 {
+        x = near + (far - near) * (goal - at_near) / (at_far - at_near).max(1e-9);
+        let root = fall(x).max(0.0).sqrt();
+        if (root - goal).abs() < 0.02 {
+            break;
+        }
+        if root > goal {
+            (far, at_far) = (x, root);
+        } else {
+            (near, at_near) = (x, root);
+        }
+    }
+    Some(best.u[k] + side * x)
+}
+
+/// Best cost with one coordinate held, by Gauss-Newton in the others.
+fn profile(
+    problem: &Problem,
+    best: &Explained,
+    covariance: &Covariance,
+    start: &[f64],
+    k: usize,
+    held: f64,
+) -> (Vec<f64>, f64) {
+    let precision = problem.prior_precision(&best.members);
+    let mut bounds = problem.bounds(&best.members);
+    bounds[k] = (held, held);
+    let mut u = start.to_vec();
+    u[k] = held;
+    let y = DVector::from_column_slice(&problem.lateral);
+    let mut m = problem.predict(&best.members, &u);
+    let mut value = cost(problem, best, covariance, &u, &m);
+    for _ in 0..4 {
+        let mut jacobian = problem.jacobian(&best.members, &u, &m);
+        jacobian.column_mut(k).fill(0.0);
+        let mut joined = jacobian.insert_columns(u.len(), 1, 0.0);
+        joined.set_column(u.len(), &(&y - &m));
+        let all = covariance.inner(&joined, &joined);
+        let d = u.len();
+        let mut hessian = all.view((0, 0), (d, d)).into_owned();
+        for i in 0..d {
+            hessian[(i, i)] += precision[i].max(1e-9);
+        }
+        let gradient = DVector::from_fn(d, |i, _| -all[(i, d)] + precision[i] * u[i]);
+        let Some(mut next) = bounded_step(&hessian, &gradient, 1e-6, &u, &bounds) else { break };
+        next[k] = held;
+        let there = problem.predict(&best.members, &next);
+        let v = cost(problem, best, covariance, &next, &there);
+        if v >= value - 1e-3 {
+            if v < value {
+                (u, value) = (next, v);
+            }
+            break;
+        }
+        (u, m, value) = (next, there, v);
+    }
+    (u, value)
+}

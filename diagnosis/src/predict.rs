@@ -1,0 +1,154 @@
+//! The verdict's model at any condition: what `--predict` writes and what held-out passes are judged by.
+
+use crate::attribute::Verdict;
+use crate::data::{Rig, Table};
+use crate::evidence::{Explained, explain, recalibration};
+use crate::fit::{NUISANCES, Problem, minimise};
+use crate::hypotheses::{FORM_LENGTHS, Fitted};
+use crate::wildcard::Wildcard;
+use effects::Operating;
+use nalgebra::{DMatrix, DVector};
+
+/// A prediction at one condition, N.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Forecast {
+    /// Of the nominal baseline.
+    pub baseline: f64,
+    /// Of the recalibrated baseline.
+    pub recalibrated: f64,
+    /// Of the verdict's model.
+    pub corrected: f64,
+    /// Of the named effects in the library's form alone, without the smooth departure from it.
+    pub form: f64,
+    /// Predictive standard deviation of `corrected`: model and pass scatter.
+    pub corrected_sd: f64,
+}
+
+/// The model behind a verdict, fitted to some rows of a table.
+pub enum Model {
+    /// The recalibrated baseline.
+    Baseline(Explained),
+    /// Effects with their smooth departure from form.
+    Effects(Explained),
+    /// The open set.
+    Open(Box<Wildcard>),
+}
+
+/// The model of a verdict on some rows (all of them for predictions), starting from the fit to the whole.
+pub fn model(
+    fitted: &Fitted,
+    table: &Table,
+    verdict: Verdict,
+    leader: usize,
+    rows: Option<&[usize]>,
+) -> (Model, Problem, Explained) {
+    let all: Vec<usize> = (0..fitted.problem.len()).collect();
+    let rows = rows.unwrap_or(&all);
+    let whole = rows.len() == fitted.problem.len();
+    let problem = fitted.problem.select(rows);
+    let basis = fitted.basis.select_rows(rows.iter());
+    let baseline = if whole {
+        fitted.none.clone()
+    } else {
+        let fit = minimise(&problem, &[], &fitted.none.u, &problem.variance, 6);
+        explain(&problem, &[], &fit.u, &basis, 0.0, 1)
+    };
+    let model = match verdict {
+        Verdict::NoGap => Model::Baseline(baseline.clone()),
+        Verdict::Named | Verdict::Ambiguous => {
+            let best = &fitted.candidates[leader].best;
+            Model::Effects(if whole {
+                best.clone()
+            } else {
+                explain(&problem, &best.members, &best.u, &basis, best.share, 3)
+            })
+        }
+        Verdict::Unknown => {
+            let part = table.select(rows);
+            Model::Open(Box::new(Wildcard::fit(&part, &problem, &baseline.u)))
+        }
+    };
+    (model, problem, baseline)
+}
+
+/// Predicts conditions.
+pub fn forecast(
+    fitted: &Fitted,
+    rig: &Rig,
+    (model, problem, baseline): &(Model, Problem, Explained),
+    passes: &[Operating],
+) -> Vec<Forecast> {
+    let n = passes.len();
+    let out = Problem {
+        passes: passes.to_vec(),
+        lateral: vec![0.0; n],
+        variance: vec![1.0; n],
+        ..problem.select(&[])
+    };
+    let nominal = out.predict(&[], &[0.0; NUISANCES]);
+    let recalibrated = out.predict(&[], &baseline.u);
+    let (form, corrected, spread): (DVector<f64>, DVector<f64>, Vec<f64>) = match model {
+        Model::Baseline(e) => {
+            let spread = parameter_variance(&out, e, &recalibrated);
+            (recalibrated.clone(), recalibrated.clone(), spread)
+        }
+        Model::Effects(e) => {
+            let plain = out.predict(&e.members, &e.u);
+            let places: Vec<_> = passes
+                .iter()
+                .map(|p| fitted.coordinates.place(p, out.design.largest_amplitude_m, &FORM_LENGTHS))
+                .collect();
+            let basis = fitted.kernel.matrix(&places);
+            let (_, _, shift) = recalibration(problem, &e.u, &e.prediction);
+            let under = out.predict(&[], &e.u[..NUISANCES]);
+            let change = &plain - &under - out.jacobian(&[], &e.u[..NUISANCES], &under) * shift;
+            let delta = &basis * &e.departure * e.share;
+            let mut spread = parameter_variance(&out, e, &plain);
+            let residual = departure_covariance(fitted, problem, e);
+            for i in 0..n {
+                let row = basis.row(i).transpose();
+                let left = row.dot(&(&residual * &row)).max(0.0);
+                spread[i] += (e.share * change[i]).powi(2) * left;
+            }
+            (plain.clone(), plain + change.component_mul(&delta), spread)
+        }
+        Model::Open(w) => {
+            let (mean, sd) = w.predict(problem, passes);
+            let mean = DVector::from_vec(mean);
+            (mean.clone(), mean, sd.iter().map(|s| s * s).collect())
+        }
+    };
+    let level: Vec<f64> = corrected.iter().copied().collect();
+    let scatter = crate::noise::variance(&out, rig, &baseline.u, &level, fitted.pure.used);
+    (0..n)
+        .map(|i| Forecast {
+            baseline: nominal[i],
+            recalibrated: recalibrated[i],
+            corrected: corrected[i],
+            form: form[i],
+            corrected_sd: (spread[i] + scatter[i]).sqrt(),
+        })
+        .collect()
+}
+
+fn parameter_variance(out: &Problem, e: &Explained, at: &DVector<f64>) -> Vec<f64> {
+    let jacobian = out.jacobian(&e.members, &e.u, at);
+    let spread = &jacobian * &e.covariance;
+    (0..out.len()).map(|i| spread.row(i).dot(&jacobian.row(i)).max(0.0)).collect()
+}
+
+/// Posterior covariance of the departure's weights.
+fn departure_covariance(fitted: &Fitted, problem: &Problem, e: &Explained) -> DMatrix<f64> {
+    let r = fitted.kernel.rank();
+    let places: Vec<_> = problem
+        .passes
+        .iter()
+        .map(|p| fitted.coordinates.place(p, problem.design.largest_amplitude_m, &FORM_LENGTHS))
+        .collect();
+    let mut phi = fitted.kernel.matrix(&places);
+    for (i, v) in problem.variance.iter().enumerate() {
+        phi.row_mut(i).scale_mut(e.share * e.change[i] / v.sqrt());
+    }
+    let gram = phi.transpose() * &phi + DMatrix::identity(r, r);
+    gram.cholesky().map_or_else(|| DMatrix::identity(r, r), |c| c.inverse())
+}

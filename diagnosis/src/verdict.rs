@@ -1,0 +1,362 @@
+//! The verdict: everything the diagnosis says about one table, in the shape of the contract.
+
+use crate::attribute::{Decision, Verdict, decide};
+use crate::data::{Rig, Table};
+use crate::fit::{NUISANCES, Problem};
+use crate::held_out::{Gap, gap};
+use crate::hypotheses::{Fitted, Options, fit_all};
+use crate::intervals::{Estimate, Shape, estimates};
+use crate::locate::{Region, ledger, regions};
+use crate::next::{Experiment, experiments};
+use crate::noise::PureError;
+use crate::predict::{Forecast, forecast, model};
+use effects::corrected::{SavedEffect, SavedModel, SavedParameter};
+use effects::library;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// One hypothesis with its probability.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hypothesis {
+    /// Names; none for no gap, `unknown` for the open set.
+    pub effects: Vec<String>,
+    /// Probability given the table.
+    pub probability: f64,
+    /// What the table does not tell from it; pairs are joined by `+`.
+    pub alias_class: Vec<String>,
+    /// Law of each effect.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub laws: Vec<String>,
+    /// Parameters with their intervals.
+    pub parameters: Vec<Estimate>,
+}
+
+/// Where the gap lies.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Where {
+    /// Probability by place.
+    pub place: BTreeMap<&'static str, f64>,
+    /// Parts of the operating space.
+    pub regions: Vec<Region>,
+}
+
+/// An effect that the table cannot show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NotTestable {
+    /// Name.
+    pub effect: String,
+    /// What is missing.
+    pub because: String,
+}
+
+/// What the leader did on regions that were left out of its fit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LeftOut {
+    /// Share of the gap closed, pooled.
+    pub pooled_closure: f64,
+    /// Regions that carry gap.
+    pub carrying: usize,
+    /// Those of them closed by more than half.
+    pub closed: usize,
+    /// Closure of each region that carries gap, by name.
+    pub regions: Vec<(String, Option<f64>)>,
+}
+
+/// Size and fingerprint of the table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DataNote {
+    /// Number of passes.
+    pub points: usize,
+    /// SHA-256 of the file.
+    pub sha256: String,
+}
+
+/// Schema `muprime.verdict/1`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// `muprime.verdict/1`.
+    pub schema: &'static str,
+    /// The answer.
+    pub verdict: Verdict,
+    /// In one sentence.
+    pub text: String,
+    /// Hypotheses, most probable first; they sum to one.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Where the gap lies.
+    #[serde(rename = "where")]
+    pub location: Where,
+    /// How far it shrinks.
+    pub gap: Gap,
+    /// The leader on left-out regions.
+    pub left_out: LeftOut,
+    /// What the replicates said about the stated repeatability.
+    pub pure_error: PureError,
+    /// Effects that the table cannot show.
+    pub not_testable: Vec<NotTestable>,
+    /// What to measure next.
+    pub next_experiment: Vec<Experiment>,
+    /// Remarks: what is missing from the table, what was assumed.
+    pub remarks: Vec<String>,
+    /// The table.
+    pub data: DataNote,
+}
+
+/// A diagnosis: the report, and what it takes to predict with it.
+pub struct Diagnosis {
+    /// The report.
+    pub report: Report,
+    /// Everything that was fitted.
+    pub fitted: Fitted,
+    /// What was decided.
+    pub decision: Decision,
+    table: Table,
+    rig: Rig,
+}
+
+/// Diagnoses a table.
+pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> Diagnosis {
+    let fitted = fit_all(table, rig, options);
+    let decision = decide(&fitted);
+    let leader = decision.class[0];
+    let best = &fitted.candidates[leader].best;
+    let gap = gap(&fitted, table, rig, decision.verdict, leader);
+    let estimated: Vec<f64> = match decision.verdict {
+        Verdict::NoGap => vec![0.0; table.len()],
+        Verdict::Named | Verdict::Ambiguous => {
+            let passes = &table.passes;
+            let whole = model(&fitted, table, decision.verdict, leader, None);
+            forecast(&fitted, rig, &whole, passes).iter().map(|f| f.corrected - f.recalibrated).collect()
+        }
+        Verdict::Unknown => (&fitted.wildcard.smooth - &fitted.none.prediction).iter().copied().collect(),
+    };
+    let location = Where {
+        place: ledger(&fitted, &decision.probabilities, decision.unknown),
+        regions: regions(&fitted, &estimated),
+    };
+    let parameters = if decision.verdict == Verdict::NoGap {
+        None
+    } else {
+        Some(estimates(&fitted.problem, best, &fitted.basis))
+    };
+    let hypotheses = hypotheses(&fitted, &decision, parameters.as_ref());
+    let second = decision
+        .class
+        .get(1)
+        .copied()
+        .or_else(|| (0..fitted.candidates.len()).find(|&i| i != leader && fitted.candidates[i].effects.len() == 1));
+    let next_experiment = match (decision.verdict, second) {
+        (Verdict::NoGap, _) | (_, None) => Vec::new(),
+        (_, Some(second)) => experiments(&fitted, table, rig, leader, second),
+    };
+    let mut remarks = Vec::new();
+    if table.still_coefficient().is_none() {
+        remarks.push("No pass has the plate still: mu0 is unknown and was fitted; add w = 0 passes.".into());
+    }
+    if fitted.pure.variance_ratio.is_none() {
+        remarks.push("No replicates lie close together: the repeatability stated in rig.toml stands for pure error.".into());
+    }
+    let report = Report {
+        schema: "muprime.verdict/1",
+        verdict: decision.verdict,
+        text: sentence(&fitted, &decision, &gap),
+        hypotheses,
+        location,
+        left_out: LeftOut {
+            pooled_closure: decision.gate.pooled,
+            carrying: decision.gate.carrying,
+            closed: decision.gate.closed,
+            regions: decision.regions.iter().map(|r| (r.name.clone(), r.errors.closed())).collect(),
+        },
+        gap,
+        pure_error: fitted.pure,
+        not_testable: fitted
+            .not_testable
+            .iter()
+            .map(|(e, because)| NotTestable { effect: (*e).to_string(), because: because.clone() })
+            .collect(),
+        next_experiment,
+        remarks,
+        data: DataNote { points: table.len(), sha256 },
+    };
+    Diagnosis { report, fitted, decision, table: table.clone(), rig: *rig }
+}
+
+fn label(fitted: &Fitted, candidate: usize) -> String {
+    fitted.candidates[candidate].names().join("+")
+}
+
+fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
+    let leader = decision.class[0];
+    let closed = gap.shrinkage.map_or_else(
+        || "held-out passes leave no gap to shrink".to_string(),
+        |s| format!("the gap shrinks by {:.0} % on held-out passes", 100.0 * s),
+    );
+    match decision.verdict {
+        Verdict::NoGap => "The recalibrated baseline explains the table: no gap.".to_string(),
+        Verdict::Named => format!(
+            "{} causes most of the gap (probability {:.2}); {closed}.",
+            label(fitted, leader),
+            decision.probabilities[leader]
+        ),
+        Verdict::Ambiguous => {
+            let names: Vec<String> = decision.class.iter().take(6).map(|&i| label(fitted, i)).collect();
+            format!("This table cannot tell {} apart; {closed}.", names.join(", "))
+        }
+        Verdict::Unknown => {
+            format!("There is a gap, and no effect of the library causes most of it; {closed} with a smooth map.")
+        }
+    }
+}
+
+fn hypotheses(fitted: &Fitted, decision: &Decision, parameters: Option<&Vec<Vec<Estimate>>>) -> Vec<Hypothesis> {
+    let leader = decision.class[0];
+    let mut list: Vec<Hypothesis> = fitted
+        .candidates
+        .iter()
+        .enumerate()
+        .filter(|(i, c)| decision.probabilities[*i] > 1e-6 || c.effects.len() == 1)
+        .map(|(i, c)| {
+            let own = if decision.class.contains(&i) {
+                let mut class = vec![label(fitted, i)];
+                class.extend(decision.class.iter().filter(|&&k| k != i).map(|&k| label(fitted, k)));
+                class
+            } else {
+                vec![label(fitted, i)]
+            };
+            let parameters = if i == leader && parameters.is_some() {
+                parameters.map(|p| p.concat()).unwrap_or_default()
+            } else {
+                laplace(&fitted.problem, &c.best)
+            };
+            Hypothesis {
+                effects: c.names().iter().map(|n| (*n).to_string()).collect(),
+                probability: decision.probabilities[i],
+                alias_class: own,
+                laws: c.best.members.iter().map(|m| library()[m.effect].laws()[m.law].name.to_string()).collect(),
+                parameters,
+            }
+        })
+        .collect();
+    for (effects, probability) in
+        [(Vec::new(), decision.none), (vec!["unknown".to_string()], decision.unknown)]
+    {
+        list.push(Hypothesis {
+            alias_class: effects.clone(),
+            effects,
+            probability,
+            laws: Vec::new(),
+            parameters: Vec::new(),
+        });
+    }
+    let total: f64 = list.iter().map(|h| h.probability).sum();
+    for h in &mut list {
+        h.probability /= total;
+    }
+    list.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.effects.cmp(&b.effects)));
+    list
+}
+
+/// Intervals from the curvature at the optimum, for hypotheses that do not lead.
+fn laplace(problem: &Problem, e: &crate::evidence::Explained) -> Vec<Estimate> {
+    let _ = problem;
+    let mut at = NUISANCES;
+    e.members
+        .iter()
+        .flat_map(|m| m.parameters())
+        .map(|p| {
+            let u = e.u[at];
+            let reach = 1.96 * e.covariance[(at, at)].max(0.0).sqrt();
+            at += 1;
+            let (low, high) = p.coordinate_bounds();
+            Estimate {
+                name: p.name,
+                value: p.value(u),
+                ci95: [p.value((u - reach).max(low)), p.value((u + reach).min(high))],
+                unit: p.unit,
+                shape: if u - reach < low || u + reach > high { Shape::OneSided } else { Shape::Bounded },
+            }
+        })
+        .collect()
+}
+
+impl Diagnosis {
+    /// Predicts conditions with the verdict's model.
+    pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {
+        let leader = self.decision.class[0];
+        let whole = model(&self.fitted, &self.table, self.decision.verdict, leader, None);
+        forecast(&self.fitted, &self.rig, &whole, &conditions.passes)
+    }
+
+    /// The model for a run; none where no effect of the library causes most of the gap.
+    pub fn saved_model(&self) -> Option<SavedModel> {
+        let problem = &self.fitted.problem;
+        let leader = self.decision.class[0];
+        let (u, effects, inertia) = match self.decision.verdict {
+            Verdict::Unknown => return None,
+            Verdict::NoGap => (self.fitted.none.u.clone(), Vec::new(), false),
+            Verdict::Named | Verdict::Ambiguous => {
+                let best = &self.fitted.candidates[leader].best;
+                let thetas = Problem::thetas(&best.members, &best.u);
+                let mut at = NUISANCES;
+                let effects = best
+                    .members
+                    .iter()
+                    .zip(thetas)
+                    .map(|(m, theta)| {
+                        let effect = library()[m.effect];
+                        let own = m.parameters();
+                        let first = at;
+                        at += own.len();
+                        // Covariance in the parameters' units, by the slope of each coordinate.
+                        let slope: Vec<f64> = own
+                            .iter()
+                            .enumerate()
+                            .map(|(i, p)| {
+                                let u = best.u[first + i];
+                                (p.value(u + 1e-4) - p.value(u - 1e-4)) / 2e-4
+                            })
+                            .collect();
+                        SavedEffect {
+                            name: effect.name().to_string(),
+                            law: effect.laws()[m.law].name.to_string(),
+                            acts_on: if effect.place() == effects::Place::Instrument {
+                                "reading".to_string()
+                            } else {
+                                "prediction".to_string()
+                            },
+                            parameters: own
+                                .iter()
+                                .zip(&theta)
+                                .map(|(p, v)| SavedParameter {
+                                    name: p.name.to_string(),
+                                    value: *v,
+                                    unit: p.unit.to_string(),
+                                })
+                                .collect(),
+                            covariance: (0..own.len())
+                                .map(|i| {
+                                    (0..own.len())
+                                        .map(|j| best.covariance[(first + i, first + j)] * slope[i] * slope[j])
+                                        .collect()
+                                })
+                                .collect(),
+                        }
+                    })
+                    .collect();
+                let inertia = best.members.iter().any(|m| m.name() == "ridge_inertia");
+                (best.u.clone(), effects, inertia)
+            }
+        };
+        let gap = &self.report.gap;
+        let left = (gap.form_alone_rmse.powi(2) - gap.noise_floor_rmse.powi(2)).max(0.0).sqrt();
+        Some(SavedModel {
+            schema: "muprime.model/1".to_string(),
+            verdict: self.report.text.clone(),
+            relative_sd: left.max(0.005),
+            interpolation_error: if inertia { effects::impact::STATED_ERROR } else { 0.0 },
+            baseline: problem.baseline(&u),
+            design: problem.design,
+            effects,
+        })
+    }
+}

@@ -1,0 +1,269 @@
+//! The corrected model: baseline and named effects, as `diagnose --save-model` writes it and a run uses it.
+//!
+//! It is evaluated directly, without allocation: the contact is a closed form or one short sweep, so no table
+//! and no interpolation error stands between the verdict and the loop. The one exception is ridge inertia,
+//! whose table's error is stated in [`crate::impact::STATED_ERROR`].
+
+use crate::effect::{Effect, Place};
+use crate::operating::{Baseline, Design, Operating};
+use crate::predict::{Active, lateral_force};
+use models::condition::{Condition, OutOfDomain};
+use models::prediction::{FrictionModel, Prediction, Regime, Validity};
+use serde::{Deserialize, Serialize};
+
+/// Most parameters of one law.
+const MOST_PARAMETERS: usize = 4;
+/// Most effects of one model.
+const MOST_EFFECTS: usize = 4;
+
+/// MODEL.toml.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SavedModel {
+    /// `muprime.model/1`.
+    pub schema: String,
+    /// The verdict that the model rests on.
+    pub verdict: String,
+    /// Relative standard uncertainty of the relative friction that the diagnosis left.
+    pub relative_sd: f64,
+    /// Largest relative error of interpolation; zero where the prediction is evaluated directly.
+    pub interpolation_error: f64,
+    /// Recalibrated baseline.
+    pub baseline: Baseline,
+    /// Scales of the table that was diagnosed.
+    pub design: Design,
+    /// Effects; empty where there is no gap.
+    #[serde(default, rename = "effect")]
+    pub effects: Vec<SavedEffect>,
+}
+
+/// One effect of a saved model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SavedEffect {
+    /// Name.
+    pub name: String,
+    /// Name of the law.
+    pub law: String,
+    /// `prediction`, or `reading` for an effect of an instrument.
+    pub acts_on: String,
+    /// Parameters in the law's order, SI units.
+    pub parameters: Vec<SavedParameter>,
+    /// Covariance of the parameters, row by row.
+    #[serde(default)]
+    pub covariance: Vec<Vec<f64>>,
+}
+
+/// One parameter of a saved effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SavedParameter {
+    /// Name.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// A saved model that cannot be used, and why.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// Another schema.
+    #[error("schema is '{0}'; this version reads 'muprime.model/1'")]
+    Schema(String),
+    /// An effect that the library does not have.
+    #[error("effect '{0}' is not in the library; `muprime model effects` lists those that are")]
+    Effect(String),
+    /// A law that the effect does not have.
+    #[error("effect '{effect}' has no law '{law}'")]
+    Law {
+        /// Effect.
+        effect: String,
+        /// Law.
+        law: String,
+    },
+    /// Parameters that are not the law's.
+    #[error("effect '{effect}': parameter {index} should be '{expected}'")]
+    Parameter {
+        /// Effect.
+        effect: String,
+        /// Position in the list.
+        index: usize,
+        /// Name expected there.
+        expected: &'static str,
+    },
+    /// A value outside the parameter's range.
+    #[error("effect '{effect}': '{name}' = {value} is outside [{lower}, {upper}]")]
+    Range {
+        /// Effect.
+        effect: String,
+        /// Parameter.
+        name: &'static str,
+        /// Value.
+        value: f64,
+        /// Smallest value.
+        lower: f64,
+        /// Largest value.
+        upper: f64,
+    },
+    /// More effects than a model may hold.
+    #[error("{0} effects; at most 4 are compiled")]
+    TooMany(usize),
+    /// A baseline or scale that is not positive.
+    #[error("'{0}' must be a finite number above zero")]
+    NotPositive(&'static str),
+}
+
+#[derive(Clone, Copy)]
+struct Compiled {
+    effect: &'static dyn Effect,
+    law: usize,
+    theta: [f64; MOST_PARAMETERS],
+    count: usize,
+}
+
+/// A corrected model, checked and ready for the loop.
+#[derive(Clone)]
+pub struct Corrected {
+    baseline: Baseline,
+    design: Design,
+    effects: Vec<Compiled>,
+    relative_sd: f64,
+    interpolation_error: f64,
+}
+
+impl Corrected {
+    /// Checks a saved model and makes it ready.
+    ///
+    /// # Errors
+    /// Names, ranges or a schema that the library does not know.
+    pub fn compile(saved: &SavedModel) -> Result<Self, ModelError> {
+        if saved.schema != "muprime.model/1" {
+            return Err(ModelError::Schema(saved.schema.clone()));
+        }
+        let b = &saved.baseline;
+        for (name, v) in [
+            ("baseline.mu0", b.mu0),
+            ("baseline.normal_stiffness_n_per_m", b.normal_stiffness_n_per_m),
+            ("baseline.lateral_stiffness_n_per_m", b.lateral_stiffness_n_per_m),
+            ("design.reference_load_n", saved.design.reference_load_n),
+            ("design.reference_speed_m_s", saved.design.reference_speed_m_s),
+        ] {
+            if !(v.is_finite() && v > 0.0) {
+                return Err(ModelError::NotPositive(name));
+            }
+        }
+        if saved.effects.len() > MOST_EFFECTS {
+            return Err(ModelError::TooMany(saved.effects.len()));
+        }
+        let mut effects = Vec::with_capacity(saved.effects.len());
+        for s in &saved.effects {
+            let effect = crate::by_name(&s.name).ok_or_else(|| ModelError::Effect(s.name.clone()))?;
+            let law = effect
+                .laws()
+                .iter()
+                .position(|l| l.name == s.law)
+                .ok_or_else(|| ModelError::Law { effect: s.name.clone(), law: s.law.clone() })?;
+            let expected = effect.laws()[law].parameters;
+            let mut theta = [0.0; MOST_PARAMETERS];
+            for (index, p) in expected.iter().enumerate() {
+                let given = s.parameters.get(index).filter(|g| g.name == p.name && g.unit == p.unit);
+                let value = given
+                    .ok_or_else(|| ModelError::Parameter { effect: s.name.clone(), index, expected: p.name })?
+                    .value;
+                let slack = 1e-9 * (p.upper - p.lower).abs().min(1.0);
+                if !(value >= p.lower - slack && value <= p.upper + slack) {
+                    return Err(ModelError::Range {
+                        effect: s.name.clone(),
+                        name: p.name,
+                        value,
+                        lower: p.lower,
+                        upper: p.upper,
+                    });
+                }
+                theta[index] = value;
+            }
+            effects.push(Compiled { effect, law, theta, count: expected.len() });
+        }
+        effects.sort_by_key(|c| {
+            crate::library().iter().position(|e| e.name() == c.effect.name()).unwrap_or(usize::MAX)
+        });
+        Ok(Self {
+            baseline: saved.baseline,
+            design: saved.design,
+            effects,
+            relative_sd: saved.relative_sd,
+            interpolation_error: saved.interpolation_error,
+        })
+    }
+
+    /// Stated relative error of interpolation.
+    pub fn interpolation_error(&self) -> f64 {
+        self.interpolation_error
+    }
+
+    /// True where an effect acts on a reading rather than on friction.
+    pub fn acts_on_reading(&self) -> bool {
+        self.effects.iter().any(|c| c.effect.place() == Place::Instrument)
+    }
+
+    /// Signed mean lateral force that the sensor will read at a pass, N. Allocates nothing.
+    pub fn lateral_force(&self, pass: &Operating) -> f64 {
+        let zero: [f64; 0] = [];
+        let idle = Active { effect: &crate::sensor_lag::SensorLag, law: 0, theta: &zero };
+        let mut active = [idle; MOST_EFFECTS];
+        for (slot, c) in active.iter_mut().zip(&self.effects) {
+            *slot = Active { effect: c.effect, law: c.law, theta: &c.theta[..c.count] };
+        }
+        lateral_force(&self.baseline, &active[..self.effects.len()], pass, &self.design)
+    }
+
+    /// The pass that a condition of the loop stands for.
+    pub fn operating(&self, c: &Condition) -> Operating {
+        Operating {
+            time_s: c.time_s,
+            run_time_s: c.time_s,
+            amplitude_pp_m: c.amplitude.metres(),
+            frequency_hz: c.frequency_hz,
+            speed_m_s: c.speed_m_s,
+            direction: c.direction.sign(),
+            position_m: c.position_m,
+            normal_force_n: c.normal_force_n,
+            ambient_pressure_pa: c.ambient_pressure_pa,
+            temperature_c: None,
+            relative_humidity_pct: None,
+        }
+    }
+}
+
+impl FrictionModel for Corrected {
+    fn name(&self) -> &str {
+        "corrected"
+    }
+
+    /// The lateral force is what the sensor will read along the motion, so an effect of an instrument is in it;
+    /// the relative friction is that force over `mu_0 F_n` with the loop's own `mu_0`.
+    fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
+        condition.check()?;
+        let pass = self.operating(condition);
+        let along = pass.direction * self.lateral_force(&pass);
+        let full = condition.mu0 * condition.normal_force_n;
+        let contact = self.baseline.contact(&pass, &self.design);
+        let regime = if contact.amplitude_pp < crate::contact::STILL_PLATE_M || contact.load_ratio() >= 1.0 {
+            Regime::FullContact
+        } else if contact.drag() >= 1.0 {
+            Regime::FullSlip
+        } else {
+            Regime::Intermittent
+        };
+        let outside = condition.amplitude.metres() > 1.05 * self.design.largest_amplitude_m;
+        Ok(Prediction {
+            mu_relative: along / full,
+            mu_relative_sd: (self.relative_sd * along / full).abs(),
+            lateral_force_n: along,
+            regime,
+            validity: if outside { Validity::Extrapolated } else { Validity::Inside },
+        })
+    }
+}
