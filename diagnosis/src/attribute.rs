@@ -70,7 +70,7 @@ pub fn decide(fitted: &Fitted) -> Decision {
         Verdict::NoGap
     } else if unknown >= in_class {
         Verdict::Unknown
-    } else if in_class >= NAME && (class.len() == 1 || probabilities[leader] >= NAME) {
+    } else if in_class >= NAME && class.len() == 1 {
         Verdict::Named
     } else {
         Verdict::Ambiguous

@@ -134,7 +134,7 @@ impl Problem {
 
     /// Bounds of the coordinates.
     pub fn bounds(&self, members: &[Member]) -> Vec<(f64, f64)> {
-        let mut bounds = vec![(-8.0, 8.0); NUISANCES];
+        let mut bounds = vec![(-40.0, 40.0); NUISANCES];
         for m in members {
             bounds.extend(m.parameters().iter().map(Parameter::coordinate_bounds));
         }

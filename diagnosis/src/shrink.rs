@@ -1,9 +1,12 @@
-//! How far: the gap left on passes that the fit did not see.
+//! The gap left on parts of the operating space that the fit did not see.
+
+
 
 use crate::evidence::{Explained, explain};
 use crate::fit::{Member, Problem, minimise};
 use crate::hypotheses::Fitted;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Squared errors in units of full friction, before and after, with the floor that repeatability leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -139,8 +142,8 @@ pub fn departure_at(
 /// Predicts each region from the rest, by the hypothesis' form alone.
 pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
     let problem = &fitted.problem;
-    let full = full_friction(problem);
-    use rayon::prelude::*;
+    // Regions are judged in deviations of a pass, where a gap shows wherever it can be measured.
+    let sd: Vec<f64> = problem.variance.iter().map(|v| v.sqrt()).collect();
     regions(problem)
         .into_par_iter()
         .map(|(name, rows)| {
@@ -149,13 +152,13 @@ pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
             let rest = problem.select(&kept);
             let base = minimise(&rest, &[], &fitted.none.u, &rest.variance, 6);
             let baseline = problem.select(&rows).predict(&[], &base.u);
-            let errors = errors(problem, &full, &rows, &baseline, &plain);
+            let errors = errors(problem, &sd, &rows, &baseline, &plain);
             Region { name, rows, errors }
         })
         .collect()
 }
 
-/// Mean squares over rows.
+/// Mean squares over rows, in units of `full`.
 pub fn errors(
     problem: &Problem,
     full: &[f64],
@@ -203,7 +206,9 @@ pub fn gate(regions: &[Region]) -> Gate {
         pooled.floor += e.floor * n;
         if e.recalibrated > e.floor * (1.0 + 3.0 * (2.0 / n).sqrt()) {
             carrying += 1;
-            if e.closed().is_some_and(|c| c > 0.5) {
+            // A residual within the floor's own scatter is closed, whatever the ratio of two small numbers says.
+            let at_floor = e.after <= e.floor * (1.0 + 2.0 * (2.0 / n).sqrt());
+            if at_floor || e.closed().is_some_and(|c| c > 0.5) {
                 closed += 1;
             }
         }

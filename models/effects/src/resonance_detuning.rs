@@ -5,7 +5,7 @@ use crate::prelude::*;
 /// See the module.
 pub struct ResonanceDetuning;
 
-static LAWS: [Law; 4] = [
+static LAWS: [Law; 5] = [
     Law {
         name: "warming (temperature)",
         parameters: &[Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0)],
@@ -27,6 +27,13 @@ static LAWS: [Law; 4] = [
     Law {
         name: "self-heating by amplitude",
         parameters: &[Parameter::positive("detuning_at_largest_amplitude", "1", 1.0, 12.0)],
+    },
+    Law {
+        name: "loss with time",
+        parameters: &[
+            Parameter::positive("loss", "1", 0.5, 8.0),
+            Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
+        ],
     },
 ];
 
@@ -50,6 +57,11 @@ impl Effect for ResonanceDetuning {
         &[Need::Vibration]
     }
     fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
+        if law == 4 {
+            let tau = theta[1] * design.duration_s.max(1e-9);
+            c.amplitude_pp /= 1.0 - theta[0] * (-pass.time_s / tau).exp_m1();
+            return;
+        }
         let off = match law {
             0 => theta[0] * pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c),
             1 => {
