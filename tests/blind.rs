@@ -69,7 +69,9 @@ fn threads_do_not_change_the_answer() {
     let table = Table::measured(&set.passes).unwrap();
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| serde_json::to_string(&diagnose(&table, &rig, &quick(), String::new()).report).unwrap())
+        pool.install(|| {
+            serde_json::to_string(&diagnose(&table, &rig, &quick(), String::new()).report).unwrap()
+        })
     };
     assert_eq!(with(1), with(3));
 }

@@ -293,11 +293,9 @@ pub struct Origin {
 
 fn check(p: &Pass) -> Result<(), DataError> {
     let refuse = |column, value, needed| Err(DataError::BadValue { point: p.point, column, value, needed });
-    for (column, value) in [
-        ("frequency_hz", p.frequency_hz),
-        ("speed_m_s", p.speed_m_s),
-        ("normal_force_n", p.normal_force_n),
-    ] {
+    for (column, value) in
+        [("frequency_hz", p.frequency_hz), ("speed_m_s", p.speed_m_s), ("normal_force_n", p.normal_force_n)]
+    {
         if !(value.is_finite() && value > 0.0) {
             return refuse(column, value, "a finite number above zero");
         }
@@ -320,9 +318,8 @@ fn scales(passes: &[Operating]) -> Design {
         (passes.iter().map(|p| f(p).ln()).sum::<f64>() / passes.len().max(1) as f64).exp()
     };
     let range = |f: &dyn Fn(&Operating) -> f64| {
-        let (low, high) = passes
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(f(p)), b.max(f(p))));
+        let (low, high) =
+            passes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(f(p)), b.max(f(p))));
         (high - low).max(0.0)
     };
     Design {

@@ -98,8 +98,7 @@ pub fn explain(
             Covariance::new(&problem.variance, &form_matrix(change, basis, share))
         }
     };
-    let penalty =
-        |u: &[f64]| -> f64 { u.iter().zip(&precision).map(|(x, p)| p * x * x).sum() };
+    let penalty = |u: &[f64]| -> f64 { u.iter().zip(&precision).map(|(x, p)| p * x * x).sum() };
     let mut covariance = build(&change);
     let mut cost = covariance.quadratic(&(&y - &m)) + covariance.log_det() + penalty(&u);
     let mut damping = 1e-3;
@@ -133,7 +132,8 @@ pub fn explain(
     let (hessian, gradient) = equations(&covariance, &jacobian, &residual, &precision, &u);
     let log_2pi = 1.837_877_066_409_345_3;
     let d = u.len() as f64;
-    let mut log_evidence = -0.5 * (covariance.quadratic(&residual) + covariance.log_det() + n as f64 * log_2pi)
+    let mut log_evidence = -0.5
+        * (covariance.quadratic(&residual) + covariance.log_det() + n as f64 * log_2pi)
         + problem.log_prior(members, &u)
         + 0.5 * d * log_2pi;
     let posterior = match hessian.clone().cholesky() {
@@ -156,8 +156,7 @@ pub fn explain(
         }
         at += member.parameters().len();
     }
-    let departure =
-        if members.is_empty() { DVector::zeros(0) } else { covariance.weights(&residual) };
+    let departure = if members.is_empty() { DVector::zeros(0) } else { covariance.weights(&residual) };
     Explained {
         members: members.to_vec(),
         u,
@@ -201,7 +200,12 @@ fn equations(
 }
 
 /// Evidence of a hypothesis averaged over the shares of form uncertainty, with the best share's solution.
-pub fn over_forms(problem: &Problem, fit: &Fit, members: &[Member], basis: &DMatrix<f64>) -> (f64, Explained) {
+pub fn over_forms(
+    problem: &Problem,
+    fit: &Fit,
+    members: &[Member],
+    basis: &DMatrix<f64>,
+) -> (f64, Explained) {
     if members.is_empty() {
         let e = explain(problem, members, &fit.u, basis, 0.0, 4);
         return (e.log_evidence, e);

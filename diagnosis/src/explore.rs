@@ -132,8 +132,8 @@ fn scan(
             let residual = &y - part.predict(members, &u);
             let score = &project * &residual;
             let step = factor.solve(&score);
-            let cost: f64 = residual.iter().zip(&part_variance).map(|(r, v)| r * r / v).sum::<f64>()
-                - score.dot(&step);
+            let cost: f64 =
+                residual.iter().zip(&part_variance).map(|(r, v)| r * r / v).sum::<f64>() - score.dot(&step);
             for (k, s) in step.iter().enumerate() {
                 u[k] += s.clamp(-2.0, 2.0);
             }
@@ -158,9 +158,9 @@ fn refine(
     // Starts that differ: in the size's sign, or by more than one step of any shape.
     let mut starts: Vec<&Vec<f64>> = Vec::new();
     for (_, u) in scored {
-        let fresh = starts.iter().all(|s| {
-            (held..u.len()).any(|k| (u[k] - s[k]).abs() > if k == held { 0.8 } else { 0.5 })
-        });
+        let fresh = starts
+            .iter()
+            .all(|s| (held..u.len()).any(|k| (u[k] - s[k]).abs() > if k == held { 0.8 } else { 0.5 }));
         if fresh {
             starts.push(u);
         }

@@ -243,7 +243,13 @@ pub struct Fit {
 }
 
 /// Levenberg-Marquardt with projection onto the bounds; weights are the inverse variances.
-pub fn minimise(problem: &Problem, members: &[Member], start: &[f64], variance: &[f64], rounds: usize) -> Fit {
+pub fn minimise(
+    problem: &Problem,
+    members: &[Member],
+    start: &[f64],
+    variance: &[f64],
+    rounds: usize,
+) -> Fit {
     let bounds = problem.bounds(members);
     let precision = problem.prior_precision(members);
     let n = problem.len();

@@ -275,12 +275,7 @@ fn sort(candidates: &mut [Candidate]) {
 }
 
 /// Pairs grown from the best singles, each with every other effect in each of its laws.
-fn pairs(
-    problem: &Problem,
-    singles: &[Candidate],
-    loose: &[f64],
-    basis: &DMatrix<f64>,
-) -> Vec<Candidate> {
+fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &DMatrix<f64>) -> Vec<Candidate> {
     let seeds = &singles[..singles.len().min(PAIR_SEEDS)];
     let jobs: Vec<(usize, &Explained)> = (0..seeds.len())
         .flat_map(|s| singles.iter().flat_map(|c| &c.laws).map(move |(_, e)| (s, e)))

@@ -57,7 +57,8 @@ pub fn estimates(problem: &Problem, best: &Explained, basis: &DMatrix<f64>) -> V
                     at += 1;
                     let bounds = p.coordinate_bounds();
                     let sd = best.covariance[(k, k)].max(1e-16).sqrt();
-                    let ends = [-1.0, 1.0].map(|side| end(problem, best, &covariance, floor, k, side, sd, bounds));
+                    let ends =
+                        [-1.0, 1.0].map(|side| end(problem, best, &covariance, floor, k, side, sd, bounds));
                     let value = p.value(best.u[k]);
                     let [low, high] = ends.map(|e| e.unwrap_or(f64::NAN));
                     let shape = match (ends[0], ends[1]) {

@@ -98,8 +98,7 @@ pub fn regions(fitted: &Fitted, gap: &[f64]) -> Vec<Region> {
             }
             let step = levels.len().div_ceil(LEVELS).max(1);
             // Cut half way between neighbouring levels.
-            let at: Vec<f64> =
-                levels.windows(2).step_by(step).map(|w| 0.5 * (w[0] + w[1])).collect();
+            let at: Vec<f64> = levels.windows(2).step_by(step).map(|w| 0.5 * (w[0] + w[1])).collect();
             Some((k, at))
         })
         .collect();

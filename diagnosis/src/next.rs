@@ -43,7 +43,13 @@ pub struct Experiment {
 const PASSES: usize = 12;
 
 /// Designs experiments for the two leading hypotheses (indices of candidates).
-pub fn experiments(fitted: &Fitted, table: &Table, rig: &Rig, first: usize, second: usize) -> Vec<Experiment> {
+pub fn experiments(
+    fitted: &Fitted,
+    table: &Table,
+    rig: &Rig,
+    first: usize,
+    second: usize,
+) -> Vec<Experiment> {
     let (a, b) = (&fitted.candidates[first], &fitted.candidates[second]);
     let names = [a.names().join("+"), b.names().join("+")];
     let mut list = Vec::new();
@@ -90,8 +96,16 @@ const ACTIONS: &[(&str, &str, f64)] = &[
     ("lateral_gain", "Hang a dead weight on the lateral axis of the force sensor.", 0.005),
     ("normal_offset", "Lift the finger and read the normal force; put a dead weight on it.", 0.001),
     ("speed_error", "Time the stage over its stroke, or read its encoder.", 0.003),
-    ("force_crosstalk", "Press on the sensor with a dead weight and no motion, plate levelled; read the lateral axis.", 0.001),
-    ("plate_tilt", "Put a spirit level (or the sensor, unloaded and turned by 180 degrees) on the plate.", 0.002),
+    (
+        "force_crosstalk",
+        "Press on the sensor with a dead weight and no motion, plate levelled; read the lateral axis.",
+        0.001,
+    ),
+    (
+        "plate_tilt",
+        "Put a spirit level (or the sensor, unloaded and turned by 180 degrees) on the plate.",
+        0.002,
+    ),
     ("lateral_offset_drift", "Lift the finger every few passes and read the lateral force.", 0.0005),
     ("squeeze_film", "Repeat the largest amplitudes at 0.2 atm.", 5e4),
 ];

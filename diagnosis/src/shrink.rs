@@ -1,7 +1,5 @@
 //! The gap left on parts of the operating space that the fit did not see.
 
-
-
 use crate::evidence::{Explained, explain};
 use crate::fit::{Member, Problem, minimise};
 use crate::hypotheses::Fitted;
@@ -45,22 +43,23 @@ pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
     let n = problem.len();
     let p = &problem.passes;
     let mut list: Vec<(String, Vec<usize>)> = Vec::new();
-    let ends = |name: &str, value: &dyn Fn(usize) -> f64, of: &[usize], list: &mut Vec<(String, Vec<usize>)>| {
-        let mut sorted: Vec<f64> = of.iter().map(|&i| value(i)).collect();
-        sorted.sort_by(f64::total_cmp);
-        if sorted.len() < 12 || sorted[sorted.len() - 1] <= sorted[0] * 1.05 {
-            return;
-        }
-        let cut = |q: f64| sorted[((sorted.len() - 1) as f64 * q) as usize];
-        let (low, high) = (cut(0.28), cut(0.72));
-        let below: Vec<usize> = of.iter().copied().filter(|&i| value(i) <= low).collect();
-        let above: Vec<usize> = of.iter().copied().filter(|&i| value(i) >= high).collect();
-        for (word, rows) in [("low", below), ("high", above)] {
-            if rows.len() >= 6 && rows.len() * 10 <= n * 6 {
-                list.push((format!("{word} {name}"), rows));
+    let ends =
+        |name: &str, value: &dyn Fn(usize) -> f64, of: &[usize], list: &mut Vec<(String, Vec<usize>)>| {
+            let mut sorted: Vec<f64> = of.iter().map(|&i| value(i)).collect();
+            sorted.sort_by(f64::total_cmp);
+            if sorted.len() < 12 || sorted[sorted.len() - 1] <= sorted[0] * 1.05 {
+                return;
             }
-        }
-    };
+            let cut = |q: f64| sorted[((sorted.len() - 1) as f64 * q) as usize];
+            let (low, high) = (cut(0.28), cut(0.72));
+            let below: Vec<usize> = of.iter().copied().filter(|&i| value(i) <= low).collect();
+            let above: Vec<usize> = of.iter().copied().filter(|&i| value(i) >= high).collect();
+            for (word, rows) in [("low", below), ("high", above)] {
+                if rows.len() >= 6 && rows.len() * 10 <= n * 6 {
+                    list.push((format!("{word} {name}"), rows));
+                }
+            }
+        };
     let all: Vec<usize> = (0..n).collect();
     let vibrating: Vec<usize> = (0..n).filter(|&i| p[i].amplitude_pp_m > 0.0).collect();
     ends("amplitude", &|i| p[i].amplitude_pp_m, &vibrating, &mut list);

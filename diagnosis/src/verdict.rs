@@ -139,11 +139,9 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
         Some(estimates(&fitted.problem, best, &fitted.basis))
     };
     let hypotheses = hypotheses(&fitted, &decision, parameters.as_ref());
-    let second = decision
-        .class
-        .get(1)
-        .copied()
-        .or_else(|| (0..fitted.candidates.len()).find(|&i| i != leader && fitted.candidates[i].effects.len() == 1));
+    let second = decision.class.get(1).copied().or_else(|| {
+        (0..fitted.candidates.len()).find(|&i| i != leader && fitted.candidates[i].effects.len() == 1)
+    });
     let next_experiment = match (decision.verdict, second) {
         (Verdict::NoGap, _) | (_, None) => Vec::new(),
         (_, Some(second)) => experiments(&fitted, table, rig, leader, second),
@@ -153,7 +151,10 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
         remarks.push("No pass has the plate still: mu0 is unknown and was fitted; add w = 0 passes.".into());
     }
     if fitted.pure.variance_ratio.is_none() {
-        remarks.push("No replicates lie close together: the repeatability stated in rig.toml stands for pure error.".into());
+        remarks.push(
+            "No replicates lie close together: the repeatability stated in rig.toml stands for pure error."
+                .into(),
+        );
     }
     let report = Report {
         schema: "muprime.verdict/1",
@@ -203,12 +204,18 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
             format!("This table cannot tell {} apart; {closed}.", names.join(", "))
         }
         Verdict::Unknown => {
-            format!("There is a gap, and no effect of the library causes most of it; {closed} with a smooth map.")
+            format!(
+                "There is a gap, and no effect of the library causes most of it; {closed} with a smooth map."
+            )
         }
     }
 }
 
-fn hypotheses(fitted: &Fitted, decision: &Decision, parameters: Option<&Vec<Vec<Estimate>>>) -> Vec<Hypothesis> {
+fn hypotheses(
+    fitted: &Fitted,
+    decision: &Decision,
+    parameters: Option<&Vec<Vec<Estimate>>>,
+) -> Vec<Hypothesis> {
     let leader = decision.class[0];
     let mut list: Vec<Hypothesis> = fitted
         .candidates
@@ -232,7 +239,12 @@ fn hypotheses(fitted: &Fitted, decision: &Decision, parameters: Option<&Vec<Vec<
                 effects: c.names().iter().map(|n| (*n).to_string()).collect(),
                 probability: decision.probabilities[i],
                 alias_class: own,
-                laws: c.best.members.iter().map(|m| library()[m.effect].laws()[m.law].name.to_string()).collect(),
+                laws: c
+                    .best
+                    .members
+                    .iter()
+                    .map(|m| library()[m.effect].laws()[m.law].name.to_string())
+                    .collect(),
                 parameters,
             }
         })
@@ -336,7 +348,9 @@ impl Diagnosis {
                             covariance: (0..own.len())
                                 .map(|i| {
                                     (0..own.len())
-                                        .map(|j| best.covariance[(first + i, first + j)] * slope[i] * slope[j])
+                                        .map(|j| {
+                                            best.covariance[(first + i, first + j)] * slope[i] * slope[j]
+                                        })
                                         .collect()
                                 })
                                 .collect(),

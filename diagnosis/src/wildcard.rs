@@ -83,7 +83,8 @@ impl Wildcard {
             .collect();
         let kernel = Kernel::new(&places, RANK, 0.02);
         let r = kernel.rank();
-        let (baseline, phi, sizes) = rows(problem, center, &problem.passes, &coordinates, &kernel, (1.0, 1.0));
+        let (baseline, phi, sizes) =
+            rows(problem, center, &problem.passes, &coordinates, &kernel, (1.0, 1.0));
         let n = problem.len();
         let residual = DVector::from_fn(n, |i, _| problem.lateral[i] - baseline[i]);
         // The nuisances' prior is centred on the nominal values, not on where the baseline was recalibrated.
@@ -111,7 +112,15 @@ impl Wildcard {
                     if white == 0.0 && friction == 0.0 && odd == 0.0 {
                         continue;
                     }
-                    let size = |j: usize| if j < r { friction } else if j < 2 * r { odd } else { 1.0 };
+                    let size = |j: usize| {
+                        if j < r {
+                            friction
+                        } else if j < 2 * r {
+                            odd
+                        } else {
+                            1.0
+                        }
+                    };
                     let active: Vec<usize> = (0..2 * r + NUISANCES).filter(|&j| size(j) > 0.0).collect();
                     let a = active.len();
                     let mut inner = DMatrix::from_fn(a, a, |i, j| {
@@ -125,7 +134,8 @@ impl Wildcard {
                     let inner_det: f64 =
                         2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
                     let fitted = g.dot(&factor.solve(&g));
-                    let value = -0.5 * (chi - fitted + log_det + inner_det) - n as f64 * 0.918_938_533_204_672_8;
+                    let value =
+                        -0.5 * (chi - fitted + log_det + inner_det) - n as f64 * 0.918_938_533_204_672_8;
                     all.push(value);
                     if value > best.0 {
                         best = (value, friction, odd, white);
@@ -143,7 +153,8 @@ impl Wildcard {
         let variance: Vec<f64> = (0..n).map(|i| problem.variance[i] + (white * sizes[i]).powi(2)).collect();
         let covariance = Covariance::new(&variance, &scaled);
         let weights = covariance.weights(&residual);
-        let smooth = baseline - scaled.columns(2 * r, NUISANCES) * DVector::from_column_slice(&center[..NUISANCES])
+        let smooth = baseline
+            - scaled.columns(2 * r, NUISANCES) * DVector::from_column_slice(&center[..NUISANCES])
             + &scaled * &weights;
         Wildcard {
             coordinates,

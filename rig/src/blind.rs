@@ -64,7 +64,8 @@ pub struct Scored {
 /// # Errors
 /// A set that the diagnosis refuses.
 pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
-    let rig: Rig = toml::from_str(&set.rig_toml).map_err(|e| miette::miette!("rig.toml of a sealed set: {e}"))?;
+    let rig: Rig =
+        toml::from_str(&set.rig_toml).map_err(|e| miette::miette!("rig.toml of a sealed set: {e}"))?;
     let table = Table::measured(&set.passes).map_err(|e| miette::miette!("table of a sealed set: {e}"))?;
     let conditions = Table::conditions(&set.conditions, &table.origin(&set.passes))
         .map_err(|e| miette::miette!("conditions of a sealed set: {e}"))?;
@@ -217,7 +218,12 @@ fn share(name: &'static str, target: &'static str, outcomes: Vec<bool>) -> Figur
     }
 }
 
-fn statistic(name: &'static str, target: &'static str, values: &[f64], of: fn(&mut Vec<f64>) -> f64) -> Figure {
+fn statistic(
+    name: &'static str,
+    target: &'static str,
+    values: &[f64],
+    of: fn(&mut Vec<f64>) -> f64,
+) -> Figure {
     if values.is_empty() {
         return Figure { name, value: None, ci95: None, n: 0, target };
     }
@@ -226,7 +232,8 @@ fn statistic(name: &'static str, target: &'static str, values: &[f64], of: fn(&m
         .map(|_| {
             let mut sample: Vec<f64> = (0..values.len())
                 .map(|_| {
-                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    state =
+                        state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                     values[((state >> 33) as usize) % values.len()]
                 })
                 .collect();
@@ -280,9 +287,9 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
         clear.iter().copied().filter(|s| s.gap_over_floor >= 4.0 && s.verdict == Verdict::Named).collect();
     let closed: Vec<f64> = gapped.iter().filter_map(|s| s.achieved_form).collect();
     let closed_full: Vec<f64> = gapped.iter().filter_map(|s| s.achieved).collect();
-    let honest: Vec<f64> =
-        gapped.iter().filter_map(|s| Some((s.claimed? - s.achieved?).abs())).collect();
-    let regions: Vec<f64> = all.iter().filter(|s| s.chi2_gain >= DETECTABLE).filter_map(|s| s.region_f1).collect();
+    let honest: Vec<f64> = gapped.iter().filter_map(|s| Some((s.claimed? - s.achieved?).abs())).collect();
+    let regions: Vec<f64> =
+        all.iter().filter(|s| s.chi2_gain >= DETECTABLE).filter_map(|s| s.region_f1).collect();
     vec![
         share("singles, detectable and decidable: named right", ">= 0.90", of(&clear, &named_right)),
         share("  confidently wrong", "<= 0.02", of(&clear, &named_wrong)),
@@ -334,7 +341,9 @@ pub fn confusion(all: &[Scored]) -> BTreeMap<String, BTreeMap<String, usize>> {
             Verdict::NoGap => "no_gap".to_string(),
             Verdict::Unknown => "unknown".to_string(),
             Verdict::Named => s.named.join("+"),
-            Verdict::Ambiguous => format!("ambiguous({})", s.class.iter().take(3).cloned().collect::<Vec<_>>().join(",")),
+            Verdict::Ambiguous => {
+                format!("ambiguous({})", s.class.iter().take(3).cloned().collect::<Vec<_>>().join(","))
+            }
         };
         *table.entry(truth).or_default().entry(answer).or_default() += 1;
     }

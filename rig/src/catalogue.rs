@@ -83,7 +83,10 @@ impl Catalogue {
     /// Whatever SQLite says.
     pub fn progress(&self, folder: &str, passes: i64, departed: bool) -> miette::Result<()> {
         self.db
-            .execute("UPDATE run SET passes = ?2, departed = ?3 WHERE folder = ?1", params![folder, passes, departed])
+            .execute(
+                "UPDATE run SET passes = ?2, departed = ?3 WHERE folder = ?1",
+                params![folder, passes, departed],
+            )
             .into_diagnostic()?;
         Ok(())
     }

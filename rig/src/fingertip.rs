@@ -84,7 +84,8 @@ impl Fingertip {
     /// # Errors
     /// A tip that is not there or not usable, in words.
     pub fn resolve(setup: &FingertipSetup, folder: &Path) -> Result<Self, String> {
-        let bundled = BUNDLED.iter().find(|(name, _)| *name == setup.tip).map(|(_, text)| (*text).to_string());
+        let bundled =
+            BUNDLED.iter().find(|(name, _)| *name == setup.tip).map(|(_, text)| (*text).to_string());
         let text = match bundled {
             Some(text) => text,
             None => input::text_of(&folder.join(&setup.tip)).map_err(|e| {
@@ -95,7 +96,9 @@ impl Fingertip {
         let file: FingertipFile =
             toml::from_str(&text).map_err(|e| format!("fingertip '{}': {e}", setup.tip))?;
         let finger = Finger {
-            normal_stiffness_n_per_m: setup.normal_stiffness_n_per_m.unwrap_or(file.finger.normal_stiffness_n_per_m),
+            normal_stiffness_n_per_m: setup
+                .normal_stiffness_n_per_m
+                .unwrap_or(file.finger.normal_stiffness_n_per_m),
             lateral_stiffness_n_per_m: setup
                 .lateral_stiffness_n_per_m
                 .unwrap_or(file.finger.lateral_stiffness_n_per_m),

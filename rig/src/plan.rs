@@ -173,7 +173,11 @@ impl Plan {
         ];
         for (name, value) in times {
             if !(value.is_finite() && value > 0.0 && value < 3600.0) {
-                return Err(bad(&["pass", name], &format!("{name} = {value}: a number above zero is needed")).into());
+                return Err(bad(
+                    &["pass", name],
+                    &format!("{name} = {value}: a number above zero is needed"),
+                )
+                .into());
             }
         }
         Ok(Plan { file, text: text.to_string(), origin: origin.to_string() })

@@ -48,7 +48,8 @@ impl RunDir {
         let file = path.join(IDENTITY);
         if file.exists() {
             let text = fs::read_to_string(&file).into_diagnostic()?;
-            let before: Identity = toml::from_str(&text).map_err(|e| miette::miette!("{shown}/{IDENTITY}: {e}"))?;
+            let before: Identity =
+                toml::from_str(&text).map_err(|e| miette::miette!("{shown}/{IDENTITY}: {e}"))?;
             if before != *identity {
                 let parts = [
                     ("setup", before.setup_sha256 == identity.setup_sha256),
@@ -64,7 +65,10 @@ impl RunDir {
                 );
             }
         } else if path.exists() && fs::read_dir(path).into_diagnostic()?.next().is_some() {
-            miette::bail!(help = "give an empty or new folder as --out", "{shown} is not empty and holds no run");
+            miette::bail!(
+                help = "give an empty or new folder as --out",
+                "{shown} is not empty and holds no run"
+            );
         }
         fs::create_dir_all(path).into_diagnostic().wrap_err_with(|| format!("cannot make {shown}"))?;
         let lock = path.join(LOCK);
@@ -87,11 +91,16 @@ impl RunDir {
             record::write_passes(&[], &mut header).into_diagnostic()?;
             write_whole(&points_file, &header)?;
         }
-        let mut points =
-            OpenOptions::new().read(true).append(true).open(&points_file).into_diagnostic().wrap_err("points.csv")?;
+        let mut points = OpenOptions::new()
+            .read(true)
+            .append(true)
+            .open(&points_file)
+            .into_diagnostic()
+            .wrap_err("points.csv")?;
         drop_torn_line(&mut points)?;
         points.seek(SeekFrom::Start(0)).into_diagnostic()?;
-        let made = record::read_passes(&points).into_diagnostic().wrap_err("points.csv of an earlier session")?;
+        let made =
+            record::read_passes(&points).into_diagnostic().wrap_err("points.csv of an earlier session")?;
         let mut journal = OpenOptions::new()
             .create(true)
             .read(true)

@@ -284,11 +284,8 @@ impl Sequence {
         if row.now.since(since) < Nanos(ZERO_SETTLE.0 + ZERO_FOR.0) {
             return;
         }
-        let event = Event::Zeros {
-            lateral_n: self.sums.lateral.mean(),
-            normal_n: self.sums.normal.mean(),
-            after,
-        };
+        let event =
+            Event::Zeros { lateral_n: self.sums.lateral.mean(), normal_n: self.sums.normal.mean(), after };
         out.events.push(event);
         self.sums = Sums::default();
         if after {
@@ -462,9 +459,8 @@ impl Sequence {
             pass.friction_force_n().and_then(|f| self.comparator.pass(&*self.model, &condition, f).ok());
         let regime = self.model.predict(&condition).ok().map(|p| p.regime);
         let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
-        let psi_eq17 = known.map(|m| {
-            PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0
-        });
+        let psi_eq17 =
+            known.map(|m| PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0);
         MeasuredPass { pass, reference, comparison, regime, psi_eq17 }
     }
 }

@@ -89,7 +89,8 @@ pub fn sha256(text: &str) -> String {
 impl Job {
     /// What the run is of.
     pub fn identity(&self) -> Identity {
-        let model = self.model_file.as_ref().map_or_else(|| self.model.name().to_string(), |(_, text)| sha256(text));
+        let model =
+            self.model_file.as_ref().map_or_else(|| self.model.name().to_string(), |(_, text)| sha256(text));
         Identity {
             setup_sha256: sha256(&self.setup.text),
             plan_sha256: sha256(&self.plan.text),

@@ -159,7 +159,9 @@ impl Setup {
     /// What is wrong, with the place in the file.
     pub fn parse(origin: &str, text: &str, folder: &Path) -> miette::Result<Self> {
         let file: SetupFile = input::parse_toml(origin, text)?;
-        let bad = |path: &[&str], problem: String| BadInput::new(origin, text, input::place_of(text, path), problem, None);
+        let bad = |path: &[&str], problem: String| {
+            BadInput::new(origin, text, input::place_of(text, path), problem, None)
+        };
         if !(10.0..=4000.0).contains(&file.pace.rate_hz) {
             return Err(bad(&["loop", "rate_hz"], "the loop runs at 10 to 4000 Hz".into()).into());
         }
@@ -170,12 +172,15 @@ impl Setup {
             let most = realtime::estimate::WINDOW_MAX;
             return Err(bad(&["estimate", "window"], format!("a window has 1 to {most} samples")).into());
         }
-        for (name, value) in [
-            ("pass_relative_sd", file.noise.pass_relative_sd),
-            ("force_sd_n", file.noise.force_sd_n),
-        ] {
+        for (name, value) in
+            [("pass_relative_sd", file.noise.pass_relative_sd), ("force_sd_n", file.noise.force_sd_n)]
+        {
             if !(value.is_finite() && value > 0.0) {
-                return Err(bad(&["noise", name], format!("{name} = {value}: a finite number above zero is needed")).into());
+                return Err(bad(
+                    &["noise", name],
+                    format!("{name} = {value}: a finite number above zero is needed"),
+                )
+                .into());
             }
         }
         let tip = Fingertip::resolve(&file.finger, folder).map_err(|p| bad(&["finger"], p))?;
@@ -242,7 +247,10 @@ fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     // link thread may be held up for some milliseconds: the latency allows for that and is stated.
     let stall = Nanos(20_000_000);
     let timing = |instrument: &InstrumentSetup| -> ChannelTiming {
-        let rate = instrument.rate_hz.or_else(|| crate::drivers::nominal_rate_hz(&instrument.profile)).unwrap_or(100.0);
+        let rate = instrument
+            .rate_hz
+            .or_else(|| crate::drivers::nominal_rate_hz(&instrument.profile))
+            .unwrap_or(100.0);
         let period = Nanos((1e9 / rate) as u64).0.max(cycle.0);
         ChannelTiming { period: Nanos(period), latency: stall, periods: 3 }
     };

@@ -252,11 +252,7 @@ pub fn lost_to_stick(phi: f64, drag: f64) -> f64 {
             return 0.0;
         }
         let late = -PI + drag.asin();
-        if late > -phi {
-            (late, -drag, -(1.0 - drag * drag).sqrt())
-        } else {
-            (-phi, -sin_phi, cos_phi)
-        }
+        if late > -phi { (late, -drag, -(1.0 - drag * drag).sqrt()) } else { (-phi, -sin_phi, cos_phi) }
     };
     // cos(x) - rise - drag (x - start) is concave: its second root is sought from a parabola through both
     // touch-downs and the top, by Halley's rule (sine and cosine come together).

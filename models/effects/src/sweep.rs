@@ -198,8 +198,8 @@ fn retarded_contact(load: f64, lag: f64) -> Retarded {
             return (0.0, Retarded { start: end - 2.0 * PI, arc: 1e-6, depth });
         };
         let start = again - 2.0 * PI;
-        let mean = (start.cos() - end.cos() + depth * (end - start) + lag * (end.sin() - start.sin()))
-            / (2.0 * PI);
+        let mean =
+            (start.cos() - end.cos() + depth * (end - start) + lag * (end.sin() - start.sin())) / (2.0 * PI);
         (mean, Retarded { start, arc: end - start, depth })
     };
     match root(-reach + 1e-9, reach - 1e-9, 1e-9, |depth| at(depth).0 - load) {

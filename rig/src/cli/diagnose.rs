@@ -58,7 +58,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot read the table {}", table_path.display()))?;
     let passes = parse_passes(&table_path, &bytes)?;
-    let table = Table::measured(&passes).into_diagnostic().wrap_err_with(|| table_path.display().to_string())?;
+    let table =
+        Table::measured(&passes).into_diagnostic().wrap_err_with(|| table_path.display().to_string())?;
     for name in &args.without {
         if effects::by_name(name).is_none() {
             miette::bail!("--without {name}: no such effect; `muprime model effects` lists them");
@@ -68,7 +69,11 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         Some(path) => {
             let rows = read_table(path)?;
             let origin = table.origin(&passes);
-            Some(Table::conditions(&rows, &origin).into_diagnostic().wrap_err_with(|| path.display().to_string())?)
+            Some(
+                Table::conditions(&rows, &origin)
+                    .into_diagnostic()
+                    .wrap_err_with(|| path.display().to_string())?,
+            )
         }
         None => None,
     };
@@ -110,7 +115,9 @@ fn read_rig(path: &Path) -> miette::Result<Rig> {
     let rig: Rig = toml::from_str(&text).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
     rig.finger.check().into_diagnostic().wrap_err_with(|| format!("{}: [finger]", path.display()))?;
     let noise = rig.noise;
-    if !(noise.pass_relative_sd >= 0.0 && noise.force_sd_n >= 0.0 && noise.pass_relative_sd + noise.force_sd_n > 0.0)
+    if !(noise.pass_relative_sd >= 0.0
+        && noise.force_sd_n >= 0.0
+        && noise.pass_relative_sd + noise.force_sd_n > 0.0)
     {
         miette::bail!(
             "{}: [noise] needs pass_relative_sd and force_sd_n of zero or more, not both zero",
@@ -180,7 +187,10 @@ fn predictions(result: &Diagnosis, conditions: &Table) -> String {
 
 /// The plan of a designed experiment: its conditions in the order of their gain.
 fn plan(experiment: &diagnosis::next::Experiment) -> String {
-    let mut text = format!("# {}\n# separates {} and {}\n", experiment.text, experiment.separates[0], experiment.separates[1]);
+    let mut text = format!(
+        "# {}\n# separates {} and {}\n",
+        experiment.text, experiment.separates[0], experiment.separates[1]
+    );
     for c in &experiment.conditions {
         text.push_str(&format!(
             "\n[[point]]\namplitude_pp_m = {:e}\nfrequency_hz = {:e}\nspeed_m_s = {:e}\ndirection = {}\nnormal_force_n = {:e}\n",
@@ -227,7 +237,12 @@ pub fn terminal(result: &Diagnosis) -> String {
         g.before_rmse, g.recalibrated_rmse, g.after_rmse, g.noise_floor_rmse
     ));
     if let (Some(s), Some([low, high])) = (g.shrinkage, g.shrinkage_ci95) {
-        text.push_str(&format!("  the removable gap shrinks by {:.0} % [{:.0}, {:.0}]\n", 100.0 * s, 100.0 * low, 100.0 * high));
+        text.push_str(&format!(
+            "  the removable gap shrinks by {:.0} % [{:.0}, {:.0}]\n",
+            100.0 * s,
+            100.0 * low,
+            100.0 * high
+        ));
     }
     if !r.location.regions.is_empty() {
         text.push_str("\nWhere\n");
@@ -238,7 +253,10 @@ pub fn terminal(result: &Diagnosis) -> String {
     if !r.next_experiment.is_empty() {
         text.push_str("\nNext\n");
         for e in r.next_experiment.iter().take(4) {
-            text.push_str(&format!("  {} (parts {} from {}: {:.1} nats)\n", e.text, e.separates[0], e.separates[1], e.expected_nats));
+            text.push_str(&format!(
+                "  {} (parts {} from {}: {:.1} nats)\n",
+                e.text, e.separates[0], e.separates[1], e.expected_nats
+            ));
         }
     }
     if !r.not_testable.is_empty() {

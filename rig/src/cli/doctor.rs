@@ -76,9 +76,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             }
         }
         let [p50, p99, p999, max] = judgement.lateness_us.idle;
-        println!("      lateness idle: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us");
+        println!(
+            "      lateness idle: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us"
+        );
         let [p50, p99, p999, max] = judgement.lateness_us.loaded;
-        println!("      lateness loaded: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us");
+        println!(
+            "      lateness loaded: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us"
+        );
     }
     super::exit(if good { super::DONE } else { super::FAILED })
 }
@@ -160,7 +164,8 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
             subject: "real-time group scheduling",
             good: !group,
             found: if group { "in force" } else { "not in force" }.into(),
-            advice: "outside the root group SCHED_FIFO may be taken away silently: give the group rt_runtime".into(),
+            advice: "outside the root group SCHED_FIFO may be taken away silently: give the group rt_runtime"
+                .into(),
         },
         Finding {
             subject: "timer slack",
@@ -179,7 +184,8 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
         Finding {
             subject: "virtual machine",
             good: !virtual_machine,
-            found: if virtual_machine { "yes: its host may hold it up for milliseconds" } else { "no" }.into(),
+            found: if virtual_machine { "yes: its host may hold it up for milliseconds" } else { "no" }
+                .into(),
             advice: "run a real rig on a machine of its own".into(),
         },
         Finding {

@@ -23,7 +23,8 @@ pub fn bytes(table: &Table) -> miette::Result<Vec<u8>> {
         }
     };
     let schema = Arc::new(Schema::new(table.iter().map(field).collect::<Vec<_>>()));
-    let batch = RecordBatch::try_new(Arc::clone(&schema), table.iter().map(array).collect()).into_diagnostic()?;
+    let batch =
+        RecordBatch::try_new(Arc::clone(&schema), table.iter().map(array).collect()).into_diagnostic()?;
     let mut bytes = Vec::new();
     let mut writer = arrow_ipc::writer::FileWriter::try_new(&mut bytes, &schema).into_diagnostic()?;
     writer.write(&batch).into_diagnostic()?;

@@ -39,7 +39,10 @@ pub fn bytes(table: &Table) -> miette::Result<Vec<u8>> {
             }
             Column::Texts(v) => {
                 let (values, levels) = present(v.iter().map(|v| v.as_deref().map(ByteArray::from)));
-                writer.typed::<ByteArrayType>().write_batch(&values, Some(&levels), None).into_diagnostic()?;
+                writer
+                    .typed::<ByteArrayType>()
+                    .write_batch(&values, Some(&levels), None)
+                    .into_diagnostic()?;
             }
         }
         writer.close().into_diagnostic()?;

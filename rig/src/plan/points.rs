@@ -72,7 +72,8 @@ impl Plan {
         for (i, series) in self.file.series.iter().enumerate() {
             self.check_series(i, limits)?;
             let base = &self.file.base;
-            let or_base = |list: &Vec<f64>, base: f64| if list.is_empty() { vec![base] } else { list.clone() };
+            let or_base =
+                |list: &Vec<f64>, base: f64| if list.is_empty() { vec![base] } else { list.clone() };
             let pressures: Vec<Option<f64>> = match &series.ambient_pressure_pa[..] {
                 [] => vec![None],
                 listed => listed.iter().copied().map(Some).collect(),
@@ -183,8 +184,10 @@ impl Plan {
                     input::place_of(&self.text, &["base", name])
                 };
                 let low = if low == tiny { 0.0 } else { low };
-                let problem = format!("{name} = {value:e} is outside what this rig allows, {low:e} to {high:e}");
-                let remedy = "change the plan, or the [limits] of the setup below the hard limits".to_string();
+                let problem =
+                    format!("{name} = {value:e} is outside what this rig allows, {low:e} to {high:e}");
+                let remedy =
+                    "change the plan, or the [limits] of the setup below the hard limits".to_string();
                 return Err(BadInput::new(&self.origin, &self.text, place, problem, remedy));
             }
         }

@@ -81,7 +81,8 @@ fn gap(result: &Diagnosis) -> String {
             100.0 * low,
             100.0 * high
         ),
-        _ => "The recalibrated baseline is within its own sampling error of repeatability: no gap to shrink.".to_string(),
+        _ => "The recalibrated baseline is within its own sampling error of repeatability: no gap to shrink."
+            .to_string(),
     };
     format!(
         "<h2>How far</h2><p>Root mean square error on held-out passes, in units of full friction.</p><table>{rows}</table><p>{words}</p>"
@@ -113,7 +114,8 @@ fn maps(result: &Diagnosis, table: &Table) -> String {
     let mut figures = String::new();
     for (name, value, log) in covariates {
         let x: Vec<f64> = table.passes.iter().map(|p| if log { value(p).ln() } else { value(p) }).collect();
-        let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let (low, high) =
+            x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         if high - low <= 1e-12 * high.abs().max(1e-12) {
             continue;
         }
@@ -123,7 +125,9 @@ fn maps(result: &Diagnosis, table: &Table) -> String {
                 let e = if k == 0 { z[i].0 } else { z[i].1 };
                 let cx = 30.0 + 270.0 * (v - low) / (high - low);
                 let cy = 80.0 - 70.0 * (e / limit).clamp(-1.0, 1.0);
-                dots.push_str(&format!("<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"1.6\" fill=\"{colour}\" fill-opacity=\".55\"/>"));
+                dots.push_str(&format!(
+                    "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"1.6\" fill=\"{colour}\" fill-opacity=\".55\"/>"
+                ));
             }
         }
         figures.push_str(&format!(
@@ -155,7 +159,12 @@ fn lists(result: &Diagnosis) -> String {
     text.push_str(&items(
         r.next_experiment
             .iter()
-            .map(|e| format!("{} Parts {} from {}; {:.1} nats expected.", e.text, e.separates[0], e.separates[1], e.expected_nats))
+            .map(|e| {
+                format!(
+                    "{} Parts {} from {}; {:.1} nats expected.",
+                    e.text, e.separates[0], e.separates[1], e.expected_nats
+                )
+            })
             .collect(),
     ));
     text.push_str("<h2>Left-out regions</h2>");

@@ -45,13 +45,19 @@ pub(super) fn page(run: &RunData) -> miette::Result<String> {
          <h2>Relative friction against &Psi;</h2>{}{}\
          <h2>Residuals</h2>{}{}",
         plots::mu_against_amplitude(run)?,
-        caption("Points: measured passes with one standard uncertainty. Lines and bands: the model's prediction at the \
-                 base condition of each speed, with twice its standard uncertainty. w is peak-to-peak."),
+        caption(
+            "Points: measured passes with one standard uncertainty. Lines and bands: the model's prediction at the \
+                 base condition of each speed, with twice its standard uncertainty. w is peak-to-peak."
+        ),
         plots::mu_against_psi(run)?,
-        caption("&Psi; = U / (w f &mu;<sub>0</sub> (1+&nu;)), Eq. 17. Line: Eq. 20 with &Psi;* = 2.38 &plusmn; 0.21."),
+        caption(
+            "&Psi; = U / (w f &mu;<sub>0</sub> (1+&nu;)), Eq. 17. Line: Eq. 20 with &Psi;* = 2.38 &plusmn; 0.21."
+        ),
         plots::residuals(run)?,
-        caption("Measured less predicted lateral force, in standard deviations, in the order of measurement; \
-                 independent from pass to pass as long as the model holds. Dashed: &plusmn;1.96."),
+        caption(
+            "Measured less predicted lateral force, in standard deviations, in the order of measurement; \
+                 independent from pass to pass as long as the model holds. Dashed: &plusmn;1.96."
+        ),
     );
     timing(w, run)?;
     events(w, run);
@@ -82,8 +88,10 @@ fn verdict(w: &mut String, run: &RunData) {
     let finding = if departed {
         let first = run.passes.iter().find(|p| p.comparison.is_some_and(|c| c.departed));
         let at = first.map_or(0, |p| p.pass.point);
-        format!("<strong>The model has left the measurement</strong> (first at point {at}). \
-                 Run <code>muprime diagnose</code> on this folder to learn where and why.")
+        format!(
+            "<strong>The model has left the measurement</strong> (first at point {at}). \
+                 Run <code>muprime diagnose</code> on this folder to learn where and why."
+        )
     } else {
         "The measurement agrees with the model.".to_string()
     };
@@ -151,7 +159,8 @@ fn passes(w: &mut String, run: &RunData) {
     );
     for p in &run.passes {
         let c = p.comparison;
-        let number = |v: Option<f64>, digits: usize| v.map_or("&ndash;".to_string(), |v| format!("{v:.digits$}"));
+        let number =
+            |v: Option<f64>, digits: usize| v.map_or("&ndash;".to_string(), |v| format!("{v:.digits$}"));
         let _ = writeln!(
             w,
             "<tr><td class=\"n\">{}</td><td class=\"n\">{:.3}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td>\
@@ -188,6 +197,8 @@ mod tests {
     fn markup_and_terminal_escapes_in_names_are_harmless() {
         let bad = "<script>alert('x')</script>\u{1b}[31m\"&";
         let safe = super::escape(bad);
-        assert!(!safe.contains('<') && !safe.contains('\u{1b}') && !safe.contains('"') && !safe.contains('\''));
+        assert!(
+            !safe.contains('<') && !safe.contains('\u{1b}') && !safe.contains('"') && !safe.contains('\'')
+        );
     }
 }

@@ -74,7 +74,8 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     speeds.dedup();
     let widest = chosen.iter().map(|p| p.pass.amplitude.micrometres()).fold(1.0, f64::max) * 1.05;
     let model = SpringSlider::new(run.finger).map_err(wrong)?;
-    let mu0 = models::record::coulomb_coefficient(&run.passes.iter().map(|p| p.pass.clone()).collect::<Vec<_>>());
+    let mu0 =
+        models::record::coulomb_coefficient(&run.passes.iter().map(|p| p.pass.clone()).collect::<Vec<_>>());
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
@@ -98,21 +99,31 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
             let of_speed: Vec<&&MeasuredPass> = chosen.iter().filter(|p| setting(p).0 == *speed).collect();
             if let (Some(mu0), Some(first)) = (mu0, of_speed.first()) {
                 let at = |w: f64| {
-                    let c = Condition { amplitude: PeakToPeak::from_metres(w * 1e-6), ..first.pass.condition(mu0) };
+                    let c = Condition {
+                        amplitude: PeakToPeak::from_metres(w * 1e-6),
+                        ..first.pass.condition(mu0)
+                    };
                     model.predict(&c).ok()
                 };
                 let grid: Vec<f64> = (1..=200).map(|k| widest * f64::from(k) / 200.0).collect();
-                let line: Vec<(f64, f64, f64)> =
-                    grid.iter().filter_map(|w| at(*w).map(|p| (*w, p.mu_relative, p.mu_relative_sd))).collect();
+                let line: Vec<(f64, f64, f64)> = grid
+                    .iter()
+                    .filter_map(|w| at(*w).map(|p| (*w, p.mu_relative, p.mu_relative_sd)))
+                    .collect();
                 let upper = line.iter().map(|(w, m, s)| (*w, (m + 2.0 * s).min(1.1)));
                 let lower = line.iter().rev().map(|(w, m, s)| (*w, (m - 2.0 * s).max(0.0)));
                 let band: Vec<(f64, f64)> = upper.chain(lower).collect();
                 chart.draw_series([Polygon::new(band, colour.mix(0.18))]).map_err(wrong)?;
                 chart
-                    .draw_series(LineSeries::new(line.iter().map(|(w, m, _)| (*w, *m)), colour.stroke_width(2)))
+                    .draw_series(LineSeries::new(
+                        line.iter().map(|(w, m, _)| (*w, *m)),
+                        colour.stroke_width(2),
+                    ))
                     .map_err(wrong)?
                     .label(format!("{speed} mm/s"))
-                    .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(3)));
+                    .legend(move |(x, y)| {
+                        PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(3))
+                    });
             }
             let points = of_speed.iter().filter_map(|p| measured(p));
             chart
@@ -163,7 +174,8 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
             .label_style(("sans-serif", 14))
             .draw()
             .map_err(wrong)?;
-        let grid: Vec<f64> = (0..=200).map(|k| lowest * (highest / lowest).powf(f64::from(k) / 200.0)).collect();
+        let grid: Vec<f64> =
+            (0..=200).map(|k| lowest * (highest / lowest).powf(f64::from(k) / 200.0)).collect();
         let law = |star: f64| grid.iter().map(move |p| (*p, psi::relative_friction(PsiEq17(*p), star)));
         let (star, sd) = (psi::PSI_STAR, psi::PSI_STAR_UNCERTAINTY);
         let mut band: Vec<(f64, f64)> = law(star - sd).collect();
@@ -234,8 +246,12 @@ pub fn residuals(run: &RunData) -> miette::Result<String> {
 /// # Errors
 /// Only if the drawing library fails.
 pub fn lateness(report: &LoopReport) -> miette::Result<String> {
-    let bars: Vec<(f64, f64)> =
-        report.histogram.iter().filter(|(_, n)| *n > 0).map(|(ns, n)| (*ns as f64 / 1e3, *n as f64)).collect();
+    let bars: Vec<(f64, f64)> = report
+        .histogram
+        .iter()
+        .filter(|(_, n)| *n > 0)
+        .map(|(ns, n)| (*ns as f64 / 1e3, *n as f64))
+        .collect();
     if bars.is_empty() {
         return Ok("<p>No cycle was timed.</p>".into());
     }
@@ -259,7 +275,9 @@ pub fn lateness(report: &LoopReport) -> miette::Result<String> {
             .label_style(("sans-serif", 14))
             .draw()
             .map_err(wrong)?;
-        let bar = |(upper, n): &(f64, f64)| Rectangle::new([(upper / 2.0, 0.7), (*upper, *n)], COLOURS[0].mix(0.6).filled());
+        let bar = |(upper, n): &(f64, f64)| {
+            Rectangle::new([(upper / 2.0, 0.7), (*upper, *n)], COLOURS[0].mix(0.6).filled())
+        };
         chart.draw_series(bars.iter().map(bar)).map_err(wrong)?;
         area.present().map_err(wrong)?;
     }

@@ -70,10 +70,11 @@ impl Keeper {
     /// Whatever file system and SQLite say.
     pub fn begin(job: &Job, dir: RunDir, planned: usize, start_unix_ns: u64) -> miette::Result<Self> {
         dir.write("rig.toml", job.setup.rig_toml()?.as_bytes())?;
-        let runs = dir.path().parent().filter(|p| !p.as_os_str().is_empty()).map_or_else(
-            || std::path::PathBuf::from("."),
-            std::path::Path::to_path_buf,
-        );
+        let runs = dir
+            .path()
+            .parent()
+            .filter(|p| !p.as_os_str().is_empty())
+            .map_or_else(|| std::path::PathBuf::from("."), std::path::Path::to_path_buf);
         let catalogue = Catalogue::open(&runs)?;
         let folder = dir.path().file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let passes = dir.made.len();

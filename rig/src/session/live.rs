@@ -95,7 +95,8 @@ pub fn run(
     let _ = commands.push(Command::Stop);
     let beat = life.heartbeat.load(Ordering::Relaxed);
     let waited = Instant::now();
-    while life.heartbeat.load(Ordering::Relaxed) < beat + 20 && waited.elapsed() < Duration::from_millis(500) {
+    while life.heartbeat.load(Ordering::Relaxed) < beat + 20 && waited.elapsed() < Duration::from_millis(500)
+    {
         std::thread::sleep(Duration::from_millis(1));
     }
     life.end.store(true, Ordering::Relaxed);
@@ -109,10 +110,14 @@ pub fn run(
     drop(rig.links);
     let outcome = outcome?;
     let loop_json = serde_json::to_string(&report).into_diagnostic()?;
-    let mut last = BTreeMap::from([("outcome".to_string(), words(&outcome)?), ("loop".to_string(), loop_json)]);
+    let mut last =
+        BTreeMap::from([("outcome".to_string(), words(&outcome)?), ("loop".to_string(), loop_json)]);
     last.insert("links".to_string(), serde_json::to_string(&links).into_diagnostic()?);
     let _ = last_in.send(last);
-    let lost = writer.join().map_err(|_| miette::miette!("the recorder's thread panicked"))?.wrap_err("the record")?;
+    let lost = writer
+        .join()
+        .map_err(|_| miette::miette!("the recorder's thread panicked"))?
+        .wrap_err("the record")?;
     end(kept, outcome, sequence.departed(), report, lost, links)
 }
 
