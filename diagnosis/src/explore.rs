@@ -59,13 +59,54 @@ pub fn optima(problem: &Problem, members: &[Member], held: &[f64], variance: &[f
     let Some(last) = members.last() else {
         return vec![minimise(problem, members, held, variance, 20)];
     };
-    let parameters = last.parameters();
-    let fine = parameters.iter().any(is_wavelength);
-    let n = problem.len();
-    let limit = if fine { n } else { SCAN_ROWS };
-    let stride = n.div_ceil(limit).max(1);
-    let rows: Vec<usize> = (0..n).step_by(stride).collect();
-    let part = problem.select(&rows);
+    let grid = grid(last.parameters(), problem.design.stroke_m);
+    let fine = last.parameters().iter().any(is_wavelength);
+    let rows = rows(problem.len(), if fine { problem.len() } else { SCAN_ROWS });
+    let scored = scan(problem, members, held, variance, &rows, grid);
+    refine(problem, members, held.len(), variance, &rows, &scored, STARTS)
+}
+
+/// Best cost of a coarse scan of the last member about coordinates that it had alone, with the place it was found.
+pub fn glance(
+    problem: &Problem,
+    members: &[Member],
+    held: &[f64],
+    variance: &[f64],
+    alone: &[f64],
+) -> Option<(f64, Vec<f64>)> {
+    let last = members.last()?;
+    let (low, high) = last.parameters()[0].coordinate_bounds();
+    let mut list = vec![alone.to_vec()];
+    for factor in [0.15, 0.4, 1.0, 2.0, -0.4, -1.0] {
+        let mut tail = alone.to_vec();
+        let reach = if alone[0].abs() > 0.05 { alone[0] } else { 0.3 };
+        tail[0] = (reach * factor).clamp(low, high);
+        list.push(tail);
+    }
+    let rows = rows(problem.len(), SCAN_ROWS);
+    scan(problem, members, held, variance, &rows, list).into_iter().next()
+}
+
+/// Local fit of a pair from one start.
+pub fn polish(problem: &Problem, members: &[Member], start: Vec<f64>, variance: &[f64]) -> Option<Fit> {
+    let rows = rows(problem.len(), SCAN_ROWS);
+    let held = start.len() - members.last()?.parameters().len();
+    refine(problem, members, held, variance, &rows, &[(0.0, start)], (1, 1)).into_iter().next()
+}
+
+fn rows(n: usize, limit: usize) -> Vec<usize> {
+    (0..n).step_by(n.div_ceil(limit).max(1)).collect()
+}
+
+fn scan(
+    problem: &Problem,
+    members: &[Member],
+    held: &[f64],
+    variance: &[f64],
+    rows: &[usize],
+    grid: Vec<Vec<f64>>,
+) -> Vec<(f64, Vec<f64>)> {
+    let part = problem.select(rows);
     let part_variance: Vec<f64> = rows.iter().map(|&i| variance[i]).collect();
     // Nuisances (and the other members) follow linearly while the scan walks.
     let others = &members[..members.len() - 1];
@@ -83,7 +124,7 @@ pub fn optima(problem: &Problem, members: &[Member], held: &[f64], variance: &[f
     }
     let project = weighted.transpose();
     let y = DVector::from_column_slice(&part.lateral);
-    let mut scored: Vec<(f64, Vec<f64>)> = grid(parameters, problem.design.stroke_m)
+    let mut scored: Vec<(f64, Vec<f64>)> = grid
         .into_iter()
         .map(|tail| {
             let mut u = held.to_vec();
@@ -100,16 +141,30 @@ pub fn optima(problem: &Problem, members: &[Member], held: &[f64], variance: &[f
         })
         .collect();
     scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+    scored
+}
+
+fn refine(
+    problem: &Problem,
+    members: &[Member],
+    held: usize,
+    variance: &[f64],
+    rows: &[usize],
+    scored: &[(f64, Vec<f64>)],
+    count: (usize, usize),
+) -> Vec<Fit> {
+    let part = problem.select(rows);
+    let part_variance: Vec<f64> = rows.iter().map(|&i| variance[i]).collect();
     // Starts that differ: in the size's sign, or by more than one step of any shape.
     let mut starts: Vec<&Vec<f64>> = Vec::new();
-    for (_, u) in &scored {
-        let fresh = starts.iter().all(|s| {
-            (held.len()..u.len()).any(|k| (u[k] - s[k]).abs() > if k == held.len() { 0.8 } else { 0.5 })
-        });
+    for (_, u) in scored {
+        let fresh = starts
+            .iter()
+            .all(|s| (held..u.len()).any(|k| (u[k] - s[k]).abs() > if k == held { 0.8 } else { 0.5 }));
         if fresh {
             starts.push(u);
         }
-        if starts.len() == STARTS.0 {
+        if starts.len() == count.0 {
             break;
         }
     }
@@ -118,7 +173,7 @@ pub fn optima(problem: &Problem, members: &[Member], held: &[f64], variance: &[f
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let best = fits.first().map_or(0.0, |f| f.cost);
     fits.retain(|f| f.cost < 1.3 * best + 10.0);
-    fits.truncate(STARTS.1);
+    fits.truncate(count.1);
     let mut whole: Vec<Fit> = fits.iter().map(|f| minimise(problem, members, &f.u, variance, 8)).collect();
     whole.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     whole

@@ -2,7 +2,7 @@
 
 use crate::data::{Rig, Table};
 use crate::evidence::{Explained, FORMS, explain, over_forms};
-use crate::explore::{held_nuisances, optima, tempered};
+use crate::explore::{glance, held_nuisances, optima, polish, tempered};
 use crate::fit::{Fit, Member, Problem, minimise};
 use crate::linear::log_sum_exp;
 use crate::noise::{PureError, settle};
@@ -112,7 +112,9 @@ const HOPELESS: (f64, f64) = (1.5, 60.0);
 /// Single effects from which pairs are grown.
 const PAIR_SEEDS: usize = 6;
 /// Pairs that are fitted in full.
-const PAIRS_FITTED: usize = 24;
+const PAIRS_FITTED: usize = 20;
+/// Deviations of chi2 above its expectation from which the best single is taken to leave something.
+const ENOUGH: f64 = 2.5;
 
 /// Fits every hypothesis to a table.
 pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
@@ -199,8 +201,16 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
     sort(&mut candidates);
 
     if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + 3.0) {
-        let pairs = pairs(&problem, &candidates, &members, &loose, &basis);
-        candidates.extend(pairs);
+        // A single that leaves nothing needs no second cause.
+        let best = &candidates[0].best;
+        let misfit: f64 = (0..problem.len())
+            .map(|i| (problem.lateral[i] - best.prediction[i]).powi(2) / problem.variance[i])
+            .sum();
+        let n = problem.len() as f64;
+        if misfit > n + ENOUGH * (2.0 * n).sqrt() {
+            let pairs = pairs(&problem, &candidates, &loose, &basis);
+            candidates.extend(pairs);
+        }
     }
 
     let priors = options.priors;
@@ -265,45 +275,65 @@ fn sort(candidates: &mut [Candidate]) {
 }
 
 /// Pairs grown from the best singles, each with every other effect in each of its laws.
-fn pairs(
-    problem: &Problem,
-    singles: &[Candidate],
-    members: &[Member],
-    loose: &[f64],
-    basis: &DMatrix<f64>,
-) -> Vec<Candidate> {
+fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &DMatrix<f64>) -> Vec<Candidate> {
     let seeds = &singles[..singles.len().min(PAIR_SEEDS)];
-    let jobs: Vec<(usize, Member)> = (0..seeds.len())
-        .flat_map(|s| members.iter().map(move |m| (s, *m)))
-        .filter(|(s, m)| m.effect != seeds[*s].effects[0])
+    let jobs: Vec<(usize, &Explained)> = (0..seeds.len())
+        .flat_map(|s| singles.iter().flat_map(|c| &c.laws).map(move |(_, e)| (s, e)))
+        .filter(|(s, e)| e.members[0].effect != seeds[*s].effects[0])
         .collect();
-    let mut fits: Vec<(f64, Vec<Member>, Fit)> = jobs
+    let mut glances: Vec<(f64, Vec<Member>, Vec<f64>)> = jobs
         .par_iter()
-        .filter_map(|(s, m)| {
+        .filter_map(|(s, e)| {
             let seed = &seeds[*s].best;
-            let pair = vec![seed.members[0], *m];
-            optima(problem, &pair, &seed.u, loose).into_iter().next().map(|f| (f.cost, pair, f))
+            let pair = vec![seed.members[0], e.members[0]];
+            let alone = &e.u[crate::fit::NUISANCES..];
+            glance(problem, &pair, &seed.u, loose, alone).map(|(cost, u)| (cost, pair, u))
         })
         .collect();
-    fits.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut chosen: Vec<(Vec<usize>, Vec<Member>, Fit)> = Vec::new();
-    for (_, pair, fit) in fits {
+    glances.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut chosen: Vec<(Vec<usize>, Vec<Member>, Vec<f64>)> = Vec::new();
+    for (_, pair, u) in glances {
         let mut effects: Vec<usize> = pair.iter().map(|m| m.effect).collect();
         effects.sort_unstable();
-        if !chosen.iter().any(|(e, ..)| *e == effects) {
-            chosen.push((effects, pair, fit));
+        // Two laws of a pair may be looked at: the scan is coarse.
+        if chosen.iter().filter(|(e, ..)| *e == effects).count() < 2 {
+            chosen.push((effects, pair, u));
         }
         if chosen.len() == PAIRS_FITTED {
             break;
         }
     }
-    chosen
+    let first: Vec<(Vec<usize>, Explained)> = chosen
         .into_par_iter()
-        .filter_map(|(effects, pair, fit)| {
-            let laws = pair.iter().map(|m| library()[m.effect].laws().len() as f64).product::<f64>();
-            let (evidence, explained) = over_forms(problem, &fit, &pair, basis);
-            // Only the best pair of laws was fitted: the others are taken to add nothing.
-            candidate(effects, vec![(evidence - laws.ln(), explained)])
+        .filter_map(|(effects, pair, u)| {
+            let fit = polish(problem, &pair, u, loose)?;
+            Some((effects, explain(problem, &pair, &fit.u, basis, FORMS[1].0, 5)))
         })
-        .collect()
+        .collect();
+    let top = first.iter().map(|(_, e)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    let full: Vec<(Vec<usize>, f64, Explained)> = first
+        .into_par_iter()
+        .map(|(effects, e)| {
+            if e.log_evidence > top - PRUNE {
+                let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
+                let (evidence, best) = over_forms(problem, &fit, &e.members, basis);
+                (effects, evidence, best)
+            } else {
+                (effects, e.log_evidence + FORMS[1].1.ln(), e)
+            }
+        })
+        .collect();
+    let mut list: Vec<Candidate> = Vec::new();
+    for (effects, evidence, best) in full {
+        let laws: f64 = best.members.iter().map(|m| library()[m.effect].laws().len() as f64).product();
+        // Only the best pair of laws was fitted: the others are taken to add nothing.
+        let log_evidence = evidence - laws.ln();
+        match list.iter_mut().find(|c| c.effects == effects) {
+            Some(c) if c.log_evidence >= log_evidence => {}
+            Some(c) => *c = Candidate { effects, log_evidence, best, laws: Vec::new(), probability: 0.0 },
+            None => list.push(Candidate { effects, log_evidence, best, laws: Vec::new(), probability: 0.0 }),
+        }
+    }
+    list.retain(|c| c.log_evidence.is_finite());
+    list
 }

@@ -1,8 +1,10 @@
 //! One file a subcommand. Add one: a file here, a line in this list, a variant and a line in `main.rs`.
 
 pub mod calibrate;
+pub mod blind;
 pub mod check;
 pub mod completions;
+pub mod diagnose;
 pub mod doctor;
 pub mod export;
 pub mod recover;

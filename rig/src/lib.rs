@@ -10,6 +10,7 @@
 //! | [`report`], [`export`] | what people look at and take elsewhere |
 //! | [`cli`] | one file a subcommand |
 
+pub mod blind;
 pub mod catalogue;
 pub mod cli;
 pub mod drivers;

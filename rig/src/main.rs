@@ -27,6 +27,10 @@ enum Verb {
     Check(cli::check::Args),
     /// Judge this machine, and the instruments of a setup
     Doctor(cli::doctor::Args),
+    /// Say where simulation and reality part, which effect causes it, and how far it shrinks
+    Diagnose(cli::diagnose::Args),
+    /// Score the diagnosis on sealed sets of an independent simulation
+    Blind(cli::blind::Args),
     /// Write the report of a run
     Report(cli::report::Args),
     /// Convert the passes of a run
@@ -60,6 +64,8 @@ fn main() -> ExitCode {
         Verb::Calibrate(args) => cli::calibrate::run(args, json),
         Verb::Check(args) => cli::check::run(args, json),
         Verb::Doctor(args) => cli::doctor::run(args, json),
+        Verb::Diagnose(args) => cli::diagnose::run(args, json),
+        Verb::Blind(args) => cli::blind::run(args, json),
         Verb::Report(args) => cli::report::run(args, json),
         Verb::Export(args) => cli::export::run(args, json),
         Verb::Recover(args) => cli::recover::run(args, json),

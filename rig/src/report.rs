@@ -1,5 +1,6 @@
 //! The report of a run: one self-contained HTML page. No script, no font, no picture from elsewhere.
 
+pub mod diagnosis;
 mod page;
 pub mod plots;
 

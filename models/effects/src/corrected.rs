@@ -246,6 +246,10 @@ impl FrictionModel for Corrected {
         "corrected"
     }
 
+    fn form_sd(&self, condition: &Condition) -> f64 {
+        self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
+    }
+
     /// The lateral force is what the sensor will read along the motion, so an effect of an instrument is in it;
     /// the relative friction is that force over `mu_0 F_n` with the loop's own `mu_0`.
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {

@@ -1,0 +1,351 @@
+//! The diagnosis scored blind on sealed sets of the independent simulation.
+//!
+//! The diagnoser gets the table, rig.toml and the hidden conditions of a set; label and truth are opened only by
+//! [`score`], after the verdict stands. Every figure comes with its number of sets and an interval.
+
+use diagnosis::attribute::Verdict;
+use diagnosis::data::{Rig, Table};
+use diagnosis::hypotheses::Options;
+use diagnosis::verdict::diagnose;
+use rayon::prelude::*;
+use serde::Serialize;
+use sim::sealed::{Ask, Set, Stratum, generate};
+use std::collections::BTreeMap;
+
+/// chi2 by which the truth must beat the recalibrated baseline to be detectable.
+const DETECTABLE: f64 = 30.0;
+/// chi2 within which another effect makes a set undecidable.
+const DECIDABLE: f64 = 10.0;
+/// Share of form uncertainty that the oracle grants an imitator: it may leave this share of the gap's chi2
+/// without being told from the truth.
+const FORM_SHARE: f64 = 0.0225;
+
+/// What a diagnoser said about one set, beside the truth.
+#[derive(Debug, Clone, Serialize)]
+pub struct Scored {
+    /// Seed of the set.
+    pub seed: u64,
+    /// Stratum.
+    pub stratum: Stratum,
+    /// True causes.
+    pub truth: Vec<String>,
+    /// Oracle: gain of the truth.
+    pub chi2_gain: f64,
+    /// Oracle: rms gap over floor on the hidden passes, recalibrated.
+    pub gap_over_floor: f64,
+    /// Oracle: no other effect imitates the truth.
+    pub decidable: bool,
+    /// Oracle: share of the gap that the best single of a pair leaves.
+    pub best_single_leaves: f64,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Names of the first entry.
+    pub named: Vec<String>,
+    /// Class of the first entry with effects.
+    pub class: Vec<String>,
+    /// Stated probability of the truth (`unknown` for causes outside the library, none for no cause).
+    pub probability_of_truth: f64,
+    /// Stated probability of the first entry.
+    pub top_probability: f64,
+    /// Whether the first entry is the truth.
+    pub top_right: bool,
+    /// Claimed shrinkage.
+    pub claimed: Option<f64>,
+    /// Achieved on the hidden passes against noise-free truth.
+    pub achieved: Option<f64>,
+    /// The same by the named effects in the library's own form alone.
+    pub achieved_form: Option<f64>,
+    /// F1 of the stated regions against the passes whose noise-free gap stands out by two deviations.
+    pub region_f1: Option<f64>,
+}
+
+/// Diagnoses one set and opens its label.
+///
+/// # Errors
+/// A set that the diagnosis refuses.
+pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
+    let rig: Rig =
+        toml::from_str(&set.rig_toml).map_err(|e| miette::miette!("rig.toml of a sealed set: {e}"))?;
+    let table = Table::measured(&set.passes).map_err(|e| miette::miette!("table of a sealed set: {e}"))?;
+    let conditions = Table::conditions(&set.conditions, &table.origin(&set.passes))
+        .map_err(|e| miette::miette!("conditions of a sealed set: {e}"))?;
+    let result = diagnose(&table, &rig, options, String::new());
+    let forecasts = result.predict(&conditions);
+    let report = &result.report;
+
+    // Only from here on are label and truth open.
+    let label = &set.label;
+    let mut truth: Vec<String> = label.causes.iter().map(|c| c.name.clone()).collect();
+    truth.sort_unstable();
+    let withheld = truth.iter().any(|t| options.without.contains(t));
+    let outside = label.causes.iter().any(|c| !c.in_library) || withheld;
+    let says_truth = |effects: &[String]| -> bool {
+        let mut own = effects.to_vec();
+        own.sort_unstable();
+        if outside { own == ["unknown"] } else { own == truth }
+    };
+    let probability_of_truth =
+        report.hypotheses.iter().filter(|h| says_truth(&h.effects)).map(|h| h.probability).sum();
+    let first = &report.hypotheses[0];
+    let class = report
+        .hypotheses
+        .iter()
+        .find(|h| !h.effects.is_empty() && h.effects != ["unknown"])
+        .map(|h| h.alias_class.clone())
+        .unwrap_or_default();
+
+    // Hidden passes: errors over mu0 F against noise-free truth, in the order of the conditions as given.
+    let mu0 = table.still_coefficient().unwrap_or(label.true_mu0);
+    let place: BTreeMap<u64, usize> = set.conditions.iter().enumerate().map(|(i, p)| (p.point, i)).collect();
+    let (mut recalibrated, mut after, mut form) = (0.0, 0.0, 0.0);
+    let mut wanted = Vec::new();
+    for (point, (pass, f)) in conditions.points.iter().zip(conditions.passes.iter().zip(&forecasts)) {
+        let i = place[point];
+        let full = mu0 * pass.normal_force_n;
+        let t = set.truth_n[i];
+        recalibrated += ((t - f.recalibrated) / full).powi(2);
+        after += ((t - f.corrected) / full).powi(2);
+        form += ((t - f.form) / full).powi(2);
+        let relative = rig.noise.pass_relative_sd * t;
+        let sd = (relative * relative + rig.noise.force_sd_n.powi(2) * (1.0 + mu0 * mu0)).sqrt();
+        wanted.push((t - f.recalibrated).abs() > 2.0 * sd);
+    }
+    let shrink = |left: f64| (recalibrated > 0.0).then(|| 1.0 - (left / recalibrated).sqrt());
+    let said: Vec<bool> = conditions
+        .passes
+        .iter()
+        .map(|p| {
+            report.location.regions.iter().any(|r| {
+                r.bounds.iter().all(|(name, b)| {
+                    let v = match *name {
+                        "amplitude_pp_m" => p.amplitude_pp_m,
+                        "speed_m_s" => p.speed_m_s,
+                        "normal_force_n" => p.normal_force_n,
+                        "frequency_hz" => p.frequency_hz,
+                        "direction" => p.direction,
+                        "position_m" => p.position_m,
+                        "time_s" => p.time_s,
+                        "ambient_pressure_pa" => p.ambient_pressure_pa.unwrap_or(f64::NAN),
+                        _ => p.temperature_c.unwrap_or(f64::NAN),
+                    };
+                    v >= b[0] && v <= b[1]
+                })
+            })
+        })
+        .collect();
+    let both = said.iter().zip(&wanted).filter(|(a, b)| **a && **b).count() as f64;
+    let sizes = (said.iter().filter(|x| **x).count() + wanted.iter().filter(|x| **x).count()) as f64;
+    let region_f1 = wanted.iter().any(|x| *x).then(|| 2.0 * both / sizes.max(1.0));
+
+    let gain = label.chi2_gain;
+    let decidable = label.imitators.iter().all(|i| i.chi2_left > DECIDABLE + FORM_SHARE * gain);
+    Ok(Scored {
+        seed: label.seed,
+        stratum: label.stratum,
+        chi2_gain: gain,
+        gap_over_floor: label.hidden_recalibrated_rmse / label.hidden_floor_rmse.max(1e-12),
+        decidable,
+        best_single_leaves: label.best_single_leaves,
+        verdict: report.verdict,
+        named: first.effects.clone(),
+        class,
+        probability_of_truth,
+        top_probability: first.probability,
+        top_right: says_truth(&first.effects),
+        claimed: report.gap.shrinkage,
+        achieved: shrink(after),
+        achieved_form: shrink(form),
+        region_f1,
+        truth,
+    })
+}
+
+/// Makes and scores `count` sets of a stratum (all strata in their shares where none is given).
+///
+/// # Errors
+/// A set that the diagnosis refuses.
+pub fn run(
+    seed: u64,
+    count: usize,
+    stratum: Option<Stratum>,
+    options: &Options,
+    progress: impl Fn(&Scored) + Sync,
+) -> miette::Result<Vec<Scored>> {
+    (0..count as u64)
+        .into_par_iter()
+        .map(|k| {
+            let own = seed.wrapping_mul(1_000_003).wrapping_add(k);
+            let stratum = stratum.unwrap_or_else(|| Stratum::draw(own));
+            let ask = match stratum {
+                Stratum::Single | Stratum::Alias => Ask::Imitators,
+                _ => Ask::Gain,
+            };
+            let scored = score(&generate(own, stratum, ask), options)?;
+            progress(&scored);
+            Ok(scored)
+        })
+        .collect()
+}
+
+/// One figure of the table.
+#[derive(Debug, Clone, Serialize)]
+pub struct Figure {
+    /// What it measures.
+    pub name: &'static str,
+    /// Its value; none where no set counts.
+    pub value: Option<f64>,
+    /// 95 % interval: Wilson for shares, bootstrap for others.
+    pub ci95: Option<[f64; 2]>,
+    /// Number of sets behind it.
+    pub n: usize,
+    /// What was asked for.
+    pub target: &'static str,
+}
+
+fn share(name: &'static str, target: &'static str, outcomes: Vec<bool>) -> Figure {
+    let n = outcomes.len();
+    let hits = outcomes.iter().filter(|x| **x).count() as f64;
+    let (p, m) = (hits / n.max(1) as f64, n as f64);
+    let z = 1.96;
+    let centre = (p + z * z / (2.0 * m)) / (1.0 + z * z / m);
+    let half = z / (1.0 + z * z / m) * (p * (1.0 - p) / m + z * z / (4.0 * m * m)).sqrt();
+    Figure {
+        name,
+        value: (n > 0).then_some(p),
+        ci95: (n > 0).then(|| [(centre - half).max(0.0), (centre + half).min(1.0)]),
+        n,
+        target,
+    }
+}
+
+fn statistic(
+    name: &'static str,
+    target: &'static str,
+    values: &[f64],
+    of: fn(&mut Vec<f64>) -> f64,
+) -> Figure {
+    if values.is_empty() {
+        return Figure { name, value: None, ci95: None, n: 0, target };
+    }
+    let mut state = 1u64;
+    let mut draws: Vec<f64> = (0..400)
+        .map(|_| {
+            let mut sample: Vec<f64> = (0..values.len())
+                .map(|_| {
+                    state =
+                        state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    values[((state >> 33) as usize) % values.len()]
+                })
+                .collect();
+            of(&mut sample)
+        })
+        .collect();
+    draws.sort_by(f64::total_cmp);
+    Figure {
+        name,
+        value: Some(of(&mut values.to_vec())),
+        ci95: Some([draws[10], draws[389]]),
+        n: values.len(),
+        target,
+    }
+}
+
+fn mean(v: &mut Vec<f64>) -> f64 {
+    v.iter().sum::<f64>() / v.len() as f64
+}
+
+fn median(v: &mut Vec<f64>) -> f64 {
+    v.sort_by(f64::total_cmp);
+    0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2])
+}
+
+/// The figures of the issue over scored sets.
+pub fn figures(all: &[Scored]) -> Vec<Figure> {
+    let single = |s: &&Scored| matches!(s.stratum, Stratum::Single | Stratum::Alias);
+    let detectable = |s: &&Scored| s.chi2_gain >= DETECTABLE;
+    let named_right = |s: &Scored| s.verdict == Verdict::Named && s.top_right;
+    let named_wrong = |s: &Scored| s.verdict == Verdict::Named && !s.top_right;
+    let clear: Vec<&Scored> = all.iter().filter(single).filter(detectable).filter(|s| s.decidable).collect();
+    let murky: Vec<&Scored> = all.iter().filter(single).filter(detectable).filter(|s| !s.decidable).collect();
+    let none: Vec<&Scored> = all.iter().filter(|s| s.stratum == Stratum::None).collect();
+    let outside: Vec<&Scored> =
+        all.iter().filter(|s| s.stratum == Stratum::Outside).filter(detectable).collect();
+    let pairs: Vec<&Scored> = all
+        .iter()
+        .filter(|s| s.stratum == Stratum::Pair && s.best_single_leaves >= 0.25)
+        .filter(detectable)
+        .collect();
+    let of = |list: &[&Scored], f: &dyn Fn(&Scored) -> bool| list.iter().map(|s| f(s)).collect::<Vec<bool>>();
+    let in_class = |s: &Scored| {
+        let joined = s.truth.join("+");
+        s.class.contains(&joined) || s.class.iter().any(|c| s.truth.len() == 1 && *c == s.truth[0])
+    };
+    let any_of = |s: &Scored| s.named.iter().any(|n| s.truth.contains(n));
+    let log: Vec<f64> = clear.iter().map(|s| s.probability_of_truth.max(1e-6).ln()).collect();
+    let probability: Vec<f64> = clear.iter().map(|s| s.probability_of_truth).collect();
+    let gapped: Vec<&Scored> =
+        clear.iter().copied().filter(|s| s.gap_over_floor >= 4.0 && s.verdict == Verdict::Named).collect();
+    let closed: Vec<f64> = gapped.iter().filter_map(|s| s.achieved_form).collect();
+    let closed_full: Vec<f64> = gapped.iter().filter_map(|s| s.achieved).collect();
+    let honest: Vec<f64> = gapped.iter().filter_map(|s| Some((s.claimed? - s.achieved?).abs())).collect();
+    let regions: Vec<f64> =
+        all.iter().filter(|s| s.chi2_gain >= DETECTABLE).filter_map(|s| s.region_f1).collect();
+    vec![
+        share("singles, detectable and decidable: named right", ">= 0.90", of(&clear, &named_right)),
+        share("  confidently wrong", "<= 0.02", of(&clear, &named_wrong)),
+        statistic("  mean probability on the truth", ">= 0.85", &probability, mean),
+        statistic("  mean log score, nats", "reported", &log, mean),
+        share("no gap: an effect named", "<= 0.01", of(&none, &|s| s.verdict == Verdict::Named)),
+        share("  gap claimed", "<= 0.05", of(&none, &|s| s.verdict != Verdict::NoGap)),
+        share("outside the library: unknown", ">= 0.85", of(&outside, &|s| s.verdict == Verdict::Unknown)),
+        share("  confidently misnamed", "<= 0.05", of(&outside, &|s| s.verdict == Verdict::Named)),
+        share("undecidable: truth in the stated class", ">= 0.90", of(&murky, &in_class)),
+        share("  confidently wrong", "<= 0.03", of(&murky, &named_wrong)),
+        share("pairs whose best single leaves 25 %: both named", ">= 0.80", of(&pairs, &|s| s.top_right)),
+        share("  at least one", ">= 0.97", of(&pairs, &any_of)),
+        statistic("gap closed by the named form alone, median", ">= 0.75", &closed, median),
+        statistic("gap closed by the verdict's model, median", "reported", &closed_full, median),
+        statistic("claimed against achieved, median difference", "<= 0.05", &honest, median),
+        statistic("where: mean F1 of the regions", ">= 0.80", &regions, mean),
+        calibration(all),
+    ]
+}
+
+/// Debiased calibration error of the first entry's probability, in ten bins of equal count.
+fn calibration(all: &[Scored]) -> Figure {
+    let mut list: Vec<(f64, f64)> =
+        all.iter().map(|s| (s.top_probability, f64::from(u8::from(s.top_right)))).collect();
+    list.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let name = "calibration error of the first entry, debiased";
+    if list.len() < 50 {
+        return Figure { name, value: None, ci95: None, n: list.len(), target: "<= 0.05" };
+    }
+    let mut error = 0.0;
+    for bin in list.chunks(list.len().div_ceil(10)) {
+        let n = bin.len() as f64;
+        let stated = bin.iter().map(|b| b.0).sum::<f64>() / n;
+        let right = bin.iter().map(|b| b.1).sum::<f64>() / n;
+        // The square of a binomial share is too large by its variance.
+        let bias = right * (1.0 - right) / (n - 1.0).max(1.0);
+        error += n / list.len() as f64 * ((stated - right).powi(2) - bias).max(0.0).sqrt();
+    }
+    Figure { name, value: Some(error), ci95: None, n: list.len(), target: "<= 0.05" }
+}
+
+/// Truth by answer, counted.
+pub fn confusion(all: &[Scored]) -> BTreeMap<String, BTreeMap<String, usize>> {
+    let mut table: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
+    for s in all {
+        let truth = if s.truth.is_empty() { "none".to_string() } else { s.truth.join("+") };
+        let answer = match s.verdict {
+            Verdict::NoGap => "no_gap".to_string(),
+            Verdict::Unknown => "unknown".to_string(),
+            Verdict::Named => s.named.join("+"),
+            Verdict::Ambiguous => {
+                format!("ambiguous({})", s.class.iter().take(3).cloned().collect::<Vec<_>>().join(","))
+            }
+        };
+        *table.entry(truth).or_default().entry(answer).or_default() += 1;
+    }
+    table
+}

@@ -1,0 +1,272 @@
+//! `muprime diagnose`: where the gap lies, which effect causes it, how far it shrinks.
+
+use clap::Args as ClapArgs;
+use diagnosis::data::{Rig, Table};
+use diagnosis::hypotheses::Options;
+use diagnosis::verdict::{Diagnosis, diagnose};
+use miette::{Context, IntoDiagnostic};
+use models::record::{Pass, read_passes};
+use sha2::{Digest, Sha256};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Say where simulation and reality part on a table of passes, which effect causes it, and how far it shrinks.
+#[derive(Debug, ClapArgs)]
+pub struct Args {
+    /// A point table (CSV or Parquet), or a run's folder with points.csv and rig.toml.
+    pub data: PathBuf,
+    /// What the rig's calibration states; without it, the rig.toml beside the table.
+    #[arg(long)]
+    pub rig: Option<PathBuf>,
+    /// Conditions to predict (a point table without lateral_force_n).
+    #[arg(long, requires = "predictions")]
+    pub predict: Option<PathBuf>,
+    /// Where the predictions go.
+    #[arg(long, requires = "predict")]
+    pub predictions: Option<PathBuf>,
+    /// Where the corrected model goes, for `muprime run --model`.
+    #[arg(long)]
+    pub save_model: Option<PathBuf>,
+    /// Where the report goes (one HTML page).
+    #[arg(long)]
+    pub report: Option<PathBuf>,
+    /// Where a plan of the best next experiment goes, for `muprime run`.
+    #[arg(long)]
+    pub save_plan: Option<PathBuf>,
+    /// Try single effects only.
+    #[arg(long)]
+    pub no_pairs: bool,
+    /// Leave an effect out of the library (may be repeated).
+    #[arg(long, value_name = "EFFECT")]
+    pub without: Vec<String>,
+}
+
+/// Reads, diagnoses, writes what was asked for.
+///
+/// # Errors
+/// Files that cannot be read or written, tables and rigs that are refused; nothing is written then.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let (table_path, beside) = if args.data.is_dir() {
+        (args.data.join("points.csv"), args.data.join("rig.toml"))
+    } else {
+        let folder = args.data.parent().unwrap_or(Path::new("."));
+        (args.data.clone(), folder.join("rig.toml"))
+    };
+    let rig = read_rig(args.rig.as_deref().unwrap_or(&beside))?;
+    let bytes = fs::read(&table_path)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot read the table {}", table_path.display()))?;
+    let passes = parse_passes(&table_path, &bytes)?;
+    let table =
+        Table::measured(&passes).into_diagnostic().wrap_err_with(|| table_path.display().to_string())?;
+    for name in &args.without {
+        if effects::by_name(name).is_none() {
+            miette::bail!("--without {name}: no such effect; `muprime model effects` lists them");
+        }
+    }
+    let conditions = match &args.predict {
+        Some(path) => {
+            let rows = read_table(path)?;
+            let origin = table.origin(&passes);
+            Some(
+                Table::conditions(&rows, &origin)
+                    .into_diagnostic()
+                    .wrap_err_with(|| path.display().to_string())?,
+            )
+        }
+        None => None,
+    };
+    let options = Options { pairs: !args.no_pairs, without: args.without.clone(), ..Options::default() };
+    let result = diagnose(&table, &rig, &options, hex(&Sha256::digest(&bytes)));
+    if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
+        write_text(out, &predictions(&result, conditions))?;
+    }
+    if let Some(out) = &args.save_model {
+        match result.saved_model() {
+            Some(model) => write_text(out, &toml::to_string(&model).into_diagnostic()?)?,
+            None => eprintln!(
+                "no model written to {}: no effect of the library causes most of the gap",
+                out.display()
+            ),
+        }
+    }
+    if let Some(out) = &args.save_plan {
+        match result.report.next_experiment.iter().find(|e| !e.conditions.is_empty()) {
+            Some(experiment) => write_text(out, &plan(experiment))?,
+            None => eprintln!("no plan written to {}: no conditions would tell more", out.display()),
+        }
+    }
+    if let Some(out) = &args.report {
+        write_text(out, &crate::report::diagnosis::page(&result, &table))?;
+    }
+    if json {
+        println!("{}", serde_json::to_string(&result.report).into_diagnostic()?);
+    } else {
+        print!("{}", terminal(&result));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn read_rig(path: &Path) -> miette::Result<Rig> {
+    let text = fs::read_to_string(path).into_diagnostic().wrap_err_with(|| {
+        format!("cannot read the rig's calibration {} (name it with --rig)", path.display())
+    })?;
+    let rig: Rig = toml::from_str(&text).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+    rig.finger.check().into_diagnostic().wrap_err_with(|| format!("{}: [finger]", path.display()))?;
+    let noise = rig.noise;
+    if !(noise.pass_relative_sd >= 0.0
+        && noise.force_sd_n >= 0.0
+        && noise.pass_relative_sd + noise.force_sd_n > 0.0)
+    {
+        miette::bail!(
+            "{}: [noise] needs pass_relative_sd and force_sd_n of zero or more, not both zero",
+            path.display()
+        );
+    }
+    Ok(rig)
+}
+
+fn read_table(path: &Path) -> miette::Result<Vec<Pass>> {
+    let bytes =
+        fs::read(path).into_diagnostic().wrap_err_with(|| format!("cannot read {}", path.display()))?;
+    parse_passes(path, &bytes)
+}
+
+fn parse_passes(path: &Path, bytes: &[u8]) -> miette::Result<Vec<Pass>> {
+    if bytes.starts_with(b"PAR1") {
+        let csv = parquet_as_csv(path).wrap_err_with(|| path.display().to_string())?;
+        return read_passes(csv.as_bytes()).into_diagnostic().wrap_err_with(|| path.display().to_string());
+    }
+    read_passes(bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())
+}
+
+/// The columns of a Parquet point table as CSV text: one reader judges both formats.
+fn parquet_as_csv(path: &Path) -> miette::Result<String> {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::Field;
+    let reader = SerializedFileReader::new(fs::File::open(path).into_diagnostic()?).into_diagnostic()?;
+    let mut text = String::new();
+    let names: Vec<String> = reader
+        .metadata()
+        .file_metadata()
+        .schema_descr()
+        .columns()
+        .iter()
+        .map(|c| c.name().to_string())
+        .collect();
+    text.push_str(&names.join(","));
+    text.push('\n');
+    for row in reader.get_row_iter(None).into_diagnostic()? {
+        let row = row.into_diagnostic()?;
+        let cells: Vec<String> = row
+            .get_column_iter()
+            .map(|(_, field)| match field {
+                Field::Null => String::new(),
+                Field::Str(s) => format!("\"{}\"", s.replace('"', "\"\"")),
+                Field::Double(v) => format!("{v:e}"),
+                Field::Float(v) => format!("{v:e}"),
+                other => other.to_string(),
+            })
+            .collect();
+        text.push_str(&cells.join(","));
+        text.push('\n');
+    }
+    Ok(text)
+}
+
+fn predictions(result: &Diagnosis, conditions: &Table) -> String {
+    let mut text = String::from(
+        "point,lateral_force_baseline_n,lateral_force_corrected_n,lateral_force_corrected_sd_n\n",
+    );
+    for (point, f) in conditions.points.iter().zip(result.predict(conditions)) {
+        text.push_str(&format!("{point},{:e},{:e},{:e}\n", f.baseline, f.corrected, f.corrected_sd));
+    }
+    text
+}
+
+/// The plan of a designed experiment: its conditions in the order of their gain.
+fn plan(experiment: &diagnosis::next::Experiment) -> String {
+    let mut text = format!(
+        "# {}\n# separates {} and {}\n",
+        experiment.text, experiment.separates[0], experiment.separates[1]
+    );
+    for c in &experiment.conditions {
+        text.push_str(&format!(
+            "\n[[point]]\namplitude_pp_m = {:e}\nfrequency_hz = {:e}\nspeed_m_s = {:e}\ndirection = {}\nnormal_force_n = {:e}\n",
+            c.amplitude_pp_m, c.frequency_hz, c.speed_m_s, c.direction as i8, c.normal_force_n
+        ));
+        if let Some(p) = c.ambient_pressure_pa {
+            text.push_str(&format!("ambient_pressure_pa = {p:e}\n"));
+        }
+    }
+    text
+}
+
+fn write_text(path: &Path, text: &str) -> miette::Result<()> {
+    fs::write(path, text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// What a terminal shows.
+pub fn terminal(result: &Diagnosis) -> String {
+    let r = &result.report;
+    let mut text = format!("{}\n\nHypotheses\n", r.text);
+    for h in r.hypotheses.iter().filter(|h| h.probability > 0.005).take(8) {
+        let name = if h.effects.is_empty() { "no gap".to_string() } else { h.effects.join(" + ") };
+        text.push_str(&format!("  {:5.3}  {name}", h.probability));
+        if h.alias_class.len() > 1 {
+            text.push_str(&format!("  (not told from {})", h.alias_class[1..].join(", ")));
+        }
+        text.push('\n');
+        if h.probability > 0.05 {
+            for p in &h.parameters {
+                text.push_str(&format!(
+                    "         {} = {:.4e} [{:.4e}, {:.4e}] {}\n",
+                    p.name, p.value, p.ci95[0], p.ci95[1], p.unit
+                ));
+            }
+        }
+    }
+    let g = &r.gap;
+    text.push_str(&format!(
+        "\nGap on held-out passes, in units of full friction\n  nominal baseline      {:.4}\n  recalibrated baseline {:.4}\n  verdict's model       {:.4}\n  repeatability         {:.4}\n",
+        g.before_rmse, g.recalibrated_rmse, g.after_rmse, g.noise_floor_rmse
+    ));
+    if let (Some(s), Some([low, high])) = (g.shrinkage, g.shrinkage_ci95) {
+        text.push_str(&format!(
+            "  the removable gap shrinks by {:.0} % [{:.0}, {:.0}]\n",
+            100.0 * s,
+            100.0 * low,
+            100.0 * high
+        ));
+    }
+    if !r.location.regions.is_empty() {
+        text.push_str("\nWhere\n");
+        for region in &r.location.regions {
+            text.push_str(&format!("  {}\n", region.text));
+        }
+    }
+    if !r.next_experiment.is_empty() {
+        text.push_str("\nNext\n");
+        for e in r.next_experiment.iter().take(4) {
+            text.push_str(&format!(
+                "  {} (parts {} from {}: {:.1} nats)\n",
+                e.text, e.separates[0], e.separates[1], e.expected_nats
+            ));
+        }
+    }
+    if !r.not_testable.is_empty() {
+        text.push_str("\nNot testable on this table\n");
+        for n in &r.not_testable {
+            text.push_str(&format!("  {}: {}\n", n.effect, n.because));
+        }
+    }
+    for remark in &r.remarks {
+        text.push_str(&format!("\n{remark}\n"));
+    }
+    text
+}

@@ -1,0 +1,185 @@
+//! One self-contained HTML page of a verdict: ranking, residual maps before and after, regions, next experiment.
+
+use diagnosis::data::Table;
+use diagnosis::verdict::Diagnosis;
+
+/// The page.
+pub fn page(result: &Diagnosis, table: &Table) -> String {
+    let r = &result.report;
+    let mut body = format!("<h1>Diagnosis</h1><p class=\"verdict\">{}</p>", escape(&r.text));
+    body.push_str(&ranking(result));
+    body.push_str(&gap(result));
+    body.push_str(&maps(result, table));
+    body.push_str(&lists(result));
+    format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Diagnosis</title><style>{STYLE}</style></head><body><main>{body}<footer>{} passes, SHA-256 {}</footer></main></body></html>\n",
+        r.data.points,
+        escape(&r.data.sha256)
+    )
+}
+
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#222;margin:0;background:#fafafa}main{max-width:62rem;margin:0 auto;padding:1.5rem}\
+h1{font-size:1.5rem;margin:0 0 .5rem}h2{font-size:1.1rem;margin:1.8rem 0 .4rem}.verdict{font-size:1.1rem;padding:.7rem 1rem;background:#fff;border-left:4px solid #2b6cb0}\
+table{border-collapse:collapse;background:#fff}td,th{padding:.25rem .7rem;border-bottom:1px solid #e3e3e3;text-align:left;vertical-align:top}\
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}.bar{display:inline-block;height:.7em;background:#2b6cb0}.maps{display:flex;flex-wrap:wrap;gap:1rem}\
+figure{margin:0;background:#fff;padding:.5rem}figcaption{font-size:.85rem;color:#555}footer{margin-top:2rem;font-size:.75rem;color:#777;word-break:break-all}";
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+fn ranking(result: &Diagnosis) -> String {
+    let mut rows = String::new();
+    for h in result.report.hypotheses.iter().filter(|h| h.probability > 0.002).take(12) {
+        let name = if h.effects.is_empty() { "no gap".to_string() } else { h.effects.join(" + ") };
+        let parameters: Vec<String> = h
+            .parameters
+            .iter()
+            .map(|p| {
+                format!("{} = {:.3e} [{:.3e}, {:.3e}] {}", p.name, p.value, p.ci95[0], p.ci95[1], p.unit)
+            })
+            .collect();
+        let alias = if h.alias_class.len() > 1 {
+            format!("<br><small>not told from {}</small>", escape(&h.alias_class[1..].join(", ")))
+        } else {
+            String::new()
+        };
+        rows.push_str(&format!(
+            "<tr><td>{}{alias}</td><td class=\"n\">{:.3}</td><td><span class=\"bar\" style=\"width:{:.0}px\"></span></td><td><small>{}</small></td></tr>",
+            escape(&name),
+            h.probability,
+            160.0 * h.probability,
+            escape(&parameters.join("; "))
+        ));
+    }
+    format!(
+        "<h2>Which</h2><table><tr><th>hypothesis</th><th class=\"n\">probability</th><th></th><th>parameters, 95 % intervals</th></tr>{rows}</table>"
+    )
+}
+
+fn gap(result: &Diagnosis) -> String {
+    let g = &result.report.gap;
+    let largest = [g.before_rmse, g.recalibrated_rmse, g.after_rmse, g.noise_floor_rmse]
+        .into_iter()
+        .fold(1e-12, f64::max);
+    let mut rows = String::new();
+    for (name, value) in [
+        ("nominal baseline", g.before_rmse),
+        ("recalibrated baseline", g.recalibrated_rmse),
+        ("verdict's model", g.after_rmse),
+        ("repeatability", g.noise_floor_rmse),
+    ] {
+        rows.push_str(&format!(
+            "<tr><td>{name}</td><td class=\"n\">{value:.4}</td><td><span class=\"bar\" style=\"width:{:.0}px\"></span></td></tr>",
+            260.0 * value / largest
+        ));
+    }
+    let words = match (g.shrinkage, g.shrinkage_ci95) {
+        (Some(s), Some([low, high])) => format!(
+            "The removable gap shrinks by {:.0} % (95 % interval {:.0} to {:.0} %).",
+            100.0 * s,
+            100.0 * low,
+            100.0 * high
+        ),
+        _ => "The recalibrated baseline is within its own sampling error of repeatability: no gap to shrink."
+            .to_string(),
+    };
+    format!(
+        "<h2>How far</h2><p>Root mean square error on held-out passes, in units of full friction.</p><table>{rows}</table><p>{words}</p>"
+    )
+}
+
+/// Scatter of the error in deviations against each covariate, before and after.
+fn maps(result: &Diagnosis, table: &Table) -> String {
+    let problem = &result.fitted.problem;
+    let forecasts = result.predict(table);
+    let covariates: [(&str, fn(&effects::Operating) -> f64, bool); 6] = [
+        ("amplitude, um peak to peak", |p| p.amplitude_pp_m * 1e6, false),
+        ("speed, mm/s (log)", |p| p.speed_m_s * 1e3, true),
+        ("normal force, N", |p| p.normal_force_n, false),
+        ("frequency, kHz", |p| p.frequency_hz * 1e-3, false),
+        ("time, s", |p| p.time_s, false),
+        ("position, mm", |p| p.position_m * 1e3, false),
+    ];
+    let z: Vec<(f64, f64)> = forecasts
+        .iter()
+        .enumerate()
+        .map(|(i, f)| {
+            let sd = problem.variance[i].sqrt();
+            let d = table.passes[i].direction;
+            (d * (table.lateral[i] - f.recalibrated) / sd, d * (table.lateral[i] - f.corrected) / sd)
+        })
+        .collect();
+    let limit = z.iter().fold(4.0f64, |a, (b, _)| a.max(b.abs())).min(40.0);
+    let mut figures = String::new();
+    for (name, value, log) in covariates {
+        let x: Vec<f64> = table.passes.iter().map(|p| if log { value(p).ln() } else { value(p) }).collect();
+        let (low, high) =
+            x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        if high - low <= 1e-12 * high.abs().max(1e-12) {
+            continue;
+        }
+        let mut dots = String::new();
+        for (k, colour) in [(0, "#c05621"), (1, "#2b6cb0")] {
+            for (i, v) in x.iter().enumerate() {
+                let e = if k == 0 { z[i].0 } else { z[i].1 };
+                let cx = 30.0 + 270.0 * (v - low) / (high - low);
+                let cy = 80.0 - 70.0 * (e / limit).clamp(-1.0, 1.0);
+                dots.push_str(&format!(
+                    "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"1.6\" fill=\"{colour}\" fill-opacity=\".55\"/>"
+                ));
+            }
+        }
+        figures.push_str(&format!(
+            "<figure><svg width=\"310\" height=\"165\" viewBox=\"0 0 310 165\" role=\"img\" aria-label=\"error against {name}\">\
+             <line x1=\"30\" y1=\"80\" x2=\"300\" y2=\"80\" stroke=\"#999\"/><line x1=\"30\" y1=\"10\" x2=\"30\" y2=\"150\" stroke=\"#999\"/>\
+             <text x=\"2\" y=\"16\" font-size=\"9\">{limit:.0} sd</text><text x=\"2\" y=\"152\" font-size=\"9\">-{limit:.0}</text>{dots}\
+             </svg><figcaption>{name}</figcaption></figure>"
+        ));
+    }
+    format!(
+        "<h2>Residuals</h2><p>Error along the motion in standard deviations of a pass: <span style=\"color:#c05621\">recalibrated baseline</span>, <span style=\"color:#2b6cb0\">verdict's model</span>.</p><div class=\"maps\">{figures}</div>"
+    )
+}
+
+fn lists(result: &Diagnosis) -> String {
+    let r = &result.report;
+    let mut text = String::from("<h2>Where</h2>");
+    let items = |list: Vec<String>| -> String {
+        if list.is_empty() {
+            "<p>Nothing to report.</p>".to_string()
+        } else {
+            format!("<ul>{}</ul>", list.iter().map(|l| format!("<li>{}</li>", escape(l))).collect::<String>())
+        }
+    };
+    text.push_str(&items(r.location.regions.iter().map(|g| g.text.clone()).collect()));
+    let places: Vec<String> = r.location.place.iter().map(|(k, v)| format!("{k}: {v:.3}")).collect();
+    text.push_str(&format!("<p>By place: {}.</p>", escape(&places.join(", "))));
+    text.push_str("<h2>What to do next</h2>");
+    text.push_str(&items(
+        r.next_experiment
+            .iter()
+            .map(|e| {
+                format!(
+                    "{} Parts {} from {}; {:.1} nats expected.",
+                    e.text, e.separates[0], e.separates[1], e.expected_nats
+                )
+            })
+            .collect(),
+    ));
+    text.push_str("<h2>Left-out regions</h2>");
+    text.push_str(&items(
+        r.left_out
+            .regions
+            .iter()
+            .map(|(name, closed)| match closed {
+                Some(c) => format!("{name}: {:.0} % of the gap closed", 100.0 * c),
+                None => format!("{name}: no gap there"),
+            })
+            .collect(),
+    ));
+    text.push_str("<h2>Not testable on this table</h2>");
+    text.push_str(&items(r.not_testable.iter().map(|n| format!("{}: {}", n.effect, n.because)).collect()));
+    text.push_str(&items(r.remarks.clone()));
+    text
+}
