@@ -1,7 +1,7 @@
 //! One file a subcommand. Add one: a file here, a line in this list, a variant and a line in `main.rs`.
 
-pub mod calibrate;
 pub mod blind;
+pub mod calibrate;
 pub mod check;
 pub mod completions;
 pub mod diagnose;
