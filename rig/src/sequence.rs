@@ -307,6 +307,7 @@ impl Sequence {
 
     fn begin_next(&mut self, row: &Row, out: &mut Reaction) {
         if self.next == self.points.len() {
+            self.sums = Sums::default();
             out.commands.push(Command::Set(Request::default(), self.marker(Phase::Zero)));
             self.stage = Stage::Zero { since: None, after: true };
             return;

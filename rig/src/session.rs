@@ -159,6 +159,12 @@ impl Job {
         if let Some(defects) = &self.defects {
             config.defects = defects.clone();
         }
-        sim::world::World::new(&config, self.seed).map_err(|e| miette::miette!("the virtual rig: {e}"))
+        // The finger is the rig's: it stays the same from run to run, and only noise and order follow the seed.
+        let wrong = |e: sim::world::ConfigError| miette::miette!("the virtual rig: {e}");
+        let finger = sim::world::World::new(&config, virtual_rig.finger_seed).map_err(wrong)?.true_finger();
+        config.finger.normal_stiffness_n_per_m = finger.normal_stiffness_n_per_m;
+        config.finger.lateral_stiffness_n_per_m = finger.lateral_stiffness_n_per_m;
+        config.finger.stiffness_relative_sd = 0.0;
+        sim::world::World::new(&config, self.seed).map_err(wrong)
     }
 }

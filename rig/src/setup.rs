@@ -72,6 +72,8 @@ impl Default for Pace {
 pub struct VirtualRig {
     /// No departure from the model at all. Otherwise the bundled world, which departs by one sealed effect.
     pub ideal: bool,
+    /// Seed of the finger's true stiffnesses about those that the setup states.
+    pub finger_seed: u64,
 }
 
 /// Soft limits as a setup states them.
