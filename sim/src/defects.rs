@@ -277,6 +277,7 @@ macro_rules! kinds {
 }
 
 kinds! {
+    amplifier_refuses_off
     adhesion
     amplitude_droop
     amplitude_miscalibration
@@ -307,6 +308,7 @@ kinds! {
     speed_error
     speed_ripple
     squeeze_film
+    stage_stall
     stiffness_error
     subsurface_relaxation
     time_misalignment

@@ -38,6 +38,8 @@ pub struct StageConfig {
     pub load_wander_s: f64,
     /// Time between two states that it publishes (s).
     pub state_period_s: f64,
+    /// Fault: the slide stands still from this time on (s); negative: never.
+    pub stalls_at_s: f64,
 }
 
 impl Default for StageConfig {
@@ -57,6 +59,7 @@ impl Default for StageConfig {
             load_relative_sd: 0.01,
             load_wander_s: 0.1,
             state_period_s: 1e-3,
+            stalls_at_s: -1.0,
         }
     }
 }
@@ -103,6 +106,7 @@ pub struct Stage {
     at_limit: bool,
     load_n: f64,
     gap_m: f64,
+    time_s: f64,
     wander: Wander,
     noise: Noise,
 }
@@ -122,6 +126,7 @@ impl Stage {
             at_limit: false,
             load_n: 0.0,
             gap_m: config.lift_gap_m,
+            time_s: 0.0,
             wander,
             noise,
         }
@@ -140,7 +145,12 @@ impl Stage {
 
     /// Moves on by `dt` seconds.
     pub fn step(&mut self, dt: f64) {
-        self.slide(dt);
+        self.time_s += dt;
+        if self.config.stalls_at_s >= 0.0 && self.time_s >= self.config.stalls_at_s {
+            self.velocity_m_s = 0.0;
+        } else {
+            self.slide(dt);
+        }
         self.press(dt);
     }
 

@@ -87,8 +87,12 @@ fn drawn_parameters_lie_in_their_ranges_and_are_those_of_their_seed() {
     for kind in ALL {
         let one = Defects::sealed(kind.name, 11).unwrap();
         assert_eq!(one, Defects::sealed(kind.name, 11).unwrap());
-        assert_ne!(one, Defects::sealed(kind.name, 12).unwrap());
-        assert!(kind.parameters.len() <= 4 && !kind.parameters.is_empty() && !kind.summary.is_empty());
+        assert!(
+            kind.parameters.is_empty() || one != Defects::sealed(kind.name, 12).unwrap(),
+            "{}",
+            kind.name
+        );
+        assert!(kind.parameters.len() <= 4 && !kind.summary.is_empty());
         assert_eq!(
             ALL.iter().filter(|other| other.name == kind.name).count(),
             1,
@@ -110,4 +114,31 @@ fn every_effect_of_the_contract_has_its_cause_here() {
     {
         assert!(ALL.iter().any(|kind| kind.name == name && kind.in_library), "{name}");
     }
+}
+
+#[test]
+fn no_text_makes_the_reader_of_defects_files_panic() {
+    use proptest::prelude::*;
+    let key = prop_oneof![
+        Just("[[defect]]\n".to_string()),
+        Just("[[channel]]\n".to_string()),
+        Just("name = \"squeeze_film\"\n".to_string()),
+        Just("seed = 18446744073709551615\n".to_string()),
+        Just("parameters = { film_area_m2 = 1e400 }\n".to_string()),
+        Just("channel = \"force\"\nfault = \"slow\"\nstrength = -1.0\n".to_string()),
+        "[ -~]{0,40}\n",
+    ];
+    let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
+        cases: 2000,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    });
+    runner
+        .run(&proptest::collection::vec(key, 0..8), |parts| {
+            if let Err(error) = Defects::parse(&parts.concat()) {
+                prop_assert!(!error.to_string().is_empty());
+            }
+            Ok(())
+        })
+        .unwrap();
 }

@@ -1,4 +1,8 @@
 //! The defects file: TOML, unknown keys refused with their place.
+//!
+//! A `[[defect]]` has a `name` and either all its `parameters` or a `seed` to draw them from (or both: what is given
+//! holds). A `[[channel]]` has a `channel` (force, amplifier, stage), a `fault` (ok, off, stuck, garbage, wrong, slow,
+//! delayed, intermittent), and may have `from_s`, `until_s` and a `strength`.
 
 use serde::Deserialize;
 
@@ -81,7 +85,7 @@ struct File {
     #[serde(default)]
     defect: Vec<Entry>,
     #[serde(default)]
-    channel: Vec<ChannelFault>,
+    channel: Vec<toml::Spanned<ChannelFault>>,
 }
 
 #[derive(Deserialize)]
@@ -109,6 +113,29 @@ impl Defects {
     }
 
     /// Reads a defects file's text.
+    ///
+    /// ```
+    /// let defects = sim::defects::Defects::parse(
+    ///     r#"
+    ///     [[defect]]
+    ///     name = "amplitude_droop"
+    ///     parameters = { load_ratio_at_1_n = 0.4 }
+    ///
+    ///     [[defect]]
+    ///     name = "plate_tilt"
+    ///     seed = 12
+    ///
+    ///     [[channel]]
+    ///     channel = "force"
+    ///     fault = "intermittent"
+    ///     from_s = 10.0
+    ///     until_s = 12.0
+    ///     strength = 0.5
+    ///     "#,
+    /// )?;
+    /// assert_eq!(defects.defects.len(), 2);
+    /// # Ok::<(), sim::defects::DefectsError>(())
+    /// ```
     ///
     /// # Errors
     /// What is wrong with it, and in which line.
@@ -151,7 +178,20 @@ impl Defects {
             }
             defects.push(defect);
         }
-        Ok(Self { defects, channels: file.channel })
+        let mut channels = Vec::with_capacity(file.channel.len());
+        for entry in &file.channel {
+            let fault = *entry.get_ref();
+            let numbers =
+                [("from_s", Some(fault.from_s)), ("until_s", fault.until_s), ("strength", fault.strength)];
+            for (parameter, value) in numbers {
+                if let Some(value) = value.filter(|v| !v.is_finite()) {
+                    let (line, parameter) = (line(entry.span().start), parameter.to_string());
+                    return Err(DefectsError::NotFinite { line, parameter, value });
+                }
+            }
+            channels.push(fault);
+        }
+        Ok(Self { defects, channels })
     }
 
     /// The file that reads back as these defects.
@@ -216,6 +256,7 @@ mod tests {
                 "[[defect]]\nname = \"ridge_inertia\"\nseed = 1\n[[defect]]\nname = \"multi_asperity\"\nseed = 1\n",
                 "line 5: 'ridge_inertia' and 'multi_asperity' cannot act together",
             ),
+            ("[[channel]]\nchannel = \"force\"\nfault = \"off\"\nfrom_s = nan\n", "'from_s' is NaN"),
             ("colour = 3\n", "line 1"),
         ] {
             let error = Defects::parse(text).unwrap_err().to_string();
