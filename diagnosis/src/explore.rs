@@ -13,7 +13,7 @@ const STARTS: (usize, usize) = (4, 2);
 /// Sizes and shapes at which a law is tried.
 fn grid(parameters: &[Parameter], stroke: f64) -> Vec<Vec<f64>> {
     let mut list: Vec<Vec<f64>> = vec![Vec::new()];
-    let fine = parameters.iter().any(|p| is_wavelength(p));
+    let fine = parameters.iter().any(is_wavelength);
     for p in parameters {
         let (low, high) = p.coordinate_bounds();
         let values: Vec<f64> = match p.prior {

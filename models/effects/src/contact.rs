@@ -85,7 +85,7 @@ pub const STILL_PLATE_M: f64 = 1e-12;
 
 /// Mean friction force over a cycle of the periodic steady state, N (unsigned).
 pub fn mean_friction(c: &Contact) -> f64 {
-    if !(c.normal_force > 0.0) {
+    if c.normal_force.is_nan() || c.normal_force <= 0.0 {
         return 0.0;
     }
     let base = if c.amplitude_pp < STILL_PLATE_M {
