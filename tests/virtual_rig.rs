@@ -102,13 +102,14 @@ fn repeatability_and_pass_noise_are_those_of_rig_toml() {
     let config = WorldConfig::ideal();
     let text = config.rig_toml();
     assert!(text.contains("pass_relative_sd = 0.015"), "{text}");
-    let n = 200;
+    let n = 400;
     let strokes: Vec<_> = (0..n).map(|seed| stroke(&config, 1000 + seed, 0.0, 0.05, 0.5)).collect();
     let ratio: Vec<f64> = strokes.iter().map(|(_, l, f)| l / f / 0.5 - 1.0).collect();
     let mean = ratio.iter().sum::<f64>() / n as f64;
     let sd = (ratio.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n as f64 - 1.0)).sqrt();
-    // Repeatability, and 0.8 mN on either axis at 0.25 and 0.5 N.
-    let expected = (0.015_f64.powi(2) + (0.8e-3_f64 / 0.25).powi(2) + (0.8e-3_f64 / 0.5).powi(2)).sqrt();
+    // Repeatability, and the stated scatter of either axis at 0.25 and 0.5 N.
+    let [lateral_sd, normal_sd] = [0, 1].map(|axis| config.pass_force_sd_n(axis, 0.5));
+    let expected = (0.015_f64.powi(2) + (lateral_sd / 0.25).powi(2) + (normal_sd / 0.5).powi(2)).sqrt();
     println!("pass-to-pass sd {sd:.4}, expected {expected:.4}, n {n}");
     assert!((sd / expected - 1.0).abs() < 0.15, "{sd} against {expected}");
 }
