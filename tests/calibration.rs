@@ -7,5 +7,11 @@
 mod amplitude;
 #[path = "calibration/bench.rs"]
 mod bench;
+#[path = "calibration/finger.rs"]
+mod finger;
 #[path = "calibration/force.rs"]
 mod force;
+#[path = "calibration/latency.rs"]
+mod latency;
+#[path = "calibration/phase.rs"]
+mod phase;

@@ -3,6 +3,7 @@
 //! | room | purpose |
 //! |---|---|
 //! | [`setup`], [`plan`], [`fingertip`] | what people write: rigs, plans, fingertips, all checked with the place in the file |
+//! | [`certificates`] | a setup's certificates, verified and applied once |
 //! | [`drivers`] | instruments behind the loop's ports |
 //! | [`sequence`] | the order of a sweep, a pure state machine over rows |
 //! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
@@ -12,6 +13,7 @@
 
 pub mod blind;
 pub mod catalogue;
+pub mod certificates;
 pub mod cli;
 pub mod drivers;
 pub mod export;

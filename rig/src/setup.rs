@@ -2,6 +2,7 @@
 
 mod bundled;
 
+use crate::certificates::Certificates;
 use crate::drivers::{InstrumentSetup, InstrumentsSetup};
 use crate::fingertip::{Fingertip, FingertipSetup};
 use crate::input::{self, BadInput};
@@ -45,6 +46,9 @@ pub struct SetupFile {
     /// Certificates by path, relative to the setup file.
     #[serde(default)]
     pub certificates: Vec<PathBuf>,
+    /// Zero of the force channels in counts, lateral and normal, where it is not the force certificate's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zero_counts: Option<[f64; 2]>,
     /// Present: this is a virtual rig, served on its instruments' loopback addresses by `muprime run` itself.
     #[serde(default, rename = "virtual")]
     pub virtual_rig: Option<VirtualRig>,
@@ -133,6 +137,8 @@ pub struct Setup {
     pub tip: Fingertip,
     /// Loop configuration.
     pub config: Config,
+    /// Its certificates, verified.
+    pub certificates: Certificates,
 }
 
 impl Setup {
@@ -194,7 +200,12 @@ impl Setup {
             bad(&["limits", name], error.to_string())
         })?;
         let config = Config { limits, estimate: file.estimate };
-        Ok(Setup { file, text: text.to_string(), origin: origin.to_string(), tip, config })
+        let now_unix_s = std::time::SystemTime::now()
+            .duration_since(std::time::UNIX_EPOCH)
+            .map_or(0, |since| since.as_secs() as i64);
+        let certificates =
+            Certificates::load(&file, folder, now_unix_s).map_err(|p| bad(&["certificates"], p))?;
+        Ok(Setup { file, text: text.to_string(), origin: origin.to_string(), tip, config, certificates })
     }
 
     /// The instruments' part, for the drivers.
@@ -215,9 +226,11 @@ impl Setup {
         struct Rig<'a> {
             finger: &'a models::finger::Finger,
             noise: &'a PassNoise,
+            calibration: &'a calibration::prior::CalibrationPriors,
         }
+        let calibration = &self.certificates.priors;
         let finger = models::finger::Finger { lateral_recovery_m_per_s: None, ..self.tip.finger };
-        toml::to_string(&Rig { finger: &finger, noise: &self.file.noise }).into_diagnostic()
+        toml::to_string(&Rig { finger: &finger, noise: &self.file.noise, calibration }).into_diagnostic()
     }
 }
 

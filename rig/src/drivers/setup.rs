@@ -22,6 +22,9 @@ pub struct InstrumentSetup {
     pub profile: String,
     /// Where it is: `host` or `host:port` for TCP, a path for a serial line, an interface for CAN.
     pub address: String,
+    /// Serial number: certificates must name it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub serial: Option<String>,
     /// Modbus unit, where it is not the profile's.
     #[serde(default)]
     pub unit: Option<u8>,
@@ -43,6 +46,7 @@ impl InstrumentSetup {
         Self {
             profile: profile.into(),
             address: address.into(),
+            serial: None,
             unit: None,
             rate_hz: None,
             lateral: None,

@@ -41,7 +41,8 @@ pub fn run(
     }
     let mut kept = Keeper::begin(&job, dir, planned, EPOCH_UNIX_NS)?;
     let [force, amplifier, stage] = VirtualRig::of(job.world()?).split();
-    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let force = job.setup.certificates.calibrated(Box::new(force));
+    let mut ports = Ports { force, amplifier: Box::new(amplifier), stage: Box::new(stage) };
     let file = BufWriter::new(kept.new_record()?);
     let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
     let config = job.setup.config;

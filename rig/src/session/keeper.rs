@@ -49,6 +49,7 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
         ("rig.toml".to_string(), job.setup.rig_toml()?),
     ];
     files.extend(job.model_file.clone());
+    files.extend(job.setup.certificates.files.iter().cloned());
     for (id, text) in job
         .setup
         .file

@@ -70,7 +70,11 @@ pub fn run(
     let parts = LoopParts {
         config: job.setup.config,
         model: Arc::clone(&job.model),
-        ports: Ports { force: rig.force, amplifier: rig.amplifier, stage: rig.stage },
+        ports: Ports {
+            force: job.setup.certificates.calibrated(rig.force),
+            amplifier: rig.amplifier,
+            stage: rig.stage,
+        },
         commands: Arc::clone(&commands),
         rows: row_in,
         watch: watch_in,
