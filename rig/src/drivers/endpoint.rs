@@ -18,6 +18,10 @@ use ringbuf::traits::{Consumer, Producer};
 use std::sync::Arc;
 use view::View;
 
+/// An alarm that came unasked shows as a fault for this long after the last: instruments repeat theirs
+/// some ten times a second.
+const ALARM_HOLDS: Nanos = Nanos(1_500_000_000);
+
 /// A frame that must not become a sample.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BadFrame {
@@ -83,6 +87,7 @@ struct FrameTime {
 #[derive(Debug, Clone, Copy)]
 struct SampleMark {
     taken_at: Nanos,
+    arrived: Nanos,
     sequence: u32,
 }
 
@@ -103,6 +108,8 @@ pub struct Endpoint {
     part: Part,
     wanted: Option<Wanted>,
     safe_sent: bool,
+    alarm_until: Nanos,
+    arrived: Nanos,
     health: Arc<Health>,
 }
 
@@ -147,7 +154,20 @@ impl Endpoint {
     ///
     /// # Errors
     /// Where the profile lacks a signal or set-point that an amplifier must have.
-    pub fn amplifier(profile: Profile) -> Result<(Self, AmplifierPort), String> {
+    pub fn amplifier(mut profile: Profile, setup: &InstrumentSetup) -> Result<(Self, AmplifierPort), String> {
+        if let Some(gain) = setup.amplitude_m_per_unit {
+            if !(gain.is_finite() && gain > 0.0) {
+                return Err("`amplitude_m_per_unit` must be above zero".into());
+            }
+            profile.set_si("amplitude", gain);
+            profile.set_si("echo_amplitude", gain);
+        }
+        if let Some(gain) = setup.measured_m_per_unit {
+            if !(gain.is_finite() && gain > 0.0) {
+                return Err("`measured_m_per_unit` must be above zero".into());
+            }
+            profile.set_measured_si("amplitude", gain);
+        }
         let signals = AmplifierSignals {
             echo_amplitude: need(&profile, "echo_amplitude")?,
             echo_frequency: need(&profile, "echo_frequency")?,
@@ -181,24 +201,31 @@ impl Endpoint {
     }
 
     fn new(profile: Profile, part: Part) -> Self {
-        let d = &profile.description;
-        let modulo = |signal: SignalId| {
-            let signal = &d.signal[signal.0];
-            (signal.number.limits().1 + 1.0, signal.scale * signal.si.factor)
-        };
-        let by_name = |name: &Option<String>| name.as_deref().and_then(|name| profile.signal(name));
-        let times = d.poll.iter().map(|poll| FrameTime {
-            clock: by_name(&poll.device_time)
-                .filter(|_| d.time.stamp == Stamp::Device)
-                .map(|signal| (signal, DeviceClock::new(modulo(signal).0 * modulo(signal).1))),
+        let stamped = profile.description.time.stamp == Stamp::Device;
+        let times = profile.frames().iter().map(|frame| FrameTime {
+            clock: frame.device_time.filter(|_| stamped).map(|signal| {
+                let (counts, si) = profile.turn(signal);
+                (signal, DeviceClock::new(counts * si))
+            }),
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 2^32 at most
-            counter: by_name(&poll.sequence).map(|signal| (signal, Counter::new(modulo(signal).0 as u64))),
+            counter: frame.sequence.map(|signal| (signal, Counter::new(profile.turn(signal).0 as u64))),
             counted: 0,
         });
-        let times = times.collect();
-        let seen = vec![false; d.poll.len()];
+        let times: Vec<FrameTime> = times.collect();
+        let seen = vec![false; times.len()];
         let values = profile.values();
-        Self { values, seen, times, part, wanted: None, safe_sent: true, health: Arc::default(), profile }
+        Self {
+            values,
+            seen,
+            times,
+            part,
+            wanted: None,
+            safe_sent: true,
+            alarm_until: Nanos(0),
+            arrived: Nanos(0),
+            health: Arc::default(),
+            profile,
+        }
     }
 
     /// The instrument's profile.
@@ -229,6 +256,7 @@ impl Endpoint {
             BadFrame::Corrupt(error.to_string())
         })?;
         self.seen[frame.0] = true;
+        self.arrived = arrived;
         if self.seen.iter().all(|&seen| seen)
             && let Some(broken) = self.profile.broken_signature(&self.values)
         {
@@ -282,10 +310,11 @@ impl Endpoint {
             }
         }
         let latency = Nanos::from_seconds(self.profile.description.time.latency_ms * 1e-3);
-        Some(SampleMark { taken_at: taken_at.since(latency), sequence: time.counted })
+        Some(SampleMark { taken_at: taken_at.since(latency), arrived, sequence: time.counted })
     }
 
     fn publish(&mut self, frame: FrameId, bytes: &[u8], mark: SampleMark) {
+        let alarmed = mark.arrived < self.alarm_until;
         let view = View { profile: &self.profile, values: &self.values, bytes, frame, mark };
         let full = match &mut self.part {
             Part::Force { lateral, normal, last, ring } => {
@@ -312,7 +341,7 @@ impl Endpoint {
                     echoed_frequency_hz: view.si(signals.echo_frequency),
                     output_on: flag(Some(signals.output_on)),
                     watchdog_tripped: flag(signals.watchdog_tripped),
-                    fault: flag(signals.fault) || view.severity() == Some(Severity::Stop),
+                    fault: alarmed || flag(signals.fault) || view.severity() == Some(Severity::Stop),
                     temperature_c: view.optional(signals.temperature),
                     taken_at: mark.taken_at,
                     sequence: mark.sequence,
@@ -326,7 +355,7 @@ impl Endpoint {
                     position_m: view.si(signals.position),
                     velocity_m_s: view.si(signals.velocity),
                     at_limit: flag(signals.at_limit),
-                    fault: flag(signals.fault) || view.severity() == Some(Severity::Stop),
+                    fault: alarmed || flag(signals.fault) || view.severity() == Some(Severity::Stop),
                     taken_at: mark.taken_at,
                     sequence: mark.sequence,
                 };
@@ -335,6 +364,13 @@ impl Endpoint {
             Part::Amplifier { .. } | Part::Stage { .. } => return,
         };
         self.health.count(if full { &self.health.ring_full } else { &self.health.samples });
+    }
+
+    /// The instrument raised an alarm unasked: its state shows a fault until it has been silent for a while.
+    pub fn alarm(&mut self, text: &str) {
+        self.health.count(&self.health.alarms);
+        self.health.problem(format!("the instrument says {text}"));
+        self.alarm_until = self.arrived.plus(ALARM_HOLDS);
     }
 
     /// Tells the loop at once that nothing will come, and why. Commands that wait are dropped: what
@@ -420,10 +456,7 @@ impl Endpoint {
             profile.set(name).map(|set| (set, si / profile.description.set[set.0].si.factor))
         };
         let heartbeat = |sequence: u32| {
-            profile.set("heartbeat").map(|set| {
-                let counts = profile.description.set[set.0].number.limits().1 + 1.0;
-                (set, f64::from(sequence) % counts)
-            })
+            profile.set("heartbeat").map(|set| (set, f64::from(sequence) % profile.heartbeat_turns(set)))
         };
         match &mut self.part {
             Part::Force { .. } => None,

@@ -20,14 +20,28 @@ pub struct InstrumentsSetup {
 pub struct InstrumentSetup {
     /// Id of the profile.
     pub profile: String,
-    /// Where it is: `host` or `host:port` for TCP, a path for a serial line, an interface for CAN.
+    /// Where it is: `host` or `host:port` for TCP, a path for a serial line
+    /// (`rtu:PATH` for a Modbus TCP profile that is reached so), an interface (`can0`) or `slcan:PATH` for CAN.
     pub address: String,
     /// Modbus unit, where it is not the profile's.
     #[serde(default)]
     pub unit: Option<u8>,
+    /// CAN identifier that the instrument's are counted from, or CANopen node, where it is not the profile's.
+    #[serde(default)]
+    pub base: Option<u32>,
+    /// Symbols per second of a serial line, where they are not the profile's.
+    #[serde(default)]
+    pub baud: Option<u32>,
     /// Reads per second, where they are not the profile's.
     #[serde(default)]
     pub rate_hz: Option<f64>,
+    /// Amplifiers whose set-point is a voltage or a current: peak-to-peak metres per unit of it, from the
+    /// certificate of the plate.
+    #[serde(default)]
+    pub amplitude_m_per_unit: Option<f64>,
+    /// The same for what they measure.
+    #[serde(default)]
+    pub measured_m_per_unit: Option<f64>,
     /// What gives the lateral force. Left out: the signal `lateral`, if the profile has it.
     #[serde(default)]
     pub lateral: Option<AxisSetup>,
@@ -44,6 +58,10 @@ impl InstrumentSetup {
             profile: profile.into(),
             address: address.into(),
             unit: None,
+            base: None,
+            baud: None,
+            amplitude_m_per_unit: None,
+            measured_m_per_unit: None,
             rate_hz: None,
             lateral: None,
             normal: None,

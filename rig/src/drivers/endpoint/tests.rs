@@ -3,7 +3,8 @@ use crate::drivers::ports::DriveSetPoint;
 use crate::drivers::profile;
 
 fn amplifier() -> (Endpoint, AmplifierPort) {
-    Endpoint::amplifier(profile("muprime-amplifier").unwrap()).unwrap()
+    Endpoint::amplifier(profile("muprime-amplifier").unwrap(), &InstrumentSetup::new("muprime-amplifier", ""))
+        .unwrap()
 }
 
 fn on(sequence: u32, expires_at: u64) -> DriveSetPoint {
