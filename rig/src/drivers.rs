@@ -39,10 +39,12 @@
 //! | [`text`] | the conversation in lines, over a serial line or SCPI over TCP |
 //! | [`canopen`] | the conversation with a CANopen drive of CiA 402 |
 //! | [`serial`] | serial lines |
+//! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 
 pub mod bundled;
 pub mod can;
 pub mod canopen;
+pub mod embed;
 pub mod endpoint;
 pub mod health;
 pub mod modbus;
@@ -175,8 +177,8 @@ pub fn open(setup: &InstrumentsSetup, epoch: Instant) -> Result<Rig, OpenError> 
         .map_err(|problem| mismatch(&setup.amplifier, problem))?;
     start(&mut links, &setup.amplifier, endpoint, epoch)?;
 
-    let (endpoint, stage) =
-        Endpoint::stage(profile(&setup.stage.profile)?).map_err(|problem| mismatch(&setup.stage, problem))?;
+    let (endpoint, stage) = Endpoint::stage(profile(&setup.stage.profile)?, &setup.stage)
+        .map_err(|problem| mismatch(&setup.stage, problem))?;
     start(&mut links, &setup.stage, endpoint, epoch)?;
     Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), links })
 }
@@ -255,6 +257,9 @@ pub fn emulators(
     let mut devices = std::collections::BTreeMap::new();
     for instrument in setup.force.iter().chain([&setup.amplifier, &setup.stage]) {
         let profile = profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
+        if !matches!(profile.description.link.kind, LinkKind::ModbusTcp | LinkKind::ModbusRtu) {
+            continue;
+        }
         let unit = instrument.unit.or(profile.description.link.unit).unwrap_or(1);
         let device = sim::wire::device::Device::new(profile)
             .map_err(|e| miette::miette!("{}: {e}", instrument.profile))?;

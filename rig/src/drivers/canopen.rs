@@ -146,11 +146,12 @@ impl Master {
             }
             let now = session.now();
             if write.is_due(now) {
-                if let Due::SetPoints(set_points) = session.endpoint.due(now) {
-                    // Only a command for the velocity's sake enables; the safe set-points do not.
+                let due = session.endpoint.due(now);
+                // Only the loop's own commands enable; the safe set-points do not.
+                let safe = matches!(due, Due::Safe(_));
+                if let Due::SetPoints(set_points) | Due::Safe(set_points) = due {
                     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 16 bits
                     let state = DriveState::of(session.endpoint.value(status) as u16);
-                    let safe = set_points == session.endpoint.safe_set_points();
                     let control = if safe {
                         NOT_ENABLED
                     } else {

@@ -40,6 +40,8 @@ pub enum Due {
     Nothing,
     /// These set-points, in their units.
     SetPoints(Vec<(SetId, f64)>),
+    /// The safe set-points, since no command is valid any more.
+    Safe(Vec<(SetId, f64)>),
 }
 
 /// One axis of force out of one signal.
@@ -73,7 +75,7 @@ struct StageSignals {
 enum Part {
     Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: HeapProd<Forces> },
     Amplifier { signals: AmplifierSignals, link: AmplifierLink },
-    Stage { signals: StageSignals, link: StageLink },
+    Stage { signals: StageSignals, link: StageLink, dead_weight_n: Option<f64> },
 }
 
 /// The clock and the counter of one frame.
@@ -188,7 +190,7 @@ impl Endpoint {
     ///
     /// # Errors
     /// Where the profile lacks a signal or set-point that a stage must have.
-    pub fn stage(profile: Profile) -> Result<(Self, StagePort), String> {
+    pub fn stage(profile: Profile, setup: &InstrumentSetup) -> Result<(Self, StagePort), String> {
         let signals = StageSignals {
             position: need(&profile, "position")?,
             velocity: need(&profile, "velocity")?,
@@ -196,8 +198,12 @@ impl Endpoint {
             fault: profile.signal("fault"),
         };
         need_set(&profile, "velocity")?;
+        let dead_weight_n = setup.dead_weight_n;
+        if profile.set("load").is_none() && dead_weight_n.is_none() {
+            return Err("the instrument loads nothing: say the weight that does, as `dead_weight_n`".into());
+        }
         let (link, port) = ports::stage();
-        Ok((Self::new(profile, Part::Stage { signals, link }), port))
+        Ok((Self::new(profile, Part::Stage { signals, link, dead_weight_n }), port))
     }
 
     fn new(profile: Profile, part: Part) -> Self {
@@ -348,7 +354,7 @@ impl Endpoint {
                 };
                 link.states.try_push(Ok(state)).is_err()
             }
-            Part::Stage { signals, link } if view.profile.frame_of(signals.position) == frame => {
+            Part::Stage { signals, link, .. } if view.profile.frame_of(signals.position) == frame => {
                 let flag =
                     |signal: Option<SignalId>| signal.is_some_and(|signal| view.values.get(signal) != 0.0);
                 let state = StageState {
@@ -447,7 +453,7 @@ impl Endpoint {
         }
         self.safe_sent = true;
         self.health.count(&self.health.safe_sent);
-        Due::SetPoints(self.safe_set_points())
+        Due::Safe(self.safe_set_points())
     }
 
     fn newest_command(&mut self) -> Option<Wanted> {
@@ -476,8 +482,17 @@ impl Endpoint {
                 set_points.extend(heartbeat(command.sequence));
                 Some(Wanted { set_points, expires_at: command.expires_at, sent: false })
             }
-            Part::Stage { link, .. } => {
+            Part::Stage { link, dead_weight_n, .. } => {
                 let command = std::iter::from_fn(|| link.commands.try_pop()).last()?;
+                let wanted = command.normal_force_n;
+                if let Some(weight) =
+                    dead_weight_n.filter(|weight| wanted != 0.0 && (wanted - weight).abs() > 1e-6)
+                {
+                    let text = format!("the load stands on a weight of {weight} N: {wanted} N cannot be had");
+                    self.health.count(&self.health.commands_refused);
+                    self.health.problem(text);
+                    return None;
+                }
                 let wanted = [
                     set("velocity", command.velocity_m_s),
                     set("load", command.normal_force_n),

@@ -92,7 +92,7 @@ impl Conversation {
             if let (Some(periodic), Some(block)) =
                 (write.as_mut().filter(|periodic| periodic.is_due(now)), &block)
             {
-                if let Due::SetPoints(set_points) = session.endpoint.due(now) {
+                if let Due::SetPoints(set_points) | Due::Safe(set_points) = session.endpoint.due(now) {
                     self.write(session, wire, block.address, &set_points)?;
                 }
                 periodic.advance(session.now());

@@ -42,6 +42,9 @@ pub struct InstrumentSetup {
     /// The same for what they measure.
     #[serde(default)]
     pub measured_m_per_unit: Option<f64>,
+    /// Stages that load nothing: the weight that does, in N.
+    #[serde(default)]
+    pub dead_weight_n: Option<f64>,
     /// What gives the lateral force. Left out: the signal `lateral`, if the profile has it.
     #[serde(default)]
     pub lateral: Option<AxisSetup>,
@@ -62,6 +65,7 @@ impl InstrumentSetup {
             baud: None,
             amplitude_m_per_unit: None,
             measured_m_per_unit: None,
+            dead_weight_n: None,
             rate_hz: None,
             lateral: None,
             normal: None,

@@ -25,6 +25,8 @@ use std::time::{Duration, Instant};
 const REPEAT: Duration = Duration::from_secs(1);
 /// The longest line that an instrument may send.
 const LONGEST_LINE: usize = 4096;
+/// Silence that must follow a binary answer.
+const AFTER_A_BLOCK: Duration = Duration::from_micros(1500);
 /// How often commands are looked for.
 const COMMAND_RATE_HZ: f64 = 500.0;
 
@@ -169,15 +171,21 @@ impl Talk {
         }
     }
 
-    /// A binary answer, framed by its length.
-    fn block(&mut self, length: usize) -> Result<Vec<u8>, Ended> {
+    /// A binary answer, framed by its length; `None` where more came than that: a line that came
+    /// unasked may then stand in the middle of it.
+    fn block(&mut self, session: &mut Session, length: usize) -> Result<Option<Vec<u8>>, Ended> {
         let deadline = Instant::now() + self.limit();
-        while self.came.len() < length {
-            if !self.take(deadline)? && Instant::now() >= deadline {
-                return Err(Ended::Timeout(self.link.response_timeout_ms));
+        loop {
+            self.unasked(session);
+            if self.came.len() < length {
+                if !self.take(deadline)? && Instant::now() >= deadline {
+                    return Err(Ended::Timeout(self.link.response_timeout_ms));
+                }
+            } else if !self.take(Instant::now() + AFTER_A_BLOCK)? {
+                let block = std::mem::take(&mut self.came);
+                return Ok((block.len() == length).then_some(block));
             }
         }
-        Ok(self.came.drain(..length).collect())
     }
 
     fn begin(&mut self, session: &mut Session) -> Result<(), Ended> {
@@ -219,7 +227,7 @@ impl Talk {
             }
             let now = session.now();
             if commands.is_due(now) {
-                if let Due::SetPoints(set_points) = session.endpoint.due(now) {
+                if let Due::SetPoints(set_points) | Due::Safe(set_points) = session.endpoint.due(now) {
                     self.command(session, &set_points)?;
                 }
                 commands.advance(session.now());
@@ -239,7 +247,13 @@ impl Talk {
         self.clear(session)?;
         self.send(&query.send)?;
         let bytes = match query.length {
-            Some(length) => self.block(usize::from(length))?,
+            Some(length) => match self.block(session, usize::from(length))? {
+                Some(block) => block,
+                None => {
+                    return self
+                        .bear(session, format!("`{}` was answered by more than {length} bytes", query.send));
+                }
+            },
             None => {
                 let line = self.line(session)?;
                 match number(&line) {

@@ -4,13 +4,14 @@ use super::SharedPlant;
 use super::device::Device;
 use super::drive::Drive;
 use instruments::FrameId;
-use instruments::codec::can::CanFrame;
+use instruments::codec::can::{CanFrame, SlcanReader, SlcanSaid, slcan_line};
 use instruments::profile::FrameKind;
 use instruments::schema::LinkKind;
 use realtime::ports::Nanos;
+use std::collections::VecDeque;
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -38,6 +39,65 @@ pub trait CanPort: Send {
     /// # Errors
     /// Where the bus is gone.
     fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>>;
+}
+
+/// The far side of a serial CAN adapter: the driver's end speaks to the adapter, this end is the bus.
+pub struct EmulatedAdapter {
+    port: Box<dyn serialport::SerialPort>,
+    reader: SlcanReader,
+    waiting: VecDeque<CanFrame>,
+    damage: Arc<AtomicUsize>,
+}
+
+impl EmulatedAdapter {
+    /// An adapter on a serial port.
+    #[must_use]
+    pub fn new(port: Box<dyn serialport::SerialPort>) -> Self {
+        Self { port, reader: SlcanReader::default(), waiting: VecDeque::new(), damage: Arc::default() }
+    }
+
+    /// What is done to the next frame that is sent: 1 loses it, 2 sends it twice.
+    #[must_use]
+    pub fn damage(&self) -> Arc<AtomicUsize> {
+        Arc::clone(&self.damage)
+    }
+}
+
+impl CanPort for EmulatedAdapter {
+    fn send(&mut self, frame: &CanFrame) -> io::Result<bool> {
+        let line = slcan_line(frame);
+        match self.damage.swap(0, Ordering::SeqCst) {
+            1 => return Ok(true),
+            2 => self.port.write_all(&line)?,
+            _ => {}
+        }
+        self.port.write_all(&line)?;
+        Ok(true)
+    }
+
+    fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>> {
+        loop {
+            if let Some(frame) = self.waiting.pop_front() {
+                return Ok(Some(CanEvent::Frame(frame, Duration::ZERO)));
+            }
+            let mut buffer = [0; 256];
+            let left = deadline.saturating_duration_since(Instant::now()).max(Duration::from_micros(100));
+            self.port.set_timeout(left)?;
+            match self.port.read(&mut buffer) {
+                Ok(count) => {
+                    let waiting = &mut self.waiting;
+                    self.reader.push(&buffer[..count], |said| {
+                        if let SlcanSaid::Frame(frame) = said {
+                            waiting.push_back(frame);
+                        }
+                    });
+                }
+                Err(_) if Instant::now() >= deadline => return Ok(None),
+                // Nobody holds the other end open just now.
+                Err(_) => std::thread::sleep(Duration::from_micros(200)),
+            }
+        }
+    }
 }
 
 /// One emulated instrument at its identifiers.

@@ -6,7 +6,7 @@
 
 use super::device::Device;
 use super::serial::SerialEmulator;
-use super::{Plant, SharedPlant};
+use super::{Command, Plant, SharedPlant};
 use instruments::profile::FrameKind;
 use instruments::{FrameId, SetId};
 use realtime::ports::Nanos;
@@ -26,13 +26,25 @@ pub struct LineInstrument {
     device: Device,
     plant: SharedPlant,
     error: bool,
+    feeds_watchdog: bool,
 }
 
 impl LineInstrument {
     /// By its profile.
     #[must_use]
     pub fn new(device: Device, plant: SharedPlant) -> Self {
-        Self { device, plant, error: false }
+        let commands = &device.profile().description.emulator.command;
+        let feeds_watchdog = commands.contains_key("enable") && !commands.contains_key("heartbeat");
+        Self { device, plant, error: false, feeds_watchdog }
+    }
+
+    /// An amplifier without a heartbeat has no watchdog: the world's is kept fed for it.
+    pub fn live(&mut self) {
+        if self.feeds_watchdog {
+            let (mut plant, now) = self.plant.now();
+            #[allow(clippy::cast_precision_loss)] // only change counts
+            plant.command(&[(Command::DriveHeartbeat, (now.0 / 1_000_000 % 65_536) as f64)]);
+        }
     }
 
     fn end(&self) -> Vec<u8> {
@@ -179,6 +191,7 @@ impl SerialEmulator {
             let mut out =
                 alarm().map_or_else(Vec::new, |line| [line.into_bytes(), instrument.end()].concat());
             lines.push(bytes, |line| out.extend(instrument.answer(line)));
+            instrument.live();
             out
         })
     }
@@ -206,6 +219,7 @@ impl TcpLines {
         let clients = Arc::new(AtomicUsize::new(0));
         let thread = std::thread::Builder::new().name("lines".into()).spawn(move || {
             while !stopped.load(Ordering::Acquire) {
+                instrument.lock().unwrap_or_else(PoisonError::into_inner).live();
                 match listener.accept() {
                     Ok((stream, _)) if clients.load(Ordering::Relaxed) < MOST_CLIENTS => {
                         let (instrument, stopped) = (Arc::clone(&instrument), Arc::clone(&stopped));
