@@ -5,6 +5,7 @@
 //! skip. User-mode Linux keeps coarse time: order and content are tested here, never speed.
 
 #[path = "wire/bench.rs"]
+#[allow(dead_code)] // the other wire tests use all of it
 mod bench;
 
 use bench::{Bench, BenchPlant, eventually, now};
