@@ -2,6 +2,8 @@
 
 #[path = "wire/bench.rs"]
 mod bench;
+#[path = "wire/lines.rs"]
+mod lines;
 #[path = "wire/modbus_tcp.rs"]
 mod modbus_tcp;
 #[path = "wire/peers.rs"]

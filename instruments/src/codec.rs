@@ -1,1 +1,19 @@
-//! Frames of the wires: one file a protocol.
+//! Frames of the wires: one file a protocol. Pure bytes, no port.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`modbus_rtu`] | Modbus RTU: requests, answers, both directions |
+//! | [`stream`] | sensor streams without a request: sync bytes, length, checksum, resynchronisation |
+//! | [`can`] | CAN frames, and the lines of serial CAN adapters |
+//! | [`canopen`] | NMT, SDO, heartbeat, emergency, and the states of CiA 402 |
+//! | [`dbc`] | signals of CAN messages by a DBC file |
+//! | [`text`] | answers that are lines of text |
+//! | [`checksum`] | the checks that frames end with |
+
+pub mod can;
+pub mod canopen;
+pub mod checksum;
+pub mod dbc;
+pub mod modbus_rtu;
+pub mod stream;
+pub mod text;

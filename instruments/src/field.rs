@@ -24,6 +24,8 @@ pub enum NumberType {
     I32,
     /// IEEE 754 single.
     F32,
+    /// IEEE 754 double; numbers that came as text are kept so.
+    F64,
 }
 
 impl NumberType {
@@ -34,6 +36,7 @@ impl NumberType {
             Self::U8 | Self::I8 => 1,
             Self::U16 | Self::I16 => 2,
             Self::U32 | Self::I32 | Self::F32 => 4,
+            Self::F64 => 8,
         }
     }
 
@@ -48,6 +51,7 @@ impl NumberType {
             Self::U32 => (0.0, f64::from(u32::MAX)),
             Self::I32 => (f64::from(i32::MIN), f64::from(i32::MAX)),
             Self::F32 => (f64::from(f32::MIN), f64::from(f32::MAX)),
+            Self::F64 => (f64::MIN, f64::MAX),
         }
     }
 }
@@ -92,63 +96,67 @@ impl Field {
 
     /// The number; `None` where the frame is too short for it.
     #[must_use]
+    // The casts between equal widths are the two's complement they look like; the others only drop zeros.
+    #[allow(clippy::cast_possible_wrap, clippy::cast_possible_truncation)]
     pub fn read(&self, frame: &[u8]) -> Option<f64> {
         let word = self.word(frame)?;
         if let Some((first, width)) = self.bits {
-            return Some(f64::from((word >> first) & mask(width)));
+            return Some(f64::from((word >> first) as u32 & mask(width)));
         }
-        // The casts between equal widths are the two's complement they look like.
-        #[allow(clippy::cast_possible_wrap, clippy::cast_possible_truncation)]
         Some(match self.number {
-            NumberType::U8 | NumberType::U16 | NumberType::U32 => f64::from(word),
+            NumberType::U8 | NumberType::U16 | NumberType::U32 => f64::from(word as u32),
             NumberType::I8 => f64::from(word as u8 as i8),
             NumberType::I16 => f64::from(word as u16 as i16),
-            NumberType::I32 => f64::from(word as i32),
-            NumberType::F32 => f64::from(f32::from_bits(word)),
+            NumberType::I32 => f64::from(word as u32 as i32),
+            NumberType::F32 => f64::from(f32::from_bits(word as u32)),
+            NumberType::F64 => f64::from_bits(word),
         })
     }
 
-    /// What stands in the frame, as a whole number: of `f32` the bits, of the others the value.
+    /// What stands in the frame, as a whole number: of floating-point numbers the bits, of the others the value.
     #[must_use]
-    #[allow(clippy::cast_possible_truncation)] // whole numbers of 32 bits are exact
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // whole numbers of 32 bits are exact
     pub fn counts(&self, frame: &[u8]) -> Option<i64> {
-        if self.number == NumberType::F32 {
-            self.word(frame).map(i64::from)
-        } else {
-            self.read(frame).map(|n| n as i64)
+        match self.number {
+            NumberType::F32 | NumberType::F64 => self.word(frame).map(|word| word as i64),
+            _ => self.read(frame).map(|number| number as i64),
         }
     }
 
     /// Stores `value`, rounded to the nearest and held to the type's limits, as an instrument's
     /// converter does. Other bits of the same word are kept. A value that is no number is stored
-    /// as one only in `f32`; integers take zero.
+    /// as one only in floating point; integers take zero.
     /// Returns `false` where the frame is too short.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn write(&self, frame: &mut [u8], value: f64) -> bool {
         let Some(old) = self.word(frame) else { return false };
         let word = if let Some((first, width)) = self.bits {
-            let value = value.round().clamp(0.0, f64::from(mask(width))) as u32;
-            (old & !(mask(width) << first)) | (value << first)
-        } else if self.number == NumberType::F32 {
-            (value as f32).to_bits()
+            let value = value.round().clamp(0.0, f64::from(mask(width))) as u64;
+            (old & !(u64::from(mask(width)) << first)) | (value << first)
         } else {
-            let (low, high) = self.number.limits();
-            value.round().clamp(low, high) as i64 as u32
+            match self.number {
+                NumberType::F32 => u64::from((value as f32).to_bits()),
+                NumberType::F64 => value.to_bits(),
+                _ => {
+                    let (low, high) = self.number.limits();
+                    value.round().clamp(low, high) as i64 as u64
+                }
+            }
         };
-        let bytes = word.to_be_bytes();
+        let bytes = word.to_le_bytes();
         for (place, significance) in self.positions() {
-            frame[place] = bytes[3 - significance];
+            frame[place] = bytes[significance];
         }
         true
     }
 
-    fn word(&self, frame: &[u8]) -> Option<u32> {
+    fn word(&self, frame: &[u8]) -> Option<u64> {
         if frame.len() < self.end() {
             return None;
         }
         let mut word = 0;
         for (place, significance) in self.positions() {
-            word |= u32::from(frame[place]) << (8 * significance);
+            word |= u64::from(frame[place]) << (8 * significance);
         }
         Some(word)
     }
@@ -157,25 +165,15 @@ impl Field {
     fn positions(&self) -> impl Iterator<Item = (usize, usize)> {
         let (at, length, order) = (self.at, self.number.bytes(), self.order);
         (0..length).map(move |i| {
+            let (word, byte, words) = (i / 2, i % 2, length / 2);
             let significance = match order {
+                _ if length == 1 => 0,
                 ByteOrder::Abcd => length - 1 - i,
                 ByteOrder::Dcba => i,
-                // Words swapped: within 16 bits this is plain big endian.
-                ByteOrder::Cdab => {
-                    if length == 4 {
-                        [1, 0, 3, 2][i]
-                    } else {
-                        length - 1 - i
-                    }
-                }
-                // Bytes swapped within words: within 16 bits plain little endian.
-                ByteOrder::Badc => {
-                    if length == 4 {
-                        [2, 3, 0, 1][i]
-                    } else {
-                        i
-                    }
-                }
+                // Low word first, each word big endian: within 16 bits plain big endian.
+                ByteOrder::Cdab => 2 * word + 1 - byte,
+                // High word first, each word little endian: within 16 bits plain little endian.
+                ByteOrder::Badc => 2 * (words - 1 - word) + byte,
             };
             (at + i, significance)
         })

@@ -8,6 +8,7 @@ mod compile;
 use std::collections::HashMap;
 use std::ops::Range;
 
+use crate::codec::dbc::DbcSignal;
 use crate::error::ProfileError;
 use crate::expression::Expression;
 use crate::field::Field;
@@ -21,7 +22,7 @@ pub struct FrameId(pub usize);
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SignalId(pub usize);
 /// Index of a set-point of one profile.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SetId(pub usize);
 
 /// The values of all signals of one profile, each in the profile's `unit`; NaN until decoded.
@@ -55,13 +56,80 @@ pub enum FrameError {
     },
 }
 
+/// One frame, compiled: a poll, the stream, a group of messages or a query. Each yields one sample.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// Name.
+    pub name: String,
+    /// Length in bytes.
+    pub bytes: usize,
+    /// The signal that counts the instrument's samples.
+    pub sequence: Option<SignalId>,
+    /// The signal that holds the instrument's own time.
+    pub device_time: Option<SignalId>,
+    /// What it is.
+    pub kind: FrameKind,
+}
+
+/// What a frame is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FrameKind {
+    /// Registers; the index of the poll in the description.
+    Poll(usize),
+    /// Frames that come by themselves.
+    Stream,
+    /// CAN messages; the index in the description, and each message's identifier (less its base) and length.
+    Messages(usize, Vec<(u32, usize)>),
+    /// A question; the index in the description.
+    Query(usize),
+}
+
+/// Where a signal stands in its frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Place {
+    /// Bytes.
+    Bytes(Field),
+    /// Bits of a CAN message that begins at this byte of the frame.
+    Dbc(usize, DbcSignal),
+}
+
+impl Place {
+    fn read(&self, frame: &[u8]) -> Option<f64> {
+        match self {
+            Place::Bytes(field) => field.read(frame),
+            Place::Dbc(at, signal) => signal.read(frame.get(*at..)?),
+        }
+    }
+
+    fn counts(&self, frame: &[u8]) -> Option<i64> {
+        match self {
+            Place::Bytes(field) => field.counts(frame),
+            #[allow(clippy::cast_possible_truncation)] // counts of at most 32 bits
+            Place::Dbc(at, signal) => signal.read(frame.get(*at..)?).map(|value| value as i64),
+        }
+    }
+
+    fn write(&self, frame: &mut [u8], value: f64) -> bool {
+        match self {
+            Place::Bytes(field) => field.write(frame, value),
+            Place::Dbc(at, signal) => frame.get_mut(*at..).is_some_and(|frame| signal.write(frame, value)),
+        }
+    }
+
+    /// How many values there are before a counter runs round.
+    fn turns_after(&self) -> f64 {
+        match self {
+            Place::Bytes(field) => field.number.limits().1 + 1.0,
+            Place::Dbc(_, signal) => 2_f64.powi(i32::from(signal.size)),
+        }
+    }
+}
+
 /// One signal, compiled.
 #[derive(Debug, Clone)]
-pub struct CompiledSignal {
-    /// Its frame.
-    pub frame: FrameId,
-    /// Its place there.
-    pub field: Field,
+pub(crate) struct CompiledSignal {
+    frame: FrameId,
+    place: Place,
     scale: f64,
     scale_expression: Option<Expression>,
     offset: f64,
@@ -73,8 +141,8 @@ pub struct CompiledSignal {
 /// One block of set-points, compiled.
 #[derive(Debug, Clone)]
 struct CompiledSet {
-    block: usize,
-    field: Field,
+    /// Block and place; `None` for a line of text.
+    block: Option<(usize, Field)>,
     scale: f64,
 }
 
@@ -83,6 +151,7 @@ struct CompiledSet {
 pub struct Profile {
     /// What the file says.
     pub description: Description,
+    frames: Vec<Frame>,
     signals: Vec<CompiledSignal>,
     sets: Vec<CompiledSet>,
     signatures: Vec<Expression>,
@@ -96,9 +165,17 @@ impl Profile {
     /// # Errors
     /// What is wrong, with the place in the file.
     pub fn parse(text: &str) -> Result<Self, ProfileError> {
+        Self::parse_with(text, &|_| None)
+    }
+
+    /// The same for a profile that names other files: `file` gives the text of each.
+    ///
+    /// # Errors
+    /// What is wrong, with the place in the file.
+    pub fn parse_with(text: &str, file: &dyn Fn(&str) -> Option<String>) -> Result<Self, ProfileError> {
         let description: Description =
             toml::from_str(text).map_err(|error| ProfileError::from_toml(text, &error))?;
-        Compiler { text, description: &description }.compile()
+        Compiler { text, description: &description, file }.compile()
     }
 
     /// The name that setups use.
@@ -128,7 +205,20 @@ impl Profile {
     /// The frame of that name.
     #[must_use]
     pub fn frame(&self, name: &str) -> Option<FrameId> {
-        self.description.poll.iter().position(|poll| poll.name.as_ref() == name).map(FrameId)
+        self.frames.iter().position(|frame| frame.name == name).map(FrameId)
+    }
+
+    /// All frames: polls, the stream, groups of messages, queries.
+    #[must_use]
+    pub fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// How many values a signal has before it runs round, and the SI value of one count.
+    #[must_use]
+    pub fn turn(&self, signal: SignalId) -> (f64, f64) {
+        let signal = &self.signals[signal.0];
+        (signal.place.turns_after(), signal.scale * signal.si_factor)
     }
 
     /// The frame in which a signal stands.
@@ -163,7 +253,7 @@ impl Profile {
         }
         // Scales may depend on signals of the same frame, so raw values come first.
         for (signal, value) in self.signals.iter().zip(&mut values.0).filter(|(s, _)| s.frame == frame) {
-            let raw = signal.field.read(bytes).unwrap_or(f64::NAN);
+            let raw = signal.place.read(bytes).unwrap_or(f64::NAN);
             *value = if signal.scale_expression.is_none() { raw * signal.scale + signal.offset } else { raw };
         }
         for index in 0..self.signals.len() {
@@ -188,14 +278,14 @@ impl Profile {
             if let Some(value) = unit_value(SignalId(index)) {
                 values[index] = value;
                 if signal.frame == frame && signal.scale_expression.is_none() {
-                    signal.field.write(bytes, (value - signal.offset) / signal.scale);
+                    signal.place.write(bytes, (value - signal.offset) / signal.scale);
                 }
             }
         }
         for (index, signal) in self.signals.iter().enumerate().filter(|(_, s)| s.frame == frame) {
             if let (Some(scale), false) = (&signal.scale_expression, values[index].is_nan()) {
                 let scale = signal.scale * scale.value(&values);
-                signal.field.write(bytes, (values[index] - signal.offset) / scale);
+                signal.place.write(bytes, (values[index] - signal.offset) / scale);
             }
         }
     }
@@ -204,7 +294,7 @@ impl Profile {
     /// Zero where the frame is too short.
     #[must_use]
     pub fn raw(&self, signal: SignalId, frame: &[u8]) -> i64 {
-        self.signals[signal.0].field.counts(frame).unwrap_or(0)
+        self.signals[signal.0].place.counts(frame).unwrap_or(0)
     }
 
     /// Whether a set-point may take `value` (in its `unit`).
@@ -216,10 +306,26 @@ impl Profile {
         if value >= low && value <= high { Ok(()) } else { Err(SetError { value, low, high }) }
     }
 
+    /// Gives the set-point of that name, or else the signal, another way to SI: a certificate's.
+    pub fn set_si(&mut self, name: &str, factor: f64) {
+        match self.description.set.iter_mut().find(|set| set.name.as_ref() == name) {
+            Some(set) => set.si.factor = factor,
+            None => self.set_measured_si(name, factor),
+        }
+    }
+
+    /// Gives the signal of that name another way to SI.
+    pub fn set_measured_si(&mut self, name: &str, factor: f64) {
+        if let Some(index) = self.by_name.get(name) {
+            self.signals[*index].si_factor = factor;
+            self.description.signal[*index].si.factor = factor;
+        }
+    }
+
     /// Bytes of a frame.
     #[must_use]
     pub fn frame_bytes(&self, frame: FrameId) -> usize {
-        2 * usize::from(self.description.poll[frame.0].count)
+        self.frames[frame.0].bytes
     }
 
     /// A value in SI units.
@@ -275,7 +381,9 @@ impl Profile {
     pub fn encode_set(&self, set: SetId, value: f64, block: &mut [u8]) -> Result<(), SetError> {
         self.allows(set, value)?;
         let compiled = &self.sets[set.0];
-        compiled.field.write(block, value / compiled.scale);
+        if let Some((_, field)) = compiled.block {
+            field.write(block, value / compiled.scale);
+        }
         Ok(())
     }
 
@@ -283,12 +391,37 @@ impl Profile {
     #[must_use]
     pub fn decode_set(&self, set: SetId, block: &[u8]) -> Option<f64> {
         let compiled = &self.sets[set.0];
-        compiled.field.read(block).map(|raw| raw * compiled.scale)
+        compiled.block?.1.read(block).map(|raw| raw * compiled.scale)
     }
 
     /// The set-points of one block.
     pub fn sets_of(&self, block: usize) -> impl Iterator<Item = SetId> {
-        self.sets.iter().enumerate().filter(move |(_, set)| set.block == block).map(|(i, _)| SetId(i))
+        let stands = move |set: &CompiledSet| set.block.is_some_and(|(stands, _)| stands == block);
+        self.sets.iter().enumerate().filter(move |(_, set)| stands(set)).map(|(i, _)| SetId(i))
+    }
+
+    /// The line of text that carries a set-point, and what its answer begins with; `None` where the
+    /// set-point is no line of text.
+    #[must_use]
+    pub fn line(&self, set: SetId, value: f64) -> Option<(String, Option<&str>)> {
+        let description = &self.description.set[set.0];
+        let (for_value, for_zero) =
+            description.answer.as_ref().map(|(v, z)| (v.as_str(), z.as_str())).unzip();
+        if let (true, Some(zero)) = (value == 0.0, &description.send_zero) {
+            return Some((zero.clone(), for_zero));
+        }
+        // Counts are whole numbers; the scale says how many decimals the unit's value needs.
+        let scale = self.sets[set.0].scale;
+        let decimals = (-scale.log10()).ceil().clamp(0.0, 12.0);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let text = format!("{:.*}", decimals as usize, self.quantise(set, value));
+        description.send.as_ref().map(|send| (send.replace("{}", &text), for_value))
+    }
+
+    /// How many values a heartbeat has before it runs round.
+    #[must_use]
+    pub fn heartbeat_turns(&self, set: SetId) -> f64 {
+        self.sets[set.0].block.map_or(65536.0, |(_, field)| field.number.limits().1 + 1.0)
     }
 
     /// The value nearest to `value` that the set-point can take (both in its `unit`).
@@ -326,4 +459,13 @@ pub struct SetError {
     pub low: f64,
     /// Largest.
     pub high: f64,
+}
+
+/// The function code that reads a table.
+#[must_use]
+pub const fn read_function(table: crate::schema::Table) -> u8 {
+    match table {
+        crate::schema::Table::Holding => 3,
+        crate::schema::Table::Input => 4,
+    }
 }

@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::codec::checksum::Check;
 use crate::field::{ByteOrder, NumberType};
 
 /// One instrument.
@@ -23,7 +24,19 @@ pub struct Description {
     /// Reads of registers; each yields ONE sample with one time.
     #[serde(default)]
     pub poll: Vec<Poll>,
-    /// Blocks of registers that are written in one piece.
+    /// Frames that come without being asked for, after the stream was started.
+    #[serde(default)]
+    pub stream: Option<Stream>,
+    /// CAN messages that together make one sample.
+    #[serde(default)]
+    pub message: Vec<Message>,
+    /// Lines of text or blocks of bytes that are asked for.
+    #[serde(default)]
+    pub query: Vec<Query>,
+    /// What is sent once, at connection, before anything else.
+    #[serde(default)]
+    pub init: Vec<Init>,
+    /// Blocks of set-points that are written in one piece.
     #[serde(default)]
     pub write: Vec<Write>,
     /// The numbers that the instrument gives.
@@ -115,6 +128,14 @@ pub enum LinkKind {
     ModbusTcp,
     /// Modbus RTU over a serial line.
     ModbusRtu,
+    /// Plain CAN.
+    Can,
+    /// CANopen.
+    Canopen,
+    /// Lines of text and blocks of bytes over a serial line.
+    Serial,
+    /// SCPI over TCP.
+    Scpi,
 }
 
 /// `[link]`: how the instrument is reached. The address itself stands in the setup.
@@ -132,9 +153,39 @@ pub struct Link {
     /// Symbols per second on a serial line.
     #[serde(default)]
     pub baud: Option<u32>,
+    /// Bits per second on a CAN bus.
+    #[serde(default)]
+    pub bitrate: Option<u32>,
     /// Data bits, parity and stop bits, as `8N1`.
     #[serde(default)]
     pub format: Option<String>,
+    /// DBC file that describes the signals of CAN messages.
+    #[serde(default)]
+    pub dbc: Option<String>,
+    /// CAN identifier that others are counted from, unless the setup names one.
+    #[serde(default)]
+    pub base: Option<u32>,
+    /// CANopen node, unless the setup names one.
+    #[serde(default)]
+    pub node: Option<u8>,
+    /// The node's heartbeat may stay away this long, in ms.
+    #[serde(default)]
+    pub heartbeat_ms: Option<u32>,
+    /// What ends a line that is sent.
+    #[serde(default)]
+    pub tx_terminator: Option<String>,
+    /// What ends a line that comes.
+    #[serde(default)]
+    pub rx_terminator: Option<String>,
+    /// Pause between two requests, in ms.
+    #[serde(default)]
+    pub min_gap_ms: f64,
+    /// Lines that come without being asked for.
+    #[serde(default)]
+    pub unsolicited: Vec<String>,
+    /// A query that is put after every set-point, and what its answer must begin with.
+    #[serde(default)]
+    pub error_query: Option<ErrorQuery>,
     /// A connection must stand within this time, in ms.
     #[serde(default = "defaults::connect_timeout_ms")]
     pub connect_timeout_ms: u32,
@@ -188,7 +239,117 @@ pub struct Poll {
     pub device_time: Option<String>,
 }
 
-/// `[[write]]`: a block of registers, written in one piece.
+/// A question for errors.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ErrorQuery {
+    /// The question.
+    pub send: String,
+    /// What the answer begins with where there is no error.
+    pub ok: Vec<String>,
+}
+
+/// `[stream]`: frames that come without being asked for. Its frame is called `stream`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stream {
+    /// Frames per second that the instrument sends.
+    pub rate_hz: f64,
+    /// The bytes that every frame begins with.
+    #[serde(default)]
+    pub sync: Vec<u8>,
+    /// Length of a frame, sync and check included.
+    pub length: u16,
+    /// The check at its end.
+    pub check: Check,
+    /// Frames in a row that make an alignment believed.
+    #[serde(default = "defaults::one_frame")]
+    pub believed_after: u32,
+    /// The register write that starts it.
+    #[serde(default)]
+    pub start_register: Option<(u16, u16)>,
+    /// The function of the maker's own, with its byte, that starts it.
+    #[serde(default)]
+    pub start_function: Option<(u8, u8)>,
+    /// Byte that stops it, and how often that is sent.
+    pub stop: (u8, u16),
+    /// Silence after the stop before the instrument listens again, in ms.
+    pub settle_ms: u32,
+    /// A crashed client leaves an instrument streaming: stop it before the first request.
+    #[serde(default)]
+    pub stop_before_open: bool,
+    /// Signal that counts samples.
+    #[serde(default)]
+    pub sequence: Option<String>,
+}
+
+/// `[[message]]`: CAN messages that together make one sample, with what asks for them.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Message {
+    /// Name, for signals to refer to.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// The messages by their names in the DBC file, in the order in which they come; or none, and `cob`.
+    #[serde(default)]
+    pub replies: Vec<String>,
+    /// The identifier that the DBC file's identifiers were written for; they move with `link.base`.
+    #[serde(default)]
+    pub dbc_base: Option<u32>,
+    /// CANopen: identifier less the node number.
+    #[serde(default)]
+    pub cob: Option<u32>,
+    /// CANopen: length in bytes.
+    #[serde(default)]
+    pub length: Option<u16>,
+    /// What asks for them, sent to `link.base`; left out for messages that come by themselves.
+    #[serde(default)]
+    pub request: Option<Vec<u8>>,
+    /// Requests per second, or messages per second where they come by themselves.
+    pub rate_hz: f64,
+    /// Signal that counts samples.
+    #[serde(default)]
+    pub sequence: Option<String>,
+}
+
+/// `[[query]]`: a question, and the answer as one sample.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Query {
+    /// Name, for signals to refer to.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// The question, without its terminator.
+    pub send: String,
+    /// Length of a binary answer; left out for a line of text that is one number or a truth.
+    #[serde(default)]
+    pub length: Option<u16>,
+    /// Questions per second.
+    pub rate_hz: f64,
+}
+
+/// `[[init]]`: what is sent once, at connection.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Init {
+    /// A line of text.
+    #[serde(default)]
+    pub send: Option<String>,
+    /// What its answer must begin with; left out where there is none.
+    #[serde(default)]
+    pub expect: Option<Vec<String>>,
+    /// A CAN frame: identifier (less the node for CANopen) and data.
+    #[serde(default)]
+    pub can: Option<(u32, Vec<u8>)>,
+    /// CANopen: object, subindex, bytes and value to be written.
+    #[serde(default)]
+    pub sdo: Option<(u16, u8, u8, i64)>,
+    /// What to tell the user where the answer is another.
+    #[serde(default)]
+    pub text: String,
+}
+
+/// `[[write]]`: a block of set-points, written in one piece.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
@@ -196,9 +357,13 @@ pub struct Write {
     #[schemars(with = "String")]
     pub name: Spanned<String>,
     /// First register.
+    #[serde(default)]
     pub address: u16,
-    /// How many registers: 1 to 123.
+    /// How many registers: 1 to 123. CANopen: bytes in pairs.
     pub count: u16,
+    /// CANopen: identifier less the node number.
+    #[serde(default)]
+    pub cob: Option<u32>,
     /// The block is repeated at this rate even without news, to keep a watchdog fed; per second.
     #[serde(default)]
     pub rate_hz: Option<f64>,
@@ -220,9 +385,12 @@ pub struct Signal {
     /// First byte, counted from the start of the frame.
     #[serde(default)]
     pub byte: Option<u16>,
-    /// Type.
-    #[serde(rename = "type")]
-    pub number: NumberType,
+    /// `message.signal` of the DBC file, in place of register, byte and type.
+    #[serde(default)]
+    pub dbc: Option<String>,
+    /// Type; left out for DBC signals and for lines of text.
+    #[serde(rename = "type", default)]
+    pub number: Option<NumberType>,
     /// Byte order.
     #[serde(default)]
     pub byte_order: ByteOrder,
@@ -286,10 +454,20 @@ pub struct Set {
     #[serde(default)]
     pub block: Option<String>,
     /// First register, counted from the start of the block.
+    #[serde(default)]
     pub register: u16,
-    /// Type.
-    #[serde(rename = "type")]
-    pub number: NumberType,
+    /// Type; left out for lines of text.
+    #[serde(rename = "type", default)]
+    pub number: Option<NumberType>,
+    /// The line of text that carries it; `{}` is the value.
+    #[serde(default)]
+    pub send: Option<String>,
+    /// The line of text where the value is zero.
+    #[serde(default)]
+    pub send_zero: Option<String>,
+    /// What the answer to `send` and to `send_zero` begins with; left out where there is none.
+    #[serde(default)]
+    pub answer: Option<(String, String)>,
     /// Byte order.
     #[serde(default)]
     pub byte_order: ByteOrder,
@@ -415,6 +593,9 @@ pub struct Vector {
     /// Bytes in hexadecimal, spaces allowed.
     #[serde(default)]
     pub hex: Option<String>,
+    /// A line of text.
+    #[serde(default)]
+    pub line: Option<String>,
     /// Values in their `unit`s, by signal or set-point.
     #[schemars(with = "BTreeMap<String, f64>")]
     pub expect: Spanned<BTreeMap<String, f64>>,
@@ -435,6 +616,9 @@ mod defaults {
     }
     pub const fn one() -> f64 {
         1.0
+    }
+    pub const fn one_frame() -> u32 {
+        1
     }
 }
 

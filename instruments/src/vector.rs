@@ -20,7 +20,7 @@ impl Profile {
     /// The first vector that does not come out, or the first frame without one.
     pub fn check(&self, text: &str) -> Result<(), ProfileError> {
         let d = &self.description;
-        let mut seen = vec![false; d.poll.len() + d.write.len()];
+        let mut seen = vec![false; self.frames().len() + d.write.len()];
         for vector in &d.vector {
             seen[self.check_vector(vector, text)?] = true;
         }
@@ -38,10 +38,11 @@ impl Profile {
     /// Runs one vector; returns the index of what it is for: polls first, then blocks.
     fn check_vector(&self, vector: &Vector, text: &str) -> Result<usize, ProfileError> {
         let d = &self.description;
+        let polls = self.frames().len();
         let place = || Some(vector.expect.span());
         let error = |message: String| ProfileError::at(text, place(), message);
         let names: Vec<&String> =
-            d.poll.iter().map(|p| p.name.as_ref()).chain(d.write.iter().map(|w| w.name.as_ref())).collect();
+            self.frames().iter().map(|f| &f.name).chain(d.write.iter().map(|w| w.name.as_ref())).collect();
         let which = match &vector.frame {
             Some(frame) => names
                 .iter()
@@ -52,26 +53,27 @@ impl Profile {
         };
         let bytes = bytes_of(vector).map_err(error)?;
         let mut values = self.values();
-        if which < d.poll.len() {
+        if which < polls {
             self.decode(FrameId(which), &bytes, &mut values).map_err(|e| error(e.to_string()))?;
-        } else if bytes.len() != 2 * usize::from(d.write[which - d.poll.len()].count) {
+        } else if bytes.len() != 2 * usize::from(d.write[which - polls].count) {
             return Err(error(format!(
                 "the block has {} registers, the vector {} bytes",
-                d.write[which - d.poll.len()].count,
+                d.write[which - polls].count,
                 bytes.len()
             )));
         }
         for (name, &expected) in vector.expect.as_ref() {
-            let found = if which < d.poll.len() {
+            let found = if which < polls {
                 self.signal(name).filter(|&s| self.frame_of(s).0 == which).map(|signal| values.get(signal))
             } else {
-                self.sets_of(which - d.poll.len())
+                self.sets_of(which - polls)
                     .find(|set| d.set[set.0].name.as_ref() == name)
                     .and_then(|set| self.decode_set(set, &bytes))
             };
             let found =
                 found.ok_or_else(|| error(format!("`{name}` does not stand in `{}`", names[which])))?;
-            let single = d.signal.iter().any(|s| s.name.as_ref() == name && s.number == NumberType::F32);
+            let single =
+                d.signal.iter().any(|s| s.name.as_ref() == name && s.number == Some(NumberType::F32));
             let tolerance = if single { TOLERANCE_SINGLE } else { TOLERANCE };
             let close = (found - expected).abs() <= tolerance * expected.abs().max(1.0);
             if !close {
@@ -87,7 +89,7 @@ impl Profile {
     /// The decoded values, encoded over the vector's bytes, must leave them as they are.
     fn check_encoding(&self, which: usize, bytes: &[u8], values: &crate::Values) -> Result<(), String> {
         let mut again = bytes.to_vec();
-        let polls = self.description.poll.len();
+        let polls = self.frames().len();
         if which < polls {
             self.encode(FrameId(which), &mut again, &mut |signal| {
                 Some(values.get(signal)).filter(|v| !v.is_nan())
@@ -107,10 +109,15 @@ impl Profile {
 }
 
 fn bytes_of(vector: &Vector) -> Result<Vec<u8>, String> {
+    if let (None, None, Some(line)) = (&vector.registers, &vector.hex, &vector.line) {
+        let number =
+            crate::codec::text::number(line).ok_or_else(|| format!("`{line}` is no number and no truth"))?;
+        return Ok(number.to_be_bytes().to_vec());
+    }
     match (&vector.registers, &vector.hex) {
         (Some(registers), None) => Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect()),
         (None, Some(hex)) => from_hex(hex).ok_or_else(|| format!("`{hex}` is not hexadecimal bytes")),
-        _ => Err("a vector needs either `registers` or `hex`".into()),
+        _ => Err("a vector needs one of `registers`, `hex` and `line`".into()),
     }
 }
 

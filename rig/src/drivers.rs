@@ -33,14 +33,30 @@
 //! | [`timebase`] | an instrument's clock and counter, mapped to the loop's |
 //! | [`health`] | what a link counts |
 //! | [`bundled`] | the profiles that come with the program |
-//! | [`modbus_tcp`] | the session over Modbus TCP |
+//! | [`session`] | the life of a link: connect, converse, back off |
+//! | [`modbus`] | the conversation with registers, over [`modbus_tcp`] or [`modbus_rtu`] |
+//! | [`can`] | the conversation in CAN messages, over [`slcan`] or [`socketcan`] |
+//! | [`text`] | the conversation in lines, over a serial line or SCPI over TCP |
+//! | [`canopen`] | the conversation with a CANopen drive of CiA 402 |
+//! | [`serial`] | serial lines |
+//! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 
 pub mod bundled;
+pub mod can;
+pub mod canopen;
+pub mod embed;
 pub mod endpoint;
 pub mod health;
+pub mod modbus;
+pub mod modbus_rtu;
 pub mod modbus_tcp;
 pub mod ports;
+pub mod serial;
+pub mod session;
 pub mod setup;
+pub mod slcan;
+pub mod socketcan;
+pub mod text;
 pub mod timebase;
 
 pub use health::{Health, HealthReport};
@@ -50,6 +66,7 @@ use endpoint::Endpoint;
 use instruments::Profile;
 use instruments::schema::LinkKind;
 use realtime::ports::{Amplifier, ForceSensor, Stage};
+use session::Session;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -156,12 +173,12 @@ pub fn open(setup: &InstrumentsSetup, epoch: Instant) -> Result<Rig, OpenError> 
     }
     let force = ports::compose(force).map_err(|problem| mismatch(&setup.force[0], problem))?;
 
-    let (endpoint, amplifier) = Endpoint::amplifier(profile(&setup.amplifier.profile)?)
+    let (endpoint, amplifier) = Endpoint::amplifier(profile(&setup.amplifier.profile)?, &setup.amplifier)
         .map_err(|problem| mismatch(&setup.amplifier, problem))?;
     start(&mut links, &setup.amplifier, endpoint, epoch)?;
 
-    let (endpoint, stage) =
-        Endpoint::stage(profile(&setup.stage.profile)?).map_err(|problem| mismatch(&setup.stage, problem))?;
+    let (endpoint, stage) = Endpoint::stage(profile(&setup.stage.profile)?, &setup.stage)
+        .map_err(|problem| mismatch(&setup.stage, problem))?;
     start(&mut links, &setup.stage, endpoint, epoch)?;
     Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), links })
 }
@@ -175,7 +192,7 @@ pub fn profile(id: &str) -> Result<Profile, OpenError> {
         id: id.into(),
         known: bundled::ids().collect::<Vec<_>>().join(", "),
     })?;
-    Profile::parse(text)
+    Profile::parse_with(text, &|name| bundled::file(name).map(String::from))
         .and_then(|profile| profile.check(text).map(|()| profile))
         .map_err(|error| OpenError::Profile { id: id.into(), error })
 }
@@ -200,11 +217,16 @@ fn start(
         problem,
     };
     let thread = match session.endpoint.profile().description.link.kind {
-        LinkKind::ModbusTcp => modbus_tcp::spawn(instrument, session).map_err(failed)?,
-        LinkKind::ModbusRtu => {
-            return Err(mismatch(instrument, "Modbus RTU is not built into this version".into()));
+        // Registers are registers: `rtu:PATH` reaches the same map over a serial line.
+        LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
+            modbus_tcp::spawn(instrument, session)
         }
-    };
+        LinkKind::ModbusTcp | LinkKind::ModbusRtu => modbus_rtu::spawn(instrument, session),
+        LinkKind::Can => can::spawn(instrument, session),
+        LinkKind::Canopen => canopen::spawn(instrument, session),
+        LinkKind::Serial | LinkKind::Scpi => text::spawn(instrument, session),
+    }
+    .map_err(failed)?;
     links.links.push(Link { name: instrument.profile.clone(), health, thread: Some(thread) });
     match opened.recv() {
         Ok(Ok(())) => Ok(()),
@@ -213,49 +235,16 @@ fn start(
     }
 }
 
-/// What every transport's thread starts from.
-pub struct Session {
-    /// Frames to samples, commands to set-points.
-    pub endpoint: Endpoint,
-    /// The moment that the loop calls zero.
-    pub epoch: Instant,
-    /// Set when the thread is to send the safe set-points and end.
-    pub stop: Arc<AtomicBool>,
-    /// Takes the outcome of the first connection, once.
-    pub ready: Option<std::sync::mpsc::SyncSender<Result<(), String>>>,
-}
-
-impl Session {
-    /// Nanoseconds since the epoch.
-    #[must_use]
-    pub fn now(&self) -> realtime::ports::Nanos {
-        realtime::ports::Nanos(u64::try_from(self.epoch.elapsed().as_nanos()).unwrap_or(u64::MAX))
-    }
-
-    /// Tells whoever opened the rig how the first connection went. Returns whether it was the first.
-    pub fn tell(&mut self, outcome: Result<(), String>) -> bool {
-        let first = self.ready.take();
-        let was_first = first.is_some();
-        if let Some(ready) = first {
-            let _ = ready.send(outcome);
-        }
-        was_first
-    }
-
-    /// Whether the thread is to end.
-    #[must_use]
-    pub fn stopping(&self) -> bool {
-        self.stop.load(Ordering::Acquire)
-    }
-}
-
-/// Samples per second of a profile's first regular poll, or of the instrument behind it where that is slower.
-/// `None` for a profile that is not bundled or has no regular poll.
+/// Samples per second of a profile's regular samples: of its stream, its polls, its
+/// messages or its queries. `None` for a profile that is not bundled or has none.
 #[must_use]
 pub fn nominal_rate_hz(id: &str) -> Option<f64> {
     let profile = profile(id).ok()?;
-    let polled = profile.description.poll.iter().find_map(|poll| poll.rate_hz)?;
-    Some(polled)
+    let d = &profile.description;
+    let polled = d.poll.iter().find_map(|poll| poll.rate_hz);
+    let streamed = d.stream.as_ref().map(|stream| stream.rate_hz);
+    let sent = d.message.first().map(|message| message.rate_hz);
+    streamed.or(polled).or(sent).or_else(|| d.query.first().map(|query| query.rate_hz))
 }
 
 /// Emulators of a setup's instruments by Modbus unit, for a virtual rig behind Modbus TCP.
@@ -268,6 +257,9 @@ pub fn emulators(
     let mut devices = std::collections::BTreeMap::new();
     for instrument in setup.force.iter().chain([&setup.amplifier, &setup.stage]) {
         let profile = profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
+        if !matches!(profile.description.link.kind, LinkKind::ModbusTcp | LinkKind::ModbusRtu) {
+            continue;
+        }
         let unit = instrument.unit.or(profile.description.link.unit).unwrap_or(1);
         let device = sim::wire::device::Device::new(profile)
             .map_err(|e| miette::miette!("{}: {e}", instrument.profile))?;

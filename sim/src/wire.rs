@@ -8,12 +8,20 @@
 //! |---|---|
 //! | [`quantity`] | what of the world a profile may name |
 //! | [`device`] | one emulated instrument: registers from the world, commands into it |
+//! | [`can`] | instruments on a CAN bus |
+//! | [`drive`] | a CANopen drive of CiA 402 |
+//! | [`serial`] | serial lines, Modbus RTU, streams |
+//! | [`lines`] | instruments of lines of text, over serial and TCP |
 //! | [`modbus_tcp`] | a Modbus TCP server over devices |
 //! | [`world`] | the virtual world as the emulators meet it |
 
+pub mod can;
 pub mod device;
+pub mod drive;
+pub mod lines;
 pub mod modbus_tcp;
 pub mod quantity;
+pub mod serial;
 pub mod world;
 
 pub use quantity::{Command, Quantity};

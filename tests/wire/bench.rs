@@ -46,6 +46,13 @@ pub struct BenchPlant {
     now: Nanos,
 }
 
+impl BenchPlant {
+    /// The world of that bench.
+    pub fn new(bench: &Bench) -> Self {
+        Self { bench: bench.clone(), now: Nanos(0) }
+    }
+}
+
 impl Plant for BenchPlant {
     fn advance(&mut self, now: Nanos) {
         self.now = self.now.max(now);
@@ -83,7 +90,7 @@ impl Plant for BenchPlant {
 
 /// Serves profiles by unit over the bench.
 pub fn serve(bench: &Bench, units: &[(u8, &str)], epoch: Instant) -> ModbusTcpServer {
-    let plant = SharedPlant::new(BenchPlant { bench: bench.clone(), now: Nanos(0) }, epoch);
+    let plant = SharedPlant::new(BenchPlant::new(bench), epoch);
     let devices: BTreeMap<u8, Device> = units
         .iter()
         .map(|(unit, id)| (*unit, Device::new(rig::drivers::profile(id).unwrap()).unwrap()))

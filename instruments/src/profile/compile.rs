@@ -3,11 +3,15 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::{CompiledSet, CompiledSignal, FrameId, Profile};
+use super::{CompiledSet, CompiledSignal, Frame, FrameId, FrameKind, Place, Profile, SignalId};
+use crate::codec::dbc::{self, DbcMessage};
 use crate::error::ProfileError;
 use crate::expression::Expression;
-use crate::field::Field;
-use crate::schema::{Description, LinkKind};
+use crate::field::{Field, NumberType};
+use crate::schema::{Description, LinkKind, Message};
+
+/// Gives the text of another file by its name.
+type Files<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 /// Turns a description into a profile.
 pub(super) struct Compiler<'a> {
@@ -15,14 +19,19 @@ pub(super) struct Compiler<'a> {
     pub text: &'a str,
     /// What it says.
     pub description: &'a Description,
+    /// The files that it names.
+    pub file: Files<'a>,
 }
+
+/// Messages of the profile's DBC file, by name.
+type Messages = HashMap<String, DbcMessage>;
 
 impl Compiler<'_> {
     /// Checks everything that the types cannot say, and compiles.
     pub fn compile(&self) -> Result<Profile, ProfileError> {
         let d = self.description;
         self.check_header()?;
-        self.unique(d.poll.iter().map(|p| &p.name).chain(d.write.iter().map(|w| &w.name)), "poll or block")?;
+        let messages = self.dbc()?;
         self.unique(d.signal.iter().map(|s| &s.name), "signal")?;
         self.unique(d.set.iter().map(|s| &s.name), "set-point")?;
         for poll in &d.poll {
@@ -30,20 +39,20 @@ impl Compiler<'_> {
         }
         for block in &d.write {
             if !(1..=123).contains(&block.count) {
-                return Err(self.at(
-                    block.name.span(),
-                    format!(
-                        "block `{}` has {} registers; one write takes 1 to 123",
-                        block.name.as_ref(),
-                        block.count
-                    ),
-                ));
+                let message = format!(
+                    "block `{}` has {} registers; one write takes 1 to 123",
+                    block.name.as_ref(),
+                    block.count
+                );
+                return Err(self.at(block.name.span(), message));
             }
         }
         let by_name: HashMap<String, usize> =
             d.signal.iter().enumerate().map(|(i, s)| (s.name.as_ref().clone(), i)).collect();
         let index = |name: &str| by_name.get(name).copied();
-        let signals = d.signal.iter().map(|s| self.signal(s, &index)).collect::<Result<_, _>>()?;
+        let frames = self.frames(&messages, &index)?;
+        let signal = |s| self.signal(s, &frames, &messages, &index);
+        let signals = d.signal.iter().map(signal).collect::<Result<_, _>>()?;
         let sets = d.set.iter().map(|s| self.set(s)).collect::<Result<_, _>>()?;
         let condition = |when: &toml::Spanned<String>| {
             Expression::compile(when.as_ref(), &index).map_err(|said| self.at(when.span(), said))
@@ -52,18 +61,113 @@ impl Compiler<'_> {
         let faults = d.fault.iter().map(|f| condition(&f.when)).collect::<Result<_, _>>()?;
         for set in &d.set {
             if let Some(echo) = set.echo.as_ref().filter(|echo| index(echo).is_none()) {
-                return Err(self.at(
-                    set.name.span(),
-                    format!("the echo of set-point `{}`, `{echo}`, is no signal", set.name.as_ref()),
-                ));
+                let message =
+                    format!("the echo of set-point `{}`, `{echo}`, is no signal", set.name.as_ref());
+                return Err(self.at(set.name.span(), message));
             }
         }
         self.check_emulator(&index)?;
-        Ok(Profile { description: d.clone(), signals, sets, signatures, faults, by_name })
+        Ok(Profile { description: d.clone(), frames, signals, sets, signatures, faults, by_name })
     }
 
     fn at(&self, span: Range<usize>, message: impl Into<String>) -> ProfileError {
         ProfileError::at(self.text, Some(span), message)
+    }
+
+    /// The messages of the DBC file, if the profile names one.
+    fn dbc(&self) -> Result<Messages, ProfileError> {
+        let Some(name) = &self.description.link.dbc else { return Ok(HashMap::new()) };
+        let place = self.text.find(name.as_str()).map(|at| at..at + name.len());
+        let error = |message: String| ProfileError::at(self.text, place.clone(), message);
+        let text = (self.file)(name).ok_or_else(|| error(format!("the file `{name}` is not there")))?;
+        dbc::parse(&text).map_err(|said| error(format!("{name}: {said}")))
+    }
+
+    /// All frames, in the order that indices follow.
+    fn frames(
+        &self,
+        messages: &Messages,
+        index: &dyn Fn(&str) -> Option<usize>,
+    ) -> Result<Vec<Frame>, ProfileError> {
+        let d = self.description;
+        let by_name = |name: &Option<String>| name.as_deref().and_then(index).map(SignalId);
+        let mut frames = Vec::new();
+        for (i, poll) in d.poll.iter().enumerate() {
+            frames.push(Frame {
+                name: poll.name.as_ref().clone(),
+                bytes: 2 * usize::from(poll.count),
+                sequence: by_name(&poll.sequence),
+                device_time: by_name(&poll.device_time),
+                kind: FrameKind::Poll(i),
+            });
+        }
+        if let Some(stream) = &d.stream {
+            frames.push(Frame {
+                name: "stream".into(),
+                bytes: usize::from(stream.length),
+                sequence: by_name(&stream.sequence),
+                device_time: None,
+                kind: FrameKind::Stream,
+            });
+        }
+        for (i, message) in d.message.iter().enumerate() {
+            let parts = self.parts(message, messages)?;
+            frames.push(Frame {
+                name: message.name.as_ref().clone(),
+                bytes: parts.iter().map(|(_, length)| length).sum(),
+                sequence: by_name(&message.sequence),
+                device_time: None,
+                kind: FrameKind::Messages(i, parts),
+            });
+        }
+        for (i, query) in d.query.iter().enumerate() {
+            frames.push(Frame {
+                name: query.name.as_ref().clone(),
+                bytes: query.length.map_or(NumberType::F64.bytes(), usize::from),
+                sequence: None,
+                device_time: None,
+                kind: FrameKind::Query(i),
+            });
+        }
+        let mut seen = std::collections::HashSet::new();
+        let names = frames
+            .iter()
+            .map(|frame| frame.name.as_str())
+            .chain(d.write.iter().map(|w| w.name.as_ref().as_str()));
+        for name in names {
+            if !seen.insert(name) {
+                let place = self.text.rfind(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
+                return Err(ProfileError::at(
+                    self.text,
+                    place,
+                    format!("a second frame or block is called `{name}`"),
+                ));
+            }
+        }
+        Ok(frames)
+    }
+
+    /// Identifiers (less their base) and lengths of a group's messages.
+    fn parts(&self, group: &Message, messages: &Messages) -> Result<Vec<(u32, usize)>, ProfileError> {
+        let name = group.name.as_ref();
+        if let Some(cob) = group.cob {
+            return Ok(vec![(cob, usize::from(group.length.unwrap_or(8)))]);
+        }
+        if group.replies.is_empty() {
+            return Err(
+                self.at(group.name.span(), format!("message group `{name}` needs `replies` or `cob`"))
+            );
+        }
+        let part = |reply: &String| {
+            let message = messages.get(reply).ok_or_else(|| {
+                self.at(group.name.span(), format!("`{reply}` of `{name}` is no message of the DBC file"))
+            })?;
+            let id = message.id.checked_sub(group.dbc_base.unwrap_or(0)).ok_or_else(|| {
+                self.at(group.name.span(), format!("the identifier of `{reply}` is below `dbc_base`"))
+            })?;
+            Ok((id, message.length))
+        };
+        group.replies.iter().map(part).collect()
     }
 
     fn check_header(&self) -> Result<(), ProfileError> {
@@ -78,8 +182,26 @@ impl Compiler<'_> {
             )
             .with_help("this version reads schema = 1"));
         }
-        if link.kind == LinkKind::ModbusRtu && (link.baud.is_none() || link.format.is_none()) {
+        if matches!(link.kind, LinkKind::ModbusRtu | LinkKind::Serial)
+            && (link.baud.is_none() || link.format.is_none())
+        {
             return Err(ProfileError::at(self.text, link_place, "a serial link needs `baud` and `format`"));
+        }
+        // Modbus RTU has no transaction number: an answer that comes late to one of two requests that
+        // look alike would be taken for the other's.
+        let polls = &self.description.poll;
+        let alike = polls.iter().enumerate().find_map(|(i, a)| {
+            polls[..i].iter().find(|b| (a.table, a.count) == (b.table, b.count)).map(|b| (a, b))
+        });
+        if let (LinkKind::ModbusRtu, Some((a, b))) = (link.kind, alike) {
+            let message = format!(
+                "polls `{}` and `{}` read the same number of registers",
+                a.name.as_ref(),
+                b.name.as_ref()
+            );
+            return Err(self.at(a.name.span(), message).with_help(
+                "over RTU a late answer to one would be taken for the other's; read one register more",
+            ));
         }
         if self.description.vector.is_empty() {
             return Err(ProfileError::at(self.text, place, "the profile has no golden vector")
@@ -143,34 +265,26 @@ impl Compiler<'_> {
     fn signal(
         &self,
         s: &crate::schema::Signal,
+        frames: &[Frame],
+        messages: &Messages,
         index: &dyn Fn(&str) -> Option<usize>,
     ) -> Result<CompiledSignal, ProfileError> {
         let name = s.name.as_ref();
         let frame = match &s.frame {
-            Some(frame) => {
-                self.description.poll.iter().position(|p| p.name.as_ref() == frame).ok_or_else(|| {
-                    self.at(s.name.span(), format!("the frame of signal `{name}`, `{frame}`, is no poll"))
-                })?
-            }
-            None if self.description.poll.len() == 1 => 0,
+            Some(wanted) => frames.iter().position(|frame| frame.name == *wanted).ok_or_else(|| {
+                self.at(s.name.span(), format!("the frame of signal `{name}`, `{wanted}`, does not exist"))
+            })?,
+            None if frames.len() == 1 => 0,
             None => {
-                return Err(self.at(
-                    s.name.span(),
-                    format!("signal `{name}` needs `frame`: the profile has several polls"),
-                ));
+                let message =
+                    format!("signal `{name}` needs `frame`: the profile has {} frames", frames.len());
+                return Err(self.at(s.name.span(), message));
             }
         };
-        let at = match (s.register, s.byte) {
-            (Some(register), None) => 2 * usize::from(register),
-            (None, Some(byte)) => usize::from(byte),
-            _ => {
-                return Err(
-                    self.at(s.name.span(), format!("signal `{name}` needs either `register` or `byte`"))
-                );
-            }
-        };
-        let field = Field { at, number: s.number, order: s.byte_order, bits: s.bits };
-        self.check_field(&field, 2 * usize::from(self.description.poll[frame].count), s.name.span(), name)?;
+        let place = self.place(s, &frames[frame], messages)?;
+        if let Place::Bytes(field) = &place {
+            self.check_field(field, frames[frame].bytes, s.name.span(), name)?;
+        }
         if s.scale == 0.0 || !s.scale.is_finite() || !s.si.factor.is_finite() || s.si.factor == 0.0 {
             return Err(self.at(s.name.span(), format!("a scale of signal `{name}` is zero or not finite")));
         }
@@ -178,16 +292,12 @@ impl Compiler<'_> {
             return Err(self.at(s.name.span(), format!("the range of signal `{name}` is empty")));
         }
         let compile = |text: &Option<String>| {
-            text.as_ref()
-                .map(|text| {
-                    Expression::compile(text, index)
-                        .map_err(|said| self.at(s.name.span(), format!("signal `{name}`: {said}")))
-                })
-                .transpose()
+            let said = |said| self.at(s.name.span(), format!("signal `{name}`: {said}"));
+            text.as_ref().map(|text| Expression::compile(text, index).map_err(said)).transpose()
         };
         Ok(CompiledSignal {
             frame: FrameId(frame),
-            field,
+            place,
             scale: s.scale,
             scale_expression: compile(&s.scale_expr)?,
             offset: s.offset,
@@ -197,41 +307,82 @@ impl Compiler<'_> {
         })
     }
 
+    /// Where a signal stands in its frame.
+    fn place(
+        &self,
+        s: &crate::schema::Signal,
+        frame: &Frame,
+        messages: &Messages,
+    ) -> Result<Place, ProfileError> {
+        let name = s.name.as_ref();
+        if let Some(path) = &s.dbc {
+            let unknown = || {
+                self.at(s.name.span(), format!("`{path}` of signal `{name}` is no signal of its messages"))
+            };
+            let (message, signal) = path.split_once('.').ok_or_else(unknown)?;
+            let signal = messages.get(message).and_then(|m| m.signals.get(signal)).ok_or_else(unknown)?;
+            let FrameKind::Messages(group, _) = frame.kind else { return Err(unknown()) };
+            let replies = &self.description.message[group].replies;
+            let which = replies.iter().position(|reply| reply == message).ok_or_else(unknown)?;
+            let before =
+                replies[..which].iter().filter_map(|reply| messages.get(reply)).map(|m| m.length).sum();
+            return Ok(Place::Dbc(before, *signal));
+        }
+        let text_answer =
+            matches!(frame.kind, FrameKind::Query(i) if self.description.query[i].length.is_none());
+        let at = match (s.register, s.byte) {
+            (None, None) if text_answer => 0,
+            (Some(register), None) => 2 * usize::from(register),
+            (None, Some(byte)) => usize::from(byte),
+            _ => {
+                return Err(
+                    self.at(s.name.span(), format!("signal `{name}` needs either `register` or `byte`"))
+                );
+            }
+        };
+        let number = if text_answer { Some(NumberType::F64) } else { s.number };
+        let number = number.ok_or_else(|| self.at(s.name.span(), format!("signal `{name}` needs `type`")))?;
+        Ok(Place::Bytes(Field { at, number, order: s.byte_order, bits: s.bits }))
+    }
+
     fn set(&self, s: &crate::schema::Set) -> Result<CompiledSet, ProfileError> {
         let name = s.name.as_ref();
+        if s.scale == 0.0 || !s.scale.is_finite() {
+            return Err(
+                self.at(s.name.span(), format!("the scale of set-point `{name}` is zero or not finite"))
+            );
+        }
+        if s.range.is_some_and(|(low, high)| low > high || low.is_nan() || high.is_nan()) {
+            return Err(self.at(s.name.span(), format!("the range of set-point `{name}` is empty")));
+        }
+        let outside = |safe: f64| s.range.is_some_and(|(low, high)| safe < low || safe > high);
+        if s.safe.is_some_and(outside) {
+            let message = format!("the safe value of set-point `{name}` lies outside its range");
+            return Err(self.at(s.name.span(), message));
+        }
+        if s.send.is_some() {
+            return Ok(CompiledSet { block: None, scale: s.scale });
+        }
         let blocks = &self.description.write;
         let block = match &s.block {
             Some(block) => blocks.iter().position(|b| b.name.as_ref() == block).ok_or_else(|| {
                 self.at(s.name.span(), format!("the block of set-point `{name}`, `{block}`, does not exist"))
             })?,
             None if blocks.len() == 1 => 0,
-            None => return Err(self.at(s.name.span(), format!("set-point `{name}` needs `block`"))),
+            None => return Err(self.at(s.name.span(), format!("set-point `{name}` needs `block` or `send`"))),
         };
-        let field =
-            Field { at: 2 * usize::from(s.register), number: s.number, order: s.byte_order, bits: None };
+        let number =
+            s.number.ok_or_else(|| self.at(s.name.span(), format!("set-point `{name}` needs `type`")))?;
+        let field = Field { at: 2 * usize::from(s.register), number, order: s.byte_order, bits: None };
         self.check_field(&field, 2 * usize::from(blocks[block].count), s.name.span(), name)?;
-        if s.scale == 0.0 || !s.scale.is_finite() {
-            return Err(
-                self.at(s.name.span(), format!("the scale of set-point `{name}` is zero or not finite"))
-            );
-        }
         if let Some((low, high)) = s.range {
-            let (least, most) = (s.number.limits().0 * s.scale, s.number.limits().1 * s.scale);
-            if low > high || low.is_nan() || high.is_nan() || low < least.min(most) || high > least.max(most)
-            {
-                return Err(self.at(
-                    s.name.span(),
-                    format!("the range of set-point `{name}` is empty or more than its type can hold"),
-                ));
-            }
-            if s.safe.is_some_and(|safe| safe < low || safe > high) {
-                return Err(self.at(
-                    s.name.span(),
-                    format!("the safe value of set-point `{name}` lies outside its range"),
-                ));
+            let (least, most) = (number.limits().0 * s.scale, number.limits().1 * s.scale);
+            if low < least.min(most) || high > least.max(most) {
+                let message = format!("the range of set-point `{name}` is more than its type can hold");
+                return Err(self.at(s.name.span(), message));
             }
         }
-        Ok(CompiledSet { block, field, scale: s.scale })
+        Ok(CompiledSet { block: Some((block, field)), scale: s.scale })
     }
 
     fn check_field(

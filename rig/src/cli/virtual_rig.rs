@@ -1,9 +1,11 @@
 //! `muprime virtual-rig`: the simulated rig behind real protocols.
 
+use crate::drivers::InstrumentsSetup;
 use crate::setup::Setup;
+use instruments::schema::LinkKind;
 use miette::{IntoDiagnostic, WrapErr};
 use sim::wire::SharedPlant;
-use sim::wire::modbus_tcp::ModbusTcpServer;
+use sim::wire::serial::SerialEmulator;
 use sim::wire::world::WorldPlant;
 use sim::world::{World, WorldConfig};
 use std::net::SocketAddr;
@@ -20,6 +22,15 @@ pub struct Args {
     /// Address of the Modbus TCP server
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1502")]
     modbus_tcp: SocketAddr,
+    /// Serial line on which the Modbus instruments are served by RTU as well
+    #[arg(long, value_name = "PATH")]
+    modbus_rtu: Option<String>,
+    /// Bus of the setup's CAN instruments: an interface, or slcan:PATH
+    #[arg(long, value_name = "IFACE")]
+    can: Option<String>,
+    /// Serial line of the setup's instrument of text
+    #[arg(long, value_name = "PATH")]
+    serial: Option<String>,
     /// Defects in place of the bundled ones
     #[arg(long)]
     defects: Option<PathBuf>,
@@ -43,7 +54,21 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let world = World::new(&config, args.seed).map_err(|e| miette::miette!("{e}"))?;
     let plant = SharedPlant::new(WorldPlant::new(world), Instant::now());
-    let devices = crate::drivers::emulators(&setup.instruments())?;
+    let mut instruments = setup.instruments();
+    let line = args.modbus_rtu.as_deref().map(|path| rtu(path, &instruments, &plant)).transpose()?;
+    for instrument in instruments.force.iter_mut().chain([&mut instruments.amplifier, &mut instruments.stage])
+    {
+        let kind = crate::drivers::profile(&instrument.profile).into_diagnostic()?.description.link.kind;
+        let place = match kind {
+            LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
+                Some(args.modbus_tcp.to_string())
+            }
+            LinkKind::Can | LinkKind::Canopen => args.can.clone(),
+            LinkKind::Serial => args.serial.clone(),
+            _ => None,
+        };
+        instrument.address = place.unwrap_or_else(|| instrument.address.clone());
+    }
     if !args.modbus_tcp.ip().is_loopback() {
         eprintln!(
             "warning: {} is reachable from other machines, and Modbus knows no password: anyone there can drive \
@@ -51,17 +76,30 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             args.modbus_tcp
         );
     }
-    let server = ModbusTcpServer::start(args.modbus_tcp, devices, plant)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot listen on {}", args.modbus_tcp))?;
+    let embedded =
+        crate::drivers::embed::embed(&mut instruments, &plant, true).map_err(|e| miette::miette!("{e}"))?;
+    let modbus_tcp = embedded.modbus_tcp().map(|address| address.to_string());
     if json {
-        println!("{}", serde_json::json!({ "modbus_tcp": server.address().to_string() }));
+        println!("{}", serde_json::json!({ "modbus_tcp": modbus_tcp, "instruments": embedded.places }));
     } else {
-        eprintln!("the virtual rig listens on {} (Modbus TCP); Ctrl-C ends it", server.address());
+        for place in &embedded.places {
+            eprintln!("{place}");
+        }
+        let listens =
+            modbus_tcp.map(|address| format!("listens on {address} (Modbus TCP)")).unwrap_or("runs".into());
+        eprintln!("the virtual rig {listens}; Ctrl-C ends it");
     }
     let mut signals =
         signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM])
             .into_diagnostic()?;
     let _ = signals.forever().next();
+    drop((line, embedded));
     super::exit(super::DONE)
+}
+
+/// Serves the Modbus instruments on one serial line as well.
+fn rtu(path: &str, instruments: &InstrumentsSetup, plant: &SharedPlant) -> miette::Result<SerialEmulator> {
+    let devices = crate::drivers::emulators(instruments)?;
+    let port = serialport::new(path, 115_200).open().into_diagnostic().wrap_err_with(|| path.to_string())?;
+    SerialEmulator::modbus_rtu(port, devices, plant.clone()).into_diagnostic()
 }

@@ -18,6 +18,10 @@ use ringbuf::traits::{Consumer, Producer};
 use std::sync::Arc;
 use view::View;
 
+/// An alarm that came unasked shows as a fault for this long after the last: instruments repeat theirs
+/// some ten times a second.
+const ALARM_HOLDS: Nanos = Nanos(1_500_000_000);
+
 /// A frame that must not become a sample.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BadFrame {
@@ -36,6 +40,8 @@ pub enum Due {
     Nothing,
     /// These set-points, in their units.
     SetPoints(Vec<(SetId, f64)>),
+    /// The safe set-points, since no command is valid any more.
+    Safe(Vec<(SetId, f64)>),
 }
 
 /// One axis of force out of one signal.
@@ -69,7 +75,7 @@ struct StageSignals {
 enum Part {
     Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: HeapProd<Forces> },
     Amplifier { signals: AmplifierSignals, link: AmplifierLink },
-    Stage { signals: StageSignals, link: StageLink },
+    Stage { signals: StageSignals, link: StageLink, dead_weight_n: Option<f64> },
 }
 
 /// The clock and the counter of one frame.
@@ -83,6 +89,7 @@ struct FrameTime {
 #[derive(Debug, Clone, Copy)]
 struct SampleMark {
     taken_at: Nanos,
+    arrived: Nanos,
     sequence: u32,
 }
 
@@ -103,6 +110,8 @@ pub struct Endpoint {
     part: Part,
     wanted: Option<Wanted>,
     safe_sent: bool,
+    alarm_until: Nanos,
+    arrived: Nanos,
     health: Arc<Health>,
 }
 
@@ -147,7 +156,20 @@ impl Endpoint {
     ///
     /// # Errors
     /// Where the profile lacks a signal or set-point that an amplifier must have.
-    pub fn amplifier(profile: Profile) -> Result<(Self, AmplifierPort), String> {
+    pub fn amplifier(mut profile: Profile, setup: &InstrumentSetup) -> Result<(Self, AmplifierPort), String> {
+        if let Some(gain) = setup.amplitude_m_per_unit {
+            if !(gain.is_finite() && gain > 0.0) {
+                return Err("`amplitude_m_per_unit` must be above zero".into());
+            }
+            profile.set_si("amplitude", gain);
+            profile.set_si("echo_amplitude", gain);
+        }
+        if let Some(gain) = setup.measured_m_per_unit {
+            if !(gain.is_finite() && gain > 0.0) {
+                return Err("`measured_m_per_unit` must be above zero".into());
+            }
+            profile.set_measured_si("amplitude", gain);
+        }
         let signals = AmplifierSignals {
             echo_amplitude: need(&profile, "echo_amplitude")?,
             echo_frequency: need(&profile, "echo_frequency")?,
@@ -168,7 +190,7 @@ impl Endpoint {
     ///
     /// # Errors
     /// Where the profile lacks a signal or set-point that a stage must have.
-    pub fn stage(profile: Profile) -> Result<(Self, StagePort), String> {
+    pub fn stage(profile: Profile, setup: &InstrumentSetup) -> Result<(Self, StagePort), String> {
         let signals = StageSignals {
             position: need(&profile, "position")?,
             velocity: need(&profile, "velocity")?,
@@ -176,29 +198,40 @@ impl Endpoint {
             fault: profile.signal("fault"),
         };
         need_set(&profile, "velocity")?;
+        let dead_weight_n = setup.dead_weight_n;
+        if profile.set("load").is_none() && dead_weight_n.is_none() {
+            return Err("the instrument loads nothing: say the weight that does, as `dead_weight_n`".into());
+        }
         let (link, port) = ports::stage();
-        Ok((Self::new(profile, Part::Stage { signals, link }), port))
+        Ok((Self::new(profile, Part::Stage { signals, link, dead_weight_n }), port))
     }
 
     fn new(profile: Profile, part: Part) -> Self {
-        let d = &profile.description;
-        let modulo = |signal: SignalId| {
-            let signal = &d.signal[signal.0];
-            (signal.number.limits().1 + 1.0, signal.scale * signal.si.factor)
-        };
-        let by_name = |name: &Option<String>| name.as_deref().and_then(|name| profile.signal(name));
-        let times = d.poll.iter().map(|poll| FrameTime {
-            clock: by_name(&poll.device_time)
-                .filter(|_| d.time.stamp == Stamp::Device)
-                .map(|signal| (signal, DeviceClock::new(modulo(signal).0 * modulo(signal).1))),
+        let stamped = profile.description.time.stamp == Stamp::Device;
+        let times = profile.frames().iter().map(|frame| FrameTime {
+            clock: frame.device_time.filter(|_| stamped).map(|signal| {
+                let (counts, si) = profile.turn(signal);
+                (signal, DeviceClock::new(counts * si))
+            }),
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 2^32 at most
-            counter: by_name(&poll.sequence).map(|signal| (signal, Counter::new(modulo(signal).0 as u64))),
+            counter: frame.sequence.map(|signal| (signal, Counter::new(profile.turn(signal).0 as u64))),
             counted: 0,
         });
-        let times = times.collect();
-        let seen = vec![false; d.poll.len()];
+        let times: Vec<FrameTime> = times.collect();
+        let seen = vec![false; times.len()];
         let values = profile.values();
-        Self { values, seen, times, part, wanted: None, safe_sent: true, health: Arc::default(), profile }
+        Self {
+            values,
+            seen,
+            times,
+            part,
+            wanted: None,
+            safe_sent: true,
+            alarm_until: Nanos(0),
+            arrived: Nanos(0),
+            health: Arc::default(),
+            profile,
+        }
     }
 
     /// The instrument's profile.
@@ -229,6 +262,7 @@ impl Endpoint {
             BadFrame::Corrupt(error.to_string())
         })?;
         self.seen[frame.0] = true;
+        self.arrived = arrived;
         if self.seen.iter().all(|&seen| seen)
             && let Some(broken) = self.profile.broken_signature(&self.values)
         {
@@ -282,10 +316,11 @@ impl Endpoint {
             }
         }
         let latency = Nanos::from_seconds(self.profile.description.time.latency_ms * 1e-3);
-        Some(SampleMark { taken_at: taken_at.since(latency), sequence: time.counted })
+        Some(SampleMark { taken_at: taken_at.since(latency), arrived, sequence: time.counted })
     }
 
     fn publish(&mut self, frame: FrameId, bytes: &[u8], mark: SampleMark) {
+        let alarmed = mark.arrived < self.alarm_until;
         let view = View { profile: &self.profile, values: &self.values, bytes, frame, mark };
         let full = match &mut self.part {
             Part::Force { lateral, normal, last, ring } => {
@@ -312,21 +347,21 @@ impl Endpoint {
                     echoed_frequency_hz: view.si(signals.echo_frequency),
                     output_on: flag(Some(signals.output_on)),
                     watchdog_tripped: flag(signals.watchdog_tripped),
-                    fault: flag(signals.fault) || view.severity() == Some(Severity::Stop),
+                    fault: alarmed || flag(signals.fault) || view.severity() == Some(Severity::Stop),
                     temperature_c: view.optional(signals.temperature),
                     taken_at: mark.taken_at,
                     sequence: mark.sequence,
                 };
                 link.states.try_push(Ok(state)).is_err()
             }
-            Part::Stage { signals, link } if view.profile.frame_of(signals.position) == frame => {
+            Part::Stage { signals, link, .. } if view.profile.frame_of(signals.position) == frame => {
                 let flag =
                     |signal: Option<SignalId>| signal.is_some_and(|signal| view.values.get(signal) != 0.0);
                 let state = StageState {
                     position_m: view.si(signals.position),
                     velocity_m_s: view.si(signals.velocity),
                     at_limit: flag(signals.at_limit),
-                    fault: flag(signals.fault) || view.severity() == Some(Severity::Stop),
+                    fault: alarmed || flag(signals.fault) || view.severity() == Some(Severity::Stop),
                     taken_at: mark.taken_at,
                     sequence: mark.sequence,
                 };
@@ -335,6 +370,13 @@ impl Endpoint {
             Part::Amplifier { .. } | Part::Stage { .. } => return,
         };
         self.health.count(if full { &self.health.ring_full } else { &self.health.samples });
+    }
+
+    /// The instrument raised an alarm unasked: its state shows a fault until it has been silent for a while.
+    pub fn alarm(&mut self, text: &str) {
+        self.health.count(&self.health.alarms);
+        self.health.problem(format!("the instrument says {text}"));
+        self.alarm_until = self.arrived.plus(ALARM_HOLDS);
     }
 
     /// Tells the loop at once that nothing will come, and why. Commands that wait are dropped: what
@@ -411,7 +453,7 @@ impl Endpoint {
         }
         self.safe_sent = true;
         self.health.count(&self.health.safe_sent);
-        Due::SetPoints(self.safe_set_points())
+        Due::Safe(self.safe_set_points())
     }
 
     fn newest_command(&mut self) -> Option<Wanted> {
@@ -420,10 +462,7 @@ impl Endpoint {
             profile.set(name).map(|set| (set, si / profile.description.set[set.0].si.factor))
         };
         let heartbeat = |sequence: u32| {
-            profile.set("heartbeat").map(|set| {
-                let counts = profile.description.set[set.0].number.limits().1 + 1.0;
-                (set, f64::from(sequence) % counts)
-            })
+            profile.set("heartbeat").map(|set| (set, f64::from(sequence) % profile.heartbeat_turns(set)))
         };
         match &mut self.part {
             Part::Force { .. } => None,
@@ -443,8 +482,17 @@ impl Endpoint {
                 set_points.extend(heartbeat(command.sequence));
                 Some(Wanted { set_points, expires_at: command.expires_at, sent: false })
             }
-            Part::Stage { link, .. } => {
+            Part::Stage { link, dead_weight_n, .. } => {
                 let command = std::iter::from_fn(|| link.commands.try_pop()).last()?;
+                let wanted = command.normal_force_n;
+                if let Some(weight) =
+                    dead_weight_n.filter(|weight| wanted != 0.0 && (wanted - weight).abs() > 1e-6)
+                {
+                    let text = format!("the load stands on a weight of {weight} N: {wanted} N cannot be had");
+                    self.health.count(&self.health.commands_refused);
+                    self.health.problem(text);
+                    return None;
+                }
                 let wanted = [
                     set("velocity", command.velocity_m_s),
                     set("load", command.normal_force_n),

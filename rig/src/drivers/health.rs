@@ -61,6 +61,8 @@ counters! {
     commands_refused,
     /// Times that the safe set-points were sent for want of a valid command.
     safe_sent,
+    /// Alarms that the instrument raised unasked.
+    alarms,
     /// Times that the instrument's clock or counter started anew.
     clock_resets,
 }

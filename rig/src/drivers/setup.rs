@@ -20,7 +20,8 @@ pub struct InstrumentsSetup {
 pub struct InstrumentSetup {
     /// Id of the profile.
     pub profile: String,
-    /// Where it is: `host` or `host:port` for TCP, a path for a serial line, an interface for CAN.
+    /// Where it is: `host` or `host:port` for TCP, a path for a serial line
+    /// (`rtu:PATH` for a Modbus TCP profile that is reached so), an interface (`can0`) or `slcan:PATH` for CAN.
     pub address: String,
     /// Serial number: certificates must name it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -28,9 +29,25 @@ pub struct InstrumentSetup {
     /// Modbus unit, where it is not the profile's.
     #[serde(default)]
     pub unit: Option<u8>,
+    /// CAN identifier that the instrument's are counted from, or CANopen node, where it is not the profile's.
+    #[serde(default)]
+    pub base: Option<u32>,
+    /// Symbols per second of a serial line, where they are not the profile's.
+    #[serde(default)]
+    pub baud: Option<u32>,
     /// Reads per second, where they are not the profile's.
     #[serde(default)]
     pub rate_hz: Option<f64>,
+    /// Amplifiers whose set-point is a voltage or a current: peak-to-peak metres per unit of it, from the
+    /// certificate of the plate.
+    #[serde(default)]
+    pub amplitude_m_per_unit: Option<f64>,
+    /// The same for what they measure.
+    #[serde(default)]
+    pub measured_m_per_unit: Option<f64>,
+    /// Stages that load nothing: the weight that does, in N.
+    #[serde(default)]
+    pub dead_weight_n: Option<f64>,
     /// What gives the lateral force. Left out: the signal `lateral`, if the profile has it.
     #[serde(default)]
     pub lateral: Option<AxisSetup>,
@@ -48,6 +65,11 @@ impl InstrumentSetup {
             address: address.into(),
             serial: None,
             unit: None,
+            base: None,
+            baud: None,
+            amplitude_m_per_unit: None,
+            measured_m_per_unit: None,
+            dead_weight_n: None,
             rate_hz: None,
             lateral: None,
             normal: None,

@@ -33,11 +33,6 @@ const SYNC_EVERY: Duration = Duration::from_secs(1);
 /// What the sweep sends to the record's thread.
 type Note = (Nanos, Vec<Event>, Option<MeasuredPass>);
 
-/// The embedded virtual rig: a world behind real Modbus TCP on loopback, served by threads of this process.
-struct Embedded {
-    _server: sim::wire::modbus_tcp::ModbusTcpServer,
-}
-
 /// Runs a job in wall-clock time.
 pub fn run(
     job: Job,
@@ -234,32 +229,19 @@ fn write_record(
     Ok(0)
 }
 
-/// Serves the virtual rig on the loopback addresses that the setup names, and puts the real ports there.
-fn embed(job: &Job, instruments: &mut drivers::InstrumentsSetup, epoch: Instant) -> miette::Result<Embedded> {
-    use sim::wire::world::WorldPlant;
-    let plant = sim::wire::SharedPlant::new(WorldPlant::new(job.world()?), epoch);
-    let devices = drivers::emulators(instruments)?;
-    let wanted: std::net::SocketAddr = instruments
-        .amplifier
-        .address
-        .parse()
-        .map_err(|_| miette::miette!("the virtual rig needs an address like 127.0.0.1:0"))?;
-    if !wanted.ip().is_loopback() {
-        miette::bail!(
-            help = "'muprime virtual-rig' serves other machines, with a warning",
-            "the embedded virtual rig listens on loopback only, not on {wanted}"
-        );
-    }
-    let server = sim::wire::modbus_tcp::ModbusTcpServer::start(wanted, devices, plant)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("the virtual rig cannot listen on {wanted}"))?;
-    let address = server.address().to_string();
-    for instrument in &mut instruments.force {
-        instrument.address.clone_from(&address);
-    }
-    instruments.amplifier.address.clone_from(&address);
-    instruments.stage.address.clone_from(&address);
-    Ok(Embedded { _server: server })
+/// Serves the virtual rig where the setup looks for its instruments, and puts the real places there.
+fn embed(
+    job: &Job,
+    instruments: &mut drivers::InstrumentsSetup,
+    epoch: Instant,
+) -> miette::Result<drivers::embed::Embedded> {
+    let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), epoch);
+    drivers::embed::embed(instruments, &plant, false).map_err(|problem| miette::miette!("{problem}"))
+}
+
+/// Whether an embedded rig is at a place that only this process knows: a free port, a terminal of its own.
+fn belongs_to_this_process(address: &str) -> bool {
+    address.ends_with(":0") || address.ends_with("pty")
 }
 
 /// One controller a rig: a lock named after the amplifier's address, taken before anything is opened.
@@ -268,7 +250,8 @@ struct RigClaim(Option<std::path::PathBuf>);
 impl RigClaim {
     fn take(job: &Job) -> miette::Result<Self> {
         // An embedded rig on a free port belongs to this process by construction.
-        if job.setup.file.virtual_rig.is_some() && job.setup.file.amplifier.address.ends_with(":0") {
+        if job.setup.file.virtual_rig.is_some() && belongs_to_this_process(&job.setup.file.amplifier.address)
+        {
             return Ok(RigClaim(None));
         }
         let name: String = job

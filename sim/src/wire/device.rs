@@ -60,7 +60,8 @@ impl Device {
             } else if let Some(quantity) = d.emulator.measure.get(name) {
                 let quantity = Quantity::from_name(quantity).ok_or_else(|| unknown(quantity))?;
                 // Counters and clocks run round at the width of their register.
-                let counts = signal.number.limits().1 + 1.0;
+                let index = SignalId(sources.len());
+                let (counts, _) = profile.turn(index);
                 let wraps = matches!(
                     quantity,
                     Quantity::ForceSample
@@ -113,6 +114,18 @@ impl Device {
             }
         });
         bytes
+    }
+
+    /// Takes one set-point that came as a line of text, in its unit.
+    ///
+    /// # Errors
+    /// Where the value is none that the instrument takes.
+    pub fn set(&mut self, set: SetId, value: f64, plant: &mut dyn Plant) -> Result<(), Refused> {
+        self.profile.allows(set, value).map_err(|_| Refused::Value)?;
+        if let Some((command, si)) = self.commands[set.0] {
+            plant.command(&[(command, value * si)]);
+        }
+        Ok(())
     }
 
     /// Registers `address..address + count` of a table, all of one moment of the world.

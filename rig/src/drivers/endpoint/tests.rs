@@ -3,7 +3,8 @@ use crate::drivers::ports::DriveSetPoint;
 use crate::drivers::profile;
 
 fn amplifier() -> (Endpoint, AmplifierPort) {
-    Endpoint::amplifier(profile("muprime-amplifier").unwrap()).unwrap()
+    Endpoint::amplifier(profile("muprime-amplifier").unwrap(), &InstrumentSetup::new("muprime-amplifier", ""))
+        .unwrap()
 }
 
 fn on(sequence: u32, expires_at: u64) -> DriveSetPoint {
@@ -18,7 +19,7 @@ fn on(sequence: u32, expires_at: u64) -> DriveSetPoint {
 
 /// The value that a set-point would get, if it is sent.
 fn sent(endpoint: &Endpoint, due: &Due, name: &str) -> Option<f64> {
-    let Due::SetPoints(set_points) = due else { return None };
+    let (Due::SetPoints(set_points) | Due::Safe(set_points)) = due else { return None };
     let wanted = endpoint.profile().set(name)?;
     set_points.iter().find(|(set, _)| *set == wanted).map(|(_, value)| *value)
 }

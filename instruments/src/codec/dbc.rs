@@ -1,0 +1,178 @@
+//! Signals of CAN messages, as a DBC file describes them. The crate can-dbc reads the file; putting
+//! bits into frames and taking them out is done here, and cross-checked with the Python package
+//! cantools on random frames by the system tests.
+
+use std::collections::HashMap;
+
+/// One signal of a message.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DbcSignal {
+    /// Start bit as the file counts it: for Intel order the least significant bit, for Motorola the most.
+    pub start: u16,
+    /// Bits.
+    pub size: u16,
+    /// Intel (little endian) order; else Motorola.
+    pub little_endian: bool,
+    /// Two's complement.
+    pub signed: bool,
+    /// Value = raw times this, plus `offset`.
+    pub factor: f64,
+    /// See `factor`.
+    pub offset: f64,
+}
+
+/// One message.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DbcMessage {
+    /// Identifier.
+    pub id: u32,
+    /// Bytes.
+    pub length: usize,
+    /// Signals by name.
+    pub signals: HashMap<String, DbcSignal>,
+}
+
+/// All messages of a file, by name.
+///
+/// # Errors
+/// Where the file is no DBC file, or a signal does not lie within its message.
+pub fn parse(text: &str) -> Result<HashMap<String, DbcMessage>, String> {
+    let dbc = can_dbc::Dbc::try_from(text).map_err(|error| format!("no DBC file: {error:?}"))?;
+    let mut messages = HashMap::new();
+    for message in &dbc.messages {
+        let length = usize::try_from(message.size).map_err(|_| "a message is too long".to_string())?;
+        let mut signals = HashMap::new();
+        for signal in &message.signals {
+            let place = DbcSignal {
+                start: u16::try_from(signal.start_bit).map_err(|_| "a start bit is too large")?,
+                size: u16::try_from(signal.size).map_err(|_| "a signal is too wide")?,
+                little_endian: signal.byte_order == can_dbc::ByteOrder::LittleEndian,
+                signed: signal.value_type == can_dbc::ValueType::Signed,
+                factor: signal.factor,
+                offset: signal.offset,
+            };
+            if !place.fits(length) {
+                return Err(format!("signal {} does not lie within message {}", signal.name, message.name));
+            }
+            signals.insert(signal.name.clone(), place);
+        }
+        let id = message.id.raw() & 0x1FFF_FFFF;
+        messages.insert(message.name.clone(), DbcMessage { id, length, signals });
+    }
+    Ok(messages)
+}
+
+impl DbcSignal {
+    fn fits(&self, length: usize) -> bool {
+        (1..=64).contains(&self.size) && self.bits().all(|bit| bit.is_some_and(|bit| bit / 8 < length))
+    }
+
+    /// Places of the bits in the frame, the least significant first: byte times 8 plus bit.
+    fn bits(&self) -> impl Iterator<Item = Option<usize>> {
+        let (start, size, little_endian) =
+            (usize::from(self.start), usize::from(self.size), self.little_endian);
+        (0..size).map(move |significance| {
+            if little_endian {
+                return Some(start + significance);
+            }
+            // Motorola counts from the most significant bit towards the right: bit 0 of a byte is
+            // followed by bit 7 of the next. Counted from the left of the frame that is plain.
+            let from_left = (start / 8) * 8 + (7 - start % 8) + (size - 1 - significance);
+            Some((from_left / 8) * 8 + (7 - from_left % 8))
+        })
+    }
+
+    /// The value; `None` where the frame is too short.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)] // a force of more than 53 bits does not exist
+    pub fn read(&self, frame: &[u8]) -> Option<f64> {
+        Some(self.raw(frame)? as f64 * self.factor + self.offset)
+    }
+
+    /// The raw number; `None` where the frame is too short.
+    #[must_use]
+    #[allow(clippy::cast_possible_wrap)]
+    pub fn raw(&self, frame: &[u8]) -> Option<i64> {
+        let mut word: u64 = 0;
+        for (significance, bit) in self.bits().enumerate() {
+            let bit = bit?;
+            word |= u64::from((frame.get(bit / 8)? >> (bit % 8)) & 1) << significance;
+        }
+        let unused = 64 - u32::from(self.size);
+        Some(if self.signed { ((word << unused) as i64) >> unused } else { word as i64 })
+    }
+
+    /// Stores `value`, rounded and held to what the bits can say. Other bits are kept.
+    /// Returns `false` where the frame is too short.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    pub fn write(&self, frame: &mut [u8], value: f64) -> bool {
+        let raw = ((value - self.offset) / self.factor).round();
+        let width = i32::from(self.size);
+        let (low, high) = if self.signed {
+            (-(2_f64.powi(width - 1)), 2_f64.powi(width - 1) - 1.0)
+        } else {
+            (0.0, 2_f64.powi(width) - 1.0)
+        };
+        let word = raw.clamp(low, high) as i128 as u64;
+        for (significance, bit) in self.bits().enumerate() {
+            let Some(byte) = bit.and_then(|bit| frame.get_mut(bit / 8)) else { return false };
+            let bit = bit.unwrap_or(0) % 8;
+            *byte = (*byte & !(1 << bit)) | ((((word >> significance) & 1) as u8) << bit);
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "VERSION \"\"\nNS_ :\nBS_:\nBU_: RIG\n\nBO_ 1552 Meas: 8 RIG\n SG_ Ch1 : 7|16@0+ (1,-32768) [0|0] \"\" RIG\n SG_ Ch4 : 55|16@0+ (1,-32768) [0|0] \"\" RIG\n\nBO_ 437 Short: 8 RIG\n SG_ Fx : 0|16@1- (1,0) [0|0] \"\" RIG\n SG_ Odd : 19|13@1- (0.5,1) [0|0] \"\" RIG\n";
+
+    #[test]
+    #[allow(clippy::float_cmp)] // whole numbers and halves
+    fn both_orders() {
+        let messages = parse(TEXT).unwrap();
+        let frame = [0x80, 0x00, 0x81, 0x00, 0x7E, 0x00, 0xFF, 0xFF];
+        let measured = &messages["Meas"];
+        assert_eq!(measured.id, 0x610);
+        assert_eq!(measured.signals["Ch1"].read(&frame), Some(0.0));
+        assert_eq!(measured.signals["Ch4"].read(&frame), Some(32767.0));
+        let short = &messages["Short"];
+        assert_eq!(short.signals["Fx"].read(&[0x56, 0x02, 0, 0, 0, 0, 0, 0]), Some(598.0));
+        assert_eq!(short.signals["Fx"].read(&[0xFE, 0xFF, 0, 0, 0, 0, 0, 0]), Some(-2.0));
+        assert_eq!(short.signals["Fx"].read(&[0xFE]), None);
+    }
+
+    #[test]
+    #[allow(clippy::float_cmp)]
+    fn what_is_written_is_read_and_neighbours_stay() {
+        let messages = parse(TEXT).unwrap();
+        for (message, name) in [("Meas", "Ch1"), ("Meas", "Ch4"), ("Short", "Fx"), ("Short", "Odd")] {
+            let signal = messages[message].signals[name];
+            for raw in [-4096.0, -1.0, 0.0, 1.0, 4095.0] {
+                let value = raw * signal.factor + signal.offset;
+                for background in [0x00_u8, 0xFF] {
+                    let mut frame = [background; 8];
+                    assert!(signal.write(&mut frame, value));
+                    let held = signal.read(&frame).unwrap();
+                    let clear = if signal.signed { raw } else { raw.max(0.0) };
+                    assert_eq!(held, clear * signal.factor + signal.offset, "{name} {raw}");
+                    let zero = |frame: [u8; 8]| {
+                        let mut frame = frame;
+                        signal.write(&mut frame, signal.offset);
+                        frame
+                    };
+                    assert_eq!(zero(frame), zero([background; 8]), "{name}: neighbours changed");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_signal_outside_its_message_is_refused() {
+        let text = TEXT.replace("Fx : 0|16", "Fx : 60|16");
+        assert!(parse(&text).unwrap_err().contains("Fx"));
+        assert!(parse("hello").is_err());
+    }
+}

@@ -1,0 +1,307 @@
+//! Modbus RTU, both directions.
+//!
+//! An own codec, since sensors on RTU do what the usual ones cannot: they use function codes of
+//! their own, leave the protocol for a stream, and need a client that throws late answers away. An
+//! answer has no transaction number: all that ties it to its request is unit, function and length,
+//! so every one of them is checked, and the length is known before the first byte arrives.
+
+use super::checksum::crc16_modbus;
+
+/// What may come back to a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum RtuError {
+    /// The instrument refused, with its exception code.
+    #[error("the instrument refused the request (exception {0})")]
+    Exception(u8),
+    /// The check bytes do not fit.
+    #[error("the check bytes do not fit the frame")]
+    Crc,
+    /// Another unit answered.
+    #[error("unit {found} answered instead of unit {expected}")]
+    Unit {
+        /// Asked.
+        expected: u8,
+        /// Answered.
+        found: u8,
+    },
+    /// The answer is one to another request.
+    #[error("the answer is to function {found}, not {expected}")]
+    Function {
+        /// Asked.
+        expected: u8,
+        /// Answered.
+        found: u8,
+    },
+    /// The answer speaks of another length or another register.
+    #[error("the answer does not fit the request")]
+    Mismatch,
+}
+
+/// A request, with what its answer must look like.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Request {
+    /// The whole frame.
+    pub bytes: Vec<u8>,
+    /// Bytes of a whole answer that is no exception.
+    pub answer_length: usize,
+}
+
+/// Bytes of an exception.
+pub const EXCEPTION_LENGTH: usize = 5;
+
+fn closed(mut body: Vec<u8>) -> Vec<u8> {
+    let crc = crc16_modbus(&body);
+    body.extend(crc.to_le_bytes());
+    body
+}
+
+/// Asks for registers by function 3 or 4.
+#[must_use]
+pub fn read(unit: u8, function: u8, address: u16, count: u16) -> Request {
+    let mut body = vec![unit, function];
+    body.extend(address.to_be_bytes());
+    body.extend(count.to_be_bytes());
+    Request { bytes: closed(body), answer_length: 5 + 2 * usize::from(count) }
+}
+
+/// Writes neighbouring registers by function 16.
+#[must_use]
+pub fn write(unit: u8, address: u16, registers: &[u16]) -> Request {
+    let count = u16::try_from(registers.len()).unwrap_or(u16::MAX);
+    let mut body = vec![unit, 16];
+    body.extend(address.to_be_bytes());
+    body.extend(count.to_be_bytes());
+    body.push(u8::try_from(2 * registers.len()).unwrap_or(u8::MAX));
+    body.extend(registers.iter().flat_map(|register| register.to_be_bytes()));
+    Request { bytes: closed(body), answer_length: 8 }
+}
+
+/// A request by a function of the maker's own: `data` follows the function code.
+#[must_use]
+pub fn custom(unit: u8, function: u8, data: &[u8], answer_length: usize) -> Request {
+    let mut body = vec![unit, function];
+    body.extend(data);
+    Request { bytes: closed(body), answer_length }
+}
+
+/// How many bytes the answer that begins with `start` has; `None` until two bytes are there.
+#[must_use]
+pub fn answer_length(request: &Request, start: &[u8]) -> Option<usize> {
+    let function = *start.get(1)?;
+    Some(if function == request.bytes[1] | 0x80 { EXCEPTION_LENGTH } else { request.answer_length })
+}
+
+/// Judges a whole answer; returns what stands between the function code and the check bytes.
+///
+/// # Errors
+/// Whatever does not fit the request.
+pub fn payload<'a>(request: &Request, answer: &'a [u8]) -> Result<&'a [u8], RtuError> {
+    if answer.len() < EXCEPTION_LENGTH {
+        return Err(RtuError::Mismatch);
+    }
+    let (body, crc) = answer.split_at(answer.len() - 2);
+    if crc16_modbus(body).to_le_bytes() != crc {
+        return Err(RtuError::Crc);
+    }
+    let (unit, function) = (request.bytes[0], request.bytes[1]);
+    if body[0] != unit {
+        return Err(RtuError::Unit { expected: unit, found: body[0] });
+    }
+    if body[1] == function | 0x80 {
+        return Err(RtuError::Exception(body[2]));
+    }
+    if body[1] != function {
+        return Err(RtuError::Function { expected: function, found: body[1] });
+    }
+    if answer.len() != request.answer_length {
+        return Err(RtuError::Mismatch);
+    }
+    Ok(&body[2..])
+}
+
+/// The registers of an answer to [`read`], as bytes.
+///
+/// # Errors
+/// Whatever does not fit the request.
+pub fn registers(request: &Request, answer: &[u8]) -> Result<Vec<u8>, RtuError> {
+    let payload = payload(request, answer)?;
+    if usize::from(payload[0]) != payload.len() - 1 {
+        return Err(RtuError::Mismatch);
+    }
+    Ok(payload[1..].to_vec())
+}
+
+/// Judges an answer to [`write`]: it repeats the address and the count.
+///
+/// # Errors
+/// Whatever does not fit the request.
+pub fn written(request: &Request, answer: &[u8]) -> Result<(), RtuError> {
+    if payload(request, answer)? == &request.bytes[2..6] { Ok(()) } else { Err(RtuError::Mismatch) }
+}
+
+/// A request, as the instrument's side sees it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Asked {
+    /// Function 3 or 4.
+    Read {
+        /// The function.
+        function: u8,
+        /// First register.
+        address: u16,
+        /// How many.
+        count: u16,
+    },
+    /// Function 6 or 16.
+    Write {
+        /// The function.
+        function: u8,
+        /// First register.
+        address: u16,
+        /// The values.
+        registers: Vec<u16>,
+    },
+    /// A one-byte request by a function of the maker's own.
+    Custom {
+        /// The function.
+        function: u8,
+        /// Its byte.
+        data: u8,
+    },
+}
+
+/// What the bytes that came so far are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Heard {
+    /// The start of something.
+    Incomplete,
+    /// No request begins here: drop a byte and look again.
+    Noise,
+    /// A request for `unit`, and how many bytes it took.
+    Request(u8, Asked, usize),
+}
+
+/// Looks for a request at the start of `bytes`; `own` are the functions of the maker's own, whose
+/// requests have one byte of data.
+#[must_use]
+pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
+    let Some(&function) = bytes.get(1) else { return Heard::Incomplete };
+    let length = match function {
+        3 | 4 | 6 => 8,
+        16 => match bytes.get(6) {
+            None => return Heard::Incomplete,
+            Some(&count) => 9 + usize::from(count),
+        },
+        _ if own.contains(&function) => 5,
+        _ => return Heard::Noise,
+    };
+    let Some(frame) = bytes.get(..length) else { return Heard::Incomplete };
+    let (body, crc) = frame.split_at(length - 2);
+    if crc16_modbus(body).to_le_bytes() != crc {
+        return Heard::Noise;
+    }
+    let word = |at: usize| u16::from_be_bytes([body[at], body[at + 1]]);
+    let asked = match function {
+        3 | 4 => Asked::Read { function, address: word(2), count: word(4) },
+        6 => Asked::Write { function, address: word(2), registers: vec![word(4)] },
+        16 => {
+            let data = &body[7..];
+            if data.len() != 2 * usize::from(word(4)) {
+                return Heard::Noise;
+            }
+            let registers = data.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
+            Asked::Write { function, address: word(2), registers }
+        }
+        _ => Asked::Custom { function, data: body[2] },
+    };
+    Heard::Request(body[0], asked, length)
+}
+
+/// The answer that gives registers.
+#[must_use]
+pub fn give(unit: u8, function: u8, registers: &[u16]) -> Vec<u8> {
+    let mut body = vec![unit, function, u8::try_from(2 * registers.len()).unwrap_or(u8::MAX)];
+    body.extend(registers.iter().flat_map(|register| register.to_be_bytes()));
+    closed(body)
+}
+
+/// The answer that confirms a write: the first four bytes after the function of the request.
+#[must_use]
+pub fn confirm(unit: u8, function: u8, address: u16, second: u16) -> Vec<u8> {
+    let mut body = vec![unit, function];
+    body.extend(address.to_be_bytes());
+    body.extend(second.to_be_bytes());
+    closed(body)
+}
+
+/// The answer to a function of the maker's own.
+#[must_use]
+pub fn acknowledge(unit: u8, function: u8, data: u8) -> Vec<u8> {
+    closed(vec![unit, function, data])
+}
+
+/// The answer that refuses.
+#[must_use]
+pub fn refuse(unit: u8, function: u8, exception: u8) -> Vec<u8> {
+    closed(vec![unit, function | 0x80, exception])
+}
+
+/// The silence that parts two frames: 3.5 characters of 11 bits, and 1.75 ms above 19200 baud, in s
+/// (Modbus over serial line, 2.5.1.1).
+#[must_use]
+pub fn silence_s(baud: u32) -> f64 {
+    if baud > 19_200 { 1.75e-3 } else { 3.5 * 11.0 / f64::from(baud.max(1)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ATI's manual prints this request for its diagnostics registers.
+    #[test]
+    fn a_published_request() {
+        assert_eq!(read(10, 4, 0x27, 6).bytes, [0x0A, 0x04, 0x00, 0x27, 0x00, 0x06, 0xC1, 0x78]);
+        assert_eq!(custom(10, 0x46, &[0x55], 5).bytes, [0x0A, 0x46, 0x55, 0xA3, 0x9D]);
+    }
+
+    #[test]
+    fn both_sides_agree() {
+        let request = read(9, 3, 180, 2);
+        let heard = Heard::Request(9, Asked::Read { function: 3, address: 180, count: 2 }, 8);
+        assert_eq!(hear(&request.bytes, &[]), heard);
+        assert_eq!(registers(&request, &give(9, 3, &[1, 0xFFFE])).unwrap(), [0, 1, 0xFF, 0xFE]);
+        let request = write(9, 410, &[0x0200, 7]);
+        let asked = Asked::Write { function: 16, address: 410, registers: vec![0x0200, 7] };
+        assert_eq!(hear(&request.bytes, &[]), Heard::Request(9, asked, 13));
+        assert_eq!(written(&request, &confirm(9, 16, 410, 2)), Ok(()));
+        assert_eq!(written(&request, &confirm(9, 16, 411, 2)), Err(RtuError::Mismatch));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let request = read(9, 3, 180, 2);
+        let good = give(9, 3, &[1, 2]);
+        for bit in 0..good.len() * 8 {
+            let mut wrong = good.clone();
+            wrong[bit / 8] ^= 1 << (bit % 8);
+            assert!(registers(&request, &wrong).is_err(), "bit {bit}");
+        }
+        assert_eq!(registers(&request, &give(8, 3, &[1, 2])), Err(RtuError::Unit { expected: 9, found: 8 }));
+        assert_eq!(
+            registers(&request, &give(9, 4, &[1, 2])),
+            Err(RtuError::Function { expected: 3, found: 4 })
+        );
+        assert_eq!(registers(&request, &give(9, 3, &[1])), Err(RtuError::Mismatch));
+        assert_eq!(registers(&request, &give(9, 3, &[1, 2, 3])), Err(RtuError::Mismatch));
+        assert_eq!(registers(&request, &refuse(9, 3, 2)), Err(RtuError::Exception(2)));
+        assert_eq!(registers(&request, &[]), Err(RtuError::Mismatch));
+    }
+
+    #[test]
+    fn every_cut_of_a_request_is_incomplete() {
+        for request in [read(9, 3, 0, 6), write(9, 0, &[1, 2, 3]), custom(9, 0x46, &[0x55], 5)] {
+            for cut in 0..request.bytes.len() {
+                assert_eq!(hear(&request.bytes[..cut], &[0x46]), Heard::Incomplete, "{cut}");
+            }
+        }
+    }
+}

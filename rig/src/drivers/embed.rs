@@ -1,0 +1,152 @@
+//! A virtual rig's instruments behind their real protocols, each where the setup looks for it.
+//!
+//! `127.0.0.1:0` is any free port, `pty` a pseudo-terminal made for the purpose, an interface such as
+//! `vcan0` the kernel's bus. What was chosen is put into the setup, so that the drivers find it.
+
+use super::setup::{InstrumentSetup, InstrumentsSetup};
+use super::socketcan::KernelCan;
+use instruments::schema::LinkKind;
+use serialport::{SerialPort, TTYPort};
+use sim::wire::can::{CanDevice, CanEmulator, EmulatedAdapter};
+use sim::wire::device::Device;
+use sim::wire::lines::{LineInstrument, TcpLines};
+use sim::wire::modbus_tcp::ModbusTcpServer;
+use sim::wire::serial::SerialEmulator;
+use sim::wire::{Command, SharedPlant};
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+
+/// Running emulators; dropping them stops them.
+#[derive(Default)]
+pub struct Embedded {
+    tcp: Vec<ModbusTcpServer>,
+    serial: Vec<SerialEmulator>,
+    can: Vec<CanEmulator>,
+    lines: Vec<TcpLines>,
+    /// Where each instrument is, in words.
+    pub places: Vec<String>,
+}
+
+impl Embedded {
+    /// Where the Modbus TCP server listens, if there is one.
+    #[must_use]
+    pub fn modbus_tcp(&self) -> Option<SocketAddr> {
+        self.tcp.first().map(ModbusTcpServer::address)
+    }
+
+    /// How many emulators run.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.tcp.len() + self.serial.len() + self.can.len() + self.lines.len()
+    }
+}
+
+/// Serves every instrument of a setup over one world; to other machines only where `everywhere`.
+///
+/// # Errors
+/// An address that cannot be served, or a profile that names what the world does not have.
+pub fn embed(
+    setup: &mut InstrumentsSetup,
+    plant: &SharedPlant,
+    everywhere: bool,
+) -> Result<Embedded, String> {
+    let mut embedded = Embedded::default();
+    let mut registers: BTreeMap<String, BTreeMap<u8, Device>> = BTreeMap::new();
+    let mut buses: BTreeMap<String, Vec<CanDevice>> = BTreeMap::new();
+    if let Some(weight) = setup.stage.dead_weight_n {
+        plant.now().0.command(&[(Command::NormalForce, weight)]);
+    }
+    let InstrumentsSetup { force, amplifier, stage } = setup;
+    let mut all: Vec<&mut InstrumentSetup> = force.iter_mut().chain([amplifier, stage]).collect();
+    for instrument in &mut all {
+        let profile = super::profile(&instrument.profile).map_err(|error| error.to_string())?;
+        let link = profile.description.link.clone();
+        let device = Device::new(profile).map_err(|error| error.to_string())?;
+        let failed = |error: std::io::Error| format!("{} cannot be served: {error}", instrument.profile);
+        match link.kind {
+            LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
+                let unit = instrument.unit.or(link.unit).unwrap_or(1);
+                let units = registers.entry(instrument.address.clone()).or_default();
+                if units.insert(unit, device).is_some() {
+                    return Err(format!(
+                        "two instruments of the virtual rig have Modbus unit {unit}; give one another `unit`"
+                    ));
+                }
+            }
+            LinkKind::ModbusTcp | LinkKind::ModbusRtu => {
+                let unit = instrument.unit.or(link.unit).unwrap_or(1);
+                let port = port(&mut instrument.address)?;
+                let units = [(unit, device)].into_iter().collect();
+                embedded.serial.push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
+            }
+            LinkKind::Can | LinkKind::Canopen => {
+                let base = instrument.base.or(link.base).or(link.node.map(u32::from)).unwrap_or(0);
+                let devices = CanDevice { device, base };
+                if instrument.address.starts_with("slcan:") {
+                    let adapter = EmulatedAdapter::new(port(&mut instrument.address)?);
+                    let emulator =
+                        CanEmulator::start(adapter, vec![devices], plant.clone()).map_err(failed)?;
+                    embedded.can.push(emulator);
+                } else {
+                    buses.entry(instrument.address.clone()).or_default().push(devices);
+                }
+            }
+            LinkKind::Serial => {
+                let port = port(&mut instrument.address)?;
+                let served = LineInstrument::new(device, plant.clone());
+                embedded.serial.push(SerialEmulator::lines(port, served, || None).map_err(failed)?);
+            }
+            LinkKind::Scpi => {
+                let served = LineInstrument::new(device, plant.clone());
+                let server =
+                    TcpLines::start(socket(&instrument.address, everywhere)?, served).map_err(failed)?;
+                instrument.address = server.address().to_string();
+                embedded.lines.push(server);
+            }
+        }
+    }
+    for (address, units) in registers {
+        let server = ModbusTcpServer::start(socket(&address, everywhere)?, units, plant.clone())
+            .map_err(|error| format!("cannot listen on {address}: {error}"))?;
+        for instrument in all.iter_mut().filter(|instrument| instrument.address == address) {
+            instrument.address = server.address().to_string();
+        }
+        embedded.tcp.push(server);
+    }
+    for (interface, devices) in buses {
+        let bus = KernelCan::open(&interface).map_err(|error| error.to_string())?;
+        embedded
+            .can
+            .push(CanEmulator::start(bus, devices, plant.clone()).map_err(|error| error.to_string())?);
+    }
+    embedded.places = all.iter().map(|one| format!("{} at {}", one.profile, one.address)).collect();
+    Ok(embedded)
+}
+
+/// A loopback address, unless other machines are to be served.
+fn socket(address: &str, everywhere: bool) -> Result<SocketAddr, String> {
+    let address: SocketAddr = address
+        .parse()
+        .map_err(|_| format!("`{address}`: the virtual rig needs an address like 127.0.0.1:0"))?;
+    if everywhere || address.ip().is_loopback() {
+        Ok(address)
+    } else {
+        Err(format!("the virtual rig listens on loopback only, not on {address}"))
+    }
+}
+
+/// The emulator's end of a serial line: `pty` makes one and puts its path into the address, another
+/// path is opened.
+fn port(address: &mut String) -> Result<Box<dyn SerialPort>, String> {
+    let (scheme, path) = match address.split_once(':') {
+        Some((scheme, path)) => (format!("{scheme}:"), path.to_string()),
+        None => (String::new(), address.clone()),
+    };
+    if path == "pty" {
+        let (master, slave) = TTYPort::pair().map_err(|error| format!("no pseudo-terminal: {error}"))?;
+        let name = slave.name().ok_or("a pseudo-terminal without a name")?;
+        *address = format!("{scheme}{name}");
+        return Ok(Box::new(master));
+    }
+    serialport::new(&path, 115_200).open().map_err(|error| format!("{path}: {error}"))
+}

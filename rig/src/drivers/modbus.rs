@@ -1,0 +1,180 @@
+//! The conversation with an instrument of registers, whatever carries it.
+
+use super::endpoint::Due;
+use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
+use instruments::profile::FrameKind;
+use instruments::schema::{Poll, Table};
+use instruments::{FrameId, SetId};
+use std::convert::Infallible;
+
+/// What may come of one request.
+#[derive(Debug)]
+pub enum Trouble {
+    /// The instrument understood, and refused.
+    Refused(String),
+    /// The answer did not pass its checks; the line is clear again.
+    Corrupt(String),
+    /// The connection is of no more use.
+    Ended(Ended),
+}
+
+/// Registers at the other end of a wire.
+pub trait Registers {
+    /// Reads registers, as bytes in the order of the wire.
+    ///
+    /// # Errors
+    /// See [`Trouble`].
+    fn read(&mut self, session: &Session, table: Table, address: u16, count: u16)
+    -> Result<Vec<u8>, Trouble>;
+
+    /// Writes neighbouring holding registers.
+    ///
+    /// # Errors
+    /// See [`Trouble`].
+    fn write(&mut self, session: &Session, address: u16, registers: &[u16]) -> Result<(), Trouble>;
+}
+
+/// A conversation's state: blocks as last sent, and bad answers in a row.
+pub struct Conversation {
+    block: Vec<u8>,
+    bad: u32,
+}
+
+impl Conversation {
+    /// Reads everything once, so that the signature is judged before anything is commanded.
+    ///
+    /// # Errors
+    /// Why the connection is of no use.
+    pub fn begin(session: &mut Session, wire: &mut dyn Registers) -> Result<Self, Ended> {
+        let block = session
+            .endpoint
+            .profile()
+            .description
+            .write
+            .first()
+            .map_or(0, |block| 2 * usize::from(block.count));
+        let mut conversation = Self { block: vec![0; block], bad: 0 };
+        for (frame, poll) in polls(session) {
+            conversation.read(session, wire, frame, &poll)?;
+        }
+        Ok(conversation)
+    }
+
+    /// Polls and commands until something is wrong with the connection.
+    ///
+    /// # Errors
+    /// Always: why it ended.
+    pub fn go_on(
+        mut self,
+        session: &mut Session,
+        wire: &mut dyn Registers,
+        rate_hz: Option<f64>,
+    ) -> Result<Infallible, Ended> {
+        session.tell(Ok(()));
+        let now = session.now();
+        let mut reads: Vec<(Periodic, FrameId, Poll)> = polls(session)
+            .into_iter()
+            .filter_map(|(frame, poll)| {
+                poll.rate_hz.map(|rate| (Periodic::new(rate_hz.unwrap_or(rate), now), frame, poll))
+            })
+            .collect();
+        let block = session.endpoint.profile().description.write.first().cloned();
+        let mut write = block.as_ref().map(|block| Periodic::new(block.rate_hz.unwrap_or(100.0), now));
+        loop {
+            if session.stopping() {
+                let safe = session.endpoint.safe_set_points();
+                if let (false, Some(block)) = (safe.is_empty(), &block) {
+                    self.write(session, wire, block.address, &safe)?;
+                }
+                return Err(Ended::Stopped);
+            }
+            let now = session.now();
+            if let (Some(periodic), Some(block)) =
+                (write.as_mut().filter(|periodic| periodic.is_due(now)), &block)
+            {
+                if let Due::SetPoints(set_points) | Due::Safe(set_points) = session.endpoint.due(now) {
+                    self.write(session, wire, block.address, &set_points)?;
+                }
+                periodic.advance(session.now());
+            }
+            for (periodic, frame, poll) in &mut reads {
+                if periodic.is_due(session.now()) {
+                    self.read(session, wire, *frame, poll)?;
+                    periodic.advance(session.now());
+                }
+            }
+            let next =
+                reads.iter().map(|(periodic, ..)| periodic.due).chain(write.as_ref().map(|w| w.due)).min();
+            session.sleep_until(next);
+        }
+    }
+
+    fn read(
+        &mut self,
+        session: &mut Session,
+        wire: &mut dyn Registers,
+        frame: FrameId,
+        poll: &Poll,
+    ) -> Result<(), Ended> {
+        let answer = wire.read(session, poll.table, poll.address, poll.count);
+        let arrived = session.now();
+        if let Some(bytes) = self.judge(session, answer)? {
+            // A library may check the length in debug builds only; a short answer is refused here.
+            session.endpoint.frame(frame, &bytes, arrived)?;
+        }
+        Ok(())
+    }
+
+    fn write(
+        &mut self,
+        session: &Session,
+        wire: &mut dyn Registers,
+        address: u16,
+        set_points: &[(SetId, f64)],
+    ) -> Result<(), Ended> {
+        for (set, value) in set_points {
+            // Ranges were checked when the command was taken.
+            let _ = session.endpoint.profile().encode_set(*set, *value, &mut self.block);
+        }
+        let words: Vec<u16> =
+            self.block.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
+        let answer = wire.write(session, address, &words);
+        self.judge(session, answer)?;
+        Ok(())
+    }
+
+    /// Tells 'the instrument refused' from 'we could not talk'. A few bad answers are borne.
+    fn judge<T>(&mut self, session: &Session, answer: Result<T, Trouble>) -> Result<Option<T>, Ended> {
+        let health = session.endpoint.health();
+        let ended = match answer {
+            Ok(value) => {
+                self.bad = 0;
+                return Ok(Some(value));
+            }
+            Err(Trouble::Ended(ended)) => return Err(ended),
+            Err(Trouble::Refused(said)) => {
+                health.count(&health.exceptions);
+                Ended::Refused(said)
+            }
+            Err(Trouble::Corrupt(said)) => {
+                health.count(&health.corrupt_frames);
+                Ended::Corrupt(said)
+            }
+        };
+        health.problem(ended.to_string());
+        self.bad += 1;
+        // Before the first sample there is nothing to bear with a refusal: the map is wrong.
+        let hopeless = session.ready.is_some() && matches!(ended, Ended::Refused(_));
+        if self.bad >= BAD_IN_A_ROW || hopeless { Err(ended) } else { Ok(None) }
+    }
+}
+
+fn polls(session: &Session) -> Vec<(FrameId, Poll)> {
+    let profile = session.endpoint.profile();
+    let frames = profile.frames().iter().enumerate();
+    let poll = |kind: &FrameKind| match kind {
+        FrameKind::Poll(index) => Some(profile.description.poll[*index].clone()),
+        _ => None,
+    };
+    frames.filter_map(|(i, frame)| poll(&frame.kind).map(|poll| (FrameId(i), poll))).collect()
+}

@@ -1,0 +1,202 @@
+//! Registers over Modbus RTU, and the streams that sensors leave it for.
+//!
+//! RTU has no transaction number: a late answer of the right length looks like the answer to the
+//! next request. So after a timeout the line is drained until it has been silent for longer than
+//! the instrument's longest answer takes, and only then is the next request made.
+
+use super::modbus::{Conversation, Registers, Trouble};
+use super::serial::Line;
+use super::session::{BAD_IN_A_ROW, Ended, LONGEST_SLEEP, Session};
+use super::setup::InstrumentSetup;
+use instruments::codec::modbus_rtu::{self as rtu, Request, RtuError};
+use instruments::codec::stream::{Cutter, Shape};
+use instruments::profile::read_function;
+use instruments::schema::{Stream, Table};
+use std::convert::Infallible;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Tries to stop a stream that a crashed client left on.
+const STOP_TRIES: u32 = 10;
+
+/// Starts the thread of one instrument.
+///
+/// # Errors
+/// Where no thread can be had.
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<()>, String> {
+    let link = session.endpoint.profile().description.link.clone();
+    let path = instrument.address.strip_prefix("rtu:").unwrap_or(&instrument.address).to_string();
+    let rate_hz = instrument.rate_hz;
+    let unit = instrument.unit.or(link.unit).unwrap_or(1);
+    let baud = instrument.baud.or(link.baud).unwrap_or(19_200);
+    let format = link.format.clone().unwrap_or_else(|| "8N1".into());
+    if let Some(late) = super::serial::latency_timer_ms(&path).filter(|&ms| ms > 2) {
+        tracing::warn!(path, "the adapter holds bytes back for up to {late} ms; set its latency_timer to 1");
+    }
+    session.spawn(move |session| {
+        let line = Line::open(&path, baud, &format)?;
+        let mut wire = Rtu { line, unit, answer_ms: link.response_timeout_ms, silence: rtu::silence_s(baud) };
+        let health = session.endpoint.health();
+        health.count(&health.connections);
+        let stream = session.endpoint.profile().description.stream.clone();
+        if let Some(stream) = stream.as_ref().filter(|stream| stream.stop_before_open) {
+            wire.stop_stream(stream)?;
+        }
+        // Whatever an earlier connection was still owed comes now or never.
+        let longest = Duration::from_millis(u64::from(link.response_timeout_ms));
+        wire.line.drain(longest, 10 * longest)?;
+        let conversation = Conversation::begin(session, &mut wire)?;
+        match stream {
+            None => conversation.go_on(session, &mut wire, rate_hz),
+            Some(stream) => wire.listen(session, &stream),
+        }
+    })
+}
+
+struct Rtu {
+    line: Line,
+    unit: u8,
+    answer_ms: u32,
+    silence: f64,
+}
+
+impl Rtu {
+    /// One request and its answer.
+    fn ask(&mut self, request: &Request) -> Result<Vec<u8>, Trouble> {
+        let ended = Trouble::Ended;
+        self.line.write(&request.bytes).map_err(ended)?;
+        let deadline = Instant::now() + Duration::from_millis(u64::from(self.answer_ms));
+        let mut answer = Vec::with_capacity(request.answer_length);
+        let mut buffer = [0; 260];
+        loop {
+            let count = self.line.read(&mut buffer, deadline).map_err(ended)?;
+            if count == 0 {
+                return Err(Trouble::Ended(Ended::Timeout(self.answer_ms)));
+            }
+            answer.extend_from_slice(&buffer[..count]);
+            // The length is known from the request, however the bytes come.
+            if rtu::answer_length(request, &answer).is_some_and(|length| answer.len() >= length) {
+                break;
+            }
+        }
+        std::thread::sleep(Duration::from_secs_f64(self.silence));
+        Ok(answer)
+    }
+
+    /// Judges an answer; after a bad one the line is drained, so that its rest is no next answer.
+    fn judged<T>(&mut self, judged: Result<T, RtuError>) -> Result<T, Trouble> {
+        judged.map_err(|error| match error {
+            RtuError::Exception(code) => Trouble::Refused(format!("exception {code}")),
+            other => {
+                let quiet = Duration::from_millis(u64::from(self.answer_ms));
+                match self.line.drain(quiet, 10 * quiet) {
+                    Ok(_) => Trouble::Corrupt(other.to_string()),
+                    Err(ended) => Trouble::Ended(ended),
+                }
+            }
+        })
+    }
+
+    /// Stops a stream by talking into it, until the line falls silent.
+    fn stop_stream(&mut self, stream: &Stream) -> Result<(), Ended> {
+        let (byte, count) = stream.stop;
+        for _ in 0..STOP_TRIES {
+            self.line.write(&vec![byte; usize::from(count)])?;
+            let settle = Duration::from_millis(u64::from(stream.settle_ms));
+            if self.line.drain(settle, settle * 3)? {
+                return Ok(());
+            }
+        }
+        Err(Ended::Io("the instrument's stream cannot be stopped".into()))
+    }
+
+    /// Starts the stream and hands over its frames until something is wrong.
+    fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
+        let frame = session
+            .endpoint
+            .profile()
+            .frame("stream")
+            .ok_or_else(|| Ended::Io("the profile has no stream".into()))?;
+        self.start_stream(session, stream)?;
+        let shape = Shape {
+            sync: stream.sync.clone(),
+            length: usize::from(stream.length),
+            check: stream.check,
+            believed_after: stream.believed_after,
+        };
+        let mut cutter = Cutter::new(shape);
+        let health = session.endpoint.health();
+        let mut skipped = 0;
+        let mut last = Instant::now();
+        let patience = Duration::from_millis(u64::from(self.answer_ms));
+        let mut buffer = [0; 1024];
+        while !session.stopping() {
+            let count = self.line.read(&mut buffer, Instant::now() + LONGEST_SLEEP)?;
+            let arrived = session.now();
+            let mut outcome = Ok(());
+            cutter.push(&buffer[..count], |bytes| {
+                last = Instant::now();
+                if outcome.is_ok() {
+                    outcome = session.endpoint.frame(frame, bytes, arrived);
+                }
+            });
+            outcome?;
+            if health.report().samples > 0 {
+                session.tell(Ok(()));
+            }
+            health.corrupt_frames.fetch_add(cutter.lost - skipped, std::sync::atomic::Ordering::Relaxed);
+            skipped = cutter.lost;
+            if last.elapsed() > patience {
+                return Err(Ended::Timeout(self.answer_ms));
+            }
+        }
+        self.stop_stream(stream)?;
+        Err(Ended::Stopped)
+    }
+
+    fn start_stream(&mut self, session: &Session, stream: &Stream) -> Result<(), Ended> {
+        let mut last = Ended::Io("the profile says no way to start the stream".into());
+        for _ in 0..BAD_IN_A_ROW {
+            let started = if let Some((address, value)) = stream.start_register {
+                self.write(session, address, &[value])
+            } else if let Some((function, data)) = stream.start_function {
+                let request = rtu::custom(self.unit, function, &[data], 5);
+                // The first bytes of the stream may follow at once: only the answer itself is judged.
+                self.ask(&request).and_then(|answer| {
+                    let judged = rtu::payload(&request, &answer[..answer.len().min(5)]).map(|_| ());
+                    self.judged(judged)
+                })
+            } else {
+                break;
+            };
+            match started {
+                Ok(()) => return Ok(()),
+                Err(Trouble::Ended(ended)) => return Err(ended),
+                Err(Trouble::Refused(said) | Trouble::Corrupt(said)) => last = Ended::Refused(said),
+            }
+        }
+        Err(last)
+    }
+}
+
+impl Registers for Rtu {
+    fn read(
+        &mut self,
+        _session: &Session,
+        table: Table,
+        address: u16,
+        count: u16,
+    ) -> Result<Vec<u8>, Trouble> {
+        let request = rtu::read(self.unit, read_function(table), address, count);
+        let answer = self.ask(&request)?;
+        self.judged(rtu::registers(&request, &answer))
+    }
+
+    fn write(&mut self, _session: &Session, address: u16, registers: &[u16]) -> Result<(), Trouble> {
+        let request = rtu::write(self.unit, address, registers);
+        let answer = self.ask(&request)?;
+        let length = rtu::answer_length(&request, &answer).unwrap_or(answer.len()).min(answer.len());
+        // A stream that this write starts may follow its answer at once.
+        self.judged(rtu::written(&request, &answer[..length]))
+    }
+}

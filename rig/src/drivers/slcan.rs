@@ -1,0 +1,66 @@
+//! CAN through a serial adapter (slcan).
+
+use super::serial::Line;
+use super::session::Ended;
+use instruments::codec::can::{CanFrame, SlcanReader, SlcanSaid, slcan_line, slcan_speed};
+use sim::wire::can::{CanEvent, CanPort};
+use std::collections::VecDeque;
+use std::io;
+use std::time::{Duration, Instant};
+
+/// A bus behind a serial adapter.
+pub struct Slcan {
+    line: Line,
+    reader: SlcanReader,
+    waiting: VecDeque<CanFrame>,
+}
+
+impl Slcan {
+    /// Opens the adapter at `path` and its bus at `bitrate`.
+    ///
+    /// # Errors
+    /// Where the port is not there or the bit rate is none of the protocol's.
+    pub fn open(path: &str, bitrate: u32) -> Result<Self, Ended> {
+        let speed = slcan_speed(bitrate)
+            .ok_or_else(|| Ended::Io(format!("slcan knows no bit rate of {bitrate} per second")))?;
+        // Adapters of this kind are USB: the symbol rate of the line means nothing to them.
+        let mut line = Line::open(path, 115_200, "8N1")?;
+        line.write(b"\rC\r")?;
+        line.drain(Duration::from_millis(20), Duration::from_millis(200))?;
+        line.write(&[b'S', speed, b'\r', b'O', b'\r'])?;
+        Ok(Self { line, reader: SlcanReader::default(), waiting: VecDeque::new() })
+    }
+}
+
+impl CanPort for Slcan {
+    fn send(&mut self, frame: &CanFrame) -> io::Result<bool> {
+        self.line.write(&slcan_line(frame)).map_err(|ended| io::Error::other(ended.to_string()))?;
+        Ok(true)
+    }
+
+    fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>> {
+        loop {
+            if let Some(frame) = self.waiting.pop_front() {
+                return Ok(Some(CanEvent::Frame(frame, Duration::ZERO)));
+            }
+            let mut buffer = [0; 512];
+            let count =
+                self.line.read(&mut buffer, deadline).map_err(|ended| io::Error::other(ended.to_string()))?;
+            if count == 0 {
+                return Ok(None);
+            }
+            let waiting = &mut self.waiting;
+            self.reader.push(&buffer[..count], |said| {
+                if let SlcanSaid::Frame(frame) = said {
+                    waiting.push_back(frame);
+                }
+            });
+        }
+    }
+}
+
+impl Drop for Slcan {
+    fn drop(&mut self) {
+        let _ = self.line.write(b"C\r");
+    }
+}

@@ -1,0 +1,94 @@
+//! CAN through the kernel (SocketCAN).
+//!
+//! Frames that wait when the bus goes off would leave when it comes back (yarp-devices issue 246). So
+//! bus-off ends the connection, nothing restarts by itself, and a queue without room is told to the
+//! caller, who sends the newest command instead of queueing more.
+
+use instruments::codec::can::CanFrame;
+use sim::wire::can::{CanEvent, CanPort};
+use socketcan::{
+    CanDataFrame, CanError, CanFrame as Raw, CanSocket, EmbeddedFrame, ExtendedId, Frame, Id, Socket,
+    SocketOptions, StandardId,
+};
+use std::io;
+use std::time::{Duration, Instant, SystemTime};
+
+/// A bus of the kernel's.
+pub struct KernelCan {
+    socket: CanSocket,
+}
+
+impl KernelCan {
+    /// Opens an interface, such as `can0`.
+    ///
+    /// # Errors
+    /// Where there is none, or this kernel has no CAN.
+    pub fn open(interface: &str) -> io::Result<Self> {
+        let socket = CanSocket::open(interface).map_err(|error| {
+            let hint = if error.raw_os_error() == Some(libc::EAFNOSUPPORT) {
+                ": this kernel has no CAN; use a serial adapter (slcan) or the guest of tests/can_guest"
+            } else {
+                ""
+            };
+            io::Error::other(format!("{interface}: {error}{hint}"))
+        })?;
+        socket.set_error_filter_accept_all()?;
+        socket.set_recv_timestamp(true)?;
+        Ok(Self { socket })
+    }
+}
+
+impl CanPort for KernelCan {
+    fn send(&mut self, frame: &CanFrame) -> io::Result<bool> {
+        let id: Option<Id> = if frame.extended {
+            ExtendedId::new(frame.id).map(Id::from)
+        } else {
+            u16::try_from(frame.id).ok().and_then(StandardId::new).map(Id::from)
+        };
+        let frame = id.and_then(|id| CanDataFrame::new(id, frame.data()));
+        let frame = frame.ok_or_else(|| io::Error::other("no CAN frame can be like that"))?;
+        match self.socket.write_frame(&frame) {
+            Ok(()) => Ok(true),
+            Err(error) if matches!(error.raw_os_error(), Some(libc::ENOBUFS | libc::EAGAIN)) => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>> {
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now()).max(Duration::from_micros(50));
+            self.socket.set_read_timeout(left)?;
+            match self.socket.read_frame_with_timestamp() {
+                Ok((Raw::Data(data), stamp)) => {
+                    let id = data.raw_id() & 0x1FFF_FFFF;
+                    // The stamp is wall-clock time: only how long ago it was is used, and never a leap.
+                    let ago = SystemTime::now().duration_since(stamp).unwrap_or_default();
+                    let ago = if ago < Duration::from_secs(1) { ago } else { Duration::ZERO };
+                    let frame = CanFrame::build(id, data.is_extended(), data.data());
+                    return Ok(frame.map(|frame| CanEvent::Frame(frame, ago)));
+                }
+                Ok((Raw::Error(error), _)) => {
+                    if let Some(event) = judge(&CanError::from(error)) {
+                        return Ok(Some(event));
+                    }
+                }
+                Ok((Raw::Remote(_), _)) => {}
+                Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                    return Ok(None);
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}
+
+/// What an error frame means for the rig; `None` for what passes by itself.
+fn judge(error: &CanError) -> Option<CanEvent> {
+    use socketcan::errors::ErrorCause;
+    error.causes().find_map(|cause| match cause {
+        ErrorCause::BusOff => Some(CanEvent::BusOff),
+        ErrorCause::Controller(_) => Some(CanEvent::Warning),
+        _ => None,
+    })
+}

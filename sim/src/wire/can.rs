@@ -1,0 +1,264 @@
+//! Emulated instruments on a CAN bus: plain CAN, and a CANopen drive.
+
+use super::SharedPlant;
+use super::device::Device;
+use super::drive::Drive;
+use instruments::FrameId;
+use instruments::codec::can::{CanFrame, SlcanReader, SlcanSaid, slcan_line};
+use instruments::profile::FrameKind;
+use instruments::schema::LinkKind;
+use realtime::ports::Nanos;
+use std::collections::VecDeque;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// What a bus gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CanEvent {
+    /// A frame, and how long ago it was received by the adapter or the kernel.
+    Frame(CanFrame, Duration),
+    /// The controller warns (error counters at 96) or is passive (128).
+    Warning,
+    /// The controller has left the bus, and comes back only when a person says so.
+    BusOff,
+}
+
+/// A CAN bus, whatever stands behind it.
+pub trait CanPort: Send {
+    /// Sends a frame; `false` where there is no room for it now (back-pressure), and then it is not sent.
+    ///
+    /// # Errors
+    /// Where the bus is gone.
+    fn send(&mut self, frame: &CanFrame) -> io::Result<bool>;
+
+    /// The next event until `deadline`; `None` where none came.
+    ///
+    /// # Errors
+    /// Where the bus is gone.
+    fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>>;
+}
+
+/// The far side of a serial CAN adapter: the driver's end speaks to the adapter, this end is the bus.
+pub struct EmulatedAdapter {
+    port: Box<dyn serialport::SerialPort>,
+    reader: SlcanReader,
+    waiting: VecDeque<CanFrame>,
+    damage: Arc<AtomicUsize>,
+}
+
+impl EmulatedAdapter {
+    /// An adapter on a serial port.
+    #[must_use]
+    pub fn new(port: Box<dyn serialport::SerialPort>) -> Self {
+        Self { port, reader: SlcanReader::default(), waiting: VecDeque::new(), damage: Arc::default() }
+    }
+
+    /// What is done to the next frame that is sent: 1 loses it, 2 sends it twice.
+    #[must_use]
+    pub fn damage(&self) -> Arc<AtomicUsize> {
+        Arc::clone(&self.damage)
+    }
+}
+
+impl CanPort for EmulatedAdapter {
+    fn send(&mut self, frame: &CanFrame) -> io::Result<bool> {
+        let line = slcan_line(frame);
+        match self.damage.swap(0, Ordering::SeqCst) {
+            1 => return Ok(true),
+            2 => self.port.write_all(&line)?,
+            _ => {}
+        }
+        self.port.write_all(&line)?;
+        Ok(true)
+    }
+
+    fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>> {
+        loop {
+            if let Some(frame) = self.waiting.pop_front() {
+                return Ok(Some(CanEvent::Frame(frame, Duration::ZERO)));
+            }
+            let mut buffer = [0; 256];
+            let left = deadline.saturating_duration_since(Instant::now()).max(Duration::from_micros(100));
+            self.port.set_timeout(left)?;
+            match self.port.read(&mut buffer) {
+                Ok(count) => {
+                    let waiting = &mut self.waiting;
+                    self.reader.push(&buffer[..count], |said| {
+                        if let SlcanSaid::Frame(frame) = said {
+                            waiting.push_back(frame);
+                        }
+                    });
+                }
+                Err(_) if Instant::now() >= deadline => return Ok(None),
+                // Nobody holds the other end open just now.
+                Err(_) => std::thread::sleep(Duration::from_micros(200)),
+            }
+        }
+    }
+}
+
+/// One emulated instrument at its identifiers.
+pub struct CanDevice {
+    /// The instrument.
+    pub device: Device,
+    /// Identifier that its messages are counted from, or its node number.
+    pub base: u32,
+}
+
+/// Emulated instruments on a bus; dropping it stops them.
+pub struct CanEmulator {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl CanEmulator {
+    /// Serves `devices` on a bus, on a thread of its own.
+    ///
+    /// # Errors
+    /// Where no thread can be had.
+    pub fn start(
+        port: impl CanPort + 'static,
+        devices: Vec<CanDevice>,
+        plant: SharedPlant,
+    ) -> io::Result<Self> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::Builder::new().name("can-emulator".into()).spawn(move || {
+            let instruments = devices.into_iter().map(Instrument::new).collect();
+            let mut bus = Bus { port: Box::new(port), instruments, plant };
+            while !stopped.load(Ordering::Acquire) {
+                if let Err(error) = bus.turn() {
+                    tracing::debug!(%error, "the emulated bus");
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+            }
+        })?;
+        Ok(Self { stop, thread: Some(thread) })
+    }
+}
+
+impl Drop for CanEmulator {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// A group of messages that comes by itself.
+struct Broadcast {
+    frame: FrameId,
+    parts: Vec<(u32, usize)>,
+    period: u64,
+    due: Nanos,
+}
+
+/// A group of messages that is asked for.
+struct Asked {
+    frame: FrameId,
+    parts: Vec<(u32, usize)>,
+    request: Vec<u8>,
+}
+
+enum Instrument {
+    Plain { device: Box<Device>, base: u32, broadcasts: Vec<Broadcast>, asked: Vec<Asked> },
+    Drive(Box<Drive>),
+}
+
+impl Instrument {
+    fn new(can: CanDevice) -> Self {
+        let CanDevice { device, base } = can;
+        let profile = device.profile();
+        if profile.description.link.kind == LinkKind::Canopen {
+            return Self::Drive(Box::new(Drive::new(device, u8::try_from(base).unwrap_or(1))));
+        }
+        let (mut broadcasts, mut asked) = (Vec::new(), Vec::new());
+        for (index, frame) in profile.frames().iter().enumerate() {
+            let FrameKind::Messages(group, parts) = &frame.kind else { continue };
+            let message = &profile.description.message[*group];
+            let (frame, parts) = (FrameId(index), parts.clone());
+            match &message.request {
+                Some(request) => asked.push(Asked { frame, parts, request: request.clone() }),
+                None => {
+                    let period = Nanos::from_seconds(1.0 / message.rate_hz).0.max(1);
+                    broadcasts.push(Broadcast { frame, parts, period, due: Nanos(0) });
+                }
+            }
+        }
+        Self::Plain { device: Box::new(device), base, broadcasts, asked }
+    }
+
+    /// When the instrument has something to say by itself.
+    fn due(&self) -> Option<Nanos> {
+        match self {
+            Self::Plain { broadcasts, .. } => broadcasts.iter().map(|one| one.due).min(),
+            Self::Drive(drive) => drive.due(),
+        }
+    }
+}
+
+struct Bus {
+    port: Box<dyn CanPort>,
+    instruments: Vec<Instrument>,
+    plant: SharedPlant,
+}
+
+/// The frames of one sample: the parts of its bytes.
+fn split(base: u32, parts: &[(u32, usize)], bytes: &[u8]) -> Vec<CanFrame> {
+    let mut at = 0;
+    let mut frames = Vec::with_capacity(parts.len());
+    for (id, length) in parts {
+        let id = base + id;
+        frames.extend(CanFrame::build(id, id > 0x7FF, &bytes[at..at + length]));
+        at += length;
+    }
+    frames
+}
+
+impl Bus {
+    /// Hears what comes and says what is due.
+    fn turn(&mut self) -> io::Result<()> {
+        let (now, epoch) = (self.plant.now().1, Instant::now());
+        let next = self.instruments.iter().filter_map(Instrument::due).min();
+        let pause = next.map_or(20_000_000, |due| due.since(now).0.min(20_000_000));
+        let heard = self.port.receive(epoch + Duration::from_nanos(pause))?;
+        let mut out = Vec::new();
+        {
+            let (mut plant, now) = self.plant.now();
+            for instrument in &mut self.instruments {
+                match instrument {
+                    Instrument::Plain { device, base, broadcasts, asked } => {
+                        if let Some(CanEvent::Frame(frame, _)) = heard
+                            && frame.id == *base
+                            && let Some(asked) = asked.iter().find(|asked| asked.request == frame.data())
+                        {
+                            let bytes = device.frame(asked.frame, &mut *plant, now);
+                            out.extend(split(*base, &asked.parts, &bytes));
+                        }
+                        for broadcast in broadcasts.iter_mut().filter(|one| one.due <= now) {
+                            let bytes = device.frame(broadcast.frame, &mut *plant, now);
+                            out.extend(split(*base, &broadcast.parts, &bytes));
+                            let missed = now.since(broadcast.due).0 / broadcast.period;
+                            broadcast.due = Nanos(broadcast.due.0 + (missed + 1) * broadcast.period);
+                        }
+                    }
+                    Instrument::Drive(drive) => {
+                        if let Some(CanEvent::Frame(frame, _)) = heard {
+                            out.extend(drive.hear(&frame, &mut *plant, now));
+                        }
+                        out.extend(drive.say(&mut *plant, now));
+                    }
+                }
+            }
+        }
+        for frame in out {
+            // A full queue loses the frame, as on a real bus nobody would hear it.
+            let _ = self.port.send(&frame)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,278 @@
+//! Emulated instruments that speak in lines of text and blocks of bytes.
+//!
+//! Everything comes from the profile: its queries, its set-points with their answers, its set-up. A
+//! line that it does not know is an error, in the way of the instrument: a line that says so, or an
+//! entry of the error queue.
+
+use super::device::Device;
+use super::serial::SerialEmulator;
+use super::{Command, Plant, SharedPlant};
+use instruments::profile::FrameKind;
+use instruments::{FrameId, SetId};
+use realtime::ports::Nanos;
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// More clients than this are turned away.
+const MOST_CLIENTS: usize = 8;
+/// A longer line is thrown away.
+const LONGEST_LINE: usize = 256;
+
+/// An instrument that speaks in lines.
+pub struct LineInstrument {
+    device: Device,
+    plant: SharedPlant,
+    error: bool,
+    feeds_watchdog: bool,
+}
+
+impl LineInstrument {
+    /// By its profile.
+    #[must_use]
+    pub fn new(device: Device, plant: SharedPlant) -> Self {
+        let commands = &device.profile().description.emulator.command;
+        let feeds_watchdog = commands.contains_key("enable") && !commands.contains_key("heartbeat");
+        Self { device, plant, error: false, feeds_watchdog }
+    }
+
+    /// An amplifier without a heartbeat has no watchdog: the world's is kept fed for it.
+    pub fn live(&mut self) {
+        if self.feeds_watchdog {
+            let (mut plant, now) = self.plant.now();
+            #[allow(clippy::cast_precision_loss)] // only change counts
+            plant.command(&[(Command::DriveHeartbeat, (now.0 / 1_000_000 % 65_536) as f64)]);
+        }
+    }
+
+    fn end(&self) -> Vec<u8> {
+        self.device
+            .profile()
+            .description
+            .link
+            .rx_terminator
+            .clone()
+            .unwrap_or_else(|| "\n".into())
+            .into_bytes()
+    }
+
+    /// The answer to one line; empty where there is none.
+    pub fn answer(&mut self, line: &str) -> Vec<u8> {
+        let plant = self.plant.clone();
+        let (mut plant, now) = plant.now();
+        let said = self.say(line.trim(), &mut *plant, now);
+        match said {
+            Said::Nothing => Vec::new(),
+            Said::Block(block) => block,
+            Said::Line(line) => [line.into_bytes(), self.end()].concat(),
+        }
+    }
+
+    fn say(&mut self, line: &str, plant: &mut dyn Plant, now: Nanos) -> Said {
+        let description = &self.device.profile().description;
+        if line.is_empty() {
+            return Said::Nothing;
+        }
+        if let Some(query) = description.link.error_query.as_ref().filter(|query| query.send == line) {
+            let ok = query.ok.first().cloned().unwrap_or_default();
+            let said =
+                if self.error { "-113,\"Undefined header\"".into() } else { format!("{ok}\"No error\"") };
+            self.error = false;
+            return Said::Line(said);
+        }
+        if let Some(init) = description.init.iter().find(|init| init.send.as_deref() == Some(line)) {
+            return init
+                .expect
+                .as_ref()
+                .and_then(|all| all.first())
+                .map_or(Said::Nothing, |start| Said::Line(start.clone()));
+        }
+        if let Some((frame, length)) = self.query(line) {
+            let bytes = self.device.frame(frame, plant, now);
+            let number = || bytes.as_slice().try_into().map(f64::from_be_bytes).unwrap_or(f64::NAN);
+            return if length { Said::Block(bytes) } else { Said::Line(format!("{:+.15E}", number())) };
+        }
+        match self.set(line) {
+            Some((set, value, answer)) => {
+                if self.device.set(set, value, plant).is_err() {
+                    self.error = true;
+                }
+                answer.map_or(Said::Nothing, Said::Line)
+            }
+            None => {
+                self.error = true;
+                let unknown = self.device.profile().description.link.unsolicited.last().cloned();
+                unknown.map_or(Said::Nothing, Said::Line)
+            }
+        }
+    }
+
+    fn query(&self, line: &str) -> Option<(FrameId, bool)> {
+        let profile = self.device.profile();
+        profile.frames().iter().enumerate().find_map(|(i, frame)| match frame.kind {
+            FrameKind::Query(index) if profile.description.query[index].send == line => {
+                Some((FrameId(i), profile.description.query[index].length.is_some()))
+            }
+            _ => None,
+        })
+    }
+
+    /// The set-point that a line carries, its value as the instrument takes it, and the answer.
+    fn set(&self, line: &str) -> Option<(SetId, f64, Option<String>)> {
+        let sets = &self.device.profile().description.set;
+        for (index, set) in sets.iter().enumerate() {
+            if set.send_zero.as_deref() == Some(line) {
+                return Some((SetId(index), 0.0, set.answer.as_ref().map(|(_, zero)| zero.clone())));
+            }
+            let Some(send) = &set.send else { continue };
+            let (value, text) = if let Some((before, after)) = send.split_once("{}") {
+                let Some(text) = line.strip_prefix(before).and_then(|rest| rest.strip_suffix(after)) else {
+                    continue;
+                };
+                let Ok(value) = text.parse::<f64>() else { continue };
+                // An instrument clips to what it can do, and answers what it took.
+                let (low, high) = set.range.unwrap_or((f64::MIN, f64::MAX));
+                let value = value.clamp(low, high);
+                (value, if set.scale.fract() == 0.0 { format!("{value:.0}") } else { format!("{value}") })
+            } else if send == line {
+                (1.0, "1".into())
+            } else {
+                continue;
+            };
+            return Some((
+                SetId(index),
+                value,
+                set.answer.as_ref().map(|(answer, _)| answer.replace("{}", &text)),
+            ));
+        }
+        None
+    }
+}
+
+enum Said {
+    Nothing,
+    Line(String),
+    Block(Vec<u8>),
+}
+
+/// Cuts bytes into lines at either line end.
+#[derive(Default)]
+struct Lines {
+    line: Vec<u8>,
+}
+
+impl Lines {
+    fn push(&mut self, bytes: &[u8], mut whole: impl FnMut(&str)) {
+        for &byte in bytes {
+            if byte == b'\r' || byte == b'\n' {
+                whole(&String::from_utf8_lossy(&self.line));
+                self.line.clear();
+            } else if self.line.len() < LONGEST_LINE {
+                self.line.push(byte);
+            }
+        }
+    }
+}
+
+impl SerialEmulator {
+    /// Serves an instrument of lines on a serial line. What `alarm` gives is sent unasked.
+    ///
+    /// # Errors
+    /// Where no thread can be had.
+    pub fn lines(
+        port: Box<dyn serialport::SerialPort>,
+        mut instrument: LineInstrument,
+        mut alarm: impl FnMut() -> Option<String> + Send + 'static,
+    ) -> io::Result<Self> {
+        let mut lines = Lines::default();
+        Self::start(port, move |bytes| {
+            let mut out =
+                alarm().map_or_else(Vec::new, |line| [line.into_bytes(), instrument.end()].concat());
+            lines.push(bytes, |line| out.extend(instrument.answer(line)));
+            instrument.live();
+            out
+        })
+    }
+}
+
+/// An instrument of lines behind TCP; dropping it stops it.
+pub struct TcpLines {
+    address: SocketAddr,
+    stop: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+impl TcpLines {
+    /// Serves an instrument at `address` (port 0 for any free one).
+    ///
+    /// # Errors
+    /// Where the address cannot be bound.
+    pub fn start(address: SocketAddr, instrument: LineInstrument) -> io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let instrument = Arc::new(Mutex::new(instrument));
+        let clients = Arc::new(AtomicUsize::new(0));
+        let thread = std::thread::Builder::new().name("lines".into()).spawn(move || {
+            while !stopped.load(Ordering::Acquire) {
+                instrument.lock().unwrap_or_else(PoisonError::into_inner).live();
+                match listener.accept() {
+                    Ok((stream, _)) if clients.load(Ordering::Relaxed) < MOST_CLIENTS => {
+                        let (instrument, stopped) = (Arc::clone(&instrument), Arc::clone(&stopped));
+                        let clients = Arc::clone(&clients);
+                        clients.fetch_add(1, Ordering::Relaxed);
+                        std::thread::spawn(move || {
+                            let _ = serve(stream, &instrument, &stopped);
+                            clients.fetch_sub(1, Ordering::Relaxed);
+                        });
+                    }
+                    Ok(_) => {}
+                    Err(_) => std::thread::sleep(Duration::from_millis(2)),
+                }
+            }
+        })?;
+        Ok(Self { address, stop, thread: Some(thread) })
+    }
+
+    /// Where it listens.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+}
+
+impl Drop for TcpLines {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn serve(mut stream: TcpStream, instrument: &Mutex<LineInstrument>, stopped: &AtomicBool) -> io::Result<()> {
+    stream.set_nonblocking(false)?;
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(Duration::from_millis(20)))?;
+    let (mut lines, mut buffer) = (Lines::default(), [0; 512]);
+    while !stopped.load(Ordering::Acquire) {
+        let count = match stream.read(&mut buffer) {
+            Ok(0) => return Ok(()),
+            Ok(count) => count,
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        let mut out = Vec::new();
+        lines.push(&buffer[..count], |line| {
+            out.extend(instrument.lock().unwrap_or_else(PoisonError::into_inner).answer(line));
+        });
+        stream.write_all(&out)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,194 @@
+//! Emulated instruments on serial lines: the port, and Modbus RTU with streams on it.
+
+use super::SharedPlant;
+use super::device::{Device, Refused};
+use instruments::codec::modbus_rtu::{self as rtu, Asked, Heard};
+use instruments::schema::{Stream, Table};
+use realtime::ports::Nanos;
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// An emulator on a serial line; dropping it stops it.
+pub struct SerialEmulator {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl SerialEmulator {
+    /// Runs `turn` again and again on a thread of its own, with what the line gave meanwhile and where
+    /// answers go. The line is polled every half millisecond; one that nobody holds open is waited for.
+    ///
+    /// # Errors
+    /// Where no thread can be had.
+    pub fn start(
+        mut port: Box<dyn serialport::SerialPort>,
+        mut turn: impl FnMut(&[u8]) -> Vec<u8> + Send + 'static,
+    ) -> io::Result<Self> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::Builder::new().name("serial-emulator".into()).spawn(move || {
+            let _ = port.set_timeout(Duration::from_micros(500));
+            let mut buffer = [0; 1024];
+            while !stopped.load(Ordering::Acquire) {
+                let count = match port.read(&mut buffer) {
+                    Ok(count) => count,
+                    Err(error) if error.kind() == io::ErrorKind::TimedOut => 0,
+                    Err(_) => {
+                        std::thread::sleep(Duration::from_millis(1));
+                        0
+                    }
+                };
+                let answer = turn(&buffer[..count]);
+                if !answer.is_empty() {
+                    let _ = port.write_all(&answer);
+                }
+            }
+        })?;
+        Ok(Self { stop, thread: Some(thread) })
+    }
+
+    /// Serves Modbus RTU units, each with its stream if its profile has one.
+    ///
+    /// # Errors
+    /// Where no thread can be had.
+    pub fn modbus_rtu(
+        port: Box<dyn serialport::SerialPort>,
+        devices: BTreeMap<u8, Device>,
+        plant: SharedPlant,
+    ) -> io::Result<Self> {
+        let mut line =
+            RtuLine { devices, plant, heard: Vec::new(), streaming: None, silent_turns: 0, zeros: 0 };
+        Self::start(port, move |bytes| line.turn(bytes))
+    }
+}
+
+impl Drop for SerialEmulator {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Units on one line; a unit that streams has it to itself.
+struct RtuLine {
+    devices: BTreeMap<u8, Device>,
+    plant: SharedPlant,
+    heard: Vec<u8>,
+    streaming: Option<(u8, Nanos)>,
+    silent_turns: u32,
+    zeros: u16,
+}
+
+impl RtuLine {
+    fn turn(&mut self, bytes: &[u8]) -> Vec<u8> {
+        if let Some((unit, due)) = self.streaming {
+            return self.stream(unit, due, bytes);
+        }
+        self.heard.extend_from_slice(bytes);
+        // A pause parts frames: what is incomplete after it is noise.
+        self.silent_turns = if bytes.is_empty() { self.silent_turns + 1 } else { 0 };
+        if self.silent_turns > 20 {
+            self.heard.clear();
+        }
+        let own: Vec<u8> = self
+            .devices
+            .values()
+            .filter_map(|d| d.profile().description.stream.as_ref()?.start_function.map(|f| f.0))
+            .collect();
+        loop {
+            match rtu::hear(&self.heard, &own) {
+                Heard::Incomplete => return Vec::new(),
+                Heard::Noise => {
+                    self.heard.remove(0);
+                }
+                Heard::Request(unit, asked, length) => {
+                    self.heard.drain(..length);
+                    return self.answer(unit, asked);
+                }
+            }
+        }
+    }
+
+    fn answer(&mut self, unit: u8, asked: Asked) -> Vec<u8> {
+        let Some(device) = self.devices.get_mut(&unit) else { return Vec::new() };
+        let (mut plant, now) = self.plant.now();
+        let stream = device.profile().description.stream.clone();
+        match asked {
+            Asked::Read { function, address, count } => {
+                let table = if function == 3 { Table::Holding } else { Table::Input };
+                match device.read(table, address, count.min(125), &mut *plant, now) {
+                    Ok(registers) => rtu::give(unit, function, &registers),
+                    Err(refused) => rtu::refuse(unit, function, code(refused)),
+                }
+            }
+            Asked::Write { function, address, registers } => {
+                let second =
+                    if function == 6 { registers[0] } else { u16::try_from(registers.len()).unwrap_or(0) };
+                let starts = stream
+                    .and_then(|s| s.start_register)
+                    .is_some_and(|s| registers == [s.1] && address == s.0);
+                if starts {
+                    self.streaming = Some((unit, now));
+                    return rtu::confirm(unit, function, address, second);
+                }
+                match device.write(address, &registers, &mut *plant) {
+                    Ok(()) => rtu::confirm(unit, function, address, second),
+                    Err(refused) => rtu::refuse(unit, function, code(refused)),
+                }
+            }
+            Asked::Custom { function, data } => {
+                if stream.and_then(|s| s.start_function) == Some((function, data)) {
+                    self.streaming = Some((unit, now));
+                }
+                rtu::acknowledge(unit, function, data)
+            }
+        }
+    }
+
+    /// A streaming unit sends frames and hears only the bytes that stop it.
+    fn stream(&mut self, unit: u8, due: Nanos, bytes: &[u8]) -> Vec<u8> {
+        let Some(device) = self.devices.get_mut(&unit) else { return Vec::new() };
+        let Some(stream) = device.profile().description.stream.clone() else { return Vec::new() };
+        let (stop, _) = stream.stop;
+        for &byte in bytes {
+            self.zeros = if byte == stop { self.zeros + 1 } else { 0 };
+        }
+        if self.zeros >= 14 {
+            (self.streaming, self.zeros) = (None, 0);
+            self.heard.clear();
+            return Vec::new();
+        }
+        let (mut plant, now) = self.plant.now();
+        if now < due {
+            return Vec::new();
+        }
+        let period = Nanos::from_seconds(1.0 / stream.rate_hz).0.max(1);
+        let next = Nanos(due.0 + (now.since(due).0 / period + 1) * period);
+        self.streaming = Some((unit, next));
+        let Some(frame) = device.profile().frame("stream") else { return Vec::new() };
+        let mut bytes = device.frame(frame, &mut *plant, now);
+        close(&stream, &mut bytes);
+        bytes
+    }
+}
+
+/// Puts sync bytes and check into a stream's frame.
+fn close(stream: &Stream, bytes: &mut [u8]) {
+    bytes[..stream.sync.len()].copy_from_slice(&stream.sync);
+    let body = bytes.len() - stream.check.length();
+    let check = stream.check.of(&bytes[..body]);
+    bytes[body..].copy_from_slice(&check);
+}
+
+const fn code(refused: Refused) -> u8 {
+    match refused {
+        Refused::Address => 2,
+        Refused::Value => 3,
+    }
+}

@@ -1,0 +1,159 @@
+//! CAN through the kernel's own stack, in a guest kernel where this machine has none.
+//!
+//! `in_a_guest_kernel` starts `tests/can_guest/can-guest` with this very binary, which then runs the
+//! tests that are marked as ignored, on vcan. If the guest cannot start, the test fails; it does not
+//! skip. User-mode Linux keeps coarse time: order and content are tested here, never speed.
+
+#[path = "wire/bench.rs"]
+#[allow(dead_code)] // the other wire tests use all of it
+mod bench;
+
+use bench::{Bench, BenchPlant, eventually, now};
+use instruments::codec::can::CanFrame;
+use realtime::ports::NoData;
+use rig::drivers::socketcan::KernelCan;
+use rig::drivers::{self, AxisSetup, InstrumentSetup, InstrumentsSetup};
+use sim::wire::can::{CanDevice, CanEmulator, CanEvent, CanPort};
+use sim::wire::device::Device;
+use sim::wire::{Quantity, SharedPlant};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+#[test]
+fn in_a_guest_kernel() {
+    let guest = Path::new(env!("CARGO_MANIFEST_DIR")).join("can_guest/can-guest");
+    let this = std::env::current_exe().unwrap();
+    let output = Command::new(&guest)
+        .arg(this)
+        .args(["--ignored", "--test-threads=1"])
+        .env("CAN_GUEST_TIMEOUT", "240")
+        .output()
+        .unwrap_or_else(|error| panic!("{}: {error}", guest.display()));
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}\n{out}\n{err}\n(tests/venv installs what the guest needs)",
+        output.status
+    );
+    assert!(out.contains("test result: ok. 5 passed"), "other tests ran than expected:\n{out}");
+}
+
+fn deadline() -> Instant {
+    Instant::now() + Duration::from_secs(10)
+}
+
+fn device(id: &str) -> Device {
+    Device::new(drivers::profile(id).unwrap()).unwrap()
+}
+
+fn setup(bench: &Bench, epoch: Instant) -> (InstrumentsSetup, sim::wire::modbus_tcp::ModbusTcpServer) {
+    let server = bench::serve_all(bench, epoch);
+    let address = server.address().to_string();
+    let axis = |signal: &str| Some(AxisSetup { signal: signal.into(), gain: 1.0, offset_n: 0.0 });
+    let force = InstrumentSetup {
+        lateral: axis("fx"),
+        normal: axis("fz"),
+        rate_hz: Some(50.0),
+        ..InstrumentSetup::new("ati-netft-can", "vcan0")
+    };
+    let slow = |id: &str| InstrumentSetup { rate_hz: Some(20.0), ..InstrumentSetup::new(id, &address) };
+    let setup = InstrumentsSetup {
+        force: vec![force],
+        amplifier: slow("muprime-amplifier"),
+        stage: slow("muprime-stage"),
+    };
+    (setup, server)
+}
+
+#[test]
+#[ignore = "needs the guest kernel"]
+fn forces_over_socketcan() {
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    bench.set(Quantity::LateralForce, -1.5);
+    bench.set(Quantity::NormalForce, 2.25);
+    let (mut setup, _server) = setup(&bench, epoch);
+    let plant = SharedPlant::new(BenchPlant::new(&bench), epoch);
+    let devices = vec![CanDevice { device: device("ati-netft-can"), base: 432 }];
+    let emulator = CanEmulator::start(KernelCan::open("vcan0").unwrap(), devices, plant).unwrap();
+    // In the guest the answer may take its time.
+    setup.amplifier.rate_hz = Some(10.0);
+    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let forces = eventually("forces", || Some(rig.force.read(now(epoch))).filter(|f| f.normal.is_ok()));
+    assert!((forces.lateral.unwrap().value + 1.5).abs() <= 2.5e-4, "{forces:?}");
+    assert!((forces.normal.unwrap().value - 2.25).abs() <= 2.5e-4, "{forces:?}");
+    let first = forces.lateral.unwrap().sequence;
+    eventually("newer", || {
+        rig.force.read(now(epoch)).lateral.ok().filter(|r| r.sequence.wrapping_sub(first) > 20)
+    });
+    drop(emulator);
+    eventually("told", || {
+        rig.force.read(now(epoch)).lateral.err().filter(|&why| why == NoData::Disconnected)
+    });
+}
+
+/// can-utils, which nobody here wrote, on both ends.
+#[test]
+#[ignore = "needs the guest kernel"]
+fn can_utils_hear_and_are_heard() {
+    let candump =
+        Command::new("candump").args(["-L", "-n", "2", "vcan1"]).stdout(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    let mut bus = KernelCan::open("vcan1").unwrap();
+    assert!(bus.send(&CanFrame::new(0x1B4, &[0x02]).unwrap()).unwrap());
+    assert!(bus.send(&CanFrame::build(0x0123_4567, true, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap()).unwrap());
+    let heard = String::from_utf8(candump.wait_with_output().unwrap().stdout).unwrap();
+    let frames: Vec<&str> = heard.lines().filter_map(|line| line.rsplit(' ').next()).collect();
+    assert_eq!(frames, ["1B4#02", "01234567#0102030405060708"]);
+    assert!(Command::new("cansend").args(["vcan1", "1B6#5602000000000100"]).status().unwrap().success());
+    let event = bus.receive(deadline()).unwrap();
+    let Some(CanEvent::Frame(frame, ago)) = event else { panic!("{event:?}") };
+    assert_eq!((frame.id, frame.data()), (0x1B6, [0x56, 0x02, 0, 0, 0, 0, 1, 0].as_slice()));
+    assert!(ago < Duration::from_secs(5));
+}
+
+/// A guest's vcan never leaves the bus: the error frame that a controller would raise is put on it by
+/// hand, and what the driver makes of it is tested.
+#[test]
+#[ignore = "needs the guest kernel"]
+fn bus_off_ends_the_link_and_nothing_restarts_by_itself() {
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let (setup, _server) = setup(&bench, epoch);
+    let plant = SharedPlant::new(BenchPlant::new(&bench), epoch);
+    let devices = vec![CanDevice { device: device("ati-netft-can"), base: 432 }];
+    let _emulator = CanEmulator::start(KernelCan::open("vcan0").unwrap(), devices, plant).unwrap();
+    let mut rig = drivers::open(&setup, epoch).unwrap();
+    eventually("forces", || rig.force.read(now(epoch)).normal.ok());
+    // CAN_ERR_FLAG | CAN_ERR_BUSOFF
+    assert!(Command::new("cansend").args(["vcan0", "20000040#0000000000000000"]).status().unwrap().success());
+    let said = eventually("the link's end", || {
+        let problem = rig.links.health().next().map(|(_, health)| health.last_problem)?;
+        problem.contains("bus-off").then_some(problem)
+    });
+    assert!(said.contains("by hand"), "{said}");
+}
+
+#[test]
+#[ignore = "needs the guest kernel"]
+fn a_burst_is_whole_and_in_order() {
+    let (mut here, mut there) = (KernelCan::open("vcan1").unwrap(), KernelCan::open("vcan1").unwrap());
+    for start in (0..1000_u32).step_by(100) {
+        for i in start..start + 100 {
+            while !here.send(&CanFrame::new(0x300, &i.to_be_bytes()).unwrap()).unwrap() {
+                std::thread::yield_now();
+            }
+        }
+        for i in start..start + 100 {
+            let event = there.receive(deadline()).unwrap();
+            let Some(CanEvent::Frame(frame, _)) = event else { panic!("{i}: {event:?}") };
+            assert_eq!(frame.data(), i.to_be_bytes());
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the guest kernel"]
+fn an_interface_that_is_not_there_is_told() {
+    let error = KernelCan::open("can77").err().unwrap().to_string();
+    assert!(error.contains("can77"), "{error}");
+}

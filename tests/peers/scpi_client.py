@@ -1,0 +1,23 @@
+"""pyvisa and pymeasure's driver of the Agilent 33500 as a client of the emulated generator; prints JSON.
+
+usage: scpi_client.py PORT
+"""
+import json
+import sys
+
+import pyvisa
+
+manager = pyvisa.ResourceManager("@py")
+generator = manager.open_resource(f"TCPIP::127.0.0.1::{sys.argv[1]}::SOCKET")
+generator.read_termination = generator.write_termination = "\n"
+generator.timeout = 5000
+assert generator.query("*IDN?").startswith("Agilent Technologies,335")
+for line in ("OUTP1:LOAD INF", "SOUR1:VOLT:UNIT VPP", "SOUR1:FUNC SIN", "SOUR1:FREQ 27500.5", "SOUR1:VOLT 1.25", "OUTP1 1"):
+    generator.write(line)
+    assert generator.query("SYST:ERR?").startswith("+0,"), line
+generator.write("SOUR1:NONSENSE 3")
+unknown = generator.query("SYST:ERR?")
+print(json.dumps({
+    "frequency": float(generator.query("SOUR1:FREQ?")), "amplitude": float(generator.query("SOUR1:VOLT?")),
+    "output": bool(float(generator.query("OUTP1?"))), "unknown": unknown,
+}))
