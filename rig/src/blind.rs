@@ -250,11 +250,11 @@ fn statistic(
     }
 }
 
-fn mean(v: &mut Vec<f64>) -> f64 {
+fn mean(v: &mut [f64]) -> f64 {
     v.iter().sum::<f64>() / v.len() as f64
 }
 
-fn median(v: &mut Vec<f64>) -> f64 {
+fn median(v: &mut [f64]) -> f64 {
     v.sort_by(f64::total_cmp);
     0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2])
 }

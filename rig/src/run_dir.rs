@@ -278,5 +278,5 @@ pub fn claim(lock: &Path) -> miette::Result<()> {
 
 fn is_alive(process: &str) -> bool {
     let same = process == std::process::id().to_string();
-    !process.is_empty() && !same && Path::new("/proc").join(process).exists() || same
+    same || (!process.is_empty() && Path::new("/proc").join(process).exists())
 }

@@ -43,7 +43,7 @@ impl Sources {
 /// Numbers of the named columns, row by row; an optional column that is missing gives NaN.
 pub fn columns<const N: usize>(
     sources: &mut Sources,
-    path: &PathBuf,
+    path: &Path,
     names: [&str; N],
     optional: &[&str],
 ) -> miette::Result<Vec<[f64; N]>> {
