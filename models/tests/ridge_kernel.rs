@@ -264,11 +264,7 @@ fn confined_column_creeps_with_the_retardation_time() {
     body.hold_top();
     let pressure = 10.0;
     for i in 0..=8 {
-        body.set_load(
-            body.node(i, 0),
-            0.0,
-            pressure * 1e-2 / 8.0,
-        );
+        body.set_load(body.node(i, 0), 0.0, pressure * 1e-2 / 8.0);
     }
     let dt = stable_step(&body);
     let slow = pressure * 1e-2 / (material.lambda_pa() + 2.0 * material.shear_modulus_pa());
