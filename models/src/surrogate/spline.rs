@@ -41,10 +41,8 @@ impl Dense {
         // Fold the 32 corners axis by axis, the fastest first.
         let mut corner = [0.0_f64; 16];
         for (k, c) in corner.iter_mut().enumerate() {
-            let mut at = base;
-            for axis in 0..4 {
-                at += if k >> (3 - axis) & 1 == 1 { stride[axis] } else { 0 };
-            }
+            let picked = stride.iter().take(4).enumerate().filter(|(axis, _)| k >> (3 - axis) & 1 == 1);
+            let at = base + picked.map(|(_, step)| step).sum::<usize>();
             let (a, b) = (f64::from(self.values[at]), f64::from(self.values[at + stride[4]]));
             *c = a + share[4] * (b - a);
         }
