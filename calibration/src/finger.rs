@@ -8,6 +8,7 @@ pub mod stiffness;
 
 use crate::amplitude::apply::block_diagonal;
 use crate::certificate::{BudgetLine, Evaluation, Kind, Outcome, Residuals, parameters};
+use crate::identify::Identified;
 use crate::regression::FitError;
 use friction::FrictionFit;
 use nalgebra::DMatrix;
@@ -61,6 +62,8 @@ pub struct FingerFit {
     pub stiffness: Vec<(String, Stiffness)>,
     /// Friction without vibration.
     pub friction: Option<FrictionFit>,
+    /// Modulus of the stratum corneum from a phase table (Eq. 2).
+    pub modulus: Option<Identified>,
 }
 
 impl FingerFit {
@@ -103,6 +106,22 @@ impl FingerFit {
             (sd, largest, unit) = (f.fit.residual_sd(), f.fit.residuals.amax(), "1 (of ln mu0)".into());
             range.extend(f.range());
             remarks.extend(f.remarks());
+        }
+        if let Some(m) = &self.modulus {
+            names.push(("stratum_corneum.young_modulus".into(), "Pa"));
+            values.push(m.young_modulus_pa);
+            dofs.push((m.points as f64 - 1.0).max(1.0));
+            // The profile interval is not symmetric; the certificate's uncertainty is its half-width.
+            let sd = 0.5 * (m.ci95_pa[1] - m.ci95_pa[0]) / 1.96;
+            blocks.push(DMatrix::from_element(1, 1, sd * sd));
+            count += m.points as u64;
+            remarks.push(format!(
+                "modulus: 95 % profile interval {:.3e} to {:.3e} Pa, residual {:.1} deg rms",
+                m.ci95_pa[0],
+                m.ci95_pa[1],
+                (m.objective_deg2 / m.points as f64).sqrt()
+            ));
+            remarks.extend(m.cannot_tell.iter().map(|what| format!("the phases cannot tell {what}")));
         }
         let covariance = block_diagonal(&blocks);
         let mut settings = BTreeMap::new();

@@ -8,6 +8,7 @@
 //! | [`latency`] | delay and jitter of a channel; clocks |
 //! | [`phase`] | contact phase shift of Eq. 1 from waveforms; the phase table |
 //! | [`finger`] | stiffness and friction of a fingertip |
+//! | [`identify`] | inverse analysis of Eq. 2: the modulus of the stratum corneum from a phase table |
 //! | [`certificate`] | the file that a calibration leaves, and the gate before its use |
 //! | [`prior`] | what certificates leave open, for the diagnosis |
 //! | [`regression`], [`uncertainty`] | least squares; GUM and its Supplement 1 |
@@ -20,6 +21,7 @@ pub mod amplitude;
 pub mod certificate;
 pub mod finger;
 pub mod force;
+pub mod identify;
 pub mod latency;
 pub mod phase;
 pub mod prior;

@@ -9,6 +9,53 @@ use std::hint::black_box;
 
 fn main() {
     divan::main();
+    print_ratios();
+}
+
+/// Operations and bytes (fields of nodes and elements once each way) of one update, counted in `kernel.rs`.
+const OBJECTIVE: (f64, f64) = (156.0, 184.0);
+const SMALL_STRAIN: (f64, f64) = (121.0, 240.0);
+
+/// Least time in s of 60 runs, each short enough to fall between two interruptions.
+fn least_seconds(mut run: impl FnMut()) -> f64 {
+    let time = |run: &mut dyn FnMut()| {
+        let start = std::time::Instant::now();
+        run();
+        start.elapsed().as_secs_f64()
+    };
+    (0..60).map(|_| time(&mut run)).fold(f64::INFINITY, f64::min)
+}
+
+/// The kernel beside both roofs, all measured here and now.
+fn print_ratios() {
+    let fma = {
+        let rate = (FMA_ROUNDS * FMA_CHAINS * lanes()) as f64;
+        2.0 * rate / least_seconds(|| drop(black_box(pulp::Arch::new().dispatch(Fma(black_box(0.999_999))))))
+    };
+    let triad = {
+        let n = 16 * 1024;
+        let (mut a, b, c) = (vec![0.0; n], vec![1.0; n], vec![2.0; n]);
+        let seconds = least_seconds(|| pulp::Arch::new().dispatch(Triad(&mut a, &b, &c, 16)));
+        24.0 * (16 * n) as f64 / seconds
+    };
+    println!("roofs: {:.0} GFLOP/s, {:.0} GB/s (triad in the second-level cache)", fma / 1e9, triad / 1e9);
+    for (name, strain, (flop, bytes)) in
+        [("small strain", Strain::Small, SMALL_STRAIN), ("objective", Strain::Objective, OBJECTIVE)]
+    {
+        let (mut body, mut plate, dt) = ridge(strain, false);
+        let seconds = least_seconds(|| {
+            body.advance(dt, 3e5, STEPS, &mut |mut s| {
+                plate.touch(&mut s, 1e-8, 0.02);
+            });
+        });
+        let rate = (body.mesh().elements() * STEPS) as f64 / seconds;
+        println!(
+            "{name}, contact included: {:.0} million updates/s, {:.2} of the multiply-add roof, {:.2} of the triad roof",
+            rate / 1e6,
+            rate * flop / fma,
+            rate * bytes / triad
+        );
+    }
 }
 
 const STEPS: usize = 200;
@@ -66,21 +113,6 @@ fn roofline_triad_l2(bencher: divan::Bencher) {
 }
 
 fn triad(bencher: divan::Bencher, n: usize) {
-    struct Triad<'a>(&'a mut [f64], &'a [f64], &'a [f64], usize);
-    impl WithSimd for Triad<'_> {
-        type Output = ();
-        #[inline(always)]
-        fn with_simd<S: Simd>(self, simd: S) {
-            let scale = simd.splat_f64s(1.000_1);
-            for _ in 0..self.3 {
-                let a = S::as_mut_simd_f64s(black_box(&mut *self.0)).0;
-                let (b, c) = (S::as_simd_f64s(self.1).0, S::as_simd_f64s(self.2).0);
-                for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
-                    *a = simd.mul_add_f64s(scale, *c, *b);
-                }
-            }
-        }
-    }
     let (mut a, b, c) = (vec![0.0; n], vec![1.0; n], vec![2.0; n]);
     let repeats = (1 << 20) / n;
     bencher.counter(divan::counter::ItemsCount::new(n * repeats)).bench_local(|| {
@@ -92,23 +124,47 @@ fn triad(bencher: divan::Bencher, n: usize) {
 /// Independent multiply-adds from registers: the peak of arithmetic. Two operations an item.
 #[divan::bench]
 fn roofline_fma(bencher: divan::Bencher) {
-    const ROUNDS: usize = 20_000;
-    const CHAINS: usize = 12;
-    struct Fma(f64);
-    impl WithSimd for Fma {
-        type Output = f64;
-        #[inline(always)]
-        fn with_simd<S: Simd>(self, simd: S) -> f64 {
-            let (m, c) = (simd.splat_f64s(self.0), simd.splat_f64s(1e-9));
-            let mut chain = [simd.splat_f64s(1.0); CHAINS];
-            for _ in 0..ROUNDS {
-                for v in &mut chain {
-                    *v = simd.mul_add_f64s(*v, m, c);
-                }
+    let lanes = lanes();
+    bencher
+        .counter(divan::counter::ItemsCount::new(FMA_ROUNDS * FMA_CHAINS * lanes))
+        .bench_local(|| pulp::Arch::new().dispatch(Fma(black_box(0.999_999))));
+}
+
+struct Triad<'a>(&'a mut [f64], &'a [f64], &'a [f64], usize);
+impl WithSimd for Triad<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let scale = simd.splat_f64s(1.000_1);
+        for _ in 0..self.3 {
+            let a = S::as_mut_simd_f64s(black_box(&mut *self.0)).0;
+            let (b, c) = (S::as_simd_f64s(self.1).0, S::as_simd_f64s(self.2).0);
+            for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
+                *a = simd.mul_add_f64s(scale, *c, *b);
             }
-            chain.iter().map(|v| simd.reduce_sum_f64s(*v)).sum()
         }
     }
+}
+
+const FMA_ROUNDS: usize = 20_000;
+const FMA_CHAINS: usize = 12;
+struct Fma(f64);
+impl WithSimd for Fma {
+    type Output = f64;
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        let (m, c) = (simd.splat_f64s(self.0), simd.splat_f64s(1e-9));
+        let mut chain = [simd.splat_f64s(1.0); FMA_CHAINS];
+        for _ in 0..FMA_ROUNDS {
+            for v in &mut chain {
+                *v = simd.mul_add_f64s(*v, m, c);
+            }
+        }
+        chain.iter().map(|v| simd.reduce_sum_f64s(*v)).sum()
+    }
+}
+/// Values in a vector.
+fn lanes() -> usize {
     struct Width;
     impl WithSimd for Width {
         type Output = usize;
@@ -117,8 +173,5 @@ fn roofline_fma(bencher: divan::Bencher) {
             S::F64_LANES
         }
     }
-    let lanes = pulp::Arch::new().dispatch(Width);
-    bencher
-        .counter(divan::counter::ItemsCount::new(ROUNDS * CHAINS * lanes))
-        .bench_local(|| pulp::Arch::new().dispatch(Fma(black_box(0.999_999))));
+    pulp::Arch::new().dispatch(Width)
 }

@@ -14,10 +14,13 @@
 
 pub mod condition;
 pub mod finger;
+pub mod inverse;
 pub mod prediction;
 pub mod psi;
+pub mod psi_fit;
 pub mod quantity;
 pub mod record;
 pub mod ridge;
 pub mod root;
 pub mod spring_slider;
+pub mod surrogate;

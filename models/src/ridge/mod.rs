@@ -8,23 +8,37 @@
 //! | `body.rs` | the fields the kernel works on, energies |
 //! | `contact.rs` | the rigid plate, penalty and friction |
 //! | `stability.rs` | the stable time step |
+//! | `case.rs` | one case and the declared defaults |
+//! | `loading.rs` | press, slide, vibrate (Fig. 6), and what is read from it |
+//! | `phase_curves.rs` | phase shift against modulus, for the inverse analysis |
+//! | `study.rs` | parametric studies (Fig. 9), content keys |
+//! | `cycle.rs` | one vibration cycle, steadiness, phase, period doubling |
 //!
 //! Forces and masses are per metre of depth (plane strain). `docs/ridge.md` states every assumption and
 //! how it was checked.
 
 pub mod body;
+pub mod case;
 pub mod contact;
+pub mod cycle;
 mod kernel;
 mod lanes;
+pub mod loading;
 pub mod material;
 pub mod mesh;
+pub mod phase_curves;
 pub mod stability;
+pub mod study;
 
 pub use body::{Body, Energy, Strain, Work};
+pub use case::RidgeCase;
 pub use contact::{ContactForce, FrictionRule, Plate};
+pub use cycle::{Cycle, Steady};
 pub use kernel::Surface;
+pub use loading::{RidgeRun, RunSettings, run};
 pub use material::Material;
 pub use mesh::{Mesh, RidgeGeometry, RidgeMesh, RidgeProfile};
+pub use phase_curves::PhaseCurves;
 
 /// Why a ridge could not be built or computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

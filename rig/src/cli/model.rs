@@ -1,0 +1,55 @@
+//! `muprime model`: evaluates the models.
+
+mod amplitude_for;
+mod conditions;
+mod figures;
+mod plot;
+mod point;
+mod reproduce;
+mod ridge;
+mod store;
+mod table;
+
+use clap::{Args, Subcommand};
+use std::process::ExitCode;
+
+/// Arguments of `muprime model`.
+#[derive(Args)]
+pub struct ModelArgs {
+    #[command(subcommand)]
+    verb: ModelVerb,
+}
+
+#[derive(Subcommand)]
+enum ModelVerb {
+    /// One condition through the spring-slider, the empirical law or the surrogate.
+    Point(point::PointArgs),
+    /// One case of the finite element ridge, to its steady state.
+    Ridge(ridge::RidgeArgs),
+    /// A parametric study on all cores: Fig. 9, or the surrogate's table. Stop it and start it again at will.
+    Table(table::TableArgs),
+    /// The paper's figures recomputed, as CSV and SVG with a line of comparison each.
+    Reproduce(reproduce::ReproduceArgs),
+    /// The amplitude (and relative drive power) for a wanted friction: open-loop control.
+    AmplitudeFor(amplitude_for::AmplitudeForArgs),
+}
+
+/// Runs the subcommand. Bad input is refused with exit status 2.
+///
+/// # Errors
+/// What could not be done for an inner reason, such as a file that cannot be written.
+pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
+    match args.verb {
+        ModelVerb::Point(args) => point::run(&args, json),
+        ModelVerb::Ridge(args) => ridge::run(&args, json),
+        ModelVerb::Table(args) => table::run(&args, json),
+        ModelVerb::Reproduce(args) => reproduce::run(&args, json),
+        ModelVerb::AmplitudeFor(args) => amplitude_for::run(&args, json),
+    }
+}
+
+/// Bad input: says why and gives the exit status of the contract.
+fn refused(why: impl std::fmt::Display) -> miette::Result<ExitCode> {
+    eprintln!("refused: {why}");
+    Ok(ExitCode::from(2))
+}

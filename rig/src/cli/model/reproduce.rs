@@ -1,0 +1,164 @@
+//! `muprime model reproduce`: the paper's figures.
+
+use super::plot::Chart;
+use super::{figures, refused, store};
+use clap::{Args, ValueEnum};
+use miette::{IntoDiagnostic, WrapErr};
+use models::ridge::study::{content_key, fig_9};
+use models::ridge::{RidgeCase, case};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// A figure of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Figure {
+    /// Phase shift against amplitude.
+    Fig4,
+    /// Velocity of ridge and plate, dry skin.
+    Fig5,
+    /// Loading.
+    Fig6,
+    /// Reaction force in time.
+    Fig7,
+    /// Lateral force in a period.
+    Fig8,
+    /// Parametric study.
+    Fig9,
+    /// Spring-slider: forces in a period.
+    Fig10,
+    /// Spring-slider: phase shift.
+    Fig11,
+    /// mu' against Psi.
+    Fig12,
+    /// Spring-slider: slow recovery, in time.
+    Fig13,
+    /// Spring-slider: slow recovery, steady.
+    Fig14,
+    /// All of them.
+    All,
+}
+
+/// Arguments of `muprime model reproduce`.
+#[derive(Args)]
+pub struct ReproduceArgs {
+    /// Which figure
+    #[arg(value_enum)]
+    figure: Figure,
+    /// Folder for CSV and SVG files, and for the study that they come from
+    #[arg(long, default_value = "studies")]
+    out: PathBuf,
+    /// Elements of each mesh, about
+    #[arg(long, default_value_t = case::ELEMENTS)]
+    elements: usize,
+}
+
+/// What a figure gives: its charts, and how it compares with the paper.
+pub struct Reproduced {
+    /// Charts to write.
+    pub charts: Vec<Chart>,
+    /// Lines of comparison.
+    pub lines: Vec<String>,
+}
+
+/// Recomputes the figure or all of them.
+pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
+    if let Err(why) = (RidgeCase { elements: args.elements, ..RidgeCase::paper() }).check() {
+        return refused(why);
+    }
+    std::fs::create_dir_all(&args.out)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot make the folder {}", args.out.display()))?;
+    let wanted: Vec<Figure> = match args.figure {
+        Figure::All => Figure::value_variants().iter().copied().filter(|f| *f != Figure::All).collect(),
+        one => vec![one],
+    };
+    for figure in wanted {
+        let base = RidgeCase { elements: args.elements, ..RidgeCase::paper() };
+        let reproduced = match figure {
+            Figure::Fig4 => figures::phase_shift(base, &args.out)?,
+            Figure::Fig5 => figures::velocities(base)?,
+            Figure::Fig6 => figures::loading(base)?,
+            Figure::Fig7 => figures::reaction_force(base)?,
+            Figure::Fig8 => figures::lateral_force(base)?,
+            Figure::Fig9 => figures::parametric_study(base, &args.out)?,
+            Figure::Fig10 => figures::slider::forces()?,
+            Figure::Fig11 => figures::slider::phase_shift()?,
+            Figure::Fig12 => figures::collapse(base, &args.out)?,
+            Figure::Fig13 => figures::slider::slow_recovery()?,
+            Figure::Fig14 => figures::slider::steady_recovery()?,
+            Figure::All => continue,
+        };
+        let name = figure.to_possible_value().map_or(String::new(), |v| v.get_name().to_string());
+        for chart in &reproduced.charts {
+            chart.write(&args.out)?;
+        }
+        let text = reproduced.lines.join("\n");
+        std::fs::write(args.out.join(format!("{name}.txt")), format!("{text}\n")).into_diagnostic()?;
+        if json {
+            let files: Vec<String> = reproduced.charts.iter().map(|c| format!("{}.csv", c.name)).collect();
+            println!(
+                "{}",
+                serde_json::json!({"figure": name, "files": files, "comparison": reproduced.lines})
+            );
+        } else {
+            println!("{name}\n  {}", text.replace('\n', "\n  "));
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The complete study as one table.
+pub fn write_fig_9_table(file: &Path, base: RidgeCase, results: &store::Results) -> miette::Result<()> {
+    let mut csv = csv::Writer::from_path(file)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot write {}", file.display()))?;
+    csv.write_record([
+        "panel",
+        "value",
+        "amplitude_pp_m",
+        "frequency_hz",
+        "speed_m_s",
+        "normal_force_n",
+        "mu0",
+        "young_modulus_pa",
+        "psi_eq17",
+        "mu_relative",
+        "mu_relative_sd",
+        "reaction_over_load",
+        "contact_fraction",
+        "phase_shift_deg",
+        "period_doubled",
+        "steady",
+        "cycles",
+        "key",
+    ])
+    .into_diagnostic()?;
+    for point in fig_9(base) {
+        let c = &point.case;
+        let key = content_key(c, &super::table::settings());
+        let Some(kept) = results.get(&key) else { continue };
+        let psi = c.speed_m_s / (c.amplitude.metres() * c.frequency_hz * c.mu0 * (1.0 + c.poisson_ratio));
+        csv.write_record([
+            point.panel.variable().to_string(),
+            point.value.to_string(),
+            format!("{:e}", c.amplitude.metres()),
+            c.frequency_hz.to_string(),
+            c.speed_m_s.to_string(),
+            c.normal_force_n.to_string(),
+            c.mu0.to_string(),
+            c.young_modulus_pa.to_string(),
+            format!("{psi:.6}"),
+            format!("{:.6}", kept.mu_relative),
+            format!("{:.6}", kept.mu_relative_sd),
+            format!("{:.6}", kept.reaction_over_load),
+            format!("{:.6}", kept.contact_fraction),
+            kept.phase_shift_deg.map_or(String::new(), |p| format!("{p:.2}")),
+            kept.period_doubled.to_string(),
+            kept.steady.to_string(),
+            kept.cycles.to_string(),
+            key,
+        ])
+        .into_diagnostic()?;
+    }
+    csv.flush().into_diagnostic()
+}

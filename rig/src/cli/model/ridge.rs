@@ -1,0 +1,142 @@
+//! `muprime model ridge`: one case of the finite element model.
+
+use super::conditions::ConditionArgs;
+use super::refused;
+use clap::{Args, ValueEnum};
+use miette::IntoDiagnostic;
+use models::ridge::{
+    self, FrictionRule, RidgeCase, RidgeError, RidgeProfile, RidgeRun, RunSettings, Strain, case,
+};
+use serde::Serialize;
+use std::process::ExitCode;
+use std::time::Instant;
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Profile {
+    Parabola,
+    Ellipse,
+    Flat,
+}
+
+/// Arguments of `muprime model ridge`.
+#[derive(Args)]
+pub struct RidgeArgs {
+    #[command(flatten)]
+    condition: ConditionArgs,
+    /// Young's modulus of the stratum corneum in Pa
+    #[arg(long, default_value_t = 28.3e6, allow_negative_numbers = true)]
+    young_modulus_pa: f64,
+    /// Retardation time of the tissue in s (0: elastic)
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    retardation_time_s: f64,
+    /// Contact penalty over the stratum corneum's modulus
+    #[arg(long, default_value_t = case::PENALTY_RATIO, allow_negative_numbers = true)]
+    penalty_ratio: f64,
+    /// Mean pressure of the gross contact in Pa (from the force, by Hertz, if left out)
+    #[arg(long, allow_negative_numbers = true)]
+    mean_pressure_pa: Option<f64>,
+    /// Mass damping in 1/s
+    #[arg(long, default_value_t = case::MASS_DAMPING_PER_S, allow_negative_numbers = true)]
+    mass_damping_per_s: f64,
+    /// Number of elements, about
+    #[arg(long, default_value_t = case::ELEMENTS)]
+    elements: usize,
+    /// Time step in s (the largest stable one if left out; an unstable one is refused)
+    #[arg(long, allow_negative_numbers = true)]
+    time_step_s: Option<f64>,
+    /// Tolerance on mu' at which the cycles count as steady
+    #[arg(long, default_value_t = 0.004)]
+    tolerance: f64,
+    /// Coulomb's limit at each node instead of for the whole ridge
+    #[arg(long)]
+    local_friction: bool,
+    /// Small strain instead of the velocity strain on the moving geometry
+    #[arg(long)]
+    small_strain: bool,
+    /// Shape of the ridge's top
+    #[arg(long, value_enum, default_value = "parabola")]
+    profile: Profile,
+}
+
+impl RidgeArgs {
+    fn case(&self) -> RidgeCase {
+        let mut case = self.condition.ridge_case(self.mean_pressure_pa);
+        case.young_modulus_pa = self.young_modulus_pa;
+        case.retardation_time_s = self.retardation_time_s;
+        case.penalty_ratio = self.penalty_ratio;
+        case.mass_damping_per_s = self.mass_damping_per_s;
+        case.elements = self.elements;
+        case.friction = if self.local_friction { FrictionRule::Local } else { FrictionRule::Global };
+        case.strain = if self.small_strain { Strain::Small } else { Strain::Objective };
+        case.geometry.profile = match self.profile {
+            Profile::Parabola => RidgeProfile::Parabola,
+            Profile::Ellipse => RidgeProfile::Ellipse,
+            Profile::Flat => RidgeProfile::Flat,
+        };
+        case
+    }
+}
+
+#[derive(Serialize)]
+struct Answer<'a> {
+    #[serde(flatten)]
+    run: &'a RidgeRun,
+    wall_seconds: f64,
+    element_updates_per_second: f64,
+    case: &'a RidgeCase,
+}
+
+/// Runs the case; refuses bad input, and fails with a reason where the run diverged.
+pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
+    let case = args.case();
+    let mut settings = RunSettings { step_s: args.time_step_s, ..RunSettings::default() };
+    settings.steady.tolerance = args.tolerance;
+    if !(args.tolerance > 0.0 && args.tolerance < 1.0) {
+        return refused(format!("--tolerance {}: above 0 and below 1", args.tolerance));
+    }
+    let start = Instant::now();
+    let run = match ridge::run(&case, &settings) {
+        Ok(run) => run,
+        Err(why @ RidgeError::Diverged) => {
+            eprintln!("{why}");
+            return Ok(ExitCode::from(1));
+        }
+        Err(why) => return refused(why),
+    };
+    let wall_seconds = start.elapsed().as_secs_f64();
+    let updates = run.elements as f64 * run.steps as f64;
+    let answer =
+        Answer { run: &run, wall_seconds, element_updates_per_second: updates / wall_seconds, case: &case };
+    if json {
+        println!("{}", serde_json::to_string(&answer).into_diagnostic()?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!(
+        "mu' = {:.4} +- {:.4}   (exponential with 2.38: {:.4})",
+        run.mu_relative,
+        run.mu_relative_sd,
+        models::psi::relative_friction(models::psi::PsiEq17(run.psi_eq17), models::psi::PSI_STAR)
+    );
+    println!(
+        "lateral force {:.5} N, mean reaction {:.5} N for {} N applied, greatest {:.4} N",
+        run.lateral_force_n, run.mean_reaction_force_n, case.normal_force_n, run.peak_reaction_force_n
+    );
+    println!(
+        "contact {:.1} % of the time, phase shift {}, {}{}",
+        100.0 * run.contact_fraction,
+        run.phase_shift_deg.map_or("none".into(), |p| format!("{p:.1} deg")),
+        if run.steady { "steady" } else { "NOT steady" },
+        if run.period_doubled { ", period doubled" } else { "" }
+    );
+    println!(
+        "{} elements, {} cycles ({} averaged), {} steps of {:.2e} s, {:.2} s, {:.0} million element updates/s",
+        run.elements,
+        run.cycles,
+        run.averaged_cycles,
+        run.steps,
+        run.step_s,
+        wall_seconds,
+        answer.element_updates_per_second / 1e6
+    );
+    Ok(ExitCode::SUCCESS)
+}
