@@ -1,7 +1,7 @@
 //! Small CSV tables by column name, with the line of whatever cannot be read.
 
 use calibration::certificate::RawData;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Bytes of the data files that one certificate rests on, in order.
 #[derive(Default)]
