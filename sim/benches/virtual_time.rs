@@ -58,9 +58,15 @@ fn simulated_second(bencher: Bencher, defect: &str) {
     run(bencher, &config);
 }
 
-#[divan::bench]
-fn simulated_second_every_cycle_marched(bencher: Bencher) {
-    run(bencher, &WorldConfig { contact: ContactMode::Resolved, ..WorldConfig::ideal() });
+/// Every cycle of the plate solved: `massless` has no memory from cycle to cycle, a ridge with mass is marched.
+#[divan::bench(args = ["massless", "mass"])]
+fn simulated_second_every_cycle(bencher: Bencher, ridge: &str) {
+    let mut config = WorldConfig { contact: ContactMode::Resolved, ..WorldConfig::ideal() };
+    if ridge == "mass" {
+        config.finger.ridge_mass_kg = 1e-6;
+        config.finger.ridge_damping_ratio = 0.3;
+    }
+    run(bencher, &config);
 }
 
 fn contact() -> Contact {

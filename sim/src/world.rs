@@ -19,7 +19,7 @@ use crate::amplifier::{Amplifier, AmplifierInput, AmplifierStatus};
 use crate::channel::{ChannelName, Gate};
 use crate::contact::averaged::Averager;
 use crate::contact::resolved::March;
-use crate::contact::{Contact, Motion, Steady};
+use crate::contact::{Contact, Motion, Recovery, Steady};
 use crate::defects::{Forces, Surroundings};
 use crate::finger::{Finger, Pad};
 use crate::noise::Noise;
@@ -224,19 +224,17 @@ impl World {
         let point = Point { at: *at, known_pp_m: known_pp, speed_m_s: speed.max(STILL_M_S) };
         let contact = steady_contact(&self.finger, &self.config.defects, &point);
         let pp = 2.0 * contact.sine_amplitude_m;
-        let steady = match self.config.contact {
-            // The march knows one ridge on a plain sine; other shapes are averaged in either mode.
-            ContactMode::Resolved
-                if contact.sine_amplitude_m > 1e-10
-                    && contact.motion == Motion::default()
-                    && contact.ridge.height_sd_m == 0.0 =>
-            {
-                self.march_tick(&contact, dt)
-            }
-            _ => {
-                self.march = None;
-                self.averager.steady(&contact)
-            }
+        // Only mass and late recovery carry anything from one cycle to the next; the march knows them for one ridge on a
+        // plain sine. Every other contact is periodic from its first cycle: its steady state is its every cycle.
+        let remembers = contact.has_inertia() || contact.recovery != Recovery::Instant;
+        let plain = contact.motion == Motion::default() && contact.ridge.height_sd_m == 0.0;
+        let steady = if self.config.contact == ContactMode::Averaged {
+            self.averager.steady(&contact)
+        } else if remembers && plain && contact.sine_amplitude_m > 1e-10 {
+            self.march_tick(&contact, dt)
+        } else {
+            self.march = None;
+            contact.steady()
         };
         (pp, steady)
     }
