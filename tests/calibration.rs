@@ -7,6 +7,8 @@
 mod amplitude;
 #[path = "calibration/bench.rs"]
 mod bench;
+#[path = "calibration/closing.rs"]
+mod closing;
 #[path = "calibration/finger.rs"]
 mod finger;
 #[path = "calibration/force.rs"]

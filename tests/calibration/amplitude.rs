@@ -107,6 +107,7 @@ fn ci(outcome: &Outcome, name: &str) -> [f64; 2] {
 fn gain_resonance_droop_are_covered_as_stated() {
     let (mut gain, mut resonance, mut quality, mut drooped) =
         (Coverage::default(), Coverage::default(), Coverage::default(), Coverage::default());
+    let mut refused = 0;
     for trial in 0..TRIALS {
         let mut draw = Noise::new(seed(trial), "amplitude truth");
         let load_ratio = draw.log_between(0.05, 0.5);
@@ -136,8 +137,12 @@ fn gain_resonance_droop_are_covered_as_stated() {
             .flat_map(|k| [f64::from(k) * 0.15; 3])
             .map(|n| AmplitudePoint { at: n, amplitude_pp_m: bench.measure(2e-6, tuned, 0.0, n) })
             .collect();
-        let Ok(gain_fit) = fit(&table, Form::Proportional, SCALE_SD) else { continue };
-        let Ok(droop_fit) = droop(&loads, Exponent::Hertz) else { continue };
+        let (gain_fit, droop_fit) =
+            (fit(&table, Form::Proportional, SCALE_SD), droop(&loads, Exponent::Hertz));
+        let (Ok(gain_fit), Ok(droop_fit)) = (gain_fit, droop_fit) else {
+            refused += 1;
+            continue;
+        };
         let whole = AmplitudeFit {
             gain: gain_fit,
             set_point_unit: "m".into(),
@@ -164,6 +169,8 @@ fn gain_resonance_droop_are_covered_as_stated() {
             assert!((use_it.amplitude(s, 0.0, 0.5).metres() / w.metres() - 1.0).abs() < 1e-12);
         }
     }
+    println!("refused: {refused} of {TRIALS}");
+    assert!(refused <= 8, "at most 2 % of good tables may be refused");
     gain.judge("amplitude gain");
     resonance.judge("resonance frequency");
     quality.judge("quality factor");

@@ -63,31 +63,32 @@ fn skin(
     (plate, skin, (360.0 * F * (peaks[1].1 - peaks[0].1)).rem_euclid(360.0))
 }
 
-/// What the surface did one delay ago, sampled now: linear interpolation is not enough, so the whole record
-/// is shifted by whole fine steps before sampling in [`skin`]; here the delay is made by a sine series.
-fn delayed(samples: &[f64], delay_s: f64) -> Vec<f64> {
-    // Exact for a periodic record: every line of its discrete spectrum is turned by its own phase.
+/// The lines of a periodic record: number, cosine and sine part.
+fn lines(samples: &[f64]) -> Vec<(f64, f64, f64)> {
     let n = samples.len();
-    let lines = n / 2;
-    let mut out = vec![samples.iter().sum::<f64>() / n as f64; n];
-    for k in 1..lines {
-        let w = 2.0 * PI * k as f64 / n as f64;
-        let (mut re, mut im) = (0.0, 0.0);
-        for (i, s) in samples.iter().enumerate() {
-            let (sin, cos) = (w * i as f64).sin_cos();
-            re += s * cos;
-            im += s * sin;
-        }
-        let size = re.hypot(im) * 2.0 / n as f64;
-        if size < 1e-9 {
-            continue;
-        }
-        for (i, o) in out.iter_mut().enumerate() {
-            let (sin, cos) = (w * (i as f64 - delay_s * RATE)).sin_cos();
-            *o += (re * cos + im * sin) * 2.0 / n as f64;
-        }
-    }
-    out
+    (0..n / 2)
+        .map(|k| {
+            let w = 2.0 * PI * k as f64 / n as f64;
+            let part = |f: fn(f64) -> f64| {
+                samples.iter().enumerate().map(|(i, s)| s * f(w * i as f64)).sum::<f64>() * 2.0 / n as f64
+            };
+            let half = if k == 0 { 0.5 } else { 1.0 };
+            (k as f64, half * part(f64::cos), half * part(f64::sin))
+        })
+        .filter(|(_, re, im)| re.hypot(*im) > 1e-6)
+        .collect()
+}
+
+/// The record one delay later, exactly: each of its lines turned by its own phase.
+fn delayed(lines: &[(f64, f64, f64)], n: usize, delay_s: f64) -> Vec<f64> {
+    let at = |i: usize| {
+        let t = i as f64 - delay_s * RATE;
+        lines.iter().map(move |(k, re, im)| {
+            let (s, c) = (2.0 * PI * k / n as f64 * t).sin_cos();
+            re * c + im * s
+        })
+    };
+    (0..n).map(|i| at(i).sum()).collect()
 }
 
 #[test]
@@ -102,12 +103,13 @@ fn phase_shifts_over_ten_repeats_are_covered_as_stated() {
         let (plate, moved, truth) = skin(&mut draw, natural, zeta, bend, 400);
         let stated = Decoder { name: "VD-02".into(), range_m_s_per_v: 0.125, delay_s: 8.16e-6 };
         let error = delay_sd * draw.normal();
-        let late_plate = delayed(&plate, stated.delay_s);
+        let (plate_lines, skin_lines) = (lines(&plate), lines(&moved));
+        let late_plate = delayed(&plate_lines, plate.len(), stated.delay_s);
         let shifts: Vec<Shift> = (0..10)
             .map(|_| {
                 // The finger is never put on twice alike: three degrees from repeat to repeat.
                 let wobble = 3.0 / 360.0 / F * draw.normal();
-                let late_skin = delayed(&moved, stated.delay_s + error + wobble);
+                let late_skin = delayed(&skin_lines, moved.len(), stated.delay_s + error + wobble);
                 let mut volts = |v: &[f64]| -> Vec<f64> {
                     v.iter().map(|v| (v + 2e-3 * draw.normal()) / stated.range_m_s_per_v).collect()
                 };

@@ -66,7 +66,7 @@ pub fn series(setup: Option<&str>, average_s: f64) -> miette::Result<String> {
             Ok(t) => {
                 eprintln!("  lateral {:.2}, normal {:.2} counts{}", t.counts[0], t.counts[1], t.note);
                 rows.push(format!(
-                    "{:.3},{axis},{mass},{},{},{branch},{}",
+                    "{:.6},{axis},{mass},{},{},{branch},{}",
                     time_s + 0.5 * t.length_s,
                     t.counts[0],
                     t.counts[1],
