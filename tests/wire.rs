@@ -2,8 +2,12 @@
 
 #[path = "wire/bench.rs"]
 mod bench;
+#[path = "wire/documents.rs"]
+mod documents;
 #[path = "wire/lines.rs"]
 mod lines;
+#[path = "wire/main_job.rs"]
+mod main_job;
 #[path = "wire/modbus_tcp.rs"]
 mod modbus_tcp;
 #[path = "wire/peers.rs"]

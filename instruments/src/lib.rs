@@ -15,9 +15,11 @@
 //! | [`field`] | one number in a frame: type, byte order, bit range |
 //! | [`codec`] | frames of the wires themselves |
 //! | [`vector`] | golden vectors: bytes beside the values they stand for |
+//! | [`document`] | a profile as a page for people |
 //! | [`error`] | what is wrong with a profile, where, and what to do |
 
 pub mod codec;
+pub mod document;
 pub mod error;
 pub mod expression;
 pub mod field;

@@ -5,21 +5,11 @@ use rig::drivers::{self, InstrumentSetup, InstrumentsSetup};
 use sim::wire::{Command, Quantity};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-/// A file of the repository.
-pub fn file(path: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
-}
-
-/// The Python of the peers. Missing peers fail: nothing is skipped.
-pub fn python() -> std::process::Command {
-    let python = file("target/venv/bin/python");
-    assert!(python.exists(), "{} is missing: run tests/venv", python.display());
-    std::process::Command::new(python)
-}
+pub use tests::{file, python};
 
 /// A program that ends with the test.
 pub struct Peer(pub Child);
@@ -42,7 +32,7 @@ pub fn start(command: &mut std::process::Command) -> (Peer, String) {
 
 /// Lateral and normal counts of each row of the recording, by the rule that its README states.
 #[allow(clippy::cast_possible_truncation)]
-fn recorded_counts(path: &PathBuf) -> Vec<(i64, i64)> {
+fn recorded_counts(path: &Path) -> Vec<(i64, i64)> {
     let text = std::fs::read_to_string(path).unwrap();
     let rows: Vec<Vec<f64>> = text
         .lines()

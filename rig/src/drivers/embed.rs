@@ -59,7 +59,12 @@ pub fn embed(
     let InstrumentsSetup { force, amplifier, stage } = setup;
     let mut all: Vec<&mut InstrumentSetup> = force.iter_mut().chain([amplifier, stage]).collect();
     for instrument in &mut all {
-        let profile = super::profile(&instrument.profile).map_err(|error| error.to_string())?;
+        let mut profile = super::profile(&instrument.profile).map_err(|error| error.to_string())?;
+        if let Some(rate) = instrument.rate_hz {
+            // What comes by itself comes as often as the setup expects it.
+            let unasked = profile.description.message.iter_mut().filter(|message| message.request.is_none());
+            unasked.for_each(|message| message.rate_hz = rate);
+        }
         let link = profile.description.link.clone();
         let device = Device::new(profile).map_err(|error| error.to_string())?;
         let failed = |error: std::io::Error| format!("{} cannot be served: {error}", instrument.profile);
