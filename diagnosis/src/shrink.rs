@@ -138,7 +138,7 @@ pub fn departure_at(
     change.component_mul(&delta)
 }
 
-/// Predicts each region from the rest, by the hypothesis' form alone.
+/// Predicts each region from the rest, by the hypothesis with its smooth departure from form.
 pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
     let problem = &fitted.problem;
     // Regions are judged in deviations of a pass, where a gap shows wherever it can be measured.
@@ -146,12 +146,12 @@ pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
     regions(problem)
         .into_par_iter()
         .map(|(name, rows)| {
-            let (plain, _) = predict_left_out(fitted, &best.members, best, &rows);
+            let (_, model) = predict_left_out(fitted, &best.members, best, &rows);
             let kept: Vec<usize> = (0..problem.len()).filter(|i| rows.binary_search(i).is_err()).collect();
             let rest = problem.select(&kept);
             let base = minimise(&rest, &[], &fitted.none.u, &rest.variance, 6);
             let baseline = problem.select(&rows).predict(&[], &base.u);
-            let errors = errors(problem, &sd, &rows, &baseline, &plain);
+            let errors = errors(problem, &sd, &rows, &baseline, &model);
             Region { name, rows, errors }
         })
         .collect()
@@ -193,24 +193,32 @@ impl Gate {
     }
 }
 
+/// Deviations of its sampling error that a residual is granted before it counts as left open.
+const GRANTED: f64 = 1.5;
+
 /// Judges the regions: those count whose gap stands above the floor's own scatter.
+///
+/// What is left is granted its sampling error, the root of twice the number of passes in units of the floor: a
+/// small gap cannot be shown to stay open by noise alone.
 pub fn gate(regions: &[Region]) -> Gate {
-    let mut pooled = Errors::default();
+    let share = |gap: f64, left: f64| (gap > 0.0).then(|| 1.0 - (left.max(0.0) / gap).sqrt());
+    let (mut gap, mut left, mut passes) = (0.0, 0.0, 0.0);
     let (mut carrying, mut closed) = (0, 0);
     for r in regions {
         let e = &r.errors;
         let n = e.passes as f64;
-        pooled.recalibrated += e.recalibrated * n;
-        pooled.after += e.after * n;
-        pooled.floor += e.floor * n;
-        if e.recalibrated > e.floor * (1.0 + 3.0 * (2.0 / n).sqrt()) {
+        let scatter = e.floor * n * (2.0 / n).sqrt();
+        let (own_gap, own_left) = ((e.recalibrated - e.floor) * n, (e.after - e.floor) * n);
+        gap += own_gap;
+        left += own_left;
+        passes += n * e.floor * e.floor;
+        if own_gap > 3.0 * scatter {
             carrying += 1;
-            // A residual within the floor's own scatter is closed, whatever the ratio of two small numbers says.
-            let at_floor = e.after <= e.floor * (1.0 + 2.0 * (2.0 / n).sqrt());
-            if at_floor || e.closed().is_some_and(|c| c > 0.5) {
+            if share(own_gap, own_left - GRANTED * scatter).is_some_and(|c| c > 0.5) {
                 closed += 1;
             }
         }
     }
-    Gate { pooled: pooled.closed().unwrap_or(1.0), carrying, closed }
+    let pooled = share(gap, left - GRANTED * (2.0 * passes).sqrt()).unwrap_or(1.0);
+    Gate { pooled, carrying, closed }
 }

@@ -12,11 +12,11 @@ use nalgebra::{DMatrix, DVector};
 
 /// Lengths of the wildcard in standard deviations of each covariate.
 pub const LENGTHS: Lengths = Lengths { condition: 1.2, time: 0.8, position: 0.8 };
-const RANK: usize = 60;
+const RANK: usize = 44;
 /// Scales of the friction-like part, of the direction-odd part, and of the white excess.
-const FRICTION: [f64; 5] = [0.0, 0.05, 0.15, 0.45, 1.3];
-const ODD: [f64; 4] = [0.0, 0.03, 0.12, 0.5];
-const WHITE: [f64; 4] = [0.0, 0.04, 0.12, 0.4];
+const FRICTION: [f64; 6] = [0.0, 0.015, 0.05, 0.15, 0.45, 1.3];
+const ODD: [f64; 4] = [0.0, 0.012, 0.06, 0.4];
+const WHITE: [f64; 4] = [0.0, 0.02, 0.08, 0.3];
 
 /// The wildcard fitted to a table.
 pub struct Wildcard {
