@@ -60,7 +60,7 @@ pub fn decide(fitted: &Fitted) -> Decision {
     let regions = left_out_regions(fitted, &candidates[leader].best);
     let judged = gate(&regions);
     let claimed = none < NO_CLAIM;
-    if claimed && !judged.passes() {
+    if claimed && !judged.passes(candidates[leader].effects.len()) {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
         for p in &mut probabilities {
             unknown += *p * (1.0 - FAILED_GATE);
@@ -112,7 +112,11 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
             })
             .map(|i| {
                 // The least that any of its laws leaves: a poor law is no second cause.
-                let least = fitted.candidates[i].laws.iter().map(|(_, e)| left(&e.prediction)).fold(f64::INFINITY, f64::min);
+                let least = fitted.candidates[i]
+                    .laws
+                    .iter()
+                    .map(|(_, e)| left(&e.prediction))
+                    .fold(f64::INFINITY, f64::min);
                 (i, least)
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));

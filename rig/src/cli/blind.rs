@@ -49,7 +49,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(folder) = &args.write {
         for set in crate::blind::sets(args.seed, args.sets, stratum) {
             let name = format!("{:06}", set.label.seed % 1_000_003);
-            set.write(&folder.join("open").join(&name), &folder.join("sealed").join(&name)).into_diagnostic()?;
+            set.write(&folder.join("open").join(&name), &folder.join("sealed").join(&name))
+                .into_diagnostic()?;
         }
         return Ok(ExitCode::SUCCESS);
     }
