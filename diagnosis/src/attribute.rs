@@ -39,25 +39,28 @@ pub struct Decision {
 const ALIAS_NATS: f64 = 5.0;
 /// Probability that a name needs.
 const NAME: f64 = 0.9;
+/// Share of its class that a name needs beside others that the data all but equals.
+const ALONE: f64 = 0.93;
 /// Probability of no gap above which none is claimed.
 const NO_CLAIM: f64 = 0.1;
 /// Share of a candidate's probability that survives when its regions fail.
 const FAILED_GATE: f64 = 0.03;
-/// Share of the gap that the best single must leave before a pair is believed.
-const PAIR_GAIN: f64 = 0.2;
+/// Share of the gap's chi2 that the best single must leave before a pair is believed.
+const PAIR_GAIN: f64 = 0.08;
 
 /// Decides.
 pub fn decide(fitted: &Fitted) -> Decision {
     let candidates = &fitted.candidates;
     let mut probabilities: Vec<f64> = candidates.iter().map(|c| c.probability).collect();
     let (none, mut unknown) = (fitted.none_probability, fitted.unknown_probability);
+    fold_pairs(fitted, &mut probabilities);
     let leader = (0..candidates.len())
         .max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)))
         .expect("the library is not empty");
     let regions = left_out_regions(fitted, &candidates[leader].best);
     let judged = gate(&regions);
     let claimed = none < NO_CLAIM;
-    if claimed && !judged.passes() {
+    if claimed && !judged.passes(candidates[leader].effects.len()) {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
         for p in &mut probabilities {
             unknown += *p * (1.0 - FAILED_GATE);
@@ -70,7 +73,7 @@ pub fn decide(fitted: &Fitted) -> Decision {
         Verdict::NoGap
     } else if unknown >= in_class {
         Verdict::Unknown
-    } else if in_class >= NAME && class.len() == 1 {
+    } else if in_class >= NAME && probabilities[leader] >= ALONE * in_class {
         Verdict::Named
     } else {
         Verdict::Ambiguous
@@ -90,7 +93,39 @@ fn alias_class(candidates: &[Candidate], leader: usize) -> Vec<usize> {
     class
 }
 
-/// True where a pair earns its second name: the best single of its members leaves a fifth of the gap.
-pub fn pair_earns(single_left: f64, pair_left: f64, gap: f64) -> bool {
-    gap > 0.0 && (single_left - pair_left) / gap >= PAIR_GAIN * PAIR_GAIN
+/// A pair whose better member alone leaves little of the gap is that single with a form of its own: its weight
+/// goes to the single.
+fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
+    let problem = &fitted.problem;
+    let left = |m: &nalgebra::DVector<f64>| -> f64 {
+        (0..problem.len()).map(|i| (problem.lateral[i] - m[i]).powi(2) / problem.variance[i] - 1.0).sum()
+    };
+    let gap = left(&fitted.none.prediction);
+    for pair in 0..fitted.candidates.len() {
+        if fitted.candidates[pair].effects.len() < 2 || probabilities[pair] < 1e-6 {
+            continue;
+        }
+        let members = &fitted.candidates[pair].effects;
+        let single = (0..fitted.candidates.len())
+            .filter(|&i| {
+                fitted.candidates[i].effects.len() == 1 && members.contains(&fitted.candidates[i].effects[0])
+            })
+            .map(|i| {
+                // The least that any of its laws leaves: a poor law is no second cause.
+                let least = fitted.candidates[i]
+                    .laws
+                    .iter()
+                    .map(|(_, e)| left(&e.prediction))
+                    .fold(f64::INFINITY, f64::min);
+                (i, least)
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((single, least)) = single
+            && gap > 0.0
+            && least < PAIR_GAIN * gap
+        {
+            probabilities[single] += probabilities[pair];
+            probabilities[pair] = 0.0;
+        }
+    }
 }

@@ -14,11 +14,13 @@ const STARTS: (usize, usize) = (4, 2);
 fn grid(parameters: &[Parameter], stroke: f64) -> Vec<Vec<f64>> {
     let mut list: Vec<Vec<f64>> = vec![Vec::new()];
     let fine = parameters.iter().any(is_wavelength);
-    for p in parameters {
+    for (index, p) in parameters.iter().enumerate() {
         let (low, high) = p.coordinate_bounds();
         let values: Vec<f64> = match p.prior {
             Prior::HalfNormal(_) if fine => vec![0.4, 1.5],
             Prior::HalfNormal(_) => vec![0.04, 0.12, 0.35, 0.9, 2.0, 4.5],
+            // Further signed parameters enter smoothly: the local fit finds them from zero.
+            Prior::Normal(_) if index > 0 => vec![0.0],
             Prior::Normal(_) => vec![-3.0, -1.2, -0.4, -0.1, 0.1, 0.4, 1.2, 3.0],
             Prior::LogNormal(..) => vec![-2.0, -1.0, 0.0, 1.0, 2.0],
             Prior::Uniform(a, b) if is_wavelength(p) => {

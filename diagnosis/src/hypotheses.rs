@@ -253,7 +253,9 @@ fn usable(effect: usize, law: usize, table: &Table) -> bool {
     let span = temperatures.iter().copied().fold(f64::NEG_INFINITY, f64::max)
         - temperatures.iter().copied().fold(f64::INFINITY, f64::min);
     match form.name {
-        "warming (temperature)" => temperatures.len() == table.len() && span > 0.3,
+        "warming (temperature)" | "warming about a tuning point" | "offset with temperature" => {
+            temperatures.len() == table.len() && span > 0.3
+        }
         "fixed resonance" => {
             let first = table.passes[0].frequency_hz;
             table.passes.iter().any(|p| (p.frequency_hz / first - 1.0).abs() > 1e-3)

@@ -11,15 +11,20 @@ use effects::Operating;
 use nalgebra::{DMatrix, DVector};
 
 /// Lengths of the wildcard in standard deviations of each covariate.
-pub const LENGTHS: Lengths = Lengths { condition: 1.2, time: 0.8, position: 0.8 };
-const RANK: usize = 60;
+pub const LENGTHS: [Lengths; 2] = [
+    Lengths { condition: 1.2, time: 0.8, position: 0.8 },
+    // As smooth as the form uncertainty of a named effect: what that can follow, the open set can follow too.
+    Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY },
+];
+const RANK: usize = 56;
 /// Scales of the friction-like part, of the direction-odd part, and of the white excess.
-const FRICTION: [f64; 5] = [0.0, 0.05, 0.15, 0.45, 1.3];
-const ODD: [f64; 4] = [0.0, 0.03, 0.12, 0.5];
-const WHITE: [f64; 4] = [0.0, 0.04, 0.12, 0.4];
+const FRICTION: [f64; 6] = [0.0, 0.015, 0.05, 0.15, 0.45, 1.3];
+const ODD: [f64; 4] = [0.0, 0.012, 0.06, 0.4];
+const WHITE: [f64; 4] = [0.0, 0.02, 0.08, 0.3];
 
 /// The wildcard fitted to a table.
 pub struct Wildcard {
+    lengths: Lengths,
     coordinates: Coordinates,
     kernel: Kernel,
     /// Log evidence over the grid without the point where all scales vanish.
@@ -43,7 +48,7 @@ fn rows(
     center: &[f64],
     passes: &[Operating],
     coordinates: &Coordinates,
-    kernel: &Kernel,
+    (kernel, lengths): (&Kernel, &Lengths),
     parts: (f64, f64),
 ) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
     let baseline = problem.predict_at(&[], center, passes);
@@ -53,7 +58,7 @@ fn rows(
     let mut sizes = Vec::with_capacity(passes.len());
     for (i, p) in passes.iter().enumerate() {
         let size = scale(baseline[i], mu0 * p.normal_force_n);
-        let basis = kernel.basis(&coordinates.place(p, problem.design.largest_amplitude_m, &LENGTHS));
+        let basis = kernel.basis(&coordinates.place(p, problem.design.largest_amplitude_m, lengths));
         for (j, b) in basis.iter().enumerate() {
             phi[(i, j)] = parts.0 * p.direction * size * b;
             phi[(i, r + j)] = parts.1 * size * b;
@@ -73,18 +78,26 @@ fn rows(
 }
 
 impl Wildcard {
-    /// Fits the wildcard about the baseline at `center` (nuisance coordinates).
+    /// Fits the wildcard about the baseline at `center` (nuisance coordinates): the better of two smoothnesses,
+    /// with the evidence of both.
     pub fn fit(table: &Table, problem: &Problem, center: &[f64]) -> Self {
+        let [a, b] = LENGTHS.map(|lengths| Self::with_lengths(table, problem, center, lengths));
+        let both = log_sum_exp(&[a.log_evidence, b.log_evidence]) - std::f64::consts::LN_2;
+        let better = if a.log_evidence >= b.log_evidence { a } else { b };
+        Wildcard { log_evidence: both, ..better }
+    }
+
+    fn with_lengths(table: &Table, problem: &Problem, center: &[f64], lengths: Lengths) -> Self {
         let coordinates = Coordinates::of(table);
         let places: Vec<_> = problem
             .passes
             .iter()
-            .map(|p| coordinates.place(p, problem.design.largest_amplitude_m, &LENGTHS))
+            .map(|p| coordinates.place(p, problem.design.largest_amplitude_m, &lengths))
             .collect();
         let kernel = Kernel::new(&places, RANK, 0.02);
         let r = kernel.rank();
         let (baseline, phi, sizes) =
-            rows(problem, center, &problem.passes, &coordinates, &kernel, (1.0, 1.0));
+            rows(problem, center, &problem.passes, &coordinates, (&kernel, &lengths), (1.0, 1.0));
         let n = problem.len();
         let residual = DVector::from_fn(n, |i, _| problem.lateral[i] - baseline[i]);
         // The nuisances' prior is centred on the nominal values, not on where the baseline was recalibrated.
@@ -157,6 +170,7 @@ impl Wildcard {
             - scaled.columns(2 * r, NUISANCES) * DVector::from_column_slice(&center[..NUISANCES])
             + &scaled * &weights;
         Wildcard {
+            lengths,
             coordinates,
             kernel,
             log_evidence,
@@ -171,8 +185,14 @@ impl Wildcard {
 
     /// Predicted lateral force and its standard deviation (without pass scatter) at other conditions, N.
     pub fn predict(&self, problem: &Problem, passes: &[Operating]) -> (Vec<f64>, Vec<f64>) {
-        let (baseline, phi, _) =
-            rows(problem, &self.center, passes, &self.coordinates, &self.kernel, (self.friction, self.odd));
+        let (baseline, phi, _) = rows(
+            problem,
+            &self.center,
+            passes,
+            &self.coordinates,
+            (&self.kernel, &self.lengths),
+            (self.friction, self.odd),
+        );
         let r = self.kernel.rank();
         let shift = phi.columns(2 * r, NUISANCES) * DVector::from_column_slice(&self.center[..NUISANCES]);
         let mean = baseline - shift + &phi * &self.weights;

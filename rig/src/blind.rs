@@ -174,17 +174,26 @@ pub fn run(
     (0..count as u64)
         .into_par_iter()
         .map(|k| {
-            let own = seed.wrapping_mul(1_000_003).wrapping_add(k);
-            let stratum = stratum.unwrap_or_else(|| Stratum::draw(own));
-            let ask = match stratum {
-                Stratum::Single | Stratum::Alias => Ask::Imitators,
-                _ => Ask::Gain,
-            };
-            let scored = score(&generate(own, stratum, ask), options)?;
+            let scored = score(&set(seed, k, stratum), options)?;
             progress(&scored);
             Ok(scored)
         })
         .collect()
+}
+
+/// The sets that [`run`] scores, one after another.
+pub fn sets(seed: u64, count: usize, stratum: Option<Stratum>) -> impl Iterator<Item = Set> {
+    (0..count as u64).map(move |k| set(seed, k, stratum))
+}
+
+fn set(seed: u64, k: u64, stratum: Option<Stratum>) -> Set {
+    let own = seed.wrapping_mul(1_000_003).wrapping_add(k);
+    let stratum = stratum.unwrap_or_else(|| Stratum::draw(own));
+    let ask = match stratum {
+        Stratum::Single | Stratum::Alias => Ask::Imitators,
+        _ => Ask::Gain,
+    };
+    generate(own, stratum, ask)
 }
 
 /// One figure of the table.

@@ -41,6 +41,10 @@ pub struct Contact {
     pub inverse_recovery_speed: f64,
     /// Relaxation time of the lateral stretch out of contact, s. 0 in the baseline.
     pub lateral_relaxation_time: f64,
+    /// Exponent of that relaxation: 1 exponential, less for a broad spectrum of times.
+    pub lateral_relaxation_exponent: f64,
+    /// True: finite recovery holds in flight only, and in contact the stretch follows the limit down at once.
+    pub instant_slip_back: bool,
     /// Time in which bonds form after touch-down, s. 0 in the baseline.
     pub bonding_time: f64,
     /// Exponent of the growth of bonds: 1 first order, 0.5 stretched.

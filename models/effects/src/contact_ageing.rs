@@ -5,12 +5,19 @@ use crate::prelude::*;
 /// See the module.
 pub struct ContactAgeing;
 
-static LAWS: [Law; 3] = [
+static LAWS: [Law; 4] = [
     Law { name: "first order", parameters: &[Parameter::positive("bonding_time", "s", 15e-6, 1e-3)] },
     Law { name: "stretched (root)", parameters: &[Parameter::positive("bonding_time", "s", 15e-6, 1e-3)] },
     Law {
         name: "by mean contact time",
         parameters: &[Parameter::positive("bonding_time", "s", 10e-6, 1e-3)],
+    },
+    Law {
+        name: "a share at once, the rest by mean contact time",
+        parameters: &[
+            Parameter::positive("bonding_time", "s", 15e-6, 1e-3),
+            Parameter::between("share_that_waits", "1", 0.1, 1.0),
+        ],
     },
 ];
 
@@ -41,7 +48,8 @@ impl Effect for ContactAgeing {
             let phi = crate::contact::half_contact_angle(c.load_ratio(), 0.0);
             if phi < std::f64::consts::PI {
                 let time = phi / (std::f64::consts::PI * c.frequency);
-                c.mu0 *= time / (time + theta[0]);
+                let bound = time / (time + theta[0]);
+                c.mu0 *= if law == 2 { bound } else { 1.0 - theta[1] * (1.0 - bound) };
             }
         }
     }

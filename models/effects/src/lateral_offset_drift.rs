@@ -5,7 +5,7 @@ use crate::prelude::*;
 /// See the module.
 pub struct LateralOffsetDrift;
 
-static LAWS: [Law; 3] = [
+static LAWS: [Law; 5] = [
     Law { name: "constant", parameters: &[Parameter::signed("offset", "N", 0.01, -0.3, 0.3)] },
     Law { name: "linear drift", parameters: &[Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4)] },
     Law {
@@ -13,6 +13,21 @@ static LAWS: [Law; 3] = [
         parameters: &[
             Parameter::signed("change", "N", 0.015, -0.4, 0.4),
             Parameter::shape("time_constant_over_duration", "1", 0.3, 0.8),
+        ],
+    },
+    Law {
+        name: "offset with curved drift",
+        parameters: &[
+            Parameter::signed("offset", "N", 0.01, -0.3, 0.3),
+            Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4),
+            Parameter::signed("curvature_over_table", "N", 0.015, -0.4, 0.4),
+        ],
+    },
+    Law {
+        name: "offset with temperature",
+        parameters: &[
+            Parameter::signed("offset", "N", 0.01, -0.3, 0.3),
+            Parameter::signed("per_kelvin", "N/K", 0.003, -0.1, 0.1),
         ],
     },
 ];
@@ -41,6 +56,11 @@ impl Effect for LateralOffsetDrift {
         reading.offset_n += match law {
             0 => theta[0],
             1 => theta[0] * s,
+            3 => theta[0] + theta[1] * (s - 0.5) + theta[2] * ((2.0 * s - 1.0).powi(2) - 1.0 / 3.0),
+            4 => {
+                let warmer = pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
+                theta[0] + theta[1] * warmer
+            }
             _ => -theta[0] * (-s / theta[1]).exp_m1(),
         };
     }

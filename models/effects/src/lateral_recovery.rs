@@ -5,12 +5,23 @@ use crate::prelude::*;
 /// See the module.
 pub struct LateralRecovery;
 
-static LAWS: [Law; 2] = [
+static LAWS: [Law; 4] = [
     Law {
         name: "rate limit",
         parameters: &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)],
     },
     Law { name: "exponential", parameters: &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)] },
+    Law {
+        name: "spectrum of times, in flight",
+        parameters: &[
+            Parameter::positive("relaxation_time", "s", 30e-6, 1e-3),
+            Parameter::between("exponent", "1", 0.2, 1.6),
+        ],
+    },
+    Law {
+        name: "rate limit, in flight",
+        parameters: &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)],
+    },
 ];
 
 impl Effect for LateralRecovery {
@@ -35,7 +46,16 @@ impl Effect for LateralRecovery {
     fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
         match law {
             0 => c.inverse_recovery_speed = theta[0],
-            _ => c.lateral_relaxation_time = theta[0],
+            1 => c.lateral_relaxation_time = theta[0],
+            2 => {
+                c.lateral_relaxation_time = theta[0];
+                c.lateral_relaxation_exponent = theta[1];
+                c.instant_slip_back = true;
+            }
+            _ => {
+                c.inverse_recovery_speed = theta[0];
+                c.instant_slip_back = true;
+            }
         }
     }
 }

@@ -88,6 +88,8 @@ impl Baseline {
             reference_load: design.reference_load_n,
             inverse_recovery_speed: 0.0,
             lateral_relaxation_time: 0.0,
+            lateral_relaxation_exponent: 1.0,
+            instant_slip_back: false,
             bonding_time: 0.0,
             bonding_exponent: 1.0,
             asperity_height: 0.0,

@@ -5,7 +5,7 @@ use crate::prelude::*;
 /// See the module.
 pub struct ResonanceDetuning;
 
-static LAWS: [Law; 5] = [
+static LAWS: [Law; 7] = [
     Law {
         name: "warming (temperature)",
         parameters: &[Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0)],
@@ -35,6 +35,24 @@ static LAWS: [Law; 5] = [
             Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
         ],
     },
+    // The point of tuning need not be the first pass, and a softening resonator falls with its own swing.
+    Law {
+        name: "warming about a tuning point",
+        parameters: &[
+            Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0),
+            Parameter::signed("tuning_point_above_first", "K", 3.0, -20.0, 20.0),
+            Parameter::signed("softening_at_largest_amplitude", "K", 2.0, -20.0, 20.0),
+        ],
+    },
+    Law {
+        name: "drift about a tuning point",
+        parameters: &[
+            Parameter::positive("detuning", "1", 1.0, 12.0),
+            Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
+            Parameter::signed("tuning_point", "1", 0.3, -2.0, 2.0),
+            Parameter::signed("softening_at_largest_amplitude", "1", 0.3, -3.0, 3.0),
+        ],
+    },
 ];
 
 impl Effect for ResonanceDetuning {
@@ -62,7 +80,16 @@ impl Effect for ResonanceDetuning {
             c.amplitude_pp /= 1.0 - theta[0] * (-pass.time_s / tau).exp_m1();
             return;
         }
+        let swing = (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).powi(2);
         let off = match law {
+            5 => {
+                let warmer = pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
+                theta[0] * (warmer - theta[1] + theta[2] * swing)
+            }
+            6 => {
+                let tau = theta[1] * design.duration_s.max(1e-9);
+                theta[0] * (-(-pass.time_s / tau).exp_m1() - theta[2] + theta[3] * swing)
+            }
             0 => theta[0] * pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c),
             1 => {
                 let tau = theta[1] * design.duration_s.max(1e-9);
@@ -72,7 +99,7 @@ impl Effect for ResonanceDetuning {
                 let r = pass.frequency_hz / (design.reference_frequency_hz * theta[1]);
                 theta[0] * (r - 1.0 / r)
             }
-            _ => theta[0] * (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).powi(2),
+            _ => theta[0] * swing,
         };
         c.amplitude_pp /= (1.0 + off * off).sqrt();
     }

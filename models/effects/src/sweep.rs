@@ -122,7 +122,12 @@ impl Lateral {
             if time < 1e-15 {
                 1.0
             } else if c.lateral_relaxation_time > 0.0 {
-                (-time / c.lateral_relaxation_time).exp()
+                let age = time / c.lateral_relaxation_time;
+                if c.lateral_relaxation_exponent == 1.0 {
+                    (-age).exp()
+                } else {
+                    (-age.powf(c.lateral_relaxation_exponent)).exp()
+                }
             } else if rate.is_finite() {
                 1.0
             } else {
@@ -133,8 +138,8 @@ impl Lateral {
         Self {
             stiffness: c.lateral_stiffness,
             advance: c.speed * dt,
-            rate_step: fall(dt),
-            keep_step: keep(dt),
+            rate_step: if c.instant_slip_back { f64::INFINITY } else { fall(dt) },
+            keep_step: if c.instant_slip_back { 0.0 } else { keep(dt) },
             rate_airborne: fall(airborne),
             keep_airborne: keep(airborne),
         }

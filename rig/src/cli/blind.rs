@@ -24,6 +24,9 @@ pub struct Args {
     /// Leave an effect out of the library (may be repeated).
     #[arg(long, value_name = "EFFECT")]
     pub without: Vec<String>,
+    /// Write the sets to this folder (open and sealed parts apart) for other diagnosers; none is scored.
+    #[arg(long, value_name = "DIR")]
+    pub write: Option<std::path::PathBuf>,
     /// Print one line a set on stderr.
     #[arg(long)]
     pub verbose: bool,
@@ -43,6 +46,14 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         Some("outside") => Some(Stratum::Outside),
         Some(other) => miette::bail!("--stratum {other}: none, single, pair, alias or outside is needed"),
     };
+    if let Some(folder) = &args.write {
+        for set in crate::blind::sets(args.seed, args.sets, stratum) {
+            let name = format!("{:06}", set.label.seed % 1_000_003);
+            set.write(&folder.join("open").join(&name), &folder.join("sealed").join(&name))
+                .into_diagnostic()?;
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
     let options = Options { pairs: !args.no_pairs, without: args.without.clone(), ..Options::default() };
     let scored = score_all(args.seed, args.sets, stratum, &options, |s| {
         if args.verbose {
