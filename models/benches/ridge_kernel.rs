@@ -30,7 +30,10 @@ fn least_seconds(mut run: impl FnMut()) -> f64 {
 fn print_ratios() {
     let fma = {
         let rate = (FMA_ROUNDS * FMA_CHAINS * lanes()) as f64;
-        2.0 * rate / least_seconds(|| drop(black_box(pulp::Arch::new().dispatch(Fma(black_box(0.999_999))))))
+        2.0 * rate
+            / least_seconds(|| {
+                black_box(pulp::Arch::new().dispatch(Fma(black_box(0.999_999))));
+            })
     };
     let triad = {
         let n = 16 * 1024;

@@ -227,12 +227,7 @@ fn share(name: &'static str, target: &'static str, outcomes: Vec<bool>) -> Figur
     }
 }
 
-fn statistic(
-    name: &'static str,
-    target: &'static str,
-    values: &[f64],
-    of: fn(&mut [f64]) -> f64,
-) -> Figure {
+fn statistic(name: &'static str, target: &'static str, values: &[f64], of: fn(&mut [f64]) -> f64) -> Figure {
     if values.is_empty() {
         return Figure { name, value: None, ci95: None, n: 0, target };
     }

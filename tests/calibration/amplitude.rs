@@ -81,7 +81,7 @@ impl Bench {
         };
         let known = self.world.truth().amplitude_pp_m;
         let pp = self.world.config().defects.plate(&at, known);
-        let (rate, phase) = (1e6, self.draw.between(0.0, 6.28));
+        let (rate, phase) = (1e6, self.draw.between(0.0, std::f64::consts::TAU));
         let v = PI * frequency_hz * pp * (1.0 + self.scale_error);
         let volts: Vec<f64> = (0..200)
             .map(|i| {
