@@ -12,7 +12,7 @@ pub struct Args {
     /// Format
     #[arg(long, value_enum)]
     to: Format,
-    /// Where to write it [default: passes.<format> in the run's folder]
+    /// Where to write it [default: passes.csv and the like, in the run's folder]
     #[arg(long)]
     out: Option<PathBuf>,
 }
