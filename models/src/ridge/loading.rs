@@ -18,6 +18,8 @@ use serde::Serialize;
 pub const SPOT_M: f64 = 20e-6;
 /// Time for pressing and then for reaching slip, s, each: a few crossings of the dermis by a wave.
 const SETTLE_S: f64 = 60e-6;
+/// Share of time in contact above which contact counts as never lost.
+const FULL_CONTACT: f64 = 0.999;
 /// Cycles over which the amplitude grows.
 const RAMP_CYCLES: usize = 2;
 /// Share of the gap to the mean friction that the lateral load takes after each cycle.
@@ -70,7 +72,7 @@ pub struct RidgeRun {
     pub peak_reaction_force_n: f64,
     /// Share of time in contact.
     pub contact_fraction: f64,
-    /// Phase shift of Eq. 1 in degrees, 0 to 360; none without vibration.
+    /// Phase shift of Eq. 1 in degrees, 0 to 360; zero in full contact, none without vibration.
     pub phase_shift_deg: Option<f64>,
     /// Phase of touch-down after the plate's greatest acceleration; none if contact is never lost.
     pub touch_down_deg: Option<f64>,
@@ -319,10 +321,15 @@ pub fn run(case: &RidgeCase, settings: &RunSettings) -> Result<RidgeRun, RidgeEr
         mean_reaction_force_n: scale * normal,
         peak_reaction_force_n: scale * mean_cycle.normal.iter().fold(0.0, |a: f64, b| a.max(*b)),
         contact_fraction: mean_cycle.contact_fraction,
-        phase_shift_deg: vibrates.then(|| mean_cycle.phase_shift_deg()),
+        // In full contact the skin goes with the plate; the peak of its acceleration is then no more than
+        // the ringing of the free flanks beside the contact.
+        phase_shift_deg: vibrates.then(|| match mean_cycle.contact_fraction {
+            c if c > FULL_CONTACT => 0.0,
+            _ => mean_cycle.phase_shift_deg(),
+        }),
         touch_down_deg,
         regime: match mean_cycle.contact_fraction {
-            c if c > 0.999 => Regime::FullContact,
+            c if c > FULL_CONTACT => Regime::FullContact,
             _ if lateral > 0.998 * case.mu0 * normal => Regime::FullSlip,
             _ => Regime::Intermittent,
         },
