@@ -15,7 +15,7 @@ fn main() {
     divan::main();
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 200)]
 fn predict_scattered(bencher: divan::Bencher) {
     let surrogate = Surrogate::shipped().expect("reads");
     // Scattered conditions, so that the table is not all in the first-level cache.

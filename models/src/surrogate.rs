@@ -89,6 +89,7 @@ impl Surrogate {
     }
 
     /// Friction and phase at amplitude, frequency, speed over mu_0, force and modulus. Allocates nothing.
+    #[inline]
     pub fn at(
         &self,
         amplitude: PeakToPeak,
