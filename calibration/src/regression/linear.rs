@@ -58,21 +58,20 @@ fn solve(design: &DMatrix<f64>, observations: &DVector<f64>) -> Result<Fit, FitE
         return Err(FitError::NotFinite { place: "design or observations" });
     }
     // Powers of two as column scales: exact, and the pivots become comparable with one another.
-    let scale: Vec<f64> = (0..p)
+    let columns: Vec<Vec<f64>> = (0..p)
         .map(|j| {
             let norm = design.column(j).norm();
-            if norm > 0.0 { 2f64.powi(-norm.log2().round() as i32) } else { 1.0 }
+            let scale = if norm > 0.0 { 2f64.powi(-norm.log2().round() as i32) } else { 1.0 };
+            design.column(j).iter().map(|x| x * scale).chain([scale]).collect()
         })
         .collect();
-    let x = |i: usize, j: usize| design[(i, j)] * scale[j];
-
-    let dot = |a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| {
-        (0..n).fold(DoubleDouble::ZERO, |sum, i| sum + DoubleDouble::product(a(i), b(i)))
-    };
+    // The scale stands behind the last row, so that a column is one slice.
+    let x = |j: usize| &columns[j][..n];
+    let scale = |j: usize| columns[j][n];
     let mut lower = vec![vec![DoubleDouble::ZERO; p]; p];
     for j in 0..p {
         for k in 0..=j {
-            let mut entry = dot(&|i| x(i, j), &|i| x(i, k));
+            let mut entry = dot(x(j), x(k));
             let before = entry.value();
             for (a, b) in lower[j][..k].iter().zip(&lower[k][..k]) {
                 entry = entry - *a * *b;
@@ -104,25 +103,30 @@ fn solve(design: &DMatrix<f64>, observations: &DVector<f64>) -> Result<Fit, FitE
         }
         z
     };
-    let scaled = solve_both((0..p).map(|j| dot(&|i| x(i, j), &|i| observations[i])).collect());
+    let scaled = solve_both((0..p).map(|j| dot(x(j), observations.as_slice())).collect());
     let residuals = DVector::from_fn(n, |i, _| {
         (0..p)
-            .fold(DoubleDouble::from(observations[i]), |r, j| r - DoubleDouble::from(x(i, j)) * scaled[j])
+            .fold(DoubleDouble::from(observations[i]), |r, j| r - DoubleDouble::from(x(j)[i]) * scaled[j])
             .value()
     });
     let mut covariance = DMatrix::zeros(p, p);
     for k in 0..p {
         let unit = (0..p).map(|j| DoubleDouble::from(if j == k { 1.0 } else { 0.0 })).collect();
         for (j, entry) in solve_both(unit).into_iter().enumerate() {
-            covariance[(j, k)] = entry.value() * scale[j] * scale[k];
+            covariance[(j, k)] = entry.value() * scale(j) * scale(k);
         }
     }
-    let estimates = DVector::from_fn(p, |j, _| scaled[j].value() * scale[j]);
+    let estimates = DVector::from_fn(p, |j, _| scaled[j].value() * scale(j));
     if estimates.iter().any(|x| !x.is_finite()) {
         return Err(FitError::NotFinite { place: "estimates" });
     }
     let residual_sum_of_squares = residuals.dot(&residuals);
     Ok(Fit { estimates, covariance, residuals, residual_sum_of_squares, degrees_of_freedom: (n - p) as f64 })
+}
+
+/// Sum of products without rounding to `f64` in between.
+fn dot(a: &[f64], b: &[f64]) -> DoubleDouble {
+    a.iter().zip(b).fold(DoubleDouble::ZERO, |sum, (a, b)| sum + DoubleDouble::product(*a, *b))
 }
 
 #[cfg(test)]
