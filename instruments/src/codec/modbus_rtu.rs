@@ -119,7 +119,7 @@ pub fn payload<'a>(request: &Request, answer: &'a [u8]) -> Result<&'a [u8], RtuE
     Ok(&body[2..])
 }
 
-/// The registers of an answer to [`read`], as bytes.
+/// The registers of an answer to [`read()`], as bytes.
 ///
 /// # Errors
 /// Whatever does not fit the request.
@@ -131,7 +131,7 @@ pub fn registers(request: &Request, answer: &[u8]) -> Result<Vec<u8>, RtuError> 
     Ok(payload[1..].to_vec())
 }
 
-/// Judges an answer to [`write`]: it repeats the address and the count.
+/// Judges an answer to [`write()`]: it repeats the address and the count.
 ///
 /// # Errors
 /// Whatever does not fit the request.
