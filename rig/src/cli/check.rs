@@ -47,8 +47,14 @@ fn check(path: &Path) -> miette::Result<&'static str> {
     let table: toml::Table = crate::input::parse_toml(&name, &text)?;
     let has = |key: &str| table.contains_key(key);
     if has("profile") {
+        // Files that a profile names (DBC) stand beside it, or come with the program.
+        let beside = |file: &str| {
+            let path = path.parent().unwrap_or(Path::new(".")).join(file);
+            let text = std::fs::read_to_string(path).ok();
+            text.or_else(|| crate::drivers::bundled::file(file).map(String::from))
+        };
         let wrong = |e: instruments::ProfileError| miette::miette!("{e}");
-        instruments::Profile::parse(&text).and_then(|p| p.check(&text)).map_err(wrong)?;
+        instruments::Profile::parse_with(&text, &beside).and_then(|p| p.check(&text)).map_err(wrong)?;
         Ok("profile")
     } else if has("amplifier") || has("force") || has("stage") {
         Setup::parse(&name, &text, path.parent().unwrap_or(Path::new(".")))?;
