@@ -39,3 +39,38 @@ pub fn documents(output: &Output) -> Vec<serde_json::Value> {
         .map(|line| serde_json::from_str(line).unwrap_or_else(|e| panic!("not JSON: {line}: {e}")))
         .collect()
 }
+
+/// Runs a sweep in wall-clock time to its end, in a fresh folder for every attempt.
+///
+/// A shared machine takes a CPU away for many milliseconds, and the safety core then trips, as it must. Such a trip is
+/// accepted only if a witness recorded a stall of the machine in the 300 ms before it, and at most four times; any
+/// other trip fails. `sweep` makes the command for a folder. Returns the output of the attempt that went through.
+pub fn sweep_unless_the_machine_stalls(folder: &Path, sweep: impl Fn(&Path) -> Command) -> (PathBuf, Output) {
+    for attempt in 1..=5 {
+        let out = folder.join(format!("attempt-{attempt}"));
+        let output = sweep(&out).output().unwrap();
+        if output.status.code() != Some(1) {
+            return (out, output);
+        }
+        let said = std::fs::read_to_string(out.join("summary.json"));
+        let (stdout, stderr) = texts(&output);
+        let said = said.unwrap_or_else(|e| panic!("no summary: {e}\n{stdout}\n{stderr}"));
+        let summary: rig::session::Summary = serde_json::from_str(&said).unwrap();
+        let rig::sequence::Outcome::Tripped(trip) = summary.outcome else {
+            panic!("status 1 without a trip: {said}")
+        };
+        let stalls = summary.stalls.expect("a run in wall-clock time has witnesses");
+        let before = realtime::ports::Nanos(trip.at.0.saturating_sub(300_000_000));
+        let stall = stalls.within(before, trip.at).unwrap_or_else(|| {
+            panic!("{trip:?} without a recorded stall of the machine (worst {:?})", stalls.worst)
+        });
+        eprintln!(
+            "attempt {attempt}: {:?}, the machine stalled for {} ms",
+            trip.cause,
+            stall.lasted.0 / 1_000_000
+        );
+    }
+    panic!(
+        "five sweeps in a row were cut by stalls of the machine: it is too busy for a test in wall-clock time"
+    );
+}

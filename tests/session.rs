@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
-use tests::{documents, file, muprime, python, texts};
+use tests::{documents, file, muprime, python, sweep_unless_the_machine_stalls, texts};
 
 /// A plan of a few seconds.
 const SHORT: &str = r#"
@@ -49,13 +49,12 @@ fn assert_each_once(points: &[u64], planned: u64) {
 #[test]
 fn a_sweep_over_real_modbus_tcp_ends_with_table_record_and_report() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
     let plan = short_plan(folder.path());
-    let output = muprime()
-        .args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"])
-        .arg(&out)
-        .output()
-        .unwrap();
+    let (out, output) = sweep_unless_the_machine_stalls(folder.path(), |out| {
+        let mut sweep = muprime();
+        sweep.args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"]).arg(out);
+        sweep
+    });
     let (_, stderr) = texts(&output);
     assert_eq!(output.status.code(), Some(0), "{stderr}");
     let said = documents(&output);

@@ -7,7 +7,8 @@
 use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
 use crate::ports::Nanos;
 use crate::safety::{
-    Cause, Controls, Decision, DriveCommand, Limits, Observation, Request, Safety, StageCommand, State, Trip,
+    Cause, Controls, Decision, DriveCommand, Limits, Observation, Remark, Request, Safety, StageCommand,
+    State, Trip,
 };
 use models::condition::Condition;
 use models::prediction::FrictionModel;
@@ -60,7 +61,7 @@ pub enum Command {
 pub const COMMANDS_PER_CYCLE: usize = 4;
 
 /// What does not change while the loop runs.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Config {
     /// Limits and timing.
     pub limits: Limits,
@@ -129,6 +130,8 @@ pub struct Outputs {
     pub online: Option<Online>,
     /// Both forces fit for use in this cycle.
     pub usable: bool,
+    /// Something is not as it should be, short of a trip.
+    pub remark: Option<Remark>,
 }
 
 const fn assert_copy<T: Copy>() {}
@@ -162,10 +165,16 @@ pub fn step(
         .map(|r| r.age(now))
         .max()
         .unwrap_or_default();
-    let mu_relative = state.window.mu_relative(&config.estimate, direction, state.mu0, age);
+    // Contact that is lost now is no `mu'` now, whatever the window still remembers.
+    let lost = usable && seen.forces.normal.is_ok_and(|r| r.value < config.estimate.normal_force_min_n);
+    let mu_relative = if lost {
+        Err(NoMu::NoContact)
+    } else {
+        state.window.mu_relative(&config.estimate, direction, state.mu0, age)
+    };
     let online = mu_relative.ok().and_then(|mu| compare(config, model, state, seen, &mu, now));
 
-    let Decision { drive, stage, cut_supply, tripped, blocking, .. } = decision;
+    let Decision { drive, stage, cut_supply, tripped, blocking, remark, .. } = decision;
     Outputs {
         drive,
         stage,
@@ -177,6 +186,7 @@ pub fn step(
         mu_relative,
         online,
         usable,
+        remark,
     }
 }
 
@@ -235,6 +245,10 @@ fn compare(
     };
     let prediction = model.predict(&condition).ok()?;
     let sd = mu.sd.hypot(prediction.mu_relative_sd);
+    // A model that has diverged has no opinion; nothing that is commanded depends on it.
+    if !(prediction.mu_relative.is_finite() && sd.is_finite() && sd > 0.0) {
+        return None;
+    }
     Some(Online {
         predicted: prediction.mu_relative,
         predicted_sd: prediction.mu_relative_sd,

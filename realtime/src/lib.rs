@@ -9,15 +9,22 @@
 //! | [`compare`] | residuals against the model; the test that says when it has left the measurement |
 //! | [`turn`] | one turn of the loop over real ports; the row that it leaves behind |
 //! | [`pacing`] | the thread: absolute deadlines, priority, memory lock, lateness histogram |
+//! | [`wrap`] | ports around ports: faults |
+//! | [`witness`] | notes when the machine kept ordinary threads from running |
+//! | [`replay`] | recorded cycles through the same code again |
 //! | [`recorder`] | rows, passes and events as MCAP; tolerant reading and recovery |
 //!
-//! The wall clock is forbidden here, and the monotonic clock is read in `pacing` alone.
+//! The wall clock is forbidden here, and the monotonic clock is read by `pacing` alone.
 
 pub mod compare;
 pub mod cycle;
 pub mod estimate;
+mod number;
 pub mod pacing;
 pub mod ports;
 pub mod recorder;
+pub mod replay;
 pub mod safety;
 pub mod turn;
+pub mod witness;
+pub mod wrap;

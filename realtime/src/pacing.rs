@@ -92,7 +92,8 @@ pub fn monotonic_ns() -> u64 {
     t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64
 }
 
-fn sleep_until(absolute_ns: u64) {
+/// Sleeps until CLOCK_MONOTONIC reaches a time in ns.
+pub(crate) fn sleep_until(absolute_ns: u64) {
     let t = libc::timespec {
         tv_sec: (absolute_ns / 1_000_000_000) as libc::time_t,
         tv_nsec: (absolute_ns % 1_000_000_000) as libc::c_long,

@@ -51,6 +51,7 @@ pub enum Quality {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reading {
     /// Calibrated value in SI units.
+    #[serde(with = "crate::number")]
     pub value: f64,
     /// What the instrument sent, in its own counts.
     pub raw: i64,
@@ -123,6 +124,7 @@ pub struct AmplifierState {
     /// Set-point that the amplifier echoes.
     pub echoed_amplitude: PeakToPeak,
     /// Frequency that the amplifier echoes, in Hz.
+    #[serde(with = "crate::number")]
     pub echoed_frequency_hz: f64,
     /// Whether its output is on.
     pub output_on: bool,
@@ -161,8 +163,10 @@ pub trait Amplifier: Send {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StageState {
     /// Position along the stroke in m.
+    #[serde(with = "crate::number")]
     pub position_m: f64,
     /// Measured velocity in m/s, signed.
+    #[serde(with = "crate::number")]
     pub velocity_m_s: f64,
     /// Whether it is on a limit of its travel.
     pub at_limit: bool,

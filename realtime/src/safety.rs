@@ -111,9 +111,11 @@ impl StageCommand {
 pub struct Trip {
     /// The rule.
     pub cause: Cause,
-    /// The value that broke it, in the unit of the rule's bound.
+    /// The value that broke it, in the unit of the rule's bound; infinite where there was no data at all.
+    #[serde(with = "crate::number")]
     pub value: f64,
     /// The bound that it broke.
+    #[serde(with = "crate::number")]
     pub bound: f64,
     /// The cycle in which it was decided.
     pub cycle: u64,
@@ -189,6 +191,20 @@ pub struct Decision {
     pub lateral_usable: bool,
     /// Normal force fit for use.
     pub normal_usable: bool,
+    /// Something is not as it should be, short of a trip.
+    pub remark: Option<Remark>,
+}
+
+/// What is not as it should be while the rig may still run: the data are kept, and flagged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Remark {
+    /// More than 15 % of the lateral samples that were due did not come.
+    LateralLossy,
+    /// More than 15 % of the normal samples that were due did not come.
+    NormalLossy,
+    /// The plate moves less than 0.7 of what it is told: resonance drifted, or a load damps it.
+    AmplitudeSags,
 }
 
 /// Safety's memory. `Copy`: it can hold no lock, no heap and no handle.
@@ -289,7 +305,8 @@ impl Safety {
                 (DriveCommand::off(self.sequence, expires_at), StageCommand::stop(self.sequence, expires_at))
             }
         };
-        self.watch.commanded(&drive, now);
+        let remark = rules::remark(&context);
+        self.watch.commanded(&drive, &stage, now);
         Decision {
             drive,
             stage,
@@ -299,6 +316,7 @@ impl Safety {
             blocking: broken.map(|b| b.cause),
             lateral_usable: self.watch.lateral.usable,
             normal_usable: self.watch.normal.usable,
+            remark,
         }
     }
 }

@@ -4,7 +4,7 @@
 use crate::cycle::{self, COMMANDS_PER_CYCLE, Config, CycleState, Inputs, Marker, Online, Outputs};
 use crate::estimate::{MuRelative, NoMu};
 use crate::ports::{Amplifier, ForceSensor, Nanos, Stage};
-use crate::safety::{Cause, Observation, Trip};
+use crate::safety::{Cause, Observation, Remark, Trip};
 use models::prediction::FrictionModel;
 use serde::{Deserialize, Serialize};
 
@@ -49,6 +49,9 @@ pub struct Row {
     pub online: Option<Online>,
     /// Both forces fit for use.
     pub usable: bool,
+    /// Something is not as it should be, short of a trip.
+    #[serde(default)]
+    pub remark: Option<Remark>,
 }
 
 impl Row {
@@ -69,6 +72,7 @@ impl Row {
             mu_relative: out.mu_relative,
             online: out.online,
             usable: out.usable,
+            remark: out.remark,
         }
     }
 }

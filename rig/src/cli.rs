@@ -7,6 +7,7 @@ pub mod completions;
 pub mod diagnose;
 pub mod doctor;
 pub mod export;
+pub mod faults;
 pub mod model;
 pub mod recover;
 pub mod report;

@@ -17,6 +17,7 @@ pub mod certificates;
 pub mod cli;
 pub mod drivers;
 pub mod export;
+pub mod faults;
 pub mod fingertip;
 pub mod input;
 pub mod model_file;

@@ -31,6 +31,8 @@ enum Verb {
     Diagnose(cli::diagnose::Args),
     /// Score the diagnosis on sealed sets of an independent simulation
     Blind(cli::blind::Args),
+    /// Strike the virtual rig with every fault of the list, in virtual time, from seeds
+    Faults(cli::faults::Args),
     /// Evaluate the models: a point, a finite element case, a study, the paper's figures
     Model(cli::model::ModelArgs),
     /// Write the report of a run
@@ -68,6 +70,7 @@ fn main() -> ExitCode {
         Verb::Doctor(args) => cli::doctor::run(args, json),
         Verb::Diagnose(args) => cli::diagnose::run(args, json),
         Verb::Blind(args) => cli::blind::run(args, json),
+        Verb::Faults(args) => cli::faults::run(args, json),
         Verb::Model(args) => cli::model::run(args, json),
         Verb::Report(args) => cli::report::run(args, json),
         Verb::Export(args) => cli::export::run(args, json),

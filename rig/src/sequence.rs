@@ -91,6 +91,8 @@ pub enum Outcome {
     },
     /// Nothing was heard of the loop.
     LoopLost,
+    /// The record, the passes or the catalogue could not be written: a measurement that is not kept is not made.
+    RecordLost,
 }
 
 /// What a row led to.

@@ -15,6 +15,7 @@ use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use crate::setup::Setup;
 use models::prediction::FrictionModel;
 use realtime::pacing::LoopReport;
+use realtime::witness::StallReport;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -68,6 +69,9 @@ pub struct Summary {
     pub model_departed: bool,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
+    /// When the machine kept ordinary threads from running; `None` in virtual time.
+    #[serde(default)]
+    pub stalls: Option<StallReport>,
     /// Rows that the record lost.
     pub record_lost: u64,
     /// What the links counted, by instrument.

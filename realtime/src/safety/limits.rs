@@ -54,7 +54,7 @@ impl ChannelTiming {
 }
 
 /// Times that the rules count in.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// Period of the loop.
     pub cycle: Nanos,
@@ -72,8 +72,9 @@ pub struct Timing {
     pub ring_time: Nanos,
 }
 
-/// The limits of a setup. Made only by [`Limits::checked`], so they never exceed [`HARD`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The limits of a setup. Made only by [`Limits::checked`] (reading them back included), so they never exceed [`HARD`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self")]
 #[non_exhaustive]
 pub struct Limits {
     /// Largest normal force in N.
@@ -131,6 +132,18 @@ pub enum LimitError {
         /// What would be accepted.
         needed: &'static str,
     },
+}
+
+impl Serialize for Limits {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        Limits::serialize(self, to)
+    }
+}
+
+impl<'a> Deserialize<'a> for Limits {
+    fn deserialize<D: serde::Deserializer<'a>>(from: D) -> Result<Self, D::Error> {
+        Limits::deserialize(from)?.checked().map_err(serde::de::Error::custom)
+    }
 }
 
 impl Limits {

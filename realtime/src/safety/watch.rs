@@ -1,6 +1,6 @@
 //! What must be remembered of each channel to judge it: spikes, repeats, gaps, rates.
 
-use super::{DriveCommand, Limits, Observation};
+use super::{ChannelTiming, DriveCommand, Limits, Observation, StageCommand};
 use crate::ports::{Channel, Nanos, Quality, Reading};
 
 /// Memory of one force channel.
@@ -14,7 +14,7 @@ pub(super) struct ForceWatch {
     suspect: bool,
     /// New samples in a row with the same raw counts.
     pub equal_in_a_row: u32,
-    /// Cycles in a row without valid data.
+    /// Cycles in a row without a sample to believe: invalid ones, and a far-off one that waits for its confirmation.
     pub invalid_in_a_row: u32,
     /// Cycles in a row at the end of the range.
     pub saturated_in_a_row: u32,
@@ -27,12 +27,28 @@ pub(super) struct ForceWatch {
     pub usable: bool,
     last_sequence: u32,
     last_raw: i64,
+    /// Samples due and come in the present window, and the share that came in the last whole one.
+    due: f64,
+    came: f64,
+    pub share_came: f64,
 }
+
+/// Samples due in a window of the rule for lost samples.
+const LOSS_WINDOW: f64 = 100.0;
 
 /// Cycles that the rule for repeated spikes looks back on.
 const SPIKE_WINDOW: u32 = 50;
 
 impl ForceWatch {
+    /// Counts the samples that are due: no cycle can see more than one.
+    fn expect(&mut self, cycle: Nanos, period: Nanos) {
+        self.due += (cycle.seconds() / period.seconds().max(1e-9)).min(1.0);
+        if self.due >= LOSS_WINDOW {
+            self.share_came = self.came / self.due;
+            (self.due, self.came) = (0.0, 0.0);
+        }
+    }
+
     const fn new() -> Self {
         ForceWatch {
             believed: None,
@@ -47,6 +63,9 @@ impl ForceWatch {
             usable: false,
             last_sequence: 0,
             last_raw: 0,
+            due: 0.0,
+            came: 0.0,
+            share_came: 1.0,
         }
     }
 
@@ -54,18 +73,27 @@ impl ForceWatch {
         (self.spikes & ((1 << SPIKE_WINDOW) - 1)).count_ones()
     }
 
-    fn look(&mut self, channel: &Channel, limits: &Limits, age_limit: Nanos, now: Nanos) {
+    fn look(&mut self, channel: &Channel, limits: &Limits, timing: &ChannelTiming, now: Nanos) {
+        let age_limit = timing.age_limit();
         self.spikes <<= 1;
         self.usable = false;
+        self.expect(limits.timing.cycle, timing.period);
         let reading = match channel {
-            Ok(reading) if reading.value.is_finite() && !reading.value.is_subnormal() => reading,
+            // A stamp ahead of the loop's time would never grow old: such a sample has no known age.
+            Ok(reading)
+                if reading.value.is_finite()
+                    && !reading.value.is_subnormal()
+                    && reading.taken_at <= now.plus(age_limit) =>
+            {
+                reading
+            }
             _ => {
                 self.invalid_in_a_row = self.invalid_in_a_row.saturating_add(1);
                 return;
             }
         };
-        self.invalid_in_a_row = 0;
         if reading.quality == Quality::Saturated {
+            self.invalid_in_a_row = 0;
             self.saturated_in_a_row = self.saturated_in_a_row.saturating_add(1);
             return;
         }
@@ -74,8 +102,15 @@ impl ForceWatch {
         // Every channel counts its samples: the same count is the same sample, not a frozen value.
         if self.believed.is_some() && reading.sequence == self.last_sequence {
             self.usable = fresh && !self.suspect;
+            // An old sample that still stands ends a row of invalid ones; one that waits to be confirmed does not.
+            self.invalid_in_a_row = if self.suspect { self.invalid_in_a_row } else { 0 };
             return;
         }
+        // Late and overtaken: the newer one has been seen already, and this one counts as lost.
+        if self.believed.is_some_and(|b| reading.taken_at < b.taken_at) {
+            return;
+        }
+        self.came += 1.0;
         let repeats = self.believed.is_some() && reading.raw == self.last_raw;
         self.equal_in_a_row = if repeats { self.equal_in_a_row.saturating_add(1) } else { 0 };
         (self.last_sequence, self.last_raw) = (reading.sequence, reading.raw);
@@ -85,16 +120,25 @@ impl ForceWatch {
             // One far-off sample is a spike until a second one confirms it.
             self.suspect = true;
             self.spikes |= 1;
+            self.invalid_in_a_row = self.invalid_in_a_row.saturating_add(1);
             return;
         }
         self.suspect = false;
+        self.invalid_in_a_row = 0;
         self.earlier = self.believed;
         self.believed = Some(*reading);
         if let Some(before) = self.earlier {
             let dt = reading.taken_at.since(before.taken_at).seconds();
-            self.rate_n_s = if dt > 0.0 { (reading.value - before.value) / dt } else { 0.0 };
-            let fast = self.rate_n_s.abs() > limits.force_rate_max_n_s;
-            self.fast_in_a_row = if fast { self.fast_in_a_row.saturating_add(1) } else { 0 };
+            let rate = if dt > 0.0 { (reading.value - before.value) / dt } else { 0.0 };
+            // Up and down again is a small spike; only a force that goes on one way is on its way somewhere.
+            let onwards = rate * self.rate_n_s > 0.0;
+            let fast = rate.abs() > limits.force_rate_max_n_s;
+            self.fast_in_a_row = match (fast, onwards) {
+                (true, true) => self.fast_in_a_row.saturating_add(1),
+                (true, false) => 1,
+                (false, _) => 0,
+            };
+            self.rate_n_s = rate;
         }
         self.usable = fresh;
     }
@@ -131,7 +175,22 @@ pub(super) struct Watch {
     amplifier_on: bool,
     /// Highest amplitude commanded within the last ring-down: measured may still be that high.
     pub ringing_pp_m: f64,
+    /// Velocity as last commanded in m/s, and since when its sign and at least its speed stand.
+    velocity_m_s: f64,
+    pub moving_since: Option<Nanos>,
+    /// Slowest speed commanded since then, and the fastest within the stage's response time, in m/s.
+    pub slowest_m_s: f64,
+    pub fastest_m_s: f64,
+    /// States in a row in which the stage was faster than it was told.
+    pub fast_stage_in_a_row: u32,
+    stage_sequence: u32,
 }
+
+/// Time within which a stage follows a new velocity: the slowest one for a reversal at full speed, and the age of its
+/// state.
+pub(super) const STAGE_RESPONSE: Nanos = Nanos(300_000_000);
+/// Speeds below this are approach and hold: a stage may rest at them, m/s.
+pub(super) const CREEP_M_S: f64 = 1.5e-3;
 
 impl Watch {
     pub(super) const fn new() -> Self {
@@ -153,6 +212,12 @@ impl Watch {
             amplitude_fast_in_a_row: 0,
             amplifier_on: false,
             ringing_pp_m: 0.0,
+            velocity_m_s: 0.0,
+            moving_since: None,
+            slowest_m_s: 0.0,
+            fastest_m_s: 0.0,
+            fast_stage_in_a_row: 0,
+            stage_sequence: 0,
         }
     }
 
@@ -163,8 +228,8 @@ impl Watch {
 
     pub(super) fn look(&mut self, limits: &Limits, seen: &Observation, now: Nanos) {
         let timing = &limits.timing;
-        self.lateral.look(&seen.forces.lateral, limits, timing.lateral.age_limit(), now);
-        self.normal.look(&seen.forces.normal, limits, timing.normal.age_limit(), now);
+        self.lateral.look(&seen.forces.lateral, limits, &timing.lateral, now);
+        self.normal.look(&seen.forces.normal, limits, &timing.normal, now);
 
         let late = seen.lateness > timing.cycle;
         self.late_in_a_row = if late { self.late_in_a_row.saturating_add(1) } else { 0 };
@@ -194,6 +259,15 @@ impl Watch {
             }
             self.amplitude = Some(reading);
         }
+        let fade = (-timing.cycle.seconds() / STAGE_RESPONSE.seconds()).exp();
+        self.fastest_m_s = (self.fastest_m_s * fade).max(self.velocity_m_s.abs());
+        if let Ok(stage) = seen.stage
+            && stage.sequence != self.stage_sequence
+        {
+            self.stage_sequence = stage.sequence;
+            let fast = stage.velocity_m_s.abs() > 1.5 * self.fastest_m_s + 0.02;
+            self.fast_stage_in_a_row = if fast { self.fast_stage_in_a_row + 1 } else { 0 };
+        }
         // A lower set-point is on its way for as long as it may be sent and its effect may be read; then the plate
         // rings down with its own time constant. The measured amplitude is judged against that.
         let on_its_way = Nanos(timing.command_expiry.0 + timing.amplifier.age_limit().0);
@@ -203,7 +277,15 @@ impl Watch {
         }
     }
 
-    pub(super) fn commanded(&mut self, drive: &DriveCommand, now: Nanos) {
+    pub(super) fn commanded(&mut self, drive: &DriveCommand, stage: &StageCommand, now: Nanos) {
+        let velocity = stage.velocity_m_s();
+        let same = velocity * self.velocity_m_s > 0.0 && velocity.abs() >= CREEP_M_S;
+        if !same {
+            self.moving_since = (velocity.abs() >= CREEP_M_S).then_some(now);
+            self.slowest_m_s = velocity.abs();
+        }
+        self.slowest_m_s = self.slowest_m_s.min(velocity.abs());
+        self.velocity_m_s = velocity;
         let amplitude = drive.amplitude().metres();
         if amplitude != self.commanded_pp_m || drive.frequency_hz() != self.commanded_hz {
             self.commanded_since = now;
@@ -214,6 +296,11 @@ impl Watch {
         self.enabled = drive.enable();
         self.off_since = if drive.enable() { None } else { self.off_since.or(Some(now)) };
         self.exposed_since = if drive.enable() { self.exposed_since.or(Some(now)) } else { None };
+    }
+
+    /// Velocity as last commanded, in m/s.
+    pub(super) const fn velocity_m_s(&self) -> f64 {
+        self.velocity_m_s
     }
 
     /// Whether the amplifier stays on although it has long been told to be off: ten cycles after a fresh state

@@ -60,7 +60,7 @@ pub fn run(
         }
         let reaction = sequence.on_row(&row);
         keeper::record(&mut recorder, now, &reaction.events, reaction.pass.as_ref())?;
-        kept.keep(&reaction, news)?;
+        kept.keep(&reaction.events, reaction.pass.as_ref(), news)?;
         if reaction.pass.is_some() {
             let (done, all) = sequence.progress();
             news(News::Progress(done, all, sequence.remaining_s()));

@@ -3,11 +3,12 @@
 use super::{Job, News, Summary};
 use crate::catalogue::{Catalogue, RunEntry};
 use crate::run_dir::RunDir;
-use crate::sequence::{MeasuredPass, Outcome, Reaction};
+use crate::sequence::{Event, MeasuredPass, Outcome};
 use miette::{IntoDiagnostic, WrapErr};
 use realtime::pacing::LoopReport;
 use realtime::ports::Nanos;
 use realtime::recorder::Preamble;
+use realtime::witness::StallReport;
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -96,12 +97,17 @@ impl Keeper {
     ///
     /// # Errors
     /// Whatever file system and SQLite say: the sweep must stop then.
-    pub fn keep(&mut self, reaction: &Reaction, news: &mut dyn FnMut(News<'_>)) -> miette::Result<()> {
-        for event in &reaction.events {
-            self.departed |= matches!(event, crate::sequence::Event::ModelDeparted { .. });
+    pub fn keep(
+        &mut self,
+        events: &[Event],
+        pass: Option<&MeasuredPass>,
+        news: &mut dyn FnMut(News<'_>),
+    ) -> miette::Result<()> {
+        for event in events {
+            self.departed |= matches!(event, Event::ModelDeparted { .. });
             news(News::Event(event));
         }
-        if let Some(pass) = &reaction.pass {
+        if let Some(pass) = pass {
             self.dir.keep(pass)?;
             self.passes += 1;
             self.catalogue.progress(&self.folder, self.passes as i64, self.departed)?;
@@ -118,7 +124,7 @@ impl Keeper {
         self,
         outcome: Outcome,
         departed: bool,
-        loop_report: Option<LoopReport>,
+        machine: Option<(LoopReport, StallReport)>,
         record_lost: u64,
         links: BTreeMap<String, serde_json::Value>,
     ) -> miette::Result<Summary> {
@@ -126,6 +132,7 @@ impl Keeper {
         let word = word.get("outcome").and_then(|o| o.as_str()).unwrap_or("?").to_string();
         self.catalogue.progress(&self.folder, self.passes as i64, departed)?;
         self.catalogue.end(&self.folder, &word)?;
+        let (loop_report, stalls) = machine.unzip();
         let summary = Summary {
             outcome,
             folder: self.dir.path().to_path_buf(),
@@ -133,6 +140,7 @@ impl Keeper {
             planned: self.planned,
             model_departed: departed,
             loop_report,
+            stalls,
             record_lost,
             links,
         };

@@ -1,37 +1,44 @@
-//! A sweep in wall-clock time: the loop on its own thread, the record on another, the sequence on this one.
+//! A sweep in wall-clock time. Four threads, each with one duty: the loop; the record's writer; the sweep, which answers
+//! the loop's rows within a millisecond or two; and this one, which makes passes safe on the disk and tells the news.
+//! A slow disk so reaches neither the loop nor the stage.
+
+mod claim;
+mod follow;
+mod writer;
 
 use super::fast::words;
 use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary};
 use crate::drivers;
 use crate::run_dir::RunDir;
-use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
+use crate::sequence::{Event, MeasuredPass, Sequence};
+use claim::RigClaim;
 use crossbeam_queue::ArrayQueue;
-use miette::{IntoDiagnostic, WrapErr};
+use miette::IntoDiagnostic;
 use realtime::cycle::Command;
-use realtime::pacing::{self, Lifeline, LoopParts, LoopReport};
+use realtime::pacing::{self, Lifeline, LoopParts};
 use realtime::ports::Nanos;
-use realtime::recorder::Recorder;
 use realtime::turn::{Ports, Row};
+use realtime::witness::Witnesses;
 use ringbuf::HeapRb;
-use ringbuf::traits::{Consumer, Split};
+use ringbuf::traits::Split;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
 /// Rows that a ring holds: eight seconds at 1 kHz.
 const RING: usize = 8192;
-/// The loop counts as lost when its heartbeat stands still for this long.
-const LOST_AFTER: Duration = Duration::from_millis(2000);
-/// Flush of the record.
-const FLUSH_EVERY: Duration = Duration::from_millis(50);
-/// Sync of the record to the disk.
-const SYNC_EVERY: Duration = Duration::from_secs(1);
 
-/// What the sweep sends to the record's thread.
-type Note = (Nanos, Vec<Event>, Option<MeasuredPass>);
+/// What the sweep has to keep and to tell.
+struct Note {
+    at: Nanos,
+    events: Vec<Event>,
+    pass: Option<MeasuredPass>,
+    /// Passes made, planned, s to go.
+    progress: (usize, usize, f64),
+}
 
 /// Runs a job in wall-clock time.
 pub fn run(
@@ -62,6 +69,7 @@ pub fn run(
     let (watch_in, mut watch) = HeapRb::<Row>::new(RING).split();
     let commands = Arc::new(ArrayQueue::new(64));
     let life = Arc::new(Lifeline::default());
+    let lost = Arc::new(AtomicBool::new(false));
     let parts = LoopParts {
         config: job.setup.config,
         model: Arc::clone(&job.model),
@@ -78,20 +86,39 @@ pub fn run(
     };
     let priority = (job.setup.file.pace.priority > 0).then_some(job.setup.file.pace.priority);
 
-    let (note, notes) = channel::<Note>();
-    let (last_in, last_out) = channel::<BTreeMap<String, String>>();
-    let writer = std::thread::Builder::new()
-        .name("recorder".into())
-        .spawn(move || write_record(file, preamble, row_out, &notes, &last_out))
-        .into_diagnostic()?;
+    let (to_writer, notes) = channel();
+    let (last_in, last_out) = channel();
+    let writing = {
+        let lost = Arc::clone(&lost);
+        let write = move || writer::write(file, preamble, row_out, &notes, &last_out, &lost);
+        std::thread::Builder::new().name("recorder".into()).spawn(write).into_diagnostic()?
+    };
     let looping = std::thread::Builder::new()
         .name("loop".into())
         .spawn(move || pacing::run(parts, priority))
         .into_diagnostic()?;
+    let witnesses = Witnesses::start(origin_ns).into_diagnostic()?;
 
-    let outcome = follow(&mut sequence, &mut watch, &commands, &life, signals, &mut kept, &note, news);
+    let (note_in, note_out) = channel::<Note>();
+    let strands = follow::Strands { commands: &commands, life: &life, signals, lost: &lost, notes: note_in };
+    let mut unkept = None;
+    let outcome = std::thread::scope(|scope| {
+        let following = scope.spawn(|| follow::follow(&mut sequence, &mut watch, strands));
+        for note in note_out {
+            if unkept.is_none() {
+                unkept = kept.keep(&note.events, note.pass.as_ref(), news).err();
+                lost.fetch_or(unkept.is_some(), Ordering::Relaxed);
+            }
+            if note.pass.is_some() {
+                let (done, all, left_s) = note.progress;
+                news(News::Progress(done, all, left_s));
+            }
+            let _ = to_writer.send((note.at, note.events, note.pass));
+        }
+        following.join()
+    });
     // Whatever ended it: the stop goes out, and a few more cycles carry it to the amplifier.
-    let _ = commands.push(Command::Stop);
+    let _ = commands.force_push(Command::Stop);
     let beat = life.heartbeat.load(Ordering::Relaxed);
     let waited = Instant::now();
     while life.heartbeat.load(Ordering::Relaxed) < beat + 20 && waited.elapsed() < Duration::from_millis(500)
@@ -99,134 +126,36 @@ pub fn run(
         std::thread::sleep(Duration::from_millis(1));
     }
     life.end.store(true, Ordering::Relaxed);
+    let stalls = witnesses.finish();
+    drop(to_writer);
+    // A loop that is stuck inside a driver cannot be joined: its instruments' own watchdogs have dropped the drive.
+    let stuck = Instant::now();
+    while !looping.is_finished() && stuck.elapsed() < Duration::from_secs(2) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    if !looping.is_finished() {
+        miette::bail!("the loop's thread is stuck inside a driver; what was measured is kept");
+    }
     let report = looping.join().map_err(|_| miette::miette!("the loop's thread panicked"))?;
-    drop(note);
     let links: BTreeMap<String, serde_json::Value> = rig
         .links
         .health()
         .map(|(name, health)| (name.to_string(), serde_json::to_value(health).unwrap_or_default()))
         .collect();
     drop(rig.links);
-    let outcome = outcome?;
-    let loop_json = serde_json::to_string(&report).into_diagnostic()?;
-    let mut last =
-        BTreeMap::from([("outcome".to_string(), words(&outcome)?), ("loop".to_string(), loop_json)]);
+    let outcome = outcome.map_err(|_| miette::miette!("the sweep's thread panicked"))?;
+    let mut last = BTreeMap::new();
+    last.insert("outcome".to_string(), words(&outcome)?);
+    last.insert("loop".to_string(), serde_json::to_string(&report).into_diagnostic()?);
+    last.insert("stalls".to_string(), serde_json::to_string(&stalls).into_diagnostic()?);
     last.insert("links".to_string(), serde_json::to_string(&links).into_diagnostic()?);
     let _ = last_in.send(last);
-    let lost = writer
-        .join()
-        .map_err(|_| miette::miette!("the recorder's thread panicked"))?
-        .wrap_err("the record")?;
-    end(kept, outcome, sequence.departed(), report, lost, links)
-}
-
-fn end(
-    kept: Keeper,
-    outcome: Outcome,
-    departed: bool,
-    report: LoopReport,
-    lost: u64,
-    links: BTreeMap<String, serde_json::Value>,
-) -> miette::Result<Summary> {
-    let lost = lost + report.ring_drops;
-    kept.end(outcome, departed, Some(report), lost, links)
-}
-
-/// Feeds the sequence with rows until it ends.
-#[allow(clippy::too_many_arguments)] // the strands of a run come together here and nowhere else
-fn follow(
-    sequence: &mut Sequence,
-    watch: &mut impl Consumer<Item = Row>,
-    commands: &ArrayQueue<Command>,
-    life: &Lifeline,
-    signals: &Signals,
-    kept: &mut Keeper,
-    note: &Sender<Note>,
-    news: &mut dyn FnMut(News<'_>),
-) -> miette::Result<Outcome> {
-    let mut heard = Instant::now();
-    let mut stops = 0;
-    loop {
-        let asked = signals.stops.load(Ordering::Relaxed);
-        if asked > stops {
-            stops = asked;
-            // Safe state first: the command goes out before anything else is looked at.
-            let _ = commands.push(Command::Stop);
-            sequence.stop();
-        }
-        let Some(row) = watch.try_pop() else {
-            if heard.elapsed() > LOST_AFTER {
-                let _ = life.heartbeat.load(Ordering::Relaxed);
-                return Ok(Outcome::LoopLost);
-            }
-            std::thread::sleep(Duration::from_micros(500));
-            continue;
-        };
-        heard = Instant::now();
-        let reaction = sequence.on_row(&row);
-        for command in &reaction.commands {
-            // The queue holds many times what one row asks for; a full one means that the loop is gone.
-            if commands.push(*command).is_err() {
-                return Ok(Outcome::LoopLost);
-            }
-        }
-        kept.keep(&reaction, news)?;
-        if reaction.pass.is_some() {
-            let (done, all) = sequence.progress();
-            news(News::Progress(done, all, sequence.remaining_s()));
-        }
-        if !reaction.events.is_empty() || reaction.pass.is_some() {
-            let _ = note.send((row.now, reaction.events, reaction.pass));
-        }
-        if let Some(outcome) = reaction.outcome {
-            return Ok(outcome);
-        }
+    let written = writing.join().map_err(|_| miette::miette!("the recorder's thread panicked"))?;
+    for why in written.problem.iter().cloned().chain(unkept.map(|e| format!("{e:#}"))) {
+        tracing::error!(why, "the record could not be kept: the sweep was stopped");
     }
-}
-
-/// The record's thread: drains the ring, writes, flushes, syncs. Returns how many rows it could not write.
-fn write_record(
-    file: std::fs::File,
-    preamble: realtime::recorder::Preamble,
-    mut rows: impl Consumer<Item = Row>,
-    notes: &Receiver<Note>,
-    last: &Receiver<BTreeMap<String, String>>,
-) -> miette::Result<u64> {
-    let disk = file.try_clone().into_diagnostic()?;
-    let mut recorder = Recorder::begin(std::io::BufWriter::new(file), preamble).into_diagnostic()?;
-    let (mut flushed, mut synced) = (Instant::now(), Instant::now());
-    let last = loop {
-        let mut idle = true;
-        while let Some(row) = rows.try_pop() {
-            recorder.row(&row).into_diagnostic()?;
-            idle = false;
-        }
-        while let Ok((at, events, pass)) = notes.try_recv() {
-            keeper::record(&mut recorder, at, &events, pass.as_ref())?;
-            idle = false;
-        }
-        if flushed.elapsed() >= FLUSH_EVERY {
-            recorder.flush().into_diagnostic()?;
-            flushed = Instant::now();
-        }
-        if synced.elapsed() >= SYNC_EVERY {
-            disk.sync_data().into_diagnostic()?;
-            synced = Instant::now();
-        }
-        if idle {
-            match last.recv_timeout(Duration::from_millis(5)) {
-                Ok(last) => break last,
-                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {}
-                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => break BTreeMap::new(),
-            }
-        }
-    };
-    while let Some(row) = rows.try_pop() {
-        recorder.row(&row).into_diagnostic()?;
-    }
-    recorder.end(last).into_diagnostic()?;
-    disk.sync_all().into_diagnostic()?;
-    Ok(0)
+    let record_lost = written.lost_rows + report.ring_drops;
+    kept.end(outcome, sequence.departed(), Some((report, stalls)), record_lost, links)
 }
 
 /// Serves the virtual rig where the setup looks for its instruments, and puts the real places there.
@@ -237,41 +166,4 @@ fn embed(
 ) -> miette::Result<drivers::embed::Embedded> {
     let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), epoch);
     drivers::embed::embed(instruments, &plant, false).map_err(|problem| miette::miette!("{problem}"))
-}
-
-/// Whether an embedded rig is at a place that only this process knows: a free port, a terminal of its own.
-fn belongs_to_this_process(address: &str) -> bool {
-    address.ends_with(":0") || address.ends_with("pty")
-}
-
-/// One controller a rig: a lock named after the amplifier's address, taken before anything is opened.
-struct RigClaim(Option<std::path::PathBuf>);
-
-impl RigClaim {
-    fn take(job: &Job) -> miette::Result<Self> {
-        // An embedded rig on a free port belongs to this process by construction.
-        if job.setup.file.virtual_rig.is_some() && belongs_to_this_process(&job.setup.file.amplifier.address)
-        {
-            return Ok(RigClaim(None));
-        }
-        let name: String = job
-            .setup
-            .file
-            .amplifier
-            .address
-            .chars()
-            .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
-            .collect();
-        let lock = std::env::temp_dir().join(format!("muprime-rig-{name}.lock"));
-        crate::run_dir::claim(&lock)?;
-        Ok(RigClaim(Some(lock)))
-    }
-}
-
-impl Drop for RigClaim {
-    fn drop(&mut self) {
-        if let Some(lock) = &self.0 {
-            let _ = std::fs::remove_file(lock);
-        }
-    }
 }

@@ -1,0 +1,103 @@
+//! `muprime faults`: the fault list in virtual time, from seeds.
+
+use crate::faults::bench::{Scene, run as run_scene};
+use crate::faults::search::{Search, Tally, search};
+use miette::IntoDiagnostic;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// How many seeds to run; each is one fault of the list in one phase
+    #[arg(long, default_value_t = 2000)]
+    seeds: u64,
+    /// First seed
+    #[arg(long, default_value_t = 1)]
+    first: u64,
+    /// Two faults in each run
+    #[arg(long)]
+    pairs: bool,
+    /// Every seed twice: equal hashes, and its rows replayed to equal decisions
+    #[arg(long)]
+    twice: bool,
+    /// Run one scene again, as a failure printed it
+    #[arg(long, value_name = "SCENE.json")]
+    scene: Option<PathBuf>,
+}
+
+/// Runs the seeds.
+///
+/// # Errors
+/// A scene that cannot be read.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    if let Some(path) = &args.scene {
+        let text = crate::input::text_of(path)?;
+        let scene: Scene = serde_json::from_str(&text).into_diagnostic()?;
+        if scene.strikes.iter().any(|s| s.row >= crate::faults::ROWS.len()) {
+            miette::bail!("{}: a strike's row is beyond the list", path.display());
+        }
+        let found = run_scene(&scene, true);
+        println!("{}", serde_json::to_string(&found).into_diagnostic()?);
+        return super::exit(if found.wrong.is_empty() { super::DONE } else { super::FAILED });
+    }
+    let Args { seeds, first, pairs, twice, .. } = args;
+    let begun = std::time::Instant::now();
+    let tally = search(Search { first, seeds, pairs, twice });
+    if json {
+        println!("{}", document(&tally)?);
+    } else {
+        table(&tally);
+        println!(
+            "{} runs in {:.0} s, {} over a bound or otherwise wrong",
+            tally.scenes,
+            begun.elapsed().as_secs_f64(),
+            tally.failed
+        );
+        for failure in &tally.failures {
+            println!("seed {}: {}", failure.seed, failure.wrong.join("; "));
+            println!("  again: muprime faults --scene FILE, with {}", json_of(&failure.smallest)?);
+        }
+    }
+    super::exit(if tally.failed == 0 { super::DONE } else { super::FAILED })
+}
+
+fn json_of(value: &impl serde::Serialize) -> miette::Result<String> {
+    serde_json::to_string(value).into_diagnostic()
+}
+
+fn document(tally: &Tally) -> miette::Result<String> {
+    let rows: Vec<_> = tally
+        .reactions
+        .iter()
+        .map(|((number, name, moment), r)| {
+            serde_json::json!({ "number": number, "fault": name, "phase": moment, "reactions": r })
+        })
+        .collect();
+    json_of(&serde_json::json!({
+        "runs": tally.scenes, "failed": tally.failed, "rows": rows, "failures": tally.failures
+    }))
+}
+
+/// Worst reactions beside their bounds, in cycles of 1 ms.
+pub fn table(tally: &Tally) {
+    println!(
+        "  # fault                          phase    runs  command off / bound  measured off / bound (ms)"
+    );
+    for ((number, name, moment), r) in &tally.reactions {
+        let moment = format!("{moment:?}").to_lowercase();
+        let cells = match r.command_bound {
+            None => "no trip due".to_string(),
+            Some(bound) => {
+                let cell = |n: Option<u64>| n.map_or_else(|| "-".into(), |n| n.to_string());
+                format!(
+                    "{:>11} / {bound:<5} {:>14} / {}",
+                    cell(r.command_off),
+                    cell(r.measured_off),
+                    r.measured_bound
+                )
+            }
+        };
+        println!("{number:>3} {name:<30} {moment:<7} {:>6}  {cells}", r.runs);
+    }
+}

@@ -1,0 +1,190 @@
+//! Many seeds over all cores, the tally of their reactions, and a failure made small.
+
+use super::bench::{Found, STEADY_AT, Scene, Strike, measured_bound, run};
+use super::rows::{Expect, Moment, ROWS};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// What is searched.
+#[derive(Clone, Copy, Debug)]
+pub struct Search {
+    /// First seed.
+    pub first: u64,
+    /// How many.
+    pub seeds: u64,
+    /// Two faults in each scene, of different channels.
+    pub pairs: bool,
+    /// Each seed twice, with hashes and a replay of its rows.
+    pub twice: bool,
+}
+
+/// Reactions to one fault in one moment.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Reactions {
+    /// Scenes.
+    pub runs: u64,
+    /// Worst number of cycles until the drive was commanded off.
+    pub command_off: Option<u64>,
+    /// Its bound; `None` where no trip is due.
+    pub command_bound: Option<u64>,
+    /// Worst number of cycles from the command until the plate was quiet.
+    pub measured_off: Option<u64>,
+    /// Its bound.
+    pub measured_bound: u64,
+}
+
+/// A scene that went wrong.
+#[derive(Clone, Debug, Serialize)]
+pub struct Failure {
+    /// Its seed.
+    pub seed: u64,
+    /// The smallest scene that still goes wrong.
+    pub smallest: Scene,
+    /// What was wrong with that.
+    pub wrong: Vec<String>,
+}
+
+/// What a search came to.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Tally {
+    /// Scenes run.
+    pub scenes: u64,
+    /// By number and name of the fault, and by moment.
+    pub reactions: BTreeMap<(u32, &'static str, Moment), Reactions>,
+    /// Scenes that went wrong, at most a hundred.
+    pub failures: Vec<Failure>,
+    /// How many went wrong.
+    pub failed: u64,
+}
+
+/// The scene of a seed: moment, faults and the cycles in which they strike.
+pub fn scene_of(seed: u64, pairs: bool) -> Scene {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut strike = || {
+        let row = rng.random_range(0..ROWS.len());
+        Strike { row, at: STEADY_AT + rng.random_range(0..100u64) }
+    };
+    let one = strike();
+    let mut strikes = vec![one];
+    if pairs {
+        // Some faults go with no other: then the scene has one.
+        strikes.extend((0..200).map(|_| strike()).find(|s| compatible(one.row, s.row)));
+    }
+    let both = |m: &&Moment| strikes.iter().all(|s| ROWS[s.row].moments.contains(m));
+    let moments: Vec<_> = ROWS[one.row].moments.iter().filter(both).collect();
+    let moment = *moments[rng.random_range(0..moments.len())];
+    Scene { moment, seed, strikes }
+}
+
+/// Two faults can strike together where they share a moment and neither hides the other: what strikes one channel twice,
+/// or alters what an instrument shows before a channel loses it, is judged one by one only.
+fn compatible(a: usize, b: usize) -> bool {
+    use super::rows::What::{Channel, Paused, Shown};
+    use realtime::wrap::fault::Target;
+    let share = ROWS[a].moments.iter().any(|m| ROWS[b].moments.contains(m));
+    let apart = match (ROWS[a].what, ROWS[b].what) {
+        (Channel(one, ..), Channel(other, ..)) => {
+            let channel = |t| if matches!(t, Target::Lateral | Target::Normal) { Target::Force } else { t };
+            channel(one) != channel(other)
+        }
+        (Channel(..), Shown(_)) | (Shown(_), Channel(..)) | (Shown(_), Shown(_)) => false,
+        // Time stands still for one of them.
+        (Paused(_), _) | (_, Paused(_)) => false,
+        (one, other) => std::mem::discriminant(&one) != std::mem::discriminant(&other),
+    };
+    share && apart
+}
+
+/// Runs the seeds.
+pub fn search(what: Search) -> Tally {
+    let seeds: Vec<u64> = (what.first..what.first.saturating_add(what.seeds)).collect();
+    seeds
+        .par_chunks(64)
+        .map(|chunk| {
+            let mut tally = Tally::default();
+            for seed in chunk {
+                tally.take(&scene_of(*seed, what.pairs), what.twice);
+            }
+            tally
+        })
+        .reduce(Tally::default, Tally::with)
+}
+
+impl Tally {
+    /// Runs a scene and counts it.
+    pub fn take(&mut self, scene: &Scene, twice: bool) {
+        let found = judged(scene, twice);
+        self.scenes += 1;
+        for (i, strike) in scene.strikes.iter().enumerate() {
+            let row = &ROWS[strike.row];
+            let entry = self.reactions.entry((row.number, row.name, scene.moment)).or_default();
+            entry.runs += 1;
+            if let Expect::Off(bound) = row.expect {
+                entry.command_bound = Some(bound);
+                entry.command_off = entry.command_off.max(found.command_off[i]);
+                entry.measured_off = entry.measured_off.max(found.measured_off);
+                entry.measured_bound = entry.measured_bound.max(measured_bound(scene));
+            }
+        }
+        if !found.wrong.is_empty() {
+            self.failed += 1;
+            if self.failures.len() < 100 {
+                let (smallest, wrong) = smallest(scene, twice, found.wrong);
+                self.failures.push(Failure { seed: scene.seed, smallest, wrong });
+            }
+        }
+    }
+
+    fn with(mut self, other: Tally) -> Tally {
+        self.scenes += other.scenes;
+        self.failed += other.failed;
+        self.failures.extend(other.failures);
+        self.failures.sort_by_key(|f| f.seed);
+        self.failures.truncate(100);
+        for (key, theirs) in other.reactions {
+            let ours = self.reactions.entry(key).or_default();
+            ours.runs += theirs.runs;
+            ours.command_off = ours.command_off.max(theirs.command_off);
+            ours.command_bound = ours.command_bound.max(theirs.command_bound);
+            ours.measured_off = ours.measured_off.max(theirs.measured_off);
+            ours.measured_bound = ours.measured_bound.max(theirs.measured_bound);
+        }
+        self
+    }
+}
+
+/// Runs a scene; with `twice` two runs must leave equal hashes.
+fn judged(scene: &Scene, twice: bool) -> Found {
+    let mut found = run(scene, twice);
+    if twice && run(scene, true).hash != found.hash {
+        found.wrong.push("two runs of one seed differ".into());
+    }
+    found
+}
+
+/// Makes a failing scene small: without one of its faults, then with every fault as early as it can strike.
+fn smallest(scene: &Scene, twice: bool, wrong: Vec<String>) -> (Scene, Vec<String>) {
+    let mut best = (scene.clone(), wrong);
+    let mut tries = Vec::new();
+    for i in 0..scene.strikes.len() {
+        let mut fewer = scene.clone();
+        fewer.strikes.remove(i);
+        tries.push(fewer);
+    }
+    for candidate in tries {
+        let found = judged(&candidate, twice);
+        if !found.wrong.is_empty() {
+            best = (candidate, found.wrong);
+            break;
+        }
+    }
+    let mut early = best.0.clone();
+    for strike in &mut early.strikes {
+        strike.at = STEADY_AT;
+    }
+    let found = judged(&early, twice);
+    if found.wrong.is_empty() { best } else { (early, found.wrong) }
+}

@@ -1,0 +1,40 @@
+//! One controller a rig.
+
+use super::Job;
+
+/// Whether an embedded rig is at a place that only this process knows: a free port, a terminal of its own.
+fn belongs_to_this_process(address: &str) -> bool {
+    address.ends_with(":0") || address.ends_with("pty")
+}
+
+/// One controller a rig: a lock named after the amplifier's address, taken before anything is opened.
+pub(super) struct RigClaim(Option<std::path::PathBuf>);
+
+impl RigClaim {
+    pub(super) fn take(job: &Job) -> miette::Result<Self> {
+        // An embedded rig on a free port belongs to this process by construction.
+        if job.setup.file.virtual_rig.is_some() && belongs_to_this_process(&job.setup.file.amplifier.address)
+        {
+            return Ok(RigClaim(None));
+        }
+        let name: String = job
+            .setup
+            .file
+            .amplifier
+            .address
+            .chars()
+            .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+            .collect();
+        let lock = std::env::temp_dir().join(format!("muprime-rig-{name}.lock"));
+        crate::run_dir::claim(&lock)?;
+        Ok(RigClaim(Some(lock)))
+    }
+}
+
+impl Drop for RigClaim {
+    fn drop(&mut self) {
+        if let Some(lock) = &self.0 {
+            let _ = std::fs::remove_file(lock);
+        }
+    }
+}
