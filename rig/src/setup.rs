@@ -116,6 +116,10 @@ pub struct LimitsFile {
     pub human_contact: Option<bool>,
     /// s.
     pub exposure_max_s: Option<f64>,
+    /// Late cycles among a thousand.
+    pub late_cycles_max: Option<u32>,
+    /// Late cycles in a row that are one too many.
+    pub late_in_a_row_max: Option<u32>,
     /// s, `Q / (pi f)` of the plate.
     pub plate_ring_time_s: Option<f64>,
 }
@@ -254,6 +258,8 @@ fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     limits.amplitude_max = l.amplitude_max_pp_m.map_or(limits.amplitude_max, PeakToPeak::from_metres);
     limits.temperature_fitted = l.temperature_fitted.unwrap_or(limits.temperature_fitted);
     limits.frozen_after = l.frozen_after.unwrap_or(limits.frozen_after);
+    limits.late_cycles_max = l.late_cycles_max.unwrap_or(limits.late_cycles_max);
+    limits.late_in_a_row_max = l.late_in_a_row_max.unwrap_or(limits.late_in_a_row_max);
     limits.human_contact = l.human_contact.unwrap_or(limits.human_contact);
     limits.timing.ring_time = l.plate_ring_time_s.map_or(limits.timing.ring_time, Nanos::from_seconds);
     limits.timing.command_expiry = Nanos((2 * cycle.0).max(20_000_000));

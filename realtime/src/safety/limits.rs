@@ -22,6 +22,10 @@ pub struct HardLimits {
     pub temperature_max_c: f64,
     /// s of vibration on a human finger in one go.
     pub exposure_max_s: f64,
+    /// Late cycles among the last thousand: beyond one in ten there is no control.
+    pub late_cycles_max: u32,
+    /// Late cycles in a row.
+    pub late_in_a_row_max: u32,
 }
 
 /// The hard limits.
@@ -33,6 +37,8 @@ pub const HARD: HardLimits = HardLimits {
     speed_max_m_s: 1.0,
     temperature_max_c: 48.0,
     exposure_max_s: 600.0,
+    late_cycles_max: 100,
+    late_in_a_row_max: 20,
 };
 
 /// When a channel counts as stale: a number of its own sample periods plus its stated latency.
@@ -105,6 +111,10 @@ pub struct Limits {
     pub human_contact: bool,
     /// Longest vibration on a human finger in one go, in s.
     pub exposure_max_s: f64,
+    /// Cycles among the last thousand that may begin more than a period late.
+    pub late_cycles_max: u32,
+    /// Late cycles in a row that are one too many.
+    pub late_in_a_row_max: u32,
     /// Timing of the channels.
     pub timing: Timing,
 }
@@ -165,6 +175,8 @@ impl Limits {
             frozen_after: 50,
             human_contact: false,
             exposure_max_s: 60.0,
+            late_cycles_max: 10,
+            late_in_a_row_max: 3,
             timing: Timing {
                 cycle,
                 lateral: fast,
@@ -190,6 +202,8 @@ impl Limits {
             ("speed_max_m_s", self.speed_max_m_s, HARD.speed_max_m_s),
             ("temperature_max_c", self.temperature_max_c, HARD.temperature_max_c),
             ("exposure_max_s", self.exposure_max_s, HARD.exposure_max_s),
+            ("late_cycles_max", f64::from(self.late_cycles_max), f64::from(HARD.late_cycles_max)),
+            ("late_in_a_row_max", f64::from(self.late_in_a_row_max), f64::from(HARD.late_in_a_row_max)),
         ];
         for (name, value, hard) in hard {
             positive(name, value)?;

@@ -67,7 +67,7 @@ pub enum Cause {
     StageFault,
     /// The stage is outside its travel.
     OverTravel,
-    /// The loop missed three deadlines in a row, or one in a hundred.
+    /// The loop missed too many deadlines in a row, or of a thousand.
     Overrun,
     /// A request beyond the limits.
     RequestRefused,
@@ -161,7 +161,7 @@ rules! {
     "SR-26" StageStale "The stage's state is no older than its own periods and latency allow." => |c| state_stale(c.seen.stage.map(|s| s.taken_at), c.limits.timing.stage.age_limit(), c.now);
     "SR-27" StageFault "A stage that reports a fault, or numbers that are none, is stopped." => |c| broken(c.seen.stage.is_ok_and(|s| s.fault || !(s.position_m.is_finite() && s.velocity_m_s.is_finite())), 1.0, 0.0);
     "SR-28" OverTravel "The stage stays within its travel." => travel;
-    "SR-29" Overrun "The loop misses fewer than three deadlines in a row and one in a hundred." => overrun;
+    "SR-29" Overrun "The loop misses fewer deadlines in a row than its limit (three by default), and of a thousand no more than another (ten by default)." => overrun;
     "SR-30" RequestRefused "A request beyond any limit, or not finite, switches off." => request;
     "SR-31" Suspended "A cycle that begins fifty periods late switches off: the rig was alone for that time." => |c| above(Some(c.seen.lateness.seconds()), SUSPENDED_CYCLES * c.limits.timing.cycle.seconds());
     "SR-32" StageNotFollowing "The stage moves as it is told: at least a fifth of its speed after its response time, and not half as fast again." => following;
@@ -331,16 +331,13 @@ fn travel(c: &Context<'_>) -> Option<(f64, f64)> {
 }
 
 fn overrun(c: &Context<'_>) -> Option<(f64, f64)> {
-    let row = c.watch.late_in_a_row;
-    if row >= 3 {
-        return Some((f64::from(row), 3.0));
+    let row = (c.watch.late_in_a_row, c.limits.late_in_a_row_max);
+    if row.0 >= row.1 {
+        return Some((f64::from(row.0), f64::from(row.1)));
     }
-    // Ten in the last thousand cycles, the first second after arming included.
-    broken(
-        c.watch.late_in_window() > 10 && c.armed_since.is_some(),
-        f64::from(c.watch.late_in_window()),
-        10.0,
-    )
+    // Among the last thousand cycles, the first second after arming included.
+    let (late, most) = (c.watch.late_in_window(), c.limits.late_cycles_max);
+    broken(late > most && c.armed_since.is_some(), f64::from(late), f64::from(most))
 }
 
 fn request(c: &Context<'_>) -> Option<(f64, f64)> {
