@@ -5,6 +5,7 @@
 
 use crate::cycle::{Command, Config, CycleState};
 use crate::ports::Nanos;
+use crate::safety::{DriveCommand, StageCommand};
 use crate::turn::{Ports, Row, Tick, turn};
 use crossbeam_queue::ArrayQueue;
 use hdrhistogram::Histogram;
@@ -12,6 +13,7 @@ use models::prediction::FrictionModel;
 use ringbuf::HeapProd;
 use ringbuf::traits::Producer;
 use serde::{Deserialize, Serialize};
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -51,6 +53,9 @@ pub struct LoopReport {
     pub major_faults: i64,
     /// Lateness quantiles in ns: 0.5, 0.9, 0.99, 0.999, maximum.
     pub lateness_ns: [u64; 5],
+    /// What a port said when it panicked, which ended the loop with the drive off; `None` otherwise.
+    #[serde(default)]
+    pub panicked: Option<String>,
     /// Lateness counts: upper bound of a bucket in ns, cycles in it.
     pub histogram: Vec<(u64, u64)>,
 }
@@ -184,6 +189,7 @@ pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
     let mut take = || commands.pop();
     let (mut cycles, mut overruns, mut ring_drops, mut watch_drops) = (0u64, 0u64, 0u64, 0u64);
     let mut faults_at_start = (0, 0);
+    let mut panicked = None;
     let mut deadline = monotonic_ns() + period;
     loop {
         sleep_until(deadline);
@@ -193,7 +199,24 @@ pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
         cycles += 1;
         let now = Nanos(begun.saturating_sub(origin_ns));
         let tick = Tick { number: cycles, lateness: Nanos(late), now };
-        let row = turn(&config, &*model, &mut state, &mut ports, &mut take, tick);
+        // A port is foreign code: if it panics, the drive goes off before anything else, and the loop ends.
+        let turned = std::panic::catch_unwind(AssertUnwindSafe(|| {
+            turn(&config, &*model, &mut state, &mut ports, &mut take, tick)
+        }));
+        let row = match turned {
+            Ok(row) => row,
+            Err(cause) => {
+                let expires_at = now.plus(Nanos(1_000_000_000));
+                let off = AssertUnwindSafe(|| {
+                    ports.amplifier.command(DriveCommand::off(u32::MAX, expires_at), now);
+                    ports.stage.command(StageCommand::stop(u32::MAX, expires_at), now);
+                });
+                // The amplifier's port may be the one that panics: then its own watchdog is left.
+                let _ = std::panic::catch_unwind(off);
+                panicked = Some(words_of(&*cause));
+                break;
+            }
+        };
         if rows.try_push(row).is_err() {
             ring_drops += 1;
         }
@@ -233,11 +256,18 @@ pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
             quantile(0.999),
             lateness_histogram.max(),
         ],
+        panicked,
         histogram: lateness_histogram
             .iter_log(1_000, 2.0)
             .map(|step| (step.value_iterated_to(), step.count_since_last_iteration()))
             .collect(),
     }
+}
+
+/// What a panic said.
+fn words_of(cause: &(dyn std::any::Any + Send)) -> String {
+    let text = cause.downcast_ref::<&str>().map(ToString::to_string);
+    text.or_else(|| cause.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no words".into())
 }
 
 /// Lateness in ns of a bare absolute sleep of that period, for so long: what the machine itself gives.

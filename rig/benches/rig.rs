@@ -142,3 +142,17 @@ fn modbus_round_trip_bare_client(bencher: Bencher<'_, '_>) {
         runtime.block_on(client.read_holding_registers(poll.address, poll.count)).unwrap().unwrap()
     });
 }
+
+/// The same read as the driver makes it: with its deadline, and as bytes for the decoder.
+#[divan::bench]
+fn modbus_round_trip_driver(bencher: Bencher<'_, '_>) {
+    let server = server();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let profile = drivers::profile("muprime-force2").unwrap();
+    let (poll, link) = (&profile.description.poll[0], &profile.description.link);
+    let unit = link.unit.unwrap_or(1);
+    let mut wire =
+        drivers::modbus_tcp::Tcp::connect(&runtime, server.address(), unit, 1000, link.response_timeout_ms)
+            .unwrap();
+    bencher.bench_local(|| wire.read_registers(poll.table, poll.address, poll.count).unwrap());
+}

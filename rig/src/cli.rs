@@ -10,6 +10,7 @@ pub mod export;
 pub mod faults;
 pub mod model;
 pub mod recover;
+pub mod replay;
 pub mod report;
 pub mod run;
 pub mod runs;

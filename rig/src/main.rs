@@ -37,6 +37,8 @@ enum Verb {
     Model(cli::model::ModelArgs),
     /// Write the report of a run
     Report(cli::report::Args),
+    /// Run a recorded run's cycles again: the same decisions, bit for bit
+    Replay(cli::replay::Args),
     /// Convert the passes of a run
     Export(cli::export::Args),
     /// Make a cut record whole again
@@ -73,6 +75,7 @@ fn main() -> ExitCode {
         Verb::Faults(args) => cli::faults::run(args, json),
         Verb::Model(args) => cli::model::run(args, json),
         Verb::Report(args) => cli::report::run(args, json),
+        Verb::Replay(args) => cli::replay::run(args, json),
         Verb::Export(args) => cli::export::run(args, json),
         Verb::Recover(args) => cli::recover::run(args, json),
         Verb::Runs(args) => cli::runs::run(args, json),

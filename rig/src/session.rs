@@ -8,6 +8,7 @@ mod keeper;
 mod live;
 
 pub use fast::{Rehearsal, rehearse};
+pub use keeper::{REPLAYABLE, Replayable};
 
 use crate::plan::{Plan, Point, Resolution};
 use crate::run_dir::{Identity, RunDir};

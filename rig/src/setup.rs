@@ -116,6 +116,8 @@ pub struct LimitsFile {
     pub human_contact: Option<bool>,
     /// s.
     pub exposure_max_s: Option<f64>,
+    /// s that a link's thread may be held up before its channel counts as stale, beyond three of its periods.
+    pub link_stall_s: Option<f64>,
     /// Late cycles among a thousand.
     pub late_cycles_max: Option<u32>,
     /// Late cycles in a row that are one too many.
@@ -238,6 +240,10 @@ impl Setup {
     }
 }
 
+/// How long a link's thread may be held up on a machine that does nothing else, and the longest that a setup may allow.
+const LINK_STALL_S: f64 = 0.02;
+const LINK_STALL_MAX_S: f64 = 0.05;
+
 /// Soft limits over the paper's, timing from the instruments' profiles.
 fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     let l = &file.limits;
@@ -266,7 +272,12 @@ fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
 
     // A channel is stale after a number of its own periods, never of the loop's cycles. On a general-purpose kernel a
     // link thread may be held up for some milliseconds: the latency allows for that and is stated.
-    let stall = Nanos(20_000_000);
+    let stall = l.link_stall_s.unwrap_or(LINK_STALL_S);
+    if !(0.0..=LINK_STALL_MAX_S).contains(&stall) {
+        let needed = "from 0 to 0.05: an amplifier's own watchdog waits no longer";
+        return Err(LimitError::Unusable { name: "link_stall_s", value: stall, needed });
+    }
+    let stall = Nanos::from_seconds(stall);
     let timing = |instrument: &InstrumentSetup| -> ChannelTiming {
         let rate = instrument
             .rate_hz

@@ -8,6 +8,7 @@ use crate::setup::Setup;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
 use models::prediction::{FrictionModel, SpringSlider};
+use realtime::ports::Nanos;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -215,6 +216,18 @@ fn tell(summary: &Summary, json: bool) {
             "loop: {} cycles, lateness median {p50:.0} us, 99 % {p99:.0} us, worst {max:.0} us; {} overruns, {} rows lost",
             report.cycles, report.overruns, summary.record_lost
         );
+    }
+    if let (Outcome::Tripped(trip), Some(stalls)) = (&summary.outcome, &summary.stalls)
+        && let Some(stall) = stalls.within(Nanos(trip.at.0.saturating_sub(100_000_000)), trip.at)
+    {
+        let _ = writeln!(
+            err,
+            "just before the trip this machine kept its programs from running for {:.0} ms: see 'muprime doctor'",
+            stall.lasted.seconds() * 1e3
+        );
+    }
+    if summary.passes < summary.planned {
+        let _ = writeln!(err, "the same command with --out {} goes on", summary.folder.display());
     }
     let finding = if summary.model_departed {
         format!(

@@ -32,10 +32,9 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         .build()
         .map_err(|error| error.to_string())?;
     session.spawn(move |session| {
-        let context = connect(&runtime, address, unit, connect_ms)?;
+        let mut wire = Tcp::connect(&runtime, address, unit, connect_ms, answer_ms)?;
         let health = session.endpoint.health();
         health.count(&health.connections);
-        let mut wire = Tcp { runtime: &runtime, context, answer_ms };
         Conversation::begin(session, &mut wire)?.go_on(session, &mut wire, rate_hz)
     })
 }
@@ -55,18 +54,6 @@ pub fn resolve(address: &str, port: Option<u16>) -> Result<SocketAddr, String> {
     found.next().ok_or_else(|| format!("`{address}` stands for no address"))
 }
 
-fn connect(runtime: &Runtime, address: SocketAddr, unit: u8, limit_ms: u32) -> Result<Context, Ended> {
-    within(runtime, limit_ms, async move {
-        let stream = tokio::net::TcpStream::connect(address).await?;
-        stream.set_nodelay(true)?;
-        // When the connection is dropped, what the kernel still holds is discarded: a command
-        // queued before an outage must not be delivered after it.
-        stream.set_zero_linger()?;
-        Ok(tcp::attach_slave(stream, Slave(unit)))
-    })?
-    .map_err(|error: std::io::Error| Ended::from(error))
-}
-
 /// Runs one request against its deadline.
 fn within<T>(runtime: &Runtime, limit_ms: u32, request: impl Future<Output = T>) -> Result<T, Ended> {
     let limit = Duration::from_millis(u64::from(limit_ms));
@@ -75,10 +62,49 @@ fn within<T>(runtime: &Runtime, limit_ms: u32, request: impl Future<Output = T>)
         .map_err(|_| Ended::Timeout(limit_ms))
 }
 
-struct Tcp<'a> {
+/// A connection whose every request has a deadline. After any error it must be dropped.
+pub struct Tcp<'a> {
     runtime: &'a Runtime,
     context: Context,
     answer_ms: u32,
+}
+
+impl<'a> Tcp<'a> {
+    /// Connects to a unit within `connect_ms`; answers may take `answer_ms`.
+    ///
+    /// # Errors
+    /// Nobody there, or not in time.
+    pub fn connect(
+        runtime: &'a Runtime,
+        address: SocketAddr,
+        unit: u8,
+        connect_ms: u32,
+        answer_ms: u32,
+    ) -> Result<Self, Ended> {
+        let context = within(runtime, connect_ms, async move {
+            let stream = tokio::net::TcpStream::connect(address).await?;
+            stream.set_nodelay(true)?;
+            // When the connection is dropped, what the kernel still holds is discarded: a command
+            // queued before an outage must not be delivered after it.
+            stream.set_zero_linger()?;
+            Ok(tcp::attach_slave(stream, Slave(unit)))
+        })?
+        .map_err(|error: std::io::Error| Ended::from(error))?;
+        Ok(Tcp { runtime, context, answer_ms })
+    }
+
+    /// Reads registers, as bytes in the order of the wire.
+    ///
+    /// # Errors
+    /// See [`Trouble`].
+    pub fn read_registers(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
+        let (runtime, limit) = (self.runtime, self.answer_ms);
+        let registers = part(match table {
+            Table::Holding => within(runtime, limit, self.context.read_holding_registers(address, count)),
+            Table::Input => within(runtime, limit, self.context.read_input_registers(address, count)),
+        })?;
+        Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect())
+    }
 }
 
 /// Parts what tokio-modbus parts: an exception of the instrument, and trouble on the way.
@@ -99,12 +125,7 @@ impl Registers for Tcp<'_> {
         address: u16,
         count: u16,
     ) -> Result<Vec<u8>, Trouble> {
-        let (runtime, limit) = (self.runtime, self.answer_ms);
-        let registers = part(match table {
-            Table::Holding => within(runtime, limit, self.context.read_holding_registers(address, count)),
-            Table::Input => within(runtime, limit, self.context.read_input_registers(address, count)),
-        })?;
-        Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect())
+        self.read_registers(table, address, count)
     }
 
     fn write(&mut self, _session: &Session, address: u16, registers: &[u16]) -> Result<(), Trouble> {

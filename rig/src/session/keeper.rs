@@ -5,12 +5,28 @@ use crate::catalogue::{Catalogue, RunEntry};
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome};
 use miette::{IntoDiagnostic, WrapErr};
+use models::finger::Finger;
+use realtime::cycle::Config;
 use realtime::pacing::LoopReport;
 use realtime::ports::Nanos;
 use realtime::recorder::Preamble;
 use realtime::witness::StallReport;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Name of the file in a record that a replay needs.
+pub const REPLAYABLE: &str = "loop.json";
+
+/// What the loop was built from, so that its rows can be run again; the model is that of the finger where the record holds
+/// no model file.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Replayable {
+    /// Limits, timing, estimate.
+    pub config: Config,
+    /// The finger of the baseline model.
+    pub finger: Finger,
+}
 
 /// The open files of a run.
 pub struct Keeper {
@@ -49,6 +65,8 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
         ("plan.toml".to_string(), job.plan.text.clone()),
         ("rig.toml".to_string(), job.setup.rig_toml()?),
     ];
+    let replayed = Replayable { config: job.setup.config, finger: job.setup.tip.finger };
+    files.push((REPLAYABLE.to_string(), serde_json::to_string_pretty(&replayed).into_diagnostic()?));
     files.extend(job.model_file.clone());
     files.extend(job.setup.certificates.files.iter().cloned());
     for (id, text) in job

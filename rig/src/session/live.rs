@@ -150,6 +150,9 @@ pub fn run(
     last.insert("stalls".to_string(), serde_json::to_string(&stalls).into_diagnostic()?);
     last.insert("links".to_string(), serde_json::to_string(&links).into_diagnostic()?);
     let _ = last_in.send(last);
+    if let Some(what) = &report.panicked {
+        tracing::error!(what, "a port panicked in the loop: the drive was switched off");
+    }
     let written = writing.join().map_err(|_| miette::miette!("the recorder's thread panicked"))?;
     for why in written.problem.iter().cloned().chain(unkept.map(|e| format!("{e:#}"))) {
         tracing::error!(why, "the record could not be kept: the sweep was stopped");
