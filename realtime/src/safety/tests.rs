@@ -52,6 +52,7 @@ struct Bench {
     request: Request,
     n: u32,
     last: DriveCommand,
+    velocity_m_s: f64,
 }
 
 impl Bench {
@@ -62,6 +63,7 @@ impl Bench {
             request: Request::default(),
             n: 0,
             last: DriveCommand::off(0, T),
+            velocity_m_s: 0.0,
         };
         bench.cycle(|_| {}, Controls::default());
         let decision = bench.cycle(|_| {}, Controls { reset: true, ..Controls::default() });
@@ -82,10 +84,12 @@ impl Bench {
     fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> Decision {
         self.n += 1;
         let mut seen = healthy(self.n, &self.last);
+        stage(&mut seen).velocity_m_s = self.velocity_m_s;
         spoil(&mut seen);
         let now = Nanos(u64::from(self.n) * T.0);
         let decision = self.safety.step(&self.limits, &seen, &self.request, controls, now);
         self.last = decision.drive;
+        self.velocity_m_s = decision.stage.velocity_m_s();
         decision
     }
 
@@ -100,6 +104,18 @@ impl Bench {
         }
         panic!("no trip in 2000 cycles");
     }
+}
+
+fn stage(seen: &mut Observation) -> &mut StageState {
+    seen.stage.as_mut().unwrap()
+}
+
+fn normal(seen: &mut Observation) -> &mut Reading {
+    seen.forces.normal.as_mut().unwrap()
+}
+
+fn lateral(seen: &mut Observation) -> &mut Reading {
+    seen.forces.lateral.as_mut().unwrap()
 }
 
 fn amplifier(seen: &mut Observation) -> &mut AmplifierState {
@@ -174,6 +190,19 @@ fn each_fault_trips_with_its_own_cause_within_its_bound() {
         (Cause::OverTravel, 1, |s| s.stage.as_mut().unwrap().position_m = 0.061),
         (Cause::StageStale, 1, |s| s.stage = Err(NoData::Disconnected)),
         (Cause::Overrun, 3, |s| s.lateness = Nanos(2 * T.0)),
+        (Cause::Suspended, 1, |s| s.lateness = Nanos(51 * T.0)),
+        (Cause::AmplifierFault, 1, |s| amplifier(s).amplitude.as_mut().unwrap().value = f64::NAN),
+        (Cause::AmplifierFault, 1, |s| amplifier(s).amplitude.as_mut().unwrap().value = -1e-6),
+        (Cause::AmplifierFault, 1, |s| amplifier(s).echoed_frequency_hz = f64::INFINITY),
+        (Cause::AmplifierFault, 1, |s| amplifier(s).echoed_amplitude = PeakToPeak::from_metres(f64::NAN)),
+        (Cause::DriveNoResponse, 2, |s| amplifier(s).amplitude = Err(NoData::Invalid)),
+        (Cause::StageFault, 1, |s| stage(s).position_m = f64::NAN),
+        (Cause::StageFault, 1, |s| stage(s).velocity_m_s = f64::NAN),
+        (Cause::StageStale, 1, |s| stage(s).taken_at.0 += 1_000_000_000),
+        (Cause::AmplifierStale, 1, |s| amplifier(s).taken_at.0 += 1_000_000_000),
+        (Cause::NormalInvalid, 4, |s| normal(s).taken_at.0 += 1_000_000_000),
+        (Cause::StageNotFollowing, 2, |s| stage(s).velocity_m_s = 0.3),
+        (Cause::StageNotFollowing, 320, |s| stage(s).velocity_m_s = 0.0),
     ];
     for (cause, bound, spoil) in cases {
         let mut bench = Bench::armed();
@@ -273,6 +302,189 @@ fn every_rule_has_its_own_identifier_and_cause() {
     for (i, rule) in RULES.iter().enumerate() {
         assert_eq!(rule.id, format!("SR-{:02}", i + 1));
         assert!(RULES.iter().filter(|r| r.cause == rule.cause).count() == 1);
+    }
+}
+
+/// A limit binds above its value, and only there.
+#[test]
+fn limits_bind_exactly_where_they_say() {
+    type Spoil = fn(&mut Observation, f64);
+    let l = limits();
+    let amplitude: Spoil = |s, v| amplifier(s).amplitude.as_mut().unwrap().value = v;
+    let cases: &[(Cause, f64, f64, Spoil)] = &[
+        (Cause::NormalOverforce, l.normal_force_max_n, 1e-6, |s, v| normal(s).value = v),
+        (Cause::LateralOverforce, l.lateral_force_max_n, 1e-6, |s, v| lateral(s).value = v),
+        (Cause::LateralOverforce, -l.lateral_force_max_n, -1e-6, |s, v| lateral(s).value = v),
+        (Cause::OverAmplitude, l.amplitude_max.metres(), 1e-12, amplitude),
+        (Cause::OverTemperature, l.temperature_max_c, 1e-6, |s, v| {
+            amplifier(s).temperature_c.as_mut().unwrap().value = v;
+        }),
+        (Cause::OverTravel, l.travel_m.1, 1e-9, |s, v| stage(s).position_m = v),
+        (Cause::OverTravel, l.travel_m.0, -1e-9, |s, v| stage(s).position_m = v),
+        (Cause::Suspended, 50.0, 0.001, |s, v| s.lateness = Nanos((v * T.0 as f64) as u64)),
+    ];
+    for (cause, bound, above, spoil) in cases {
+        let mut bench = Bench::armed();
+        // At rest in the middle, so that a position beyond the travel is not on its way back.
+        bench.request.velocity_m_s = 0.0;
+        if *cause == Cause::OverAmplitude {
+            bench.request.amplitude = l.amplitude_max;
+        }
+        for _ in 0..60 {
+            bench.cycle(|_| {}, Controls::default());
+        }
+        // A jump to the bound is confirmed by its second sample; the rate rule is out of the way.
+        bench.limits.force_rate_max_n_s = 1e9;
+        for i in 0..5 {
+            let late = *cause == Cause::Suspended && i > 0;
+            let decision = bench.cycle(
+                |s| {
+                    if !late {
+                        spoil(s, *bound)
+                    }
+                },
+                Controls::default(),
+            );
+            assert_eq!(decision.tripped, None, "{cause:?} at its bound");
+        }
+        let (got, cycles) = bench.until_off(|s| spoil(s, bound + above));
+        assert_eq!((got, cycles), (*cause, 1), "just above the bound");
+    }
+}
+
+#[test]
+fn a_force_that_rises_too_fast_trips_and_a_small_spike_does_not() {
+    let mut bench = Bench::armed();
+    let n0 = bench.n;
+    let (cause, cycles) = bench.until_off(|s| {
+        let n = normal(s).sequence - n0;
+        normal(s).value = 0.25 + 0.061 * f64::from(n);
+    });
+    assert_eq!((cause, cycles), (Cause::ForceRate, 2));
+    let mut bench = Bench::armed();
+    let n0 = bench.n;
+    for _ in 0..15 {
+        let decision = bench.cycle(
+            |s| {
+                let n = normal(s).sequence - n0;
+                normal(s).value = 0.25 + 0.059 * f64::from(n);
+            },
+            Controls::default(),
+        );
+        assert_eq!(decision.tripped, None, "just under the limit");
+    }
+    let mut bench = Bench::armed();
+    for n in 0..30 {
+        let decision =
+            bench.cycle(|s| normal(s).value += if n % 10 == 5 { 0.2 } else { 0.0 }, Controls::default());
+        assert_eq!(decision.tripped, None, "up and down again");
+    }
+}
+
+#[test]
+fn an_amplitude_that_rises_too_fast_trips() {
+    for (rise_m, trips) in [(21e-9, true), (19e-9, false)] {
+        let mut bench = Bench::armed();
+        bench.limits.amplitude_rate_max_m_s = 20e-6;
+        let mut w = 2e-6;
+        let tripped = (0..10).find_map(|_| {
+            w += rise_m;
+            bench.cycle(|s| amplifier(s).amplitude.as_mut().unwrap().value = w, Controls::default()).tripped
+        });
+        assert_eq!(tripped.map(|t| t.cause), trips.then_some(Cause::AmplitudeRate));
+    }
+}
+
+#[test]
+fn lost_samples_are_remarked_and_then_trip() {
+    let mut bench = Bench::armed();
+    let mut last = healthy(bench.n, &bench.last).forces;
+    let mut lose = |bench: &mut Bench, one_in: u32, cycles: u32| {
+        let mut remarked = None;
+        for _ in 0..cycles {
+            let decision = bench.cycle(
+                |s| {
+                    if normal(s).sequence % one_in == 0 {
+                        last = s.forces;
+                    } else {
+                        // The same sample again, made fresh enough not to be stale.
+                        for channel in [&mut last.lateral, &mut last.normal] {
+                            channel.as_mut().unwrap().taken_at = stage(s).taken_at;
+                        }
+                        s.forces = last;
+                    }
+                },
+                Controls::default(),
+            );
+            if let Some(trip) = decision.tripped {
+                return (remarked, Some(trip.cause));
+            }
+            remarked = remarked.or(decision.remark);
+        }
+        (remarked, None)
+    };
+    assert_eq!(lose(&mut bench, 2, 250), (Some(Remark::LateralLossy), None));
+    let (_, cause) = lose(&mut bench, 5, 250);
+    assert_eq!(cause, Some(Cause::LateralLossy));
+}
+
+#[test]
+fn a_plate_that_sags_is_remarked() {
+    let mut bench = Bench::armed();
+    let half = |s: &mut Observation| amplifier(s).amplitude.as_mut().unwrap().value = 1.0e-6;
+    assert_eq!(bench.cycle(half, Controls::default()).remark, Some(Remark::AmplitudeSags));
+    let most = |s: &mut Observation| amplifier(s).amplitude.as_mut().unwrap().value = 1.5e-6;
+    assert_eq!(bench.cycle(most, Controls::default()).remark, None);
+}
+
+#[test]
+fn an_overtaken_sample_is_never_used() {
+    let mut bench = Bench::armed();
+    let decision = bench.cycle(|s| normal(s).taken_at.0 -= 2 * T.0, Controls::default());
+    assert!(!decision.normal_usable && decision.lateral_usable);
+}
+
+#[test]
+fn the_command_expires_and_counts() {
+    let mut bench = Bench::armed();
+    let first = bench.cycle(|_| {}, Controls::default());
+    let second = bench.cycle(|_| {}, Controls::default());
+    assert_eq!(second.drive.sequence(), first.drive.sequence().wrapping_add(1));
+    assert_eq!(second.stage.sequence(), second.drive.sequence());
+    let now = Nanos(u64::from(bench.n) * T.0);
+    assert_eq!(second.drive.expires_at(), now.plus(limits().timing.command_expiry));
+    assert_eq!(second.stage.expires_at(), second.drive.expires_at());
+    assert_eq!((second.drive.frequency_hz(), second.stage.normal_force_n()), (27_500.0, 0.25));
+}
+
+#[test]
+fn one_late_cycle_in_a_hundred_is_too_many() {
+    let mut bench = Bench::armed();
+    let mut i = 0;
+    let (cause, cycles) = bench.until_off(|s| {
+        i += 1;
+        s.lateness = Nanos(if i % 50 == 0 { 2 * T.0 } else { T.0 });
+    });
+    assert_eq!((cause, cycles), (Cause::Overrun, 550), "the eleventh of a thousand");
+    let mut bench = Bench::armed();
+    for i in 0..3000 {
+        let lateness = Nanos(if i % 101 == 0 { 2 * T.0 } else { 0 });
+        let decision = bench.cycle(|s| s.lateness = lateness, Controls::default());
+        assert_eq!(decision.tripped, None, "one in a hundred and one");
+    }
+}
+
+#[test]
+fn beyond_the_travel_only_the_way_back_is_let_through() {
+    for (position, velocity, trips) in
+        [(0.061, -0.02, false), (0.061, 0.02, true), (-0.061, 0.02, false), (-0.061, -0.02, true)]
+    {
+        let mut bench = Bench::armed();
+        bench.request.velocity_m_s = velocity;
+        bench.cycle(|_| {}, Controls::default());
+        let decision = bench.cycle(|s| stage(s).position_m = position, Controls::default());
+        assert_eq!(decision.tripped.is_some(), trips, "{position} {velocity}");
+        bench.cycle(|s| stage(s).at_limit = true, Controls::default());
     }
 }
 

@@ -43,7 +43,9 @@ fn say(path: &Path, found: &Replay) {
     let Replay { cycles, equal, missing, first_difference } = found;
     println!("{}: {equal} of {cycles} cycles decide as recorded", path.display());
     if *missing > 0 {
-        println!("  {missing} cycles are missing from the record: what follows them cannot be expected to agree");
+        println!(
+            "  {missing} cycles are missing from the record: what follows them cannot be expected to agree"
+        );
     }
     if let Some(cycle) = first_difference {
         println!("  the first that differs is cycle {cycle}");
