@@ -2,6 +2,7 @@
 
 mod amplitude_for;
 mod conditions;
+mod effects;
 mod figures;
 mod plot;
 mod point;
@@ -30,6 +31,8 @@ enum ModelVerb {
     Table(table::TableArgs),
     /// The paper's figures recomputed, as CSV and SVG with a line of comparison each.
     Reproduce(reproduce::ReproduceArgs),
+    /// The candidate effects: place, parameters, units, zero, prior, source, covariates needed.
+    Effects(effects::EffectsArgs),
     /// The amplitude (and relative drive power) for a wanted friction: open-loop control.
     AmplitudeFor(amplitude_for::AmplitudeForArgs),
 }
@@ -44,6 +47,7 @@ pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
         ModelVerb::Ridge(args) => ridge::run(&args, json),
         ModelVerb::Table(args) => table::run(&args, json),
         ModelVerb::Reproduce(args) => reproduce::run(&args, json),
+        ModelVerb::Effects(args) => effects::run(&args, json),
         ModelVerb::AmplitudeFor(args) => amplitude_for::run(&args, json),
     }
 }
