@@ -87,11 +87,13 @@ fn points(run: &Path) -> Vec<u64> {
 
 #[test]
 fn killed_at_any_instant_nothing_acknowledged_is_lost_and_the_drive_drops() {
-    let kills: u64 = std::env::var("MUPRIME_KILLS").map_or(30, |n| n.parse().expect("MUPRIME_KILLS is a count"));
+    let kills: u64 =
+        std::env::var("MUPRIME_KILLS").map_or(30, |n| n.parse().expect("MUPRIME_KILLS is a count"));
     let folder = tempfile::tempdir().unwrap();
     let world = World::new(&WorldConfig::ideal(), 5).unwrap();
     let plant = SharedPlant::new(WorldPlant::new(world), Instant::now());
-    let devices = rig::drivers::emulators(&rig::setup::Setup::load("virtual").unwrap().instruments()).unwrap();
+    let devices =
+        rig::drivers::emulators(&rig::setup::Setup::load("virtual").unwrap().instruments()).unwrap();
     let server = ModbusTcpServer::start("127.0.0.1:0".parse().unwrap(), devices, plant).unwrap();
     let (plan, setup_file) = (folder.path().join("plan.toml"), folder.path().join("setup.toml"));
     std::fs::write(&plan, PLAN).unwrap();

@@ -44,7 +44,7 @@ pub fn documents(output: &Output) -> Vec<serde_json::Value> {
 ///
 /// A shared machine takes a CPU away for many milliseconds, and the safety core then trips, as it must. Such a trip is
 /// accepted only if a witness recorded a stall of the machine in the 300 ms before it, and at most four times; any
-/// other trip fails. `sweep` makes the command for a folder. Returns the output of the attempt that went through.
+/// other trip fails. What ends otherwise is the caller's to judge. `sweep` makes the command for a folder. Returns the output of the attempt that went through.
 pub fn sweep_unless_the_machine_stalls(folder: &Path, sweep: impl Fn(&Path) -> Command) -> (PathBuf, Output) {
     for attempt in 1..=5 {
         let out = folder.join(format!("attempt-{attempt}"));
@@ -56,9 +56,7 @@ pub fn sweep_unless_the_machine_stalls(folder: &Path, sweep: impl Fn(&Path) -> C
         let (stdout, stderr) = texts(&output);
         let said = said.unwrap_or_else(|e| panic!("no summary: {e}\n{stdout}\n{stderr}"));
         let summary: rig::session::Summary = serde_json::from_str(&said).unwrap();
-        let rig::sequence::Outcome::Tripped(trip) = summary.outcome else {
-            panic!("status 1 without a trip: {said}")
-        };
+        let rig::sequence::Outcome::Tripped(trip) = summary.outcome else { return (out, output) };
         let stalls = summary.stalls.expect("a run in wall-clock time has witnesses");
         let before = realtime::ports::Nanos(trip.at.0.saturating_sub(300_000_000));
         let stall = stalls.within(before, trip.at).unwrap_or_else(|| {

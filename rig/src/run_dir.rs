@@ -7,7 +7,7 @@ use crate::sequence::MeasuredPass;
 use miette::{Context, IntoDiagnostic};
 use models::record::{self, Pass};
 use serde::{Deserialize, Serialize};
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -30,7 +30,8 @@ pub struct RunDir {
     path: PathBuf,
     points: File,
     journal: File,
-    lock: PathBuf,
+    /// Held, and so locked, for as long as this lives: the system frees it with the process, whatever ends that.
+    _lock: File,
     /// Passes that an earlier session has made.
     pub made: Vec<Pass>,
 }
@@ -64,23 +65,18 @@ impl RunDir {
                     other.join(" and ")
                 );
             }
-        } else if path.exists() && fs::read_dir(path).into_diagnostic()?.next().is_some() {
+        } else if path.exists() && holds_something(path)? {
             miette::bail!(
                 help = "give an empty or new folder as --out",
                 "{shown} is not empty and holds no run"
             );
         }
         fs::create_dir_all(path).into_diagnostic().wrap_err_with(|| format!("cannot make {shown}"))?;
-        let lock = path.join(LOCK);
-        claim(&lock)?;
-        let opened = Self::open_locked(path, identity, &lock);
-        if opened.is_err() {
-            let _ = fs::remove_file(&lock);
-        }
-        opened
+        let lock = claim(&path.join(LOCK))?;
+        Self::open_locked(path, identity, lock)
     }
 
-    fn open_locked(path: &Path, identity: &Identity, lock: &Path) -> miette::Result<Self> {
+    fn open_locked(path: &Path, identity: &Identity, lock: File) -> miette::Result<Self> {
         let identity_file = path.join(IDENTITY);
         if !identity_file.exists() {
             write_whole(&identity_file, toml::to_string(identity).into_diagnostic()?.as_bytes())?;
@@ -108,7 +104,7 @@ impl RunDir {
             .open(path.join("passes.jsonl"))
             .into_diagnostic()?;
         drop_torn_line(&mut journal)?;
-        Ok(RunDir { path: path.to_path_buf(), points, journal, lock: lock.to_path_buf(), made })
+        Ok(RunDir { path: path.to_path_buf(), points, journal, _lock: lock, made })
     }
 
     /// The folder.
@@ -169,12 +165,6 @@ impl RunDir {
     /// Whatever the file system says.
     pub fn write(&self, name: &str, bytes: &[u8]) -> miette::Result<()> {
         write_whole(&self.path.join(name), bytes)
-    }
-}
-
-impl Drop for RunDir {
-    fn drop(&mut self) {
-        let _ = fs::remove_file(&self.lock);
     }
 }
 
@@ -248,35 +238,47 @@ fn drop_torn_line(file: &mut File) -> miette::Result<()> {
     file.set_len(whole).into_diagnostic()
 }
 
-/// Takes a lock file that names this process; one whose process is gone is taken over.
+/// Takes a lock: the file stays, named after its present holder, and is locked as long as the answer lives.
 ///
 /// # Errors
-/// The lock is held by a living process.
-pub fn claim(lock: &Path) -> miette::Result<()> {
-    for _ in 0..2 {
-        match OpenOptions::new().create_new(true).write(true).open(lock) {
-            Ok(mut file) => {
-                return write!(file, "{}", std::process::id()).into_diagnostic();
-            }
-            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
-                let holder = fs::read_to_string(lock).unwrap_or_default();
-                if is_alive(holder.trim()) {
-                    miette::bail!(
-                        help = "wait until it ends, or end it",
-                        "another muprime (process {}) holds {}",
-                        holder.trim(),
-                        lock.display()
-                    );
-                }
-                fs::remove_file(lock).into_diagnostic()?;
-            }
-            Err(e) => return Err(miette::miette!("{}: {e}", lock.display())),
+/// A living process holds it, or the file system refuses.
+pub fn claim(lock: &Path) -> miette::Result<File> {
+    let shown = lock.display();
+    let wrong = |e: std::io::Error| miette::miette!("{shown}: {e}");
+    let mut file =
+        OpenOptions::new().create(true).read(true).write(true).truncate(false).open(lock).map_err(wrong)?;
+    match file.try_lock() {
+        Ok(()) => {
+            file.set_len(0).map_err(wrong)?;
+            write!(file, "{}", std::process::id()).map_err(wrong)?;
+            Ok(file)
         }
+        Err(TryLockError::WouldBlock) => {
+            let holder = fs::read_to_string(lock).unwrap_or_default();
+            Err(miette::miette!(
+                help = "wait until it ends, or end it",
+                "another muprime (process {}) holds {shown}",
+                holder.trim()
+            ))
+        }
+        Err(TryLockError::Error(e)) => Err(wrong(e)),
     }
-    miette::bail!("{} is being taken by another muprime", lock.display())
 }
 
-fn is_alive(process: &str) -> bool {
-    let same = process == std::process::id().to_string();
-    same || (!process.is_empty() && Path::new("/proc").join(process).exists())
+/// Whether a process holds the lock of a run's folder.
+pub fn is_held(run: &Path) -> bool {
+    let Ok(file) = File::open(run.join(LOCK)) else { return false };
+    matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
+}
+
+/// Whether a folder holds more than what a session leaves that died before it wrote its identity.
+fn holds_something(path: &Path) -> miette::Result<bool> {
+    let part = Path::new(IDENTITY).with_extension("part");
+    for entry in fs::read_dir(path).into_diagnostic()? {
+        let name = entry.into_diagnostic()?.file_name();
+        if name != LOCK && name != part.as_os_str() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }

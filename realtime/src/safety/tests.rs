@@ -247,6 +247,10 @@ fn an_amplifier_that_refuses_off_is_cut_from_its_supply() {
     let cut =
         (0..100).find(|_| bench.cycle(|s| amplifier(s).output_on = true, Controls::default()).cut_supply);
     assert!(cut.is_some_and(|n| n <= age + 11), "{cut:?}");
+    // As long as it stays on nothing arms the rig.
+    let reset = Controls { reset: true, ..Controls::default() };
+    let decision = bench.cycle(|s| amplifier(s).output_on = true, reset);
+    assert!(!decision.armed_now && decision.blocking == Some(Cause::RefusesOff), "{:?}", decision.blocking);
 }
 
 #[test]
@@ -404,7 +408,7 @@ fn lost_samples_are_remarked_and_then_trip() {
         for _ in 0..cycles {
             let decision = bench.cycle(
                 |s| {
-                    if normal(s).sequence % one_in == 0 {
+                    if normal(s).sequence.is_multiple_of(one_in) {
                         last = s.forces;
                     } else {
                         // The same sample again, made fresh enough not to be stale.
@@ -426,6 +430,20 @@ fn lost_samples_are_remarked_and_then_trip() {
     assert_eq!(lose(&mut bench, 2, 250), (Some(Remark::LateralLossy), None));
     let (_, cause) = lose(&mut bench, 5, 250);
     assert_eq!(cause, Some(Cause::LateralLossy));
+}
+
+#[test]
+fn a_normal_channel_that_loses_most_samples_trips_by_itself() {
+    let mut bench = Bench::armed();
+    let mut last = healthy(bench.n, &bench.last).forces.normal.unwrap();
+    let (cause, cycles) = bench.until_off(|s| {
+        if normal(s).sequence.is_multiple_of(5) {
+            last = *normal(s);
+        }
+        last.taken_at = lateral(s).taken_at;
+        *normal(s) = last;
+    });
+    assert!(cause == Cause::NormalLossy && cycles <= 200, "{cause:?} after {cycles}");
 }
 
 #[test]

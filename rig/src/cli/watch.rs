@@ -36,7 +36,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let mut line = String::new();
     loop {
         // Looked at before reading: what was written before the lock went is still printed.
-        let running = run.join(".lock").exists();
+        let running = crate::run_dir::is_held(&run);
         while reader.read_line(&mut line).into_diagnostic()? > 0 {
             if !line.ends_with('\n') {
                 break;

@@ -11,7 +11,7 @@ use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary};
 use crate::drivers;
 use crate::run_dir::RunDir;
-use crate::sequence::{Event, MeasuredPass, Sequence};
+use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use claim::RigClaim;
 use crossbeam_queue::ArrayQueue;
 use miette::IntoDiagnostic;
@@ -157,6 +157,9 @@ pub fn run(
     for why in written.problem.iter().cloned().chain(unkept.map(|e| format!("{e:#}"))) {
         tracing::error!(why, "the record could not be kept: the sweep was stopped");
     }
+    // A file that failed only while the last rows went into it: the sweep was over, but it is not recorded.
+    let unrecorded = written.problem.is_some() && outcome == Outcome::Complete;
+    let outcome = if unrecorded { Outcome::RecordLost } else { outcome };
     let record_lost = written.lost_rows + report.ring_drops;
     kept.end(outcome, sequence.departed(), Some((report, stalls)), record_lost, links)
 }

@@ -8,14 +8,16 @@ fn belongs_to_this_process(address: &str) -> bool {
 }
 
 /// One controller a rig: a lock named after the amplifier's address, taken before anything is opened.
-pub(super) struct RigClaim(Option<std::path::PathBuf>);
+pub(super) struct RigClaim {
+    _lock: Option<std::fs::File>,
+}
 
 impl RigClaim {
     pub(super) fn take(job: &Job) -> miette::Result<Self> {
         // An embedded rig on a free port belongs to this process by construction.
         if job.setup.file.virtual_rig.is_some() && belongs_to_this_process(&job.setup.file.amplifier.address)
         {
-            return Ok(RigClaim(None));
+            return Ok(RigClaim { _lock: None });
         }
         let name: String = job
             .setup
@@ -26,15 +28,6 @@ impl RigClaim {
             .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
             .collect();
         let lock = std::env::temp_dir().join(format!("muprime-rig-{name}.lock"));
-        crate::run_dir::claim(&lock)?;
-        Ok(RigClaim(Some(lock)))
-    }
-}
-
-impl Drop for RigClaim {
-    fn drop(&mut self) {
-        if let Some(lock) = &self.0 {
-            let _ = std::fs::remove_file(lock);
-        }
+        Ok(RigClaim { _lock: Some(crate::run_dir::claim(&lock)?) })
     }
 }

@@ -1,0 +1,134 @@
+//! The process dies at EVERY step of a sweep: `kill -9` at each system call that changes the disk, one run a step, by an
+//! independent tool (strace's fault injection). Each crashed sweep is resumed, and resumed again when nothing is left.
+
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::{Command, Output};
+use tests::{documents, muprime, texts};
+
+const PLAN: &str = r#"
+name = "steps"
+seed = 3
+reference_every = 2
+[pass]
+settle_s = 0.05
+measure_s = 0.05
+[base]
+amplitude_pp_m = 2e-6
+frequency_hz = 27500
+speed_m_s = 0.02
+normal_force_n = 0.25
+[[series]]
+amplitude_pp_m = [2e-6]
+"#;
+
+/// System calls that make, change, name or remove files.
+const CHANGES: &str = "openat,write,pwrite64,writev,pwritev,fsync,fdatasync,rename,renameat,renameat2,unlink,unlinkat,\
+                       mkdir,mkdirat,ftruncate,fallocate,link,linkat,symlink";
+
+fn sweep(plan: &Path, out: &Path) -> Command {
+    let mut command = muprime();
+    command.args(["--json", "run", "--fast", "--setup", "virtual-ideal"]).arg(plan).arg("--out").arg(out);
+    command
+}
+
+/// The sweep under strace, killed at its n-th change of the disk.
+fn killed_at(n: u64, plan: &Path, out: &Path) -> Output {
+    let plain = sweep(plan, out);
+    Command::new("strace")
+        .args(["-f", "-qq", "-o", "/dev/null"])
+        .args(["-e", &format!("trace={CHANGES}"), "-e", &format!("inject={CHANGES}:signal=KILL:when={n}")])
+        .arg(plain.get_program())
+        .args(plain.get_args())
+        .output()
+        .expect("strace is needed: tests/run installs it")
+}
+
+fn acknowledged(output: &Output) -> BTreeSet<u64> {
+    // The kill may cut the last line: then it acknowledged nothing.
+    let (out, _) = texts(output);
+    let said = out.lines().filter_map(|l| serde_json::from_str::<serde_json::Value>(l).ok());
+    said.filter_map(|d| d.get("pass").map(|p| p["pass"]["point"].as_u64().unwrap())).collect()
+}
+
+fn points(run: &Path) -> Vec<u64> {
+    rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
+}
+
+/// One crash and its repair; false when the sweep came to its end before its n-th step.
+fn crash(n: u64, plan: &Path, folder: &Path, planned: usize) -> bool {
+    let out = folder.join(format!("run-{n}"));
+    let died = killed_at(n, plan, &out);
+    if died.status.code() == Some(0) {
+        return false;
+    }
+    let promised = acknowledged(&died);
+    let resumed = sweep(plan, &out).output().unwrap();
+    assert_eq!(resumed.status.code(), Some(0), "step {n}: {}", texts(&resumed).1);
+    assert_eq!(documents(&resumed).last().unwrap()["summary"]["outcome"], "complete", "step {n}");
+    let kept = points(&out);
+    let unique: BTreeSet<u64> = kept.iter().copied().collect();
+    assert_eq!(
+        (kept.len(), unique.len()),
+        (planned, planned),
+        "step {n}: a pass is lost or doubled: {kept:?}"
+    );
+    assert!(promised.is_subset(&unique), "step {n}");
+    for record in rig::run_dir::records_in(&out).unwrap() {
+        let read = realtime::recorder::read(&std::fs::read(&record).unwrap());
+        assert_eq!(read.damaged, 0, "step {n}: {}", record.display());
+    }
+    // Every step twice: a sweep that is done stays as it is.
+    let table = std::fs::read(out.join("points.csv")).unwrap();
+    let again = sweep(plan, &out).output().unwrap();
+    assert_eq!(again.status.code(), Some(0), "step {n}: {}", texts(&again).1);
+    assert_eq!(std::fs::read(out.join("points.csv")).unwrap(), table, "step {n}: a whole run was changed");
+    std::fs::remove_dir_all(&out).unwrap();
+    true
+}
+
+#[test]
+fn a_crash_at_every_step_of_a_sweep_loses_and_doubles_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = folder.path().join("plan.toml");
+    std::fs::write(&plan, PLAN).unwrap();
+    let whole = folder.path().join("whole");
+    let output = sweep(&plan, &whole).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
+    let planned = points(&whole).len();
+    // In blocks, until a whole block finds nothing left to kill.
+    let mut steps = 0;
+    for block in 0.. {
+        let crashed: Vec<bool> = (1..=64u64)
+            .into_par_iter()
+            .map(|i| {
+                let n = block * 64 + i;
+                let own = folder.path().join(format!("of-{n}"));
+                std::fs::create_dir(&own).unwrap();
+                let crashed = crash(n, &plan, &own, planned);
+                std::fs::remove_dir_all(&own).unwrap();
+                crashed
+            })
+            .collect();
+        steps += crashed.iter().filter(|c| **c).count();
+        if !crashed.iter().any(|c| *c) {
+            break;
+        }
+    }
+    println!("{steps} steps of a sweep of {planned} passes, a crash at each: nothing lost, nothing doubled");
+    assert!(steps > 100, "{steps} steps: strace saw too little of the sweep");
+}
+
+#[test]
+fn a_read_only_folder_is_refused_before_anything_moves() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = folder.path().join("plan.toml");
+    std::fs::write(&plan, PLAN).unwrap();
+    // A file where the folder should be: refused for every user, root included.
+    let blocked = folder.path().join("blocked");
+    std::fs::write(&blocked, "not a folder").unwrap();
+    let output = sweep(&plan, &blocked.join("run")).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", texts(&output).1);
+    assert_eq!(std::fs::read(&blocked).unwrap(), b"not a folder");
+}

@@ -1,0 +1,122 @@
+//! The table from requirement to test, generated: `docs/safety.md` must say what the code does.
+//!
+//! `MUPRIME_UPDATE=1 cargo test --release -p tests --test requirements` writes it anew.
+
+use realtime::safety::{Cause, RULES};
+use rig::faults::bench::STEADY_AT;
+use rig::faults::{Expect, Moment, ROWS, Scene, Strike, Tally, run};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+use tests::file;
+
+/// Unit tests of the safety core that name a cause.
+fn unit_tests() -> BTreeMap<String, BTreeSet<String>> {
+    let source = std::fs::read_to_string(file("realtime/src/safety/tests.rs")).unwrap();
+    let (mut name, mut found) = (String::new(), BTreeMap::<String, BTreeSet<String>>::new());
+    for line in source.lines() {
+        if let Some(rest) = line.strip_prefix("fn ") {
+            name = rest.split('(').next().unwrap_or_default().to_string();
+        }
+        for part in line.split("Cause::").skip(1) {
+            let cause: String = part.chars().take_while(|c| c.is_alphanumeric()).collect();
+            found.entry(cause).or_default().insert(name.clone());
+        }
+    }
+    found
+}
+
+/// Faults of the list by the cause that they tripped, and the tally of the same scenes.
+fn faults_by_cause() -> (BTreeMap<String, BTreeSet<&'static str>>, Tally) {
+    let (mut by_cause, mut tally) = (BTreeMap::<String, BTreeSet<_>>::new(), Tally::default());
+    for (row, fault) in ROWS.iter().enumerate() {
+        for moment in fault.moments {
+            let scene = Scene { moment: *moment, seed: 1, strikes: vec![Strike { row, at: STEADY_AT }] };
+            tally.take(&scene, false);
+            if let Some(trip) = run(&scene, false).trip {
+                by_cause.entry(format!("{:?}", trip.cause)).or_default().insert(fault.name);
+            }
+        }
+    }
+    (by_cause, tally)
+}
+
+fn words(names: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+    names.into_iter().map(|n| format!("`{}`", n.as_ref())).collect::<Vec<_>>().join(", ")
+}
+
+fn page() -> String {
+    let (units, (faults, tally)) = (unit_tests(), faults_by_cause());
+    assert_eq!(tally.failed, 0, "{:?}", tally.failures);
+    let mut out = String::from(
+        "# Safety: requirements, tests, reactions\n\n\
+         Generated: `MUPRIME_UPDATE=1 cargo test --release -p tests --test requirements`. A test fails where this page is not \
+         what the code does.\n\n## From requirement to test\n\n\
+         Unit tests are in `realtime/src/safety/tests.rs`; faults are those of the list below, which `tests/faults.rs` runs.\n\n\
+         | requirement | cause | it demands | unit tests | faults that trip it |\n|---|---|---|---|---|\n",
+    );
+    for rule in RULES {
+        let cause = format!("{:?}", rule.cause);
+        let (unit, fault) = (units.get(&cause), faults.get(&cause));
+        assert!(unit.is_some() || fault.is_some(), "{} {cause}: no test trips it", rule.id);
+        let _ = writeln!(
+            out,
+            "| {} | {cause} | {} | {} | {} |",
+            rule.id,
+            rule.text,
+            unit.map_or_else(String::new, words),
+            fault.map_or_else(String::new, words),
+        );
+    }
+    out.push_str(
+        "\n## Faults and reactions\n\n\
+         In virtual time at a 1 kHz loop, one seed a phase; `muprime faults --seeds 100000` runs as many as wanted. Cycles \
+         count from the first whose inputs show the fault, that one included. 'Measured off' is the time from the command \
+         until the plate's true amplitude is below 5 %.\n\n\
+         | # | fault | phases | must follow | worst command off | worst measured off / bound (ms) |\n|---|---|---|---|---|---|\n",
+    );
+    for fault in ROWS {
+        let phases: Vec<String> =
+            fault.moments.iter().map(|m: &Moment| format!("{m:?}").to_lowercase()).collect();
+        let must = match fault.expect {
+            Expect::Off(n) => format!("off within {n}"),
+            Expect::Remark(n) => format!("a remark within {n}, no trip"),
+            Expect::RemarkOrOff(n) => format!("a remark or off within {n}"),
+            Expect::NoTrip => "no trip".into(),
+            Expect::NoMu => "no mu', no trip".into(),
+        };
+        let reactions =
+            || tally.reactions.iter().filter(|((_, name, _), _)| *name == fault.name).map(|(_, r)| r);
+        let worst = reactions().filter_map(|r| r.command_off).max();
+        let quiet = reactions().filter_map(|r| r.measured_off).max();
+        let bound = reactions().map(|r| r.measured_bound).max().unwrap_or(0);
+        let _ = writeln!(
+            out,
+            "| {} | `{}` | {} | {must} | {} | {} |",
+            fault.number,
+            fault.name,
+            phases.join(", "),
+            worst.map_or_else(String::new, |n| n.to_string()),
+            quiet.map_or_else(String::new, |n| format!("{n} / {bound}")),
+        );
+    }
+    out
+}
+
+#[test]
+fn every_requirement_has_a_test_and_the_page_says_which() {
+    let path = file("docs/safety.md");
+    let now = page();
+    if std::env::var_os("MUPRIME_UPDATE").is_some() {
+        std::fs::write(&path, &now).unwrap();
+    }
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        written == now,
+        "docs/safety.md is old: MUPRIME_UPDATE=1 cargo test --release -p tests --test requirements"
+    );
+}
+
+#[test]
+fn start_up_is_no_rule() {
+    assert!(RULES.iter().all(|r| r.cause != Cause::StartUp));
+}
