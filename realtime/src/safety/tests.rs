@@ -584,3 +584,107 @@ proptest! {
         }
     }
 }
+
+/// The last line of defence behind the rules: whatever is not inside every limit is off.
+#[test]
+fn a_command_beyond_any_single_limit_is_off() {
+    let limits = limits();
+    let command = |amplitude_m: f64, frequency_hz: f64| {
+        let amplitude = PeakToPeak::from_metres(amplitude_m);
+        let request = Request { amplitude, frequency_hz, ..Request::default() };
+        DriveCommand::within(&limits, &request, 1, T).enable()
+    };
+    let most = limits.amplitude_max.metres();
+    assert!(
+        command(most, 27_500.0)
+            && command(1e-6, limits.frequency_hz.0)
+            && command(1e-6, limits.frequency_hz.1)
+    );
+    assert!(!command(0.0, 27_500.0) && !command(-1e-6, 27_500.0) && !command(f64::NAN, 27_500.0));
+    assert!(!command(most * 1.001, 27_500.0));
+    assert!(!command(1e-6, limits.frequency_hz.0 - 1.0) && !command(1e-6, limits.frequency_hz.1 + 1.0));
+    // A setup's limit that is above the hard one (which `checked` would refuse) does not help either.
+    let mut lax = limits;
+    lax.amplitude_max = PeakToPeak::from_metres(1.0);
+    let wild =
+        Request { amplitude: PeakToPeak::from_metres(11e-6), frequency_hz: 27_500.0, ..Request::default() };
+    assert!(!DriveCommand::within(&lax, &wild, 1, T).enable());
+}
+
+#[test]
+fn armed_is_armed_and_faulted_is_not() {
+    let mut bench = Bench::armed();
+    assert!(bench.safety.is_armed());
+    bench.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
+    assert!(!bench.safety.is_armed() && !Safety::default().is_armed());
+}
+
+#[test]
+fn ages_are_periods_and_latency() {
+    let timing = ChannelTiming { period: Nanos(1_000), latency: Nanos(70), periods: 3 };
+    assert_eq!(timing.age_limit(), Nanos(3_070));
+    assert_eq!(limits().timing.command_expiry, Nanos(2 * T.0));
+    assert_eq!(format!("{:?}", RULES[0]), "SR-01 Stopped");
+}
+
+#[test]
+fn a_setup_may_go_to_its_hard_limit_and_not_beyond() {
+    let with = |change: fn(&mut Limits)| {
+        let mut limits = Limits::paper(T);
+        change(&mut limits);
+        limits.checked()
+    };
+    assert!(with(|l| l.normal_force_max_n = HARD.normal_force_max_n).is_ok());
+    assert!(with(|l| l.frequency_hz = HARD.frequency_hz).is_ok());
+    assert!(with(|l| l.frequency_hz.0 = HARD.frequency_hz.0 - 1.0).is_err());
+    assert!(with(|l| l.frequency_hz = (30e3, 30e3)).is_err());
+    assert!(with(|l| l.frequency_hz.1 = HARD.frequency_hz.1 + 1.0).is_err());
+    assert!(with(|l| l.travel_m = (0.01, 0.01)).is_err());
+    assert!(with(|l| l.travel_m = (f64::NEG_INFINITY, 0.01)).is_err());
+    assert!(with(|l| l.travel_m = (0.0, f64::INFINITY)).is_err());
+    assert!(with(|l| l.force_step_max_n = 0.0).is_err());
+    assert!(with(|l| l.force_rate_max_n_s = f64::INFINITY).is_err());
+    assert!(with(|l| l.amplitude_rate_max_m_s = -1.0).is_err());
+    assert!(with(|l| l.frozen_after = 1001).is_err());
+    assert!(with(|l| l.timing.cycle = Nanos(0)).is_err());
+    // What was recorded is checked again when it is read.
+    let mut above = Limits::paper(T);
+    above.exposure_max_s = 1e6;
+    let text = serde_json::to_string(&above).unwrap();
+    assert!(serde_json::from_str::<Limits>(&text).unwrap_err().to_string().contains("hard limit"));
+    let text = serde_json::to_string(&limits()).unwrap();
+    assert_eq!(serde_json::from_str::<Limits>(&text).unwrap(), limits());
+}
+
+#[test]
+fn a_stage_is_given_its_time_and_a_fifth_of_its_speed() {
+    // 300 ms to respond and nine for the state's age, then it must move: forwards, and not at less than a fifth.
+    let after = |share: f64, velocity: f64| {
+        let mut bench = Bench::armed();
+        bench.request.velocity_m_s = velocity;
+        let (cause, cycles) = bench.until_off(|s| stage(s).velocity_m_s = share * velocity);
+        assert_eq!(cause, Cause::StageNotFollowing);
+        cycles
+    };
+    // `armed` has asked for this speed for sixty cycles already; a new direction starts the time anew.
+    assert_eq!((after(0.19, 0.02), after(0.19, -0.02)), (251, 311));
+    assert_eq!(after(-1.0, -0.02), after(0.0, -0.02), "the wrong way is not following");
+    let mut bench = Bench::armed();
+    for _ in 0..800 {
+        let decision = bench.cycle(|s| stage(s).velocity_m_s = 0.2001 * 0.02, Controls::default());
+        assert_eq!(decision.tripped, None, "a fifth will do");
+    }
+    // Slower than creeping nothing is asked of it.
+    let mut bench = Bench::armed();
+    bench.request.velocity_m_s = 1.4e-3;
+    for _ in 0..800 {
+        assert_eq!(bench.cycle(|s| stage(s).velocity_m_s = 0.0, Controls::default()).tripped, None);
+    }
+    // Half as fast again and 20 mm/s is the limit.
+    let mut bench = Bench::armed();
+    for _ in 0..100 {
+        let decision = bench.cycle(|s| stage(s).velocity_m_s = 0.0499, Controls::default());
+        assert_eq!(decision.tripped, None);
+    }
+    assert_eq!(bench.until_off(|s| stage(s).velocity_m_s = 0.0501), (Cause::StageNotFollowing, 2));
+}
