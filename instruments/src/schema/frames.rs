@@ -1,0 +1,172 @@
+//! What goes over the link: `[[poll]]`, `[stream]`, `[[message]]`, `[[query]]`, `[[init]]`, `[[write]]`.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::codec::checksum::Check;
+
+/// Tables of Modbus registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Table {
+    /// Function codes 3, 6 and 16.
+    #[default]
+    Holding,
+    /// Function code 4.
+    Input,
+}
+
+/// `[[poll]]`: one read of neighbouring registers, which yields one sample.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Poll {
+    /// Name, for signals to refer to.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// Table.
+    #[serde(default)]
+    pub table: Table,
+    /// First register.
+    pub address: u16,
+    /// How many registers: 1 to 125.
+    pub count: u16,
+    /// Reads per second; left out for one that is read once, at connection.
+    #[serde(default)]
+    pub rate_hz: Option<f64>,
+    /// Read once, at connection.
+    #[serde(default)]
+    pub once: bool,
+    /// The signal that counts the instrument's samples, modulo its type.
+    #[serde(default)]
+    pub sequence: Option<String>,
+    /// The signal that holds the instrument's own time; its SI value is in seconds.
+    #[serde(default)]
+    pub device_time: Option<String>,
+}
+
+/// `[stream]`: frames that come without being asked for. Its frame is called `stream`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stream {
+    /// Frames per second that the instrument sends.
+    pub rate_hz: f64,
+    /// The bytes that every frame begins with.
+    #[serde(default)]
+    pub sync: Vec<u8>,
+    /// Length of a frame, sync and check included.
+    pub length: u16,
+    /// The check at its end.
+    pub check: Check,
+    /// Frames in a row that make an alignment believed.
+    #[serde(default = "defaults::one_frame")]
+    pub believed_after: u32,
+    /// The register write that starts it.
+    #[serde(default)]
+    pub start_register: Option<(u16, u16)>,
+    /// The function of the maker's own, with its byte, that starts it.
+    #[serde(default)]
+    pub start_function: Option<(u8, u8)>,
+    /// Byte that stops it, and how often that is sent.
+    pub stop: (u8, u16),
+    /// Silence after the stop before the instrument listens again, in ms.
+    pub settle_ms: u32,
+    /// A crashed client leaves an instrument streaming: stop it before the first request.
+    #[serde(default)]
+    pub stop_before_open: bool,
+    /// Signal that counts samples.
+    #[serde(default)]
+    pub sequence: Option<String>,
+}
+
+/// `[[message]]`: CAN messages that together make one sample, with what asks for them.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Message {
+    /// Name, for signals to refer to.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// The messages by their names in the DBC file, in the order in which they come; or none, and `cob`.
+    #[serde(default)]
+    pub replies: Vec<String>,
+    /// The identifier that the DBC file's identifiers were written for; they move with `link.base`.
+    #[serde(default)]
+    pub dbc_base: Option<u32>,
+    /// CANopen: identifier less the node number.
+    #[serde(default)]
+    pub cob: Option<u32>,
+    /// CANopen: length in bytes.
+    #[serde(default)]
+    pub length: Option<u16>,
+    /// What asks for them, sent to `link.base`; left out for messages that come by themselves.
+    #[serde(default)]
+    pub request: Option<Vec<u8>>,
+    /// Requests per second, or messages per second where they come by themselves.
+    pub rate_hz: f64,
+    /// Signal that counts samples.
+    #[serde(default)]
+    pub sequence: Option<String>,
+}
+
+/// `[[query]]`: a question, and the answer as one sample.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Query {
+    /// Name, for signals to refer to.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// The question, without its terminator.
+    pub send: String,
+    /// Length of a binary answer; left out for a line of text that is one number or a truth.
+    #[serde(default)]
+    pub length: Option<u16>,
+    /// Questions per second.
+    pub rate_hz: f64,
+}
+
+/// `[[init]]`: what is sent once, at connection.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Init {
+    /// A line of text.
+    #[serde(default)]
+    pub send: Option<String>,
+    /// What its answer must begin with; left out where there is none.
+    #[serde(default)]
+    pub expect: Option<Vec<String>>,
+    /// A CAN frame: identifier (less the node for CANopen) and data.
+    #[serde(default)]
+    pub can: Option<(u32, Vec<u8>)>,
+    /// CANopen: object, subindex, bytes and value to be written.
+    #[serde(default)]
+    pub sdo: Option<(u16, u8, u8, i64)>,
+    /// What to tell the user where the answer is another.
+    #[serde(default)]
+    pub text: String,
+}
+
+/// `[[write]]`: a block of set-points, written in one piece.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Write {
+    /// Name, for set-points to refer to.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// First register.
+    #[serde(default)]
+    pub address: u16,
+    /// How many registers: 1 to 123. CANopen: bytes in pairs.
+    pub count: u16,
+    /// CANopen: identifier less the node number.
+    #[serde(default)]
+    pub cob: Option<u32>,
+    /// The block is repeated at this rate even without news, to keep a watchdog fed; per second.
+    #[serde(default)]
+    pub rate_hz: Option<f64>,
+}
+
+mod defaults {
+    pub const fn one_frame() -> u32 {
+        1
+    }
+}

@@ -1,0 +1,109 @@
+//! `[link]`: the bus, its settings and its time limits.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// Kinds of link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LinkKind {
+    /// Modbus over TCP.
+    ModbusTcp,
+    /// Modbus RTU over a serial line.
+    ModbusRtu,
+    /// Plain CAN.
+    Can,
+    /// CANopen.
+    Canopen,
+    /// Lines of text and blocks of bytes over a serial line.
+    Serial,
+    /// SCPI over TCP.
+    Scpi,
+}
+
+/// `[link]`: how the instrument is reached. The address itself stands in the setup.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Link {
+    /// Kind of link.
+    pub kind: LinkKind,
+    /// TCP port, unless the setup names one.
+    #[serde(default)]
+    pub port: Option<u16>,
+    /// Modbus unit, unless the setup names one.
+    #[serde(default)]
+    pub unit: Option<u8>,
+    /// Symbols per second on a serial line.
+    #[serde(default)]
+    pub baud: Option<u32>,
+    /// Bits per second on a CAN bus.
+    #[serde(default)]
+    pub bitrate: Option<u32>,
+    /// Data bits, parity and stop bits, as `8N1`.
+    #[serde(default)]
+    pub format: Option<String>,
+    /// DBC file that describes the signals of CAN messages.
+    #[serde(default)]
+    pub dbc: Option<String>,
+    /// CAN identifier that others are counted from, unless the setup names one.
+    #[serde(default)]
+    pub base: Option<u32>,
+    /// CANopen node, unless the setup names one.
+    #[serde(default)]
+    pub node: Option<u8>,
+    /// The node's heartbeat may stay away this long, in ms.
+    #[serde(default)]
+    pub heartbeat_ms: Option<u32>,
+    /// What ends a line that is sent.
+    #[serde(default)]
+    pub tx_terminator: Option<String>,
+    /// What ends a line that comes.
+    #[serde(default)]
+    pub rx_terminator: Option<String>,
+    /// Pause between two requests, in ms.
+    #[serde(default)]
+    pub min_gap_ms: f64,
+    /// Lines that come without being asked for.
+    #[serde(default)]
+    pub unsolicited: Vec<String>,
+    /// A query that is put after every set-point, and what its answer must begin with.
+    #[serde(default)]
+    pub error_query: Option<ErrorQuery>,
+    /// A connection must stand within this time, in ms.
+    #[serde(default = "defaults::connect_timeout_ms")]
+    pub connect_timeout_ms: u32,
+    /// An answer must be complete within this time, in ms; afterwards the connection is dropped.
+    #[serde(default = "defaults::response_timeout_ms")]
+    pub response_timeout_ms: u32,
+    /// First pause before a new connection, in ms; it doubles up to `backoff_longest_ms`.
+    #[serde(default = "defaults::backoff_first_ms")]
+    pub backoff_first_ms: u32,
+    /// Longest pause before a new connection, in ms.
+    #[serde(default = "defaults::backoff_longest_ms")]
+    pub backoff_longest_ms: u32,
+}
+
+/// A question for errors.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ErrorQuery {
+    /// The question.
+    pub send: String,
+    /// What the answer begins with where there is no error.
+    pub ok: Vec<String>,
+}
+
+mod defaults {
+    pub const fn backoff_first_ms() -> u32 {
+        20
+    }
+    pub const fn backoff_longest_ms() -> u32 {
+        2000
+    }
+    pub const fn connect_timeout_ms() -> u32 {
+        1000
+    }
+    pub const fn response_timeout_ms() -> u32 {
+        100
+    }
+}

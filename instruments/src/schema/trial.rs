@@ -1,0 +1,43 @@
+//! What tries a profile: `[emulator]` and `[[vector]]`.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use toml::Spanned;
+
+/// `[emulator]`: what the emulator answers.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Emulator {
+    /// Signal name to quantity of the virtual world.
+    #[serde(default)]
+    pub measure: BTreeMap<String, String>,
+    /// Set-point name to quantity of the virtual world.
+    #[serde(default)]
+    pub command: BTreeMap<String, String>,
+    /// Signals that keep one raw value.
+    #[serde(default)]
+    pub constant: BTreeMap<String, f64>,
+}
+
+/// `[[vector]]`: bytes beside the values that they stand for.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Vector {
+    /// The poll or block; may be left out where there is only one.
+    #[serde(default)]
+    pub frame: Option<String>,
+    /// Registers, for Modbus.
+    #[serde(default)]
+    pub registers: Option<Vec<u16>>,
+    /// Bytes in hexadecimal, spaces allowed.
+    #[serde(default)]
+    pub hex: Option<String>,
+    /// A line of text.
+    #[serde(default)]
+    pub line: Option<String>,
+    /// Values in their `unit`s, by signal or set-point.
+    #[schemars(with = "BTreeMap<String, f64>")]
+    pub expect: Spanned<BTreeMap<String, f64>>,
+}

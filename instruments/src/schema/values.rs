@@ -1,0 +1,138 @@
+//! The numbers in the frames: `[[signal]]` and `[[set]]`, with their units.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::field::{ByteOrder, NumberType};
+
+/// `[[signal]]`: one number that the instrument gives.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Signal {
+    /// Name, for setups, faults and vectors.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// The poll that it stands in; may be left out where there is only one.
+    #[serde(default)]
+    pub frame: Option<String>,
+    /// First register, counted from the start of the frame.
+    #[serde(default)]
+    pub register: Option<u16>,
+    /// First byte, counted from the start of the frame.
+    #[serde(default)]
+    pub byte: Option<u16>,
+    /// `message.signal` of the DBC file, in place of register, byte and type.
+    #[serde(default)]
+    pub dbc: Option<String>,
+    /// Type; left out for DBC signals and for lines of text.
+    #[serde(rename = "type", default)]
+    pub number: Option<NumberType>,
+    /// Byte order.
+    #[serde(default)]
+    pub byte_order: ByteOrder,
+    /// First bit and width, where only a part of the number counts.
+    #[serde(default)]
+    pub bits: Option<(u32, u32)>,
+    /// Counts times this are `unit`s.
+    #[serde(default = "defaults::one")]
+    pub scale: f64,
+    /// A scale that depends on other signals, such as `pow10(-decimals)`; multiplies `scale`.
+    #[serde(default)]
+    pub scale_expr: Option<String>,
+    /// Added after scaling, in `unit`s.
+    #[serde(default)]
+    pub offset: f64,
+    /// Unit of the scaled value; empty for a bare number.
+    #[serde(default)]
+    pub unit: String,
+    /// Turns `unit` into its SI unit.
+    #[serde(default)]
+    pub si: Si,
+    /// Smallest and largest value that the instrument can measure, in `unit`s.
+    #[serde(default)]
+    pub range: Option<(f64, f64)>,
+    /// Standard deviation of the noise, in `unit`s.
+    #[serde(default)]
+    pub noise: Option<f64>,
+    /// The value counts only where this holds.
+    #[serde(default)]
+    pub valid_when: Option<String>,
+    /// What it is, for the generated documentation.
+    #[serde(default)]
+    pub text: String,
+}
+
+/// The way from an instrument's unit to SI.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Si {
+    /// SI value = value times this.
+    pub factor: f64,
+    /// The SI unit.
+    pub unit: String,
+}
+
+impl Default for Si {
+    fn default() -> Self {
+        Self { factor: 1.0, unit: String::new() }
+    }
+}
+
+/// `[[set]]`: one absolute set-point. There are no increments and no toggles: a frame that reaches
+/// the instrument twice must do no harm.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Set {
+    /// Name, for the driver.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// The block that it stands in; may be left out where there is only one.
+    #[serde(default)]
+    pub block: Option<String>,
+    /// First register, counted from the start of the block.
+    #[serde(default)]
+    pub register: u16,
+    /// Type; left out for lines of text.
+    #[serde(rename = "type", default)]
+    pub number: Option<NumberType>,
+    /// The line of text that carries it; `{}` is the value.
+    #[serde(default)]
+    pub send: Option<String>,
+    /// The line of text where the value is zero.
+    #[serde(default)]
+    pub send_zero: Option<String>,
+    /// What the answer to `send` and to `send_zero` begins with; left out where there is none.
+    #[serde(default)]
+    pub answer: Option<(String, String)>,
+    /// Byte order.
+    #[serde(default)]
+    pub byte_order: ByteOrder,
+    /// Counts times this are `unit`s.
+    #[serde(default = "defaults::one")]
+    pub scale: f64,
+    /// Unit of the scaled value.
+    #[serde(default)]
+    pub unit: String,
+    /// Turns `unit` into its SI unit.
+    #[serde(default)]
+    pub si: Si,
+    /// Smallest and largest value that may be sent, in `unit`s; others are refused.
+    #[serde(default)]
+    pub range: Option<(f64, f64)>,
+    /// The value that makes the rig safe, in `unit`s.
+    #[serde(default)]
+    pub safe: Option<f64>,
+    /// The signal that echoes what the instrument took.
+    #[serde(default)]
+    pub echo: Option<String>,
+    /// What it is, for the generated documentation.
+    #[serde(default)]
+    pub text: String,
+}
+
+mod defaults {
+    pub const fn one() -> f64 {
+        1.0
+    }
+}
