@@ -14,6 +14,8 @@ use std::collections::BTreeMap;
 
 /// chi2 by which the truth must beat the recalibrated baseline to be detectable.
 const DETECTABLE: f64 = 30.0;
+/// rms gap over floor on the hidden passes that the truth must leave to be detectable.
+const ABOVE_FLOOR: f64 = 1.0;
 /// chi2 within which another effect makes a set undecidable.
 const DECIDABLE: f64 = 10.0;
 /// Share of form uncertainty that the oracle grants an imitator: it may leave this share of the gap's chi2
@@ -266,10 +268,13 @@ fn median(v: &mut [f64]) -> f64 {
 /// The figures of the issue over scored sets.
 pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let single = |s: &&Scored| matches!(s.stratum, Stratum::Single | Stratum::Alias);
-    let detectable = |s: &&Scored| s.chi2_gain >= DETECTABLE;
+    // Both words of the definition: the data speak for the truth, and its gap stands above the floor.
+    let faint = |s: &&Scored| s.chi2_gain >= DETECTABLE && s.gap_over_floor < ABOVE_FLOOR;
+    let detectable = |s: &&Scored| s.chi2_gain >= DETECTABLE && s.gap_over_floor >= ABOVE_FLOOR;
     let named_right = |s: &Scored| s.verdict == Verdict::Named && s.top_right;
     let named_wrong = |s: &Scored| s.verdict == Verdict::Named && !s.top_right;
     let clear: Vec<&Scored> = all.iter().filter(single).filter(detectable).filter(|s| s.decidable).collect();
+    let faint: Vec<&Scored> = all.iter().filter(single).filter(faint).filter(|s| s.decidable).collect();
     let murky: Vec<&Scored> = all.iter().filter(single).filter(detectable).filter(|s| !s.decidable).collect();
     let none: Vec<&Scored> = all.iter().filter(|s| s.stratum == Stratum::None).collect();
     let outside: Vec<&Scored> =
@@ -299,6 +304,8 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
         share("  confidently wrong", "<= 0.02", of(&clear, &named_wrong)),
         statistic("  mean probability on the truth", ">= 0.85", &probability, mean),
         statistic("  mean log score, nats", "reported", &log, mean),
+        share("  gap below the floor: named right", "reported", of(&faint, &named_right)),
+        share("  gap below the floor: confidently wrong", "reported", of(&faint, &named_wrong)),
         share("no gap: an effect named", "<= 0.01", of(&none, &|s| s.verdict == Verdict::Named)),
         share("  gap claimed", "<= 0.05", of(&none, &|s| s.verdict != Verdict::NoGap)),
         share("outside the library: unknown", ">= 0.85", of(&outside, &|s| s.verdict == Verdict::Unknown)),
