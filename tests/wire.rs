@@ -4,6 +4,8 @@
 mod bench;
 #[path = "wire/documents.rs"]
 mod documents;
+#[path = "wire/line_peers.rs"]
+mod line_peers;
 #[path = "wire/lines.rs"]
 mod lines;
 #[path = "wire/main_job.rs"]

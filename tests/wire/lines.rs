@@ -20,23 +20,23 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 /// A pseudo-terminal: the emulator's end, and the path that the other side opens.
-fn pty() -> (Box<dyn SerialPort>, String) {
+pub fn pty() -> (Box<dyn SerialPort>, String) {
     let (master, slave) = TTYPort::pair().unwrap();
     let path = slave.name().unwrap();
     drop(slave);
     (Box::new(master), path)
 }
 
-fn device(id: &str) -> Device {
+pub fn device(id: &str) -> Device {
     Device::new(drivers::profile(id).unwrap()).unwrap()
 }
 
-fn plant(bench: &Bench, epoch: Instant) -> SharedPlant {
+pub fn plant(bench: &Bench, epoch: Instant) -> SharedPlant {
     SharedPlant::new(BenchPlant::new(bench), epoch)
 }
 
 /// A setup whose amplifier and stage stand at a Modbus TCP server, to put one other instrument in.
-fn setup(server: SocketAddr) -> InstrumentsSetup {
+pub fn setup(server: SocketAddr) -> InstrumentsSetup {
     let address = server.to_string();
     InstrumentsSetup {
         force: vec![InstrumentSetup::new("muprime-force2", &address)],
@@ -45,7 +45,7 @@ fn setup(server: SocketAddr) -> InstrumentsSetup {
     }
 }
 
-fn axes(profile: &str, address: &str) -> InstrumentSetup {
+pub fn axes(profile: &str, address: &str) -> InstrumentSetup {
     let axis = |signal: &str, gain: f64| Some(AxisSetup { signal: signal.into(), gain, offset_n: 0.0 });
     InstrumentSetup {
         lateral: axis("fx", 1.0),
@@ -54,13 +54,13 @@ fn axes(profile: &str, address: &str) -> InstrumentSetup {
     }
 }
 
-fn standing_forces(bench: &Bench) {
+pub fn standing_forces(bench: &Bench) {
     bench.set(Quantity::LateralForce, 1.5);
     bench.set(Quantity::NormalForce, -2.25);
 }
 
 /// Waits for a sample and compares it with what stands on the bench, to `count` newtons.
-fn expect_forces(rig: &mut drivers::Rig, epoch: Instant, count: f64) {
+pub fn expect_forces(rig: &mut drivers::Rig, epoch: Instant, count: f64) {
     let (lateral, normal) = eventually("both axes", || {
         let forces = rig.force.read(now(epoch));
         Some((forces.lateral.ok()?, forces.normal.ok()?))
@@ -350,7 +350,7 @@ fn a_generator_by_scpi_and_pyvisa_as_its_client() {
     eventually("off", || rig.amplifier.state(now(epoch)).ok().filter(|state| !state.output_on));
 }
 
-fn adapter() -> (EmulatedAdapter, String, Arc<AtomicUsize>) {
+pub fn adapter() -> (EmulatedAdapter, String, Arc<AtomicUsize>) {
     let (port, path) = pty();
     let adapter = EmulatedAdapter::new(port);
     let damage = adapter.damage();
@@ -420,22 +420,25 @@ fn a_cia402_drive_over_slcan() {
     assert!(!rig.stage.state(now(epoch)).unwrap().fault);
 }
 
-/// python-can's slcan as the other side of ours.
-#[test]
-fn python_can_hears_and_answers_our_frames() {
-    let (port, path) = pty();
-    drop(port);
-    let _ = path;
-    // socat joins two pseudo-terminals; each side opens its own.
+/// socat joins two pseudo-terminals, so that each side opens its own; they end with the first value.
+pub fn socat_pair() -> ((super::peers::Peer, tempfile::TempDir), String, String) {
     let folder = tempfile::tempdir().unwrap();
     let (ours, theirs) = (folder.path().join("ours"), folder.path().join("theirs"));
     let end = |path: &std::path::Path| format!("pty,raw,echo=0,link={}", path.display());
     let socat = std::process::Command::new("socat").args([end(&ours), end(&theirs)]).spawn();
-    let _socat = super::peers::Peer(socat.unwrap_or_else(|error| panic!("socat: {error}: run tests/venv")));
+    let socat = super::peers::Peer(socat.unwrap_or_else(|error| panic!("socat: {error}: run tests/venv")));
     eventually("the pseudo-terminals", || (ours.exists() && theirs.exists()).then_some(()));
+    let name = |path: std::path::PathBuf| path.to_str().unwrap().to_string();
+    ((socat, folder), name(ours), name(theirs))
+}
+
+/// python-can's slcan as the other side of ours.
+#[test]
+fn python_can_hears_and_answers_our_frames() {
+    let (_socat, ours, theirs) = socat_pair();
     let (_echo, ready) = super::peers::start(python().arg(file("tests/peers/slcan_echo.py")).arg(&theirs));
     assert_eq!(ready, "ready");
-    let mut bus = Slcan::open(ours.to_str().unwrap(), 1_000_000).unwrap();
+    let mut bus = Slcan::open(&ours, 1_000_000).unwrap();
     for i in 0..200_u32 {
         let data = i.to_be_bytes();
         let frame = CanFrame::build(0x100 + i, false, &data[..(i % 5) as usize]).unwrap();
