@@ -370,3 +370,30 @@ fn bad_input_is_refused_by_name() {
     assert!(spring_slider::solve(&c, &finger).unwrap_err().to_string().starts_with("amplitude_pp_m"));
     assert!(SpringSlider::new(Finger { normal_stiffness_n_per_m: -1.0, ..finger }).is_err());
 }
+
+/// Through the onset of intermittent contact, where slip turns into stick at a point that rounding could miss.
+#[test]
+fn friction_is_continuous_through_the_onset_of_intermittent_contact() {
+    let finger = Finger::paper();
+    for (speed_m_s, normal_force_n) in [(0.005, 0.245), (0.01, 0.25), (0.02, 0.25), (0.03, 0.5)] {
+        let mut before: Option<f64> = None;
+        for k in 0..1000 {
+            let amplitude = PeakToPeak::from_metres(0.05e-6 + 0.5e-9 * f64::from(k));
+            let c = Condition { amplitude, speed_m_s, normal_force_n, mu0: 0.5, ..Condition::paper() };
+            let mu = spring_slider::solve(&c, &finger).unwrap().mu_relative;
+            if let Some(before) = before {
+                let step = (mu - before).abs();
+                assert!(
+                    step < 0.01,
+                    "{speed_m_s} m/s, {normal_force_n} N, {} m: {before} to {mu}",
+                    amplitude.metres()
+                );
+            }
+            if k % 50 == 0 {
+                let apart = (mu - by_running_minimum(&c, &finger, 20_000)).abs();
+                assert!(apart < 1e-3, "{} m: {apart} from the running minimum", amplitude.metres());
+            }
+            before = Some(mu);
+        }
+    }
+}

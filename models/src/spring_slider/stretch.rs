@@ -49,6 +49,9 @@ enum Piece {
     Recover,
 }
 
+/// Far above rounding, far below any length of a piece.
+const AHEAD_RAD: f64 = 1e-9;
+
 impl Stretch {
     fn g(&self, phi: f64) -> f64 {
         phi.cos() + self.offset
@@ -124,7 +127,9 @@ impl Stretch {
             }
             let gap = self.g(phi) - x;
             let tolerance = 1e-13 * (1.0 + self.offset.abs());
-            let slope = -phi.sin();
+            // The slope just ahead: a slip ends where slope and rate are equal, and rounding must not decide there
+            // whether what follows is another slip, to the end of the contact.
+            let slope = -(phi + AHEAD_RAD).sin();
             let piece = if gap < -tolerance {
                 Piece::Recover
             } else if gap > tolerance || slope > self.kappa {
