@@ -268,6 +268,7 @@ impl Safety {
         let context =
             rules::Context { limits, seen, request, controls, watch: &self.watch, armed_since, now };
         let broken = rules::first_broken(&context);
+        let remark = rules::remark(&context);
 
         let mut tripped = None;
         let mut armed_now = false;
@@ -286,6 +287,8 @@ impl Safety {
             (State::Faulted(_), None) if reset_edge => {
                 self.state = State::Armed { since: now };
                 armed_now = true;
+                self.watch.lateral.forget_losses();
+                self.watch.normal.forget_losses();
             }
             _ => {}
         }
@@ -305,7 +308,6 @@ impl Safety {
                 (DriveCommand::off(self.sequence, expires_at), StageCommand::stop(self.sequence, expires_at))
             }
         };
-        let remark = rules::remark(&context);
         self.watch.commanded(&drive, &stage, now);
         Decision {
             drive,

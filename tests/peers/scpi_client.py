@@ -1,4 +1,4 @@
-"""pyvisa and pymeasure's driver of the Agilent 33500 as a client of the emulated generator; prints JSON.
+"""pyvisa as a client of the emulated generator; prints JSON.
 
 usage: scpi_client.py PORT
 """

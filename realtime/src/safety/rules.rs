@@ -202,7 +202,7 @@ pub(super) fn remark(c: &Context<'_>) -> Option<Remark> {
 }
 
 fn lossy(c: &Context<'_>, share: f64) -> Option<(f64, f64)> {
-    // The window before arming counts no samples of a channel that was still being opened.
+    // Arming begins a new window: a channel that was still being opened is not lossy.
     broken(share < LOSSY_SHARE && c.armed_since.is_some(), share, LOSSY_SHARE)
 }
 

@@ -447,6 +447,20 @@ fn a_normal_channel_that_loses_most_samples_trips_by_itself() {
 }
 
 #[test]
+fn what_was_lost_before_arming_does_not_trip_after_it() {
+    let mut bench = Bench::armed();
+    bench.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
+    for _ in 0..250 {
+        bench.cycle(|s| s.forces = Forces::missing(NoData::Disconnected), Controls::default());
+    }
+    let reset = Controls { reset: true, ..Controls::default() };
+    assert!(bench.cycle(|_| {}, reset).armed_now);
+    for _ in 0..250 {
+        assert_eq!(bench.cycle(|_| {}, Controls::default()).tripped, None);
+    }
+}
+
+#[test]
 fn a_plate_that_sags_is_remarked() {
     let mut bench = Bench::armed();
     let half = |s: &mut Observation| amplifier(s).amplitude.as_mut().unwrap().value = 1.0e-6;

@@ -49,6 +49,11 @@ impl ForceWatch {
         }
     }
 
+    /// Begins a new window: what was lost while the channel was being opened is no fault of the armed rig.
+    pub(super) fn forget_losses(&mut self) {
+        (self.due, self.came, self.share_came) = (0.0, 0.0, 1.0);
+    }
+
     const fn new() -> Self {
         ForceWatch {
             believed: None,
