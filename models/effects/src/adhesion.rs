@@ -1,16 +1,25 @@
 //! Adhesion loads the contact beyond what the normal force does, and holds it until it is pulled off.
 
+use crate::contact::Attraction;
 use crate::prelude::*;
 
 /// See the module.
 pub struct Adhesion;
 
-static LAWS: [Law; 2] = [
+static LAWS: [Law; 4] = [
     Law { name: "DMT", parameters: &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)] },
     Law {
         name: "constant shear on the touching time",
         parameters: &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)],
     },
+    Law {
+        name: "developing with the momentary load",
+        parameters: &[
+            Parameter::positive("adhesive_force", "N", 0.06, 1.0),
+            Parameter::shape("load_of_half_attraction", "N", 0.04, 1.0),
+        ],
+    },
+    Law { name: "JKR", parameters: &[Parameter::positive("pull_off_force", "N", 0.015, 0.5)] },
 ];
 
 impl Effect for Adhesion {
@@ -24,7 +33,7 @@ impl Effect for Adhesion {
         "The friction limit is mu0 (F + Fa), and contact is kept until the spring pulls with Fa."
     }
     fn source(&self) -> &'static str {
-        "Derjaguin, Muller, Toporov 1975; capillary and van der Waals pull of tens of mN on a finger"
+        "Derjaguin, Muller, Toporov 1975; Johnson, Kendall, Roberts 1971; capillary and van der Waals pull of tens of mN on a finger"
     }
     fn laws(&self) -> &'static [Law] {
         &LAWS
@@ -35,6 +44,15 @@ impl Effect for Adhesion {
     fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
         if law == 0 {
             c.adhesion = theta[0];
+        } else if law == 2 {
+            c.attraction = if theta[0] > 0.0 {
+                Attraction::Developing { force: theta[0], scale: theta[1] }
+            } else {
+                Attraction::None
+            };
+        } else if law == 3 {
+            c.attraction =
+                if theta[0] > 0.0 { Attraction::Jkr { pull_off: theta[0] } } else { Attraction::None };
         } else {
             // Added friction for the share of the cycle in which the surfaces touch.
             let touching = if c.amplitude_pp > crate::contact::STILL_PLATE_M {

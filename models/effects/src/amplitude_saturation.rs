@@ -7,7 +7,13 @@ pub struct AmplitudeSaturation;
 
 static LAWS: [Law; 3] = [
     Law { name: "hard limit", parameters: &[Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6)] },
-    Law { name: "soft limit", parameters: &[Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6)] },
+    Law {
+        name: "limit with a bend",
+        parameters: &[
+            Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6),
+            Parameter::shape("sharpness", "1", 4.0, 0.6),
+        ],
+    },
     Law { name: "compression", parameters: &[Parameter::positive("inverse_limit", "1/m", 0.2e6, 5e6)] },
 ];
 
@@ -40,7 +46,7 @@ impl Effect for AmplitudeSaturation {
                     1.0
                 }
             }
-            1 => (1.0 + x.powi(4)).powf(-0.25),
+            1 => (1.0 + x.powf(theta[1])).powf(-1.0 / theta[1]),
             _ => {
                 if x > 1e-6 {
                     x.tanh() / x

@@ -1,40 +1,55 @@
 //! Many asperities of unequal height, each a slider of its own on a share of the springs.
 //!
-//! Heights are represented by five quadrature nodes; the finger's height is found so that together they carry
+//! Heights are represented by nine equal shares; the finger's height is found so that together they carry
 //! the load. The onset of intermittent contact loses its kink, and the last asperities keep touching at
 //! amplitudes where a single slider would fly.
 
 use crate::contact::{Contact, arc_load, lost_to_stick};
 use std::f64::consts::PI;
 
-/// Gauss-Hermite nodes and weights (probabilists', five points), heights in units of their deviation.
-const GAUSSIAN: [(f64, f64); 5] = [
-    (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
-    (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
-    (0.0, 0.533_333_333_333_333_3),
-    (1.355_626_179_974_266, 0.222_075_922_005_612_6),
-    (2.856_970_013_872_806, 0.011_257_411_327_720_69),
-];
+/// Distribution of the heights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Heights {
+    /// Gaussian.
+    Gaussian,
+    /// Few tall ones: exponential above the lowest.
+    Exponential,
+    /// Evenly spread between lowest and highest.
+    Even,
+}
 
-/// Gauss-Laguerre nodes and weights (five points) for exponential heights (few tall ones), zero mean.
-const EXPONENTIAL: [(f64, f64); 5] = [
-    (-0.736_439_680_281_64, 0.521_755_610_582_809),
-    (0.413_403_059_107_29, 0.398_666_811_083_176),
-    (2.596_425_771_040_77, 0.075_942_449_681_708),
-    (6.085_810_005_858_42, 0.003_611_758_679_922),
-    (11.640_800_844_275_27, 0.000_023_369_972_385_8),
-];
+/// Number of asperities, each of an equal share.
+const SHARES: usize = 9;
+
+impl Heights {
+    /// Medians of equal shares of the distribution, in units of its scale, about a mean of zero.
+    ///
+    /// Equal shares rather than quadrature nodes: as the plate takes leave of one asperity after another, a node of
+    /// half the weight would leave at once.
+    fn nodes(self) -> &'static [f64; SHARES] {
+        match self {
+            Heights::Gaussian => {
+                &[-1.593_2, -0.967_4, -0.589_5, -0.282_2, 0.0, 0.282_2, 0.589_5, 0.967_4, 1.593_2]
+            }
+            Heights::Exponential => {
+                &[-0.904_8, -0.779_7, -0.636_6, -0.469_5, -0.268_9, -0.017_5, 0.318_9, 0.829_8, 1.928_4]
+            }
+            Heights::Even => &[-1.539_6, -1.154_7, -0.769_8, -0.384_9, 0.0, 0.384_9, 0.769_8, 1.154_7, 1.539_6],
+        }
+    }
+}
 
 /// Mean friction of the ensemble over a cycle, N.
 pub fn mean_friction(c: &Contact) -> f64 {
     let half = c.half_amplitude();
-    let nodes = if c.asperity_exponential { &EXPONENTIAL } else { &GAUSSIAN };
+    let nodes = c.asperity_heights.nodes();
+    let weight = 1.0 / SHARES as f64;
     let spread = c.asperity_height / half;
     let load = c.load_ratio();
     let drag = c.drag();
     // Depth of the mean asperity below the mean plane of the plate, in units of w/2.
     let carried = |depth: f64| -> (f64, f64) {
-        nodes.iter().fold((0.0, 0.0), |(sum, slope), &(z, weight)| {
+        nodes.iter().fold((0.0, 0.0), |(sum, slope), &z| {
             let (value, rate) = one_load(depth + z * spread);
             (sum + weight * value, slope + weight * rate)
         })
@@ -57,7 +72,7 @@ pub fn mean_friction(c: &Contact) -> f64 {
         depth = next;
     }
     let mut friction = 0.0;
-    for &(z, weight) in nodes {
+    for &z in nodes {
         let (share, _) = one_load(depth + z * spread);
         if share > 0.0 {
             let phi = (-(depth + z * spread)).clamp(-1.0, 1.0).acos();
@@ -68,6 +83,7 @@ pub fn mean_friction(c: &Contact) -> f64 {
     let alone = Contact { asperity_height: 0.0, friction_factor: 1.0, mass: 0.0, ..*c };
     let plain = Contact {
         adhesion: 0.0,
+        attraction: crate::contact::Attraction::None,
         load_exponent: 0.0,
         inverse_recovery_speed: 0.0,
         lateral_relaxation_time: 0.0,

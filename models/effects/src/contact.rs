@@ -32,6 +32,8 @@ pub struct Contact {
     pub friction_factor: f64,
     /// Adhesive force of the whole contact (DMT), N. 0 in the baseline.
     pub adhesion: f64,
+    /// Attraction that adds to the friction limit without holding the contact at lift-off. None in the baseline.
+    pub attraction: Attraction,
     /// Exponent by which the friction limit departs from Amontons within the cycle: the limit is
     /// `mu0 F (F/reference_load)^load_exponent`. 0 in the baseline.
     pub load_exponent: f64,
@@ -39,6 +41,8 @@ pub struct Contact {
     pub reference_load: f64,
     /// Inverse of the largest speed of lateral recovery, s/m. 0 in the baseline (infinitely fast).
     pub inverse_recovery_speed: f64,
+    /// Stretch below which that speed falls in proportion to the stretch, m. 0: the speed is the same at any stretch.
+    pub recovery_knee: f64,
     /// Relaxation time of the lateral stretch out of contact, s. 0 in the baseline.
     pub lateral_relaxation_time: f64,
     /// Exponent of that relaxation: 1 exponential, less for a broad spectrum of times.
@@ -51,14 +55,45 @@ pub struct Contact {
     pub bonding_exponent: f64,
     /// Scale of the heights of the asperities, m. 0 in the baseline (one height).
     pub asperity_height: f64,
-    /// True: heights fall off exponentially; false: they are Gaussian.
-    pub asperity_exponential: bool,
+    /// Distribution of the heights.
+    pub asperity_heights: crate::asperities::Heights,
     /// Retardation time of the normal spring, s. 0 in the baseline.
     pub normal_retardation_time: f64,
     /// Mass of the ridges that follow the plate, kg. 0 in the baseline.
     pub mass: f64,
     /// Index into [`crate::impact::CLASSES`] where there is mass.
     pub damping_class: usize,
+}
+
+/// Attraction between skin and plate that friction feels beside the normal force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Attraction {
+    /// There is none.
+    None,
+    /// `force F / (F + scale)`: it is there as far as the surfaces are pressed into each other.
+    Developing {
+        /// Attraction of the full contact, N.
+        force: f64,
+        /// Normal force at which half of it is there, N.
+        scale: f64,
+    },
+    /// `2 Fc + 2 sqrt(Fc (F + Fc))`: what the contact of Johnson, Kendall and Roberts adds to the load, by its
+    /// pull-off force.
+    Jkr {
+        /// Pull-off force, N.
+        pull_off: f64,
+    },
+}
+
+impl Attraction {
+    /// Attraction at a normal force in contact, N.
+    pub fn at(&self, force: f64) -> f64 {
+        match *self {
+            Attraction::None => 0.0,
+            Attraction::Developing { force: full, scale } => full * force / (force + scale),
+            Attraction::Jkr { pull_off } => 2.0 * pull_off + 2.0 * (pull_off * (force + pull_off)).sqrt(),
+        }
+    }
 }
 
 impl Contact {
@@ -80,6 +115,7 @@ impl Contact {
             || self.inverse_recovery_speed > 0.0
             || self.lateral_relaxation_time > 0.0
             || self.bonding_time > 0.0
+            || self.attraction != Attraction::None
             || self.normal_retardation_time > 0.0
     }
 }
@@ -108,7 +144,8 @@ pub fn mean_friction(c: &Contact) -> f64 {
 
 /// Steady sliding on a still plate, N.
 fn still_friction(c: &Contact) -> f64 {
-    let load = c.normal_force * c.solid_share + c.adhesion;
+    let carried = c.normal_force * c.solid_share;
+    let load = carried + c.adhesion + c.attraction.at(carried);
     c.mu0 * load * (load / c.reference_load).powf(c.load_exponent)
 }
 

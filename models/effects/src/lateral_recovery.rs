@@ -5,7 +5,7 @@ use crate::prelude::*;
 /// See the module.
 pub struct LateralRecovery;
 
-static LAWS: [Law; 4] = [
+static LAWS: [Law; 5] = [
     Law {
         name: "rate limit",
         parameters: &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)],
@@ -21,6 +21,13 @@ static LAWS: [Law; 4] = [
     Law {
         name: "rate limit, in flight",
         parameters: &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)],
+    },
+    Law {
+        name: "rate limit, slower near rest",
+        parameters: &[
+            Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0),
+            Parameter::shape("stretch_of_half_speed", "m", 1e-7, 1.0),
+        ],
     },
 ];
 
@@ -51,6 +58,10 @@ impl Effect for LateralRecovery {
                 c.lateral_relaxation_time = theta[0];
                 c.lateral_relaxation_exponent = theta[1];
                 c.instant_slip_back = true;
+            }
+            4 => {
+                c.inverse_recovery_speed = theta[0];
+                c.recovery_knee = theta[1];
             }
             _ => {
                 c.inverse_recovery_speed = theta[0];

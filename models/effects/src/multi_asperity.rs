@@ -1,16 +1,18 @@
 //! Not one slider but many, of unequal height.
 
+use crate::asperities::Heights;
 use crate::prelude::*;
 
 /// See the module.
 pub struct MultiAsperity;
 
-static LAWS: [Law; 2] = [
+static LAWS: [Law; 3] = [
     Law { name: "Gaussian heights", parameters: &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)] },
     Law {
         name: "exponential heights",
         parameters: &[Parameter::positive("height_scale", "m", 0.5e-6, 6e-6)],
     },
+    Law { name: "even heights", parameters: &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)] },
 ];
 
 impl Effect for MultiAsperity {
@@ -34,6 +36,10 @@ impl Effect for MultiAsperity {
     }
     fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
         c.asperity_height = theta[0];
-        c.asperity_exponential = law == 1;
+        c.asperity_heights = match law {
+            0 => Heights::Gaussian,
+            1 => Heights::Exponential,
+            _ => Heights::Even,
+        };
     }
 }

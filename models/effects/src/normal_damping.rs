@@ -5,9 +5,17 @@ use crate::prelude::*;
 /// See the module.
 pub struct NormalDamping;
 
-static LAWS: [Law; 2] = [
+static LAWS: [Law; 3] = [
     Law { name: "Kelvin-Voigt", parameters: &[Parameter::positive("retardation_time", "s", 4e-6, 1e-4)] },
     Law { name: "constant loss factor", parameters: &[Parameter::positive("loss_factor", "1", 0.6, 10.0)] },
+    // Storage and loss at the vibration's frequency of a spring beside a spring and dashpot in series.
+    Law {
+        name: "standard linear solid",
+        parameters: &[
+            Parameter::positive("relaxing_share", "1", 1.0, 10.0),
+            Parameter::shape("relaxation_time", "s", 5e-6, 1.0),
+        ],
+    },
 ];
 
 impl Effect for NormalDamping {
@@ -30,9 +38,16 @@ impl Effect for NormalDamping {
         &[Need::Vibration]
     }
     fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+        let omega = 2.0 * std::f64::consts::PI * c.frequency;
         c.normal_retardation_time = match law {
             0 => theta[0],
-            _ => theta[0] / (2.0 * std::f64::consts::PI * c.frequency),
+            1 => theta[0] / omega,
+            _ => {
+                let x = omega * theta[1];
+                let storage = 1.0 + theta[0] * x * x / (1.0 + x * x);
+                c.normal_stiffness *= storage;
+                theta[0] * theta[1] / (1.0 + x * x) / storage
+            }
         };
     }
 }

@@ -1,11 +1,13 @@
 //! The drive is off the plate's resonance: by warming up, with time, or at one of the frequencies.
+//!
+//! A resonance that falls with the amplitude alone is not told from saturation, and belongs there.
 
 use crate::prelude::*;
 
 /// See the module.
 pub struct ResonanceDetuning;
 
-static LAWS: [Law; 7] = [
+static LAWS: [Law; 6] = [
     Law {
         name: "warming (temperature)",
         parameters: &[Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0)],
@@ -23,10 +25,6 @@ static LAWS: [Law; 7] = [
             Parameter::positive("quality_factor", "1", 60.0, 600.0),
             Parameter::between("resonance_over_reference", "1", 0.7, 1.4),
         ],
-    },
-    Law {
-        name: "self-heating by amplitude",
-        parameters: &[Parameter::positive("detuning_at_largest_amplitude", "1", 1.0, 12.0)],
     },
     Law {
         name: "loss with time",
@@ -75,21 +73,13 @@ impl Effect for ResonanceDetuning {
         &[Need::Vibration]
     }
     fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
-        if law == 4 {
+        if law == 3 {
             let tau = theta[1] * design.duration_s.max(1e-9);
             c.amplitude_pp /= 1.0 - theta[0] * (-pass.time_s / tau).exp_m1();
             return;
         }
         let swing = (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).powi(2);
         let off = match law {
-            5 => {
-                let warmer = pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
-                theta[0] * (warmer - theta[1] + theta[2] * swing)
-            }
-            6 => {
-                let tau = theta[1] * design.duration_s.max(1e-9);
-                theta[0] * (-(-pass.time_s / tau).exp_m1() - theta[2] + theta[3] * swing)
-            }
             0 => theta[0] * pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c),
             1 => {
                 let tau = theta[1] * design.duration_s.max(1e-9);
@@ -99,7 +89,14 @@ impl Effect for ResonanceDetuning {
                 let r = pass.frequency_hz / (design.reference_frequency_hz * theta[1]);
                 theta[0] * (r - 1.0 / r)
             }
-            _ => theta[0] * swing,
+            4 => {
+                let warmer = pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
+                theta[0] * (warmer - theta[1] + theta[2] * swing)
+            }
+            _ => {
+                let tau = theta[1] * design.duration_s.max(1e-9);
+                theta[0] * (-(-pass.time_s / tau).exp_m1() - theta[2] + theta[3] * swing)
+            }
         };
         c.amplitude_pp /= (1.0 + off * off).sqrt();
     }

@@ -41,7 +41,7 @@ pub fn mean_friction(c: &Contact) -> f64 {
     let always = airborne < 1e-9;
     // The friction limit over the contact.
     for (i, f) in force.iter_mut().enumerate() {
-        let mut limit = c.mu0 * *f;
+        let mut limit = c.mu0 * (*f + c.attraction.at(*f));
         if c.load_exponent != 0.0 {
             limit *= (*f / c.reference_load).max(1e-6).powf(c.load_exponent);
         }
@@ -112,6 +112,7 @@ struct Lateral {
     keep_step: f64,
     rate_airborne: f64,
     keep_airborne: f64,
+    knee: f64,
 }
 
 impl Lateral {
@@ -142,6 +143,7 @@ impl Lateral {
             keep_step: if c.instant_slip_back { 0.0 } else { keep(dt) },
             rate_airborne: fall(airborne),
             keep_airborne: keep(airborne),
+            knee: c.recovery_knee,
         }
     }
 
@@ -174,8 +176,31 @@ impl Lateral {
     }
 
     fn recover(&self, x: f64, floor: f64, rate: f64, keep: f64) -> f64 {
+        if self.knee > 0.0 && rate.is_finite() {
+            return softened(x, rate, self.knee).max(floor);
+        }
         (floor + (x - floor) * keep - rate).max(floor)
     }
+}
+
+/// What is left of a stretch `x` that recovers at a speed `v x/(x + knee)` for a time in which it would have lost
+/// `rate` at the full speed: the root of `y + knee ln y = x + knee ln x - rate`.
+fn softened(x: f64, rate: f64, knee: f64) -> f64 {
+    if x <= 0.0 {
+        return 0.0;
+    }
+    // In z = ln(y/x) the equation is convex and rises: Newton from the left of the root needs no guard.
+    let (own, lost) = (x / knee, rate / knee);
+    let mut z = -lost / (1.0 + own);
+    for _ in 0..12 {
+        let y = own * z.exp();
+        let step = (y + z - own + lost) / (1.0 + y);
+        z -= step;
+        if step.abs() < 1e-9 {
+            break;
+        }
+    }
+    x * z.exp()
 }
 
 /// A contact of the massless spring with a dashpot beside it (Kelvin-Voigt).

@@ -1,5 +1,6 @@
 //! The contact solver against figures that an independent time-domain simulation printed.
-use effects::contact::{Contact, mean_friction};
+use effects::asperities::Heights;
+use effects::contact::{Attraction, Contact, mean_friction};
 use effects::{Baseline, Design, Operating};
 
 const DESIGN: Design = Design {
@@ -122,8 +123,8 @@ fn friction_is_continuous_at_the_onset() {
 fn asperities_of_one_height_are_one_slider() {
     for w in [0.5e-6, 2e-6] {
         let c = contact(w, 0.02, 0.25, 1e6, 0.4e6);
-        for asperity_exponential in [false, true] {
-            let many = Contact { asperity_height: 1e-12, asperity_exponential, ..c };
+        for asperity_heights in [Heights::Gaussian, Heights::Exponential, Heights::Even] {
+            let many = Contact { asperity_height: 1e-12, asperity_heights, ..c };
             assert!((relative(&many) - relative(&c)).abs() < 1e-4);
         }
     }
@@ -151,4 +152,29 @@ fn tabulated_angle_balances_the_load() {
     }
     println!("worst relative error of the load {worst:e}");
     assert!(worst < 2e-6, "{worst:e}");
+}
+
+/// A knee far below the stretch is the plain rate limit; far above it, the exponential whose time is knee over speed.
+#[test]
+fn a_soft_recovery_has_both_limits() {
+    let c = contact(3e-6, 0.02, 0.25, 1e6, 0.4e6);
+    let plain = mean_friction(&Contact { inverse_recovery_speed: 200.0, ..c });
+    let hard = mean_friction(&Contact { inverse_recovery_speed: 200.0, recovery_knee: 1e-14, ..c });
+    assert!((plain / hard - 1.0).abs() < 1e-4, "{plain} {hard}");
+    // In flight only: in contact an exponential relaxes towards what the limit holds, a soft speed towards rest.
+    let flight = Contact { instant_slip_back: true, ..c };
+    let slow = mean_friction(&Contact { inverse_recovery_speed: 0.02, recovery_knee: 1e-3, ..flight });
+    let exponential =
+        mean_friction(&Contact { lateral_relaxation_time: 2e-5, lateral_relaxation_exponent: 1.0, ..flight });
+    assert!((slow / exponential - 1.0).abs() < 1e-3, "{slow} {exponential}");
+}
+
+/// Johnson, Kendall and Roberts: at no load the contact holds as if pressed with four times its pull-off force.
+#[test]
+fn jkr_adds_four_pull_offs_at_no_load() {
+    let jkr = Attraction::Jkr { pull_off: 0.02 };
+    assert!((jkr.at(0.0) - 0.08).abs() < 1e-15);
+    let c = Contact { attraction: jkr, ..contact(0.0, 0.02, 0.5, 1e6, 0.4e6) };
+    let expected = 0.5 * (0.5 + 0.04 + 2.0 * (0.02f64 * 0.52).sqrt());
+    assert!((mean_friction(&c) - expected).abs() < 1e-12);
 }
