@@ -43,10 +43,9 @@ const NAME: f64 = 0.9;
 const ALONE: f64 = 0.93;
 /// Probability of no gap above which none is claimed.
 const NO_CLAIM: f64 = 0.1;
-/// Share of a candidate's probability that survives when its regions fail.
-const FAILED_GATE: f64 = 0.03;
-/// Share of the gap's chi2 that the best single must leave before a pair is believed.
-const PAIR_GAIN: f64 = 0.08;
+/// Share of the gap's chi2 that a second cause must add to the evidence before it is believed: single causes whose form
+/// is not the library's gain up to 0.026 by a spurious companion (sealed sets of two generators).
+const PAIR_GAIN: f64 = 0.03;
 
 /// Decides.
 pub fn decide(fitted: &Fitted) -> Decision {
@@ -60,11 +59,12 @@ pub fn decide(fitted: &Fitted) -> Decision {
     let regions = left_out_regions(fitted, &candidates[leader].best);
     let judged = gate(&regions);
     let claimed = none < NO_CLAIM;
-    if claimed && !judged.passes(candidates[leader].effects.len()) {
+    if claimed {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
+        let survival = judged.survival(candidates[leader].effects.len());
         for p in &mut probabilities {
-            unknown += *p * (1.0 - FAILED_GATE);
-            *p *= FAILED_GATE;
+            unknown += *p * (1.0 - survival);
+            *p *= survival;
         }
     }
     let class = alias_class(candidates, leader);
@@ -93,39 +93,35 @@ fn alias_class(candidates: &[Candidate], leader: usize) -> Vec<usize> {
     class
 }
 
-/// A pair whose better member alone leaves little of the gap is that single with a form of its own: its weight
-/// goes to the single.
+/// A pair that says little more than one of its members alone is that single with a form of its own: its weight goes
+/// to such members, in proportion to their evidence.
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     let problem = &fitted.problem;
-    let left = |m: &nalgebra::DVector<f64>| -> f64 {
-        (0..problem.len()).map(|i| (problem.lateral[i] - m[i]).powi(2) / problem.variance[i] - 1.0).sum()
-    };
-    let gap = left(&fitted.none.prediction);
-    for pair in 0..fitted.candidates.len() {
-        if fitted.candidates[pair].effects.len() < 2 || probabilities[pair] < 1e-6 {
+    let gap: f64 = (0..problem.len())
+        .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.variance[i] - 1.0)
+        .sum();
+    let candidates = &fitted.candidates;
+    for pair in 0..candidates.len() {
+        let own = &candidates[pair];
+        if own.effects.len() < 2 || probabilities[pair] < 1e-6 {
             continue;
         }
-        let members = &fitted.candidates[pair].effects;
-        let single = (0..fitted.candidates.len())
+        let alone: Vec<usize> = (0..candidates.len())
             .filter(|&i| {
-                fitted.candidates[i].effects.len() == 1 && members.contains(&fitted.candidates[i].effects[0])
+                let c = &candidates[i];
+                c.effects.len() == 1
+                    && own.effects.contains(&c.effects[0])
+                    && 2.0 * (own.log_evidence - c.log_evidence) < PAIR_GAIN * gap
             })
-            .map(|i| {
-                // The least that any of its laws leaves: a poor law is no second cause.
-                let least = fitted.candidates[i]
-                    .laws
-                    .iter()
-                    .map(|(_, e)| left(&e.prediction))
-                    .fold(f64::INFINITY, f64::min);
-                (i, least)
-            })
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((single, least)) = single
-            && gap > 0.0
-            && least < PAIR_GAIN * gap
-        {
-            probabilities[single] += probabilities[pair];
-            probabilities[pair] = 0.0;
+            .collect();
+        if alone.is_empty() {
+            continue;
+        }
+        let evidence: Vec<f64> = alone.iter().map(|&i| candidates[i].log_evidence).collect();
+        let total = crate::linear::log_sum_exp(&evidence);
+        let weight = std::mem::take(&mut probabilities[pair]);
+        for (i, e) in alone.iter().zip(&evidence) {
+            probabilities[*i] += weight * (e - total).exp();
         }
     }
 }

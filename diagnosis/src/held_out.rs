@@ -153,7 +153,7 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &Rig, verdict: Verdict, leader: 
 }
 
 /// SplitMix64: a fixed stream, so that the same data gives the same interval.
-fn split_mix(state: &mut u64) -> u64 {
+pub(crate) fn split_mix(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let mut z = *state;
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -111,6 +111,8 @@ const PRUNE: f64 = 15.0;
 const HOPELESS: (f64, f64) = (1.5, 60.0);
 /// Single effects from which pairs are grown.
 const PAIR_SEEDS: usize = 6;
+/// Likeness of two changes above which they are one.
+const ONE_CHANGE: f64 = 0.98;
 /// Pairs that are fitted in full.
 const PAIRS_FITTED: usize = 20;
 /// Deviations of chi2 above its expectation from which the best single is taken to leave something.
@@ -276,12 +278,22 @@ fn sort(candidates: &mut [Candidate]) {
     candidates.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence).then(a.effects.cmp(&b.effects)));
 }
 
+/// Cosine of the angle between the changes of two hypotheses, in deviations of a pass.
+fn likeness(problem: &Problem, a: &Explained, b: &Explained) -> f64 {
+    let product = |x: &Explained, y: &Explained| -> f64 {
+        x.change.iter().zip(y.change.iter()).zip(&problem.variance).map(|((p, q), v)| p * q / v).sum()
+    };
+    product(a, b) / (product(a, a) * product(b, b)).sqrt().max(1e-300)
+}
+
 /// Pairs grown from the best singles, each with every other effect in each of its laws.
 fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &DMatrix<f64>) -> Vec<Candidate> {
     let seeds = &singles[..singles.len().min(PAIR_SEEDS)];
     let jobs: Vec<(usize, &Explained)> = (0..seeds.len())
         .flat_map(|s| singles.iter().flat_map(|c| &c.laws).map(move |(_, e)| (s, e)))
         .filter(|(s, e)| e.members[0].effect != seeds[*s].effects[0])
+        // Two names for one change are not two causes.
+        .filter(|(s, e)| likeness(problem, &seeds[*s].best, e) < ONE_CHANGE)
         .collect();
     let mut glances: Vec<(f64, Vec<Member>, Vec<f64>)> = jobs
         .par_iter()

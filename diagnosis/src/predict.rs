@@ -22,6 +22,8 @@ pub struct Forecast {
     pub form: f64,
     /// Predictive standard deviation of `corrected`: model and pass scatter.
     pub corrected_sd: f64,
+    /// The pass scatter in it.
+    pub scatter_sd: f64,
 }
 
 /// The model behind a verdict, fitted to some rows of a table.
@@ -127,6 +129,7 @@ pub fn forecast(
             corrected: corrected[i],
             form: form[i],
             corrected_sd: (spread[i] + scatter[i]).sqrt(),
+            scatter_sd: scatter[i].sqrt(),
         })
         .collect()
 }

@@ -36,6 +36,8 @@ pub struct Region {
     pub rows: Vec<usize>,
     /// Errors there.
     pub errors: Errors,
+    /// Whether the rest of the table holds enough of the gap for a cause to be learnt from it.
+    pub informed: bool,
 }
 
 /// Parts of the operating space that are worth leaving out: ends of each covariate, each frequency, late passes.
@@ -138,11 +140,18 @@ pub fn departure_at(
     change.component_mul(&delta)
 }
 
+/// Share of the whole gap that the rest of a table must hold before a region is judged: a cause that lives in the
+/// region alone (saturation, in the largest amplitudes) cannot be learnt from what is left.
+const INFORMED: f64 = 0.1;
+
 /// Predicts each region from the rest, by the hypothesis' form alone.
 pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
     let problem = &fitted.problem;
     // Regions are judged in deviations of a pass, where a gap shows wherever it can be measured.
     let sd: Vec<f64> = problem.variance.iter().map(|v| v.sqrt()).collect();
+    let whole: f64 = (0..problem.len())
+        .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.variance[i] - 1.0)
+        .sum();
     regions(problem)
         .into_par_iter()
         .map(|(name, rows)| {
@@ -152,7 +161,11 @@ pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
             let base = minimise(&rest, &[], &fitted.none.u, &rest.variance, 6);
             let baseline = problem.select(&rows).predict(&[], &base.u);
             let errors = errors(problem, &sd, &rows, &baseline, &plain);
-            Region { name, rows, errors }
+            let held: f64 = (0..rest.len())
+                .map(|i| (rest.lateral[i] - base.prediction[i]).powi(2) / rest.variance[i] - 1.0)
+                .sum();
+            let informed = held > 3.0 * (2.0 * rest.len() as f64).sqrt() && held > INFORMED * whole;
+            Region { name, rows, errors, informed }
         })
         .collect()
 }
@@ -187,15 +200,26 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// Whether the effect may be named.
+    /// Share of a candidate's probability that survives: one half where it closes just so much as a mimic may, and
+    /// ever less below that.
     ///
-    /// One effect has to close 0.6 of the pooled gap, more than the half that the definition asks for: sets of
-    /// causes outside the library, mimicked, reached 0.55 to 0.63. Two have the freedom to mimic more.
-    pub fn passes(&self, effects: usize) -> bool {
-        let asked = if effects > 1 { 0.8 } else { 0.6 };
-        self.pooled >= asked && 2 * self.closed >= self.carrying
+    /// The contract asks for half of the pooled gap. Two effects have the freedom to mimic more.
+    pub fn survival(&self, effects: usize) -> f64 {
+        let middle = if effects > 1 { MIMIC_PAIR } else { MIMIC };
+        let pooled = 1.0 / (1.0 + (-(self.pooled - middle) / GRADE).exp());
+        if 2 * self.closed < self.carrying && self.carrying >= FEW { pooled.min(HALF_OPEN) } else { pooled }
     }
 }
+
+/// Pooled closure at which cause and mimic are as likely, for one effect and for two.
+const MIMIC: f64 = 0.45;
+const MIMIC_PAIR: f64 = 0.65;
+/// Scale on which that changes.
+const GRADE: f64 = 0.03;
+/// What survives at most where less than half of the regions that carry gap are closed by more than half.
+const HALF_OPEN: f64 = 0.1;
+/// Number of regions below which their count says nothing.
+const FEW: usize = 3;
 
 /// Deviations of its sampling error that a residual is granted before it counts as left open.
 const GRANTED: f64 = 2.0;
@@ -210,11 +234,13 @@ pub fn gate(regions: &[Region]) -> Gate {
     let share = |gap: f64, left: f64| (gap > 0.0).then(|| 1.0 - (left.max(0.0) / gap).sqrt());
     let (mut gap, mut left, mut passes) = (0.0, 0.0, 0.0);
     let (mut carrying, mut closed) = (0, 0);
-    for r in regions {
+    for r in regions.iter().filter(|r| r.informed) {
         let e = &r.errors;
         let n = e.passes as f64;
         let scatter = e.floor * n * (2.0 / n).sqrt();
-        let (own_gap, own_left) = ((e.recalibrated - e.floor) * n, (e.after - e.floor) * n);
+        let own_gap = (e.recalibrated - e.floor) * n;
+        // A region that stays wholly open is open, however far off the refit ran: it must not outweigh all others.
+        let own_left = ((e.after - e.floor) * n).min(own_gap.max(0.0));
         gap += own_gap;
         left += own_left;
         passes += n * e.floor * e.floor;

@@ -120,18 +120,13 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
     let leader = decision.class[0];
     let best = &fitted.candidates[leader].best;
     let gap = gap(&fitted, table, rig, decision.verdict, leader);
-    let estimated: Vec<f64> = match decision.verdict {
-        Verdict::NoGap => vec![0.0; table.len()],
-        Verdict::Named | Verdict::Ambiguous => {
-            let passes = &table.passes;
-            let whole = model(&fitted, table, decision.verdict, leader, None);
-            forecast(&fitted, rig, &whole, passes).iter().map(|f| f.corrected - f.recalibrated).collect()
-        }
-        Verdict::Unknown => (&fitted.wildcard.smooth - &fitted.none.prediction).iter().copied().collect(),
-    };
     let location = Where {
         place: ledger(&fitted, &decision.probabilities, decision.unknown),
-        regions: regions(&fitted, &estimated),
+        regions: if decision.verdict == Verdict::NoGap {
+            Vec::new()
+        } else {
+            regions(&fitted, rig, &model(&fitted, table, decision.verdict, leader, None))
+        },
     };
     let parameters = if decision.verdict == Verdict::NoGap {
         None

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 /// Damping ratio and restitution of the touch-down for which tables are kept.
-pub const CLASSES: [(f64, f64); 3] = [(0.3, 0.0), (1.0, 0.0), (0.15, 0.6)];
+pub const CLASSES: [(f64, f64); 4] = [(0.3, 0.0), (1.0, 0.0), (0.15, 0.6), (0.5, 0.35)];
 /// Relative error of the interpolated ratio, root mean square, measured between the nodes by the tests.
 pub const STATED_ERROR: f64 = 0.06;
 
@@ -23,7 +23,7 @@ const LARGEST_RATIO: f64 = 1.5;
 const STEPS: usize = 240;
 
 type Table = Vec<f32>;
-static TABLES: OnceLock<[Table; 3]> = OnceLock::new();
+static TABLES: OnceLock<[Table; CLASSES.len()]> = OnceLock::new();
 
 /// Ratio of the mean friction with mass to that without.
 pub fn friction_ratio(c: &Contact) -> f64 {

@@ -5,11 +5,15 @@ use crate::prelude::*;
 /// See the module.
 pub struct RidgeInertia;
 
-static LAWS: [Law; 3] = [
+static LAWS: [Law; 4] = [
     Law { name: "damping ratio 0.3", parameters: &[Parameter::positive("mass", "kg", 4e-6, 40e-6)] },
     Law { name: "damping ratio 1", parameters: &[Parameter::positive("mass", "kg", 4e-6, 40e-6)] },
     Law {
         name: "rebounding, damping ratio 0.15",
+        parameters: &[Parameter::positive("mass", "kg", 4e-6, 40e-6)],
+    },
+    Law {
+        name: "rebounding, damping ratio 0.5",
         parameters: &[Parameter::positive("mass", "kg", 4e-6, 40e-6)],
     },
 ];
