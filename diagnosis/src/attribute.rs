@@ -61,7 +61,7 @@ pub fn decide(fitted: &Fitted) -> Decision {
     let claimed = none < NO_CLAIM;
     if claimed {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
-        let survival = judged.survival(candidates[leader].effects.len());
+        let survival = judged.survival(candidates[leader].effects.len(), candidates[leader].best.share);
         for p in &mut probabilities {
             unknown += *p * (1.0 - survival);
             *p *= survival;

@@ -111,7 +111,9 @@ const PRUNE: f64 = 15.0;
 const HOPELESS: (f64, f64) = (1.5, 60.0);
 /// Single effects from which pairs are grown.
 const PAIR_SEEDS: usize = 6;
-/// Likeness of two changes above which they are one.
+/// Exact aliases: a pair of them is one cause with the freedom of two.
+const SAME: [[&str; 2]; 1] = [["force_crosstalk", "plate_tilt"]];
+/// Cosine between two changes above which they are one.
 const ONE_CHANGE: f64 = 0.98;
 /// Pairs that are fitted in full.
 const PAIRS_FITTED: usize = 20;
@@ -278,12 +280,17 @@ fn sort(candidates: &mut [Candidate]) {
     candidates.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence).then(a.effects.cmp(&b.effects)));
 }
 
-/// Cosine of the angle between the changes of two hypotheses, in deviations of a pass.
-fn likeness(problem: &Problem, a: &Explained, b: &Explained) -> f64 {
+/// Whether two hypotheses change the forces alike: by name, or by the angle between their changes in deviations of a
+/// pass.
+fn one_change(problem: &Problem, a: &Explained, b: &Explained) -> bool {
+    let names = [a.members[0].name(), b.members[0].name()];
+    if SAME.iter().any(|same| names.iter().all(|n| same.contains(n))) {
+        return true;
+    }
     let product = |x: &Explained, y: &Explained| -> f64 {
         x.change.iter().zip(y.change.iter()).zip(&problem.variance).map(|((p, q), v)| p * q / v).sum()
     };
-    product(a, b) / (product(a, a) * product(b, b)).sqrt().max(1e-300)
+    product(a, b) > ONE_CHANGE * (product(a, a) * product(b, b)).sqrt().max(1e-300)
 }
 
 /// Pairs grown from the best singles, each with every other effect in each of its laws.
@@ -293,7 +300,7 @@ fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &DMatri
         .flat_map(|s| singles.iter().flat_map(|c| &c.laws).map(move |(_, e)| (s, e)))
         .filter(|(s, e)| e.members[0].effect != seeds[*s].effects[0])
         // Two names for one change are not two causes.
-        .filter(|(s, e)| likeness(problem, &seeds[*s].best, e) < ONE_CHANGE)
+        .filter(|(s, e)| !one_change(problem, &seeds[*s].best, e))
         .collect();
     let mut glances: Vec<(f64, Vec<Member>, Vec<f64>)> = jobs
         .par_iter()

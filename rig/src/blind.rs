@@ -3,6 +3,9 @@
 //! The diagnoser gets the table, rig.toml and the hidden conditions of a set; label and truth are opened only by
 //! [`score`], after the verdict stands. Every figure comes with its number of sets and an interval.
 
+pub mod further;
+pub mod same_form;
+
 use diagnosis::attribute::Verdict;
 use diagnosis::data::{Rig, Table};
 use diagnosis::hypotheses::Options;
@@ -213,7 +216,8 @@ pub struct Figure {
     pub target: &'static str,
 }
 
-fn share(name: &'static str, target: &'static str, outcomes: Vec<bool>) -> Figure {
+/// A share with Wilson's interval.
+pub fn share(name: &'static str, target: &'static str, outcomes: Vec<bool>) -> Figure {
     let n = outcomes.len();
     let hits = outcomes.iter().filter(|x| **x).count() as f64;
     let (p, m) = (hits / n.max(1) as f64, n as f64);

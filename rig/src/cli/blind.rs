@@ -27,6 +27,12 @@ pub struct Args {
     /// Write the sets to this folder (open and sealed parts apart) for other diagnosers; none is scored.
     #[arg(long, value_name = "DIR")]
     pub write: Option<std::path::PathBuf>,
+    /// Instead: how often the intervals of the size cover on sets of the library's own forms.
+    #[arg(long, conflicts_with_all = ["further", "write", "stratum"])]
+    pub same_form: bool,
+    /// Instead: designed next experiments against random ones.
+    #[arg(long, conflicts_with_all = ["write", "stratum"])]
+    pub further: bool,
     /// Print one line a set on stderr.
     #[arg(long)]
     pub verbose: bool,
@@ -54,6 +60,12 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         return Ok(ExitCode::SUCCESS);
     }
+    if args.same_form {
+        return same_form(&args, json);
+    }
+    if args.further {
+        return further(&args, json);
+    }
     let options = Options { pairs: !args.no_pairs, without: args.without.clone(), ..Options::default() };
     let scored = score_all(args.seed, args.sets, stratum, &options, |s| {
         if args.verbose {
@@ -80,6 +92,69 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             let list: Vec<String> = answers.iter().map(|(a, n)| format!("{a} {n}")).collect();
             println!("  {truth:40} {}", list.join("; "));
         }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Coverage of the size's interval, and how many sets were named in their own form.
+fn same_form(args: &Args, json: bool) -> miette::Result<ExitCode> {
+    let sets = crate::blind::same_form::run(args.seed, args.sets)?;
+    let stated: Vec<(f64, [f64; 2])> = sets.iter().filter_map(|s| Some((s.truth, s.ci95?))).collect();
+    let covered = stated.iter().map(|(t, ci)| ci[0] <= *t && *t <= ci[1]).collect();
+    let figure = crate::blind::share("size inside its 95 % interval, same form", "0.92 to 0.98", covered);
+    if json {
+        let document =
+            serde_json::json!({ "schema": "muprime.blind.same_form/1", "figure": figure, "sets": sets });
+        println!("{}", serde_json::to_string(&document).into_diagnostic()?);
+    } else {
+        let ci = figure.ci95.unwrap_or([f64::NAN; 2]);
+        println!(
+            "{}: {:.3} [{:.3}, {:.3}], n {} of {} sets (the others were not named in their own form)",
+            figure.name,
+            figure.value.unwrap_or(f64::NAN),
+            ci[0],
+            ci[1],
+            figure.n,
+            sets.len()
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Passes until a probability of 0.9, designed and at random.
+fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
+    let races = crate::blind::further::run(args.seed, args.sets)?;
+    // Who does not arrive is counted with infinitely many passes: medians stay right.
+    let median = |of: &dyn Fn(&crate::blind::further::Race) -> Option<usize>| {
+        let mut list: Vec<f64> = races.iter().map(|r| of(r).map_or(f64::INFINITY, |n| n as f64)).collect();
+        list.sort_by(f64::total_cmp);
+        list.get(list.len() / 2).copied().unwrap_or(f64::NAN)
+    };
+    let arrived = |of: &dyn Fn(&crate::blind::further::Race) -> Option<usize>| {
+        races.iter().filter(|r| of(r).is_some()).count()
+    };
+    let (designed, random) = (median(&|r| r.designed), median(&|r| r.random));
+    if json {
+        let document = serde_json::json!({
+            "schema": "muprime.blind.further/1", "median_designed": designed, "median_random": random, "races": races,
+        });
+        println!("{}", serde_json::to_string(&document).into_diagnostic()?);
+    } else {
+        println!(
+            "further passes to a probability of 0.9 on the truth, {} sets not plain at first:",
+            races.len()
+        );
+        println!("  designed: median {designed}, arrived {}", arrived(&|r| r.designed));
+        println!("  random:   median {random}, arrived {}", arrived(&|r| r.random));
+        let better = races
+            .iter()
+            .filter(|r| r.designed.unwrap_or(usize::MAX) < r.random.unwrap_or(usize::MAX))
+            .count();
+        let worse = races
+            .iter()
+            .filter(|r| r.designed.unwrap_or(usize::MAX) > r.random.unwrap_or(usize::MAX))
+            .count();
+        println!("  designed sooner in {better}, later in {worse}");
     }
     Ok(ExitCode::SUCCESS)
 }
