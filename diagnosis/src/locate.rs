@@ -62,6 +62,21 @@ fn covariates() -> [Covariate; 9] {
     ]
 }
 
+/// A covariate in words, with the scale and unit in which it is told.
+fn words_for(name: &str) -> (&str, f64, &str) {
+    match name {
+        "amplitude_pp_m" => ("amplitude", 1e6, "um pp"),
+        "speed_m_s" => ("speed", 1e3, "mm/s"),
+        "normal_force_n" => ("normal force", 1.0, "N"),
+        "frequency_hz" => ("frequency", 1e-3, "kHz"),
+        "position_m" => ("position", 1e3, "mm"),
+        "time_s" => ("time", 1.0, "s"),
+        "ambient_pressure_pa" => ("pressure", 1e-3, "kPa"),
+        "temperature_c" => ("temperature", 1.0, "degrees C"),
+        other => (other, 1.0, ""),
+    }
+}
+
 /// Deviations of a pass by which the gap must stand out at a condition to count.
 const STANDS_OUT: f64 = 2.0;
 /// Largest number of parts that the operating space is cut into, and the least number of places in one.
@@ -258,18 +273,21 @@ fn region(bounds: &BTreeMap<usize, [f64; 2]>, passes: &[Operating], share: f64, 
         let low = if b[0].is_finite() { b[0] } else { low };
         let high = if b[1].is_finite() { b[1] } else { high };
         named.insert(name, [low, high]);
+        let (word, scale, unit) = words_for(name);
+        let (low, high) = (low * scale, high * scale);
         words.push(match (b[0].is_finite(), b[1].is_finite()) {
-            (true, true) => format!("{name} between {low:.4e} and {high:.4e}"),
-            (true, false) => format!("{name} above {low:.4e}"),
-            _ => format!("{name} below {high:.4e}"),
+            (true, true) => format!("{word} {low:.3} to {high:.3} {unit}"),
+            (true, false) => format!("{word} above {low:.3} {unit}"),
+            _ => format!("{word} below {high:.3} {unit}"),
         });
     }
-    let place = if words.is_empty() { "everywhere".to_string() } else { words.join(" and ") };
+    let place = if words.is_empty() { "everywhere".to_string() } else { format!("at {}", words.join(", ")) };
+    let p = if p_value < 1e-300 { "p < 1e-300".to_string() } else { format!("p = {p_value:.1e}") };
     Region {
         bounds: named,
         share_of_gap: share,
         p_value,
-        text: format!("{:.0} % of the gap lies at {place} (p = {p_value:.1e})", 100.0 * share),
+        text: format!("{:.0} % of the gap lies {place} ({p})", 100.0 * share),
     }
 }
 

@@ -246,17 +246,24 @@ pub fn terminal(result: &Diagnosis) -> String {
     }
     if !r.location.regions.is_empty() {
         text.push_str("\nWhere\n");
-        for region in &r.location.regions {
+        let told = r.location.regions.iter().filter(|g| g.share_of_gap >= 0.01).count();
+        for region in r.location.regions.iter().take(told) {
             text.push_str(&format!("  {}\n", region.text));
+        }
+        let rest = r.location.regions.len() - told;
+        if rest > 0 {
+            text.push_str(&format!("  and {rest} further parts with less than 1 % each\n"));
         }
     }
     if !r.next_experiment.is_empty() {
         text.push_str("\nNext\n");
         for e in r.next_experiment.iter().take(4) {
-            text.push_str(&format!(
-                "  {} (parts {} from {}: {:.1} nats)\n",
-                e.text, e.separates[0], e.separates[1], e.expected_nats
-            ));
+            text.push_str(&format!("  {}", e.text));
+            if e.conditions.is_empty() {
+                let [a, b] = &e.separates;
+                text.push_str(&format!(" (parts {a} from {b}: {:.1} nats)", e.expected_nats));
+            }
+            text.push('\n');
         }
     }
     if !r.not_testable.is_empty() {

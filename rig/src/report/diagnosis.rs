@@ -130,16 +130,27 @@ fn maps(result: &Diagnosis, table: &Table) -> String {
                 ));
             }
         }
+        let [first, last] = [low, high].map(|v| short(if log { v.exp() } else { v }));
         figures.push_str(&format!(
             "<figure><svg width=\"310\" height=\"165\" viewBox=\"0 0 310 165\" role=\"img\" aria-label=\"error against {name}\">\
              <line x1=\"30\" y1=\"80\" x2=\"300\" y2=\"80\" stroke=\"#999\"/><line x1=\"30\" y1=\"10\" x2=\"30\" y2=\"150\" stroke=\"#999\"/>\
-             <text x=\"2\" y=\"16\" font-size=\"9\">{limit:.0} sd</text><text x=\"2\" y=\"152\" font-size=\"9\">-{limit:.0}</text>{dots}\
+             <text x=\"2\" y=\"16\" font-size=\"9\">{limit:.0} sd</text><text x=\"2\" y=\"152\" font-size=\"9\">-{limit:.0}</text>\
+             <text x=\"30\" y=\"163\" font-size=\"9\">{first}</text><text x=\"300\" y=\"163\" font-size=\"9\" text-anchor=\"end\">{last}</text>{dots}\
              </svg><figcaption>{name}</figcaption></figure>"
         ));
     }
     format!(
         "<h2>Residuals</h2><p>Error along the motion in standard deviations of a pass: <span style=\"color:#c05621\">recalibrated baseline</span>, <span style=\"color:#2b6cb0\">verdict's model</span>.</p><div class=\"maps\">{figures}</div>"
     )
+}
+
+/// A number with about three digits.
+fn short(v: f64) -> String {
+    match v.abs() {
+        a if a >= 100.0 => format!("{v:.0}"),
+        a if a >= 1.0 || a == 0.0 => format!("{v:.1}"),
+        _ => format!("{v:.3}"),
+    }
 }
 
 fn lists(result: &Diagnosis) -> String {
@@ -160,10 +171,12 @@ fn lists(result: &Diagnosis) -> String {
         r.next_experiment
             .iter()
             .map(|e| {
-                format!(
-                    "{} Parts {} from {}; {:.1} nats expected.",
-                    e.text, e.separates[0], e.separates[1], e.expected_nats
-                )
+                let [a, b] = &e.separates;
+                if e.conditions.is_empty() {
+                    format!("{} Parts {a} from {b}; {:.1} nats expected.", e.text, e.expected_nats)
+                } else {
+                    e.text.clone()
+                }
             })
             .collect(),
     ));
@@ -180,6 +193,9 @@ fn lists(result: &Diagnosis) -> String {
     ));
     text.push_str("<h2>Not testable on this table</h2>");
     text.push_str(&items(r.not_testable.iter().map(|n| format!("{}: {}", n.effect, n.because)).collect()));
-    text.push_str(&items(r.remarks.clone()));
+    if !r.remarks.is_empty() {
+        text.push_str("<h2>Remarks</h2>");
+        text.push_str(&items(r.remarks.clone()));
+    }
     text
 }
