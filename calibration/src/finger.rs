@@ -9,6 +9,7 @@ pub mod stiffness;
 use crate::amplitude::apply::block_diagonal;
 use crate::certificate::{BudgetLine, Evaluation, Kind, Outcome, Residuals, parameters};
 use crate::identify::Identified;
+use crate::identify::skin::{IdentifiedSkin, Profile};
 use crate::regression::FitError;
 use friction::FrictionFit;
 use nalgebra::DMatrix;
@@ -64,6 +65,8 @@ pub struct FingerFit {
     pub friction: Option<FrictionFit>,
     /// Modulus of the stratum corneum from a phase table (Eq. 2).
     pub modulus: Option<Identified>,
+    /// The same with penalty and retardation time free.
+    pub skin: Option<IdentifiedSkin>,
 }
 
 impl FingerFit {
@@ -108,20 +111,18 @@ impl FingerFit {
             remarks.extend(f.remarks());
         }
         if let Some(m) = &self.modulus {
-            names.push(("stratum_corneum.young_modulus".into(), "Pa"));
-            values.push(m.young_modulus_pa);
-            dofs.push((m.points as f64 - 1.0).max(1.0));
-            // The profile interval is not symmetric; the certificate's uncertainty is its half-width.
-            let sd = 0.5 * (m.ci95_pa[1] - m.ci95_pa[0]) / 1.96;
-            blocks.push(DMatrix::from_element(1, 1, sd * sd));
+            let fit = ModulusFit::of(m, self.skin.as_ref());
+            for (name, unit, value, ci95) in fit.parameters {
+                names.push((name.into(), unit));
+                values.push(value);
+                dofs.push((m.points as f64 - 1.0).max(1.0));
+                // A profile interval is not symmetric; the certificate's uncertainty is its half-width.
+                let sd = 0.5 * (ci95[1] - ci95[0]) / 1.96;
+                blocks.push(DMatrix::from_element(1, 1, sd * sd));
+            }
             count += m.points as u64;
-            remarks.push(format!(
-                "modulus: 95 % profile interval {:.3e} to {:.3e} Pa, residual {:.1} deg rms",
-                m.ci95_pa[0],
-                m.ci95_pa[1],
-                (m.objective_deg2 / m.points as f64).sqrt()
-            ));
-            remarks.extend(m.cannot_tell.iter().map(|what| format!("the phases cannot tell {what}")));
+            (sd, largest, unit) = (m.residual_deg[0], m.residual_deg[1], "deg".into());
+            remarks.extend(fit.remarks);
         }
         let covariance = block_diagonal(&blocks);
         let mut settings = BTreeMap::new();
@@ -143,5 +144,69 @@ impl FingerFit {
             range,
             budget,
         }
+    }
+}
+
+/// What the certificate says of the inverse analysis.
+struct ModulusFit {
+    /// Name, unit, value, 95 % interval.
+    parameters: Vec<(&'static str, &'static str, f64, [f64; 2])>,
+    remarks: Vec<String>,
+}
+
+impl ModulusFit {
+    /// Elastic skin where that will do, as the paper has it; otherwise the skin with all three free. Penalty and
+    /// time are parameters only where both ends of their interval were found.
+    fn of(elastic: &Identified, skin: Option<&IdentifiedSkin>) -> ModulusFit {
+        let (value, ci95) = match skin {
+            Some(skin) if !skin.elastic_will_do() => (skin.young_modulus_pa.best, skin.young_modulus_pa.ci95),
+            _ => (elastic.young_modulus_pa, elastic.ci95_pa),
+        };
+        let mut parameters = vec![("stratum_corneum.young_modulus", "Pa", value, ci95)];
+        let mut remarks = vec![format!(
+            "modulus of elastic skin: {:.3e} Pa, 95 % profile interval {:.3e} to {:.3e} Pa, residual {:.1} deg rms",
+            elastic.young_modulus_pa, elastic.ci95_pa[0], elastic.ci95_pa[1], elastic.residual_deg[0]
+        )];
+        let mut cannot = elastic.cannot_tell.clone();
+        if let Some(skin) = skin {
+            let gain = skin.chi2_elastic - skin.chi2;
+            let verdict =
+                if skin.elastic_will_do() { "elastic skin will do" } else { "elastic skin does not fit" };
+            remarks.push(format!(
+                "{verdict}: freeing penalty and retardation time lowers chi-square by {gain:.1} to {:.1}",
+                skin.chi2
+            ));
+            let quantities: [(&str, &str, &'static str, &Profile); 3] = [
+                ("modulus", " Pa", "", &skin.young_modulus_pa),
+                ("penalty over modulus", "", "stratum_corneum.penalty_ratio", &skin.penalty_ratio),
+                ("retardation time", " s", "stratum_corneum.retardation_time", &skin.retardation_time_s),
+            ];
+            for (quantity, unit, parameter, profile) in quantities {
+                let end = |closed: bool, value: f64| {
+                    if closed {
+                        format!("{value:.3e}")
+                    } else {
+                        format!("{value:.3e} (end of the range searched)")
+                    }
+                };
+                let remark = format!(
+                    "all three free: {quantity} {:.3e}{unit}, 95 % profile interval {} to {}{unit}{}",
+                    profile.best,
+                    end(profile.closed[0], profile.ci95[0]),
+                    end(profile.closed[1], profile.ci95[1]),
+                    if profile.gaps { ", with gaps" } else { "" }
+                );
+                remarks.push(remark);
+                if !parameter.is_empty() && profile.closed == [true; 2] && !profile.gaps {
+                    let unit = if unit.is_empty() { "1" } else { "s" };
+                    parameters.push((parameter, unit, profile.best, profile.ci95));
+                }
+            }
+            cannot.extend(skin.cannot_tell.iter().cloned());
+        }
+        remarks.extend(cannot.iter().map(|what| format!("the phases cannot tell {what}")));
+        let else_wrong = "a wrong mean pressure or damping of the model: it would shift the modulus";
+        remarks.push(format!("the phases cannot tell {else_wrong} without a trace in the misfit"));
+        ModulusFit { parameters, remarks }
     }
 }

@@ -1,9 +1,12 @@
-//! Inverse analysis of section 3.3: the stratum corneum's modulus from phase shifts, by Eq. 2.
+//! Inverse analysis of section 3.3, by Eq. 2: here the stratum corneum's modulus, taken as elastic as the paper
+//! does in the end; in [`skin`] modulus, penalty and retardation time together.
 //!
 //! The objective is not smooth (contact is lost, periods double), so it is scanned on a fine grid over the
 //! whole range, which is a multi-start of its own, and only then refined in the best valleys. The uncertainty
 //! is the profile of the likelihood: all moduli whose chi-square lies within 3.84 of the least (95 %).
 //! The model of the phase shift is handed in: the surrogate for speed, or the finite element model itself.
+
+pub mod skin;
 
 use crate::phase::table::PhasePoint;
 use models::quantity::PeakToPeak;
@@ -31,6 +34,8 @@ pub struct Identified {
     pub closed: [bool; 2],
     /// Eq. 2 at the best modulus, degrees squared.
     pub objective_deg2: f64,
+    /// Root mean square and greatest of the residuals there, degrees.
+    pub residual_deg: [f64; 2],
     /// Chi-square at the best modulus.
     pub chi2: f64,
     /// Rows used.
@@ -103,13 +108,7 @@ pub fn identify(
 ) -> Result<Identified, IdentifyError> {
     check(points, search)?;
     // Rows without an uncertainty of their own share one, found from the residuals below.
-    let given: Vec<Option<f64>> = points
-        .iter()
-        .map(|p| {
-            let of_mean = p.phase_shift_sd_deg? / f64::from(p.repeats.unwrap_or(1).max(1)).sqrt();
-            Some(of_mean.hypot(search.model_sd_deg))
-        })
-        .collect();
+    let given = row_sds(points, search.model_sd_deg);
     let sd_estimated = given.iter().any(Option::is_none);
     let chi2 = |modulus: f64, common_sd: f64| -> f64 {
         let rows = points.iter().zip(&given);
@@ -160,17 +159,31 @@ pub fn identify(
     let high = inside.iter().fold(0.0, |a: f64, b| a.max(*b));
     let closed = [low > search.lowest_pa * 1.000_001, high < search.highest_pa * 0.999_999];
     let sds: Vec<f64> = given.iter().map(|sd| sd.unwrap_or(common_sd)).collect();
+    let residuals: Vec<f64> =
+        points.iter().map(|p| apart(phase(best, p.amplitude), p.phase_shift_deg).abs()).collect();
+    let square: f64 = residuals.iter().map(|r| r * r).sum();
     Ok(Identified {
         young_modulus_pa: best,
         ci95_pa: [low, high],
         closed,
-        objective_deg2: objective_deg2(points, |w| phase(best, w)),
+        objective_deg2: square,
+        residual_deg: [
+            (square / points.len() as f64).sqrt(),
+            residuals.iter().fold(0.0, |a: f64, b| a.max(*b)),
+        ],
         chi2: least,
         points: points.len(),
         typical_sd_deg: sds.iter().sum::<f64>() / sds.len() as f64,
         sd_estimated,
         cannot_tell: cannot_tell(closed, least, points.len(), sd_estimated),
     })
+}
+
+/// Standard uncertainty of each row, the model's included, where the row gives one.
+fn row_sds(points: &[PhasePoint], model_sd_deg: f64) -> Vec<Option<f64>> {
+    let of_mean =
+        |p: &PhasePoint| Some(p.phase_shift_sd_deg? / f64::from(p.repeats.unwrap_or(1).max(1)).sqrt());
+    points.iter().map(|p| of_mean(p).map(|sd| sd.hypot(model_sd_deg))).collect()
 }
 
 fn cannot_tell(closed: [bool; 2], chi2: f64, points: usize, sd_estimated: bool) -> Vec<String> {

@@ -8,7 +8,7 @@
 //! | [`latency`] | delay and jitter of a channel; clocks |
 //! | [`phase`] | contact phase shift of Eq. 1 from waveforms; the phase table |
 //! | [`finger`] | stiffness and friction of a fingertip |
-//! | [`identify`] | inverse analysis of Eq. 2: the modulus of the stratum corneum from a phase table |
+//! | [`identify`] | inverse analysis of Eq. 2: modulus, penalty and retardation time of the skin from a phase table |
 //! | [`certificate`] | the file that a calibration leaves, and the gate before its use |
 //! | [`prior`] | what certificates leave open, for the diagnosis |
 //! | [`regression`], [`uncertainty`] | least squares; GUM and its Supplement 1 |

@@ -4,7 +4,7 @@
 use calibration::identify::{Search, identify};
 use calibration::phase::table::PhasePoint;
 use models::quantity::PeakToPeak;
-use models::ridge::{PhaseCurves, RidgeCase, RunSettings, run};
+use models::ridge::{PhaseCurves, RidgeCase, RunSettings, Skin, SkinGrid, run};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 
@@ -29,7 +29,8 @@ fn normal(random: &mut ChaCha12Rng) -> f64 {
 fn the_modulus_is_found_and_its_interval_covers_the_truth() {
     let amplitudes = amplitudes();
     let base = RidgeCase { elements: 500, ..RidgeCase::paper() };
-    let curves = PhaseCurves::compute(base, &amplitudes, (18e6, 45e6), 6).expect("computed");
+    let curves =
+        PhaseCurves::compute(base, &amplitudes, SkinGrid::elastic((18e6, 45e6), 6), || {}).expect("computed");
     // The data: another mesh, another step.
     let exact: Vec<f64> = amplitudes
         .iter()
@@ -46,7 +47,8 @@ fn the_modulus_is_found_and_its_interval_covers_the_truth() {
             if phase > 270.0 { phase - 360.0 } else { phase }
         })
         .collect();
-    let mesh: Vec<f64> = amplitudes.iter().zip(&exact).map(|(w, p)| curves.at(TRUTH_PA, *w) - p).collect();
+    let mesh: Vec<f64> =
+        amplitudes.iter().zip(&exact).map(|(w, p)| curves.at(&Skin::elastic(TRUTH_PA), *w) - p).collect();
     println!("phases of the data {exact:.1?}\nmodel less data at the truth {mesh:.1?}");
     let search = Search { lowest_pa: 18e6, highest_pa: 45e6, model_sd_deg: 2.0 };
     let rows = |noise: &mut dyn FnMut() -> f64| -> Vec<PhasePoint> {
@@ -66,7 +68,7 @@ fn the_modulus_is_found_and_its_interval_covers_the_truth() {
         let mut random = ChaCha12Rng::seed_from_u64(20_260_000 + seed);
         let sd = NOISE_DEG / f64::from(REPEATS).sqrt();
         let data = rows(&mut || sd * normal(&mut random));
-        let answer = identify(&data, &search, |e, w| curves.at(e, w)).expect("identified");
+        let answer = identify(&data, &search, |e, w| curves.at(&Skin::elastic(e), w)).expect("identified");
         covered += usize::from(answer.ci95_pa[0] <= TRUTH_PA && TRUTH_PA <= answer.ci95_pa[1]);
         found.push(answer.young_modulus_pa / TRUTH_PA - 1.0);
     }

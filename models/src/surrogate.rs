@@ -42,10 +42,10 @@ pub struct SurrogatePoint {
     pub phase_shift_deg: f64,
     /// Share of the cycle in contact.
     pub contact_fraction: f64,
-    /// Whether the condition is within the table of friction.
+    /// Whether the condition is within the table.
     pub inside: bool,
-    /// Whether it is within the table of the phase shift, which reaches stiffer skin.
-    pub phase_inside: bool,
+    /// Whether it is, whatever the speed: phase and contact are those at rest.
+    pub inside_at_rest: bool,
 }
 
 /// The interpolated table.
@@ -106,11 +106,10 @@ impl Surrogate {
         let f = g.frequency_hz.place(frequency_hz);
         let s = g.speed_over_mu0_m_s.place(speed_over_mu0_m_s);
         let column = (w.max(first) / first).ln() / (last / first).ln();
-        let sliding_e = e * g.sliding_scale();
         let within = |places: &[f64]| places.iter().all(|p| *p > -1e-9 && *p < 1.0 + 1e-9);
-        let phase_inside = within(&[e, force, f, column]);
-        let inside = within(&[sliding_e, force, f, s, column]);
-        let mut mu = self.mu.at([sliding_e, force, f, s, column]);
+        let inside_at_rest = within(&[e, force, f, column]);
+        let inside = inside_at_rest && within(&[s]);
+        let mut mu = self.mu.at([e, force, f, s, column]);
         let phase = self.phase.at([e, force, f, 0.0, column]);
         let mut contact = self.contact.at([e, force, f, 0.0, column]);
         if w < first {
@@ -128,7 +127,7 @@ impl Surrogate {
             phase_shift_deg: phase,
             contact_fraction: contact.clamp(0.0, 1.0),
             inside,
-            phase_inside,
+            inside_at_rest,
         }
     }
 }

@@ -22,9 +22,7 @@ fn the_shipped_table_belongs_to_this_model() {
 #[test]
 fn a_few_held_out_cases_agree_with_the_model_itself() {
     let surrogate = Surrogate::shipped().expect("reads");
-    for point in
-        Grid::SHIPPED.held_out(24).into_iter().filter(|p| !p.at_rest && p.case.young_modulus_pa < 60e6)
-    {
+    for point in Grid::SHIPPED.held_out(24).into_iter().filter(|p| !p.at_rest) {
         let c = point.case;
         let fe = run(&c, &Grid::settings()).expect("runs").mu_relative;
         let s = surrogate.at(
@@ -67,7 +65,7 @@ fn predictions_are_bounded_and_say_where_they_hold() {
 #[test]
 fn a_damaged_table_is_refused_with_its_line() {
     for (text, line) in
-        [("", 1), ("muprime ridge table 9\n", 1), ("muprime ridge table 1\ninputs x\naxis y 1 2 3\n", 3)]
+        [("", 1), ("muprime ridge table 9\n", 1), ("muprime ridge table 2\ninputs x\naxis y 1 2 3\n", 3)]
     {
         let why = Surrogate::from_text(text).expect_err("refused");
         assert!(matches!(why, TableError::Line { line: at, .. } if at == line), "{why}");

@@ -1,12 +1,16 @@
-//! Finger: friction without vibration of the virtual fingertip, its coefficient withheld.
+//! Finger: friction without vibration of the virtual fingertip, its coefficient withheld; and the command of the
+//! inverse analysis on a file of phases made by another mesh and step.
 
 use crate::bench::{Coverage, TRIALS, seed};
 use calibration::finger::friction::{FrictionPoint, friction};
 use calibration::uncertainty::student::coverage_factor;
+use models::quantity::PeakToPeak;
+use models::ridge::{RidgeCase, RunSettings, run};
 use sim::defects::{Defects, Surroundings};
 use sim::finger::{Finger, FingerConfig};
 use sim::noise::Noise;
 use sim::world::{Point, steady_forces};
+use tests::{documents, muprime, texts};
 
 /// Passes over loads and speeds with pass-to-pass scatter and force noise, as the rig would measure them.
 fn passes(finger: &Finger, defects: &Defects, draw: &mut Noise) -> Vec<FrictionPoint> {
@@ -67,4 +71,56 @@ fn a_contact_that_is_not_coulombic_is_seen() {
     let (exponent, u) = (found.fit.estimates[1], found.fit.standard_uncertainty(1));
     // Between Coulomb (0) and a Hertz contact's area (-1/3).
     assert!(exponent + 3.0 * u < 0.0 && exponent > -0.34, "{exponent} +- {u}");
+}
+
+/// Phases of elastic skin of 28.3 MPa on 600 elements with a step of its own, a deterministic scatter of about a
+/// degree and a half on each mean, as PHASES.csv has them.
+fn phases_csv(conditions: [&str; 2]) -> String {
+    let mut text = String::from("amplitude_pp_m,phase_shift_deg,phase_shift_sd_deg,repeats,condition\n");
+    for (n, um) in [0.5, 1.1, 1.3, 1.5, 1.8, 2.2, 2.6].into_iter().enumerate() {
+        let amplitude = PeakToPeak::from_metres(um * 1e-6);
+        let case = RidgeCase { amplitude, speed_m_s: 0.0, elements: 600, ..RidgeCase::paper() };
+        let settings = RunSettings { step_s: Some(5.2e-9), energy: false, ..RunSettings::default() };
+        let phase = run(&case, &settings).unwrap().phase_shift_deg.unwrap();
+        let scatter = 2.2 * (7.3 * n as f64).sin();
+        let phase = (phase + scatter).rem_euclid(360.0);
+        text += &format!("{um}e-6,{phase:.2},5,10,{}\n", conditions[n % 2]);
+    }
+    text
+}
+
+#[test]
+fn the_command_finds_the_skin_in_a_file_of_phases() {
+    let folder = tempfile::tempdir().unwrap();
+    let phases = folder.path().join("PHASES.csv");
+    std::fs::write(&phases, phases_csv(["moist", "moist"])).unwrap();
+    let calibrate = |out: &str| {
+        let mut command = muprime();
+        command.args(["--json", "calibrate", "finger", "--operator", "a", "--serial", "index"]);
+        command.args(["--elements", "300", "--modulus-range-pa", "14e6", "60e6", "--out"]);
+        command.arg(folder.path().join(out)).arg(&phases).output().unwrap()
+    };
+    let output = calibrate("finger.toml");
+    assert!(output.status.success(), "{}", texts(&output).1);
+    let said = &documents(&output)[0];
+    let number = |at: &str| said.pointer(at).and_then(serde_json::Value::as_f64).unwrap();
+    println!("{said:#}");
+    // The modulus within 5 %, and no more said of penalty and time than the phases hold.
+    assert_eq!(said["parameters"][0]["name"], "stratum_corneum.young_modulus");
+    assert!((number("/skin/elastic/young_modulus_pa") / 28.3e6 - 1.0).abs() < 0.05);
+    let interval = |name: &str| [0, 1].map(|end| number(&format!("/skin/all_free/{name}/ci95/{end}")));
+    let holds = |[low, high]: [f64; 2], truth: f64| low <= truth && truth <= high;
+    assert!(holds(interval("young_modulus_pa"), 28.3e6), "{:?}", interval("young_modulus_pa"));
+    assert!(holds(interval("penalty_ratio"), 93.0 / 28.3 - 1e-9), "{:?}", interval("penalty_ratio"));
+    assert!(holds(interval("retardation_time_s"), 0.0), "{:?}", interval("retardation_time_s"));
+    assert_eq!(said["skin"]["all_free"]["penalty_ratio"]["closed"][1], false);
+    let remarks = said["remarks"].to_string();
+    assert!(remarks.contains("elastic skin will do") && remarks.contains("cannot tell"), "{remarks}");
+    let text = std::fs::read_to_string(folder.path().join("finger.toml")).unwrap();
+    calibration::certificate::Certificate::from_toml(&text).unwrap();
+    // Moist and dry in one table are two fingers.
+    std::fs::write(&phases, phases_csv(["moist", "dry"])).unwrap();
+    let refused = calibrate("mixed.toml");
+    assert!(!refused.status.success() && !folder.path().join("mixed.toml").exists());
+    assert!(texts(&refused).1.contains("one at a time"), "{}", texts(&refused).1);
 }

@@ -10,7 +10,7 @@
 //! | `stability.rs` | the stable time step |
 //! | `case.rs` | one case and the declared defaults |
 //! | `loading.rs` | press, slide, vibrate (Fig. 6), and what is read from it |
-//! | `phase_curves.rs` | phase shift against modulus, for the inverse analysis |
+//! | `phase_curves.rs` | phase shift over a grid of skins, for the inverse analysis |
 //! | `study.rs` | parametric studies (Fig. 9), content keys |
 //! | `cycle.rs` | one vibration cycle, steadiness, phase, period doubling |
 //!
@@ -38,7 +38,7 @@ pub use kernel::Surface;
 pub use loading::{RidgeRun, RunSettings, run};
 pub use material::Material;
 pub use mesh::{Mesh, RidgeGeometry, RidgeMesh, RidgeProfile};
-pub use phase_curves::PhaseCurves;
+pub use phase_curves::{PhaseCurves, Skin, SkinGrid};
 
 /// Why a ridge could not be built or computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

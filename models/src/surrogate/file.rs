@@ -4,7 +4,7 @@ use super::spline::Dense;
 use super::{Axis, Grid, GridPoint, InterpolationError, Surrogate};
 use std::fmt::Write;
 
-const FIRST_LINE: &str = "muprime ridge table 1";
+const FIRST_LINE: &str = "muprime ridge table 2";
 /// Field name, and how many steps of the integers make one unit.
 const FIELDS: [(&str, f64); 3] = [("mu_relative", 1e4), ("phase_shift_deg", 10.0), ("contact_fraction", 1e4)];
 
@@ -68,7 +68,6 @@ impl Surrogate {
         for (name, axis) in grid.axes() {
             let _ = writeln!(text, "axis {name} {:e} {:e} {}", axis.low, axis.high, axis.count);
         }
-        let _ = writeln!(text, "sliding_moduli {}", grid.sliding_moduli);
         let _ = writeln!(text, "amplitudes {}", grid.amplitudes);
         let _ = writeln!(
             text,
@@ -136,10 +135,7 @@ impl Surrogate {
                 .filter(|c| (2..=1000).contains(c))
                 .ok_or_else(|| bad(n, format!("'{name} COUNT' is needed")))
         };
-        let (sliding_moduli, amplitudes) = (count("sliding_moduli")?, count("amplitudes")?);
-        if sliding_moduli > axes[0].count {
-            return Err(bad(7, format!("{sliding_moduli} moduli with friction of {} in all", axes[0].count)));
-        }
+        let amplitudes = count("amplitudes")?;
         let (n, line) = next("the interpolation error")?;
         let error: Vec<f64> =
             line.strip_prefix("error ").unwrap_or("").split_whitespace().flat_map(str::parse).collect();
@@ -147,14 +143,7 @@ impl Surrogate {
             return Err(bad(n, "'error MU_RMS MU_MAX PHASE_RMS_DEG CASES' is needed".into()));
         };
         let [young_modulus_pa, normal_force_n, frequency_hz, speed_over_mu0_m_s] = axes;
-        let grid = Grid {
-            young_modulus_pa,
-            sliding_moduli,
-            normal_force_n,
-            frequency_hz,
-            speed_over_mu0_m_s,
-            amplitudes,
-        };
+        let grid = Grid { young_modulus_pa, normal_force_n, frequency_hz, speed_over_mu0_m_s, amplitudes };
         let mut dense = Vec::new();
         for (field, (name, scale)) in FIELDS.into_iter().enumerate() {
             let (n, line) = next(name)?;

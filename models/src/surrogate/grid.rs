@@ -38,9 +38,6 @@ impl Axis {
 pub struct Grid {
     /// E_sc in Pa.
     pub young_modulus_pa: Axis,
-    /// How many of the moduli, from the lowest, have friction; all have the phase at rest. (Stiff skin needs
-    /// small steps, and friction hardly depends on the modulus.)
-    pub sliding_moduli: usize,
     /// F_n in N.
     pub normal_force_n: Axis,
     /// f in Hz.
@@ -65,8 +62,8 @@ pub struct GridPoint {
 impl Grid {
     /// The axes of the shipped table.
     pub const SHIPPED: Grid = Grid {
-        young_modulus_pa: Axis { low: 20e6, high: 200e6, count: 4 },
-        sliding_moduli: 3,
+        // From the paper's softest skin to a little beyond its dry finger (202.4 MPa).
+        young_modulus_pa: Axis { low: 20e6, high: 210e6, count: 5 },
         normal_force_n: Axis { low: 0.1, high: 1.0, count: 3 },
         frequency_hz: Axis { low: 10e3, high: 100e3, count: 5 },
         speed_over_mu0_m_s: Axis { low: 0.0025, high: 1.0, count: 6 },
@@ -83,11 +80,6 @@ impl Grid {
     pub fn amplitude_range_m(&self, frequency_hz: f64, normal_force_n: f64) -> (f64, f64) {
         let first = 0.35e-6 * (27_500.0 / frequency_hz).powf(0.75) * (normal_force_n / 0.25).cbrt();
         (first.min(4e-6), 5.5e-6)
-    }
-
-    /// Place on the axis of the moduli with friction over the place on that of all.
-    pub fn sliding_scale(&self) -> f64 {
-        (self.young_modulus_pa.count - 1) as f64 / (self.sliding_moduli - 1) as f64
     }
 
     /// How the table's cases are run.
@@ -125,7 +117,7 @@ impl Grid {
     /// Counts along the axes: modulus, force, frequency, speed, amplitude; for friction, or at rest.
     pub fn shape(&self, at_rest: bool) -> [usize; 5] {
         [
-            if at_rest { self.young_modulus_pa.count } else { self.sliding_moduli },
+            self.young_modulus_pa.count,
             self.normal_force_n.count,
             self.frequency_hz.count,
             if at_rest { 1 } else { self.speed_over_mu0_m_s.count },
@@ -143,9 +135,7 @@ impl Grid {
                 let mut rest: usize = index;
                 let mut place = [0.0; 5];
                 for axis in (0..5).rev() {
-                    // Moduli with friction stand on the axis of all moduli.
-                    let count = if axis == 0 { self.young_modulus_pa.count } else { shape[axis] };
-                    place[axis] = share(rest % shape[axis], count);
+                    place[axis] = share(rest % shape[axis], shape[axis]);
                     rest /= shape[axis];
                 }
                 points.push(GridPoint { place, at_rest, case: self.case(place, at_rest) });
@@ -160,12 +150,9 @@ impl Grid {
         let root = 1.134_724_138_401_519_5_f64;
         (1..=count)
             .map(|n| {
-                let mut place: [f64; 5] =
+                let place: [f64; 5] =
                     std::array::from_fn(|d| (0.5 + n as f64 / root.powi(d as i32 + 1)).fract());
                 let at_rest = n.is_multiple_of(4);
-                if !at_rest {
-                    place[0] /= self.sliding_scale();
-                }
                 GridPoint { place, at_rest, case: self.case(place, at_rest) }
             })
             .collect()

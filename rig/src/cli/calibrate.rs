@@ -4,6 +4,7 @@ mod amplitude;
 mod finger;
 mod force;
 mod guided;
+mod inverse;
 mod latency;
 mod phase;
 mod tables;
@@ -31,7 +32,7 @@ enum What {
     Latency(latency::Args),
     /// Vibrometer waveforms of plate and skin to the contact phase shift (Eq. 1)
     Phase(phase::Args),
-    /// Stiffness, friction and (from a phase table) the skin's modulus of a fingertip
+    /// Stiffness, friction and (from a phase table) modulus, penalty and retardation time of a fingertip
     Finger(finger::Args),
     /// Print what verified certificates leave open, as the [calibration] section of rig.toml
     Priors(PriorsArgs),
@@ -161,6 +162,17 @@ impl Common {
 
     /// Writes the certificate and says what it says.
     fn issue(&self, outcome: Outcome, raw: RawData, json: bool) -> miette::Result<ExitCode> {
+        self.issue_with(outcome, raw, json, [])
+    }
+
+    /// The same with more to say in JSON.
+    fn issue_with<const N: usize>(
+        &self,
+        outcome: Outcome,
+        raw: RawData,
+        json: bool,
+        more: [(&str, serde_json::Value); N],
+    ) -> miette::Result<ExitCode> {
         let certificate = outcome.certify(&self.occasion(raw)?);
         let safe: String =
             self.serial.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
@@ -181,14 +193,13 @@ impl Common {
                     })
                 })
                 .collect();
-            println!(
-                "{}",
-                serde_json::json!({
+            let mut document = serde_json::json!({
                     "certificate": out, "kind": certificate.kind, "serial": self.serial,
                     "content_sha256": certificate.content_sha256, "valid_until": certificate.validity.until,
                     "parameters": parameters, "remarks": certificate.remarks,
-                })
-            );
+            });
+            more.into_iter().for_each(|(key, value)| document[key] = value);
+            println!("{document}");
         } else {
             show(&certificate, &out);
         }

@@ -1,14 +1,12 @@
 //! `muprime calibrate finger`.
 
 use super::Common;
+use super::inverse;
 use super::tables::{Sources, columns};
 use calibration::finger::friction;
 use calibration::finger::stiffness::{Stiffness, UltrasonicPoint, quasi_static, ultrasonic};
 use calibration::finger::{FingerError, FingerFit};
-use calibration::identify::{Identified, Search, identify};
-use calibration::phase::table::{PhasePoint, read_phases};
-use miette::IntoDiagnostic;
-use models::ridge::{PhaseCurves, RidgeCase};
+use calibration::phase::table::read_phases;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -23,6 +21,12 @@ pub struct Args {
     /// Range of moduli searched, in Pa
     #[arg(long, num_args = 2, value_names = ["LOWEST", "HIGHEST"], default_values_t = [10e6, 1e9])]
     modulus_range_pa: Vec<f64>,
+    /// Identify the modulus alone, of elastic skin with the default penalty: quicker
+    #[arg(long)]
+    modulus_only: bool,
+    /// Elements of the ridge's mesh, about; half as many where penalty and retardation time are free too
+    #[arg(long, default_value_t = models::ridge::case::ELEMENTS)]
+    elements: usize,
     /// Slow normal loop as CSV: displacement_m, force_n, up (1 or 0)
     #[arg(long)]
     normal_loop: Option<PathBuf>,
@@ -96,47 +100,22 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(path) = &args.phases {
         let bytes = sources.read(path)?;
         let points = read_phases(bytes.as_slice()).map_err(|e| miette::miette!("{}: {e}", path.display()))?;
-        let found_modulus = modulus(args, &points).map_err(|e| e.wrap_err(path.display().to_string()))?;
-        found.modulus = Some(found_modulus);
+        let options = inverse::Options {
+            frequency_hz: args.frequency_hz,
+            normal_force_n: args.normal_force_n,
+            modulus_range_pa: (args.modulus_range_pa[0], args.modulus_range_pa[1]),
+            elements: args.elements,
+            modulus_only: args.modulus_only,
+        };
+        let (modulus, skin) =
+            inverse::analyse(&options, &points).map_err(|e| e.wrap_err(path.display().to_string()))?;
+        (found.modulus, found.skin) = (Some(modulus), skin);
     }
     if found.stiffness.is_empty() && found.friction.is_none() && found.modulus.is_none() {
         miette::bail!(
             "nothing to calibrate: give a phase table, a loop, ultrasonic data, or friction passes"
         );
     }
-    args.common.issue(found.outcome(), sources.raw_data(), json)
-}
-
-/// Error in degrees that the mesh leaves in a computed phase (`docs/ridge.md`).
-const MODEL_SD_DEG: f64 = 2.0;
-/// Moduli on which the model is run.
-const MODULI: usize = 14;
-
-/// Inverse analysis of a phase table: the finite element model is run at its amplitudes.
-fn modulus(args: &Args, points: &[PhasePoint]) -> miette::Result<Identified> {
-    let one = |name: &str, of: fn(&PhasePoint) -> Option<f64>, flag: Option<f64>, default: f64| {
-        let mut given: Vec<f64> = points.iter().filter_map(of).collect();
-        given.dedup();
-        match (given[..].len(), flag) {
-            (0, flag) => Ok(flag.unwrap_or(default)),
-            (1, None) => Ok(given[0]),
-            (1, Some(flag)) if flag == given[0] => Ok(flag),
-            (1, Some(flag)) => miette::bail!("--{name} {flag} contradicts the table's {}", given[0]),
-            _ => miette::bail!("the table has several values of {name}: identify one condition at a time"),
-        }
-    };
-    let frequency_hz = one("frequency-hz", |p: &PhasePoint| p.frequency_hz, args.frequency_hz, 27_500.0)?;
-    let force = one("normal-force-n", |p: &PhasePoint| p.normal_force_n, args.normal_force_n, 0.25)?;
-    let [low, high] = args.modulus_range_pa[..] else {
-        miette::bail!("--modulus-range-pa takes the lowest and the highest modulus");
-    };
-    // Without vibration there is no phase.
-    let points: Vec<PhasePoint> = points.iter().filter(|p| p.amplitude.metres() > 0.0).cloned().collect();
-    let mut amplitudes: Vec<_> = points.iter().map(|p| p.amplitude).collect();
-    amplitudes.dedup();
-    let base = RidgeCase { frequency_hz, ..RidgeCase::paper().with_normal_force_n(force) };
-    eprintln!("running the ridge for {} amplitudes and {MODULI} moduli", amplitudes.len());
-    let curves = PhaseCurves::compute(base, &amplitudes, (low, high), MODULI).into_diagnostic()?;
-    let search = Search { lowest_pa: low, highest_pa: high, model_sd_deg: MODEL_SD_DEG };
-    identify(&points, &search, |modulus_pa, amplitude| curves.at(modulus_pa, amplitude)).into_diagnostic()
+    let identified = serde_json::json!({ "elastic": found.modulus, "all_free": found.skin });
+    args.common.issue_with(found.outcome(), sources.raw_data(), json, [("skin", identified)])
 }

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 /// Cases that are not in the table, on which its interpolation is judged.
-const HELD_OUT: usize = 120;
+const HELD_OUT: usize = 200;
 
 /// Arguments of `muprime model table`.
 #[derive(Args)]
