@@ -106,26 +106,9 @@ impl FrictionModel for SpringSlider {
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
         condition.check()?;
         let cycle = spring_slider::solve_checked(condition, &self.finger);
-        let sd = self.finger.stiffness_relative_sd;
-        let mu_relative_sd = if sd > 0.0 && condition.amplitude.metres() > 0.0 {
-            let at = |kn: f64, kl: f64| {
-                let finger = Finger {
-                    normal_stiffness_n_per_m: self.finger.normal_stiffness_n_per_m * kn,
-                    lateral_stiffness_n_per_m: self.finger.lateral_stiffness_n_per_m * kl,
-                    ..self.finger
-                };
-                spring_slider::solve_checked(condition, &finger).mu_relative
-            };
-            // Half the spread at one standard deviation either way: exact to second order.
-            let normal = 0.5 * (at(1.0 + sd, 1.0) - at(1.0 - sd, 1.0));
-            let lateral = 0.5 * (at(1.0, 1.0 + sd) - at(1.0, 1.0 - sd));
-            normal.hypot(lateral)
-        } else {
-            0.0
-        };
         Ok(Prediction {
             mu_relative: cycle.mu_relative,
-            mu_relative_sd,
+            mu_relative_sd: cycle.mu_relative_sd(self.finger.stiffness_relative_sd),
             lateral_force_n: cycle.lateral_force_n,
             regime: cycle.regime,
             validity: Validity::Inside,

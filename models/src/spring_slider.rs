@@ -44,10 +44,27 @@ pub fn half_contact_angle_rad(compression_ratio: f64) -> f64 {
     if compression_ratio >= 1.0 {
         return PI;
     }
+    // The leading terms for short contact and for contact that is nearly never lost.
+    let start = if compression_ratio < 0.6 {
+        let short = (3.0 * PI * compression_ratio).cbrt();
+        short * (1.0 + short * short / 30.0)
+    } else {
+        let gap = (2.0 * (1.0 - compression_ratio)).sqrt();
+        PI - gap * (1.0 + gap / (3.0 * PI))
+    };
+    half_contact_angle_from(compression_ratio, start)
+}
+
+/// [`half_contact_angle_rad`] by Newton's method from a guess.
+fn half_contact_angle_from(compression_ratio: f64, start: f64) -> f64 {
+    if compression_ratio >= 1.0 {
+        return PI;
+    }
     let target = PI * compression_ratio;
     // For short contact the leading term alpha^3/3 is nearly exact: bracket it closely, for speed and digits.
     let upper = if target < 0.1 { (3.0 * target).cbrt() * 1.1 } else { PI };
-    root::bracketed(|alpha| contact_area(alpha) - target, 0.0, upper)
+    let excess = |alpha: f64| (contact_area(alpha) - target, alpha * alpha.sin());
+    root::newton(excess, 0.0, upper, start)
 }
 
 /// `sin(alpha) - alpha cos(alpha)` without cancellation at small `alpha`.
@@ -108,6 +125,27 @@ impl Groups {
         let rate = finger.lateral_stiffness_n_per_m / (2.0 * PI * c.frequency_hz * c.mu0 * kn * a);
         let rho = finger.lateral_recovery_m_per_s.map_or(f64::INFINITY, |v| rate * v);
         Groups { alpha, offset, kappa: rate * c.speed_m_s, rho, compression_ratio }
+    }
+
+    /// The same with both stiffnesses multiplied. The contact angle depends on the normal one alone.
+    fn with_stiffness_times(&self, normal: f64, lateral: f64) -> Self {
+        let compression_ratio = self.compression_ratio / normal;
+        let (alpha, offset) = if normal == 1.0 {
+            (self.alpha, self.offset)
+        } else {
+            let alpha = if self.alpha < PI {
+                half_contact_angle_from(compression_ratio, self.alpha)
+            } else {
+                half_contact_angle_rad(compression_ratio)
+            };
+            (alpha, if compression_ratio >= 1.0 { compression_ratio } else { -alpha.cos() })
+        };
+        let rate = lateral / normal;
+        Groups { alpha, offset, kappa: self.kappa * rate, rho: self.rho * rate, compression_ratio }
+    }
+
+    fn mu_relative(&self) -> f64 {
+        (self.stretch().steady().mean_force / self.compression_ratio).clamp(0.0, 1.0)
     }
 
     fn stretch(&self) -> Stretch {
@@ -178,6 +216,20 @@ pub(crate) fn solve_checked(c: &Condition, finger: &Finger) -> Cycle {
         touch_down_deg: if full_contact { 0.0 } else { (PI - groups.alpha).to_degrees() },
         regime,
         groups,
+    }
+}
+
+impl Cycle {
+    /// Standard deviation of `mu'` from independent relative standard deviations `sd` of both stiffnesses: half
+    /// the spread at one standard deviation either way, exact to second order.
+    pub fn mu_relative_sd(&self, sd: f64) -> f64 {
+        if sd == 0.0 || !self.groups.compression_ratio.is_finite() {
+            return 0.0;
+        }
+        let at = |kn: f64, kl: f64| self.groups.with_stiffness_times(kn, kl).mu_relative();
+        let normal = 0.5 * (at(1.0 + sd, 1.0) - at(1.0 - sd, 1.0));
+        let lateral = 0.5 * (at(1.0, 1.0 + sd) - at(1.0, 1.0 - sd));
+        normal.hypot(lateral)
     }
 }
 

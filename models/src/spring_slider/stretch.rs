@@ -186,7 +186,11 @@ impl Stretch {
                 if ahead(inside) <= 0.0 {
                     return inside;
                 }
-                return root::bracketed(ahead, inside, to);
+                let with_slope = |p: f64| {
+                    let (sin, cos) = p.sin_cos();
+                    (sign * (cos + self.offset - x - slope * (p - phi)), sign * (-sin - slope))
+                };
+                return root::newton(with_slope, inside, to, 0.5 * (inside + to));
             }
             from = to;
         }
