@@ -4,6 +4,20 @@ use miette::{IntoDiagnostic, WrapErr, miette};
 use plotters::prelude::*;
 use std::path::Path;
 
+/// Room for the legend, in pixels.
+const LEGEND_WIDTH: i32 = 190;
+/// Colours that are told apart on white, also by the colour-blind (after Okabe and Ito, the yellow darkened).
+const COLOURS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(190, 130, 0),
+    RGBColor(0, 0, 0),
+    RGBColor(130, 130, 130),
+];
+
 /// One curve.
 pub struct Series {
     /// Its name in the legend and in the CSV.
@@ -67,29 +81,26 @@ impl Chart {
         };
         let root = SVGBackend::new(path, (860, 560)).into_drawing_area();
         root.fill(&WHITE)?;
+        // The legend stands beside the curves, never on them.
         let mut chart = ChartBuilder::on(&root)
             .caption(&self.title, ("sans-serif", 18))
             .margin(12)
+            .margin_right(LEGEND_WIDTH)
             .x_label_area_size(44)
             .y_label_area_size(72)
             .build_cartesian_2d(range(|p| p.0), range(|p| p.1))?;
         chart.configure_mesh().x_desc(&self.x).y_desc(&self.y).light_line_style(BLACK.mix(0.06)).draw()?;
         for (k, series) in self.series.iter().enumerate() {
-            let colour = Palette99::pick(k).to_rgba();
-            let drawn = if series.marks {
-                chart.draw_series(series.points.iter().map(|p| Circle::new(*p, 3, colour.filled())))?
+            let colour = COLOURS[k % COLOURS.len()];
+            if series.marks {
+                chart.draw_series(series.points.iter().map(|p| Circle::new(*p, 3, colour.filled())))?;
             } else {
-                chart.draw_series(LineSeries::new(series.points.iter().copied(), colour.stroke_width(2)))?
-            };
-            drawn
-                .label(&series.name)
-                .legend(move |(x, y)| Rectangle::new([(x, y - 3), (x + 14, y + 3)], colour.filled()));
+                chart.draw_series(LineSeries::new(series.points.iter().copied(), colour.stroke_width(2)))?;
+            }
+            let (x, y) = (860 - LEGEND_WIDTH + 8, 60 + 20 * k as i32);
+            root.draw(&Rectangle::new([(x, y - 3), (x + 14, y + 3)], colour.filled()))?;
+            root.draw(&Text::new(series.name.as_str(), (x + 20, y - 7), ("sans-serif", 12)))?;
         }
-        chart
-            .configure_series_labels()
-            .background_style(WHITE.mix(0.85))
-            .border_style(BLACK.mix(0.3))
-            .draw()?;
         root.present()?;
         Ok(())
     }
