@@ -5,23 +5,7 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output};
-use tests::{documents, muprime, texts};
-
-const PLAN: &str = r#"
-name = "steps"
-seed = 3
-reference_every = 2
-[pass]
-settle_s = 0.05
-measure_s = 0.05
-[base]
-amplitude_pp_m = 2e-6
-frequency_hz = 27500
-speed_m_s = 0.02
-normal_force_n = 0.25
-[[series]]
-amplitude_pp_m = [2e-6]
-"#;
+use tests::{documents, muprime, served, texts};
 
 /// System calls that make, change, name or remove files.
 const CHANGES: &str = "openat,write,pwrite64,writev,pwritev,fsync,fdatasync,rename,renameat,renameat2,unlink,unlinkat,\
@@ -92,7 +76,7 @@ fn crash(n: u64, plan: &Path, folder: &Path, planned: usize) -> bool {
 fn a_crash_at_every_step_of_a_sweep_loses_and_doubles_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let plan = folder.path().join("plan.toml");
-    std::fs::write(&plan, PLAN).unwrap();
+    std::fs::write(&plan, served::plan("steps", 2, &[2e-6])).unwrap();
     let whole = folder.path().join("whole");
     let output = sweep(&plan, &whole).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
@@ -124,7 +108,7 @@ fn a_crash_at_every_step_of_a_sweep_loses_and_doubles_nothing() {
 fn a_read_only_folder_is_refused_before_anything_moves() {
     let folder = tempfile::tempdir().unwrap();
     let plan = folder.path().join("plan.toml");
-    std::fs::write(&plan, PLAN).unwrap();
+    std::fs::write(&plan, served::plan("steps", 2, &[2e-6])).unwrap();
     // A file where the folder should be: refused for every user, root included.
     let blocked = folder.path().join("blocked");
     std::fs::write(&blocked, "not a folder").unwrap();

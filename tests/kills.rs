@@ -10,65 +10,21 @@ use sim::wire::modbus_tcp::ModbusTcpServer;
 use sim::wire::world::WorldPlant;
 use sim::world::{World, WorldConfig};
 use std::collections::BTreeSet;
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 use tests::muprime;
-
-const PLAN: &str = r#"
-name = "kills"
-seed = 3
-reference_every = 3
-[pass]
-settle_s = 0.05
-measure_s = 0.05
-[base]
-amplitude_pp_m = 2e-6
-frequency_hz = 27500
-speed_m_s = 0.02
-normal_force_n = 0.25
-[[series]]
-amplitude_pp_m = [0.5e-6, 1e-6, 2e-6, 3e-6]
-"#;
-
-fn setup(address: SocketAddr) -> String {
-    let instrument = |head: &str, id: &str| format!("{head}\nprofile = \"{id}\"\naddress = \"{address}\"\n");
-    format!(
-        "name = \"kills\"\n{}{}{}\n[finger]\ntip = \"artificial-silicone\"\n[noise]\npass_relative_sd = 0.015\n\
-         force_sd_n = 0.0008\n[limits]\nlate_cycles_max = 100\nlate_in_a_row_max = 20\nlink_stall_s = 0.045\n",
-        instrument("[[force]]", "muprime-force2"),
-        instrument("[amplifier]", "muprime-amplifier"),
-        instrument("[stage]", "muprime-stage"),
-    )
-}
-
-/// What the amplifier says: its clock in us, output on, watchdog tripped, heartbeat.
-struct State {
-    time_us: u32,
-    on: bool,
-    heartbeat: u16,
-}
-
-/// A Modbus master of nothing but bytes: function 3 on unit 2.
-fn read_amplifier(stream: &mut TcpStream) -> State {
-    stream.write_all(&[0, 1, 0, 0, 0, 6, 2, 3, 0, 0, 0, 20]).unwrap();
-    let mut answer = [0u8; 9 + 40];
-    stream.read_exact(&mut answer).unwrap();
-    let register = |n: usize| u16::from_be_bytes([answer[9 + 2 * n], answer[10 + 2 * n]]);
-    let time_us = u32::from(register(4)) << 16 | u32::from(register(5));
-    State { time_us, on: register(15) & 1 != 0, heartbeat: register(16) }
-}
+use tests::served::{self, AmplifierWatch};
 
 /// Watches the amplifier after the controller's death; the longest time, by its clock, that it was seen on after the last
 /// new heartbeat, in us. `None`: it was off already.
-fn alone(stream: &mut TcpStream) -> Option<u32> {
+fn alone(amplifier: &mut AmplifierWatch) -> Option<u32> {
     let began = Instant::now();
-    let mut last = read_amplifier(stream);
+    let mut last = amplifier.read();
     let (mut fed_at, mut longest) = (last.time_us, None);
     loop {
-        let state = read_amplifier(stream);
+        let state = amplifier.read();
         if state.heartbeat != last.heartbeat {
             fed_at = state.time_us;
         }
@@ -96,12 +52,11 @@ fn killed_at_any_instant_nothing_acknowledged_is_lost_and_the_drive_drops() {
         rig::drivers::emulators(&rig::setup::Setup::load("virtual").unwrap().instruments()).unwrap();
     let server = ModbusTcpServer::start("127.0.0.1:0".parse().unwrap(), devices, plant).unwrap();
     let (plan, setup_file) = (folder.path().join("plan.toml"), folder.path().join("setup.toml"));
-    std::fs::write(&plan, PLAN).unwrap();
-    std::fs::write(&setup_file, setup(server.address())).unwrap();
+    std::fs::write(&plan, served::plan("kills", 3, &[0.5e-6, 1e-6, 2e-6, 3e-6])).unwrap();
+    std::fs::write(&setup_file, served::setup("kills", server.address())).unwrap();
 
     let mut rng = ChaCha8Rng::seed_from_u64(20_261_121);
-    let mut amplifier = TcpStream::connect(server.address()).unwrap();
-    amplifier.set_nodelay(true).unwrap();
+    let mut amplifier = AmplifierWatch::connect(server.address());
     let (mut made, mut driven, mut acknowledged_in_all, mut runs) = (0, 0, 0, 0);
     let mut worst_us = 0;
     'runs: loop {

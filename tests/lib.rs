@@ -1,5 +1,7 @@
 //! Helpers that several system tests share.
 
+pub mod served;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -34,20 +34,59 @@ fn bodies(bytes: &[u8]) -> Vec<Vec<u8>> {
     recorder::read(bytes).messages.into_iter().map(|m| m.2).collect()
 }
 
-#[test]
-fn cut_at_every_byte_nothing_panics_and_what_is_read_is_a_prefix() {
-    let whole = bodies(&RECORD);
-    assert!(whole.len() > 500);
+/// Cuts at every `step`-th byte; each cut is recovered as well where `recover` says so.
+fn cut(record: &[u8], step: usize, recover: bool) {
+    let whole = bodies(record);
     let mut most = 0;
-    let step = (RECORD.len() / 12_000).max(1);
-    for cut in (0..RECORD.len()).step_by(step) {
-        let read = bodies(&RECORD[..cut]);
+    for cut in (0..record.len()).step_by(step) {
+        let read = bodies(&record[..cut]);
         assert!(read.len() >= most, "a longer file never tells less: cut at {cut}");
         most = read.len();
         assert!(read.iter().eq(whole.iter().take(read.len())), "cut at {cut}: not a prefix");
+        if !recover {
+            continue;
+        }
+        let mut repaired = Cursor::new(Vec::new());
+        match recorder::recover(&record[..cut], &mut repaired).unwrap() {
+            Recovery::Rewritten { .. } => assert_eq!(bodies(repaired.get_ref()), read, "cut at {cut}"),
+            // All is there, and only the end mark was cut: or nothing is.
+            Recovery::Whole | Recovery::Nothing { .. } => assert!(repaired.get_ref().is_empty()),
+        }
     }
-    assert_eq!(bodies(&RECORD).len(), whole.len());
-    println!("{} bytes, cut every {step}, {} messages", RECORD.len(), whole.len());
+    println!("{} bytes, cut every {step}, {} messages", record.len(), whole.len());
+}
+
+/// The first rows of the sweep in a record of their own, flushed often, as a young record is.
+fn short() -> Vec<u8> {
+    let read = recorder::read(&RECORD);
+    let preamble = recorder::Preamble {
+        start_unix_ns: 5,
+        facts: [("plan".to_string(), "tiny".to_string())].into(),
+        files: vec![("plan.toml".to_string(), "name = \"tiny\"\n".repeat(20))],
+    };
+    let mut out = Cursor::new(Vec::new());
+    let mut recorder = recorder::Recorder::begin(&mut out, preamble).unwrap();
+    for (i, row) in read.rows().take(30).enumerate() {
+        recorder.row(&row).unwrap();
+        if i % 7 == 6 {
+            recorder.flush().unwrap();
+        }
+    }
+    recorder.end([("outcome".to_string(), "cut".to_string())].into()).unwrap();
+    out.into_inner()
+}
+
+#[test]
+fn a_short_record_cut_at_every_byte_is_read_up_to_the_cut_and_recovered() {
+    let record = short();
+    assert!(bodies(&record).len() >= 30);
+    cut(&record, 1, true);
+}
+
+#[test]
+fn a_whole_sweep_cut_at_thousands_of_bytes_is_read_up_to_the_cut() {
+    assert!(bodies(&RECORD).len() > 500);
+    cut(&RECORD, (RECORD.len() / 12_000).max(1), false);
 }
 
 #[test]

@@ -11,7 +11,10 @@ use tests::file;
 
 /// Unit tests of the safety core that name a cause.
 fn unit_tests() -> BTreeMap<String, BTreeSet<String>> {
-    let source = std::fs::read_to_string(file("realtime/src/safety/tests.rs")).unwrap();
+    let mut files = vec![file("realtime/src/safety/tests.rs")];
+    let rooms = std::fs::read_dir(file("realtime/src/safety/tests")).unwrap();
+    files.extend(rooms.map(|f| f.unwrap().path()));
+    let source: String = files.iter().map(|f| std::fs::read_to_string(f).unwrap()).collect();
     let (mut name, mut found) = (String::new(), BTreeMap::<String, BTreeSet<String>>::new());
     for line in source.lines() {
         if let Some(rest) = line.strip_prefix("fn ") {
@@ -51,7 +54,7 @@ fn page() -> String {
         "# Safety: requirements, tests, reactions\n\n\
          Generated: `MUPRIME_UPDATE=1 cargo test --release -p tests --test requirements`. A test fails where this page is not \
          what the code does.\n\n## From requirement to test\n\n\
-         Unit tests are in `realtime/src/safety/tests.rs`; faults are those of the list below, which `tests/faults.rs` runs.\n\n\
+         Unit tests are in `realtime/src/safety/tests.rs` and `tests/` beside it; faults are those of the list below, which `tests/faults.rs` runs.\n\n\
          | requirement | cause | it demands | unit tests | faults that trip it |\n|---|---|---|---|---|\n",
     );
     for rule in RULES {

@@ -28,7 +28,32 @@ pub const REFUSED: u8 = 2;
 /// A fault of this program.
 pub const INTERNAL: u8 = 3;
 
+/// The status of an error: refused, unless a run had begun.
+pub fn status_of(error: &miette::Report) -> u8 {
+    use crate::session::Unfinished;
+    match error.downcast_ref::<Unfinished>() {
+        Some(Unfinished::NotKept) => FAILED,
+        Some(Unfinished::Internal) => INTERNAL,
+        None => REFUSED,
+    }
+}
+
 /// A status as the process's exit code.
 pub fn exit(status: u8) -> miette::Result<ExitCode> {
     Ok(ExitCode::from(status))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::Unfinished;
+
+    #[test]
+    fn refused_means_that_nothing_was_touched() {
+        let full = || miette::miette!("No space left on device");
+        assert_eq!(status_of(&full()), REFUSED);
+        assert_eq!(status_of(&full().wrap_err(Unfinished::NotKept)), FAILED);
+        assert_eq!(status_of(&full().wrap_err(Unfinished::Internal)), INTERNAL);
+        assert_eq!(status_of(&full().wrap_err(Unfinished::NotKept).wrap_err("and more")), FAILED);
+    }
 }

@@ -86,7 +86,7 @@ fn main() -> ExitCode {
         Ok(Ok(code)) => code,
         Ok(Err(report)) => {
             eprintln!("{report:?}");
-            ExitCode::from(cli::REFUSED)
+            ExitCode::from(cli::status_of(&report))
         }
         Err(_) => ExitCode::from(cli::INTERNAL),
     }

@@ -91,7 +91,7 @@ pub enum Outcome {
     },
     /// Nothing was heard of the loop.
     LoopLost,
-    /// The record, the passes or the catalogue could not be written: a measurement that is not kept is not made.
+    /// Record, passes, catalogue, summary or report could not be written: a measurement that is not kept is not made.
     RecordLost,
 }
 

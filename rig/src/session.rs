@@ -79,6 +79,18 @@ pub struct Summary {
     pub links: BTreeMap<String, serde_json::Value>,
 }
 
+/// Why a run that had begun did not come to an orderly end. Anything else that goes wrong is a refusal: it comes before
+/// the rig or the folder of the run is touched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unfinished {
+    /// The sweep ran, and its record could not be kept.
+    #[error("the sweep had begun, and what came of it could not be kept")]
+    NotKept,
+    /// A thread hangs or has panicked: a fault of this program.
+    #[error("the sweep had begun; the instruments' own watchdogs switch off; what was measured is kept")]
+    Internal,
+}
+
 /// Signals that a run looks at: how often a stop was asked for, and whether to leave at once.
 #[derive(Clone, Debug, Default)]
 pub struct Signals {

@@ -42,10 +42,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         return super::exit(if found.wrong.is_empty() { super::DONE } else { super::FAILED });
     }
     let Args { seeds, first, pairs, twice, .. } = args;
-    let begun = std::time::Instant::now();
+    let (begun, cpu_ns) = (std::time::Instant::now(), realtime::pacing::process_cpu_ns());
     let tally = search(Search { first, seeds, pairs, twice });
+    let cpu_s = (realtime::pacing::process_cpu_ns() - cpu_ns) as f64 * 1e-9;
+    let simulated_s = tally.cycles as f64 * crate::faults::bench::T.seconds();
+    let speed = simulated_s / cpu_s.max(1e-9);
     if json {
-        println!("{}", document(&tally)?);
+        println!("{}", document(&tally, speed)?);
     } else {
         table(&tally);
         println!(
@@ -53,6 +56,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             tally.scenes,
             begun.elapsed().as_secs_f64(),
             tally.failed
+        );
+        println!(
+            "{simulated_s:.0} s simulated in {cpu_s:.0} s of processor time: {speed:.0} times real time per core"
         );
         for failure in &tally.failures {
             println!("seed {}: {}", failure.seed, failure.wrong.join("; "));
@@ -66,7 +72,7 @@ fn json_of(value: &impl serde::Serialize) -> miette::Result<String> {
     serde_json::to_string(value).into_diagnostic()
 }
 
-fn document(tally: &Tally) -> miette::Result<String> {
+fn document(tally: &Tally, speed: f64) -> miette::Result<String> {
     let rows: Vec<_> = tally
         .reactions
         .iter()
@@ -75,7 +81,7 @@ fn document(tally: &Tally) -> miette::Result<String> {
         })
         .collect();
     json_of(&serde_json::json!({
-        "runs": tally.scenes, "failed": tally.failed, "rows": rows, "failures": tally.failures
+        "runs": tally.scenes, "simulated_seconds_per_core_second": speed, "failed": tally.failed, "rows": rows, "failures": tally.failures
     }))
 }
 

@@ -57,6 +57,8 @@ pub struct Scene {
 /// What came of a scene.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Found {
+    /// Cycles that were simulated.
+    pub cycles: u64,
     /// The trip, if there was one.
     pub trip: Option<Trip>,
     /// For each strike the cycle whose inputs showed it first.
@@ -435,6 +437,7 @@ impl Watch {
             self.wrong.push(format!("the amplifier's own watchdog: {:?} ms", self.alone_quiet_at));
         }
         Found {
+            cycles: scene.length(),
             trip: self.trip,
             shown: shown_cycles,
             command_off,

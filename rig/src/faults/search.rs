@@ -52,6 +52,8 @@ pub struct Failure {
 pub struct Tally {
     /// Scenes run.
     pub scenes: u64,
+    /// Cycles simulated, replays not counted.
+    pub cycles: u64,
     /// By number and name of the fault, and by moment.
     pub reactions: BTreeMap<(u32, &'static str, Moment), Reactions>,
     /// Scenes that went wrong, at most a hundred.
@@ -118,6 +120,7 @@ impl Tally {
     pub fn take(&mut self, scene: &Scene, twice: bool) {
         let found = judged(scene, twice);
         self.scenes += 1;
+        self.cycles += found.cycles * if twice { 2 } else { 1 };
         for (i, strike) in scene.strikes.iter().enumerate() {
             let row = &ROWS[strike.row];
             let entry = self.reactions.entry((row.number, row.name, scene.moment)).or_default();
@@ -140,6 +143,7 @@ impl Tally {
 
     fn with(mut self, other: Tally) -> Tally {
         self.scenes += other.scenes;
+        self.cycles += other.cycles;
         self.failed += other.failed;
         self.failures.extend(other.failures);
         self.failures.sort_by_key(|f| f.seed);

@@ -1,7 +1,7 @@
 //! A sweep in virtual time: one thread, no clock, the same bytes for the same seed.
 
 use super::keeper::{self, Keeper};
-use super::{Job, News, Signals, Summary};
+use super::{Job, News, Signals, Summary, Unfinished};
 use crate::plan::{Plan, Resolution};
 use crate::run_dir::RunDir;
 use crate::sequence::{MeasuredPass, Outcome, Sequence};
@@ -39,8 +39,20 @@ pub fn run(
             job.setup.file.name
         );
     }
-    let mut kept = Keeper::begin(&job, dir, planned, EPOCH_UNIX_NS)?;
-    let [force, amplifier, stage] = VirtualRig::of(job.world()?).split();
+    let rig = VirtualRig::of(job.world()?);
+    let kept = Keeper::begin(&job, dir, planned, EPOCH_UNIX_NS)?;
+    sweep(job, rig, kept, &mut sequence, signals, news).wrap_err(Unfinished::NotKept)
+}
+
+fn sweep(
+    job: Job,
+    rig: VirtualRig,
+    mut kept: Keeper,
+    sequence: &mut Sequence,
+    signals: &Signals,
+    news: &mut dyn FnMut(News<'_>),
+) -> miette::Result<Summary> {
+    let [force, amplifier, stage] = rig.split();
     let force = job.setup.certificates.calibrated(Box::new(force));
     let mut ports = Ports { force, amplifier: Box::new(amplifier), stage: Box::new(stage) };
     let file = BufWriter::new(kept.new_record()?);
@@ -84,7 +96,7 @@ pub fn run(
     let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
     recorder.end(last).into_diagnostic().wrap_err("the record")?;
     let departed = sequence.departed();
-    kept.end(outcome, departed, None, 0, BTreeMap::new())
+    Ok(kept.end(outcome, departed, None, 0, BTreeMap::new()))
 }
 
 /// What a sweep in memory comes to.

@@ -134,10 +134,8 @@ impl Keeper {
         Ok(())
     }
 
-    /// Ends the run: catalogue, report, summary.
-    ///
-    /// # Errors
-    /// Whatever file system and SQLite say.
+    /// Ends the run: catalogue, summary, report. What cannot be written is said, and makes a sweep that went well one whose
+    /// record is lost; the summary is returned all the same.
     pub fn end(
         self,
         outcome: Outcome,
@@ -145,13 +143,9 @@ impl Keeper {
         machine: Option<(LoopReport, StallReport)>,
         record_lost: u64,
         links: BTreeMap<String, serde_json::Value>,
-    ) -> miette::Result<Summary> {
-        let word = serde_json::to_value(&outcome).into_diagnostic()?;
-        let word = word.get("outcome").and_then(|o| o.as_str()).unwrap_or("?").to_string();
-        self.catalogue.progress(&self.folder, self.passes as i64, departed)?;
-        self.catalogue.end(&self.folder, &word)?;
+    ) -> Summary {
         let (loop_report, stalls) = machine.unzip();
-        let summary = Summary {
+        let mut summary = Summary {
             outcome,
             folder: self.dir.path().to_path_buf(),
             passes: self.passes,
@@ -162,11 +156,24 @@ impl Keeper {
             record_lost,
             links,
         };
-        let text = serde_json::to_vec_pretty(&summary).into_diagnostic()?;
-        self.dir.write("summary.json", &text)?;
+        if let Err(why) = self.write_end(&summary) {
+            tracing::error!("the end of the run could not be kept: {why:#}");
+            if matches!(summary.outcome, Outcome::Complete | Outcome::Stopped) {
+                summary.outcome = Outcome::RecordLost;
+            }
+        }
+        summary
+    }
+
+    fn write_end(&self, summary: &Summary) -> miette::Result<()> {
+        let word = serde_json::to_value(&summary.outcome).into_diagnostic()?;
+        let word = word.get("outcome").and_then(|o| o.as_str()).unwrap_or("?").to_string();
+        self.catalogue.progress(&self.folder, self.passes as i64, summary.model_departed)?;
+        self.catalogue.end(&self.folder, &word)?;
+        let text = serde_json::to_vec_pretty(summary).into_diagnostic()?;
+        self.dir.write("summary.json", &text).wrap_err("the summary")?;
         let html = crate::report::html(self.dir.path()).wrap_err("the report")?;
-        self.dir.write("report.html", html.as_bytes())?;
-        Ok(summary)
+        self.dir.write("report.html", html.as_bytes()).wrap_err("the report")
     }
 
     /// A new record file of the run.

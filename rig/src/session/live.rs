@@ -8,13 +8,13 @@ mod writer;
 
 use super::fast::words;
 use super::keeper::{self, Keeper};
-use super::{Job, News, Signals, Summary};
+use super::{Job, News, Signals, Summary, Unfinished};
 use crate::drivers;
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use claim::RigClaim;
 use crossbeam_queue::ArrayQueue;
-use miette::IntoDiagnostic;
+use miette::{IntoDiagnostic, WrapErr};
 use realtime::cycle::Command;
 use realtime::pacing::{self, Lifeline, LoopParts};
 use realtime::ports::Nanos;
@@ -97,7 +97,7 @@ pub fn run(
         .name("loop".into())
         .spawn(move || pacing::run(parts, priority))
         .into_diagnostic()?;
-    let witnesses = Witnesses::start(origin_ns).into_diagnostic()?;
+    let witnesses = Witnesses::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
 
     let (note_in, note_out) = channel::<Note>();
     let strands = follow::Strands { commands: &commands, life: &life, signals, lost: &lost, notes: note_in };
@@ -134,16 +134,16 @@ pub fn run(
         std::thread::sleep(Duration::from_millis(1));
     }
     if !looping.is_finished() {
-        miette::bail!("the loop's thread is stuck inside a driver; what was measured is kept");
+        return Err(fault("the loop's thread is stuck inside a driver"));
     }
-    let report = looping.join().map_err(|_| miette::miette!("the loop's thread panicked"))?;
+    let report = looping.join().map_err(|_| fault("the loop's thread panicked"))?;
     let links: BTreeMap<String, serde_json::Value> = rig
         .links
         .health()
         .map(|(name, health)| (name.to_string(), serde_json::to_value(health).unwrap_or_default()))
         .collect();
     drop(rig.links);
-    let outcome = outcome.map_err(|_| miette::miette!("the sweep's thread panicked"))?;
+    let outcome = outcome.map_err(|_| fault("the sweep's thread panicked"))?;
     let mut last = BTreeMap::new();
     last.insert("outcome".to_string(), words(&outcome)?);
     last.insert("loop".to_string(), serde_json::to_string(&report).into_diagnostic()?);
@@ -153,7 +153,7 @@ pub fn run(
     if let Some(what) = &report.panicked {
         tracing::error!(what, "a port panicked in the loop: the drive was switched off");
     }
-    let written = writing.join().map_err(|_| miette::miette!("the recorder's thread panicked"))?;
+    let written = writing.join().map_err(|_| fault("the recorder's thread panicked"))?;
     for why in written.problem.iter().cloned().chain(unkept.map(|e| format!("{e:#}"))) {
         tracing::error!(why, "the record could not be kept: the sweep was stopped");
     }
@@ -161,7 +161,12 @@ pub fn run(
     let unrecorded = written.problem.is_some() && outcome == Outcome::Complete;
     let outcome = if unrecorded { Outcome::RecordLost } else { outcome };
     let record_lost = written.lost_rows + report.ring_drops;
-    kept.end(outcome, sequence.departed(), Some((report, stalls)), record_lost, links)
+    Ok(kept.end(outcome, sequence.departed(), Some((report, stalls)), record_lost, links))
+}
+
+/// A fault of this program, after the rig was touched.
+fn fault(what: &'static str) -> miette::Report {
+    miette::miette!("{what}").wrap_err(Unfinished::Internal)
 }
 
 /// Serves the virtual rig where the setup looks for its instruments, and puts the real places there.

@@ -1,0 +1,462 @@
+//! Each bound from both sides: the last value that is let through, and the first that is not.
+
+use super::*;
+use crate::safety::limits::{ChannelTiming, LimitError};
+
+/// A bench whose every sample may jump, so that a value can be set at once.
+fn bench() -> Bench {
+    let mut bench = Bench::armed();
+    bench.limits.force_rate_max_n_s = 1e9;
+    bench.limits.amplitude_rate_max_m_s = 1e9;
+    bench
+}
+
+/// Spoils `cycles` cycles; the first trip.
+fn trips(bench: &mut Bench, cycles: u32, mut spoil: impl FnMut(&mut Observation)) -> Option<Trip> {
+    (0..cycles).find_map(|_| bench.cycle(&mut spoil, Controls::default()).tripped)
+}
+
+fn measured(seen: &mut Observation) -> &mut f64 {
+    &mut amplifier(seen).amplitude.as_mut().unwrap().value
+}
+
+/// 30 % and 0.3 um above what is commanded; a fifth of it below; seven tenths for the remark.
+#[test]
+fn the_measured_amplitude_is_held_to_what_was_commanded() {
+    let w = 2e-6;
+    for (value, cause) in [
+        (1.3 * w + 0.3e-6, None),
+        (1.3 * w + 0.301e-6, Some(Cause::AmplitudeRunaway)),
+        (0.2 * w, None),
+        (0.2 * w * (1.0 - 1e-12), Some(Cause::DriveNoResponse)),
+        (-0.3e-6, Some(Cause::DriveNoResponse)),
+        (-0.3001e-6, Some(Cause::AmplifierFault)),
+    ] {
+        let trip = trips(&mut bench(), 3, |s| *measured(s) = value);
+        assert_eq!(trip.map(|t| t.cause), cause, "{value}");
+        if let Some(trip) = trip.filter(|t| t.cause != Cause::AmplifierFault) {
+            let bound = if value > w { 1.3 * w + 0.3e-6 } else { 0.2 * w };
+            assert!((trip.value - value).abs() < 1e-15 && (trip.bound - bound).abs() < 1e-15, "{trip:?}");
+        }
+    }
+    for (value, remark) in [(0.7 * w, None), (0.7 * w * (1.0 - 1e-12), Some(Remark::AmplitudeSags))] {
+        assert_eq!(bench().cycle(|s| *measured(s) = value, Controls::default()).remark, remark);
+    }
+    // At rest a sensor may be as noisy as that, and the plate is not said to sag.
+    let mut rest = bench();
+    rest.request.amplitude = PeakToPeak::ZERO;
+    assert_eq!(trips(&mut rest, 100, |_| {}), None);
+    let decision = rest.cycle(|s| *measured(s) = -0.3e-6, Controls::default());
+    assert_eq!((decision.tripped, decision.remark), (None, None));
+    // A plate sensor that is not fitted is missed by nobody; one that is fitted is.
+    assert_eq!(trips(&mut bench(), 9, |s| amplifier(s).amplitude = Err(NoData::NotFitted)), None);
+    // A saturated one is no measure of anything: neither too high nor too low.
+    let saturated = |s: &mut Observation| {
+        *measured(s) = 1.0;
+        amplifier(s).amplitude.as_mut().unwrap().quality = Quality::Saturated;
+    };
+    assert_eq!(trips(&mut bench(), 9, saturated), None);
+}
+
+/// The echo: 2 % and 5 nm, 1 Hz and 1e-4, either way.
+#[test]
+fn the_echo_is_held_to_what_was_sent() {
+    for (off_m, off_hz, trip) in [
+        (44.9e-9, 0.0, false),
+        (-44.9e-9, 0.0, false),
+        (45.1e-9, 0.0, true),
+        (-45.1e-9, 0.0, true),
+        (0.0, 3.74, false),
+        (0.0, -3.74, false),
+        (0.0, 3.76, true),
+        (0.0, -3.76, true),
+    ] {
+        let got = trips(&mut bench(), 2, |s| {
+            amplifier(s).echoed_amplitude = PeakToPeak::from_metres(2e-6 + off_m);
+            amplifier(s).echoed_frequency_hz = 27_500.0 + off_hz;
+        });
+        assert_eq!(got.map(|t| t.cause), trip.then_some(Cause::EchoMismatch), "{off_m} {off_hz}");
+        if let Some(trip) = got {
+            let (said, told) =
+                if off_hz == 0.0 { (2e-6 + off_m, 2e-6) } else { (27_500.0 + off_hz, 27_500.0) };
+            assert_eq!((trip.value, trip.bound), (said, told));
+        }
+    }
+    // Off, nothing is expected of it.
+    let mut off = bench();
+    off.request.amplitude = PeakToPeak::ZERO;
+    trips(&mut off, 60, |_| {});
+    assert_eq!(trips(&mut off, 60, |s| amplifier(s).echoed_frequency_hz = 5.0), None);
+}
+
+/// A request at a limit is granted, one beyond it is refused, and the trip names the side.
+#[test]
+fn requests_up_to_each_limit_are_granted() {
+    type Set = fn(&mut Request, f64);
+    let l = limits();
+    let cases: &[(f64, f64, Set)] = &[
+        (0.0, l.amplitude_max.metres(), |r, v| r.amplitude = PeakToPeak::from_metres(v)),
+        (-l.speed_max_m_s, l.speed_max_m_s, |r, v| r.velocity_m_s = v),
+        (0.0, l.normal_force_max_n, |r, v| r.normal_force_n = v),
+        (l.frequency_hz.0, l.frequency_hz.1, |r, v| r.frequency_hz = v),
+    ];
+    for (low, high, set) in cases {
+        let step = (high - low) * 1e-9;
+        for (value, bound) in
+            [(*low, None), (*high, None), (low - step, Some(*low)), (high + step, Some(*high))]
+        {
+            let mut bench = bench();
+            set(&mut bench.request, value);
+            let decision = bench.cycle(|_| {}, Controls::default());
+            assert_eq!(
+                decision.tripped.map(|t| (t.cause, t.bound)),
+                bound.map(|b| (Cause::RequestRefused, b))
+            );
+            if bound.is_none() {
+                assert_eq!(decision.stage.velocity_m_s(), bench.request.velocity_m_s);
+                assert_eq!(decision.drive.amplitude(), bench.request.amplitude);
+            }
+        }
+    }
+    // A setup whose limit is above the hard one does not help.
+    let mut lax = bench();
+    lax.limits.amplitude_max = PeakToPeak::from_metres(1.0);
+    lax.request.amplitude = PeakToPeak::from_metres(10.1e-6);
+    let trip = lax.cycle(|_| {}, Controls::default()).tripped.unwrap();
+    assert_eq!((trip.cause, trip.bound), (Cause::RequestRefused, HARD.amplitude_max.metres()));
+    // Without vibration the frequency does not matter.
+    let mut still = bench();
+    still.request = Request { frequency_hz: 1.0, ..Request::default() };
+    assert_eq!(trips(&mut still, 3, |_| {}), None);
+}
+
+/// The middle of a travel that is not centred decides which way is back; standing still is not a way back.
+#[test]
+fn the_way_back_leads_to_the_middle_of_the_travel() {
+    for (position, velocity, end) in [
+        (0.2, 0.02, None),
+        (0.2, -0.02, Some(-0.25)),
+        (0.2, 0.0, Some(-0.25)),
+        (0.3, -0.02, None),
+        (0.3, 0.02, Some(0.75)),
+        (0.3, 0.0, Some(0.75)),
+        (0.25, -0.02, None),
+        (0.25, 0.02, Some(0.75)),
+    ] {
+        let mut bench = bench();
+        bench.limits.travel_m = (-0.25, 0.75);
+        bench.request.velocity_m_s = velocity;
+        bench.cycle(|_| {}, Controls::default());
+        let trip = trips(&mut bench, 1, |s| (stage(s).position_m, stage(s).at_limit) = (position, true));
+        assert_eq!(
+            trip.map(|t| (t.cause, t.bound)),
+            end.map(|e| (Cause::OverTravel, e)),
+            "{position} {velocity}"
+        );
+    }
+}
+
+/// What the temperature rule asks, and of whom.
+#[test]
+fn a_temperature_is_asked_for_only_where_it_is_fitted() {
+    let lost = |s: &mut Observation| amplifier(s).temperature_c = Err(NoData::NotFitted);
+    let mut bench = bench();
+    bench.limits.temperature_fitted = false;
+    assert_eq!(trips(&mut bench, 3, lost), None);
+    bench.limits.temperature_fitted = true;
+    assert_eq!(
+        trips(&mut bench, 1, lost).map(|t| (t.cause, t.value)),
+        Some((Cause::OverTemperature, f64::INFINITY))
+    );
+    let mut none = super::bounds::bench();
+    let trip = trips(&mut none, 1, |s| amplifier(s).temperature_c.as_mut().unwrap().value = f64::NAN);
+    assert_eq!(trip.map(|t| t.cause), Some(Cause::OverTemperature));
+}
+
+/// A step of the force that is no spike yet, and one that is; a value too small for a normal number is none.
+#[test]
+fn a_sample_is_believed_up_to_the_step_limit() {
+    // 0.25 and 0.5 are exact in binary.
+    for (value, usable) in
+        [(0.75, true), (-0.25, true), (0.7500001, false), (-0.2500001, false), (1e-310, false)]
+    {
+        let decision = bench().cycle(|s| normal(s).value = value, Controls::default());
+        assert_eq!((decision.normal_usable, decision.lateral_usable), (usable, true), "{value}");
+        let mut lateral_bench = bench();
+        lateral_bench.cycle(|s| lateral(s).value = 0.25, Controls::default());
+        let decision = lateral_bench.cycle(|s| lateral(s).value = value, Controls::default());
+        assert_eq!((decision.lateral_usable, decision.normal_usable), (usable, true), "{value}");
+    }
+    // A second far-off sample confirms the first, wherever it lies.
+    let mut bench = bench();
+    bench.cycle(|s| lateral(s).value = 1.5, Controls::default());
+    assert!(bench.cycle(|s| lateral(s).value = 0.9, Controls::default()).lateral_usable);
+}
+
+/// Force rates at the limit, one above it, and of two samples with one stamp.
+#[test]
+fn a_rate_is_a_difference_over_a_time() {
+    let climb = |step: f64, limit: f64, held_stamp: bool| {
+        let mut bench = Bench::armed();
+        bench.limits.force_rate_max_n_s = limit;
+        bench.limits.timing.normal.periods = 100;
+        let (n0, stamp) = (bench.n, Nanos(u64::from(bench.n) * T.0));
+        trips(&mut bench, 6, |s| {
+            normal(s).value = 0.25 + step * f64::from(normal(s).sequence - n0);
+            if held_stamp {
+                normal(s).taken_at = stamp;
+            }
+        })
+    };
+    // A sixteenth of a newton in a millisecond: the limit is that very quotient.
+    let limit = 0.0625 / T.seconds();
+    assert_eq!(climb(0.0625, limit, false), None);
+    let trip = climb(0.0625, limit * (1.0 - 1e-9), false).unwrap();
+    assert_eq!((trip.cause, trip.value, trip.bound), (Cause::ForceRate, limit, limit * (1.0 - 1e-9)));
+    assert_eq!(climb(-0.0625, limit * (1.0 - 1e-9), false).map(|t| t.cause), Some(Cause::ForceRate));
+    assert_eq!(climb(0.0625, limit * 0.5, true), None, "one stamp is no time");
+    // Fast, slow, fast: two in a row are needed.
+    let mut bench = Bench::armed();
+    let n0 = bench.n;
+    let trip = trips(&mut bench, 12, |s| {
+        let i = normal(s).sequence - n0;
+        normal(s).value = 0.25 + 0.07 * f64::from(i / 2) + 1e-3 * f64::from(i % 2);
+    });
+    assert_eq!(trip, None);
+}
+
+/// The same of the amplitude, whose sample counts only when its count is new.
+#[test]
+fn an_amplitude_rate_is_a_difference_over_a_time() {
+    let climb = |rise_m: f64, held_stamp: bool, held_count: bool| {
+        let mut bench = Bench::armed();
+        bench.limits.amplitude_rate_max_m_s = 20e-6;
+        let (n0, stamp) = (bench.n, Nanos(u64::from(bench.n) * T.0));
+        trips(&mut bench, 8, |s| {
+            let i = stage(s).sequence - n0;
+            let reading = amplifier(s).amplitude.as_mut().unwrap();
+            reading.value = 2e-6 + rise_m * f64::from(i);
+            if held_stamp {
+                reading.taken_at = stamp;
+            }
+            if held_count {
+                reading.sequence = n0;
+            }
+        })
+    };
+    let trip = climb(20.1e-9, false, false).unwrap();
+    assert!(trip.cause == Cause::AmplitudeRate && (trip.value - 20.1e-6).abs() < 1e-9, "{trip:?}");
+    assert_eq!(climb(20.1e-9, true, false), None, "one stamp is no time");
+    assert_eq!(climb(20.1e-9, false, true), None, "the same count is the same sample");
+    assert_eq!(climb(-25e-9, false, false), None, "falling is not rising");
+    // Fast, slow, fast: two in a row are needed.
+    let mut bench = Bench::armed();
+    bench.limits.amplitude_rate_max_m_s = 20e-6;
+    let n0 = bench.n;
+    let trip = trips(&mut bench, 12, |s| {
+        let i = stage(s).sequence - n0;
+        *measured(s) = 2e-6 + 25e-9 * f64::from(i / 2);
+    });
+    assert_eq!(trip, None);
+}
+
+/// Shares of lost samples at the very limits: 85 of a hundred for the remark, 25 for the trip.
+#[test]
+fn lost_samples_are_counted_in_whole_windows() {
+    type Pick = fn(&mut Observation) -> &mut Reading;
+    let lose = |channel: Pick, came: u32| {
+        let mut bench = bench();
+        (bench.limits.timing.lateral.periods, bench.limits.timing.normal.periods) = (1000, 1000);
+        bench.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
+        assert!(bench.cycle(|_| {}, Controls { reset: true, ..Controls::default() }).armed_now);
+        // The window began with the reset: of its hundred samples the first ones come.
+        let n0 = bench.n;
+        let mut remark = None;
+        for i in 1..=150 {
+            let lost = |s: &mut Observation| {
+                if (came + 1..=100).contains(&i) {
+                    channel(s).sequence = n0 + came;
+                }
+            };
+            let decision = bench.cycle(lost, Controls::default());
+            if let Some(trip) = decision.tripped {
+                return (remark, Some((trip.cause, trip.value, trip.bound)));
+            }
+            remark = remark.or(decision.remark.map(|r| (r, i)));
+        }
+        (remark, None)
+    };
+    let channels: [(Pick, Remark, Cause); 2] = [
+        (lateral, Remark::LateralLossy, Cause::LateralLossy),
+        (normal, Remark::NormalLossy, Cause::NormalLossy),
+    ];
+    for (channel, remark, cause) in channels {
+        assert_eq!(lose(channel, 85), (None, None));
+        assert_eq!(lose(channel, 84), (Some((remark, 100)), None));
+        assert_eq!(lose(channel, 25), (Some((remark, 100)), None));
+        assert_eq!(lose(channel, 24), (None, Some((cause, 0.24, 0.25))));
+    }
+}
+
+/// A channel at half the loop's rate owes half as many samples.
+#[test]
+fn a_slow_channel_owes_what_its_period_says() {
+    let mut bench = bench();
+    bench.limits.timing.lateral.period = Nanos(2 * T.0);
+    let mut held = healthy(bench.n, &bench.last).forces.lateral;
+    for _ in 0..600 {
+        let decision = bench.cycle(
+            |s| {
+                if lateral(s).sequence.is_multiple_of(2) {
+                    held = s.forces.lateral;
+                }
+                s.forces.lateral = held;
+            },
+            Controls::default(),
+        );
+        assert_eq!((decision.tripped, decision.remark), (None, None));
+    }
+    // A channel faster than the loop can show one sample a cycle, no more.
+    bench.limits.timing.lateral.period = Nanos(T.0 / 4);
+    bench.limits.timing.lateral.latency = Nanos(5 * T.0);
+    for _ in 0..600 {
+        let decision = bench.cycle(|_| {}, Controls::default());
+        assert_eq!((decision.tripped, decision.remark), (None, None));
+    }
+}
+
+/// What is refused is named, with its value.
+#[test]
+fn a_refused_limit_is_named() {
+    let refused = |change: fn(&mut Limits)| {
+        let mut limits = Limits::paper(T);
+        change(&mut limits);
+        match limits.checked().unwrap_err() {
+            LimitError::AboveHard { name, .. } | LimitError::Unusable { name, .. } => name,
+        }
+    };
+    assert_eq!(refused(|l| l.lateral_force_max_n = 10.1), "lateral_force_max_n");
+    assert_eq!(refused(|l| l.amplitude_max = PeakToPeak::from_metres(10.1e-6)), "amplitude_max_pp_m");
+    assert_eq!(refused(|l| l.frequency_hz.1 = 120_001.0), "frequency_max_hz");
+    assert_eq!(refused(|l| l.frequency_hz.0 = 4_999.0), "frequency_min_hz");
+    assert_eq!(refused(|l| l.frequency_hz.0 = f64::NAN), "frequency_min_hz");
+    assert_eq!(refused(|l| l.speed_max_m_s = 1.01), "speed_max_m_s");
+    assert_eq!(refused(|l| l.temperature_max_c = 48.1), "temperature_max_c");
+    assert_eq!(refused(|l| l.exposure_max_s = 600.1), "exposure_max_s");
+    assert_eq!(refused(|l| l.late_cycles_max = 101), "late_cycles_max");
+    assert_eq!(refused(|l| l.late_in_a_row_max = 21), "late_in_a_row_max");
+    assert_eq!(refused(|l| l.late_in_a_row_max = 0), "late_in_a_row_max");
+    assert_eq!(refused(|l| l.travel_m.1 = f64::NAN), "travel_min_m");
+    assert_eq!(refused(|l| l.timing.cycle = Nanos(0)), "cycle");
+    let ends = |n| {
+        let mut limits = Limits::paper(T);
+        limits.frozen_after = n;
+        limits.checked().is_ok()
+    };
+    assert_eq!([19, 20, 1000, 1001].map(ends), [false, true, true, false]);
+    let timing = ChannelTiming { period: Nanos(7), latency: Nanos(0), periods: 2 };
+    assert_eq!(timing.age_limit(), Nanos(14));
+}
+
+/// A limit binds above its value, and only there.
+#[test]
+fn limits_bind_exactly_where_they_say() {
+    type Spoil = fn(&mut Observation, f64);
+    let l = limits();
+    let amplitude: Spoil = |s, v| amplifier(s).amplitude.as_mut().unwrap().value = v;
+    let cases: &[(Cause, f64, f64, Spoil)] = &[
+        (Cause::NormalOverforce, l.normal_force_max_n, 1e-6, |s, v| normal(s).value = v),
+        (Cause::LateralOverforce, l.lateral_force_max_n, 1e-6, |s, v| lateral(s).value = v),
+        (Cause::LateralOverforce, -l.lateral_force_max_n, -1e-6, |s, v| lateral(s).value = v),
+        (Cause::OverAmplitude, l.amplitude_max.metres(), 1e-12, amplitude),
+        (Cause::OverTemperature, l.temperature_max_c, 1e-6, |s, v| {
+            amplifier(s).temperature_c.as_mut().unwrap().value = v;
+        }),
+        (Cause::OverTravel, l.travel_m.1, 1e-9, |s, v| stage(s).position_m = v),
+        (Cause::OverTravel, l.travel_m.0, -1e-9, |s, v| stage(s).position_m = v),
+        (Cause::Suspended, 50.0, 0.001, |s, v| s.lateness = Nanos((v * T.0 as f64) as u64)),
+    ];
+    for (cause, bound, above, spoil) in cases {
+        let mut bench = Bench::armed();
+        // At rest in the middle, so that a position beyond the travel is not on its way back.
+        bench.request.velocity_m_s = 0.0;
+        if *cause == Cause::OverAmplitude {
+            bench.request.amplitude = l.amplitude_max;
+        }
+        for _ in 0..60 {
+            bench.cycle(|_| {}, Controls::default());
+        }
+        // A jump to the bound is confirmed by its second sample; the rate rule is out of the way.
+        bench.limits.force_rate_max_n_s = 1e9;
+        for i in 0..5 {
+            let late = *cause == Cause::Suspended && i > 0;
+            let decision = bench.cycle(
+                |s| {
+                    if !late {
+                        spoil(s, *bound)
+                    }
+                },
+                Controls::default(),
+            );
+            assert_eq!(decision.tripped, None, "{cause:?} at its bound");
+        }
+        let (got, cycles) = bench.until_off(|s| spoil(s, bound + above));
+        assert_eq!((got, cycles), (*cause, 1), "just above the bound");
+    }
+}
+
+#[test]
+fn no_setup_can_raise_a_hard_limit() {
+    let mut limits = Limits::paper(T);
+    limits.normal_force_max_n = HARD.normal_force_max_n * 1.01;
+    assert!(limits.checked().unwrap_err().to_string().contains("above the hard limit"));
+    let mut limits = Limits::paper(T);
+    limits.temperature_max_c = f64::NAN;
+    assert!(limits.checked().is_err());
+    let mut limits = Limits::paper(T);
+    limits.frozen_after = 19;
+    assert!(limits.checked().is_err());
+}
+
+#[test]
+fn a_setup_may_go_to_its_hard_limit_and_not_beyond() {
+    let with = |change: fn(&mut Limits)| {
+        let mut limits = Limits::paper(T);
+        change(&mut limits);
+        limits.checked()
+    };
+    assert!(with(|l| l.normal_force_max_n = HARD.normal_force_max_n).is_ok());
+    assert!(with(|l| l.frequency_hz = HARD.frequency_hz).is_ok());
+    assert!(with(|l| l.frequency_hz.0 = HARD.frequency_hz.0 - 1.0).is_err());
+    assert!(with(|l| l.frequency_hz = (30e3, 30e3)).is_err());
+    assert!(with(|l| l.frequency_hz.1 = HARD.frequency_hz.1 + 1.0).is_err());
+    assert!(with(|l| l.travel_m = (0.01, 0.01)).is_err());
+    assert!(with(|l| l.travel_m = (f64::NEG_INFINITY, 0.01)).is_err());
+    assert!(with(|l| l.travel_m = (0.0, f64::INFINITY)).is_err());
+    assert!(with(|l| l.force_step_max_n = 0.0).is_err());
+    assert!(with(|l| l.force_rate_max_n_s = f64::INFINITY).is_err());
+    assert!(with(|l| l.amplitude_rate_max_m_s = -1.0).is_err());
+    assert!(with(|l| l.frozen_after = 1001).is_err());
+    assert!(with(|l| l.timing.cycle = Nanos(0)).is_err());
+    // What was recorded is checked again when it is read.
+    let mut above = Limits::paper(T);
+    above.exposure_max_s = 1e6;
+    let text = serde_json::to_string(&above).unwrap();
+    assert!(serde_json::from_str::<Limits>(&text).unwrap_err().to_string().contains("hard limit"));
+    let text = serde_json::to_string(&limits()).unwrap();
+    assert_eq!(serde_json::from_str::<Limits>(&text).unwrap(), limits());
+}
+
+#[test]
+fn beyond_the_travel_only_the_way_back_is_let_through() {
+    for (position, velocity, trips) in
+        [(0.061, -0.02, false), (0.061, 0.02, true), (-0.061, 0.02, false), (-0.061, -0.02, true)]
+    {
+        let mut bench = Bench::armed();
+        bench.request.velocity_m_s = velocity;
+        bench.cycle(|_| {}, Controls::default());
+        let decision = bench.cycle(|s| stage(s).position_m = position, Controls::default());
+        assert_eq!(decision.tripped.is_some(), trips, "{position} {velocity}");
+        bench.cycle(|s| stage(s).at_limit = true, Controls::default());
+    }
+}
