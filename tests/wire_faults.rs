@@ -1,7 +1,7 @@
 //! Faults in wall-clock time: the rig in one process, its controller in another, Modbus TCP between them.
 //!
-//! Each trip must match what was injected, or a stall of the machine that a witness recorded (then the case is run again, four
-//! times at most); reactions are judged on the virtual amplifier's own clock.
+//! Each trip must match what was injected, or a stall of the machine that a witness recorded (then the case is run again,
+//! seven times at most); reactions are judged on the virtual amplifier's own clock.
 
 use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip};
@@ -284,9 +284,9 @@ fn strike(case: &Case) -> Result<String, String> {
     ))
 }
 
-/// Tries until the machine does not spoil it, five times at most.
+/// Tries until the machine does not spoil it, eight times at most.
 fn tried<T>(mut once: impl FnMut() -> Result<T, String>) -> T {
-    for attempt in 1..=5 {
+    for attempt in 1..=8 {
         match once() {
             Ok(found) => return found,
             Err(why) => println!("attempt {attempt}: {why}"),
