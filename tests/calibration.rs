@@ -7,6 +7,8 @@
 mod amplitude;
 #[path = "calibration/bench.rs"]
 mod bench;
+#[path = "calibration/bound.rs"]
+mod bound;
 #[path = "calibration/closing.rs"]
 mod closing;
 #[path = "calibration/finger.rs"]

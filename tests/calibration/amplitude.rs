@@ -1,6 +1,7 @@
 //! Amplitude: the true plate under a vibrometer whose scale error is withheld.
 
 use crate::bench::{Coverage, TRIALS, seed};
+use crate::bound::{independent, jacobian};
 use crate::force::{at, occasion};
 use calibration::amplitude::AmplitudePoint;
 use calibration::amplitude::apply::{AmplitudeCalibration, AmplitudeFit};
@@ -10,6 +11,7 @@ use calibration::amplitude::map::mode_shape;
 use calibration::amplitude::resonance::sweep;
 use calibration::amplitude::vibrometer::{Decoder, sine};
 use calibration::certificate::{Kind, Outcome};
+use calibration::uncertainty::student::coverage_factor;
 use models::quantity::PeakToPeak;
 use realtime::ports::Nanos;
 use sim::amplifier::AmplifierInput;
@@ -19,7 +21,7 @@ use sim::world::{World, WorldConfig};
 use std::f64::consts::PI;
 
 /// A world with a plate to find, and a laser vibrometer on it.
-struct Bench {
+pub struct Bench {
     world: World,
     draw: Noise,
     /// Relative error of the vibrometer's scale, which the operator knows only the size of.
@@ -32,9 +34,16 @@ struct Bench {
 const SCALE_SD: f64 = 0.01;
 /// Noise of the vibrometer's velocity signal in m/s a sample.
 const NOISE_M_S: f64 = 2e-3;
+/// Relative repeatability from spot to spot.
+const SPECKLE_SD: f64 = 0.005;
+
+/// True standard deviation of one measured amplitude: speckle, and what a sine fitted to 200 samples leaves of the noise.
+fn reading_sd(amplitude_pp_m: f64, frequency_hz: f64) -> f64 {
+    (SPECKLE_SD * amplitude_pp_m).hypot(NOISE_M_S * (2.0f64 / 200.0).sqrt() / (PI * frequency_hz))
+}
 
 impl Bench {
-    fn new(config: &WorldConfig, seed: u64) -> Self {
+    pub fn new(config: &WorldConfig, seed: u64) -> Self {
         let mut draw = Noise::new(seed, "amplitude bench");
         Bench {
             world: World::new(config, seed).unwrap(),
@@ -66,7 +75,7 @@ impl Bench {
     }
 
     /// The vibrometer's waveform of what moves at a position under a load, evaluated.
-    fn measure(&mut self, set_pp_m: f64, frequency_hz: f64, position_m: f64, normal_force_n: f64) -> f64 {
+    pub fn measure(&mut self, set_pp_m: f64, frequency_hz: f64, position_m: f64, normal_force_n: f64) -> f64 {
         self.drive = (set_pp_m, frequency_hz);
         self.wait(0.1);
         let at = Surroundings {
@@ -90,7 +99,7 @@ impl Bench {
             })
             .collect();
         // Speckle changes the signal from spot to spot: half a per cent of repeatability.
-        let speckle = 1.0 + 0.005 * self.draw.normal();
+        let speckle = 1.0 + SPECKLE_SD * self.draw.normal();
         sine(&volts, rate, frequency_hz, &self.decoder).unwrap().amplitude().metres() * speckle
     }
 }
@@ -143,6 +152,28 @@ fn gain_resonance_droop_are_covered_as_stated() {
             refused += 1;
             continue;
         };
+        let sds = |of: &[AmplitudePoint], f: &dyn Fn(&AmplitudePoint) -> f64| -> Vec<f64> {
+            of.iter().map(|p| reading_sd(p.amplitude_pp_m, f(p))).collect()
+        };
+        let line = |b: &[f64]| table.iter().map(|p| b[0] * p.at).collect();
+        let gain_bound = independent(&jacobian(line, &[1.0], &[1e-3]), &sds(&table, &|_| tuned));
+        let curve = |b: &[f64]| {
+            points.iter().map(|p| b[0] / (1.0 + (2.0 * b[2] * (p.at - b[1]) / b[1]).powi(2)).sqrt()).collect()
+        };
+        let sweep_bound =
+            independent(&jacobian(curve, &[2e-6, f0, q], &[1e-9, 0.01, 0.01]), &sds(&points, &|p| p.at));
+        let bent = |b: &[f64]| loads.iter().map(|p| b[0] / (1.0 + b[1] * p.at.powf(2.0 / 3.0))).collect();
+        let droop_bound =
+            independent(&jacobian(bent, &[2e-6, load_ratio], &[1e-9, 1e-4]), &sds(&loads, &|_| tuned));
+        let k = |dof: f64| coverage_factor(0.95, dof);
+        let half = [
+            k(gain_fit.fit.degrees_of_freedom) * gain_fit.fit.standard_uncertainty(0),
+            k(found.degrees_of_freedom) * found.frequency_hz[1],
+            k(found.degrees_of_freedom) * found.quality_factor[1],
+            k(droop_fit.fit.degrees_of_freedom) * droop_fit.coefficient[1],
+        ];
+        let bound = [gain_bound[(0, 0)], sweep_bound[(1, 1)], sweep_bound[(2, 2)], droop_bound[(1, 1)]]
+            .map(f64::sqrt);
         let whole = AmplitudeFit {
             gain: gain_fit,
             set_point_unit: "m".into(),
@@ -155,10 +186,10 @@ fn gain_resonance_droop_are_covered_as_stated() {
         let outcome = whole.outcome();
         // The drive settles at its set-point at resonance, at 1 / sqrt(1 + (2 Q df / f0)^2) off it.
         let off = 2.0 * q * (tuned - f0) / f0;
-        gain.add(ci(&outcome, "gain"), 1.0 / (1.0 + off * off).sqrt());
-        resonance.add(ci(&outcome, "resonance_hz"), f0);
-        quality.add(ci(&outcome, "quality_factor"), q);
-        drooped.add(ci(&outcome, "droop"), load_ratio);
+        gain.add_with_bound(ci(&outcome, "gain"), 1.0 / (1.0 + off * off).sqrt(), half[0], bound[0]);
+        resonance.add_with_bound(ci(&outcome, "resonance_hz"), f0, half[1], bound[1]);
+        quality.add_with_bound(ci(&outcome, "quality_factor"), q, half[2], bound[2]);
+        drooped.add_with_bound(ci(&outcome, "droop"), load_ratio, half[3], bound[3]);
         if trial == 0 {
             let certificate = outcome.certify(&occasion());
             let use_it =
@@ -200,14 +231,38 @@ fn mode_shapes_are_covered_as_stated() {
             .collect();
         let found = mode_shape(&points).unwrap();
         let dof = found.fit.degrees_of_freedom;
-        let k = calibration::uncertainty::student::coverage_factor(0.95, dof);
+        let k = coverage_factor(0.95, dof);
         let interval = |[v, u]: [f64; 2]| [v - k * u, v + k * u];
-        wavelength.add(interval(found.wavelength_m), 2.0 * half_wave);
-        share.add(interval(found.standing_share), depth);
+        let wave = |b: &[f64]| {
+            points
+                .iter()
+                .map(|p| b[0] * (1.0 - b[3] + b[3] * (2.0 * PI * (p.at - b[2]) / b[1]).cos().abs()))
+                .collect()
+        };
+        let truth = [2e-6, 2.0 * half_wave, -phase / PI * half_wave, depth];
+        let sd: Vec<f64> = points.iter().map(|p| reading_sd(p.amplitude_pp_m, 25_000.0)).collect();
+        let bound = independent(&jacobian(wave, &truth, &[1e-10, 1e-7, 1e-7, 1e-4]), &sd);
+        let half = |[_, u]: [f64; 2]| k * u;
+        let sd = |i: usize| bound[(i, i)].sqrt();
+        wavelength.add_with_bound(
+            interval(found.wavelength_m),
+            2.0 * half_wave,
+            half(found.wavelength_m),
+            sd(1),
+        );
+        share.add_with_bound(interval(found.standing_share), depth, half(found.standing_share), sd(3));
         // Antinodes stand every half wave; the one nearest to the stated place is meant.
         let first = -phase / PI * half_wave;
         let n = ((found.antinode_at_m[0] - first) / half_wave).round();
-        antinode.add(interval(found.antinode_at_m), first + n * half_wave);
+        // An antinode n half waves further on also takes up n halves of the wavelength's error.
+        let there = nalgebra::DVector::from_row_slice(&[0.0, n / 2.0, 1.0, 0.0]);
+        let antinode_sd = (there.transpose() * &bound * &there)[(0, 0)].sqrt();
+        antinode.add_with_bound(
+            interval(found.antinode_at_m),
+            first + n * half_wave,
+            half(found.antinode_at_m),
+            antinode_sd,
+        );
     }
     wavelength.judge("wavelength of the mode");
     antinode.judge("place of the antinode");

@@ -9,9 +9,11 @@ use realtime::ports::Nanos;
 use sim::noise::Noise;
 use sim::sensor::{Sensor, SensorConfig};
 
-/// Number of trials of each quantity, and the base of their seeds: fixed beforehand.
+/// Number of trials of each quantity.
 pub const TRIALS: u64 = 400;
-const SEEDS: u64 = 0x6d75_7072;
+/// Base of their seeds: fixed on 2026-11-21 before the first trial with it, when the calibrations stood still. The base
+/// before it, 0x6d75_7072, was in use while three of their choices were made (docs/calibration.md names them).
+const SEEDS: u64 = 20_261_121;
 
 /// Seed of a trial.
 pub fn seed(trial: u64) -> u64 {

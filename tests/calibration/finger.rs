@@ -2,6 +2,7 @@
 //! inverse analysis on a file of phases made by another mesh and step.
 
 use crate::bench::{Coverage, TRIALS, seed};
+use crate::bound::{independent, jacobian};
 use calibration::finger::friction::{FrictionPoint, friction};
 use calibration::uncertainty::student::coverage_factor;
 use models::quantity::PeakToPeak;
@@ -49,12 +50,29 @@ fn friction_and_its_exponents_are_covered_as_stated() {
         let mut draw = Noise::new(seed(trial), "friction bench");
         let config = FingerConfig { mu0: draw.between(0.2, 1.2), ..FingerConfig::default() };
         let finger = Finger::new(&config, seed(trial));
-        let found = friction(&passes(&finger, &Defects::none(), &mut draw)).unwrap();
+        let points = passes(&finger, &Defects::none(), &mut draw);
+        let found = friction(&points).unwrap();
+        let line = |b: &[f64]| {
+            let ln = |x: f64, x0: f64| (x / x0).ln();
+            points
+                .iter()
+                .map(|p| {
+                    b[0] + b[1] * ln(p.normal_force_n, found.reference_force_n)
+                        + b[2] * ln(p.speed_m_s, found.reference_speed_m_s)
+                })
+                .collect()
+        };
+        // Scatter of ln(L / F): from pass to pass, and 0.2 mN on either force.
+        let sd: Vec<f64> = points
+            .iter()
+            .map(|p| 0.015f64.hypot(2e-4 / p.lateral_force_n).hypot(2e-4 / p.normal_force_n))
+            .collect();
+        let bound = independent(&jacobian(line, &[config.mu0.ln(), 0.0, 0.0], &[1e-4; 3]), &sd);
         let k = coverage_factor(0.95, found.fit.degrees_of_freedom);
         // A Coulombic world: no dependence on load or speed.
         for (i, truth) in [config.mu0.ln(), 0.0, 0.0].into_iter().enumerate() {
             let (value, half) = (found.fit.estimates[i], k * found.fit.standard_uncertainty(i));
-            covered[i].add([value - half, value + half], truth);
+            covered[i].add_with_bound([value - half, value + half], truth, half, bound[(i, i)].sqrt());
         }
     }
     for (c, name) in covered.iter().zip(["mu0", "load exponent", "speed exponent"]) {
