@@ -19,3 +19,11 @@ mod force;
 mod latency;
 #[path = "calibration/phase.rs"]
 mod phase;
+#[path = "calibration/refusals.rs"]
+mod refusals;
+#[path = "calibration/sensor.rs"]
+mod sensor;
+#[path = "calibration/whole.rs"]
+mod whole;
+#[path = "calibration/wire.rs"]
+mod wire;

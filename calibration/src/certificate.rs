@@ -32,6 +32,8 @@ pub enum Kind {
     Phase,
     /// Stiffness and friction of a fingertip.
     Finger,
+    /// What a force sensor is besides its matrix: creep, orientation, noise, dynamics.
+    Sensor,
 }
 
 impl std::fmt::Display for Kind {
@@ -42,6 +44,7 @@ impl std::fmt::Display for Kind {
             Kind::Latency => "latency",
             Kind::Phase => "phase",
             Kind::Finger => "finger",
+            Kind::Sensor => "sensor",
         })
     }
 }

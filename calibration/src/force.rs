@@ -5,6 +5,7 @@
 //! loop uses, together with an explicit [`zero::Zero`]: nothing here tares by itself.
 
 pub mod apply;
+pub mod characteristics;
 pub mod creep;
 pub mod dynamics;
 pub mod gravity;

@@ -50,7 +50,7 @@ impl CalibrationPriors {
             Kind::Amplitude => {
                 self.amplitude_gain_sd = Some(AmplitudeCalibration::compile(verified)?.gain_relative_sd());
             }
-            Kind::Latency | Kind::Phase | Kind::Finger => {}
+            Kind::Latency | Kind::Phase | Kind::Finger | Kind::Sensor => {}
         }
         Ok(())
     }

@@ -64,6 +64,16 @@ impl DriveCommand {
         self.expires_at
     }
 
+    /// The same command on the amplifier's own scale, where a certificate knows that scale: only its amplitude changes.
+    /// An amplitude of zero, an answer that is no amplitude, and one over the hard limit all become zero.
+    #[must_use]
+    pub fn on_scale(self, set_point: impl FnOnce(PeakToPeak) -> Option<PeakToPeak>) -> Self {
+        let allowed = |w: &PeakToPeak| (0.0..=HARD.amplitude_max.metres()).contains(&w.metres());
+        let asked = Some(self.amplitude).filter(|w| self.enable && *w > PeakToPeak::ZERO);
+        let amplitude = asked.and_then(set_point).filter(allowed).unwrap_or(PeakToPeak::ZERO);
+        DriveCommand { amplitude, ..self }
+    }
+
     /// The command that every state but one gives: output off, amplitude zero.
     pub const fn off(sequence: u32, expires_at: Nanos) -> Self {
         DriveCommand { amplitude: PeakToPeak::ZERO, frequency_hz: 0.0, enable: false, sequence, expires_at }

@@ -1,24 +1,40 @@
 //! Certificates of a setup: verified when the setup is read, applied once in the loop.
 //!
 //! A force certificate takes the counts of the force instruments and gives newtons with cross-talk taken off;
-//! the profile's own scale and the setup's `gain` and `offset_n` then play no part. What certificates leave
-//! open goes into rig.toml as `[calibration]`.
+//! the profile's own scale and the setup's `gain` and `offset_n` then play no part. An amplitude certificate turns
+//! the amplitude that is asked for into the amplifier's set-point, and what the amplifier reads back into the plate's
+//! true amplitude: every amplitude in the loop, its limits and its record is then the plate's. What certificates
+//! leave open goes into rig.toml as `[calibration]`.
 
 use crate::setup::SetupFile;
-use calibration::certificate::{Certificate, Circumstances, Kind};
+use calibration::amplitude::apply::AmplitudeCalibration;
+use calibration::certificate::{Certificate, Circumstances, Kind, Verified};
 use calibration::force::apply::ForceCalibration;
 use calibration::force::zero::Zero;
 use calibration::prior::CalibrationPriors;
-use realtime::ports::{ForceSensor, Forces, Nanos, Quality, Reading};
+use models::quantity::PeakToPeak;
+use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Quality, Reading};
+use realtime::safety::DriveCommand;
+use std::collections::BTreeMap;
 use std::path::Path;
+
+/// Amplitude over set-point that a drive whose set-point is an amplitude may have. A factor of two is no gain, it is a
+/// single amplitude taken for peak-to-peak.
+const PLAUSIBLE: (f64, f64) = (0.55, 1.8);
 
 /// What a setup's certificates come to.
 #[derive(Clone, Debug, Default)]
 pub struct Certificates {
     /// The force calibration with its zero.
     pub force: Option<(ForceCalibration, Zero)>,
+    /// The amplitude calibration of a drive whose set-point is an amplitude.
+    pub amplitude: Option<AmplitudeCalibration>,
+    /// The gain in m per unit of a drive whose set-point is a current.
+    pub amplitude_m_per_unit: Option<f64>,
     /// What remains uncertain, for rig.toml.
     pub priors: CalibrationPriors,
+    /// File name of each certificate, by its kind.
+    pub names: BTreeMap<String, String>,
     /// The files, for the record.
     pub files: Vec<(String, String)>,
 }
@@ -44,8 +60,14 @@ impl Certificates {
             }
             seen.push(kind);
             let serial = serial(file, kind).map_err(&fail)?.unwrap_or(certificate.instrument.serial.clone());
-            let at = Circumstances { kind, serial: &serial, now_unix_s, temperature_c: None };
+            let at = Circumstances { kind, serial: &serial, now_unix_s, temperature_c: file.temperature_c };
             let verified = certificate.verify(&at).map_err(|e| fail(e.to_string()))?;
+            if let (Some([low, high]), None) = (certificate.validity.temperature_c, file.temperature_c) {
+                return Err(fail(format!(
+                    "it holds from {low:.1} to {high:.1} deg C: state `temperature_c` in the setup, as read at the \
+                     bench"
+                )));
+            }
             all.priors.take(verified).map_err(|e| fail(e.to_string()))?;
             if kind == Kind::Force {
                 let axes = file.force.iter().flat_map(|i| [&i.lateral, &i.normal]).flatten();
@@ -55,14 +77,60 @@ impl Certificates {
                             .into(),
                     ));
                 }
-                let calibration =
-                    ForceCalibration::compile(verified, None).map_err(|e| fail(e.to_string()))?;
+                let calibration = ForceCalibration::compile(verified, file.temperature_c)
+                    .map_err(|e| fail(e.to_string()))?;
                 all.force = Some((calibration, zero(file, &certificate)));
             }
+            if kind == Kind::Amplitude {
+                all.take_amplitude(file, verified).map_err(&fail)?;
+            }
             let kept = path.file_name().map_or(name.clone(), |n| n.to_string_lossy().into_owned());
+            all.names.insert(kind.to_string(), kept.clone());
             all.files.push((format!("certificates/{kept}"), text));
         }
         Ok(all)
+    }
+
+    /// Takes in an amplitude certificate, by what the drive's set-point is.
+    fn take_amplitude(&mut self, file: &SetupFile, verified: Verified) -> Result<(), String> {
+        if file.amplifier.amplitude_m_per_unit.is_some() {
+            return Err(
+                "the setup scales the set-point too (amplitude_m_per_unit): leave that to the certificate"
+                    .into(),
+            );
+        }
+        let certificate = verified.certificate();
+        let calibration = AmplitudeCalibration::compile(verified).map_err(|e| e.to_string())?;
+        match certificate.settings.get("set_point_unit").map(String::as_str) {
+            Some("A") => {
+                if certificate.parameter("offset").or(certificate.parameter("bend")).is_some() {
+                    return Err("a current is turned into an amplitude by a proportional gain only".into());
+                }
+                self.amplitude_m_per_unit = certificate.parameter("gain").map(|p| p.value);
+            }
+            Some("m") => {
+                // A drive that states metres and is off by more than that states something else.
+                let at = certificate.validity.range.get("set_point").map_or(1e-6, |r| r[1]);
+                let ratio = calibration.free_amplitude(at).metres() / at;
+                if !(PLAUSIBLE.0..=PLAUSIBLE.1).contains(&ratio) {
+                    return Err(format!(
+                        "its amplitude is {ratio:.3} of the set-point: a table in other units, or half a swing for a \
+                         whole one? w is peak-to-peak"
+                    ));
+                }
+                self.amplitude = Some(calibration);
+            }
+            other => return Err(format!("its set_point_unit is {other:?}, not m or A")),
+        }
+        Ok(())
+    }
+
+    /// The amplifier's port with the certificate applied, or the port itself where there is none.
+    pub fn calibrated_amplifier(&self, amplifier: Box<dyn Amplifier>) -> Box<dyn Amplifier> {
+        match self.amplitude {
+            None => amplifier,
+            Some(calibration) => Box::new(CalibratedAmplifier { inner: amplifier, calibration }),
+        }
     }
 
     /// The force port with the certificate applied, or the port itself where there is none.
@@ -79,7 +147,7 @@ fn serial(file: &SetupFile, kind: Kind) -> Result<Option<String>, String> {
     let stated: Vec<Option<&String>> = match kind {
         Kind::Force => file.force.iter().map(|i| i.serial.as_ref()).collect(),
         Kind::Amplitude => vec![file.amplifier.serial.as_ref()],
-        Kind::Latency | Kind::Phase | Kind::Finger => return Ok(None),
+        Kind::Latency | Kind::Phase | Kind::Finger | Kind::Sensor => return Ok(None),
     };
     let known: Option<Vec<&str>> = stated.into_iter().map(|s| s.map(String::as_str)).collect();
     match known {
@@ -130,5 +198,36 @@ impl ForceSensor for Calibrated {
             ..reading
         };
         Forces { lateral: Ok(with(lateral, force[0])), normal: Ok(with(normal, force[1])) }
+    }
+}
+
+/// An amplifier's port around an amplifier's port: the plate's amplitude in, the drive's set-point out, and back. The
+/// curve is that of the free plate at the table's place; mode shape and droop are the diagnosis's. No allocation.
+struct CalibratedAmplifier {
+    inner: Box<dyn Amplifier>,
+    calibration: AmplitudeCalibration,
+}
+
+impl Amplifier for CalibratedAmplifier {
+    fn command(&mut self, command: DriveCommand, now: Nanos) {
+        let set_point = |w| self.calibration.free_set_point(w).map(PeakToPeak::from_metres);
+        self.inner.command(command.on_scale(set_point), now);
+    }
+
+    fn state(&mut self, now: Nanos) -> Result<AmplifierState, NoData> {
+        let state = self.inner.state(now)?;
+        // Nothing driven is nothing moving, whatever the curve's offset: a reading of zero stays zero.
+        let plate = |drive: f64| {
+            if drive > 0.0 { self.calibration.free_amplitude(drive) } else { PeakToPeak::from_metres(drive) }
+        };
+        Ok(AmplifierState {
+            amplitude: state.amplitude.map(|r| Reading { value: plate(r.value).metres(), ..r }),
+            echoed_amplitude: plate(state.echoed_amplitude.metres()),
+            ..state
+        })
+    }
+
+    fn cut_supply(&mut self, now: Nanos) -> bool {
+        self.inner.cut_supply(now)
     }
 }

@@ -46,6 +46,10 @@ pub struct SetupFile {
     /// Certificates by path, relative to the setup file.
     #[serde(default)]
     pub certificates: Vec<PathBuf>,
+    /// Temperature at the instruments in deg C, as read at the bench: a certificate that holds within a range of
+    /// temperatures asks for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
     /// Zero of the force channels in counts, lateral and normal, where it is not the force certificate's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero_counts: Option<[f64; 2]>,
@@ -216,11 +220,11 @@ impl Setup {
 
     /// The instruments' part, for the drivers.
     pub fn instruments(&self) -> InstrumentsSetup {
-        InstrumentsSetup {
-            force: self.file.force.clone(),
-            amplifier: self.file.amplifier.clone(),
-            stage: self.file.stage.clone(),
-        }
+        let mut amplifier = self.file.amplifier.clone();
+        // A certificate of the drive's current is what the setup would otherwise have to state.
+        amplifier.amplitude_m_per_unit =
+            self.certificates.amplitude_m_per_unit.or(amplifier.amplitude_m_per_unit);
+        InstrumentsSetup { force: self.file.force.clone(), amplifier, stage: self.file.stage.clone() }
     }
 
     /// The `rig.toml` that goes beside a point table (contract).
@@ -232,9 +236,18 @@ impl Setup {
         struct Rig<'a> {
             finger: &'a models::finger::Finger,
             noise: &'a PassNoise,
-            calibration: &'a calibration::prior::CalibrationPriors,
+            calibration: Calibration<'a>,
         }
-        let calibration = &self.certificates.priors;
+        #[derive(Serialize)]
+        struct Calibration<'a> {
+            #[serde(flatten)]
+            priors: &'a calibration::prior::CalibrationPriors,
+            /// Which certificate says so, by its kind.
+            #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty")]
+            certificates: &'a std::collections::BTreeMap<String, String>,
+        }
+        let calibration =
+            Calibration { priors: &self.certificates.priors, certificates: &self.certificates.names };
         let finger = models::finger::Finger { lateral_recovery_m_per_s: None, ..self.tip.finger };
         toml::to_string(&Rig { finger: &finger, noise: &self.file.noise, calibration }).into_diagnostic()
     }

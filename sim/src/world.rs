@@ -74,6 +74,8 @@ pub struct World {
     pass_factor: f64,
     contact_time_s: f64,
     truth: Truth,
+    hung: Forces,
+    known_pp_m: f64,
     forces: Gate<ForceSample>,
     amplifier_states: Gate<AmplifierStatus>,
     stage_states: Gate<StageStatus>,
@@ -123,6 +125,8 @@ impl World {
                 position_m: 0.0,
                 contact_fraction: 0.0,
             },
+            hung: Forces { lateral_n: 0.0, normal_n: 0.0 },
+            known_pp_m: 0.0,
             forces: Gate::new(
                 ChannelName::Force,
                 config.sensor.latency_s,
@@ -164,6 +168,7 @@ impl World {
         let room_c = self.config.room.temperature_c;
         let (drive, frequency) = self.amplifier.step(self.now, room_c, self.plate.warming_k());
         let known_pp = self.plate.step(drive, frequency, dt);
+        self.known_pp_m = known_pp;
         self.stage.step(dt);
         if self.stage.strokes != self.strokes {
             self.strokes = self.stage.strokes;
@@ -195,7 +200,8 @@ impl World {
             position_m: at.position_m,
             contact_fraction: steady.contact_fraction,
         };
-        let mut forces = Forces { lateral_n: lateral, normal_n: normal };
+        let mut forces =
+            Forces { lateral_n: lateral + self.hung.lateral_n, normal_n: normal + self.hung.normal_n };
         self.config.defects.forces(&at, &mut forces);
         let shown = self.sensor.feel(forces.lateral_n, forces.normal_n);
         if self.ticks.is_multiple_of(self.every[0]) {
@@ -289,6 +295,26 @@ impl World {
     /// Closes the supply relay again and clears the amplifier's fault, by hand at the bench.
     pub fn restore_supply(&mut self) {
         self.amplifier.restore_supply();
+    }
+
+    /// Hangs dead weights on the force sensor, as an operator does at the bench: true forces from the next tick on (N).
+    pub fn hang(&mut self, lateral_n: f64, normal_n: f64) {
+        self.hung = Forces { lateral_n, normal_n };
+    }
+
+    /// What a vibrometer beside the finger sees: the true motion of the free plate at the stage's place, peak-to-peak (m).
+    pub fn free_amplitude_pp_m(&self) -> f64 {
+        let at = Surroundings {
+            time_s: self.now.seconds(),
+            contact_time_s: 0.0,
+            position_m: self.truth.position_m,
+            direction: 1.0,
+            frequency_hz: self.truth.frequency_hz,
+            normal_force_n: 0.0,
+            ambient_pressure_pa: self.config.room.ambient_pressure_pa,
+            temperature_c: self.config.room.temperature_c,
+        };
+        self.config.defects.plate(&at, self.known_pp_m)
     }
 
     /// Sets the pressure around the rig (a chamber) (Pa).

@@ -14,7 +14,7 @@ parameters = { lateral_per_normal = 0.08, normal_per_lateral = 0.01 }
 ";
 
 /// A dead-weight series on the virtual rig's own sensor, with the world's defect before it, as CSV.
-fn series(defects: &Defects) -> String {
+pub fn series(defects: &Defects) -> String {
     let mut sensor = Sensor::new(SensorConfig { sample_period_s: 0.01, ..SensorConfig::default() }, 0.01, 11);
     let mut direction = Noise::new(11, "pulls");
     let weighing = Weighing::default();
@@ -67,12 +67,12 @@ fn series(defects: &Defects) -> String {
     text
 }
 
-fn muprime(folder: &Path, args: &str) -> Output {
+pub fn muprime(folder: &Path, args: &str) -> Output {
     tests::muprime().current_dir(folder).args(args.split(' ')).output().unwrap()
 }
 
 /// The verdict of a fast sweep of a setup on the world with the cross-talk.
-fn verdict(folder: &Path, setup: &str, out: &str) -> serde_json::Value {
+pub fn verdict(folder: &Path, setup: &str, out: &str) -> serde_json::Value {
     let run =
         muprime(folder, &format!("run --setup {setup} --fast --defects defects.toml --out {out} --seed 3"));
     assert!(run.status.success(), "{}", tests::texts(&run).1);

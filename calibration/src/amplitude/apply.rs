@@ -190,10 +190,22 @@ impl AmplitudeCalibration {
         })
     }
 
+    /// Peak-to-peak amplitude of the free plate at the table's place for a set-point.
+    pub fn free_amplitude(&self, set_point: f64) -> PeakToPeak {
+        let free = self.gain * set_point + self.offset + self.bend * set_point * set_point;
+        PeakToPeak::from_metres(free.max(0.0))
+    }
+
+    /// The set-point for an amplitude of the free plate at the table's place: the inverse of
+    /// [`AmplitudeCalibration::free_amplitude`]. `None` beyond where a bent curve still rises.
+    pub fn free_set_point(&self, amplitude: PeakToPeak) -> Option<f64> {
+        self.inverse(amplitude.metres() - self.offset)
+    }
+
     /// Peak-to-peak amplitude under the finger for a set-point, a position and a normal force.
     pub fn amplitude(&self, set_point: f64, position_m: f64, normal_force_n: f64) -> PeakToPeak {
-        let free = self.gain * set_point + self.offset + self.bend * set_point * set_point;
-        PeakToPeak::from_metres(free.max(0.0) * self.relative(position_m, normal_force_n))
+        let free = self.free_amplitude(set_point).metres();
+        PeakToPeak::from_metres(free * self.relative(position_m, normal_force_n))
     }
 
     /// The set-point for an amplitude under the finger: the inverse of [`AmplitudeCalibration::amplitude`].
@@ -204,6 +216,11 @@ impl AmplitudeCalibration {
         if relative < 1e-3 {
             return None;
         }
+        self.inverse(free)
+    }
+
+    /// The set-point for an amplitude net of the offset.
+    fn inverse(&self, free: f64) -> Option<f64> {
         if self.bend == 0.0 {
             return Some(free / self.gain);
         }

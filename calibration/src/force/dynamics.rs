@@ -20,6 +20,8 @@ pub struct StepResponse {
     pub bandwidth_hz: Estimate,
     /// Height of the step, in the unit of the samples.
     pub height: Estimate,
+    /// Standard deviation of what the fit left, and the largest of it, in the unit of the samples.
+    pub residual: [f64; 2],
 }
 
 /// Fits a second-order low-pass with dead time to samples around one step at `step_at_s`.
@@ -81,6 +83,7 @@ pub fn step_response(time_s: &[f64], samples: &[f64], step_at_s: f64) -> Result<
         damping_ratio: [zeta, best.standard_uncertainty(4)],
         bandwidth_hz: [natural * ratio, bandwidth_u],
         height: [best.estimates[1], best.standard_uncertainty(1)],
+        residual: [best.residual_sd(), best.residuals.amax()],
     })
 }
 
@@ -116,6 +119,8 @@ pub struct RingDown {
     pub frequency_hz: Estimate,
     /// Damping ratio.
     pub damping_ratio: Estimate,
+    /// Standard deviation of what the fit left, and the largest of it, in the unit of the samples.
+    pub residual: [f64; 2],
 }
 
 /// Fits `x = c + exp(-zeta omega t) (p cos + q sin)` to a free decay.
@@ -169,6 +174,7 @@ pub fn ring_down(time_s: &[f64], samples: &[f64]) -> Result<RingDown, FitError> 
             sigma / natural,
             best.standard_uncertainty_along(&[0.0, 0.0, 0.0, -sigma * damped / n3, damped * damped / n3]),
         ],
+        residual: [best.residual_sd(), best.residuals.amax()],
     })
 }
 

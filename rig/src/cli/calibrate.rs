@@ -1,11 +1,15 @@
-//! `muprime calibrate force|amplitude|latency|phase|finger ...`: data in, a certificate out.
+//! `muprime calibrate force|amplitude|latency|phase|finger|creep|gravity|noise|step|tap ...`: data in, a certificate out.
 
 mod amplitude;
+mod creep;
+mod dynamics;
 mod finger;
 mod force;
+mod gravity;
 mod guided;
 mod inverse;
 mod latency;
+mod noise;
 mod phase;
 mod tables;
 
@@ -34,6 +38,16 @@ enum What {
     Phase(phase::Args),
     /// Stiffness, friction and (from a phase table) modulus, penalty and retardation time of a fingertip
     Finger(finger::Args),
+    /// Creep of a force channel under a standing load
+    Creep(creep::Args),
+    /// Direction of the force sensor's axes, by gravity at known tilts
+    Gravity(gravity::Args),
+    /// Spectrum, quantisation and frozen-value rule of the force sensor at rest
+    Noise(noise::Args),
+    /// Bandwidth and dead time of a channel from steps of force
+    Step(dynamics::Args),
+    /// Resonance of the sensor's mount from taps
+    Tap(dynamics::Args),
     /// Print what verified certificates leave open, as the [calibration] section of rig.toml
     Priors(PriorsArgs),
 }
@@ -83,6 +97,11 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         What::Latency(args) => latency::run(&args, json),
         What::Phase(args) => phase::run(&args, json),
         What::Finger(args) => finger::run(&args, json),
+        What::Creep(args) => creep::run(&args, json),
+        What::Gravity(args) => gravity::run(&args, json),
+        What::Noise(args) => noise::run(&args, json),
+        What::Step(args) => dynamics::step(&args, json),
+        What::Tap(args) => dynamics::tap(&args, json),
         What::Priors(args) => priors(&args, json),
     }
 }

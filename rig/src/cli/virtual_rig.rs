@@ -6,8 +6,9 @@ use instruments::schema::LinkKind;
 use miette::{IntoDiagnostic, WrapErr};
 use sim::wire::SharedPlant;
 use sim::wire::serial::SerialEmulator;
-use sim::wire::world::WorldPlant;
+use sim::wire::world::{Hands, WorldPlant};
 use sim::world::{World, WorldConfig};
+use std::io::BufRead;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,6 +32,10 @@ pub struct Args {
     /// Serial line of the setup's instrument of text
     #[arg(long, value_name = "PATH")]
     serial: Option<String>,
+    /// Take an operator's hands from the standard input, to calibrate the virtual rig: `hang LATERAL_N NORMAL_N`
+    /// puts dead weights on the force sensor, `look` reads the plate's motion off a vibrometer; one JSON line each
+    #[arg(long)]
+    hands: bool,
     /// Defects in place of the bundled ones
     #[arg(long)]
     defects: Option<PathBuf>,
@@ -53,7 +58,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             sim::defects::Defects::parse(&text).map_err(|e| miette::miette!("{}: {e}", path.display()))?;
     }
     let world = World::new(&config, args.seed).map_err(|e| miette::miette!("{e}"))?;
-    let plant = SharedPlant::new(WorldPlant::new(world), Instant::now());
+    let (world, hands) = WorldPlant::at_hand(world);
+    let plant = SharedPlant::new(world, Instant::now());
     let mut instruments = setup.instruments();
     let line = args.modbus_rtu.as_deref().map(|path| rtu(path, &instruments, &plant)).transpose()?;
     for instrument in instruments.force.iter_mut().chain([&mut instruments.amplifier, &mut instruments.stage])
@@ -89,12 +95,50 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             modbus_tcp.map(|address| format!("listens on {address} (Modbus TCP)")).unwrap_or("runs".into());
         eprintln!("the virtual rig {listens}; Ctrl-C ends it");
     }
+    if args.hands {
+        let plant = plant.clone();
+        std::thread::Builder::new()
+            .name("hands".into())
+            .spawn(move || at_the_bench(&hands, &plant))
+            .into_diagnostic()?;
+    }
     let mut signals =
         signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM])
             .into_diagnostic()?;
     let _ = signals.forever().next();
     drop((line, embedded));
     super::exit(super::DONE)
+}
+
+/// Does what the lines of the standard input say, until they end; the rig goes on.
+fn at_the_bench(hands: &Hands, plant: &SharedPlant) {
+    for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let number = |word: &str| word.parse().ok().filter(|x: &f64| x.is_finite() && x.abs() <= 1e3);
+        let answer = match words.as_slice() {
+            [] => continue,
+            ["hang", lateral, normal] => match (number(lateral), number(normal)) {
+                (Some(lateral), Some(normal)) => {
+                    // First up to now with the old weights: the new ones begin now.
+                    let (guard, now) = plant.now();
+                    hands.hang(lateral, normal);
+                    drop(guard);
+                    serde_json::json!({ "time_s": now.seconds(), "hung_n": [lateral, normal] })
+                }
+                _ => serde_json::json!({ "error": "hang LATERAL_N NORMAL_N: two forces of at most 1000 N" }),
+            },
+            ["look"] => {
+                drop(plant.now());
+                let seen = hands.look();
+                serde_json::json!({
+                    "time_s": seen.time_s, "frequency_hz": seen.frequency_hz,
+                    "amplitude_pp_m": seen.amplitude_pp_m,
+                })
+            }
+            _ => serde_json::json!({ "error": format!("`{line}`: hang LATERAL_N NORMAL_N, or look") }),
+        };
+        println!("{answer}");
+    }
 }
 
 /// Serves the Modbus instruments on one serial line as well.

@@ -54,7 +54,8 @@ fn sweep(
 ) -> miette::Result<Summary> {
     let [force, amplifier, stage] = rig.split();
     let force = job.setup.certificates.calibrated(Box::new(force));
-    let mut ports = Ports { force, amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
+    let mut ports = Ports { force, amplifier, stage: Box::new(stage) };
     let file = BufWriter::new(kept.new_record()?);
     let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
     let config = job.setup.config;

@@ -75,7 +75,7 @@ pub fn run(
         model: Arc::clone(&job.model),
         ports: Ports {
             force: job.setup.certificates.calibrated(rig.force),
-            amplifier: rig.amplifier,
+            amplifier: job.setup.certificates.calibrated_amplifier(rig.amplifier),
             stage: rig.stage,
         },
         commands: Arc::clone(&commands),

@@ -6,10 +6,50 @@ use crate::stage::StageInput;
 use crate::world::World;
 use models::quantity::PeakToPeak;
 use realtime::ports::Nanos;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// An operator's hands at the virtual rig: weights to hang on the force sensor, a vibrometer to look with. What they do
+/// reaches the world with the next look at it by an instrument.
+#[derive(Clone, Default)]
+pub struct Hands(Arc<Mutex<Bench>>);
+
+#[derive(Clone, Copy, Default)]
+struct Bench {
+    hung_n: [f64; 2],
+    free: Laser,
+}
+
+/// What the vibrometer shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Laser {
+    /// True peak-to-peak motion of the free plate (m).
+    pub amplitude_pp_m: f64,
+    /// Frequency of the drive (Hz).
+    pub frequency_hz: f64,
+    /// Time of the world (s).
+    pub time_s: f64,
+}
+
+impl Hands {
+    /// Hangs true forces on the sensor (N), lateral and normal, in place of those before.
+    pub fn hang(&self, lateral_n: f64, normal_n: f64) {
+        self.bench().hung_n = [lateral_n, normal_n];
+    }
+
+    /// Looks with the vibrometer.
+    pub fn look(&self) -> Laser {
+        self.bench().free
+    }
+
+    fn bench(&self) -> MutexGuard<'_, Bench> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 /// A world behind the wire. Set-points arrive in blocks; what a block leaves out keeps its last value.
 pub struct WorldPlant {
     world: World,
+    hands: Hands,
     drive: AmplifierInput,
     motion: StageInput,
 }
@@ -17,15 +57,30 @@ pub struct WorldPlant {
 impl WorldPlant {
     /// Puts a world behind the wire.
     pub fn new(world: World) -> Self {
+        Self::at_hand(world).0
+    }
+
+    /// The same, with hands at the bench.
+    pub fn at_hand(world: World) -> (Self, Hands) {
+        let hands = Hands::default();
         let drive =
             AmplifierInput { amplitude: PeakToPeak::ZERO, frequency_hz: 0.0, enable: false, heartbeat: 0 };
-        WorldPlant { world, drive, motion: StageInput { velocity_m_s: 0.0, normal_force_n: 0.0 } }
+        let motion = StageInput { velocity_m_s: 0.0, normal_force_n: 0.0 };
+        (WorldPlant { world, hands: hands.clone(), drive, motion }, hands)
     }
 }
 
 impl Plant for WorldPlant {
     fn advance(&mut self, now: Nanos) {
+        // Whatever was hung since the last look has been there since then.
+        let [lateral_n, normal_n] = self.hands.bench().hung_n;
+        self.world.hang(lateral_n, normal_n);
         self.world.advance_to(now);
+        self.hands.bench().free = Laser {
+            amplitude_pp_m: self.world.free_amplitude_pp_m(),
+            frequency_hz: self.world.truth().frequency_hz,
+            time_s: self.world.now().seconds(),
+        };
     }
 
     fn measure(&mut self, quantity: Quantity) -> f64 {

@@ -41,6 +41,9 @@ pub struct Args {
     /// Relative standard uncertainty of the vibrometer (its own certificate)
     #[arg(long, default_value_t = 0.01)]
     vibrometer_relative_sd: f64,
+    /// Temperatures at which the certificate holds in deg C, as LOW,HIGH [default: not limited]
+    #[arg(long, value_delimiter = ',', num_args = 2, allow_negative_numbers = true)]
+    temperature_c: Option<Vec<f64>>,
     #[command(flatten)]
     common: Common,
 }
@@ -100,5 +103,11 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         mode_shape: shape,
         droop: drooped,
     };
-    args.common.issue(found.outcome(), sources.raw_data(), json)
+    let mut outcome = found.outcome();
+    outcome.temperature_c = match args.temperature_c.as_deref() {
+        None => None,
+        Some([low, high]) if low < high => Some([*low, *high]),
+        Some(other) => miette::bail!("--temperature-c {other:?}: two temperatures, the lower one first"),
+    };
+    args.common.issue(outcome, sources.raw_data(), json)
 }

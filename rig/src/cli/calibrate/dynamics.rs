@@ -1,0 +1,116 @@
+//! `muprime calibrate step` and `muprime calibrate tap`: bandwidth and dead time of a channel, resonance of its mount.
+
+use super::Common;
+use super::tables::{Sources, columns};
+use calibration::certificate::Residuals;
+use calibration::force::characteristics::{Finding, outcome};
+use calibration::force::dynamics::{Estimate, ring_down, step_response};
+use calibration::uncertainty::Input;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// One or more events, as CSV: event (number), time_s (since the event), value (counts or newtons).
+    /// Steps: with samples before the event. Taps: the free decay alone, once the hammer is off
+    samples: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// One event's answer: what it found, and standard deviation and largest of what the fit left.
+struct Event {
+    found: Vec<Estimate>,
+    samples: usize,
+    residual: [f64; 2],
+}
+
+/// A step of force: second-order low-pass with dead time.
+pub fn step(args: &Args, json: bool) -> miette::Result<ExitCode> {
+    const NAMES: [(&str, &str); 4] = [
+        ("step.delay", "s"),
+        ("step.natural_frequency", "Hz"),
+        ("step.damping_ratio", "1"),
+        ("step.bandwidth", "Hz"),
+    ];
+    let model =
+        "value = base + height step(t - delay) of a second-order low-pass; bandwidth where it is 3 dB down";
+    run(args, json, &NAMES, model, |time, value| {
+        let found = step_response(time, value, 0.0)?;
+        Ok(Event {
+            found: vec![found.delay_s, found.natural_frequency_hz, found.damping_ratio, found.bandwidth_hz],
+            samples: time.len(),
+            residual: found.residual,
+        })
+    })
+}
+
+/// A tap: the free decay of the mount.
+pub fn tap(args: &Args, json: bool) -> miette::Result<ExitCode> {
+    const NAMES: [(&str, &str); 2] = [("mount.resonance", "Hz"), ("mount.damping_ratio", "1")];
+    let model = "value = c + exp(-zeta omega t) (p cos(omega_d t) + q sin(omega_d t))";
+    run(args, json, &NAMES, model, |time, value| {
+        let found = ring_down(time, value)?;
+        Ok(Event {
+            found: vec![found.frequency_hz, found.damping_ratio],
+            samples: time.len(),
+            residual: found.residual,
+        })
+    })
+}
+
+fn run(
+    args: &Args,
+    json: bool,
+    names: &[(&str, &'static str)],
+    model: &str,
+    fit: impl Fn(&[f64], &[f64]) -> Result<Event, calibration::regression::FitError>,
+) -> miette::Result<ExitCode> {
+    let mut sources = Sources::default();
+    let rows = columns(&mut sources, &args.samples, ["event", "time_s", "value"], &[])?;
+    let shown = args.samples.display();
+    let mut events = Vec::new();
+    for event in rows.chunk_by(|a, b| a[0] == b[0]) {
+        let (time, value): (Vec<f64>, Vec<f64>) = event.iter().map(|r| (r[1], r[2])).unzip();
+        let number = event[0][0];
+        if time.windows(2).any(|w| w[1] <= w[0]) {
+            miette::bail!("{shown}: event {number}: time_s must rise from row to row");
+        }
+        events.push(
+            fit(&time, &value)
+                .map_err(|e| miette::miette!("{shown}: event {number}: no certificate: {e}"))?,
+        );
+    }
+    let mut remarks = Vec::new();
+    if events.len() == 2 {
+        miette::bail!("{shown}: two events say little of their scatter: give one, or at least three");
+    }
+    if events.len() == 1 {
+        remarks.push(
+            "one event: uncertainties are those of its fit, from event to event they are unknown".into(),
+        );
+    }
+    let findings: Vec<Finding> = names
+        .iter()
+        .enumerate()
+        .map(|(k, (name, unit))| match events.as_slice() {
+            // Both models have five parameters.
+            [one] => Finding::new(*name, unit, one.found[k], one.samples as f64 - 5.0),
+            all => {
+                let values: Vec<f64> = all.iter().map(|e| e.found[k][0]).collect();
+                let mean = Input::type_a(name, &values);
+                Finding::new(*name, unit, [mean.value, mean.standard_uncertainty], mean.degrees_of_freedom)
+            }
+        })
+        .collect();
+    let n = events.len() as f64;
+    let residuals = Residuals {
+        count: events.iter().map(|e| e.samples as u64).sum(),
+        sd: (events.iter().map(|e| e.residual[0].powi(2)).sum::<f64>() / n).sqrt(),
+        largest: events.iter().map(|e| e.residual[1]).fold(0.0, f64::max),
+        unit: "as the values".into(),
+        lack_of_fit_p: None,
+    };
+    args.common.issue(outcome(model, &findings, residuals, remarks), sources.raw_data(), json)
+}

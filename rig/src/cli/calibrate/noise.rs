@@ -1,0 +1,135 @@
+//! `muprime calibrate noise`: spectrum, lines, quantisation of a sensor at rest, and the rule for a frozen value.
+
+use super::Common;
+use super::tables::{Sources, columns};
+use calibration::certificate::Residuals;
+use calibration::force::characteristics::{Finding, outcome};
+use calibration::force::noise::{
+    EqualSamples, Spectrum, integrated_autocorrelation_time, mean_with_uncertainty,
+    probability_of_equal_samples, quantum,
+};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Samples at rest, every one and evenly spaced, as CSV: lateral_counts, normal_counts (whole numbers)
+    samples: PathBuf,
+    /// Samples per second
+    #[arg(long)]
+    rate_hz: f64,
+    /// Samples of a segment of the spectrum (Welch, Hann, half overlapping)
+    #[arg(long, default_value_t = 1024)]
+    segment: usize,
+    /// Probability per sample that a live channel may be called frozen
+    #[arg(long, default_value_t = 1e-9)]
+    false_alarm: f64,
+    /// Where the spectra go, as CSV: frequency_hz, lateral_counts2_per_hz, normal_counts2_per_hz
+    #[arg(long)]
+    spectrum: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Calibrates.
+pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+    if !(args.rate_hz > 0.0 && args.rate_hz.is_finite()) {
+        miette::bail!("--rate-hz {}: above zero", args.rate_hz);
+    }
+    if !(args.false_alarm > 0.0 && args.false_alarm < 0.01) {
+        miette::bail!("--false-alarm {}: above 0 and below 0.01", args.false_alarm);
+    }
+    let mut sources = Sources::default();
+    let rows = columns(&mut sources, &args.samples, ["lateral_counts", "normal_counts"], &[])?;
+    let shown = args.samples.display();
+    let (mut findings, mut remarks, mut spectra, mut frozen) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut largest = 0f64;
+    for (axis, name) in ["lateral", "normal"].into_iter().enumerate() {
+        let counts: Vec<f64> = rows.iter().map(|r| r[axis]).collect();
+        if let Some(row) = counts.iter().position(|c| c.fract() != 0.0) {
+            miette::bail!("{shown}, row {}: {name}_counts are whole numbers, raw as they came", row + 1);
+        }
+        let whole: Vec<i64> = counts.iter().map(|c| *c as i64).collect();
+        let n = counts.len() as f64;
+        let (Some(spectrum), Some(equal)) =
+            (Spectrum::welch(&counts, args.rate_hz, args.segment), EqualSamples::of(&whole))
+        else {
+            miette::bail!(
+                "{shown}: {n} samples are too few; at least 100 and one --segment ({})",
+                args.segment
+            )
+        };
+        let mean = mean_with_uncertainty(&counts);
+        let independent = (n / integrated_autocorrelation_time(&counts)).max(2.0);
+        let sd = (counts.iter().map(|c| (c - mean.0).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+        largest = counts.iter().fold(largest, |m, c| m.max((c - mean.0).abs()));
+        let level = spectrum.white_level();
+        findings.extend([
+            Finding::new(format!("{name}.zero"), "counts", [mean.0, mean.1], independent - 1.0),
+            // The relative uncertainty of a standard deviation is 1 / sqrt(2 (n - 1)) (GUM E.4.3).
+            Finding::new(
+                format!("{name}.noise_sd"),
+                "counts",
+                [sd, sd / (2.0 * (independent - 1.0)).sqrt()],
+                independent - 1.0,
+            ),
+            Finding::new(
+                format!("{name}.white_density"),
+                "counts^2/Hz",
+                [level, level / (spectrum.segments as f64).sqrt()],
+                spectrum.segments as f64,
+            ),
+        ]);
+        for line in spectrum.lines(6.0) {
+            remarks
+                .push(format!("{name}: a line at {:.2} Hz of {:.3} counts rms", line.frequency_hz, line.rms));
+        }
+        match quantum(&whole) {
+            None => remarks.push(format!("{name}: all samples are equal: this channel is dead or frozen")),
+            Some(step) => {
+                let white = (level * args.rate_hz / 2.0).sqrt();
+                remarks.push(format!(
+                    "{name}: the converter's step is {step} counts; {:.3} % of successive samples are equal (white \
+                     noise of that level alone: {:.3} %), the longest run is {}",
+                    100.0 * equal.share,
+                    100.0 * probability_of_equal_samples(white, step as f64),
+                    equal.longest_run
+                ));
+            }
+        }
+        frozen.push(equal.frozen_after(args.false_alarm));
+        spectra.push(spectrum);
+    }
+    let frozen_after = match frozen.as_slice() {
+        [Some(a), Some(b)] => Some((*a).max(*b)),
+        _ => None,
+    };
+    remarks.push(match frozen_after {
+        Some(n) => format!(
+            "frozen-value rule: {n} equal samples in a row, at most {:.0e} false alarms a sample; in the setup: [limits] \
+             frozen_after = {n}",
+            args.false_alarm
+        ),
+        None => "no frozen-value rule: the noise is below the converter's step, equal samples say nothing".into(),
+    });
+    if let Some(path) = &args.spectrum {
+        let mut text = String::from("frequency_hz,lateral_counts2_per_hz,normal_counts2_per_hz\n");
+        for (k, (l, n)) in spectra[0].density.iter().zip(&spectra[1].density).enumerate().skip(1) {
+            let _ = writeln!(text, "{},{l:e},{n:e}", k as f64 * spectra[0].resolution_hz);
+        }
+        std::fs::write(path, text).map_err(|e| miette::miette!("{}: {e}", path.display()))?;
+    }
+    let sd =
+        findings.iter().filter(|f| f.name.ends_with("noise_sd")).map(|f| f.estimate[0]).fold(0.0, f64::max);
+    let residuals =
+        Residuals { count: 2 * rows.len() as u64, sd, largest, unit: "counts".into(), lack_of_fit_p: None };
+    let mut found = outcome("counts = zero + noise, at rest", &findings, residuals, remarks);
+    found.settings.insert("rate_hz".into(), args.rate_hz.to_string());
+    if let Some(n) = frozen_after {
+        found.settings.insert("frozen_after".into(), n.to_string());
+    }
+    args.common.issue(found, sources.raw_data(), json)
+}
