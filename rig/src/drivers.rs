@@ -39,6 +39,7 @@
 //! | [`text`] | the conversation in lines, over a serial line or SCPI over TCP |
 //! | [`canopen`] | the conversation with a CANopen drive of CiA 402 |
 //! | [`serial`] | serial lines |
+//! | [`probe`] | each instrument asked by itself, for `muprime doctor` |
 //! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 
 pub mod bundled;
@@ -51,6 +52,7 @@ pub mod modbus;
 pub mod modbus_rtu;
 pub mod modbus_tcp;
 pub mod ports;
+pub mod probe;
 pub mod serial;
 pub mod session;
 pub mod setup;
@@ -199,6 +201,20 @@ pub fn profile(id: &str) -> Result<Profile, OpenError> {
 
 fn mismatch(instrument: &InstrumentSetup, problem: String) -> OpenError {
     OpenError::Mismatch { id: instrument.profile.clone(), address: instrument.address.clone(), problem }
+}
+
+/// Connects one instrument by itself: its port is the endpoint's other half.
+///
+/// # Errors
+/// Where it does not answer, or is another than the profile says. Nothing was commanded then.
+pub fn open_one(
+    instrument: &InstrumentSetup,
+    endpoint: Endpoint,
+    epoch: Instant,
+) -> Result<Links, OpenError> {
+    let mut links = Links { stop: Arc::new(AtomicBool::new(false)), links: Vec::new() };
+    start(&mut links, instrument, endpoint, epoch)?;
+    Ok(links)
 }
 
 /// Starts the thread of one instrument and waits for its first sample.

@@ -2,6 +2,7 @@
 
 mod bundled;
 mod points;
+mod visible;
 
 use crate::input::{self, BadInput};
 use models::quantity::PeakToPeak;
@@ -11,6 +12,7 @@ use std::path::Path;
 
 pub use bundled::{BUNDLED, text as bundled_text};
 pub use points::{PlanProblem, Point, Resolution};
+pub use visible::{COUNTS_MIN, LateralChannel};
 
 /// A plan file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

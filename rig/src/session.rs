@@ -121,9 +121,16 @@ impl Job {
     /// The passes of the plan, checked.
     ///
     /// # Errors
-    /// The first value that the rig cannot do, with its place in the plan.
+    /// The first value that the rig cannot do, or the first series whose expected change of force its sensor cannot
+    /// see, with its place in the plan.
     pub fn points(&self) -> miette::Result<Vec<Point>> {
-        self.plan.points(self.seed, &self.setup.config.limits, &self.resolution()?)
+        let resolution = self.resolution()?;
+        let points = self.plan.points(self.seed, &self.setup.config.limits, &resolution)?;
+        if let Some(channel) = self.setup.lateral_channel()? {
+            let mu0 = self.setup.tip.mu0;
+            self.plan.check_visible(&points, &resolution, &*self.model, mu0, &channel)?;
+        }
+        Ok(points)
     }
 
     /// What the setup's amplifier can set, by its profile.

@@ -6,6 +6,7 @@ use crate::certificates::Certificates;
 use crate::drivers::{InstrumentSetup, InstrumentsSetup};
 use crate::fingertip::{Fingertip, FingertipSetup};
 use crate::input::{self, BadInput};
+use crate::plan::LateralChannel;
 use miette::IntoDiagnostic;
 use models::quantity::PeakToPeak;
 use realtime::compare::PassNoise;
@@ -225,6 +226,35 @@ impl Setup {
         amplifier.amplitude_m_per_unit =
             self.certificates.amplitude_m_per_unit.or(amplifier.amplitude_m_per_unit);
         InstrumentsSetup { force: self.file.force.clone(), amplifier, stage: self.file.stage.clone() }
+    }
+
+    /// What reads the lateral force, by profile, setup and certificate; `None` where no instrument does.
+    ///
+    /// # Errors
+    /// A profile that cannot be used.
+    pub fn lateral_channel(&self) -> miette::Result<Option<LateralChannel>> {
+        for instrument in &self.file.force {
+            let profile = crate::drivers::profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
+            let named = instrument.lateral.as_ref().map_or("lateral", |axis| axis.signal.as_str());
+            let Some(signal) = profile.signal(named) else { continue };
+            let gain = instrument.lateral.as_ref().map_or(1.0, |axis| axis.gain).abs();
+            let by_profile = gain * profile.lsb_si(signal, &profile.values());
+            let count = match &self.certificates.force {
+                None => by_profile,
+                Some((calibration, zero)) => {
+                    let at = |counts: f64| calibration.apply([counts, 0.0], zero)[0];
+                    (at(1.0) - at(0.0)).abs()
+                }
+            };
+            let described = &profile.description.signal[signal.0];
+            return Ok(Some(LateralChannel {
+                sensor: format!("`{}` ({named})", instrument.profile),
+                count_n: Some(count).filter(|count| count.is_finite()),
+                noise_n: described.noise.map(|noise| gain * noise * described.si.factor),
+                pass_sd_n: self.file.noise.force_sd_n,
+            }));
+        }
+        Ok(None)
     }
 
     /// The `rig.toml` that goes beside a point table (contract).

@@ -1,5 +1,7 @@
 //! `muprime doctor`: judges this machine truthfully, and talks to the instruments of a setup.
 
+use crate::drivers::OpenError;
+use crate::drivers::probe::Probed;
 use crate::setup::Setup;
 use realtime::pacing;
 use serde::Serialize;
@@ -15,11 +17,14 @@ pub struct Args {
     /// How long lateness is measured, in s
     #[arg(long, default_value_t = 3.0)]
     seconds: f64,
+    /// Only the setup's instruments, not the machine: the exit status then speaks of them alone
+    #[arg(long, requires = "setup")]
+    instruments_only: bool,
 }
 
 #[derive(Debug, Serialize)]
 struct Finding {
-    subject: &'static str,
+    subject: String,
     good: bool,
     found: String,
     advice: String,
@@ -28,7 +33,7 @@ struct Finding {
 #[derive(Debug, Serialize)]
 struct Judgement {
     findings: Vec<Finding>,
-    lateness_us: Lateness,
+    lateness_us: Option<Lateness>,
     instruments: Vec<Finding>,
 }
 
@@ -46,25 +51,11 @@ struct Lateness {
 /// A setup that cannot be used.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let setup = args.setup.as_deref().map(Setup::load).transpose()?;
-    let seconds = args.seconds.clamp(0.1, 60.0);
-    let (grants, idle) = measure(seconds, 0);
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let (_, loaded) = measure(seconds, cores);
-    let mut findings = machine(&grants);
-    let worst = loaded[3];
-    findings.push(Finding {
-        subject: "lateness under load",
-        good: loaded[2] < 500.0,
-        found: format!("99.9 % {:.0} us, worst {worst:.0} us", loaded[2]),
-        advice: "use a PREEMPT_RT kernel, isolate a core (isolcpus, nohz_full), no virtual machine".into(),
-    });
+    let (findings, lateness_us) =
+        if args.instruments_only { (Vec::new(), None) } else { judge(args.seconds) };
     let instruments = setup.as_ref().map(talk).unwrap_or_default();
     let good = findings.iter().chain(&instruments).all(|f| f.good);
-    let judgement = Judgement {
-        findings,
-        lateness_us: Lateness { idle, loaded, quantiles: [0.5, 0.99, 0.999, 1.0] },
-        instruments,
-    };
+    let judgement = Judgement { findings, lateness_us, instruments };
     if json {
         println!("{}", serde_json::json!({ "good": good, "judgement": judgement }));
     } else {
@@ -75,16 +66,31 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 println!("      {}", f.advice);
             }
         }
-        let [p50, p99, p999, max] = judgement.lateness_us.idle;
-        println!(
-            "      lateness idle: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us"
-        );
-        let [p50, p99, p999, max] = judgement.lateness_us.loaded;
-        println!(
-            "      lateness loaded: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us"
-        );
+        if let Some(late) = &judgement.lateness_us {
+            for (when, [p50, p99, p999, max]) in [("idle", late.idle), ("loaded", late.loaded)] {
+                println!(
+                    "      lateness {when}: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us"
+                );
+            }
+        }
     }
     super::exit(if good { super::DONE } else { super::FAILED })
+}
+
+/// Judges the machine.
+fn judge(seconds: f64) -> (Vec<Finding>, Option<Lateness>) {
+    let seconds = seconds.clamp(0.1, 60.0);
+    let (grants, idle) = measure(seconds, 0);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let (_, loaded) = measure(seconds, cores);
+    let mut findings = machine(&grants);
+    findings.push(Finding {
+        subject: "lateness under load".into(),
+        good: loaded[2] < 500.0,
+        found: format!("99.9 % {:.0} us, worst {:.0} us", loaded[2], loaded[3]),
+        advice: "use a PREEMPT_RT kernel, isolate a core (isolcpus, nohz_full), no virtual machine".into(),
+    });
+    (findings, Some(Lateness { idle, loaded, quantiles: [0.5, 0.99, 0.999, 1.0] }))
 }
 
 /// Lateness quantiles of a 1 kHz sleep in us, with so many busy threads beside it.
@@ -131,7 +137,7 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
     let virtual_machine = read("/proc/cpuinfo").is_some_and(|c| c.contains("hypervisor"));
     vec![
         Finding {
-            subject: "scheduling class",
+            subject: "scheduling class".into(),
             good: fifo,
             found: match &grants.policy_refused {
                 None => format!("{} at priority {}, read back", grants.policy, grants.priority),
@@ -140,7 +146,7 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
             advice: "give the user RLIMIT_RTPRIO (limits.d: '@realtime - rtprio 98') or CAP_SYS_NICE".into(),
         },
         Finding {
-            subject: "memory lock",
+            subject: "memory lock".into(),
             good: grants.memory_locked,
             found: match &grants.lock_refused {
                 None => "granted".into(),
@@ -149,26 +155,26 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
             advice: "give the user RLIMIT_MEMLOCK (limits.d: '@realtime - memlock unlimited')".into(),
         },
         Finding {
-            subject: "kernel",
+            subject: "kernel".into(),
             good: preempt_rt,
             found: format!("{kernel}, {}", if preempt_rt { "PREEMPT_RT" } else { "not PREEMPT_RT" }),
             advice: "install a PREEMPT_RT kernel (Debian: linux-image-rt-amd64)".into(),
         },
         Finding {
-            subject: "real-time throttling",
+            subject: "real-time throttling".into(),
             good: throttle.as_deref() != Some("0"),
             found: throttle.map_or("not readable".into(), |t| format!("sched_rt_runtime_us = {t}")),
             advice: "0 forbids real-time threads; set kernel.sched_rt_runtime_us to 950000".into(),
         },
         Finding {
-            subject: "real-time group scheduling",
+            subject: "real-time group scheduling".into(),
             good: !group,
             found: if group { "in force" } else { "not in force" }.into(),
             advice: "outside the root group SCHED_FIFO may be taken away silently: give the group rt_runtime"
                 .into(),
         },
         Finding {
-            subject: "timer slack",
+            subject: "timer slack".into(),
             good: true,
             found: slack.map_or("not readable".into(), |s| {
                 format!("{s} ns for ordinary threads; the loop sets its own to 1 ns")
@@ -176,20 +182,20 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
             advice: String::new(),
         },
         Finding {
-            subject: "CPU frequency",
+            subject: "CPU frequency".into(),
             good: governor.as_deref().is_none_or(|g| g == "performance"),
             found: governor.unwrap_or_else(|| "no frequency governor is visible".into()),
             advice: "set the governor to 'performance'".into(),
         },
         Finding {
-            subject: "virtual machine",
+            subject: "virtual machine".into(),
             good: !virtual_machine,
             found: if virtual_machine { "yes: its host may hold it up for milliseconds" } else { "no" }
                 .into(),
             advice: "run a real rig on a machine of its own".into(),
         },
         Finding {
-            subject: "CAN",
+            subject: "CAN".into(),
             good: true,
             found: if std::path::Path::new("/proc/net/can").exists() {
                 "the kernel has SocketCAN".into()
@@ -201,34 +207,49 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
     ]
 }
 
-/// Talks to every instrument of a setup and says what it found.
+/// Talks to every instrument of a setup, also after one that fails, and says of each what it found.
 fn talk(setup: &Setup) -> Vec<Finding> {
     if setup.file.virtual_rig.is_some() {
         return vec![Finding {
-            subject: "instruments",
+            subject: "instruments".into(),
             good: true,
             found: format!("'{}' is a virtual rig: it is started by 'muprime run'", setup.file.name),
             advice: String::new(),
         }];
     }
-    match crate::drivers::open(&setup.instruments(), Instant::now()) {
-        Err(error) => vec![Finding {
-            subject: "instruments",
+    let probed = crate::drivers::probe::probe(&setup.instruments(), Duration::from_secs(1));
+    probed.into_iter().map(found).collect()
+}
+
+fn found(probed: Probed) -> Finding {
+    let subject = format!("{} `{}` at {}", probed.role, probed.id, probed.address);
+    match probed.outcome {
+        Err(error) => Finding {
+            subject,
             good: false,
-            found: error.to_string(),
+            found: match error {
+                // The subject names the instrument already.
+                OpenError::Mismatch { problem, .. } | OpenError::Link { problem, .. } => problem,
+                other => other.to_string(),
+            },
             advice: "check address, wiring, power, and that no other program holds the link".into(),
-        }],
-        Ok(rig) => {
-            std::thread::sleep(Duration::from_secs(1));
-            rig.links
-                .health()
-                .map(|(name, health)| Finding {
-                    subject: "instrument",
-                    good: health.last_problem.is_empty(),
-                    found: format!("{name}: {} samples in a second; {}", health.samples, health.last_problem),
-                    advice: "see 'last problem'".into(),
-                })
-                .collect()
+        },
+        Ok((state, health)) => {
+            let bad = health.corrupt_frames + health.timeouts + health.exceptions;
+            let last = if health.last_problem.is_empty() {
+                String::new()
+            } else {
+                format!("; {}", health.last_problem)
+            };
+            Finding {
+                subject,
+                good: health.samples > 0 && health.last_problem.is_empty(),
+                found: format!(
+                    "{state}; {} samples in a second, {} lost, {bad} bad answers{last}",
+                    health.samples, health.lost_samples
+                ),
+                advice: "see what is said last; 'docs/devices.md' lists the traps of each bus".into(),
+            }
         }
     }
 }

@@ -53,13 +53,30 @@ pub struct PlanProblem(String);
 
 /// A condition of a series, before directions and repeats.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Wanted {
-    amplitude_pp_m: f64,
-    frequency_hz: f64,
-    speed_m_s: f64,
-    normal_force_n: f64,
-    position_m: f64,
-    ambient_pressure_pa: Option<f64>,
+pub(super) struct Wanted {
+    pub(super) amplitude_pp_m: f64,
+    pub(super) frequency_hz: f64,
+    pub(super) speed_m_s: f64,
+    pub(super) normal_force_n: f64,
+    pub(super) position_m: f64,
+    pub(super) ambient_pressure_pa: Option<f64>,
+}
+
+impl Wanted {
+    /// The condition of a pass in that direction; `time_s` is not known yet.
+    pub(super) fn condition(&self, direction: Direction, mu0: f64) -> Condition {
+        Condition {
+            amplitude: PeakToPeak::from_metres(self.amplitude_pp_m),
+            frequency_hz: self.frequency_hz,
+            speed_m_s: self.speed_m_s,
+            direction,
+            normal_force_n: self.normal_force_n,
+            mu0,
+            position_m: self.position_m,
+            time_s: 0.0,
+            ambient_pressure_pa: self.ambient_pressure_pa,
+        }
+    }
 }
 
 impl Plan {
@@ -69,38 +86,44 @@ impl Plan {
     /// The first value beyond a limit, or that the rig cannot do, with its place in the file. Nothing has moved.
     pub fn points(&self, seed: u64, limits: &Limits, resolution: &Resolution) -> miette::Result<Vec<Point>> {
         let mut conditions = Vec::new();
-        for (i, series) in self.file.series.iter().enumerate() {
-            self.check_series(i, limits)?;
-            let base = &self.file.base;
-            let or_base =
-                |list: &Vec<f64>, base: f64| if list.is_empty() { vec![base] } else { list.clone() };
-            let pressures: Vec<Option<f64>> = match &series.ambient_pressure_pa[..] {
-                [] => vec![None],
-                listed => listed.iter().copied().map(Some).collect(),
-            };
-            for &ambient_pressure_pa in &pressures {
-                for &frequency_hz in &or_base(&series.frequency_hz, base.frequency_hz) {
-                    for &speed_m_s in &or_base(&series.speed_m_s, base.speed_m_s) {
-                        for &normal_force_n in &or_base(&series.normal_force_n, base.normal_force_n) {
-                            for &position_m in &or_base(&series.position_m, base.position_m) {
-                                for &amplitude_pp_m in &or_base(&series.amplitude_pp_m, base.amplitude_pp_m) {
-                                    conditions.push(Wanted {
-                                        amplitude_pp_m: resolution.amplitude(amplitude_pp_m),
-                                        frequency_hz: resolution.frequency(frequency_hz),
-                                        speed_m_s,
-                                        normal_force_n,
-                                        position_m,
-                                        ambient_pressure_pa,
-                                    });
-                                }
+        for index in 0..self.file.series.len() {
+            self.check_series(index, limits)?;
+            conditions.extend(self.conditions_of(index, resolution));
+        }
+        self.check_travel(&conditions, limits)?;
+        Ok(self.order(conditions, seed))
+    }
+
+    /// The conditions of one series: the product of its lists, at what the amplifier can set.
+    pub(super) fn conditions_of(&self, index: usize, resolution: &Resolution) -> Vec<Wanted> {
+        let (series, base) = (&self.file.series[index], &self.file.base);
+        let or_base = |list: &Vec<f64>, base: f64| if list.is_empty() { vec![base] } else { list.clone() };
+        let pressures: Vec<Option<f64>> = match &series.ambient_pressure_pa[..] {
+            [] => vec![None],
+            listed => listed.iter().copied().map(Some).collect(),
+        };
+        let mut conditions = Vec::new();
+        for &ambient_pressure_pa in &pressures {
+            for &frequency_hz in &or_base(&series.frequency_hz, base.frequency_hz) {
+                for &speed_m_s in &or_base(&series.speed_m_s, base.speed_m_s) {
+                    for &normal_force_n in &or_base(&series.normal_force_n, base.normal_force_n) {
+                        for &position_m in &or_base(&series.position_m, base.position_m) {
+                            for &amplitude_pp_m in &or_base(&series.amplitude_pp_m, base.amplitude_pp_m) {
+                                conditions.push(Wanted {
+                                    amplitude_pp_m: resolution.amplitude(amplitude_pp_m),
+                                    frequency_hz: resolution.frequency(frequency_hz),
+                                    speed_m_s,
+                                    normal_force_n,
+                                    position_m,
+                                    ambient_pressure_pa,
+                                });
                             }
                         }
                     }
                 }
             }
         }
-        self.check_travel(&conditions, limits)?;
-        Ok(self.order(conditions, seed))
+        conditions
     }
 
     /// Repeats, shuffles within each pressure, interleaves references, and turns conditions into passes.
@@ -137,17 +160,7 @@ impl Plan {
             let direction = Direction::try_from(*sign).expect("checked when the plan was read");
             points.push(Point {
                 number: points.len() as u32,
-                condition: Condition {
-                    amplitude: PeakToPeak::from_metres(wanted.amplitude_pp_m),
-                    frequency_hz: wanted.frequency_hz,
-                    speed_m_s: wanted.speed_m_s,
-                    direction,
-                    normal_force_n: wanted.normal_force_n,
-                    mu0: 1.0,
-                    position_m: wanted.position_m,
-                    time_s: 0.0,
-                    ambient_pressure_pa: wanted.ambient_pressure_pa,
-                },
+                condition: wanted.condition(direction, 1.0),
                 replicate,
                 reference,
             });
@@ -214,7 +227,7 @@ impl Plan {
     }
 }
 
-fn series_place(text: &str, index: usize, name: &str) -> Option<std::ops::Range<usize>> {
+pub(super) fn series_place(text: &str, index: usize, name: &str) -> Option<std::ops::Range<usize>> {
     let table = toml::de::DeTable::parse(text).ok()?;
     let series = table.get_ref().get("series")?.get_ref().as_array()?;
     series.get(index)?.get_ref().as_table()?.get(name).map(toml::Spanned::span)
