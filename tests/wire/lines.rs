@@ -320,7 +320,7 @@ fn pdus210_over_its_serial_line() {
 }
 
 #[test]
-fn a_generator_by_scpi_and_pyvisa_as_its_client() {
+fn a_generator_by_scpi_with_pyvisa_and_pymeasure_as_its_clients() {
     let (bench, epoch) = (Bench::default(), Instant::now());
     let others = bench::serve_all(&bench, epoch);
     let instrument = LineInstrument::new(device("keysight-33500b"), plant(&bench, epoch));
@@ -338,6 +338,9 @@ fn a_generator_by_scpi_and_pyvisa_as_its_client() {
         (said["output"].as_bool(), said["unknown"].as_str()),
         (Some(true), Some("-113,\"Undefined header\""))
     );
+    assert_eq!(said["pymeasure_found"], serde_json::json!([27_500.5, 1.25, true]));
+    assert_eq!(said["pymeasure_set"], serde_json::json!([31_000.25, 0.75, false]));
+    assert!(said["pymeasure_errors"].as_str().unwrap().starts_with("+0,"), "{said}");
     assert!((bench.commanded(Command::Amplitude).unwrap() - 1.25e-6).abs() < 1e-15);
 
     let mut setup = setup(others.address());

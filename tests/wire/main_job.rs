@@ -1,89 +1,81 @@
-//! The main job on every bus: the same plan, world and seed give the same friction per pass.
+//! The main job on every bus: the same plan, world and seed give the same friction in every pass.
 //!
-//! The passes' means differ by the sensors' noise and the instants of sampling; what they may differ
-//! by is the repeatability that the setups state, 1.5 % of the lateral force and 0.8 mN a pass.
+//! Passes differ by the sensors' noise and the instants of sampling. What they may differ by is the uncertainty that
+//! each run states for each `mu'`, which follows from the repeatability in its setup.
 
 use super::peers::file;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-/// A machine shared with others may hold a link up until it times out or the loop trips, as it should; the run is then
-/// done again.
-const TRIES: usize = 4;
+/// `mu'` of each pass, its standard uncertainty, and whether the plate vibrated, by the number of the pass.
+type Passes = BTreeMap<u64, (f64, f64, bool)>;
 
-/// Mean of `direction * lateral / normal` by amplitude set-point in nm, of a finished run.
-pub fn friction(setup: &str, out: &Path, prefix: Option<&Path>) -> BTreeMap<i64, f64> {
+/// Sweeps on that setup, inside what `prefix` starts, and returns the passes.
+fn sweep(setup: &str, folder: &Path, prefix: Option<&Path>) -> Passes {
     let binary = tests::muprime().get_program().to_owned();
-    let mut last = String::new();
-    for _ in 0..TRIES {
-        let _ = std::fs::remove_dir_all(out);
-        let mut command = match prefix {
-            Some(guest) => {
-                let mut command = Command::new(guest);
-                command.arg(&binary);
-                command
-            }
-            None => Command::new(&binary),
-        };
-        let output = command
-            .arg("run")
-            .arg(file("tests/plans/buses.toml"))
-            .args(["--setup", setup, "--seed", "11", "--out"])
-            .arg(out)
-            .output()
-            .unwrap();
-        last = String::from_utf8_lossy(&output.stderr).into_owned();
-        if output.status.success() {
-            return read(out);
+    let (out, output) = tests::sweep_unless_the_machine_stalls(&folder.join(setup), |out| {
+        let mut command = Command::new(prefix.map_or(binary.as_os_str(), Path::as_os_str));
+        if prefix.is_some() {
+            command.arg(&binary);
         }
-        let held_up = ["Stale", "Overrun", "no answer within"].iter().any(|sign| last.contains(sign));
-        assert!(held_up, "{setup}: {last}");
-    }
-    panic!("{setup}: tripped {TRIES} times: {last}");
+        command.arg("run").arg(file("tests/plans/buses.toml"));
+        command.args(["--setup", setup, "--seed", "11", "--out"]).arg(out);
+        command
+    });
+    let (_, said) = tests::texts(&output);
+    assert!(output.status.success(), "{setup}: {said}");
+    read(&out)
 }
 
-fn read(out: &Path) -> BTreeMap<i64, f64> {
+fn read(out: &Path) -> Passes {
     let text = std::fs::read_to_string(out.join("points.csv")).unwrap();
     let mut lines = text.lines();
     let head: Vec<&str> = lines.next().unwrap().split(',').collect();
     let column = |name: &str| head.iter().position(|h| *h == name).unwrap();
-    let (w, direction) = (column("amplitude_pp_m"), column("direction"));
-    let (lateral, normal) = (column("lateral_force_n"), column("normal_force_n"));
-    let mut sums: BTreeMap<i64, (f64, f64)> = BTreeMap::new();
-    for line in lines {
-        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
-        // The echoed amplitude is quantised: to the nearest quarter of a micrometre it is the plan's.
-        #[allow(clippy::cast_possible_truncation)]
-        let key = (cells[w] / 250e-9).round() as i64 * 250;
-        let sum = sums.entry(key).or_default();
-        sum.0 += cells[direction] * cells[lateral] / cells[normal];
-        sum.1 += 1.0;
-    }
-    sums.into_iter().map(|(key, (sum, count))| (key, sum / count)).collect()
+    let columns = ["point", "mu_relative", "mu_relative_sd", "amplitude_pp_m"].map(column);
+    let passes = lines.filter_map(|line| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let [point, mu, sd, w] = columns.map(|column| cells[column].parse::<f64>());
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // counts
+        Some((point.ok()? as u64, (mu.ok()?, sd.ok()?, w.ok()? > 0.0)))
+    });
+    passes.collect()
 }
 
-/// Compares two runs, amplitude by amplitude: four standard deviations of the difference of two means
-/// of at least two passes, by the repeatability that the setups state.
-pub fn compare(setup: &str, reference: &BTreeMap<i64, f64>, found: &BTreeMap<i64, f64>) {
-    assert_eq!(reference.keys().collect::<Vec<_>>(), found.keys().collect::<Vec<_>>(), "{setup}");
-    for (amplitude, mu) in reference {
-        let sd = ((0.015 * mu).powi(2) + (0.0008_f64 / 0.25).powi(2)).sqrt();
-        let difference = found[amplitude] - mu;
-        assert!(difference.abs() < 4.0 * sd, "{setup} at {amplitude} nm: {} and {mu}", found[amplitude]);
-    }
-    let spread = reference.values().fold(0.0_f64, |most, mu| most.max(*mu))
-        / reference.values().fold(f64::INFINITY, |least, mu| least.min(*mu));
+/// Compares two runs pass by pass, each difference in units of its own standard uncertainty.
+fn compare(setup: &str, reference: &Passes, found: &Passes) {
+    let points = |passes: &Passes| passes.keys().copied().collect::<Vec<_>>();
+    assert_eq!(points(reference), points(found), "{setup}: the same seed gives the same passes");
+    assert!(reference.len() >= 8, "{reference:?}");
+    let z: Vec<f64> = reference
+        .iter()
+        .zip(found.values())
+        .map(|((point, (mu, sd, on)), (other, other_sd, other_on))| {
+            assert_eq!(on, other_on, "{setup}: pass {point}");
+            (other - mu) / sd.hypot(*other_sd)
+        })
+        .collect();
+    let worst = z.iter().fold(0.0_f64, |most, z| most.max(z.abs()));
+    #[allow(clippy::cast_precision_loss)]
+    let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
+    println!(
+        "{setup}: {} passes, difference {rms:.2} standard uncertainties rms, {worst:.2} at worst",
+        z.len()
+    );
+    // Of some twenty passes none lies beyond four of its own standard uncertainties by chance.
+    assert!(worst < 4.0 && rms < 1.5, "{setup}: {z:?}");
+    let vibrating = || reference.values().filter(|(.., on)| *on).map(|(mu, ..)| *mu);
+    let spread = vibrating().fold(0.0_f64, f64::max) / vibrating().fold(f64::INFINITY, f64::min);
     assert!(spread > 2.0, "the plan must show a reduction, else the comparison is empty: {reference:?}");
 }
 
 #[test]
 fn the_same_friction_over_tcp_rtu_slcan_and_mixed_buses() {
     let folder = tempfile::tempdir().unwrap();
-    let reference = friction("virtual-ideal", &folder.path().join("tcp"), None);
+    let reference = sweep("virtual-ideal", folder.path(), None);
     for setup in ["virtual-rtu", "virtual-slcan", "virtual-mixed"] {
-        let found = friction(setup, &folder.path().join(setup), None);
-        compare(setup, &reference, &found);
+        compare(setup, &reference, &sweep(setup, folder.path(), None));
     }
 }
 
@@ -91,8 +83,7 @@ fn the_same_friction_over_tcp_rtu_slcan_and_mixed_buses() {
 #[test]
 fn the_same_friction_over_the_kernels_can_bus() {
     let folder = tempfile::tempdir().unwrap();
-    let reference = friction("virtual-ideal", &folder.path().join("tcp"), None);
+    let reference = sweep("virtual-ideal", folder.path(), None);
     let guest = file("tests/can_guest/can-guest");
-    let found = friction("virtual-socketcan", &folder.path().join("can"), Some(&guest));
-    compare("virtual-socketcan", &reference, &found);
+    compare("virtual-socketcan", &reference, &sweep("virtual-socketcan", folder.path(), Some(&guest)));
 }
