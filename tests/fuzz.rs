@@ -136,6 +136,12 @@ fn dbc_files() {
     decoder("dbc_files", &corpus, 20);
 }
 
+/// Objects of any data sheet that is accepted can be asked for their process data.
+#[test]
+fn data_sheets() {
+    decoder("data_sheets", &files("rig/profiles", ".eds"), 20);
+}
+
 #[test]
 fn profiles() {
     decoder("profiles", &files("rig/profiles", ".toml"), 20);

@@ -1,7 +1,11 @@
 //! The drivers against emulators and misbehaving servers, over real sockets.
 
+#[path = "wire/ati_digital.rs"]
+mod ati_digital;
 #[path = "wire/bench.rs"]
 mod bench;
+#[path = "wire/doctor.rs"]
+mod doctor;
 #[path = "wire/documents.rs"]
 mod documents;
 #[path = "wire/line_peers.rs"]

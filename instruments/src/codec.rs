@@ -6,6 +6,7 @@
 //! | [`stream`] | sensor streams without a request: sync bytes, length, checksum, resynchronisation |
 //! | [`can`] | CAN frames, and the lines of serial CAN adapters |
 //! | [`canopen`] | NMT, SDO, heartbeat, emergency, and the states of CiA 402 |
+//! | [`eds`] | CANopen objects by an electronic data sheet |
 //! | [`dbc`] | signals of CAN messages by a DBC file |
 //! | [`text`] | answers that are lines of text |
 //! | [`checksum`] | the checks that frames end with |
@@ -14,6 +15,7 @@ pub mod can;
 pub mod canopen;
 pub mod checksum;
 pub mod dbc;
+pub mod eds;
 pub mod modbus_rtu;
 pub mod stream;
 pub mod text;

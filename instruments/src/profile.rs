@@ -4,6 +4,7 @@
 //! decoding a frame neither searches nor allocates.
 
 mod compile;
+mod computed;
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -34,6 +35,10 @@ impl Values {
     #[must_use]
     pub fn get(&self, signal: SignalId) -> f64 {
         self.0.get(signal.0).copied().unwrap_or(f64::NAN)
+    }
+
+    pub(crate) fn set(&mut self, signal: SignalId, value: f64) {
+        self.0[signal.0] = value;
     }
 
     /// All of them, by index.
@@ -85,12 +90,14 @@ pub enum FrameKind {
 }
 
 /// Where a signal stands in its frame.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) enum Place {
     /// Bytes.
     Bytes(Field),
     /// Bits of a CAN message that begins at this byte of the frame.
     Dbc(usize, DbcSignal),
+    /// Nowhere: worked out from other signals.
+    Computed(Expression),
 }
 
 impl Place {
@@ -98,6 +105,7 @@ impl Place {
         match self {
             Place::Bytes(field) => field.read(frame),
             Place::Dbc(at, signal) => signal.read(frame.get(*at..)?),
+            Place::Computed(_) => None,
         }
     }
 
@@ -106,6 +114,7 @@ impl Place {
             Place::Bytes(field) => field.counts(frame),
             #[allow(clippy::cast_possible_truncation)] // counts of at most 32 bits
             Place::Dbc(at, signal) => signal.read(frame.get(*at..)?).map(|value| value as i64),
+            Place::Computed(_) => None,
         }
     }
 
@@ -113,6 +122,7 @@ impl Place {
         match self {
             Place::Bytes(field) => field.write(frame, value),
             Place::Dbc(at, signal) => frame.get_mut(*at..).is_some_and(|frame| signal.write(frame, value)),
+            Place::Computed(_) => true,
         }
     }
 
@@ -121,6 +131,7 @@ impl Place {
         match self {
             Place::Bytes(field) => field.number.limits().1 + 1.0,
             Place::Dbc(_, signal) => 2_f64.powi(i32::from(signal.size)),
+            Place::Computed(_) => f64::INFINITY,
         }
     }
 }
@@ -173,8 +184,9 @@ impl Profile {
     /// # Errors
     /// What is wrong, with the place in the file.
     pub fn parse_with(text: &str, file: &dyn Fn(&str) -> Option<String>) -> Result<Self, ProfileError> {
-        let description: Description =
+        let mut description: Description =
             toml::from_str(text).map_err(|error| ProfileError::from_toml(text, &error))?;
+        description.signal = computed::spread(description.signal);
         Compiler { text, description: &description, file }.compile()
     }
 
@@ -252,7 +264,8 @@ impl Profile {
             return Err(FrameError::Length { expected, found: bytes.len() });
         }
         // Scales may depend on signals of the same frame, so raw values come first.
-        for (signal, value) in self.signals.iter().zip(&mut values.0).filter(|(s, _)| s.frame == frame) {
+        let stored = |s: &CompiledSignal| s.frame == frame && !matches!(s.place, Place::Computed(_));
+        for (signal, value) in self.signals.iter().zip(&mut values.0).filter(|(s, _)| stored(s)) {
             let raw = signal.place.read(bytes).unwrap_or(f64::NAN);
             *value = if signal.scale_expression.is_none() { raw * signal.scale + signal.offset } else { raw };
         }
@@ -262,6 +275,7 @@ impl Profile {
                 values.0[index] = values.0[index] * signal.scale * scale.value(&values.0) + signal.offset;
             }
         }
+        self.work_out(frame, values);
         Ok(())
     }
 
@@ -291,10 +305,15 @@ impl Profile {
     }
 
     /// What the instrument sent for a signal, in its own counts; for `f32` the bits of the number.
-    /// Zero where the frame is too short.
+    /// Zero where the frame is too short. A signal that is worked out is given in its own smallest steps
+    /// ([`Profile::lsb_si`]).
     #[must_use]
-    pub fn raw(&self, signal: SignalId, frame: &[u8]) -> i64 {
-        self.signals[signal.0].place.counts(frame).unwrap_or(0)
+    pub fn raw(&self, signal: SignalId, frame: &[u8], values: &Values) -> i64 {
+        match &self.signals[signal.0].place {
+            #[allow(clippy::cast_possible_truncation)] // saturates, and NaN gives zero
+            Place::Computed(_) => (self.si(signal, values) / self.lsb_si(signal, values)).round() as i64,
+            place => place.counts(frame).unwrap_or(0),
+        }
     }
 
     /// Whether a set-point may take `value` (in its `unit`).
@@ -337,6 +356,9 @@ impl Profile {
     /// The size of one count in SI units, at the scale that holds now.
     #[must_use]
     pub fn lsb_si(&self, signal: SignalId, values: &Values) -> f64 {
+        if let Place::Computed(value) = &self.signals[signal.0].place {
+            return self.smallest_step(signal, value, values);
+        }
         let signal = &self.signals[signal.0];
         let expression = signal.scale_expression.as_ref().map_or(1.0, |scale| scale.value(values.as_slice()));
         (signal.scale * expression * signal.si_factor).abs()
@@ -353,8 +375,17 @@ impl Profile {
         if signal.valid_when.as_ref().is_some_and(|valid| !valid.holds(values.as_slice())) {
             return Some(Refusal::MarkedInvalid);
         }
-        // A value on the end of the range is a rail: what lies beyond it cannot be seen.
-        signal.range.and_then(|(low, high)| (value <= low || value >= high).then_some(Refusal::OutOfRange))
+        // A value on the end of the range is a rail: what lies beyond it cannot be seen. What is worked out from a
+        // signal at its rail is worth no more.
+        let railed = |signal: &CompiledSignal, value: f64| {
+            signal.range.is_some_and(|(low, high)| value <= low || value >= high)
+        };
+        let computed = matches!(signal.place, Place::Computed(_));
+        let input = |(other, value): (&CompiledSignal, &f64)| {
+            computed && other.frame == signal.frame && railed(other, *value)
+        };
+        let beyond = railed(signal, value) || self.signals.iter().zip(values.as_slice()).any(input);
+        beyond.then_some(Refusal::OutOfRange)
     }
 
     /// The first signature that does not hold, by index into the description.

@@ -53,6 +53,11 @@ impl Profile {
         };
         let bytes = bytes_of(vector).map_err(error)?;
         let mut values = self.values();
+        for (name, &given) in &vector.given {
+            let signal = self.signal(name).filter(|&s| self.frame_of(s).0 != which);
+            let signal = signal.ok_or_else(|| error(format!("`{name}` is no signal of another frame")))?;
+            values.set(signal, given);
+        }
         if which < polls {
             self.decode(FrameId(which), &bytes, &mut values).map_err(|e| error(e.to_string()))?;
         } else if bytes.len() != 2 * usize::from(d.write[which - polls].count) {

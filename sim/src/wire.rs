@@ -63,4 +63,10 @@ impl SharedPlant {
         plant.advance(now);
         (plant, now)
     }
+
+    /// The world as it was left, and what time it is: for whoever advances it in steps of his own.
+    pub fn as_left(&self) -> (MutexGuard<'_, dyn Plant + 'static>, Nanos) {
+        let plant = self.plant.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        (plant, Nanos(u64::try_from(self.epoch.elapsed().as_nanos()).unwrap_or(u64::MAX)))
+    }
 }

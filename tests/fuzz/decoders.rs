@@ -6,6 +6,7 @@ use instruments::Profile;
 use instruments::codec::can::{CanFrame, SlcanReader, SlcanSaid, slcan_line};
 use instruments::codec::canopen::{self, DriveState, SdoAnswer};
 use instruments::codec::checksum::Check;
+use instruments::codec::eds;
 use instruments::codec::modbus_rtu::{self as rtu, Heard};
 use instruments::codec::stream::{Cutter, Shape};
 use instruments::codec::{dbc, text};
@@ -19,6 +20,7 @@ pub const ALL: &[(&str, fn(&[u8], &mut Chance))] = &[
     ("numbers_in_text", numbers_in_text),
     ("dbc_files", dbc_files),
     ("profiles", profiles),
+    ("data_sheets", data_sheets),
 ];
 
 /// Whatever is heard or accepted as Modbus RTU lies within the bytes and carries a right check.
@@ -121,8 +123,10 @@ pub fn dbc_files(input: &[u8], chance: &mut Chance) {
 /// A profile that is accepted decodes frames of any content and any length without harm.
 pub fn profiles(input: &[u8], chance: &mut Chance) {
     const DBC: &str = include_str!("../../rig/profiles/muprime-can.dbc");
+    const EDS: &str = include_str!("../../rig/profiles/cia402-profile-velocity.eds");
     let Ok(text) = std::str::from_utf8(input) else { return };
-    let Ok(profile) = Profile::parse_with(text, &|_| Some(DBC.to_string())) else { return };
+    let sheet = |name: &str| Some(if name.ends_with(".eds") { EDS.to_string() } else { DBC.to_string() });
+    let Ok(profile) = Profile::parse_with(text, &sheet) else { return };
     let _ = profile.check(text);
     let mut values = profile.values();
     for frame in 0..profile.frames().len() {
@@ -133,4 +137,15 @@ pub fn profiles(input: &[u8], chance: &mut Chance) {
         let _ = profile.decode(instruments::FrameId(frame), &bytes, &mut values);
     }
     let _ = (profile.broken_signature(&values), profile.fault(&values));
+}
+
+/// Objects of any data sheet that is accepted can be asked for their process data.
+pub fn data_sheets(input: &[u8], chance: &mut Chance) {
+    let Ok(text) = std::str::from_utf8(input) else { return };
+    let Ok(objects) = eds::parse(text) else { return };
+    for (first, cob) in [(0x1800, 0x180), (0x1400, 0x200), (0x1800, u32::from(chance.byte()))] {
+        if let Ok((placed, length)) = eds::mapping(&objects, first, cob) {
+            assert!(length <= 8 && placed.iter().all(|(key, at)| *at < 8 && objects.contains_key(key)));
+        }
+    }
 }

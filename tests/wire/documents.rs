@@ -30,3 +30,27 @@ fn the_pages_of_the_instruments_are_current() {
         check(&format!("rig/profiles/docs/{id}.md"), &instruments::document::markdown(&profile(id).unwrap()));
     }
 }
+
+/// Every test that the table of traps names exists where it says, and every trap but one has a test.
+#[test]
+fn every_trap_has_the_tests_that_it_names() {
+    let page = std::fs::read_to_string(file("docs/devices.md")).unwrap();
+    let rows = page.lines().skip_while(|line| !line.starts_with("| trap |")).skip(2);
+    let (mut traps, mut without, mut named) = (0, 0, 0);
+    for row in rows.take_while(|line| line.starts_with('|')) {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        assert_eq!(cells.len(), 6, "{row}");
+        traps += 1;
+        without += usize::from(cells[4].starts_with("none:"));
+        for test in cells[4].split('`').skip(1).step_by(2) {
+            let (path, name) = test.split_once(": ").unwrap_or_else(|| panic!("{test}"));
+            let source = std::fs::read_to_string(file(path)).unwrap_or_else(|e| panic!("{path}: {e}"));
+            let at = source.find(&format!("fn {name}(")).unwrap_or_else(|| panic!("{path} has no {name}"));
+            let head = &source[..at];
+            let attribute = head.rfind("#[test]").unwrap_or_else(|| panic!("{name} is no test"));
+            assert!(!head[attribute..].contains("fn "), "{name} is no test");
+            named += 1;
+        }
+    }
+    assert!(traps >= 20 && named >= 25 && without == 1, "{traps} traps, {named} tests, {without} without");
+}

@@ -130,3 +130,24 @@ fn our_driver_commands_a_python_canopen_node() {
     // The loop falls silent: the driver takes the drive out of it.
     eventually("a drive that is no longer enabled", || at(&mut rig, 0.012_345));
 }
+
+/// Our reading of the drive's data sheet and python-canopen's own: the same objects, types, access and defaults.
+#[test]
+fn the_data_sheet_means_the_same_to_python_canopen() {
+    const NODE: i64 = 5;
+    let path = file("rig/profiles/cia402-profile-velocity.eds");
+    let said = json(python().arg(file("tests/peers/eds_objects.py")).arg(&path).arg(NODE.to_string()));
+    let ours = instruments::codec::eds::parse(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let theirs = said.as_array().unwrap();
+    assert_eq!(theirs.len(), ours.len());
+    for entry in theirs {
+        let number = |i: usize| entry[i].as_u64().unwrap();
+        let key = (u16::try_from(number(0)).unwrap(), u8::try_from(number(1)).unwrap());
+        let object = &ours[&key];
+        assert_eq!(Some(object.name.rsplit('.').next().unwrap()), entry[2].as_str(), "{entry}");
+        assert_eq!(u64::from(object.data_type), number(3), "{entry}");
+        assert_eq!(Some(object.access.as_str()), entry[4].as_str(), "{entry}");
+        let default = object.default.map(|d| d.value + if d.plus_node { NODE } else { 0 });
+        assert_eq!(default, entry[5].as_i64(), "{entry}");
+    }
+}

@@ -46,6 +46,9 @@ pub struct Request {
     pub answer_length: usize,
 }
 
+/// What answers a function of the maker's own that was carried out (ATI Digital F/T).
+pub const DONE: u8 = 1;
+
 /// Bytes of an exception.
 pub const EXCEPTION_LENGTH: usize = 5;
 

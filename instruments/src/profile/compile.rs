@@ -5,9 +5,10 @@ use std::ops::Range;
 
 use super::{CompiledSet, CompiledSignal, Frame, FrameId, FrameKind, Place, Profile, SignalId};
 use crate::codec::dbc::{self, DbcMessage};
+use crate::codec::eds::{self, Objects};
 use crate::error::ProfileError;
 use crate::expression::Expression;
-use crate::field::{Field, NumberType};
+use crate::field::{ByteOrder, Field, NumberType};
 use crate::schema::{Description, LinkKind, Message};
 
 /// Gives the text of another file by its name.
@@ -32,6 +33,7 @@ impl Compiler<'_> {
         let d = self.description;
         self.check_header()?;
         let messages = self.dbc()?;
+        let sheet = self.eds()?;
         self.unique(d.signal.iter().map(|s| &s.name), "signal")?;
         self.unique(d.set.iter().map(|s| &s.name), "set-point")?;
         for poll in &d.poll {
@@ -51,9 +53,9 @@ impl Compiler<'_> {
             d.signal.iter().enumerate().map(|(i, s)| (s.name.as_ref().clone(), i)).collect();
         let index = |name: &str| by_name.get(name).copied();
         let frames = self.frames(&messages, &index)?;
-        let signal = |s| self.signal(s, &frames, &messages, &index);
+        let signal = |s| self.signal(s, &frames, &messages, &sheet, &index);
         let signals = d.signal.iter().map(signal).collect::<Result<_, _>>()?;
-        let sets = d.set.iter().map(|s| self.set(s)).collect::<Result<_, _>>()?;
+        let sets = d.set.iter().map(|s| self.set(s, &sheet)).collect::<Result<_, _>>()?;
         let condition = |when: &toml::Spanned<String>| {
             Expression::compile(when.as_ref(), &index).map_err(|said| self.at(when.span(), said))
         };
@@ -81,6 +83,65 @@ impl Compiler<'_> {
         let error = |message: String| ProfileError::at(self.text, place.clone(), message);
         let text = (self.file)(name).ok_or_else(|| error(format!("the file `{name}` is not there")))?;
         dbc::parse(&text).map_err(|said| error(format!("{name}: {said}")))
+    }
+
+    /// The objects of the profile's data sheet, if it names one, and what the profile writes to them at connection.
+    fn eds(&self) -> Result<Objects, ProfileError> {
+        let Some(name) = &self.description.link.eds else { return Ok(Objects::new()) };
+        let place = self.text.find(name.as_str()).map(|at| at..at + name.len());
+        let error = |message: String| ProfileError::at(self.text, place.clone(), message);
+        let text = (self.file)(name).ok_or_else(|| error(format!("the file `{name}` is not there")))?;
+        let sheet = eds::parse(&text).map_err(|said| error(format!("{name}: {said}")))?;
+        for (index, sub, bytes, _) in self.description.init.iter().filter_map(|init| init.sdo) {
+            let wrong = match sheet.get(&(index, sub)) {
+                None => "is not in the data sheet",
+                Some(object) if !object.writable() => "cannot be written",
+                Some(object) if object.number().map(NumberType::bytes) != Some(usize::from(bytes)) => {
+                    "has another length"
+                }
+                Some(_) => continue,
+            };
+            return Err(error(format!("{name}: object {index:04X}sub{sub} of an [[init]] {wrong}")));
+        }
+        for (first, cob, length) in (self.description.message.iter())
+            .filter_map(|m| Some((0x1800, m.cob?, usize::from(m.length.unwrap_or(8)))))
+            .chain(
+                self.description
+                    .write
+                    .iter()
+                    .filter_map(|w| Some((0x1400, w.cob?, 2 * usize::from(w.count)))),
+            )
+        {
+            let (_, mapped) =
+                eds::mapping(&sheet, first, cob).map_err(|said| error(format!("{name}: {said}")))?;
+            if mapped != length {
+                let said =
+                    format!("{name}: the frame {cob:#x} has {mapped} bytes, the profile says {length}");
+                return Err(error(said));
+            }
+        }
+        Ok(sheet)
+    }
+
+    /// Where an object stands in its process data, by the data sheet.
+    fn mapped(
+        &self,
+        object: Option<eds::Key>,
+        first: u16,
+        cob: Option<u32>,
+        sheet: &Objects,
+        name: &toml::Spanned<String>,
+    ) -> Result<Field, ProfileError> {
+        let error = |said: String| self.at(name.span(), format!("`{}`: {said}", name.as_ref()));
+        let (object, cob) =
+            object.zip(cob).ok_or_else(|| error("`object` needs a frame with `cob`".into()))?;
+        let (placed, _) = eds::mapping(sheet, first, cob).map_err(error)?;
+        let at = placed.iter().find(|(key, _)| *key == object).map(|(_, at)| *at);
+        let at = at.ok_or_else(|| error(format!("{:04X}sub{} is not mapped there", object.0, object.1)))?;
+        let number = sheet.get(&object).and_then(eds::Object::number);
+        let number = number.ok_or_else(|| error("the object is no number of at most 32 bits".into()))?;
+        // CANopen is little endian throughout.
+        Ok(Field { at, number, order: ByteOrder::Dcba, bits: None })
     }
 
     /// All frames, in the order that indices follow.
@@ -267,6 +328,7 @@ impl Compiler<'_> {
         s: &crate::schema::Signal,
         frames: &[Frame],
         messages: &Messages,
+        sheet: &Objects,
         index: &dyn Fn(&str) -> Option<usize>,
     ) -> Result<CompiledSignal, ProfileError> {
         let name = s.name.as_ref();
@@ -281,7 +343,24 @@ impl Compiler<'_> {
                 return Err(self.at(s.name.span(), message));
             }
         };
-        let place = self.place(s, &frames[frame], messages)?;
+        let place = match &s.value {
+            None if s.object.is_some() => {
+                let cob = match frames[frame].kind {
+                    FrameKind::Messages(group, _) => self.description.message[group].cob,
+                    _ => None,
+                };
+                Place::Bytes(self.mapped(s.object, 0x1800, cob, sheet, &s.name)?)
+            }
+            None => self.place(s, &frames[frame], messages)?,
+            Some(value) => {
+                if s.register.is_some() || s.byte.is_some() || s.dbc.is_some() || s.number.is_some() {
+                    let message = format!("signal `{name}` is worked out: it stands nowhere and has no type");
+                    return Err(self.at(s.name.span(), message));
+                }
+                let said = |said| self.at(s.name.span(), format!("signal `{name}`: {said}"));
+                Place::Computed(Expression::compile(value, index).map_err(said)?)
+            }
+        };
         if let Place::Bytes(field) = &place {
             self.check_field(field, frames[frame].bytes, s.name.span(), name)?;
         }
@@ -345,7 +424,7 @@ impl Compiler<'_> {
         Ok(Place::Bytes(Field { at, number, order: s.byte_order, bits: s.bits }))
     }
 
-    fn set(&self, s: &crate::schema::Set) -> Result<CompiledSet, ProfileError> {
+    fn set(&self, s: &crate::schema::Set, sheet: &Objects) -> Result<CompiledSet, ProfileError> {
         let name = s.name.as_ref();
         if s.scale == 0.0 || !s.scale.is_finite() {
             return Err(
@@ -371,9 +450,14 @@ impl Compiler<'_> {
             None if blocks.len() == 1 => 0,
             None => return Err(self.at(s.name.span(), format!("set-point `{name}` needs `block` or `send`"))),
         };
-        let number =
-            s.number.ok_or_else(|| self.at(s.name.span(), format!("set-point `{name}` needs `type`")))?;
-        let field = Field { at: 2 * usize::from(s.register), number, order: s.byte_order, bits: None };
+        let field = if s.object.is_some() {
+            self.mapped(s.object, 0x1400, blocks[block].cob, sheet, &s.name)?
+        } else {
+            let number =
+                s.number.ok_or_else(|| self.at(s.name.span(), format!("set-point `{name}` needs `type`")))?;
+            Field { at: 2 * usize::from(s.register), number, order: s.byte_order, bits: None }
+        };
+        let number = field.number;
         self.check_field(&field, 2 * usize::from(blocks[block].count), s.name.span(), name)?;
         if let Some((low, high)) = s.range {
             let (least, most) = (number.limits().0 * s.scale, number.limits().1 * s.scale);

@@ -137,6 +137,12 @@ pub struct Init {
     /// A CAN frame: identifier (less the node for CANopen) and data.
     #[serde(default)]
     pub can: Option<(u32, Vec<u8>)>,
+    /// Modbus RTU: a function of the maker's own and its byte; answered by the function and 1.
+    #[serde(default)]
+    pub function: Option<(u8, u8)>,
+    /// Modbus: registers read from the first address and written to the second, and how many.
+    #[serde(default)]
+    pub copy: Option<(u16, u16, u16)>,
     /// CANopen: object, subindex, bytes and value to be written.
     #[serde(default)]
     pub sdo: Option<(u16, u8, u8, i64)>,

@@ -45,6 +45,9 @@ pub struct Link {
     /// DBC file that describes the signals of CAN messages.
     #[serde(default)]
     pub dbc: Option<String>,
+    /// CANopen: the electronic data sheet that describes the objects and the process data.
+    #[serde(default)]
+    pub eds: Option<String>,
     /// CAN identifier that others are counted from, unless the setup names one.
     #[serde(default)]
     pub base: Option<u32>,

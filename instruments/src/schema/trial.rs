@@ -37,6 +37,9 @@ pub struct Vector {
     /// A line of text.
     #[serde(default)]
     pub line: Option<String>,
+    /// Values that were read before, of signals of other frames.
+    #[serde(default)]
+    pub given: BTreeMap<String, f64>,
     /// Values in their `unit`s, by signal or set-point.
     #[schemars(with = "BTreeMap<String, f64>")]
     pub expect: Spanned<BTreeMap<String, f64>>,

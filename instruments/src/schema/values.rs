@@ -22,6 +22,15 @@ pub struct Signal {
     /// First byte, counted from the start of the frame.
     #[serde(default)]
     pub byte: Option<u16>,
+    /// How many neighbours of the same type there are: they are called `name0`, `name1` and so on.
+    #[serde(default)]
+    pub array: Option<u16>,
+    /// Worked out from other signals, in place of register, byte and type; linear in those of its own frame.
+    #[serde(default)]
+    pub value: Option<String>,
+    /// CANopen: index and subindex, in place of byte and type; the data sheet says where in the process data.
+    #[serde(default)]
+    pub object: Option<(u16, u8)>,
     /// `message.signal` of the DBC file, in place of register, byte and type.
     #[serde(default)]
     pub dbc: Option<String>,
@@ -93,6 +102,9 @@ pub struct Set {
     /// First register, counted from the start of the block.
     #[serde(default)]
     pub register: u16,
+    /// CANopen: index and subindex, in place of register and type; the data sheet says where in the process data.
+    #[serde(default)]
+    pub object: Option<(u16, u8)>,
     /// Type; left out for lines of text.
     #[serde(rename = "type", default)]
     pub number: Option<NumberType>,

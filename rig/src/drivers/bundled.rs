@@ -1,6 +1,7 @@
 //! The profiles that come with the program. A new one: a file in `profiles/` and one line here.
 
 const PROFILES: &[(&str, &str)] = &[
+    ("ati-digital-ft", include_str!("../../profiles/ati-digital-ft.toml")),
     ("ati-netft-can", include_str!("../../profiles/ati-netft-can.toml")),
     ("cia402-profile-velocity", include_str!("../../profiles/cia402-profile-velocity.toml")),
     ("hbk-wtx110", include_str!("../../profiles/hbk-wtx110.toml")),
@@ -15,7 +16,10 @@ const PROFILES: &[(&str, &str)] = &[
 ];
 
 /// The files that profiles name.
-const FILES: &[(&str, &str)] = &[("muprime-can.dbc", include_str!("../../profiles/muprime-can.dbc"))];
+const FILES: &[(&str, &str)] = &[
+    ("cia402-profile-velocity.eds", include_str!("../../profiles/cia402-profile-velocity.eds")),
+    ("muprime-can.dbc", include_str!("../../profiles/muprime-can.dbc")),
+];
 
 /// The text of a file that a profile names.
 #[must_use]
@@ -48,6 +52,31 @@ mod tests {
             profile.check(text).unwrap_or_else(|error| panic!("{id}: {error}"));
             assert_eq!(profile.id(), id);
         }
+    }
+
+    /// What is worked out from a gage at its converter's rail is no good force; a count of it is a step of the matrix.
+    #[test]
+    fn a_gage_at_its_rail_saturates_every_force() {
+        use instruments::profile::Refusal;
+        let profile = crate::drivers::profile("ati-digital-ft").unwrap();
+        let mut values = profile.values();
+        let frame = |name: &str| profile.frame(name).unwrap();
+        for vector in profile.description.vector.iter().filter(|vector| vector.registers.is_some()) {
+            let bytes: Vec<u8> = vector.registers.iter().flatten().flat_map(|r| r.to_be_bytes()).collect();
+            let named = vector.frame.as_deref().and_then(|name| profile.frame(name));
+            if let Some(frame) = named {
+                profile.decode(frame, &bytes, &mut values).unwrap();
+            }
+        }
+        let fx = profile.signal("fx").unwrap();
+        assert!((profile.lsb_si(fx, &values) - 610e-6).abs() < 1e-9, "610 by the matrix over 10^6 counts");
+        assert!(profile.lsb_si(fx, &profile.values()).is_nan(), "not known before the matrix is");
+        let mut sample = [0_u8; 13];
+        profile.decode(frame("stream"), &sample, &mut values).unwrap();
+        assert_eq!(profile.refusal(fx, &values), None);
+        sample[6..8].copy_from_slice(&i16::MAX.to_be_bytes());
+        profile.decode(frame("stream"), &sample, &mut values).unwrap();
+        assert_eq!(profile.refusal(fx, &values), Some(Refusal::OutOfRange));
     }
 
     /// A check that cannot fail is none: each number of each vector, changed, must be noticed.

@@ -46,6 +46,7 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         let longest = Duration::from_millis(u64::from(link.response_timeout_ms));
         wire.line.drain(longest, 10 * longest)?;
         let conversation = Conversation::begin(session, &mut wire)?;
+        wire.initialise(session)?;
         match stream {
             None => conversation.go_on(session, &mut wire, rate_hz),
             Some(stream) => wire.listen(session, &stream),
@@ -110,6 +111,43 @@ impl Rtu {
         Err(Ended::Io("the instrument's stream cannot be stopped".into()))
     }
 
+    /// What the profile wants done before the samples count, once the signature is known to hold.
+    fn initialise(&mut self, session: &Session) -> Result<(), Ended> {
+        for init in &session.endpoint.profile().description.init {
+            let done = match (init.function, init.copy) {
+                (Some((function, data)), _) => self.own_function(function, data),
+                (None, Some((from, to, count))) => {
+                    self.read(session, Table::Holding, from, count).and_then(|bytes| {
+                        let pairs = bytes.chunks_exact(2);
+                        let words: Vec<u16> = pairs.map(|p| u16::from_be_bytes([p[0], p[1]])).collect();
+                        self.write(session, to, &words)
+                    })
+                }
+                (None, None) => Ok(()),
+            };
+            match done {
+                Ok(()) => {}
+                Err(Trouble::Ended(ended)) => return Err(ended),
+                Err(Trouble::Refused(said) | Trouble::Corrupt(said)) => {
+                    return Err(Ended::Refused(format!("{}: {said}", init.text)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A function of the maker's own with its byte.
+    fn own_function(&mut self, function: u8, data: u8) -> Result<(), Trouble> {
+        let request = rtu::custom(self.unit, function, &[data], 5);
+        let answer = self.ask(&request)?;
+        // The first bytes of a stream may follow at once: only the answer itself is judged.
+        let answered = rtu::payload(&request, &answer[..answer.len().min(5)]).map(|payload| payload[0]);
+        match self.judged(answered)? {
+            rtu::DONE => Ok(()),
+            other => Err(Trouble::Refused(format!("function {function:#04x} was answered by {other}"))),
+        }
+    }
+
     /// Starts the stream and hands over its frames until something is wrong.
     fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
         let frame = session
@@ -160,12 +198,7 @@ impl Rtu {
             let started = if let Some((address, value)) = stream.start_register {
                 self.write(session, address, &[value])
             } else if let Some((function, data)) = stream.start_function {
-                let request = rtu::custom(self.unit, function, &[data], 5);
-                // The first bytes of the stream may follow at once: only the answer itself is judged.
-                self.ask(&request).and_then(|answer| {
-                    let judged = rtu::payload(&request, &answer[..answer.len().min(5)]).map(|_| ());
-                    self.judged(judged)
-                })
+                self.own_function(function, data)
             } else {
                 break;
             };

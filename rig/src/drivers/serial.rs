@@ -39,16 +39,10 @@ impl Line {
             self.port
                 .set_timeout(left.max(Duration::from_micros(100)))
                 .map_err(|error| Ended::Io(error.to_string()))?;
-            match self.port.read(buffer) {
-                Ok(0) => return Err(Ended::Io("the port is gone (unplugged?)".into())),
-                Ok(count) => return Ok(count),
-                Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {
-                    if Instant::now() >= deadline {
-                        return Ok(0);
-                    }
-                }
-                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error.into()),
+            match came(self.port.read(buffer))? {
+                Some(count) => return Ok(count),
+                None if Instant::now() >= deadline => return Ok(0),
+                None => {}
             }
         }
     }
@@ -80,6 +74,17 @@ impl Line {
     }
 }
 
+/// How many bytes a read brought; `None` where it is to be tried again until the deadline.
+fn came(read: std::io::Result<usize>) -> Result<Option<usize>, Ended> {
+    use std::io::ErrorKind::{Interrupted, TimedOut};
+    match read {
+        Ok(0) => Err(Ended::Io("the port is gone (unplugged?)".into())),
+        Ok(count) => Ok(Some(count)),
+        Err(error) if matches!(error.kind(), TimedOut | Interrupted) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
 fn parse_format(format: &str) -> Option<(DataBits, Parity, StopBits)> {
     let bytes = format.as_bytes();
     let data = match bytes.first()? {
@@ -108,4 +113,21 @@ pub fn latency_timer_ms(path: &str) -> Option<u32> {
     let name = std::fs::canonicalize(path).ok()?;
     let timer = format!("/sys/bus/usb-serial/devices/{}/latency_timer", name.file_name()?.to_str()?);
     std::fs::read_to_string(timer).ok()?.trim().parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Error, ErrorKind};
+
+    /// espmonitor issue 12: an unplugged port gives `Ok(0)` at once and for ever.
+    #[test]
+    fn a_read_of_nothing_is_an_unplugged_port() {
+        let gone = came(Ok(0)).unwrap_err().to_string();
+        assert!(gone.contains("unplugged"), "{gone}");
+        assert!(matches!(came(Ok(7)), Ok(Some(7))));
+        assert!(matches!(came(Err(Error::from(ErrorKind::TimedOut))), Ok(None)));
+        assert!(matches!(came(Err(Error::from(ErrorKind::Interrupted))), Ok(None)));
+        assert!(came(Err(Error::from(ErrorKind::BrokenPipe))).is_err());
+    }
 }

@@ -47,11 +47,7 @@ impl CanPort for KernelCan {
         };
         let frame = id.and_then(|id| CanDataFrame::new(id, frame.data()));
         let frame = frame.ok_or_else(|| io::Error::other("no CAN frame can be like that"))?;
-        match self.socket.write_frame(&frame) {
-            Ok(()) => Ok(true),
-            Err(error) if matches!(error.raw_os_error(), Some(libc::ENOBUFS | libc::EAGAIN)) => Ok(false),
-            Err(error) => Err(error),
-        }
+        sent(self.socket.write_frame(&frame))
     }
 
     fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>> {
@@ -83,6 +79,15 @@ impl CanPort for KernelCan {
     }
 }
 
+/// Whether a frame was taken: a queue without room is back-pressure, no error (python-can issue 2004).
+fn sent(written: io::Result<()>) -> io::Result<bool> {
+    match written {
+        Ok(()) => Ok(true),
+        Err(error) if matches!(error.raw_os_error(), Some(libc::ENOBUFS | libc::EAGAIN)) => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
 /// What an error frame means for the rig; `None` for what passes by itself.
 fn judge(error: &CanError) -> Option<CanEvent> {
     use socketcan::errors::ErrorCause;
@@ -91,4 +96,18 @@ fn judge(error: &CanError) -> Option<CanEvent> {
         ErrorCause::Controller(_) => Some(CanEvent::Warning),
         _ => None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_queue_is_back_pressure_and_no_error() {
+        let failed = |code: i32| sent(Err(io::Error::from_raw_os_error(code)));
+        assert!(matches!(failed(libc::ENOBUFS), Ok(false)));
+        assert!(matches!(failed(libc::EAGAIN), Ok(false)));
+        assert!(failed(libc::ENETDOWN).is_err());
+        assert!(matches!(sent(Ok(())), Ok(true)));
+    }
 }

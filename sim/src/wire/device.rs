@@ -2,7 +2,7 @@
 
 use super::{Command, Plant, Quantity};
 use instruments::schema::Table;
-use instruments::{FrameId, Profile, SetId, SignalId};
+use instruments::{FrameId, Profile, SetId, SignalId, Values};
 use realtime::ports::Nanos;
 
 /// Where a signal's value comes from.
@@ -40,6 +40,8 @@ pub struct Device {
     sources: Vec<Option<Source>>,
     commands: Vec<Option<(Command, f64)>>,
     blocks: Vec<Vec<u8>>,
+    /// What frames of constants say, such as a calibration: known to the instrument itself.
+    constants: Values,
     reads: u32,
 }
 
@@ -88,7 +90,17 @@ impl Device {
             });
         }
         let blocks = d.write.iter().map(|block| vec![0; 2 * usize::from(block.count)]).collect();
-        Ok(Self { sources, commands, blocks, reads: 0, profile })
+        let mut constants = profile.values();
+        for frame in (0..profile.frames().len()).map(FrameId) {
+            // Single precision rounds: the instrument works with what it shows.
+            let mut bytes = vec![0; profile.frame_bytes(frame)];
+            profile.encode(frame, &mut bytes, &mut |signal| match sources[signal.0]? {
+                Source::Constant(raw) => Some(raw),
+                Source::World { .. } => None,
+            });
+            let _ = profile.decode(frame, &bytes, &mut constants);
+        }
+        Ok(Self { sources, commands, blocks, constants, reads: 0, profile })
     }
 
     /// The profile.
@@ -101,7 +113,7 @@ impl Device {
     pub fn frame(&mut self, frame: FrameId, plant: &mut dyn Plant, now: Nanos) -> Vec<u8> {
         let mut bytes = vec![0; self.profile.frame_bytes(frame)];
         let (sources, reads) = (&self.sources, self.reads);
-        self.profile.encode(frame, &mut bytes, &mut |signal: SignalId| match sources[signal.0]? {
+        let mut shown = |signal: SignalId| match sources[signal.0]? {
             Source::Constant(raw) => Some(raw),
             Source::World { quantity, per_si, modulo } => {
                 let value = per_si
@@ -112,6 +124,13 @@ impl Device {
                     };
                 Some(if modulo.is_finite() { value.rem_euclid(modulo) } else { value })
             }
+        };
+        // What the host works out, the instrument does not send: it sends the readings that lead there.
+        let gages = self.profile.inputs_for(frame, &self.constants, &mut |s| shown(s).unwrap_or(0.0));
+        let gages = gages.unwrap_or_default();
+        self.profile.encode(frame, &mut bytes, &mut |signal: SignalId| {
+            let gage = gages.iter().find(|(input, _)| *input == signal).map(|(_, value)| *value);
+            gage.or_else(|| shown(signal))
         });
         bytes
     }

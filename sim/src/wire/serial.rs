@@ -5,7 +5,7 @@ use super::device::{Device, Refused};
 use instruments::codec::modbus_rtu::{self as rtu, Asked, Heard};
 use instruments::schema::{Stream, Table};
 use realtime::ports::Nanos;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -60,8 +60,15 @@ impl SerialEmulator {
         devices: BTreeMap<u8, Device>,
         plant: SharedPlant,
     ) -> io::Result<Self> {
-        let mut line =
-            RtuLine { devices, plant, heard: Vec::new(), streaming: None, silent_turns: 0, zeros: 0 };
+        let mut line = RtuLine {
+            devices,
+            plant,
+            heard: Vec::new(),
+            streaming: None,
+            unlocked: BTreeSet::new(),
+            silent_turns: 0,
+            zeros: 0,
+        };
         Self::start(port, move |bytes| line.turn(bytes))
     }
 }
@@ -75,12 +82,19 @@ impl Drop for SerialEmulator {
     }
 }
 
+/// Frames of a stream that one turn may send: 9 ms of the fastest.
+const FRAMES_A_TURN: u64 = 64;
+
+/// Modbus exception of a request that is not allowed now.
+const ILLEGAL_FUNCTION: u8 = 1;
+
 /// Units on one line; a unit that streams has it to itself.
 struct RtuLine {
     devices: BTreeMap<u8, Device>,
     plant: SharedPlant,
     heard: Vec<u8>,
     streaming: Option<(u8, Nanos)>,
+    unlocked: BTreeSet<u8>,
     silent_turns: u32,
     zeros: u16,
 }
@@ -99,7 +113,12 @@ impl RtuLine {
         let own: Vec<u8> = self
             .devices
             .values()
-            .filter_map(|d| d.profile().description.stream.as_ref()?.start_function.map(|f| f.0))
+            .map(|device| &device.profile().description)
+            .flat_map(|d| {
+                let started = d.stream.as_ref().and_then(|stream| stream.start_function);
+                started.into_iter().chain(d.init.iter().filter_map(|init| init.function))
+            })
+            .map(|(function, _)| function)
             .collect();
         loop {
             match rtu::hear(&self.heard, &own) {
@@ -119,6 +138,8 @@ impl RtuLine {
         let Some(device) = self.devices.get_mut(&unit) else { return Vec::new() };
         let (mut plant, now) = self.plant.now();
         let stream = device.profile().description.stream.clone();
+        // An instrument with functions of its own around its configuration is locked until the first of them.
+        let key = device.profile().description.init.iter().find_map(|init| init.function);
         match asked {
             Asked::Read { function, address, count } => {
                 let table = if function == 3 { Table::Holding } else { Table::Input };
@@ -137,6 +158,9 @@ impl RtuLine {
                     self.streaming = Some((unit, now));
                     return rtu::confirm(unit, function, address, second);
                 }
+                if key.is_some() && !self.unlocked.contains(&unit) {
+                    return rtu::refuse(unit, function, ILLEGAL_FUNCTION);
+                }
                 match device.write(address, &registers, &mut *plant) {
                     Ok(()) => rtu::confirm(unit, function, address, second),
                     Err(refused) => rtu::refuse(unit, function, code(refused)),
@@ -145,8 +169,12 @@ impl RtuLine {
             Asked::Custom { function, data } => {
                 if stream.and_then(|s| s.start_function) == Some((function, data)) {
                     self.streaming = Some((unit, now));
+                } else if key == Some((function, data)) {
+                    self.unlocked.insert(unit);
+                } else if key.is_some_and(|(own, _)| own == function) {
+                    self.unlocked.remove(&unit);
                 }
-                rtu::acknowledge(unit, function, data)
+                rtu::acknowledge(unit, function, rtu::DONE)
             }
         }
     }
@@ -164,17 +192,21 @@ impl RtuLine {
             self.heard.clear();
             return Vec::new();
         }
-        let (mut plant, now) = self.plant.now();
-        if now < due {
-            return Vec::new();
-        }
-        let period = Nanos::from_seconds(1.0 / stream.rate_hz).0.max(1);
-        let next = Nanos(due.0 + (now.since(due).0 / period + 1) * period);
-        self.streaming = Some((unit, next));
+        let (mut plant, now) = self.plant.as_left();
         let Some(frame) = device.profile().frame("stream") else { return Vec::new() };
-        let mut bytes = device.frame(frame, &mut *plant, now);
-        close(&stream, &mut bytes);
-        bytes
+        let period = Nanos::from_seconds(1.0 / stream.rate_hz).0.max(1);
+        // A thread that was held up for long leaves samples out, as the instrument's own buffer would.
+        let mut due = Nanos(due.0 + (now.since(due).0 / period).saturating_sub(FRAMES_A_TURN) * period);
+        let mut sent = Vec::new();
+        while due <= now {
+            plant.advance(due);
+            let mut bytes = device.frame(frame, &mut *plant, due);
+            close(&stream, &mut bytes);
+            sent.extend(bytes);
+            due = Nanos(due.0 + period);
+        }
+        self.streaming = Some((unit, due));
+        sent
     }
 }
 

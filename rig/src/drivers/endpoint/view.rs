@@ -35,7 +35,7 @@ impl View<'_> {
             (None, _) => Quality::Good,
         };
         let raw = if self.profile.frame_of(signal) == self.frame {
-            self.profile.raw(signal, self.bytes)
+            self.profile.raw(signal, self.bytes, self.values)
         } else {
             0
         };

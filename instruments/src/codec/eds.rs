@@ -1,0 +1,222 @@
+//! CANopen objects by an electronic data sheet (CiA 306): an INI file with a section for each object.
+
+use crate::field::NumberType;
+use std::collections::BTreeMap;
+
+/// Index and subindex.
+pub type Key = (u16, u8);
+
+/// The objects of a data sheet.
+pub type Objects = BTreeMap<Key, Object>;
+
+/// A value that may depend on the node's number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DefaultValue {
+    /// The value, less the node's number where that is added.
+    pub value: i64,
+    /// Whether the node's number is added (`$NODEID+0x180`).
+    pub plus_node: bool,
+}
+
+/// One object.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Object {
+    /// Name.
+    pub name: String,
+    /// Number of its type (CiA 301, table 44).
+    pub data_type: u16,
+    /// `ro`, `wo`, `rw`, `rwr`, `rww` or `const`.
+    pub access: String,
+    /// Value after power-on, where the data sheet states a whole number.
+    pub default: Option<DefaultValue>,
+}
+
+impl Object {
+    /// How it is stored; `None` for texts, domains and numbers of more than 32 bits.
+    #[must_use]
+    pub const fn number(&self) -> Option<NumberType> {
+        match self.data_type {
+            1 | 5 => Some(NumberType::U8),
+            2 => Some(NumberType::I8),
+            3 => Some(NumberType::I16),
+            4 => Some(NumberType::I32),
+            6 => Some(NumberType::U16),
+            7 => Some(NumberType::U32),
+            8 => Some(NumberType::F32),
+            _ => None,
+        }
+    }
+
+    /// Whether it can be written.
+    #[must_use]
+    pub fn writable(&self) -> bool {
+        matches!(self.access.as_str(), "wo" | "rw" | "rwr" | "rww")
+    }
+}
+
+/// Reads a data sheet. Objects without sub-objects have subindex 0.
+///
+/// # Errors
+/// What is wrong, with the line.
+pub fn parse(text: &str) -> Result<Objects, String> {
+    let mut objects = Objects::new();
+    let mut section: Option<(Key, BTreeMap<String, (String, usize)>)> = None;
+    for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line.trim())) {
+        if line.is_empty() || line.starts_with(';') {
+            continue;
+        }
+        if let Some(name) = line.strip_prefix('[') {
+            let name = name.strip_suffix(']').ok_or(format!("line {number}: a section needs a `]`"))?;
+            close(&mut objects, section.take())?;
+            section = key(name).map(|key| (key, BTreeMap::new()));
+            continue;
+        }
+        let (name, value) =
+            line.split_once('=').ok_or(format!("line {number}: `{line}` is no `key=value`"))?;
+        if let Some((_, entries)) = &mut section {
+            entries.insert(name.trim().to_ascii_lowercase(), (value.trim().to_string(), number));
+        }
+    }
+    close(&mut objects, section)?;
+    if objects.is_empty() { Err("there is no object in it".into()) } else { Ok(objects) }
+}
+
+/// The object that a section such as `6040` or `1018sub1` describes; other sections describe none.
+fn key(section: &str) -> Option<Key> {
+    let lower = section.to_ascii_lowercase();
+    let (index, sub) = lower.split_once("sub").unwrap_or((&lower, "0"));
+    if index.len() != 4 {
+        return None;
+    }
+    Some((u16::from_str_radix(index, 16).ok()?, u8::from_str_radix(sub, 16).ok()?))
+}
+
+/// Takes a whole section; the head of a record or an array (object type 8 or 9) is no object of its own.
+fn close(
+    objects: &mut Objects,
+    section: Option<(Key, BTreeMap<String, (String, usize)>)>,
+) -> Result<(), String> {
+    let Some((key, entries)) = section else { return Ok(()) };
+    let (index, sub) = key;
+    let entry = |name: &str| entries.get(name).map(|(value, _)| value.as_str()).filter(|v| !v.is_empty());
+    let wrong = |name: &str, said: &str| {
+        let line = entries.get(name).map_or(0, |(_, line)| *line);
+        format!("line {line}: {name} of object {index:04X}sub{sub}: `{said}` is no number")
+    };
+    let whole = |name: &str| entry(name).map(|said| self::number(said).ok_or(wrong(name, said))).transpose();
+    if entries.contains_key("compactsubobj") {
+        return Err(format!("object {index:04X}: CompactSubObj is not read; write its sub-objects out"));
+    }
+    if matches!(whole("objecttype")?, Some(8 | 9)) {
+        return Ok(());
+    }
+    let data_type = whole("datatype")?.and_then(|kind| u16::try_from(kind).ok());
+    let data_type = data_type.ok_or(format!("object {index:04X}sub{sub} has no DataType"))?;
+    let access = entry("accesstype").unwrap_or("rw").to_ascii_lowercase();
+    let default = entry("defaultvalue").and_then(default_of);
+    let name = entry("parametername").unwrap_or_default().to_string();
+    let object = Object { name, data_type, access, default };
+    if objects.insert(key, object).is_some() {
+        return Err(format!("object {index:04X}sub{sub} is described twice"));
+    }
+    Ok(())
+}
+
+/// A whole number: decimal, or hexadecimal after `0x`.
+fn number(text: &str) -> Option<i64> {
+    let (sign, digits) = text.strip_prefix('-').map_or((1, text), |rest| (-1, rest));
+    let hex = digits.strip_prefix("0x").or(digits.strip_prefix("0X"));
+    let value = hex.map_or_else(|| digits.parse().ok(), |hex| i64::from_str_radix(hex, 16).ok())?;
+    i64::checked_mul(sign, value)
+}
+
+/// A default: a whole number, with or without the node's.
+fn default_of(text: &str) -> Option<DefaultValue> {
+    let upper: String = text.to_ascii_uppercase().split_whitespace().collect();
+    let without = upper.strip_prefix("$NODEID+").or(upper.strip_suffix("+$NODEID"));
+    if upper == "$NODEID" {
+        return Some(DefaultValue { value: 0, plus_node: true });
+    }
+    match without {
+        Some(rest) => number(&rest.replace("0X", "0x")).map(|value| DefaultValue { value, plus_node: true }),
+        None => number(&upper.replace("0X", "0x")).map(|value| DefaultValue { value, plus_node: false }),
+    }
+}
+
+/// What a process data frame holds: each object with its first byte. `first` is 0x1800 for what the node sends and
+/// 0x1400 for what it takes; `cob` is the frame's identifier less the node's number.
+///
+/// # Errors
+/// Where the data sheet has no such frame, or one that is not made of whole bytes.
+pub fn mapping(objects: &Objects, first: u16, cob: u32) -> Result<(Vec<(Key, usize)>, usize), String> {
+    let is_frame = |(&(index, sub), object): (&Key, &Object)| {
+        // Bits 31 and 30 say 'not used' and 'no remote request'.
+        let found = object.default.filter(|d| d.plus_node && d.value & 0x7FF == i64::from(cob));
+        ((first..first + 0x200).contains(&index) && sub == 1 && found.is_some()).then_some(index)
+    };
+    let communication = objects.iter().find_map(is_frame).ok_or(format!(
+        "the data sheet has no process data with identifier {cob:#x} plus the node's number"
+    ))?;
+    let map = communication + 0x200;
+    let value = |sub: u8| objects.get(&(map, sub)).and_then(|object| object.default).map(|d| d.value);
+    let count = value(0).ok_or(format!("object {map:04X}sub0 has no default: nothing is mapped"))?;
+    let (mut placed, mut at) = (Vec::new(), 0);
+    for sub in 1..=u8::try_from(count).unwrap_or(0) {
+        // Index, subindex, length in bits (CiA 301, 7.5.2.36).
+        let entry = value(sub).ok_or(format!("object {map:04X}sub{sub} has no default"))?;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // taken apart byte by byte
+        let (key, bits) = (((entry >> 16) as u16, (entry >> 8) as u8), (entry & 0xFF) as usize);
+        if bits % 8 != 0 || bits == 0 {
+            return Err(format!("object {map:04X}sub{sub} maps {bits} bits: only whole bytes are read"));
+        }
+        let stored = objects.get(&key).and_then(Object::number).map(|number| 8 * number.bytes());
+        if stored != Some(bits) {
+            let (index, sub_mapped) = key;
+            return Err(format!(
+                "object {map:04X}sub{sub} maps {bits} bits of {index:04X}sub{sub_mapped}, which has {stored:?}"
+            ));
+        }
+        placed.push((key, at));
+        at += bits / 8;
+    }
+    if at > 8 { Err(format!("object {map:04X} maps {at} bytes; a frame has 8")) } else { Ok((placed, at)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHEET: &str = "; a comment\n[FileInfo]\nFileName=a.eds\n[1018]\nObjectType=0x9\nSubNumber=2\n\
+        [1018sub1]\nParameterName=Vendor-ID\nObjectType=0x7\nDataType=0x0007\nAccessType=ro\nDefaultValue=0x1\n\
+        [1800sub1]\nParameterName=COB-ID\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x40000180\n\
+        [1A00sub0]\nDataType=5\nAccessType=rw\nDefaultValue=2\n\
+        [1a00sub1]\nDataType=7\nAccessType=rw\nDefaultValue=0x60410010\n\
+        [1A00sub2]\nDataType=7\nAccessType=rw\nDefaultValue=0x60640020\n\
+        [6041]\nDataType=6\nAccessType=ro\n[6064]\nDataType=4\nAccessType=ro\nDefaultValue=-5\n";
+
+    #[test]
+    fn objects_and_process_data() {
+        let objects = parse(SHEET).unwrap();
+        assert_eq!(objects.len(), 7, "the head of the record is none: {objects:?}");
+        assert_eq!(objects[&(0x1018, 1)].default, Some(DefaultValue { value: 1, plus_node: false }));
+        assert_eq!(objects[&(0x6064, 0)].default.unwrap().value, -5);
+        assert!(!objects[&(0x6064, 0)].writable() && objects[&(0x1A00, 0)].writable());
+        let (placed, length) = mapping(&objects, 0x1800, 0x180).unwrap();
+        assert_eq!((placed, length), (vec![((0x6041, 0), 0), ((0x6064, 0), 2)], 6));
+        assert!(mapping(&objects, 0x1800, 0x280).unwrap_err().contains("0x280"));
+        let wrong = SHEET.replace("0x60640020", "0x60640010");
+        assert!(
+            mapping(&parse(&wrong).unwrap(), 0x1800, 0x180).unwrap_err().contains("16 bits"),
+            "i32 in 16 bits"
+        );
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line() {
+        assert!(parse("[6041\n").unwrap_err().contains("line 1"));
+        assert!(parse("[6041]\nDataType=six\n").unwrap_err().contains("line 2"));
+        assert!(parse("[6041]\nAccessType=ro\n").unwrap_err().contains("DataType"));
+        assert!(parse("[6041]\nDataType=6\n[6041]\nDataType=6\n").unwrap_err().contains("twice"));
+        assert!(parse("nonsense").unwrap_err().contains("line 1"));
+    }
+}
