@@ -155,6 +155,18 @@ fn setups_plans_models_and_certificates() {
     run("configuration", configuration::ALL, "configuration", &corpus, 20);
 }
 
+/// A damaged certificate is refused, or says what the sound one said: the sum over its contents sees to that.
+#[test]
+fn certificates() {
+    let corpus = files("tests/fuzz/certificates", ".toml");
+    assert_eq!(corpus.len(), configuration::SOUND.len());
+    // The sound ones are taken: else the target would hold of anything.
+    for bytes in &corpus {
+        assert!(configuration::taken(std::str::from_utf8(bytes).unwrap()));
+    }
+    run("configuration", configuration::ALL, "certificates", &corpus, 20);
+}
+
 #[test]
 fn tables() {
     let table = b"point,time_s,amplitude_pp_m,frequency_hz,speed_m_s,direction,position_m,normal_force_n,lateral_force_n\n\

@@ -4,6 +4,7 @@
 //! each run states for each `mu'`, which follows from the repeatability in its setup.
 
 use super::peers::file;
+use rig::sequence::MeasuredPass;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
@@ -29,18 +30,14 @@ fn sweep(setup: &str, folder: &Path, prefix: Option<&Path>) -> Passes {
 }
 
 fn read(out: &Path) -> Passes {
-    let text = std::fs::read_to_string(out.join("points.csv")).unwrap();
-    let mut lines = text.lines();
-    let head: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let column = |name: &str| head.iter().position(|h| *h == name).unwrap();
-    let columns = ["point", "mu_relative", "mu_relative_sd", "amplitude_pp_m"].map(column);
-    let passes = lines.filter_map(|line| {
-        let cells: Vec<&str> = line.split(',').collect();
-        let [point, mu, sd, w] = columns.map(|column| cells[column].parse::<f64>());
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // counts
-        Some((point.ok()? as u64, (mu.ok()?, sd.ok()?, w.ok()? > 0.0)))
-    });
-    passes.collect()
+    let text = std::fs::read_to_string(out.join("passes.jsonl")).unwrap();
+    let passes = text.lines().map(|line| serde_json::from_str::<MeasuredPass>(line).unwrap());
+    let found = |pass: MeasuredPass| {
+        let compared = pass.comparison?;
+        let on = pass.pass.amplitude.metres() > 0.0;
+        Some((pass.pass.point, (compared.mu_relative?, compared.mu_relative_sd?, on)))
+    };
+    passes.filter_map(found).collect()
 }
 
 /// Compares two runs pass by pass, each difference in units of its own standard uncertainty.
