@@ -5,7 +5,8 @@ use calibration::certificate::{Certificate, Circumstances};
 use std::path::Path;
 
 /// All of them, by name, in the order that the coverage-guided target counts them.
-pub const ALL: &[(&str, fn(&[u8], &mut Chance))] = &[("configuration", configuration), ("certificates", certificates)];
+pub const ALL: &[(&str, fn(&[u8], &mut Chance))] =
+    &[("configuration", configuration), ("certificates", certificates)];
 
 /// Every reader of a configuration file; a setup names its fingertip, or holds one.
 pub fn configuration(input: &[u8], _: &mut Chance) {
