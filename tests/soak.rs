@@ -210,7 +210,7 @@ fn half_an_hour_over_the_wire_without_a_trip_that_the_machine_did_not_cause() {
         let mut steady =
             seen.iter().filter(|(at, _)| *at >= warm_up && *at <= looped).map(|(_, bytes)| *bytes);
         let warm = steady.next();
-        sessions.push(SessionSeen { lasted, warm_and_last: warm.zip(steady.last()), summary });
+        sessions.push(SessionSeen { lasted, warm_and_last: warm.zip(steady.next_back()), summary });
     }
     let longest = sessions.iter().max_by_key(|s| s.lasted).unwrap();
     let (warm, last) = longest.warm_and_last.expect("no session was longer than its warm-up");

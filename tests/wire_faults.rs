@@ -166,12 +166,8 @@ impl Running {
 
     fn signal(&self, pid: u32, signal: i32) {
         // SAFETY: a signal to a child that has not been waited for: its id is still its own.
-        assert_eq!(
-            unsafe { libc::kill(pid as i32, signal) },
-            0,
-            "{signal} to {pid} ({})",
-            self.out.display()
-        );
+        let failed = unsafe { libc::kill(pid as i32, signal) };
+        assert_eq!(failed, 0, "{signal} to {pid} ({})", self.out.display());
     }
 
     /// The end of the run: its status and summary.

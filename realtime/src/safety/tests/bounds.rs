@@ -247,6 +247,18 @@ fn an_amplitude_rate_is_a_difference_over_a_time() {
     let trip = climb(20.1e-9, false, false).unwrap();
     assert!(trip.cause == Cause::AmplitudeRate && (trip.value - 20.1e-6).abs() < 1e-9, "{trip:?}");
     assert_eq!(climb(20.1e-9, true, false), None, "one stamp is no time");
+    // At the limit itself: values, and their differences, that are exact in binary.
+    let step = 2f64.powi(-26);
+    let mut exact = Bench::armed();
+    exact.limits.amplitude_rate_max_m_s = step / T.seconds();
+    let n0 = exact.n;
+    let climb_by = |s: &mut Observation| {
+        let i = stage(s).sequence - n0;
+        *measured(s) = 2f64.powi(-19) + step * f64::from(i);
+    };
+    assert_eq!(trips(&mut exact, 8, climb_by), None);
+    exact.limits.amplitude_rate_max_m_s *= 1.0 - 1e-12;
+    assert_eq!(trips(&mut exact, 8, climb_by).map(|t| t.cause), Some(Cause::AmplitudeRate));
     assert_eq!(climb(20.1e-9, false, true), None, "the same count is the same sample");
     assert_eq!(climb(-25e-9, false, false), None, "falling is not rising");
     // Fast, slow, fast: two in a row are needed.
