@@ -261,7 +261,8 @@ impl Bench {
         Nanos(u64::try_from(self.epoch.elapsed().as_nanos()).unwrap())
     }
 
-    /// Samples of the lateral axis as they arrive, once each, until a time.
+    /// Samples of the lateral axis at the time of their arrival, once each, until a time. (The driver's own stamps take the
+    /// shortest transport off, and with it a constant delay: they cannot show it.)
     fn listen(&mut self, until: Nanos, samples: &mut Vec<(f64, f64)>) {
         let mut last = None;
         while self.now() < until {
@@ -269,7 +270,7 @@ impl Bench {
                 && last != Some(reading.sequence)
             {
                 last = Some(reading.sequence);
-                samples.push((reading.taken_at.seconds(), reading.value));
+                samples.push((self.now().seconds(), reading.value));
             }
             std::thread::sleep(Duration::from_micros(200));
         }
@@ -346,7 +347,8 @@ fn a_withheld_amplitude_scale_is_found_over_modbus() {
         format!("[[defect]]\nname = \"amplitude_miscalibration\"\nparameters = {{ factor = {factor} }}\n");
     let mut config = WorldConfig { defects: Defects::parse(&defects).unwrap(), ..WorldConfig::ideal() };
     config.plate.warming_k = 0.0;
-    let frequency_hz = config.plate.resonance_hz;
+    let frequency_hz = 27_500.0;
+    config.plate.resonance_hz = frequency_hz;
     let scale = 1.0 + VIBROMETER_SD * draw.normal();
     let Bench { hands, rig, setup, epoch, _embedded, .. } = Bench::new("virtual-ideal", &config);
     let mut ports = Ports { force: rig.force, amplifier: rig.amplifier, stage: rig.stage };
@@ -364,6 +366,9 @@ fn a_withheld_amplitude_scale_is_found_over_modbus() {
             let tick = Tick { number, lateness: Nanos(0), now };
             let row = turn(&setup.config, &*model, &mut state, &mut ports, &mut || commands.pop(), tick);
             armed = row.armed;
+            if let Some(trip) = row.tripped {
+                eprintln!("tripped: {trip:?}");
+            }
             std::thread::sleep(Duration::from_millis(2));
         }
         armed
