@@ -133,8 +133,8 @@ fn bus_off_ends_the_link_and_nothing_restarts_by_itself() {
     assert!(said.contains("by hand"), "{said}");
 }
 
-/// A drive was enabled when its bus went off, and commands were waiting: after the bus is back not one frame that
-/// enables may leave until the loop gives a new command.
+/// A drive was enabled when its bus went off, and commands were waiting: after the bus is back not one frame
+/// of set-points may leave until the loop gives a new command.
 #[test]
 #[ignore = "needs the guest kernel"]
 fn no_command_from_before_a_bus_off_leaves_after_it() {
@@ -155,14 +155,15 @@ fn no_command_from_before_a_bus_off_leaves_after_it() {
     // Process data to node 5 (CiA 301: 0x200 + node), each frame's control word.
     let mut heard = |until: Duration| {
         let (end, mut words) = (Instant::now() + until, Vec::new());
-        while Instant::now() < end {
-            if let Some(CanEvent::Frame(frame, _)) = listener.receive(end).unwrap()
-                && frame.id == 0x205
-            {
-                words.push([frame.data()[0], frame.data()[1]]);
+        loop {
+            match listener.receive(end).unwrap() {
+                Some(CanEvent::Frame(frame, _)) if frame.id == 0x205 => {
+                    words.push([frame.data()[0], frame.data()[1]]);
+                }
+                None if Instant::now() >= end => return words,
+                _ => {}
             }
         }
-        words
     };
     let mut rig = drivers::open(&setup, epoch).unwrap();
     let health = |rig: &drivers::Rig| rig.links.health().last().unwrap().1;
@@ -178,18 +179,18 @@ fn no_command_from_before_a_bus_off_leaves_after_it() {
     });
     assert!(Command::new("cansend").args(["vcan1", "20000040#0000000000000000"]).status().unwrap().success());
     eventually("the link's end", || health(&rig).last_problem.contains("bus-off").then_some(()));
+    heard(Duration::ZERO);
     // They would be valid for long after the bus is back: that they are old is enough.
     (0..50).for_each(|_| command(&mut rig, 30.0));
     assert_eq!(health(&rig).connections, 1, "the commands came while the link was down");
-    heard(Duration::ZERO);
     eventually("the drive's data again", || {
         (health(&rig).connections > 1).then(|| rig.stage.state(now(epoch)).ok()).flatten()
     });
-    let stale = heard(Duration::from_secs(1)).iter().filter(|word| **word == ENABLED).count();
-    assert_eq!(stale, 0, "frames that enable, left from before the outage");
-    eventually("a new command enables again", || {
+    assert_eq!(heard(Duration::from_secs(1)), Vec::<[u8; 2]>::new(), "set-points from before the outage");
+    // The drive's own guard has put it into a fault meanwhile, which only a person resets; but new commands leave.
+    eventually("a new command leaves", || {
         command(&mut rig, 1.0);
-        heard(Duration::from_millis(40)).contains(&ENABLED).then_some(())
+        (!heard(Duration::from_millis(40)).is_empty()).then_some(())
     });
 }
 
