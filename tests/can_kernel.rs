@@ -133,7 +133,7 @@ fn bus_off_ends_the_link_and_nothing_restarts_by_itself() {
     assert!(said.contains("by hand"), "{said}");
 }
 
-/// A drive was enabled when its bus went off, and commands were waiting: after the bus is back not one frame
+/// A drive was enabled when its bus went off, by a command that is still valid: after the bus is back not one frame
 /// of set-points may leave until the loop gives a new command.
 #[test]
 #[ignore = "needs the guest kernel"]
@@ -160,6 +160,8 @@ fn no_command_from_before_a_bus_off_leaves_after_it() {
                 Some(CanEvent::Frame(frame, _)) if frame.id == 0x205 => {
                     words.push([frame.data()[0], frame.data()[1]]);
                 }
+                // What was sent before the bus went off is no matter here.
+                Some(CanEvent::BusOff) => words.clear(),
                 None if Instant::now() >= end => return words,
                 _ => {}
             }
@@ -177,12 +179,11 @@ fn no_command_from_before_a_bus_off_leaves_after_it() {
         command(&mut rig, 1.0);
         heard(Duration::from_millis(40)).contains(&ENABLED).then_some(())
     });
+    // It is valid for long after the bus is back: that it is old is enough.
+    command(&mut rig, 60.0);
+    std::thread::sleep(Duration::from_millis(100));
     assert!(Command::new("cansend").args(["vcan1", "20000040#0000000000000000"]).status().unwrap().success());
     eventually("the link's end", || health(&rig).last_problem.contains("bus-off").then_some(()));
-    heard(Duration::ZERO);
-    // They would be valid for long after the bus is back: that they are old is enough.
-    (0..50).for_each(|_| command(&mut rig, 30.0));
-    assert_eq!(health(&rig).connections, 1, "the commands came while the link was down");
     eventually("the drive's data again", || {
         (health(&rig).connections > 1).then(|| rig.stage.state(now(epoch)).ok()).flatten()
     });
