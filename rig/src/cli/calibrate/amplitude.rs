@@ -41,8 +41,8 @@ pub struct Args {
     /// Relative standard uncertainty of the vibrometer (its own certificate)
     #[arg(long, default_value_t = 0.01)]
     vibrometer_relative_sd: f64,
-    /// Temperatures at which the certificate holds in deg C, as LOW HIGH [default: not limited]
-    #[arg(long, value_delimiter = ',', num_args = 2, allow_negative_numbers = true)]
+    /// Temperatures at which the certificate holds in deg C [default: not limited]
+    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true)]
     temperature_c: Option<Vec<f64>>,
     #[command(flatten)]
     common: Common,

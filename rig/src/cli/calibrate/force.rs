@@ -42,8 +42,8 @@ pub struct Args {
     /// Fit the square of each load too
     #[arg(long)]
     quadratic: bool,
-    /// Ends of the converter in counts, as LOW HIGH
-    #[arg(long, value_delimiter = ',', num_args = 2, allow_negative_numbers = true)]
+    /// Ends of the converter in counts
+    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true)]
     count_limits: Option<Vec<f64>>,
     /// Largest drift of the zero over the series, as a share of the span
     #[arg(long, default_value_t = 0.01)]
