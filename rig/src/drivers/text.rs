@@ -70,9 +70,19 @@ impl Way {
         match self {
             Way::Serial(line) => line.read(buffer, deadline),
             Way::Tcp(stream) => {
-                let left = deadline.saturating_duration_since(Instant::now()).max(Duration::from_micros(100));
-                stream.set_read_timeout(Some(left))?;
-                match stream.read(buffer) {
+                let left = deadline.saturating_duration_since(Instant::now());
+                // The kernel rounds a timeout up to its tick of some milliseconds: what is only asked whether it is
+                // there is asked without waiting.
+                let came = if left.is_zero() {
+                    stream.set_nonblocking(true)?;
+                    let came = stream.read(buffer);
+                    stream.set_nonblocking(false)?;
+                    came
+                } else {
+                    stream.set_read_timeout(Some(left.max(Duration::from_micros(100))))?;
+                    stream.read(buffer)
+                };
+                match came {
                     Ok(0) => Err(Ended::Io("the instrument closed the connection".into())),
                     Ok(count) => Ok(count),
                     Err(error)
