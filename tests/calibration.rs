@@ -3,6 +3,8 @@
 //!
 //! `cargo test --release -p tests --test calibration -- --nocapture` prints coverage and interval lengths.
 
+#[path = "calibration/absorbed.rs"]
+mod absorbed;
 #[path = "calibration/amplitude.rs"]
 mod amplitude;
 #[path = "calibration/bench.rs"]

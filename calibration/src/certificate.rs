@@ -96,6 +96,21 @@ pub struct Parameter {
     pub ci95: [f64; 2],
 }
 
+impl Parameter {
+    /// The same with an interval of its own, as the profile of a likelihood gives it: it need not be symmetric.
+    pub fn with_interval(self, ci95: [f64; 2]) -> Self {
+        Parameter { ci95, ..self }
+    }
+
+    /// The same with value and interval kept within what the quantity can be, `least` or more. The part that is cut
+    /// off holds no possible value, so the interval covers the truth as often as before; its lower end at `least` says
+    /// that the data give an upper bound only. The value is then the likelihood's maximum within the range.
+    pub fn at_least(self, least: f64) -> Self {
+        let ci95 = self.ci95.map(|end| end.max(least));
+        Parameter { ci95, value: self.value.max(least), ..self }
+    }
+}
+
 /// What the model left of the data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

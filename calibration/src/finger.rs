@@ -51,6 +51,12 @@ pub enum FingerError {
     /// A stiffness that is not positive.
     #[error("the {0} stiffness comes out negative: check the sign of force and displacement")]
     Negative(&'static str),
+    /// A finger that gives energy to the plate.
+    #[error(
+        "the quadrature force is negative beyond its scatter: a finger cannot drive the plate; check the sign of the \
+         quadrature (a quarter period ahead of the displacement is positive) and the delay between the channels"
+    )]
+    NegativeLoss,
     /// The regression failed.
     #[error(transparent)]
     Fit(#[from] FitError),
@@ -98,8 +104,12 @@ impl FingerFit {
             (sd, largest, unit) = (s.residual_sd_n, s.largest_residual_n, "N".into());
         }
         let mut remarks = Vec::new();
+        // Intervals that are not value +- k u: where each begins at the earliest, or the whole of it.
+        let mut ends: Vec<Ends> = vec![Ends::AtLeast(0.0); names.len()];
         if let Some(f) = &self.friction {
             for (i, (name, u)) in f.names().into_iter().enumerate() {
+                // mu0 (1 + growth) is the coefficient of friction in the end: it cannot be negative.
+                ends.push(if name.ends_with(".growth") { Ends::AtLeast(-1.0) } else { Ends::Free });
                 names.push((name, u));
                 values.push(f.fit.estimates[i]);
                 dofs.push(f.fit.degrees_of_freedom);
@@ -116,7 +126,8 @@ impl FingerFit {
                 names.push((name.into(), unit));
                 values.push(value);
                 dofs.push((m.points as f64 - 1.0).max(1.0));
-                // A profile interval is not symmetric; the certificate's uncertainty is its half-width.
+                // A profile interval is not symmetric; the certificate's standard uncertainty is its half-width.
+                ends.push(Ends::Both(ci95));
                 let sd = 0.5 * (ci95[1] - ci95[0]) / 1.96;
                 blocks.push(DMatrix::from_element(1, 1, sd * sd));
             }
@@ -125,6 +136,23 @@ impl FingerFit {
             remarks.extend(fit.remarks);
         }
         let covariance = block_diagonal(&blocks);
+        let parameters: Vec<_> = parameters(&names, &values, &covariance, &dofs)
+            .into_iter()
+            .zip(&ends)
+            .map(|(parameter, ends)| match ends {
+                Ends::Free => parameter,
+                Ends::AtLeast(least) => parameter.at_least(*least),
+                Ends::Both(ci95) => parameter.with_interval(*ci95),
+            })
+            .collect();
+        for (p, ends) in parameters.iter().zip(&ends) {
+            if matches!(ends, Ends::AtLeast(least) if p.ci95[0] == *least) {
+                remarks.push(format!(
+                    "{}: the data give an upper bound only ({:.3e} {}); the interval begins where the quantity does",
+                    p.name, p.ci95[1], p.unit
+                ));
+            }
+        }
         let mut settings = BTreeMap::new();
         if let Some(f) = &self.friction {
             settings.insert("reference_force_n".into(), f.reference_force_n.to_string());
@@ -137,7 +165,7 @@ impl FingerFit {
                 .into(),
             settings,
             remarks,
-            parameters: parameters(&names, &values, &covariance, &dofs),
+            parameters,
             covariance,
             residuals: Residuals { count, sd, largest, unit, lack_of_fit_p: None },
             temperature_c: None,
@@ -145,6 +173,17 @@ impl FingerFit {
             budget,
         }
     }
+}
+
+/// What is known of the ends of a parameter's interval.
+#[derive(Clone, Copy, Debug)]
+enum Ends {
+    /// Value and uncertainty tell them.
+    Free,
+    /// The quantity cannot be less.
+    AtLeast(f64),
+    /// A profile of the likelihood told them.
+    Both([f64; 2]),
 }
 
 /// What the certificate says of the inverse analysis.

@@ -16,6 +16,7 @@ pub mod locate;
 pub mod next;
 pub mod noise;
 pub mod predict;
+pub mod pulls;
 pub mod shrink;
 pub mod smooth;
 pub mod verdict;

@@ -10,6 +10,7 @@ use crate::locate::{Region, ledger, regions};
 use crate::next::{Experiment, experiments};
 use crate::noise::PureError;
 use crate::predict::{Forecast, forecast, model};
+use crate::pulls::{Pull, pulls};
 use effects::corrected::{SavedEffect, SavedModel, SavedParameter};
 use effects::library;
 use serde::Serialize;
@@ -91,6 +92,9 @@ pub struct Report {
     pub left_out: LeftOut,
     /// What the replicates said about the stated repeatability.
     pub pure_error: PureError,
+    /// How far the verdict's model had to pull the stiffnesses from their calibration; empty for `unknown`, which
+    /// has no model that holds.
+    pub stiffness_pulls: Vec<Pull>,
     /// Effects that the table cannot show.
     pub not_testable: Vec<NotTestable>,
     /// What to measure next.
@@ -151,6 +155,12 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
                 .into(),
         );
     }
+    let stiffness_pulls = match decision.verdict {
+        Verdict::NoGap => pulls(&fitted.problem, &fitted.none, &fitted.none),
+        Verdict::Named | Verdict::Ambiguous => pulls(&fitted.problem, &fitted.none, best),
+        Verdict::Unknown => Vec::new(),
+    };
+    remarks.extend(stiffness_pulls.iter().filter_map(Pull::remark));
     let report = Report {
         schema: "muprime.verdict/1",
         verdict: decision.verdict,
@@ -165,6 +175,7 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
         },
         gap,
         pure_error: fitted.pure,
+        stiffness_pulls,
         not_testable: fitted
             .not_testable
             .iter()

@@ -124,6 +124,13 @@ impl Certificate {
             if !p.value.is_finite() || !p.standard_uncertainty.is_finite() || p.standard_uncertainty < 0.0 {
                 return malformed(format!("parameter `{}` has no finite value and uncertainty", p.name));
             }
+            if !(p.ci95[0] <= p.value && p.value <= p.ci95[1]) {
+                let [low, high] = p.ci95;
+                return malformed(format!(
+                    "the interval of `{}` ({low:e} to {high:e}) does not hold its value {:e}",
+                    p.name, p.value
+                ));
+            }
             if (sd(i) - p.standard_uncertainty).abs() > 1e-6 * p.standard_uncertainty {
                 return malformed(format!("the covariance disagrees with the uncertainty of `{}`", p.name));
             }

@@ -6,6 +6,7 @@
 use super::FingerError;
 use crate::regression::Fit;
 use crate::regression::nonlinear::{Scatter, fit};
+use crate::uncertainty::student::coverage_factor;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -182,9 +183,14 @@ impl FrictionFit {
 
     pub(super) fn remarks(&self) -> Vec<String> {
         let [mu, u] = self.mu0(self.reference_force_n, self.reference_speed_m_s, 0.0);
+        // The law is one of ln mu0: so is the interval, which then stays above zero.
+        let reach = coverage_factor(0.95, self.fit.degrees_of_freedom) * u / mu;
         let mut remarks = vec![format!(
-            "mu0 = {mu:.4} +- {u:.4} (one standard deviation) at {:.3} N and {:.4} m/s, right after contact",
-            self.reference_force_n, self.reference_speed_m_s
+            "mu0 = {mu:.4}, 95 %: {:.4} to {:.4} at {:.3} N and {:.4} m/s, right after contact",
+            mu * (-reach).exp(),
+            mu * reach.exp(),
+            self.reference_force_n,
+            self.reference_speed_m_s
         )];
         if !self.timed() {
             remarks.push("the dependence on time since contact was not determined".into());

@@ -2,6 +2,7 @@
 
 use super::FingerError;
 use crate::regression::linear;
+use crate::uncertainty::student::coverage_factor;
 use nalgebra::{DMatrix, DVector};
 
 /// A stiffness about a point of load.
@@ -122,6 +123,9 @@ pub fn ultrasonic(
         return Err(FingerError::ContactLost { amplitude_pp_m: 2.0 * range_m[1], limit_m });
     }
     let (us, ul) = (stored.standard_uncertainty(0), lost.standard_uncertainty(0));
+    if loss + coverage_factor(0.95, lost.degrees_of_freedom) * ul < 0.0 {
+        return Err(FingerError::NegativeLoss);
+    }
     let u = us.hypot(k * scale_relative_sd);
     Ok(Stiffness {
         value_n_per_m: [k, u],

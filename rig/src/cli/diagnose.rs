@@ -1,5 +1,7 @@
 //! `muprime diagnose`: where the gap lies, which effect causes it, how far it shrinks.
 
+mod certificates;
+
 use clap::Args as ClapArgs;
 use diagnosis::data::{Rig, Table};
 use diagnosis::hypotheses::Options;
@@ -102,54 +104,22 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         write_text(out, &crate::report::diagnosis::page(&result, &table))?;
     }
     let mut report = serde_json::to_value(&result.report).into_diagnostic()?;
-    let faults = certificates_at_fault(&rig, rig_path, &report);
+    let faults = certificates::at_fault(&rig, rig_path, &report);
+    let doubts = certificates::in_doubt(rig_path, &result.report.stiffness_pulls);
     if json {
         if !faults.is_empty() {
             report["certificates_at_fault"] = serde_json::to_value(&faults).into_diagnostic()?;
         }
+        if !doubts.is_empty() {
+            report["certificates_in_doubt"] = serde_json::to_value(&doubts).into_diagnostic()?;
+        }
         println!("{}", serde_json::to_string(&report).into_diagnostic()?);
     } else {
         print!("{}", terminal(&result));
-        for fault in &faults {
-            println!(
-                "The {} leaves a standard uncertainty of {:.2e} for {}, and the data want it beyond: it is at fault, or \
-                 something changed since. Calibrate again.",
-                fault.certificate, fault.stated_sd, fault.effect
-            );
-        }
+        faults.iter().for_each(|fault| println!("{}", fault.text()));
+        doubts.iter().for_each(|doubt| println!("{}", doubt.text()));
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// A certificate that speaks for an instrument which is blamed nevertheless.
-#[derive(Debug, serde::Serialize)]
-struct CertificateAtFault {
-    effect: String,
-    certificate: String,
-    stated_sd: f64,
-}
-
-/// The certificates at fault: an effect that leads the verdict although one bounds it.
-fn certificates_at_fault(rig: &Rig, path: &Path, report: &serde_json::Value) -> Vec<CertificateAtFault> {
-    if !matches!(report["verdict"].as_str(), Some("named" | "ambiguous")) {
-        return Vec::new();
-    }
-    let text = fs::read_to_string(path).unwrap_or_default();
-    let stated: toml::Table = toml::from_str(&text).unwrap_or_default();
-    let files = stated.get("calibration").and_then(|c| c.get("certificates"));
-    let effects = report["hypotheses"][0]["effects"].as_array().cloned().unwrap_or_default();
-    effects
-        .iter()
-        .filter_map(|e| e.as_str())
-        .filter_map(|effect| {
-            let stated_sd = rig.certified_sd(effect, 0)?;
-            let kind = if effect == "amplitude_miscalibration" { "amplitude" } else { "force" };
-            let file = files.and_then(|f| f.get(kind)).and_then(|f| f.as_str());
-            let certificate =
-                file.map_or(format!("{kind} certificate"), |f| format!("{kind} certificate ({f})"));
-            Some(CertificateAtFault { effect: effect.into(), certificate, stated_sd })
-        })
-        .collect()
 }
 
 fn read_rig(path: &Path) -> miette::Result<Rig> {

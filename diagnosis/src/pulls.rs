@@ -1,0 +1,119 @@
+//! How far the recalibrated baseline stands from what the finger's calibration states.
+//!
+//! Only the groups `Fn / (k_n w)` and `k_l U / (pi f mu0 k_n w)` enter the baseline (Eqs. 6-15). So an amplitude whose
+//! scale is wrong by a factor is, pass for pass, a normal stiffness wrong by that factor: the stiffness takes it up, no
+//! gap is left, and no table of passes can say which of the two it was. What can be said is that the stiffness had to go
+//! where its own calibration does not want it. The pull says how far: the shift in units of the deviation that such a
+//! shift has when prior and table agree (prior variance less posterior variance).
+
+use crate::evidence::Explained;
+use crate::fit::Problem;
+use effects::library;
+use serde::Serialize;
+
+/// Pull of one stiffness from its prior.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Pull {
+    /// `normal_stiffness` or `lateral_stiffness`.
+    pub quantity: &'static str,
+    /// What rig.toml states, N/m.
+    pub stated_n_per_m: f64,
+    /// What the verdict's model takes, N/m.
+    pub fitted_n_per_m: f64,
+    /// Stated relative standard deviation.
+    pub stated_relative_sd: f64,
+    /// Shift in deviations of a shift when prior and table agree; none where the table says too little of the quantity.
+    pub pull_sd: Option<f64>,
+    /// Instrument errors that imitate the shift exactly: only an outside calibration tells them from it.
+    pub imitated_by: &'static [&'static str],
+}
+
+impl Pull {
+    /// Whether prior and table disagree about this stiffness.
+    pub fn remarkable(&self) -> bool {
+        self.pull_sd.is_some_and(|pull| pull.abs() >= REMARKABLE)
+    }
+
+    /// What a reader should know of a remarkable pull.
+    pub fn remark(&self) -> Option<String> {
+        let pull = self.pull_sd.filter(|_| self.remarkable())?;
+        let factor = self.fitted_n_per_m / self.stated_n_per_m;
+        let instruments = if self.quantity == "normal_stiffness" {
+            format!(
+                "an amplitude that is read {:.3} times too large, or a normal force read {factor:.3} times too large",
+                1.0 / factor
+            )
+        } else {
+            format!(
+                "a lateral force read with another gain, or a sliding speed read {:.3} times too large",
+                1.0 / factor
+            )
+        };
+        Some(format!(
+            "The model holds only with a {} of {:.3e} N/m, {factor:.3} times the stated {:.3e}: {:.1} standard \
+             deviations off, at the stated {:.1} %. Either the finger is not what its calibration says, or an \
+             instrument's is wrong: {instruments} looks the same on every pass. No table of passes tells these apart; \
+             calibrate the instrument again, or the finger.",
+            self.quantity.replace('_', " "),
+            self.fitted_n_per_m,
+            self.stated_n_per_m,
+            pull.abs(),
+            100.0 * self.stated_relative_sd,
+        ))
+    }
+}
+
+/// Pull from which the remark is made: one table in 185 passes it by chance, two stiffnesses counted.
+pub const REMARKABLE: f64 = 3.0;
+/// Least share of the prior variance that the table must take away before a pull is stated.
+const TOLD: f64 = 0.05;
+
+/// Exact aliases of each stiffness, from the two groups.
+const ALIASES: [(&str, &[&str]); 2] = [
+    ("normal_stiffness", &["amplitude_miscalibration", "normal_gain"]),
+    ("lateral_stiffness", &["lateral_gain", "speed_error"]),
+];
+
+/// Pulls of both stiffnesses in a model. Where `model` explains the table by an error of a stiffness, that error is what
+/// was pulled: how far is then asked of the recalibrated baseline, `none`, and the fitted value is the model's whole one.
+pub fn pulls(problem: &Problem, none: &Explained, model: &Explained) -> Vec<Pull> {
+    let named = model.members.iter().any(|m| m.name() == "stiffness_error");
+    let judged = if named { none } else { model };
+    let fitted = problem.baseline(&model.u);
+    let nominal = &problem.nominal;
+    let [on_normal, on_lateral] = stiffness_factors(model);
+    let values = [
+        (nominal.normal_stiffness_n_per_m, on_normal * fitted.normal_stiffness_n_per_m),
+        (nominal.lateral_stiffness_n_per_m, on_lateral * fitted.lateral_stiffness_n_per_m),
+    ];
+    ALIASES
+        .iter()
+        .zip(values)
+        .enumerate()
+        .map(|(i, (&(quantity, imitated_by), (stated_n_per_m, fitted_n_per_m)))| {
+            // Coordinates are standard normal a priori: mu0 first, then the stiffnesses.
+            let at = i + 1;
+            let told = 1.0 - judged.covariance[(at, at)];
+            Pull {
+                quantity,
+                stated_n_per_m,
+                fitted_n_per_m,
+                stated_relative_sd: problem.prior_sd[at],
+                pull_sd: (told > TOLD).then(|| judged.u[at] / told.sqrt()),
+                imitated_by,
+            }
+        })
+        .collect()
+}
+
+/// Factors on normal and lateral stiffness that a named error of a stiffness adds to the baseline's.
+fn stiffness_factors(model: &Explained) -> [f64; 2] {
+    let thetas = Problem::thetas(&model.members, &model.u);
+    let mut factors = [1.0; 2];
+    for (member, theta) in model.members.iter().zip(thetas).filter(|(m, _)| m.name() == "stiffness_error") {
+        let law = library()[member.effect].laws()[member.law].name;
+        let acts = [law != "lateral stiffness", law != "normal stiffness"];
+        (0..2).filter(|k| acts[*k]).for_each(|k| factors[k] *= theta[0].exp());
+    }
+    factors
+}
