@@ -6,6 +6,8 @@
 //! true amplitude: every amplitude in the loop, its limits and its record is then the plate's. What certificates
 //! leave open goes into rig.toml as `[calibration]`.
 
+pub mod temperature;
+
 use crate::setup::SetupFile;
 use calibration::amplitude::apply::AmplitudeCalibration;
 use calibration::certificate::{Certificate, Circumstances, Kind, Verified};
@@ -17,6 +19,7 @@ use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoD
 use realtime::safety::DriveCommand;
 use std::collections::BTreeMap;
 use std::path::Path;
+use temperature::TemperatureRange;
 
 /// Amplitude over set-point that a drive whose set-point is an amplitude may have. A factor of two is no gain, it is a
 /// single amplitude taken for peak-to-peak.
@@ -31,6 +34,8 @@ pub struct Certificates {
     pub amplitude: Option<AmplitudeCalibration>,
     /// The gain in m per unit of a drive whose set-point is a current.
     pub amplitude_m_per_unit: Option<f64>,
+    /// Ranges of temperature that the amplifier's own channel is held against while the rig runs.
+    pub temperature_ranges: Vec<TemperatureRange>,
     /// What remains uncertain, for rig.toml.
     pub priors: CalibrationPriors,
     /// File name of each certificate, by its kind.
@@ -85,6 +90,11 @@ impl Certificates {
                 all.take_amplitude(file, verified).map_err(&fail)?;
             }
             let kept = path.file_name().map_or(name.clone(), |n| n.to_string_lossy().into_owned());
+            // No instrument of force reports a temperature to the loop; the amplifier does.
+            if let (Kind::Amplitude, Some(range_c)) = (kind, certificate.validity.temperature_c) {
+                let certificate = format!("{kind} certificate ({kept})");
+                all.temperature_ranges.push(TemperatureRange { certificate, range_c });
+            }
             all.names.insert(kind.to_string(), kept.clone());
             all.files.push((format!("certificates/{kept}"), text));
         }

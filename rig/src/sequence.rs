@@ -6,6 +6,7 @@
 //!  any -> Failed(trip)      Stopped by request at any time
 //! ```
 
+use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
 use crate::plan::{PassTimes, Point};
 use models::condition::Condition;
 use models::prediction::{FrictionModel, Regime};
@@ -15,7 +16,7 @@ use models::record::Pass;
 use realtime::compare::{Comparator, PassComparison, PassNoise};
 use realtime::cycle::{Command, Marker, Phase};
 use realtime::estimate::Moments;
-use realtime::ports::Nanos;
+use realtime::ports::{Nanos, NoData};
 use realtime::safety::{Cause, Request, Trip};
 use realtime::turn::Row;
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,9 @@ pub struct MeasuredPass {
     pub regime: Option<Regime>,
     /// Psi of Eq. 17 at the measured condition; `None` without vibration or without `mu_0`.
     pub psi_eq17: Option<f64>,
+    /// Certificates that do not hold at the temperature that the pass began with. Nothing was corrected for it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub temperature_flags: Vec<TemperatureFlag>,
 }
 
 /// Something worth a line in the record and on the terminal.
@@ -66,6 +70,20 @@ pub enum Event {
     PassRepeated {
         /// Which.
         point: u32,
+    },
+    /// From this pass on a certificate does not hold at the temperature that the amplifier reports, or that is not
+    /// known: every pass until it holds again carries the flag.
+    TemperatureBeyondCertificate {
+        /// The first such pass.
+        point: u32,
+        /// What does not hold.
+        flag: TemperatureFlag,
+    },
+    /// A certificate holds within a range of temperatures, and the amplifier reports none: only the setup's
+    /// `temperature_c` was checked.
+    TemperatureUnwatched {
+        /// Which certificate.
+        certificate: String,
     },
 }
 
@@ -158,6 +176,8 @@ pub struct Sequence {
     departed: bool,
     started: bool,
     poisson_ratio: f64,
+    temperature_ranges: Vec<TemperatureRange>,
+    temperature_flags: Vec<TemperatureFlag>,
 }
 
 impl Sequence {
@@ -183,7 +203,14 @@ impl Sequence {
             departed: false,
             started: false,
             poisson_ratio: tip.finger.poisson_ratio,
+            temperature_ranges: Vec::new(),
+            temperature_flags: Vec::new(),
         }
+    }
+
+    /// The same, with certificates that are held against the amplifier's temperature at the start of each pass.
+    pub fn watching(self, temperature_ranges: &[TemperatureRange]) -> Self {
+        Sequence { temperature_ranges: temperature_ranges.to_vec(), ..self }
     }
 
     /// Takes in a pass of an earlier session of the same run: `mu_0` and the evidence go on from there.
@@ -258,6 +285,11 @@ impl Sequence {
         let since = since.unwrap_or(row.now);
         if row.armed {
             out.events.push(Event::Armed);
+            if row.inputs.seen.amplifier.is_ok_and(|a| a.temperature_c == Err(NoData::NotFitted)) {
+                let certificates = self.temperature_ranges.iter().map(|range| range.certificate.clone());
+                out.events
+                    .extend(certificates.map(|certificate| Event::TemperatureUnwatched { certificate }));
+            }
             out.commands.push(Command::Set(Request::default(), self.marker(Phase::Zero)));
             self.stage = Stage::Zero { since: None, after: false };
             return;
@@ -366,7 +398,24 @@ impl Sequence {
         };
         out.commands.push(Command::Set(request, self.marker(Phase::Measure)));
         self.sums = Sums::default();
+        self.check_temperature(row, out);
         self.stage = Stage::Measure { since: row.now };
+    }
+
+    /// Holds the amplifier's temperature against the certificates; what is new is told.
+    fn check_temperature(&mut self, row: &Row, out: &mut Reaction) {
+        let temperature_c = match &row.inputs.seen.amplifier {
+            Ok(amplifier) => amplifier.temperature_c,
+            Err(reason) => Err(*reason),
+        };
+        let flags: Vec<TemperatureFlag> =
+            self.temperature_ranges.iter().filter_map(|range| range.flag(&temperature_c)).collect();
+        let before = std::mem::take(&mut self.temperature_flags);
+        let point = self.points[self.next].number;
+        let fresh = flags.iter().filter(|flag| !before.iter().any(|b| b.certificate == flag.certificate));
+        let told = fresh.map(|flag| Event::TemperatureBeyondCertificate { point, flag: flag.clone() });
+        out.events.extend(told);
+        self.temperature_flags = flags;
     }
 
     /// Adds a row's fresh samples to the sums.
@@ -464,6 +513,7 @@ impl Sequence {
         let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
         let psi_eq17 =
             known.map(|m| PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0);
-        MeasuredPass { pass, reference, comparison, regime, psi_eq17 }
+        let temperature_flags = self.temperature_flags.clone();
+        MeasuredPass { pass, reference, comparison, regime, psi_eq17, temperature_flags }
     }
 }

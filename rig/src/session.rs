@@ -161,7 +161,8 @@ impl Job {
             Arc::clone(&self.model),
             &self.setup.tip,
             self.setup.file.noise,
-        );
+        )
+        .watching(&self.setup.certificates.temperature_ranges);
         for pass in &dir.made {
             sequence.remember(pass);
         }

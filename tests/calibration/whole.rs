@@ -171,3 +171,46 @@ fn a_certificate_holds_within_its_temperatures_only() {
     assert!(said.status.success(), "{}", tests::texts(&said).1);
     assert!(!at.join("c").exists(), "nothing was touched");
 }
+
+/// A certificate that holds at the bench's temperature but not at the amplifier's during the run: every pass says so, the
+/// report too, and the numbers are the same as without.
+#[test]
+fn a_temperature_beyond_the_certificate_flags_the_passes_and_corrects_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    write(at, "table.csv", &table("", 1.0));
+    let passes = |low: f64, high: f64, out: &str| {
+        certify(
+            at,
+            &format!(
+                "amplitude --table table.csv --form bent --serial A-1 --out amplitude.toml --temperature-c {low} {high}"
+            ),
+        );
+        // Read off at the bench: 20 deg C. The virtual amplifier reports 22.
+        write(at, "setup.toml", &setup("\"amplitude.toml\"", "temperature_c = 20.0\n"));
+        let run = muprime(at, &format!("run --setup setup.toml --fast --out {out} --seed 3"));
+        assert!(run.status.success(), "{}", tests::texts(&run).1);
+        let journal = std::fs::read_to_string(at.join(out).join("passes.jsonl")).unwrap();
+        let passes: Vec<serde_json::Value> =
+            journal.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        assert!(passes.len() > 10);
+        let report = std::fs::read_to_string(at.join(out).join("report.html")).unwrap();
+        let points = std::fs::read_to_string(at.join(out).join("points.csv")).unwrap();
+        (passes, report, points, tests::texts(&run).1)
+    };
+    let (held, report, points, _) = passes(15.0, 30.0, "held");
+    assert!(held.iter().all(|p| p["temperature_flags"].is_null()));
+    assert!(!report.contains("does not hold"));
+    let (beyond, report, same, said) = passes(10.0, 21.0, "beyond");
+    for pass in &beyond {
+        let flag = &pass["temperature_flags"][0];
+        assert_eq!(flag["certificate"], "amplitude certificate (amplitude.toml)", "{pass}");
+        assert_eq!(flag["range_c"], serde_json::json!([10.0, 21.0]));
+        assert!((flag["found_c"].as_f64().unwrap() - 22.0).abs() < 0.5, "{flag}");
+    }
+    let text = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains("holds from 10.0 to 21.0 deg C, the amplifier reports 22.0"), "{text}");
+    assert_eq!(text.matches("holds from 10.0").count(), 1, "told once, flagged on every pass: {text}");
+    assert!(report.contains("at which a certificate does not hold"), "the report says so");
+    assert_eq!(points, same, "a flag changes no number");
+}

@@ -199,6 +199,13 @@ fn describe(event: &Event) -> String {
         }
         Event::StopRequested => "stopping: the rig goes to its safe state first".into(),
         Event::PassRepeated { point } => format!("point {point}: no contact, once more"),
+        Event::TemperatureBeyondCertificate { point, flag } => {
+            format!("point {point} and on: {flag}; the passes are flagged, nothing is corrected")
+        }
+        Event::TemperatureUnwatched { certificate } => format!(
+            "{certificate} holds within a range of temperatures, and the amplifier reports none: only the setup's \
+             temperature_c was checked"
+        ),
     }
 }
 

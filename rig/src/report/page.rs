@@ -97,6 +97,15 @@ fn verdict(w: &mut String, run: &RunData) {
     };
     let class = if departed { "verdict departed" } else { "verdict" };
     let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}</p>");
+    let flagged = run.passes.iter().filter(|p| !p.temperature_flags.is_empty()).count();
+    if let Some(flag) = run.passes.iter().find_map(|p| p.temperature_flags.first()) {
+        let _ = writeln!(
+            w,
+            "<p class=\"verdict departed\">{flagged} of {made} passes began at a temperature at which a certificate \
+             does not hold (first: {}). They are marked * below; nothing was corrected.</p>",
+            escape(&flag.to_string())
+        );
+    }
 }
 
 fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
@@ -163,10 +172,11 @@ fn passes(w: &mut String, run: &RunData) {
             |v: Option<f64>, digits: usize| v.map_or("&ndash;".to_string(), |v| format!("{v:.digits$}"));
         let _ = writeln!(
             w,
-            "<tr><td class=\"n\">{}</td><td class=\"n\">{:.3}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td>\
+            "<tr><td class=\"n\">{}{}</td><td class=\"n\">{:.3}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td>\
              <td class=\"n\">{}</td><td class=\"n\">{:.4}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
              <td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>",
             p.pass.point,
+            if p.temperature_flags.is_empty() { "" } else { "*" },
             p.pass.amplitude.micrometres(),
             p.pass.frequency_hz / 1e3,
             p.pass.speed_m_s * 1e3,
