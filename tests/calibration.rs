@@ -17,6 +17,8 @@ mod closing;
 mod finger;
 #[path = "calibration/force.rs"]
 mod force;
+#[path = "calibration/interrupted.rs"]
+mod interrupted;
 #[path = "calibration/latency.rs"]
 mod latency;
 #[path = "calibration/phase.rs"]

@@ -21,6 +21,9 @@ pub struct Args {
     /// Guided: averaging time of a reading in s
     #[arg(long, default_value_t = 2.0)]
     average_s: f64,
+    /// Guided: how long a link that went down is waited for, in s
+    #[arg(long, default_value_t = 60.0)]
+    reconnect_s: f64,
     /// Guided: where the series is kept [default: beside the certificate, .csv]
     #[arg(long)]
     save_series: Option<PathBuf>,
@@ -66,10 +69,15 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let (name, bytes) = match &args.series {
         Some(path) => (path.display().to_string(), sources.read(path)?),
         None => {
-            let text = guided::series(args.setup.as_deref(), args.average_s)?;
             let beside = args.common.out.clone().unwrap_or_else(|| "force.toml".into()).with_extension("csv");
             let path = args.save_series.clone().unwrap_or(beside);
-            std::fs::write(&path, &text).map_err(|e| miette::miette!("{}: {e}", path.display()))?;
+            let way = guided::Way {
+                setup: args.setup.as_deref(),
+                average_s: args.average_s,
+                reconnect_s: args.reconnect_s,
+                keep: &path,
+            };
+            let text = guided::series(&way)?;
             let name = path.display().to_string();
             eprintln!("the series is kept in {name}");
             sources.add(&name, text.as_bytes());
