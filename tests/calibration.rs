@@ -27,6 +27,8 @@ mod phase;
 mod refusals;
 #[path = "calibration/sensor.rs"]
 mod sensor;
+#[path = "calibration/vibrometer.rs"]
+mod vibrometer;
 #[path = "calibration/whole.rs"]
 mod whole;
 #[path = "calibration/wire.rs"]

@@ -17,7 +17,7 @@ mod values;
 
 pub use frames::{Init, Message, Poll, Query, Stream, Table, Write};
 pub use header::{Header, Role, Verified};
-pub use link::{ErrorQuery, Link, LinkKind};
+pub use link::{Choice, ErrorQuery, Link, LinkKind};
 pub use state::{Fault, Severity, Signature, Stamp, Time};
 pub use trial::{Emulator, Vector};
 pub use values::{Set, Si, Signal};

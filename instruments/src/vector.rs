@@ -5,7 +5,7 @@
 
 use crate::error::ProfileError;
 use crate::field::NumberType;
-use crate::profile::{FrameId, Profile};
+use crate::profile::{FrameId, FrameKind, Profile};
 use crate::schema::Vector;
 
 /// Relative error that a vector's value may have: decimal numbers are not exact in binary.
@@ -51,7 +51,11 @@ impl Profile {
             None if names.len() == 1 => 0,
             None => return Err(error("the vector needs `frame`: the profile has several".into())),
         };
-        let bytes = bytes_of(vector).map_err(error)?;
+        let unit = self.frames().get(which).and_then(|frame| match frame.kind {
+            FrameKind::Query(index) => d.query[index].unit.as_deref(),
+            _ => None,
+        });
+        let bytes = bytes_of(vector, unit).map_err(error)?;
         let mut values = self.values();
         for (name, &given) in &vector.given {
             let signal = self.signal(name).filter(|&s| self.frame_of(s).0 != which);
@@ -113,11 +117,16 @@ impl Profile {
     }
 }
 
-fn bytes_of(vector: &Vector) -> Result<Vec<u8>, String> {
+fn bytes_of(vector: &Vector, unit: Option<&str>) -> Result<Vec<u8>, String> {
     if let (None, None, Some(line)) = (&vector.registers, &vector.hex, &vector.line) {
-        let number =
-            crate::codec::text::number(line).ok_or_else(|| format!("`{line}` is no number and no truth"))?;
-        return Ok(number.to_be_bytes().to_vec());
+        let number = match unit {
+            Some(unit) => crate::codec::text::quantity(line, unit)
+                .ok_or_else(|| format!("`{line}` is nothing in {unit}")),
+            None => {
+                crate::codec::text::number(line).ok_or_else(|| format!("`{line}` is no number and no truth"))
+            }
+        };
+        return Ok(number?.to_be_bytes().to_vec());
     }
     match (&vector.registers, &vector.hex) {
         (Some(registers), None) => Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect()),

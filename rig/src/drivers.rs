@@ -39,6 +39,7 @@
 //! | [`text`] | the conversation in lines, over a serial line or SCPI over TCP |
 //! | [`canopen`] | the conversation with a CANopen drive of CiA 402 |
 //! | [`serial`] | serial lines |
+//! | [`vibrometer`] | the settings of a vibrometer's controller, read back for a calibration |
 //! | [`probe`] | each instrument asked by itself, for `muprime doctor` |
 //! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 
@@ -60,6 +61,7 @@ pub mod slcan;
 pub mod socketcan;
 pub mod text;
 pub mod timebase;
+pub mod vibrometer;
 
 pub use health::{Health, HealthReport};
 pub use setup::{AxisSetup, InstrumentSetup, InstrumentsSetup};

@@ -7,6 +7,8 @@ mod fast;
 mod keeper;
 mod live;
 
+pub use live::RigClaim;
+
 pub use fast::{Rehearsal, rehearse};
 pub use keeper::{REPLAYABLE, Replayable};
 

@@ -3,6 +3,7 @@
 mod bundled;
 
 use crate::certificates::Certificates;
+use crate::drivers::vibrometer::{Settings, VibrometerSetup};
 use crate::drivers::{InstrumentSetup, InstrumentsSetup};
 use crate::fingertip::{Fingertip, FingertipSetup};
 use crate::input::{self, BadInput};
@@ -34,6 +35,9 @@ pub struct SetupFile {
     pub amplifier: InstrumentSetup,
     /// The stage.
     pub stage: InstrumentSetup,
+    /// The vibrometer's controller, whose settings calibrations read back; it takes no part in a run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vibrometer: Option<VibrometerSetup>,
     /// Soft limits; what is left out keeps its default.
     #[serde(default)]
     pub limits: LimitsFile,
@@ -226,6 +230,25 @@ impl Setup {
         amplifier.amplitude_m_per_unit =
             self.certificates.amplitude_m_per_unit.or(amplifier.amplitude_m_per_unit);
         InstrumentsSetup { force: self.file.force.clone(), amplifier, stage: self.file.stage.clone() }
+    }
+
+    /// The settings of the vibrometer's controller, read back now; they must cover the drive's frequency.
+    ///
+    /// # Errors
+    /// A setup without one, a controller that does not answer, a decoder that is not there or does not reach so far.
+    pub fn vibrometer_settings(&self, frequency_hz: f64) -> miette::Result<Settings> {
+        let Some(vibrometer) = &self.file.vibrometer else {
+            miette::bail!(
+                help = "[vibrometer] profile = \"polytec-ofv5000\", address = \"/dev/ttyS0\", decoder = \"VD-02\"",
+                "{}: the setup names no vibrometer",
+                self.origin
+            );
+        };
+        let settings =
+            crate::drivers::vibrometer::settings(vibrometer).map_err(|e| miette::miette!("{e}"))?;
+        settings.covers(frequency_hz).map_err(|e| miette::miette!("{e}"))?;
+        eprintln!("vibrometer: {settings}");
+        Ok(settings)
     }
 
     /// What reads the lateral force, by profile, setup and certificate; `None` where no instrument does.

@@ -11,6 +11,45 @@ pub fn number(line: &str) -> Option<f64> {
     }
 }
 
+/// SI prefixes as instruments of text write them; the two signs for micro are the micro sign and the Greek letter.
+const PREFIXES: [(&str, f64); 8] = [
+    ("n", 1e-9),
+    ("u", 1e-6),
+    ("\u{b5}", 1e-6),
+    ("\u{3bc}", 1e-6),
+    ("m", 1e-3),
+    ("k", 1e3),
+    ("M", 1e6),
+    ("G", 1e9),
+];
+
+/// The value in `unit` that a line such as `5mm/s/V` (0.005 m/s/V) or `8.16 us` stands for: a number, perhaps a space, an
+/// SI prefix or none, the unit. `None` for anything else, and for numbers that are not finite.
+#[must_use]
+pub fn quantity(line: &str, unit: &str) -> Option<f64> {
+    let rest = line.trim().strip_suffix(unit)?;
+    let (number, factor) = PREFIXES
+        .iter()
+        .find_map(|(prefix, factor)| rest.strip_suffix(prefix).map(|number| (number, *factor)))
+        .unwrap_or((rest, 1.0));
+    // A decimal number is all that may be left: Rust would read `inf` and `1e3` as well.
+    let number = number.trim_end();
+    let plain = number.chars().all(|c| c.is_ascii_digit() || matches!(c, '.' | '-' | '+'));
+    number.parse().ok().filter(|value: &f64| plain && value.is_finite()).map(|value| value * factor)
+}
+
+/// The line that stands for a value in `unit`, with the prefix that leaves one to three digits before the point.
+#[must_use]
+pub fn with_prefix(value: f64, unit: &str) -> String {
+    let steps = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n")];
+    let (factor, prefix) =
+        steps.into_iter().find(|(factor, _)| value.abs() >= factor * (1.0 - 1e-9)).unwrap_or((1.0, ""));
+    // What decimal prefixes leave of binary fractions is rounded away.
+    let shown = format!("{:.9}", value / factor);
+    let shown = shown.trim_end_matches('0').trim_end_matches('.');
+    format!("{shown}{prefix}{unit}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -30,5 +69,42 @@ mod tests {
         ] {
             assert_eq!(number(line), expected, "{line:?}");
         }
+    }
+
+    #[test]
+    fn quantities_with_prefixes_and_units() {
+        let close = |found: Option<f64>, expected: f64| {
+            found.is_some_and(|found| (found - expected).abs() <= 1e-12 * expected.abs())
+        };
+        for (line, unit, expected) in [
+            ("5mm/s/V", "m/s/V", 5e-3),
+            (" 125 mm/s/V\r", "m/s/V", 0.125),
+            ("1m/s/V", "m/s/V", 1.0),
+            ("8.16 us", "s", 8.16e-6),
+            ("8.16 \u{b5}s", "s", 8.16e-6),
+            ("250kHz", "Hz", 250e3),
+            ("1.5MHz", "Hz", 1.5e6),
+        ] {
+            assert!(close(quantity(line, unit), expected), "{line}: {:?}", quantity(line, unit));
+            assert!(
+                close(quantity(&with_prefix(expected, unit), unit), expected),
+                "{}",
+                with_prefix(expected, unit)
+            );
+        }
+        for (line, unit) in [
+            ("5mm/V", "m/s/V"),
+            ("fast", "s"),
+            ("", "s"),
+            ("us", "s"),
+            ("1e3 s", "s"),
+            ("inf s", "s"),
+            ("8.16", "s"),
+        ] {
+            assert_eq!(quantity(line, unit), None, "{line}");
+        }
+        assert_eq!(with_prefix(5e-3, "m/s/V"), "5mm/s/V");
+        assert_eq!(with_prefix(8.16e-6, "s"), "8.16us");
+        assert_eq!(with_prefix(0.0, "s"), "0s");
     }
 }

@@ -120,6 +120,9 @@ pub struct Query {
     /// Length of a binary answer; left out for a line of text that is one number or a truth.
     #[serde(default)]
     pub length: Option<u16>,
+    /// The answer is a number, an SI prefix or none, and this unit, as `5mm/s/V`; left out for a bare number or a truth.
+    #[serde(default)]
+    pub unit: Option<String>,
     /// Questions per second.
     pub rate_hz: f64,
 }

@@ -47,6 +47,9 @@ pub enum Role {
     /// Loading of the contact.
     #[serde(rename = "motion.load")]
     MotionLoad,
+    /// A vibrometer's controller, whose settings are read back for a calibration; it takes no part in a run.
+    #[serde(rename = "measure.vibration")]
+    MeasureVibration,
 }
 
 /// How far a profile was tried.

@@ -72,6 +72,9 @@ pub struct Link {
     /// A query that is put after every set-point, and what its answer must begin with.
     #[serde(default)]
     pub error_query: Option<ErrorQuery>,
+    /// Several units of one kind, of which the setup means one by its name: `{which}` in the questions is its number.
+    #[serde(default)]
+    pub choice: Option<Choice>,
     /// A connection must stand within this time, in ms.
     #[serde(default = "defaults::connect_timeout_ms")]
     pub connect_timeout_ms: u32,
@@ -84,6 +87,16 @@ pub struct Link {
     /// Longest pause before a new connection, in ms.
     #[serde(default = "defaults::backoff_longest_ms")]
     pub backoff_longest_ms: u32,
+}
+
+/// How the name of each of several units is asked for.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Choice {
+    /// The question for a name; `{which}` is the number of the unit, from 0.
+    pub ask: String,
+    /// So many numbers are asked for at most.
+    pub most: u8,
 }
 
 /// A question for errors.

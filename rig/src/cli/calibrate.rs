@@ -9,6 +9,7 @@ mod gravity;
 mod guided;
 mod inverse;
 mod latency;
+mod live;
 mod noise;
 mod phase;
 mod tables;

@@ -218,7 +218,16 @@ fn talk(setup: &Setup) -> Vec<Finding> {
         }];
     }
     let probed = crate::drivers::probe::probe(&setup.instruments(), Duration::from_secs(1));
-    probed.into_iter().map(found).collect()
+    let vibrometer = setup.file.vibrometer.as_ref().map(|v| {
+        let settings = crate::drivers::vibrometer::settings(v);
+        Finding {
+            subject: format!("vibrometer `{}` at {}", v.profile, v.address),
+            good: settings.is_ok(),
+            found: settings.map_or_else(|problem| problem, |settings| settings.to_string()),
+            advice: "check line, power and that no other program holds it; Echo must be off".into(),
+        }
+    });
+    probed.into_iter().map(found).chain(vibrometer).collect()
 }
 
 fn found(probed: Probed) -> Finding {

@@ -84,6 +84,16 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let embedded =
         crate::drivers::embed::embed(&mut instruments, &plant, true).map_err(|e| miette::miette!("{e}"))?;
+    let mut embedded = embedded;
+    let vibrometer = match setup.file.vibrometer.clone() {
+        None => None,
+        Some(mut vibrometer) => {
+            let served = crate::drivers::embed::vibrometer(&mut vibrometer, &plant)
+                .map_err(|e| miette::miette!("{e}"))?;
+            embedded.places.push(format!("{} at {}", vibrometer.profile, vibrometer.address));
+            Some(served)
+        }
+    };
     let modbus_tcp = embedded.modbus_tcp().map(|address| address.to_string());
     if json {
         println!("{}", serde_json::json!({ "modbus_tcp": modbus_tcp, "instruments": embedded.places }));
@@ -106,7 +116,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM])
             .into_diagnostic()?;
     let _ = signals.forever().next();
-    drop((line, embedded));
+    drop((line, embedded, vibrometer));
     super::exit(super::DONE)
 }
 

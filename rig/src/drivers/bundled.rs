@@ -11,6 +11,7 @@ const PROFILES: &[(&str, &str)] = &[
     ("muprime-force2", include_str!("../../profiles/muprime-force2.toml")),
     ("muprime-stage", include_str!("../../profiles/muprime-stage.toml")),
     ("piezodrive-pdus210", include_str!("../../profiles/piezodrive-pdus210.toml")),
+    ("polytec-ofv5000", include_str!("../../profiles/polytec-ofv5000.toml")),
     ("robotiq-ft300", include_str!("../../profiles/robotiq-ft300.toml")),
     ("robotiq-ft300-stream", include_str!("../../profiles/robotiq-ft300-stream.toml")),
 ];

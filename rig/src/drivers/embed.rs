@@ -5,6 +5,7 @@
 
 use super::setup::{InstrumentSetup, InstrumentsSetup};
 use super::socketcan::KernelCan;
+use super::vibrometer::VibrometerSetup;
 use instruments::schema::LinkKind;
 use serialport::{SerialPort, TTYPort};
 use sim::wire::can::{CanDevice, CanEmulator, EmulatedAdapter};
@@ -126,6 +127,18 @@ pub fn embed(
     }
     embedded.places = all.iter().map(|one| format!("{} at {}", one.profile, one.address)).collect();
     Ok(embedded)
+}
+
+/// Serves a vibrometer's controller where the setup looks for it.
+///
+/// # Errors
+/// A line that cannot be served, or a profile that names what the world does not have.
+pub fn vibrometer(setup: &mut VibrometerSetup, plant: &SharedPlant) -> Result<SerialEmulator, String> {
+    let profile = super::profile(&setup.profile).map_err(|error| error.to_string())?;
+    let device = Device::new(profile).map_err(|error| error.to_string())?;
+    let port = port(&mut setup.address)?;
+    SerialEmulator::lines(port, LineInstrument::new(device, plant.clone()), || None)
+        .map_err(|error| format!("{} cannot be served: {error}", setup.profile))
 }
 
 /// A loopback address, unless other machines are to be served.

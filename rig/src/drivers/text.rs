@@ -10,7 +10,7 @@ use super::modbus_tcp::resolve;
 use super::serial::Line;
 use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
 use super::setup::InstrumentSetup;
-use instruments::codec::text::number;
+use instruments::codec::text::{number, quantity};
 use instruments::profile::FrameKind;
 use instruments::schema::{Link, LinkKind, Query};
 use instruments::{FrameId, SetId};
@@ -266,7 +266,11 @@ impl Talk {
             },
             None => {
                 let line = self.line(session)?;
-                match number(&line) {
+                let read = match &query.unit {
+                    Some(unit) => quantity(&line, unit),
+                    None => number(&line),
+                };
+                match read {
                     Some(number) => number.to_be_bytes().to_vec(),
                     None => return self.bear(session, format!("`{}` was answered by `{line}`", query.send)),
                 }

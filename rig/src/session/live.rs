@@ -12,7 +12,7 @@ use super::{Job, News, Signals, Summary, Unfinished};
 use crate::drivers;
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
-use claim::RigClaim;
+pub use claim::RigClaim;
 use crossbeam_queue::ArrayQueue;
 use miette::{IntoDiagnostic, WrapErr};
 use realtime::cycle::Command;
@@ -49,7 +49,7 @@ pub fn run(
     signals: &Signals,
     news: &mut dyn FnMut(News<'_>),
 ) -> miette::Result<Summary> {
-    let _claim = RigClaim::take(&job)?;
+    let _claim = RigClaim::take(&job.setup)?;
     let epoch = Instant::now();
     let origin_ns = pacing::monotonic_ns();
     let start_unix_ns = keeper::unix_ns();

@@ -7,6 +7,7 @@
 use super::device::Device;
 use super::serial::SerialEmulator;
 use super::{Command, Plant, SharedPlant};
+use instruments::codec::text::with_prefix;
 use instruments::profile::FrameKind;
 use instruments::{FrameId, SetId};
 use realtime::ports::Nanos;
@@ -89,10 +90,27 @@ impl LineInstrument {
                 .and_then(|all| all.first())
                 .map_or(Said::Nothing, |start| Said::Line(start.clone()));
         }
-        if let Some((frame, length)) = self.query(line) {
+        if let Some(choice) = &description.link.choice
+            && let Some(which) = number_in(&choice.ask, line)
+        {
+            let name = description.emulator.names.get(which);
+            return name.map_or(Said::Nothing, |name| Said::Line(name.clone()));
+        }
+        if let Some((frame, index, which)) = self.query(line) {
+            let query = &description.query[index];
+            let (block, unit) = (query.length.is_some(), query.unit.clone());
+            // A wrong unit answers as plausibly as the right one.
+            let tenfold = if query.name.as_ref() == "range" { 10f64.powi(which as i32) } else { 1.0 };
+            if description.link.choice.is_some() && which >= description.emulator.names.len() {
+                return Said::Nothing;
+            }
             let bytes = self.device.frame(frame, plant, now);
             let number = || bytes.as_slice().try_into().map(f64::from_be_bytes).unwrap_or(f64::NAN);
-            return if length { Said::Block(bytes) } else { Said::Line(format!("{:+.15E}", number())) };
+            return match (block, unit) {
+                (true, _) => Said::Block(bytes),
+                (false, Some(unit)) => Said::Line(with_prefix(tenfold * number(), &unit)),
+                (false, None) => Said::Line(format!("{:+.15E}", number())),
+            };
         }
         match self.set(line) {
             Some((set, value, answer)) => {
@@ -109,12 +127,12 @@ impl LineInstrument {
         }
     }
 
-    fn query(&self, line: &str) -> Option<(FrameId, bool)> {
+    /// The question that a line puts: its frame, its place in the profile, and the number of the unit that it is put to.
+    fn query(&self, line: &str) -> Option<(FrameId, usize, usize)> {
         let profile = self.device.profile();
         profile.frames().iter().enumerate().find_map(|(i, frame)| match frame.kind {
-            FrameKind::Query(index) if profile.description.query[index].send == line => {
-                Some((FrameId(i), profile.description.query[index].length.is_some()))
-            }
+            FrameKind::Query(index) => number_in(&profile.description.query[index].send, line)
+                .map(|which| (FrameId(i), index, which)),
             _ => None,
         })
     }
@@ -148,6 +166,14 @@ impl LineInstrument {
             ));
         }
         None
+    }
+}
+
+/// The number that a line has where the question has `{which}`; 0 for a question without one that is this line.
+fn number_in(question: &str, line: &str) -> Option<usize> {
+    match question.split_once("{which}") {
+        None => (question == line).then_some(0),
+        Some((before, after)) => line.strip_prefix(before)?.strip_suffix(after)?.parse().ok(),
     }
 }
 

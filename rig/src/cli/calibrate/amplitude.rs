@@ -1,7 +1,8 @@
 //! `muprime calibrate amplitude`.
 
-use super::Common;
 use super::tables::{Sources, columns};
+use super::{Common, live};
+use crate::setup::Setup;
 use calibration::amplitude::apply::AmplitudeFit;
 use calibration::amplitude::droop::{Exponent, droop};
 use calibration::amplitude::gain::{Form, fit};
@@ -14,9 +15,29 @@ use std::process::ExitCode;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Vibrometer table as CSV: set_point (or the column of --set-point), amplitude_pp_m
+    /// Vibrometer table as CSV: set_point (or the column of --set-point), amplitude_pp_m (or velocity_v, see
+    /// --velocity-volts). Left out: taken live, see --live
     #[arg(long)]
-    table: PathBuf,
+    table: Option<PathBuf>,
+    /// The table holds velocity_v, the amplitude of the velocity signal in V (zero to peak), in place of
+    /// amplitude_pp_m; range and band are read back from the vibrometer of --setup
+    #[arg(long, requires = "setup")]
+    velocity_volts: bool,
+    /// Setup with a [vibrometer]; with --live, its amplifier is driven
+    #[arg(long)]
+    setup: Option<String>,
+    /// Take the table live: drive these set-points (peak-to-peak, m) and ask for the velocity's amplitude at each
+    #[arg(long, num_args = 1.., value_name = "W_PP_M", requires = "setup", conflicts_with = "table")]
+    live: Vec<f64>,
+    /// Frequency of the drive where velocities are measured
+    #[arg(long, default_value_t = 27_500.0)]
+    frequency_hz: f64,
+    /// Live: times through the set-points, up and down by turns
+    #[arg(long, default_value_t = 3)]
+    passes: u32,
+    /// Live: wait before each reading in s
+    #[arg(long, default_value_t = 0.5)]
+    settle_s: f64,
     /// Column of the table that holds the set-point: set_point_pp_m, or current_a
     #[arg(long, default_value = "set_point_pp_m")]
     set_point: String,
@@ -66,10 +87,6 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         other => miette::bail!("--set-point {other}: set_point_pp_m or current_a"),
     };
     let mut sources = Sources::default();
-    let mut points = |path: &PathBuf, at: &str| -> miette::Result<Vec<AmplitudePoint>> {
-        let rows = columns(&mut sources, path, [at, "amplitude_pp_m"], &[])?;
-        Ok(rows.into_iter().map(|[at, amplitude_pp_m]| AmplitudePoint { at, amplitude_pp_m }).collect())
-    };
     let said = |path: &PathBuf| {
         let shown = path.display().to_string();
         move |e: AmplitudeError| miette::miette!("{shown}: no certificate: {e}")
@@ -79,8 +96,30 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         FormChoice::Affine => Form::Affine,
         FormChoice::Bent => Form::Bent,
     };
-    let table = points(&args.table, &args.set_point)?;
-    let gain = fit(&table, form, args.vibrometer_relative_sd).map_err(said(&args.table))?;
+    let (path, table, vibrometer) = match (&args.table, args.velocity_volts) {
+        (None, _) if args.live.is_empty() => miette::bail!("give a --table, or --live with set-points"),
+        (None, _) if unit != "m" => {
+            miette::bail!("--live drives amplitudes in m: take the table of a drive of current by hand")
+        }
+        (None, _) => {
+            let (path, settings) = live_table(args)?;
+            (path.clone(), points_of(&mut sources, &path, &args.set_point)?, Some(settings))
+        }
+        (Some(path), false) => (path.clone(), points_of(&mut sources, path, &args.set_point)?, None),
+        (Some(path), true) => {
+            let settings = with_vibrometer(args)?.vibrometer_settings(args.frequency_hz)?;
+            let rows = columns(&mut sources, path, [args.set_point.as_str(), "velocity_v"], &[])?;
+            let convert = |(row, [at, volts]): (usize, [f64; 2])| {
+                live::displacement(volts, settings.range_m_s_per_v, args.frequency_hz)
+                    .map(|w| AmplitudePoint { at, amplitude_pp_m: w.metres() })
+                    .map_err(|e| miette::miette!("{}: row {}: {e}", path.display(), row + 1))
+            };
+            let table = rows.into_iter().enumerate().map(convert).collect::<miette::Result<Vec<_>>>()?;
+            (path.clone(), table, Some(settings.to_string()))
+        }
+    };
+    let gain = fit(&table, form, args.vibrometer_relative_sd).map_err(said(&path))?;
+    let mut points = |path: &PathBuf, at: &str| points_of(&mut sources, path, at);
     let resonance = match &args.sweep {
         None => None,
         Some(path) => Some(sweep(&points(path, "frequency_hz")?).map_err(said(path))?),
@@ -104,10 +143,40 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         droop: drooped,
     };
     let mut outcome = found.outcome();
+    outcome.remarks.extend(vibrometer.map(|settings| {
+        format!("velocity at {:.1} Hz, settings read back from the vibrometer: {settings}", args.frequency_hz)
+    }));
     outcome.temperature_c = match args.temperature_c.as_deref() {
         None => None,
         Some([low, high]) if low < high => Some([*low, *high]),
         Some(other) => miette::bail!("--temperature-c {other:?}: two temperatures, the lower one first"),
     };
     args.common.issue(outcome, sources.raw_data(), json)
+}
+
+fn points_of(sources: &mut Sources, path: &PathBuf, at: &str) -> miette::Result<Vec<AmplitudePoint>> {
+    let rows = columns(sources, path, [at, "amplitude_pp_m"], &[])?;
+    Ok(rows.into_iter().map(|[at, amplitude_pp_m]| AmplitudePoint { at, amplitude_pp_m }).collect())
+}
+
+fn with_vibrometer(args: &Args) -> miette::Result<Setup> {
+    let name = args.setup.as_deref().ok_or_else(|| miette::miette!("--setup is needed"))?;
+    Setup::load(name)
+}
+
+/// Takes the table live and keeps it beside the certificate; its path, and the vibrometer's settings in words.
+fn live_table(args: &Args) -> miette::Result<(PathBuf, String)> {
+    let setup = with_vibrometer(args)?;
+    let table = live::Table {
+        set_points_pp_m: &args.live,
+        frequency_hz: args.frequency_hz,
+        passes: args.passes,
+        settle_s: args.settle_s,
+    };
+    let text = live::table(&setup, &table)?;
+    let path = args.common.out.clone().unwrap_or_else(|| "amplitude.toml".into()).with_extension("csv");
+    super::write_whole(&path, &text)?;
+    eprintln!("the table is kept in {}", path.display());
+    let settings = text.lines().next().and_then(|l| l.strip_prefix("# vibrometer: ")).unwrap_or_default();
+    Ok((path, settings.to_string()))
 }

@@ -2,6 +2,7 @@
 
 use super::Common;
 use super::tables::{Sources, columns};
+use crate::setup::Setup;
 use calibration::amplitude::vibrometer::{Decoder, sine};
 use calibration::phase::{
     Acquisition, PhasePoint, RepeatedShift, Shift, Waveforms, outcome, repeated, shift, write_phases,
@@ -23,18 +24,22 @@ pub struct Args {
     /// Frequency of the drive
     #[arg(long, default_value_t = 27_500.0)]
     frequency_hz: f64,
-    /// Range of the plate's decoder, as the controller says it
-    #[arg(long, default_value = "125mm/s/V")]
-    plate_range: String,
-    /// Delay of the plate's decoder, as the controller says it
-    #[arg(long, default_value = "0 us")]
-    plate_delay: String,
-    /// Range of the skin's decoder
-    #[arg(long, default_value = "125mm/s/V")]
-    skin_range: String,
-    /// Delay of the skin's decoder
-    #[arg(long, default_value = "0 us")]
-    skin_delay: String,
+    /// Setup with a [vibrometer]: range and delay of the decoder are read back from it, for plate and skin, where the
+    /// four flags below do not state them
+    #[arg(long)]
+    setup: Option<String>,
+    /// Range of the plate's decoder, as the controller says it [default: read back, or 125mm/s/V]
+    #[arg(long)]
+    plate_range: Option<String>,
+    /// Delay of the plate's decoder, as the controller says it [default: read back, or 0 us]
+    #[arg(long)]
+    plate_delay: Option<String>,
+    /// Range of the skin's decoder [default: read back, or 125mm/s/V]
+    #[arg(long)]
+    skin_range: Option<String>,
+    /// Delay of the skin's decoder [default: read back, or 0 us]
+    #[arg(long)]
+    skin_delay: Option<String>,
     /// Standard uncertainty of the difference of the two delays in s
     #[arg(long, default_value_t = 0.0)]
     delay_sd_s: f64,
@@ -56,8 +61,21 @@ pub struct Args {
 
 /// Calibrates.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
-    let decoder = |name: &str, range: &str, delay: &str| {
-        Decoder::from_settings(name, range, delay).map_err(|e| miette::miette!("{name}: {e}"))
+    let settings = match &args.setup {
+        None => None,
+        Some(name) => Some(Setup::load(name)?.vibrometer_settings(args.frequency_hz)?),
+    };
+    let decoder = |name: &str, range: &Option<String>, delay: &Option<String>| {
+        let (range_text, delay_text) =
+            (range.as_deref().unwrap_or("125mm/s/V"), delay.as_deref().unwrap_or("0 us"));
+        let stated = Decoder::from_settings(name, range_text, delay_text);
+        let stated = stated.map_err(|e| miette::miette!("{name}: {e}"))?;
+        let read = settings.as_ref().map_or_else(|| stated.clone(), |s| s.decoder());
+        Ok::<_, miette::Report>(Decoder {
+            name: stated.name,
+            range_m_s_per_v: if range.is_some() { stated.range_m_s_per_v } else { read.range_m_s_per_v },
+            delay_s: if delay.is_some() { stated.delay_s } else { read.delay_s },
+        })
     };
     let plate = decoder("plate", &args.plate_range, &args.plate_delay)?;
     let skin = decoder("skin", &args.skin_range, &args.skin_delay)?;
@@ -110,5 +128,14 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         condition: args.condition.clone(),
         normal_force_n: args.normal_force_n,
     };
-    args.common.issue(outcome(&found, &acquisition), sources.raw_data(), json)
+    let mut outcome = outcome(&found, &acquisition);
+    outcome.remarks.push(format!(
+        "decoders: plate {:e} m/s/V and {:.3} us, skin {:e} m/s/V and {:.3} us{}",
+        plate.range_m_s_per_v,
+        plate.delay_s * 1e6,
+        skin.range_m_s_per_v,
+        skin.delay_s * 1e6,
+        settings.map_or(String::new(), |s| format!("; read back from the vibrometer: {s}"))
+    ));
+    args.common.issue(outcome, sources.raw_data(), json)
 }

@@ -1,6 +1,6 @@
 //! One controller a rig.
 
-use super::Job;
+use crate::setup::Setup;
 
 /// Whether an embedded rig is at a place that only this process knows: a free port, a terminal of its own.
 fn belongs_to_this_process(address: &str) -> bool {
@@ -8,19 +8,21 @@ fn belongs_to_this_process(address: &str) -> bool {
 }
 
 /// One controller a rig: a lock named after the amplifier's address, taken before anything is opened.
-pub(super) struct RigClaim {
+pub struct RigClaim {
     _lock: Option<std::fs::File>,
 }
 
 impl RigClaim {
-    pub(super) fn take(job: &Job) -> miette::Result<Self> {
+    /// Takes the rig of a setup.
+    ///
+    /// # Errors
+    /// Another process has it.
+    pub fn take(setup: &Setup) -> miette::Result<Self> {
         // An embedded rig on a free port belongs to this process by construction.
-        if job.setup.file.virtual_rig.is_some() && belongs_to_this_process(&job.setup.file.amplifier.address)
-        {
+        if setup.file.virtual_rig.is_some() && belongs_to_this_process(&setup.file.amplifier.address) {
             return Ok(RigClaim { _lock: None });
         }
-        let name: String = job
-            .setup
+        let name: String = setup
             .file
             .amplifier
             .address

@@ -1,0 +1,262 @@
+//! A vibrometer's settings, read back from its controller for a calibration.
+//!
+//! The velocity itself is a voltage that something else reads; what turns it into metres is set at the controller: the
+//! decoder's range and delay. They are asked for once, before a calibration, and nothing is ever set. Decoders have other
+//! numbers in other instruments, and a wrong one gives a plausible wrong amplitude: so each is asked for its name first.
+
+use super::serial::Line;
+use super::session::Ended;
+use calibration::amplitude::vibrometer::Decoder;
+use instruments::codec::text::quantity;
+use instruments::profile::FrameKind;
+use instruments::schema::{Link, LinkKind};
+use instruments::{FrameId, Profile};
+use serde::{Deserialize, Serialize};
+use std::time::{Duration, Instant};
+
+/// `[vibrometer]` of a setup.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VibrometerSetup {
+    /// Id of the profile.
+    pub profile: String,
+    /// Path of the serial line; `pty` for a virtual rig.
+    pub address: String,
+    /// Name of the decoder whose output is read, as the controller gives it. May be left out where it has one only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decoder: Option<String>,
+    /// Symbols per second, where they are not the profile's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub baud: Option<u32>,
+}
+
+/// What a controller says of the decoder that is read.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Settings {
+    /// Name of the decoder.
+    pub decoder: String,
+    /// Its number in this instrument.
+    pub number: u8,
+    /// Velocity per volt in (m/s)/V.
+    pub range_m_s_per_v: f64,
+    /// Delay of the output in s.
+    pub signal_delay_s: f64,
+    /// Upper end of the decoder's band in Hz.
+    pub max_frequency_hz: f64,
+    /// Names of all decoders, by number.
+    pub decoders: Vec<String>,
+}
+
+impl Settings {
+    /// The decoder, as the calibrations take it.
+    pub fn decoder(&self) -> Decoder {
+        Decoder {
+            name: self.decoder.clone(),
+            range_m_s_per_v: self.range_m_s_per_v,
+            delay_s: self.signal_delay_s,
+        }
+    }
+
+    /// Whether a drive of that frequency lies within the decoder's band.
+    ///
+    /// # Errors
+    /// It does not: the amplitude would come out too small.
+    pub fn covers(&self, frequency_hz: f64) -> Result<(), String> {
+        if frequency_hz <= self.max_frequency_hz {
+            return Ok(());
+        }
+        Err(format!(
+            "decoder {} reaches to {:.0} Hz in this range, the drive is at {frequency_hz:.0} Hz: choose another decoder or \
+             range at the controller",
+            self.decoder, self.max_frequency_hz
+        ))
+    }
+}
+
+impl std::fmt::Display for Settings {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "decoder {} (number {}) at {} mm/s/V, delay {:.3} us, to {:.1} kHz",
+            self.decoder,
+            self.number,
+            self.range_m_s_per_v * 1e3,
+            self.signal_delay_s * 1e6,
+            self.max_frequency_hz * 1e-3
+        )
+    }
+}
+
+/// Asks a controller for the settings of the decoder that the setup names.
+///
+/// # Errors
+/// A profile that is no vibrometer's, a line that cannot be opened, a decoder that is not there, answers that make no
+/// sense, settings that changed while they were read; in words.
+pub fn settings(setup: &VibrometerSetup) -> Result<Settings, String> {
+    let profile = super::profile(&setup.profile).map_err(|error| error.to_string())?;
+    let link = profile.description.link.clone();
+    let (LinkKind::Serial, Some(choice)) = (link.kind, link.choice.clone()) else {
+        return Err(format!("profile `{}` is not that of a vibrometer's controller", setup.profile));
+    };
+    let told = |error: Ended| format!("`{}` at {}: {error}", setup.profile, setup.address);
+    let format = link.format.clone().unwrap_or_else(|| "8N1".into());
+    let line =
+        Line::open(&setup.address, setup.baud.or(link.baud).unwrap_or(115_200), &format).map_err(told)?;
+    let mut talk = Talk { line, link, came: Vec::new() };
+    // Ends whatever an earlier program left half said.
+    talk.line.write(talk.end(true).as_bytes()).map_err(told)?;
+    talk.line.drain(Duration::from_millis(100), Duration::from_secs(1)).map_err(told)?;
+    let mut decoders = Vec::new();
+    for number in 0..choice.most {
+        match talk.ask(&choice.ask.replace("{which}", &number.to_string())) {
+            Ok(name) if is_name(&name) => decoders.push(name),
+            // The end of the list: silence, or words that are no name.
+            Ok(_) | Err(Ended::Timeout(_)) => break,
+            Err(error) => return Err(told(error)),
+        }
+    }
+    let number = choose(&decoders, setup.decoder.as_deref())
+        .map_err(|problem| format!("`{}` at {}: {problem}", setup.profile, setup.address))?;
+    let mut read = || talk.settings(&profile, number, &decoders).map_err(told);
+    let (first, second) = (read()?, read()?);
+    if first != second {
+        return Err(format!(
+            "`{}` at {}: the settings changed while they were read; let nobody touch the controller and ask again",
+            setup.profile, setup.address
+        ));
+    }
+    Ok(first)
+}
+
+/// A name is one word with a letter in it, such as `VD-02`.
+fn is_name(text: &str) -> bool {
+    !text.is_empty()
+        && text.len() <= 32
+        && text.chars().any(|c| c.is_ascii_alphabetic())
+        && text.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.' | '/'))
+        && !text.to_ascii_lowercase().contains("err")
+}
+
+/// The number of the decoder that is meant.
+fn choose(decoders: &[String], wanted: Option<&str>) -> Result<u8, String> {
+    let all = decoders.join(", ");
+    let found: Vec<usize> = match wanted {
+        None => (0..decoders.len()).collect(),
+        Some(name) => (0..decoders.len()).filter(|&i| decoders[i] == name).collect(),
+    };
+    match (found.as_slice(), wanted) {
+        ([one], _) => u8::try_from(*one).map_err(|e| e.to_string()),
+        (_, _) if decoders.is_empty() => {
+            Err("no decoder answered with a name: is its echo on, or is this another instrument?".into())
+        }
+        (_, None) => Err(format!("it has several decoders ({all}): say which by `decoder` in the setup")),
+        ([], Some(name)) => Err(format!("it has no decoder {name}; it has {all}")),
+        (_, Some(name)) => Err(format!("two of its decoders are called {name}")),
+    }
+}
+
+struct Talk {
+    line: Line,
+    link: Link,
+    came: Vec<u8>,
+}
+
+impl Talk {
+    fn end(&self, sent: bool) -> String {
+        let end = if sent { &self.link.tx_terminator } else { &self.link.rx_terminator };
+        end.clone().unwrap_or_else(|| "\n".into())
+    }
+
+    /// One question and its answer, a line.
+    fn ask(&mut self, question: &str) -> Result<String, Ended> {
+        let (sent, came) = (self.end(true), self.end(false).into_bytes());
+        self.came.clear();
+        self.line.write(format!("{question}{sent}").as_bytes())?;
+        let deadline = Instant::now() + Duration::from_millis(u64::from(self.link.response_timeout_ms));
+        loop {
+            if let Some(at) = self.came.windows(came.len()).position(|window| window == came) {
+                let answer = String::from_utf8_lossy(&self.came[..at]).trim().to_string();
+                if answer == question {
+                    return Err(Ended::Refused("it echoes what it is sent: switch its Echo off".into()));
+                }
+                return Ok(answer);
+            }
+            if self.came.len() > 4096 {
+                return Err(Ended::Corrupt("a line without an end".into()));
+            }
+            let mut buffer = [0; 256];
+            let count = self.line.read(&mut buffer, deadline)?;
+            self.came.extend_from_slice(&buffer[..count]);
+            if count == 0 && Instant::now() >= deadline {
+                return Err(Ended::Timeout(self.link.response_timeout_ms));
+            }
+        }
+    }
+
+    fn settings(&mut self, profile: &Profile, number: u8, decoders: &[String]) -> Result<Settings, Ended> {
+        let mut values = profile.values();
+        for (index, frame) in profile.frames().iter().enumerate() {
+            let FrameKind::Query(query) = frame.kind else { continue };
+            let query = &profile.description.query[query];
+            let question = query.send.replace("{which}", &number.to_string());
+            let answer = self.ask(&question)?;
+            let unit = query.unit.as_deref().unwrap_or("");
+            let value = quantity(&answer, unit)
+                .ok_or_else(|| Ended::Refused(format!("`{question}` was answered by `{answer}`")))?;
+            profile
+                .decode(FrameId(index), &value.to_be_bytes(), &mut values)
+                .map_err(|error| Ended::Refused(format!("`{question}`, `{answer}`: {error}")))?;
+        }
+        let value = |name: &str| {
+            let signal = profile.signal(name);
+            let signal =
+                signal.ok_or_else(|| Ended::Refused(format!("the profile has no signal `{name}`")))?;
+            match profile.refusal(signal, &values) {
+                None => Ok(values.get(signal)),
+                Some(why) => Err(Ended::Refused(format!("{name} = {}: {why:?}", values.get(signal)))),
+            }
+        };
+        Ok(Settings {
+            decoder: decoders[usize::from(number)].clone(),
+            number,
+            range_m_s_per_v: value("range")?,
+            signal_delay_s: value("signal_delay")?,
+            max_frequency_hz: value("max_frequency")?,
+            decoders: decoders.to_vec(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_decoder_is_chosen_by_its_name_alone() {
+        let all: Vec<String> = ["DD-300", "VD-02", "VD-09"].map(String::from).into();
+        assert_eq!(choose(&all, Some("VD-02")), Ok(1));
+        assert_eq!(choose(&all[..1], None), Ok(0));
+        assert!(choose(&all, None).unwrap_err().contains("DD-300, VD-02, VD-09"));
+        assert!(choose(&all, Some("VD-03")).unwrap_err().contains("no decoder VD-03"));
+        assert!(choose(&[], Some("VD-02")).unwrap_err().contains("echo"));
+        for (text, name) in
+            [("VD-02", true), ("", false), ("Error", false), ("5", false), ("no such unit", false)]
+        {
+            assert_eq!(is_name(text), name, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_frequency_beyond_the_band_is_told() {
+        let settings = Settings {
+            decoder: "VD-09".into(),
+            number: 0,
+            range_m_s_per_v: 0.1,
+            signal_delay_s: 8e-6,
+            max_frequency_hz: 20e3,
+            decoders: vec!["VD-09".into()],
+        };
+        assert!(settings.covers(19e3).is_ok());
+        assert!(settings.covers(27.5e3).unwrap_err().contains("20000 Hz"));
+    }
+}
