@@ -123,6 +123,7 @@ fn a_link_that_goes_down_is_waited_for_and_nothing_weighed_is_lost() {
     guided.type_in("zero");
     guided.hear(" counts");
     bench.hands.hang(0.4903, 0.0);
+    std::thread::sleep(Duration::from_millis(300));
     guided.type_in("lateral 0.05 up");
     guided.hear(" counts");
     // The cable comes out in the middle of a reading, and goes in again a second later.

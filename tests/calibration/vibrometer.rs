@@ -118,7 +118,7 @@ fn an_amplitude_table_taken_live_finds_the_withheld_scale() {
         .current_dir(at)
         .args(["calibrate", "amplitude", "--setup", "rig.toml", "--form", "bent", "--operator", "O"])
         .args(["--serial", "A-1", "--out", "live.toml", "--json", "--passes", "2", "--settle-s", "0.3"])
-        .args(["--live", "0.5e-6", "1e-6", "1.5e-6", "2e-6", "2.5e-6"])
+        .args(["--live", "0.4e-6", "0.8e-6", "1.2e-6", "1.6e-6", "2e-6"])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -257,7 +257,7 @@ fn the_delay_read_back_is_taken_off_in_phase() {
     let (plain, _) = phase(" --plate-range 25mm/s/V --skin-range 25mm/s/V");
     let (both, w) = phase(" --setup rig.toml");
     // Stated by hand to be none on the plate's channel: then the skin's delay counts in full.
-    let (skin_alone, _) = phase(&format!(" --setup rig.toml --plate-delay 0us"));
+    let (skin_alone, _) = phase(" --setup rig.toml --plate-delay 0us");
     let apart = |a: f64, b: f64| (a - b + 180.0).rem_euclid(360.0) - 180.0;
     println!("no delay {plain:.2} deg, on both {both:.2} deg, on the skin alone {skin_alone:.2} deg");
     assert!(apart(both, plain).abs() < 0.01);

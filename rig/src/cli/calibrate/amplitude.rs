@@ -9,7 +9,7 @@ use calibration::amplitude::gain::{Form, fit};
 use calibration::amplitude::map::mode_shape;
 use calibration::amplitude::resonance::sweep;
 use calibration::amplitude::{AmplitudeError, AmplitudePoint};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments.
@@ -154,7 +154,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     args.common.issue(outcome, sources.raw_data(), json)
 }
 
-fn points_of(sources: &mut Sources, path: &PathBuf, at: &str) -> miette::Result<Vec<AmplitudePoint>> {
+fn points_of(sources: &mut Sources, path: &Path, at: &str) -> miette::Result<Vec<AmplitudePoint>> {
     let rows = columns(sources, path, [at, "amplitude_pp_m"], &[])?;
     Ok(rows.into_iter().map(|[at, amplitude_pp_m]| AmplitudePoint { at, amplitude_pp_m }).collect())
 }

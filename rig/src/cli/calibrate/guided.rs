@@ -86,7 +86,6 @@ pub fn series(way: &Way<'_>) -> miette::Result<String> {
         };
         match taken {
             Ok(t) => {
-                eprintln!("  lateral {:.2}, normal {:.2} counts{}", t.counts[0], t.counts[1], t.note);
                 // The middle of the readings that were averaged, which a link that went down may have put off.
                 let time_s = kept.time_s() - 0.5 * t.length_s;
                 kept.rows.push(format!(
@@ -96,6 +95,8 @@ pub fn series(way: &Way<'_>) -> miette::Result<String> {
                     u8::from(t.saturated)
                 ));
                 kept.write()?;
+                // Said only once it is kept.
+                eprintln!("  lateral {:.2}, normal {:.2} counts{}", t.counts[0], t.counts[1], t.note);
             }
             Err(why) => eprintln!("  no reading: {why}; try again"),
         }
