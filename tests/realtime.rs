@@ -1,8 +1,10 @@
-//! The loop's promises that do not depend on the machine: no allocation, whatever the cycle does.
+//! The promises that do not depend on the machine: the loop does not allocate, whatever the cycle does; the record's writer
+//! holds no more memory after hours than after seconds.
 
 use models::prediction::SpringSlider;
 use realtime::cycle::{Command, CycleState};
 use realtime::ports::Nanos;
+use realtime::recorder::{Entry, Preamble, Reader, Recorder};
 use realtime::turn::{Ports, Row, Tick, turn};
 use rig::plan::{Plan, Resolution};
 use rig::sequence::Sequence;
@@ -18,6 +20,8 @@ use std::sync::Arc;
 thread_local! {
     static COUNTING: Cell<bool> = const { Cell::new(false) };
     static COUNT: Cell<u64> = const { Cell::new(0) };
+    /// Bytes that the thread holds, since it asked, and the most that it held.
+    static HELD: Cell<[i64; 2]> = const { Cell::new([0; 2]) };
 }
 
 /// The system's allocator, counting on threads that ask for it.
@@ -28,6 +32,9 @@ unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         if COUNTING.get() {
             COUNT.set(COUNT.get() + 1);
+            let [held, most] = HELD.get();
+            let held = held + layout.size() as i64;
+            HELD.set([held, most.max(held)]);
         }
         // SAFETY: the caller's promise is passed on.
         unsafe { System.alloc(layout) }
@@ -36,6 +43,8 @@ unsafe impl GlobalAlloc for Counting {
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         if COUNTING.get() {
             COUNT.set(COUNT.get() + 1);
+            let [held, most] = HELD.get();
+            HELD.set([held - layout.size() as i64, most]);
         }
         // SAFETY: the caller's promise is passed on.
         unsafe { System.dealloc(pointer, layout) }
@@ -89,4 +98,46 @@ fn no_allocation_in_a_hundred_thousand_cycles_of_a_sweep() {
     println!("100000 cycles, {armed} armed, {driven} driving, {} allocations", COUNT.get());
     assert!(driven > 30_000, "the cycles must be those of a real sweep: {driven}");
     assert_eq!(COUNT.get(), 0);
+}
+
+/// Three minutes of rows, flushed as a run flushes them, and the end of the file with its index of 3600 chunks.
+#[test]
+fn a_record_takes_no_more_memory_the_longer_it_gets() {
+    const ROWS: u64 = 180_000;
+    let setup = Setup::load("virtual-ideal").unwrap();
+    let model = SpringSlider::new(setup.tip.finger).unwrap();
+    let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::ideal(), 3).unwrap().split();
+    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let mut state = CycleState::default();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("long.mcap");
+    let file = std::fs::File::options().create_new(true).read(true).write(true).open(&path).unwrap();
+    COUNTING.set(true);
+    let mut recorder = Recorder::begin(file, Preamble::default()).unwrap();
+    let mut early = 0;
+    for number in 1..=ROWS {
+        COUNTING.set(false);
+        let tick = Tick { number, lateness: Nanos(0), now: Nanos(number * 1_000_000) };
+        let row = turn(&setup.config, &model, &mut state, &mut ports, &mut || None, tick);
+        COUNTING.set(true);
+        recorder.row(&row).unwrap();
+        if number.is_multiple_of(50) {
+            recorder.flush().unwrap();
+            if number == ROWS / 100 {
+                early = HELD.get()[0];
+            }
+        }
+    }
+    let late = HELD.get()[0];
+    HELD.set([late; 2]);
+    recorder.end(std::collections::BTreeMap::new()).unwrap();
+    let most = HELD.get()[1] - late;
+    COUNTING.set(false);
+    println!(
+        "{ROWS} rows: {early} bytes held after a hundredth, {late} at the end, {most} more while the file was ended"
+    );
+    assert!((late - early).abs() < 16 * 1024);
+    assert!(most < 1 << 20);
+    let rows = Reader::new(std::io::BufReader::new(std::fs::File::open(&path).unwrap()));
+    assert_eq!(rows.filter(|e| matches!(e, Entry::Message { .. })).count() as u64, ROWS);
 }

@@ -108,6 +108,46 @@ fn recovered_files_are_whole_and_hold_what_was_readable() {
     assert!(matches!(recorder::recover(&[], Cursor::new(Vec::new())).unwrap(), Recovery::Nothing { .. }));
 }
 
+/// The index is this project's own work, read back from the file; here the MCAP library finds its way by it.
+#[test]
+fn an_ordinary_reader_finds_every_message_attachment_and_fact_by_the_index() {
+    use mcap::sans_io::indexed_reader::{IndexedReadEvent, IndexedReader, IndexedReaderOptions, ReadOrder};
+    for record in [RECORD.clone(), short()] {
+        let read = recorder::read(&record);
+        let summary = mcap::Summary::read(&record).unwrap().unwrap();
+        let options = IndexedReaderOptions::new().with_order(ReadOrder::File);
+        let mut reader = IndexedReader::new_with_options(&summary, options).unwrap();
+        let mut found = Vec::new();
+        while let Some(event) = reader.next_event() {
+            match event.unwrap() {
+                IndexedReadEvent::ReadChunkRequest { offset, length } => {
+                    let chunk = &record[offset as usize..offset as usize + length];
+                    reader.insert_chunk_record_data(offset, chunk).unwrap();
+                }
+                IndexedReadEvent::Message { header, data } => {
+                    let topic = summary.channels[&header.channel_id].topic.clone();
+                    found.push((topic, header.log_time, data.to_vec()));
+                }
+            }
+        }
+        assert_eq!(found, read.messages);
+        let facts = summary.metadata_indexes.iter().map(|i| mcap::read::metadata(&record, i).unwrap());
+        assert!(facts.map(|m| (m.name, m.metadata)).eq(read.metadata));
+        let files = summary.attachment_indexes.iter().map(|i| mcap::read::attachment(&record, i).unwrap());
+        assert!(files.map(|a| (a.name, a.data.into_owned())).eq(read.files.iter().cloned()));
+        let stats = summary.stats.unwrap();
+        assert_eq!(stats.message_count, read.messages.len() as u64);
+        assert_eq!(stats.chunk_count as usize, summary.chunk_indexes.len());
+        let times = || read.messages.iter().map(|m| m.1);
+        assert_eq!(Some(stats.message_start_time), times().min());
+        assert_eq!(Some(stats.message_end_time), times().max());
+        for (channel, count) in stats.channel_message_counts {
+            let topic = &summary.channels[&channel].topic;
+            assert_eq!(count, read.messages.iter().filter(|m| m.0 == *topic).count() as u64);
+        }
+    }
+}
+
 #[test]
 fn flipped_bits_never_give_a_silently_wrong_value() {
     let whole: std::collections::HashSet<Vec<u8>> = bodies(&RECORD).into_iter().collect();

@@ -83,6 +83,14 @@ fn a_sweep_over_real_modbus_tcp_ends_with_table_record_and_report() {
     assert!(record.facts("muprime.end").unwrap()["loop"].contains("lateness_ns"));
     let passes = record.passes().count();
     assert_eq!(passes as u64, summary["planned"].as_u64().unwrap());
+    // And to an ordinary reader, which checks every checksum and finds its way by the index.
+    let script = "import sys; from mcap.reader import make_reader\n\
+                  with open(sys.argv[1], 'rb') as f:\n\
+                  \tr = make_reader(f, validate_crcs=True); s = r.get_summary()\n\
+                  \tprint(s.statistics.message_count, len(s.chunk_indexes) > 9, sum(1 for _ in r.iter_messages()))";
+    let counted = python().args(["-c", script]).arg(out.join("run-1.mcap")).output().unwrap();
+    let all = record.messages.len();
+    assert_eq!(texts(&counted).0.trim(), format!("{all} True {all}"), "{}", texts(&counted).1);
 }
 
 #[test]

@@ -18,7 +18,6 @@ use rig::setup::Setup;
 use sim::virtual_rig::VirtualRig;
 use sim::world::WorldConfig;
 use std::collections::{BTreeMap, VecDeque};
-use std::io::BufWriter;
 use std::process::Stdio;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -75,7 +74,7 @@ fn a_day_in_virtual_time_without_a_trip() {
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("day.mcap");
-    let file = BufWriter::new(std::fs::File::create(&path).unwrap());
+    let file = std::fs::File::options().create_new(true).read(true).write(true).open(&path).unwrap();
     let preamble = Preamble { start_unix_ns: 0, facts: BTreeMap::new(), files: Vec::new() };
     let mut recorder = Recorder::begin(file, preamble).unwrap();
 

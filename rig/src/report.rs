@@ -9,8 +9,10 @@ use crate::sequence::MeasuredPass;
 use crate::session::Summary;
 use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
-use realtime::recorder;
+use realtime::recorder::{self, Entry, Reader};
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
 pub use page::escape;
@@ -43,17 +45,21 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
     let mut facts = BTreeMap::new();
     let mut events = Vec::new();
     for path in records_in(folder)? {
-        let bytes = std::fs::read(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-        let contents = recorder::read(&bytes);
-        if let Some(found) = contents.facts(recorder::HEADER) {
-            facts.clone_from(found);
-        }
-        let start: u64 = facts.get("start_unix_ns").and_then(|s| s.parse().ok()).unwrap_or(0);
-        for (topic, at, text) in &contents.messages {
-            if topic == recorder::EVENTS
-                && let Ok(event) = serde_json::from_slice(text)
-            {
-                events.push((at.saturating_sub(start) as f64 * 1e-9, event));
+        let file = File::open(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        let mut start = 0u64;
+        // Entry by entry: the rows of hours would not fit into memory.
+        for entry in Reader::new(BufReader::new(file)).only(recorder::EVENTS) {
+            match entry {
+                Entry::Facts { name, facts: found } if name == recorder::HEADER => {
+                    start = found.get("start_unix_ns").and_then(|s| s.parse().ok()).unwrap_or(0);
+                    facts = found;
+                }
+                Entry::Message { log_time, text, .. } => {
+                    if let Ok(event) = serde_json::from_slice(&text) {
+                        events.push((log_time.saturating_sub(start) as f64 * 1e-9, event));
+                    }
+                }
+                Entry::Facts { .. } | Entry::File { .. } => {}
             }
         }
     }

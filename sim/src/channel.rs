@@ -1,12 +1,14 @@
 //! The way from an instrument to its reader: latency, and what can be wrong with it.
 //!
-//! The vocabulary of faults is that of PX4's failure injection: ok, off, stuck, garbage, wrong, slow, delayed,
-//! intermittent.
+//! The vocabulary of faults is that of the wrappers around the loop's ports, which is PX4's: ok, off, stuck, garbage, wrong,
+//! slow, delayed, intermittent.
 
 use std::collections::VecDeque;
 
 use realtime::ports::Nanos;
-use serde::{Deserialize, Serialize};
+use realtime::wrap::fault::FaultMode;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::amplifier::AmplifierStatus;
 use crate::noise::Noise;
@@ -25,38 +27,16 @@ pub enum ChannelName {
     Stage,
 }
 
-/// What is wrong with a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FaultMode {
-    /// Nothing.
-    Ok,
-    /// Silent: nothing goes out, no command comes in.
-    Off,
-    /// The values stand still while counters and clocks go on.
-    Stuck,
-    /// Random values over the whole range.
-    Garbage,
-    /// Plausible but wrong: values times `strength` (default -0.5).
-    Wrong,
-    /// One message in `strength` (default 4) goes out.
-    Slow,
-    /// Later by `strength` seconds (default 0.02).
-    Delayed,
-    /// Messages are lost with probability `strength` (default 0.3).
-    Intermittent,
-}
-
-impl FaultMode {
-    fn default_strength(self) -> f64 {
-        match self {
-            FaultMode::Wrong => -0.5,
-            FaultMode::Slow => 4.0,
-            FaultMode::Delayed => 0.02,
-            FaultMode::Intermittent => 0.3,
-            FaultMode::Ok | FaultMode::Off | FaultMode::Stuck | FaultMode::Garbage => 0.0,
-        }
+/// Reads one of PX4's words. The others are of readings, not of an instrument's messages.
+fn of_a_message<'de, D: Deserializer<'de>>(from: D) -> Result<FaultMode, D::Error> {
+    let mode = FaultMode::deserialize(from)?;
+    if FaultMode::PX4.contains(&mode) {
+        return Ok(mode);
     }
+    Err(D::Error::custom(
+        "an instrument's channel cannot have this fault; it has one of ok, off, stuck, garbage, wrong, slow, delayed, \
+         intermittent",
+    ))
 }
 
 /// A fault of a channel during a time.
@@ -65,7 +45,8 @@ impl FaultMode {
 pub struct ChannelFault {
     /// Which channel.
     pub channel: ChannelName,
-    /// What is wrong.
+    /// What is wrong: one of [`FaultMode::PX4`]. `off` stops commands too.
+    #[serde(deserialize_with = "of_a_message")]
     pub fault: FaultMode,
     /// From this time on (s).
     #[serde(default)]
@@ -213,6 +194,14 @@ impl<T: Message> Gate<T> {
                         return;
                     }
                 }
+                // Of readings only: no defects file can ask for them here.
+                FaultMode::Invalid
+                | FaultMode::Corrupt
+                | FaultMode::Disconnected
+                | FaultMode::Spikes
+                | FaultMode::Saturated
+                | FaultMode::Disordered
+                | FaultMode::ClockJump => {}
             }
         }
         if !stuck {

@@ -1,10 +1,9 @@
 //! Reading a record that may have been cut anywhere, and making it whole.
 
-use super::{CYCLES, EVENTS, PASSES};
+use super::{CYCLES, ENCODING, EVENTS, Entry, PASSES, Reader, SCHEMA, schema_name};
 use crate::turn::Row;
-use mcap::records::{MessageHeader, Record};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
+use mcap::records::MessageHeader;
+use mcap::{Attachment, Compression, McapError, WriteOptions};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Cursor, Seek, Write};
@@ -50,68 +49,20 @@ impl Contents {
     }
 }
 
-/// Reads whatever a record still holds, in the order it was written. Never panics, never invents: a chunk whose
-/// checksum fails ends the reading.
+/// Reads whatever a record still holds into memory, in the order it was written: see [`Reader`].
 pub fn read(bytes: &[u8]) -> Contents {
     let mut contents = Contents::default();
-    let mut topics: BTreeMap<u16, String> = BTreeMap::new();
-    let options = LinearReaderOptions::default()
-        .with_validate_chunk_crcs(true)
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(64 << 20);
-    let mut reader = LinearReader::new_with_options(options);
-    let mut rest = bytes;
-    let mut ended = false;
-    while let Some(event) = reader.next_event() {
-        match event {
-            Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                let n = wanted.min(rest.len());
-                reader.insert(n).copy_from_slice(&rest[..n]);
-                reader.notify_read(n);
-                rest = &rest[n..];
-            }
-            Ok(LinearReadEvent::Record { opcode, data }) => match mcap::parse_record(opcode, data) {
-                Ok(record) => {
-                    ended |= matches!(record, Record::Footer(_));
-                    take(&mut contents, &mut topics, record);
-                }
-                Err(error) => {
-                    contents.cut = Some(error.to_string());
-                    break;
-                }
-            },
-            Err(error) => {
-                contents.cut = Some(error.to_string());
-                break;
-            }
+    let mut reader = Reader::new(bytes);
+    for entry in &mut reader {
+        match entry {
+            Entry::Facts { name, facts } => contents.metadata.push((name, facts)),
+            Entry::File { name, bytes } => contents.files.push((name, bytes)),
+            Entry::Message { topic, log_time, text } => contents.messages.push((topic, log_time, text)),
         }
     }
-    if !ended && contents.cut.is_none() {
-        contents.cut = Some("the file ends before its footer".into());
-    }
+    contents.cut = reader.cut().map(str::to_string);
+    contents.damaged = reader.damaged();
     contents
-}
-
-fn take(contents: &mut Contents, topics: &mut BTreeMap<u16, String>, record: Record<'_>) {
-    match record {
-        Record::Channel(channel) => {
-            topics.insert(channel.id, channel.topic);
-        }
-        Record::Message { header, data } => {
-            let Some(topic) = topics.get(&header.channel_id) else {
-                contents.damaged += 1;
-                return;
-            };
-            if serde_json::from_slice::<serde::de::IgnoredAny>(&data).is_err() {
-                contents.damaged += 1;
-                return;
-            }
-            contents.messages.push((topic.clone(), header.log_time, data.into_owned()));
-        }
-        Record::Metadata(metadata) => contents.metadata.push((metadata.name, metadata.metadata)),
-        Record::Attachment { header, data, .. } => contents.files.push((header.name, data.into_owned())),
-        _ => {}
-    }
 }
 
 /// What a recovery found.
@@ -135,55 +86,65 @@ pub enum Recovery {
     },
 }
 
-/// Reads a record and, unless it is whole, writes a whole one of what it still holds.
+/// Reads a record and, unless it is whole, writes a whole one of what it still holds. It is read twice: what it holds is never
+/// in memory at once.
 ///
 /// # Errors
 /// Whatever the writer says.
 pub fn recover(bytes: &[u8], to: impl Write + Seek) -> Result<Recovery, McapError> {
-    let contents = read(bytes);
-    let Some(because) = contents.cut.clone() else {
+    let (mut messages, mut facts) = (0, 0);
+    let mut reader = Reader::new(bytes);
+    for entry in &mut reader {
+        match entry {
+            Entry::Message { .. } => messages += 1,
+            Entry::Facts { .. } => facts += 1,
+            Entry::File { .. } => {}
+        }
+    }
+    let Some(because) = reader.cut().map(str::to_string) else {
         return Ok(Recovery::Whole);
     };
-    if contents.messages.is_empty() && contents.metadata.is_empty() {
+    if messages + facts == 0 {
         return Ok(Recovery::Nothing { because });
     }
-    rewrite(&contents, to)?;
-    Ok(Recovery::Rewritten { messages: contents.messages.len(), damaged: contents.damaged, because })
+    rewrite(Reader::new(bytes), to)?;
+    Ok(Recovery::Rewritten { messages, damaged: reader.damaged(), because })
 }
 
-fn rewrite(contents: &Contents, to: impl Write + Seek) -> Result<(), McapError> {
+fn rewrite(entries: impl Iterator<Item = Entry>, to: impl Write + Seek) -> Result<(), McapError> {
     let options =
         WriteOptions::new().compression(Some(Compression::Lz4)).profile("").library("muprime recover");
-    let mut writer: Writer<_> = options.create(to)?;
-    for (name, facts) in &contents.metadata {
-        writer.write_metadata(&mcap::records::Metadata { name: name.clone(), metadata: facts.clone() })?;
-    }
-    for (name, data) in &contents.files {
-        let attachment = Attachment {
-            log_time: 0,
-            create_time: 0,
-            name: name.clone(),
-            media_type: "text/plain".into(),
-            data: Cow::Borrowed(data),
-        };
-        writer.attach(&attachment)?;
-    }
-    let mut channels: BTreeMap<&str, (u16, u32)> = BTreeMap::new();
-    for (topic, log_time, data) in &contents.messages {
-        if !channels.contains_key(topic.as_str()) {
-            let name = format!("muprime{}", topic.replace('/', "."));
-            let schema = writer.add_schema(&name, "jsonschema", b"{\"type\":\"object\"}")?;
-            channels.insert(topic, (writer.add_channel(schema, topic, "json", &BTreeMap::new())?, 0));
+    let mut writer = options.create(to)?;
+    let mut channels: BTreeMap<String, (u16, u32)> = BTreeMap::new();
+    for entry in entries {
+        match entry {
+            Entry::Facts { name, facts: metadata } => {
+                writer.write_metadata(&mcap::records::Metadata { name, metadata })?;
+            }
+            Entry::File { name, bytes } => writer.attach(&Attachment {
+                log_time: 0,
+                create_time: 0,
+                name,
+                media_type: "text/plain".into(),
+                data: Cow::Owned(bytes),
+            })?,
+            Entry::Message { topic, log_time, text } => {
+                if !channels.contains_key(&topic) {
+                    let schema = writer.add_schema(&schema_name(&topic), ENCODING, SCHEMA)?;
+                    let channel = writer.add_channel(schema, &topic, "json", &BTreeMap::new())?;
+                    channels.insert(topic.clone(), (channel, 0));
+                }
+                let (channel_id, sequence) = channels.get_mut(&topic).expect("inserted above");
+                *sequence += 1;
+                let header = MessageHeader {
+                    channel_id: *channel_id,
+                    sequence: *sequence,
+                    log_time,
+                    publish_time: log_time,
+                };
+                writer.write_to_known_channel(&header, &text)?;
+            }
         }
-        let (channel_id, sequence) = channels.get_mut(topic.as_str()).expect("inserted above");
-        *sequence += 1;
-        let header = MessageHeader {
-            channel_id: *channel_id,
-            sequence: *sequence,
-            log_time: *log_time,
-            publish_time: *log_time,
-        };
-        writer.write_to_known_channel(&header, data)?;
     }
     writer.finish()?;
     Ok(())
@@ -196,8 +157,12 @@ impl Contents {
     /// # Errors
     /// Whatever the MCAP writer says.
     pub fn to_bytes(&self) -> Result<Vec<u8>, McapError> {
+        let facts = self.metadata.iter().cloned().map(|(name, facts)| Entry::Facts { name, facts });
+        let files = self.files.iter().cloned().map(|(name, bytes)| Entry::File { name, bytes });
+        let messages = self.messages.iter().cloned();
+        let messages = messages.map(|(topic, log_time, text)| Entry::Message { topic, log_time, text });
         let mut bytes = Cursor::new(Vec::new());
-        rewrite(self, &mut bytes)?;
+        rewrite(facts.chain(files).chain(messages), &mut bytes)?;
         Ok(bytes.into_inner())
     }
 }

@@ -1,9 +1,9 @@
 //! Faults of channels, injected between a port and the loop.
 //!
 //! The vocabulary is that of PX4's failure injection (ok, off, stuck, garbage, wrong, slow, delayed, intermittent), the
-//! same in virtual time, on the wire and in a defects file; a few words are added for what only a reading can show
-//! ([`FaultMode::EXTRA`]). A wrapper is plain data around its port: no heap, no lock, and its random numbers come from a
-//! seed.
+//! same in virtual time, on the wire and in a defects file. A few words are added for what only a reading can show
+//! ([`FaultMode::EXTRA`]); the virtual rig's instruments know PX4's alone. A wrapper is plain data around its port: no
+//! heap, no lock, and its random numbers come from a seed.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::ports::{

@@ -4,8 +4,10 @@ use crate::run_dir::records_in;
 use crate::session::{REPLAYABLE, Replayable};
 use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::{FrictionModel, SpringSlider};
-use realtime::recorder::{Contents, read};
+use realtime::recorder::{CYCLES, Entry, Reader};
 use realtime::replay::{Replay, replay};
+use std::fs::File;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -53,21 +55,31 @@ fn say(path: &Path, found: &Replay) {
 }
 
 fn again(path: &Path) -> miette::Result<Replay> {
-    let bytes = std::fs::read(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-    let record = read(&bytes);
-    let text = |name: &str| record.files.iter().find(|f| f.0 == name).map(|f| f.1.clone());
-    let Some(built) = text(REPLAYABLE) else {
+    let entries = || {
+        let file = File::open(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        Ok::<_, miette::Report>(Reader::new(BufReader::new(file)).only(CYCLES))
+    };
+    // The files come first: what follows the first row holds none.
+    let files: Vec<(String, Vec<u8>)> = entries()?
+        .take_while(|entry| !matches!(entry, Entry::Message { .. }))
+        .filter_map(|entry| if let Entry::File { name, bytes } = entry { Some((name, bytes)) } else { None })
+        .collect();
+    let Some((_, built)) = files.iter().find(|f| f.0 == REPLAYABLE) else {
         miette::bail!("{}: the record holds no {REPLAYABLE}, which a replay needs", path.display());
     };
-    let built: Replayable = serde_json::from_slice(&built)
+    let built: Replayable = serde_json::from_slice(built)
         .into_diagnostic()
         .wrap_err_with(|| format!("{REPLAYABLE} in {}", path.display()))?;
-    let model = model_of(&record, &built)?;
-    Ok(replay(&built.config, &*model, record.rows()))
+    let model = model_of(&files, &built)?;
+    let rows = entries()?.filter_map(|entry| {
+        let Entry::Message { text, .. } = entry else { return None };
+        serde_json::from_slice(&text).ok()
+    });
+    Ok(replay(&built.config, &*model, rows))
 }
 
-fn model_of(record: &Contents, built: &Replayable) -> miette::Result<Arc<dyn FrictionModel>> {
-    match record.files.iter().find(|f| f.0 == "model.toml") {
+fn model_of(files: &[(String, Vec<u8>)], built: &Replayable) -> miette::Result<Arc<dyn FrictionModel>> {
+    match files.iter().find(|f| f.0 == "model.toml") {
         Some((name, text)) => crate::model_file::load(name, &String::from_utf8_lossy(text)),
         None => Ok(Arc::new(SpringSlider::new(built.finger).into_diagnostic()?)),
     }

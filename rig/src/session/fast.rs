@@ -14,7 +14,6 @@ use realtime::recorder::Recorder;
 use realtime::turn::{Ports, Tick, turn};
 use sim::virtual_rig::VirtualRig;
 use std::collections::{BTreeMap, VecDeque};
-use std::io::BufWriter;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -56,7 +55,7 @@ fn sweep(
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
     let mut ports = Ports { force, amplifier, stage: Box::new(stage) };
-    let file = BufWriter::new(kept.new_record()?);
+    let file = kept.new_record()?;
     let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
     let config = job.setup.config;
     let mut state = CycleState::default();

@@ -189,7 +189,7 @@ impl Keeper {
 ///
 /// # Errors
 /// Whatever the file says.
-pub fn record<W: std::io::Write + std::io::Seek>(
+pub fn record<W: std::io::Write>(
     recorder: &mut realtime::recorder::Recorder<W>,
     at: Nanos,
     events: &[crate::sequence::Event],

@@ -237,6 +237,7 @@ mod tests {
     #[test]
     fn every_fault_of_a_file_is_told_with_its_place() {
         for (text, expected) in [
+            ("[[channel]]\nchannel = \"force\"\nfault = \"spikes\"\n", "it has one of ok, off, stuck"),
             ("[[defect]]\nname = \"gremlin\"\nseed = 1\n", "line 2: no defect is called 'gremlin'"),
             (
                 "[[defect]]\nname = \"squeeze_film\"\nparameters = { area = 1.0 }\n",

@@ -65,7 +65,7 @@ fn record(
     last: &Receiver<Last>,
 ) -> miette::Result<()> {
     let disk = file.try_clone().into_diagnostic()?;
-    let mut recorder = Recorder::begin(std::io::BufWriter::new(file), preamble).into_diagnostic()?;
+    let mut recorder = Recorder::begin(file, preamble).into_diagnostic()?;
     let (mut flushed, mut synced) = (Instant::now(), Instant::now());
     let last = loop {
         let mut idle = true;

@@ -1,0 +1,314 @@
+//! The end of a record: the indexes by which an ordinary reader finds its way, and the footer.
+//!
+//! They are read back from the file itself, a few thousand at a time: a writer that kept one entry a chunk in memory would
+//! grow for as long as the run lasts. Format: MCAP specification 0, "Summary section" (<https://mcap.dev/spec>).
+
+use super::{ENCODING, SCHEMA, TOPICS, schema_name};
+use mcap::McapError;
+use mcap::records::{Record, op};
+use std::collections::BTreeMap;
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
+
+/// First and last bytes of a file.
+const MAGIC: &[u8] = mcap::MAGIC;
+/// Bytes of index entries that are held before they are written.
+const HELD: usize = 256 * 1024;
+/// Length of an opcode and the length that follows it.
+const HEAD: u64 = 9;
+
+/// Bytes in the order of the format: little-endian, lengths before contents.
+#[derive(Default)]
+struct Bytes(Vec<u8>);
+
+impl Bytes {
+    fn u16(mut self, value: u16) -> Self {
+        self.0.extend(value.to_le_bytes());
+        self
+    }
+    fn u32(mut self, value: u32) -> Self {
+        self.0.extend(value.to_le_bytes());
+        self
+    }
+    fn u64(mut self, value: u64) -> Self {
+        self.0.extend(value.to_le_bytes());
+        self
+    }
+    fn text(mut self, value: &[u8]) -> Self {
+        self = self.u32(value.len() as u32);
+        self.0.extend(value);
+        self
+    }
+    fn map(mut self, of: &BTreeMap<u16, u64>) -> Self {
+        self = self.u32(10 * of.len() as u32);
+        of.iter().fold(self, |bytes, (key, value)| bytes.u16(*key).u64(*value))
+    }
+    /// Appends these bytes to `to` as a record.
+    fn record(self, opcode: u8, to: &mut Vec<u8>) {
+        to.push(opcode);
+        to.extend((self.0.len() as u64).to_le_bytes());
+        to.extend(self.0);
+    }
+}
+
+/// A chunk, as its index entry describes it.
+#[derive(Default)]
+struct ChunkSeen {
+    first_ns: u64,
+    last_ns: u64,
+    start: u64,
+    length: u64,
+    message_indexes: BTreeMap<u16, u64>,
+    message_index_length: u64,
+    compression: Vec<u8>,
+    compressed: u64,
+    uncompressed: u64,
+}
+
+impl ChunkSeen {
+    fn write(self, to: &mut Vec<u8>) {
+        Bytes::default()
+            .u64(self.first_ns)
+            .u64(self.last_ns)
+            .u64(self.start)
+            .u64(self.length)
+            .map(&self.message_indexes)
+            .u64(self.message_index_length)
+            .text(&self.compression)
+            .u64(self.compressed)
+            .u64(self.uncompressed)
+            .record(op::CHUNK_INDEX, to);
+    }
+}
+
+/// What the statistics say.
+#[derive(Default)]
+struct Counts {
+    messages: BTreeMap<u16, u64>,
+    attachments: u32,
+    metadata: u32,
+    chunks: u32,
+    /// Log times of the first and the last message.
+    bounds_ns: Option<(u64, u64)>,
+}
+
+/// The file from its beginning up to its data's end, record by record.
+struct Walk {
+    at: u64,
+    end: u64,
+    counts: Counts,
+    chunk: Option<ChunkSeen>,
+    /// Index entries of attachments and of metadata: a handful.
+    others: [Vec<u8>; 2],
+}
+
+impl Walk {
+    /// Reads on until the index entries fill `held`, or to the data's end. False: it is reached.
+    fn on(&mut self, file: &mut (impl Read + Seek), held: &mut Vec<u8>) -> Result<bool, McapError> {
+        file.seek(SeekFrom::Start(self.at))?;
+        let mut file = BufReader::with_capacity(4096, file);
+        while self.at < self.end && held.len() < HELD {
+            let mut head = [0; HEAD as usize];
+            file.read_exact(&mut head)?;
+            let body = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
+            let length = HEAD + body;
+            let read = match head[0] {
+                op::CHUNK => {
+                    self.close(held);
+                    self.chunk(&mut file, length)?
+                }
+                op::MESSAGE_INDEX => self.message_index(&mut file, length)?,
+                op::ATTACHMENT | op::METADATA => {
+                    let mut data = vec![0; body as usize];
+                    file.read_exact(&mut data)?;
+                    self.other(mcap::parse_record(head[0], &data)?, length);
+                    body
+                }
+                _ => 0,
+            };
+            // Within the buffer where it can be: most records are longer than it, and are skipped.
+            file.seek_relative((body - read) as i64)?;
+            self.at += length;
+        }
+        let more = self.at < self.end;
+        if !more {
+            self.close(held);
+        }
+        Ok(more)
+    }
+
+    /// Reads a chunk's head; returns how many bytes that took.
+    fn chunk(&mut self, file: &mut impl Read, length: u64) -> Result<u64, McapError> {
+        // First and last log time, uncompressed size, its checksum, length of the compression's name.
+        let mut head = [0; 32];
+        file.read_exact(&mut head)?;
+        let number = |at: usize| u64::from_le_bytes(head[at..at + 8].try_into().expect("eight bytes"));
+        let name = u32::from_le_bytes(head[28..].try_into().expect("four bytes"));
+        let mut compression = vec![0; name as usize];
+        file.read_exact(&mut compression)?;
+        let mut compressed = [0; 8];
+        file.read_exact(&mut compressed)?;
+        self.chunk = Some(ChunkSeen {
+            first_ns: number(0),
+            last_ns: number(8),
+            start: self.at,
+            length,
+            compression,
+            compressed: u64::from_le_bytes(compressed),
+            uncompressed: number(16),
+            ..ChunkSeen::default()
+        });
+        self.counts.chunks += 1;
+        Ok(40 + u64::from(name))
+    }
+
+    /// Reads of which channel an index of messages is, and how many it lists; returns how many bytes that took.
+    fn message_index(&mut self, file: &mut impl Read, length: u64) -> Result<u64, McapError> {
+        let mut head = [0; 6];
+        file.read_exact(&mut head)?;
+        let channel = u16::from_le_bytes([head[0], head[1]]);
+        let bytes = u32::from_le_bytes(head[2..].try_into().expect("four bytes"));
+        if let Some(chunk) = &mut self.chunk {
+            chunk.message_indexes.insert(channel, self.at);
+            chunk.message_index_length += length;
+            // Each entry: log time and offset.
+            *self.counts.messages.entry(channel).or_default() += u64::from(bytes / 16);
+            let (first, last) = self.counts.bounds_ns.unwrap_or((chunk.first_ns, chunk.last_ns));
+            self.counts.bounds_ns = Some((first.min(chunk.first_ns), last.max(chunk.last_ns)));
+        }
+        Ok(6)
+    }
+
+    fn other(&mut self, record: Record<'_>, length: u64) {
+        let place = Bytes::default().u64(self.at).u64(length);
+        match record {
+            Record::Attachment { header, data, .. } => {
+                self.counts.attachments += 1;
+                place
+                    .u64(header.log_time)
+                    .u64(header.create_time)
+                    .u64(data.len() as u64)
+                    .text(header.name.as_bytes())
+                    .text(header.media_type.as_bytes())
+                    .record(op::ATTACHMENT_INDEX, &mut self.others[0]);
+            }
+            Record::Metadata(metadata) => {
+                self.counts.metadata += 1;
+                place.text(metadata.name.as_bytes()).record(op::METADATA_INDEX, &mut self.others[1]);
+            }
+            _ => {}
+        }
+    }
+
+    fn close(&mut self, held: &mut Vec<u8>) {
+        if let Some(chunk) = self.chunk.take() {
+            chunk.write(held);
+        }
+    }
+}
+
+/// What is written of the summary, with its checksum and where its groups are.
+struct Summary<'a, F> {
+    file: &'a mut F,
+    start: u64,
+    at: u64,
+    checksum: crc32fast::Hasher,
+    offsets: Vec<u8>,
+}
+
+impl<F: Read + Write + Seek> Summary<'_, F> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), McapError> {
+        self.file.seek(SeekFrom::Start(self.at))?;
+        self.file.write_all(bytes)?;
+        self.checksum.update(bytes);
+        self.at += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// Notes that everything since `from` is of one kind.
+    fn group(&mut self, opcode: u8, from: u64) {
+        if self.at > from {
+            let mut group = Bytes(vec![opcode]);
+            group = group.u64(from).u64(self.at - from);
+            group.record(op::SUMMARY_OFFSET, &mut self.offsets);
+        }
+    }
+
+    fn write_group(&mut self, opcode: u8, bytes: &[u8]) -> Result<(), McapError> {
+        let from = self.at;
+        self.write(bytes)?;
+        self.group(opcode, from);
+        Ok(())
+    }
+}
+
+/// Ends a file whose data is complete: mark of its end, summary, footer.
+pub(super) fn end(file: &mut (impl Read + Write + Seek)) -> Result<(), McapError> {
+    let end = file.seek(SeekFrom::End(0))?;
+    let mut mark = Vec::new();
+    // No checksum of the whole data: every chunk and every attachment has its own.
+    Bytes::default().u32(0).record(op::DATA_END, &mut mark);
+    file.write_all(&mark)?;
+    let start = end + mark.len() as u64;
+    let checksum = crc32fast::Hasher::new();
+    let mut summary = Summary { file, start, at: start, checksum, offsets: Vec::new() };
+    let (mut schemas, mut channels) = (Vec::new(), Vec::new());
+    for (id, topic) in (1..).zip(TOPICS) {
+        Bytes::default()
+            .u16(id)
+            .text(schema_name(topic).as_bytes())
+            .text(ENCODING.as_bytes())
+            .text(SCHEMA)
+            .record(op::SCHEMA, &mut schemas);
+        let channel = Bytes::default().u16(id).u16(id).text(topic.as_bytes()).text(b"json");
+        channel.u32(0).record(op::CHANNEL, &mut channels);
+    }
+    summary.write_group(op::SCHEMA, &schemas)?;
+    summary.write_group(op::CHANNEL, &channels)?;
+
+    let at = MAGIC.len() as u64;
+    let mut walk = Walk { at, end, counts: Counts::default(), chunk: None, others: Default::default() };
+    let from = summary.at;
+    let mut held = Vec::with_capacity(HELD + 1024);
+    loop {
+        held.clear();
+        let more = walk.on(summary.file, &mut held)?;
+        summary.write(&held)?;
+        if !more {
+            break;
+        }
+    }
+    summary.group(op::CHUNK_INDEX, from);
+    let Walk { counts, others: [attachments, metadata], .. } = walk;
+    summary.write_group(op::ATTACHMENT_INDEX, &attachments)?;
+    summary.write_group(op::METADATA_INDEX, &metadata)?;
+    let mut statistics = Vec::new();
+    let (first, last) = counts.bounds_ns.unwrap_or_default();
+    Bytes::default()
+        .u64(counts.messages.values().sum())
+        .u16(TOPICS.len() as u16)
+        .u32(TOPICS.len() as u32)
+        .u32(counts.attachments)
+        .u32(counts.metadata)
+        .u32(counts.chunks)
+        .u64(first)
+        .u64(last)
+        .map(&counts.messages)
+        .record(op::STATISTICS, &mut statistics);
+    summary.write_group(op::STATISTICS, &statistics)?;
+    footer(summary)
+}
+
+fn footer<F: Read + Write + Seek>(mut summary: Summary<'_, F>) -> Result<(), McapError> {
+    let offsets_start = summary.at;
+    let offsets = std::mem::take(&mut summary.offsets);
+    summary.write(&offsets)?;
+    // The checksum covers the footer up to itself.
+    let mut footer = Vec::new();
+    Bytes::default().u64(summary.start).u64(offsets_start).u32(0).record(op::FOOTER, &mut footer);
+    footer.truncate(footer.len() - 4);
+    summary.write(&footer)?;
+    let checksum = summary.checksum.clone().finalize();
+    summary.file.write_all(&checksum.to_le_bytes())?;
+    summary.file.write_all(MAGIC)?;
+    Ok(summary.file.flush()?)
+}
