@@ -1,8 +1,8 @@
 //! The process dies at EVERY step of a sweep: `kill -9` at each system call that changes the disk, one run a step, by an
-//! independent tool (strace's fault injection). Each crashed sweep is resumed, and resumed again when nothing is left.
+//! independent tool (strace's fault injection, which counts each kind of call for itself). Each crashed sweep is resumed, and resumed again when nothing is left.
 
 use rayon::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::{Command, Output};
 use tests::{documents, muprime, served, texts};
@@ -17,12 +17,29 @@ fn sweep(plan: &Path, out: &Path) -> Command {
     command
 }
 
-/// The sweep under strace, killed at its n-th change of the disk.
-fn killed_at(n: u64, plan: &Path, out: &Path) -> Output {
+/// Every change of the disk that a sweep makes: which call, and the how many-th of its kind.
+fn steps(plan: &Path, folder: &Path) -> Vec<(String, u64)> {
+    let log = folder.join("calls");
+    let plain = sweep(plan, &folder.join("traced"));
+    let mut traced = Command::new("strace");
+    traced.args(["-f", "-qq", "-e", &format!("trace={CHANGES}"), "-o"]).arg(&log);
+    traced.arg(plain.get_program()).args(plain.get_args());
+    let output = traced.output().expect("strace is needed: tests/run installs it");
+    assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
+    let mut counts: BTreeMap<String, u64> = BTreeMap::new();
+    let log = std::fs::read_to_string(log).unwrap();
+    for call in log.lines().filter_map(|l| l.split_whitespace().nth(1)?.split_once('(')) {
+        *counts.entry(call.0.to_string()).or_default() += 1;
+    }
+    counts.into_iter().flat_map(|(call, count)| (1..=count).map(move |n| (call.clone(), n))).collect()
+}
+
+/// The sweep under strace, killed at the n-th of its calls of one kind.
+fn killed_at((call, n): &(String, u64), plan: &Path, out: &Path) -> Output {
     let plain = sweep(plan, out);
     Command::new("strace")
         .args(["-f", "-qq", "-o", "/dev/null"])
-        .args(["-e", &format!("trace={CHANGES}"), "-e", &format!("inject={CHANGES}:signal=KILL:when={n}")])
+        .args(["-e", &format!("trace={call}"), "-e", &format!("inject={call}:signal=KILL:when={n}")])
         .arg(plain.get_program())
         .args(plain.get_args())
         .output()
@@ -40,10 +57,11 @@ fn points(run: &Path) -> Vec<u64> {
     rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
 }
 
-/// One crash and its repair; false when the sweep came to its end before its n-th step.
-fn crash(n: u64, plan: &Path, folder: &Path, planned: usize) -> bool {
-    let out = folder.join(format!("run-{n}"));
-    let died = killed_at(n, plan, &out);
+/// One crash and its repair; false when the sweep came to its end before that step: its threads share the calls out anew.
+fn crash(step: &(String, u64), plan: &Path, folder: &Path, planned: usize) -> bool {
+    let out = folder.join("run");
+    let died = killed_at(step, plan, &out);
+    let n = format!("{} {}", step.0, step.1);
     if died.status.code() == Some(0) {
         return false;
     }
@@ -81,27 +99,23 @@ fn a_crash_at_every_step_of_a_sweep_loses_and_doubles_nothing() {
     let output = sweep(&plan, &whole).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
     let planned = points(&whole).len();
-    // In blocks, until a whole block finds nothing left to kill.
-    let mut steps = 0;
-    for block in 0.. {
-        let crashed: Vec<bool> = (1..=64u64)
-            .into_par_iter()
-            .map(|i| {
-                let n = block * 64 + i;
-                let own = folder.path().join(format!("of-{n}"));
-                std::fs::create_dir(&own).unwrap();
-                let crashed = crash(n, &plan, &own, planned);
-                std::fs::remove_dir_all(&own).unwrap();
-                crashed
-            })
-            .collect();
-        steps += crashed.iter().filter(|c| **c).count();
-        if !crashed.iter().any(|c| *c) {
-            break;
-        }
-    }
-    println!("{steps} steps of a sweep of {planned} passes, a crash at each: nothing lost, nothing doubled");
-    assert!(steps > 100, "{steps} steps: strace saw too little of the sweep");
+    let steps = steps(&plan, folder.path());
+    let crashed: Vec<bool> = steps
+        .par_iter()
+        .map(|step| {
+            let own = folder.path().join(format!("{}-{}", step.0, step.1));
+            std::fs::create_dir(&own).unwrap();
+            let crashed = crash(step, &plan, &own, planned);
+            std::fs::remove_dir_all(&own).unwrap();
+            crashed
+        })
+        .collect();
+    let died = crashed.iter().filter(|c| **c).count();
+    println!(
+        "{died} of {} steps of a sweep of {planned} passes, a crash at each: nothing lost, nothing doubled",
+        steps.len()
+    );
+    assert!(steps.len() > 100 && 20 * died > 19 * steps.len(), "strace saw too little of the sweep");
 }
 
 #[test]
