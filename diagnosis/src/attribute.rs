@@ -46,6 +46,10 @@ const NO_CLAIM: f64 = 0.1;
 /// Share of the gap's chi2 that a second cause must add to the evidence before it is believed: single causes whose form
 /// is not the library's gain up to 0.026 by a spurious companion (sealed sets of two generators).
 const PAIR_GAIN: f64 = 0.03;
+/// Or: the best single leaves a quarter of the gap (this share of its chi2) or nearly so, the second cause takes up
+/// more than half of that, and the evidence grows by these nats. Spurious companions of such singles gained up to 34.
+const PAIR_LEFT: f64 = 0.05;
+const PAIR_NATS: f64 = 50.0;
 
 /// Decides.
 pub fn decide(fitted: &Fitted) -> Decision {
@@ -54,6 +58,7 @@ pub fn decide(fitted: &Fitted) -> Decision {
     let (none, mut unknown) = (fitted.none_probability, fitted.unknown_probability);
     fold_pairs(fitted, &mut probabilities);
     let leader = (0..candidates.len())
+        // Candidates come in the order of their own probability, which decides where all are too small for a number.
         .max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)))
         .expect("the library is not empty");
     let regions = left_out_regions(fitted, &candidates[leader].best);
@@ -97,21 +102,27 @@ fn alias_class(candidates: &[Candidate], leader: usize) -> Vec<usize> {
 /// to such members, in proportion to their evidence.
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     let problem = &fitted.problem;
-    let gap: f64 = (0..problem.len())
-        .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.variance[i] - 1.0)
-        .sum();
+    let left = |model: &nalgebra::DVector<f64>| -> f64 {
+        (0..problem.len()).map(|i| (problem.lateral[i] - model[i]).powi(2) / problem.variance[i] - 1.0).sum()
+    };
+    let gap = left(&fitted.none.prediction);
     let candidates = &fitted.candidates;
     for pair in 0..candidates.len() {
         let own = &candidates[pair];
         if own.effects.len() < 2 || probabilities[pair] < 1e-6 {
             continue;
         }
+        let own_left = left(&own.best.prediction);
         let alone: Vec<usize> = (0..candidates.len())
             .filter(|&i| {
                 let c = &candidates[i];
-                c.effects.len() == 1
-                    && own.effects.contains(&c.effects[0])
-                    && 2.0 * (own.log_evidence - c.log_evidence) < PAIR_GAIN * gap
+                if c.effects.len() != 1 || !own.effects.contains(&c.effects[0]) {
+                    return false;
+                }
+                let gain = own.log_evidence - c.log_evidence;
+                let c_left = left(&c.best.prediction);
+                let needed = c_left > PAIR_LEFT * gap && own_left < 0.5 * c_left && gain > PAIR_NATS;
+                2.0 * gain < PAIR_GAIN * gap && !needed
             })
             .collect();
         if alone.is_empty() {

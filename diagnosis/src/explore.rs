@@ -10,6 +10,9 @@ const SCAN_ROWS: usize = 160;
 /// Starts that are fitted on the scan's rows, and those of them refined on all.
 const STARTS: (usize, usize) = (4, 2);
 
+/// Deviations of its prior beyond which a nuisance imitates a cause.
+const DRIVEN: f64 = 3.0;
+
 /// Sizes and shapes at which a law is tried.
 fn grid(parameters: &[Parameter], stroke: f64) -> Vec<Vec<f64>> {
     let mut list: Vec<Vec<f64>> = vec![Vec::new()];
@@ -87,6 +90,20 @@ pub fn glance(
     }
     let rows = rows(problem.len(), SCAN_ROWS);
     scan(problem, members, held, variance, &rows, list).into_iter().next()
+}
+
+/// Best cost of the whole scan of the last member beside the given coordinates of the others, with the place.
+pub fn survey(
+    problem: &Problem,
+    members: &[Member],
+    held: &[f64],
+    variance: &[f64],
+) -> Option<(f64, Vec<f64>)> {
+    let parameters = members.last()?.parameters();
+    let rows =
+        rows(problem.len(), if parameters.iter().any(is_wavelength) { problem.len() } else { SCAN_ROWS });
+    let grid = grid(parameters, problem.design.stroke_m);
+    scan(problem, members, held, variance, &rows, grid).into_iter().next()
 }
 
 /// Local fit of a pair from one start.
@@ -190,4 +207,16 @@ pub fn tempered(problem: &Problem, gap: &DVector<f64>, share: f64) -> Vec<f64> {
 /// Coordinates of a baseline fit followed by nothing: where a single effect starts from.
 pub fn held_nuisances(fit: &Fit) -> Vec<f64> {
     fit.u[..NUISANCES].to_vec()
+}
+
+/// Where nuisances start: where they are, and at their calibration if they have been driven far from it to imitate a
+/// cause, from where no local fit comes back.
+pub fn nuisance_starts(u: &[f64]) -> Vec<Vec<f64>> {
+    let mut list = vec![u.to_vec()];
+    if u[..NUISANCES].iter().any(|x| x.abs() > DRIVEN) {
+        let mut calibrated = u.to_vec();
+        calibrated[..NUISANCES].fill(0.0);
+        list.push(calibrated);
+    }
+    list
 }

@@ -2,10 +2,11 @@
 
 use crate::data::{Rig, Table};
 use crate::evidence::{Explained, FORMS, explain, over_forms};
-use crate::explore::{glance, held_nuisances, optima, polish, tempered};
+use crate::explore::{held_nuisances, nuisance_starts, optima, tempered};
 use crate::fit::{Fit, Member, Problem, minimise};
 use crate::linear::log_sum_exp;
 use crate::noise::{PureError, settle};
+use crate::pairs::pairs;
 use crate::smooth::{Coordinates, Kernel, Lengths};
 use crate::wildcard::Wildcard;
 use effects::library;
@@ -61,9 +62,21 @@ pub struct Candidate {
     pub laws: Vec<(f64, Explained)>,
     /// Probability given the data.
     pub probability: f64,
+    /// Its logarithm: it orders hypotheses whose probabilities are too small for a number.
+    pub log_probability: f64,
 }
 
 impl Candidate {
+    /// A hypothesis whose probability is not known yet.
+    pub(crate) fn new(
+        effects: Vec<usize>,
+        log_evidence: f64,
+        best: Explained,
+        laws: Vec<(f64, Explained)>,
+    ) -> Self {
+        Candidate { effects, log_evidence, best, laws, probability: 0.0, log_probability: f64::NEG_INFINITY }
+    }
+
     /// Names in the library's order.
     pub fn names(&self) -> Vec<&'static str> {
         self.effects.iter().map(|&e| library()[e].name()).collect()
@@ -106,17 +119,9 @@ const FORM_RANK: usize = 40;
 /// Share of the smooth gap below which starts do not look.
 const START_SHARE: f64 = 0.15;
 /// Laws this many nats behind the best single keep the middle share only.
-const PRUNE: f64 = 15.0;
+pub(crate) const PRUNE: f64 = 15.0;
 /// A law whose tempered cost is beyond this factor of the best, plus this, is not refined.
 const HOPELESS: (f64, f64) = (1.5, 60.0);
-/// Single effects from which pairs are grown.
-const PAIR_SEEDS: usize = 6;
-/// Exact aliases: a pair of them is one cause with the freedom of two.
-const SAME: [[&str; 2]; 1] = [["force_crosstalk", "plate_tilt"]];
-/// Cosine between two changes above which they are one.
-const ONE_CHANGE: f64 = 0.98;
-/// Pairs that are fitted in full.
-const PAIRS_FITTED: usize = 20;
 /// Deviations of chi2 above its expectation from which the best single is taken to leave something.
 const ENOUGH: f64 = 2.5;
 
@@ -159,8 +164,17 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
     }
 
     // Middle share first, for every law; the other shares where they could matter.
-    let starts: Vec<Vec<Fit>> =
-        members.par_iter().map(|member| optima(&problem, &[*member], &held, &loose)).collect();
+    let starts: Vec<Vec<Fit>> = members
+        .par_iter()
+        .map(|member| {
+            let mut fits: Vec<Fit> = nuisance_starts(&held)
+                .iter()
+                .flat_map(|held| optima(&problem, &[*member], held, &loose))
+                .collect();
+            fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+            fits
+        })
+        .collect();
     let cheapest = starts.iter().flatten().map(|f| f.cost).fold(f64::INFINITY, f64::min);
     let middle: Vec<Option<Explained>> = members
         .par_iter()
@@ -212,8 +226,8 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
             .sum();
         let n = problem.len() as f64;
         if misfit > n + ENOUGH * (2.0 * n).sqrt() {
-            let pairs = pairs(&problem, &candidates, &loose, &basis);
-            candidates.extend(pairs);
+            let grown = pairs(&problem, &candidates, &loose, &basis);
+            candidates.extend(grown);
         }
     }
 
@@ -228,11 +242,13 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
     all.push(wildcard.log_evidence + priors.unknown.ln());
     let total = log_sum_exp(&all);
     for (c, v) in candidates.iter_mut().zip(&all) {
-        c.probability = (v - total).exp();
+        c.log_probability = v - total;
+        c.probability = c.log_probability.exp();
     }
     let k = candidates.len();
     let (none_probability, unknown_probability) = ((all[k] - total).exp(), (all[k + 1] - total).exp());
-    candidates.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.effects.cmp(&b.effects)));
+    candidates
+        .sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability).then(a.effects.cmp(&b.effects)));
     Fitted {
         problem,
         pure,
@@ -273,88 +289,9 @@ fn candidate(effects: Vec<usize>, laws: Vec<(f64, Explained)>) -> Option<Candida
     let best = laws.iter().max_by(|a, b| a.0.total_cmp(&b.0))?.1.clone();
     let evidences: Vec<f64> = laws.iter().map(|l| l.0).collect();
     let log_evidence = log_sum_exp(&evidences) - (laws.len() as f64).ln();
-    log_evidence.is_finite().then_some(Candidate { effects, log_evidence, best, laws, probability: 0.0 })
+    log_evidence.is_finite().then(|| Candidate::new(effects, log_evidence, best, laws))
 }
 
 fn sort(candidates: &mut [Candidate]) {
     candidates.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence).then(a.effects.cmp(&b.effects)));
-}
-
-/// Whether two hypotheses change the forces alike: by name, or by the angle between their changes in deviations of a
-/// pass.
-fn one_change(problem: &Problem, a: &Explained, b: &Explained) -> bool {
-    let names = [a.members[0].name(), b.members[0].name()];
-    if SAME.iter().any(|same| names.iter().all(|n| same.contains(n))) {
-        return true;
-    }
-    let product = |x: &Explained, y: &Explained| -> f64 {
-        x.change.iter().zip(y.change.iter()).zip(&problem.variance).map(|((p, q), v)| p * q / v).sum()
-    };
-    product(a, b) > ONE_CHANGE * (product(a, a) * product(b, b)).sqrt().max(1e-300)
-}
-
-/// Pairs grown from the best singles, each with every other effect in each of its laws.
-fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &DMatrix<f64>) -> Vec<Candidate> {
-    let seeds = &singles[..singles.len().min(PAIR_SEEDS)];
-    let jobs: Vec<(usize, &Explained)> = (0..seeds.len())
-        .flat_map(|s| singles.iter().flat_map(|c| &c.laws).map(move |(_, e)| (s, e)))
-        .filter(|(s, e)| e.members[0].effect != seeds[*s].effects[0])
-        // Two names for one change are not two causes.
-        .filter(|(s, e)| !one_change(problem, &seeds[*s].best, e))
-        .collect();
-    let mut glances: Vec<(f64, Vec<Member>, Vec<f64>)> = jobs
-        .par_iter()
-        .filter_map(|(s, e)| {
-            let seed = &seeds[*s].best;
-            let pair = vec![seed.members[0], e.members[0]];
-            let alone = &e.u[crate::fit::NUISANCES..];
-            glance(problem, &pair, &seed.u, loose, alone).map(|(cost, u)| (cost, pair, u))
-        })
-        .collect();
-    glances.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut chosen: Vec<(Vec<usize>, Vec<Member>, Vec<f64>)> = Vec::new();
-    for (_, pair, u) in glances {
-        let mut effects: Vec<usize> = pair.iter().map(|m| m.effect).collect();
-        effects.sort_unstable();
-        // Two laws of a pair may be looked at: the scan is coarse.
-        if chosen.iter().filter(|(e, ..)| *e == effects).count() < 2 {
-            chosen.push((effects, pair, u));
-        }
-        if chosen.len() == PAIRS_FITTED {
-            break;
-        }
-    }
-    let first: Vec<(Vec<usize>, Explained)> = chosen
-        .into_par_iter()
-        .filter_map(|(effects, pair, u)| {
-            let fit = polish(problem, &pair, u, loose)?;
-            Some((effects, explain(problem, &pair, &fit.u, basis, FORMS[1].0, 5)))
-        })
-        .collect();
-    let top = first.iter().map(|(_, e)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-    let full: Vec<(Vec<usize>, f64, Explained)> = first
-        .into_par_iter()
-        .map(|(effects, e)| {
-            if e.log_evidence > top - PRUNE {
-                let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
-                let (evidence, best) = over_forms(problem, &fit, &e.members, basis);
-                (effects, evidence, best)
-            } else {
-                (effects, e.log_evidence + FORMS[1].1.ln(), e)
-            }
-        })
-        .collect();
-    let mut list: Vec<Candidate> = Vec::new();
-    for (effects, evidence, best) in full {
-        let laws: f64 = best.members.iter().map(|m| library()[m.effect].laws().len() as f64).product();
-        // Only the best pair of laws was fitted: the others are taken to add nothing.
-        let log_evidence = evidence - laws.ln();
-        match list.iter_mut().find(|c| c.effects == effects) {
-            Some(c) if c.log_evidence >= log_evidence => {}
-            Some(c) => *c = Candidate { effects, log_evidence, best, laws: Vec::new(), probability: 0.0 },
-            None => list.push(Candidate { effects, log_evidence, best, laws: Vec::new(), probability: 0.0 }),
-        }
-    }
-    list.retain(|c| c.log_evidence.is_finite());
-    list
 }

@@ -15,6 +15,7 @@ pub mod linear;
 pub mod locate;
 pub mod next;
 pub mod noise;
+pub mod pairs;
 pub mod predict;
 pub mod pulls;
 pub mod shrink;

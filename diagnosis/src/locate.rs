@@ -80,12 +80,12 @@ fn words_for(name: &str) -> (&str, f64, &str) {
 /// Deviations of a pass by which the gap must stand out at a condition to count.
 const STANDS_OUT: f64 = 2.0;
 /// Largest number of parts that the operating space is cut into, and the least number of places in one.
-const PARTS: usize = 28;
+const PARTS: usize = 128;
 const LEAST: usize = 16;
 /// Levels at which a covariate may be cut.
 const LEVELS: usize = 24;
 /// Conditions at which the verdict's model is asked for its gap.
-const ASKED: usize = 4000;
+const ASKED: usize = 10_000;
 
 /// Boxes that together hold the conditions at which the verdict's model says that the gap stands out of the noise.
 ///

@@ -13,6 +13,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+/// Parts of the operating space that are told in words, the largest first.
+const TOLD: usize = 6;
+
 /// Say where simulation and reality part on a table of passes, which effect causes it, and how far it shrinks.
 #[derive(Debug, ClapArgs)]
 pub struct Args {
@@ -260,13 +263,13 @@ pub fn terminal(result: &Diagnosis) -> String {
     }
     if !r.location.regions.is_empty() {
         text.push_str("\nWhere\n");
-        let told = r.location.regions.iter().filter(|g| g.share_of_gap >= 0.01).count();
+        let told = r.location.regions.iter().filter(|g| g.share_of_gap >= 0.01).count().min(TOLD);
         for region in r.location.regions.iter().take(told) {
             text.push_str(&format!("  {}\n", region.text));
         }
         let rest = r.location.regions.len() - told;
         if rest > 0 {
-            text.push_str(&format!("  and {rest} further parts with less than 1 % each\n"));
+            text.push_str(&format!("  and {rest} further parts, in the JSON document\n"));
         }
     }
     if !r.next_experiment.is_empty() {

@@ -3,6 +3,9 @@
 use diagnosis::data::Table;
 use diagnosis::verdict::Diagnosis;
 
+/// Parts of the operating space that are told in words, the largest first.
+const TOLD: usize = 12;
+
 /// The page.
 pub fn page(result: &Diagnosis, table: &Table) -> String {
     let r = &result.report;
@@ -163,7 +166,10 @@ fn lists(result: &Diagnosis) -> String {
             format!("<ul>{}</ul>", list.iter().map(|l| format!("<li>{}</li>", escape(l))).collect::<String>())
         }
     };
-    text.push_str(&items(r.location.regions.iter().map(|g| g.text.clone()).collect()));
+    text.push_str(&items(r.location.regions.iter().take(TOLD).map(|g| g.text.clone()).collect()));
+    if r.location.regions.len() > TOLD {
+        text.push_str(&format!("<p>And {} further parts.</p>", r.location.regions.len() - TOLD));
+    }
     let places: Vec<String> = r.location.place.iter().map(|(k, v)| format!("{k}: {v:.3}")).collect();
     text.push_str(&format!("<p>By place: {}.</p>", escape(&places.join(", "))));
     text.push_str("<h2>What to do next</h2>");
