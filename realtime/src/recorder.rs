@@ -3,7 +3,6 @@
 //! What a reader must know comes first (metadata and attachments), so that a file cut at any byte still tells what it
 //! is. Chunks are closed at every [`Recorder::flush`]; a kill loses at most what came after the last one.
 //! Time stamps are the wall clock at the start plus loop time, which is monotonic.
-
 //!
 //! Memory stays the same however long a run lasts. Every chunk is made by a writer of its own and tells its own channels;
 //! what a reader needs to find its way is put together when the file ends, from the file.
