@@ -22,12 +22,13 @@ use std::time::{Duration, Instant};
 /// How long each client runs in a turn, and how many turns there are.
 const TURN: Duration = Duration::from_millis(1500);
 const TURNS: usize = 5;
-/// As often as the instrument answers.
-const FAST: f64 = 20_000.0;
+/// As often as the instrument answers: every period is over before the driver could sleep for it.
+const FAST: f64 = 1e9;
 
-/// A world that stands still but counts: every read is a new sample.
+/// A world that stands still but counts: every read is a new sample, taken when it is read.
 struct Still {
     samples: f64,
+    begun: Instant,
 }
 
 impl Plant for Still {
@@ -38,6 +39,9 @@ impl Plant for Still {
                 self.samples += 1.0;
                 self.samples
             }
+            Quantity::ForceTime | Quantity::DriveTime | Quantity::DeviceTime => {
+                self.begun.elapsed().as_secs_f64()
+            }
             Quantity::FrequencySetPoint => 27_500.0,
             Quantity::LateralForce | Quantity::NormalForce => 0.25,
             _ => 0.0,
@@ -47,7 +51,7 @@ impl Plant for Still {
 }
 
 fn plant() -> SharedPlant {
-    SharedPlant::new(Still { samples: 0.0 }, Instant::now())
+    SharedPlant::new(Still { samples: 0.0, begun: Instant::now() }, Instant::now())
 }
 
 fn device(id: &str) -> Device {
