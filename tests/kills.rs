@@ -37,7 +37,11 @@ fn alone(amplifier: &mut AmplifierWatch) -> Option<u32> {
     }
 }
 
+/// Points of the passes that a run's folder holds: none where it was killed before the table was begun.
 fn points(run: &Path) -> Vec<u64> {
+    if !run.join("points.csv").exists() {
+        return Vec::new();
+    }
     rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
 }
 
