@@ -166,9 +166,18 @@ fn lists(result: &Diagnosis) -> String {
             format!("<ul>{}</ul>", list.iter().map(|l| format!("<li>{}</li>", escape(l))).collect::<String>())
         }
     };
-    text.push_str(&items(r.location.regions.iter().take(TOLD).map(|g| g.text.clone()).collect()));
-    if r.location.regions.len() > TOLD {
-        text.push_str(&format!("<p>And {} further parts.</p>", r.location.regions.len() - TOLD));
+    let told: Vec<String> = r
+        .location
+        .regions
+        .iter()
+        .filter(|g| g.share_of_gap >= 0.01)
+        .take(TOLD)
+        .map(|g| g.text.clone())
+        .collect();
+    let rest = r.location.regions.len() - told.len();
+    text.push_str(&items(told));
+    if rest > 0 {
+        text.push_str(&format!("<p>And {rest} further parts, in the JSON document.</p>"));
     }
     let places: Vec<String> = r.location.place.iter().map(|(k, v)| format!("{k}: {v:.3}")).collect();
     text.push_str(&format!("<p>By place: {}.</p>", escape(&places.join(", "))));
