@@ -54,23 +54,29 @@ pub fn sweep_unless_the_machine_stalls(folder: &Path, sweep: impl Fn(&Path) -> C
         if output.status.code() != Some(1) {
             return (out, output);
         }
-        let said = std::fs::read_to_string(out.join("summary.json"));
-        let (stdout, stderr) = texts(&output);
-        let said = said.unwrap_or_else(|e| panic!("no summary: {e}\n{stdout}\n{stderr}"));
-        let summary: rig::session::Summary = serde_json::from_str(&said).unwrap();
-        let rig::sequence::Outcome::Tripped(trip) = summary.outcome else { return (out, output) };
-        let stalls = summary.stalls.expect("a run in wall-clock time has witnesses");
-        let before = realtime::ports::Nanos(trip.at.0.saturating_sub(300_000_000));
-        let stall = stalls.within(before, trip.at).unwrap_or_else(|| {
-            panic!("{trip:?} without a recorded stall of the machine (worst {:?})", stalls.worst)
-        });
-        eprintln!(
-            "attempt {attempt}: {:?}, the machine stalled for {} ms",
-            trip.cause,
-            stall.lasted.0 / 1_000_000
-        );
+        match cut_by_a_stall(&out) {
+            Some(why) => eprintln!("attempt {attempt}: {why}"),
+            None => return (out, output),
+        }
     }
     panic!(
         "five sweeps in a row were cut by stalls of the machine: it is too busy for a test in wall-clock time"
     );
+}
+
+/// What cut a run that has ended: a trip with a recorded stall of the machine before it, in words; `None` if no trip did.
+///
+/// # Panics
+/// A trip without a stall, and a run without a summary.
+pub fn cut_by_a_stall(out: &Path) -> Option<String> {
+    let said = std::fs::read_to_string(out.join("summary.json"));
+    let said = said.unwrap_or_else(|e| panic!("no summary in {}: {e}", out.display()));
+    let summary: rig::session::Summary = serde_json::from_str(&said).unwrap();
+    let rig::sequence::Outcome::Tripped(trip) = summary.outcome else { return None };
+    let stalls = summary.stalls.expect("a run in wall-clock time has witnesses");
+    let before = realtime::ports::Nanos(trip.at.0.saturating_sub(300_000_000));
+    let stall = stalls.within(before, trip.at).unwrap_or_else(|| {
+        panic!("{trip:?} without a recorded stall of the machine (worst {:?})", stalls.worst)
+    });
+    Some(format!("{:?}, the machine stalled for {} ms", trip.cause, stall.lasted.0 / 1_000_000))
 }
