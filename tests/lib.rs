@@ -46,7 +46,8 @@ pub fn documents(output: &Output) -> Vec<serde_json::Value> {
 ///
 /// A shared machine takes a CPU away for many milliseconds, and the safety core then trips, as it must. Such a trip is
 /// accepted only if a witness recorded a stall of the machine in the 300 ms before it, and at most four times; any
-/// other trip fails. What ends otherwise is the caller's to judge. `sweep` makes the command for a folder. Returns the output of the attempt that went through.
+/// other trip fails. What ends otherwise is the caller's to judge. `sweep` makes the command for a folder. Returns the
+/// folder and output of the attempt that went through.
 pub fn sweep_unless_the_machine_stalls(folder: &Path, sweep: impl Fn(&Path) -> Command) -> (PathBuf, Output) {
     for attempt in 1..=5 {
         let out = folder.join(format!("attempt-{attempt}"));

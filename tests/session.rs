@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 use tests::{cut_by_a_stall, documents, file, muprime, python, sweep_unless_the_machine_stalls, texts};
 
@@ -44,6 +44,13 @@ fn assert_each_once(points: &[u64], planned: u64) {
     }
     assert_eq!(seen.len() as u64, planned, "{points:?}");
     assert!(seen.values().all(|n| *n == 1), "{points:?}");
+}
+
+/// A sweep on the ideal virtual rig, in wall-clock time.
+fn started(plan: &str, out: &Path) -> Child {
+    let mut sweep = muprime();
+    sweep.args(["--json", "run", plan, "--setup", "virtual-ideal", "--out"]).arg(out);
+    sweep.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
 }
 
 #[test]
@@ -123,13 +130,7 @@ fn a_killed_sweep_resumes_without_a_lost_or_doubled_pass() {
             break;
         }
         sessions += 1;
-        let mut child = muprime()
-            .args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"])
-            .arg(&out)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        let mut child = started(&plan, &out);
         let lines = BufReader::new(child.stdout.take().unwrap()).lines();
         let mut heard = 0;
         for line in lines {
@@ -166,13 +167,7 @@ fn a_killed_record_is_recovered_and_an_ordinary_reader_opens_it() {
     let plan = short_plan(folder.path());
     let killed = |attempt: u32| {
         let out = folder.path().join(format!("run-{attempt}"));
-        let mut child = muprime()
-            .args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"])
-            .arg(&out)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        let mut child = started(&plan, &out);
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
         let third = lines.by_ref().filter(|l| l.as_ref().unwrap().contains("\"pass\"")).nth(2);
         child.kill().unwrap();
@@ -203,13 +198,7 @@ fn an_interrupt_stops_safely_and_keeps_what_was_measured() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
     let plan = short_plan(folder.path());
-    let mut child = muprime()
-        .args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"])
-        .arg(&out)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut child = started(&plan, &out);
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
     lines.by_ref().find(|l| l.as_ref().unwrap().contains("\"pass\"")).unwrap().unwrap();
     // SAFETY: sends SIGINT to the child that this test has started and not yet waited for.
@@ -316,7 +305,7 @@ fn exports_are_read_by_others() {
 }
 
 /// A program that ends with the test.
-struct Peer(std::process::Child);
+struct Peer(Child);
 
 impl Drop for Peer {
     fn drop(&mut self) {

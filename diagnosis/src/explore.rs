@@ -61,14 +61,25 @@ fn is_wavelength(p: &Parameter) -> bool {
 ///
 /// `held` are the coordinates of nuisances and of all members but the last; `variance` may be tempered.
 pub fn optima(problem: &Problem, members: &[Member], held: &[f64], variance: &[f64]) -> Vec<Fit> {
-    let Some(last) = members.last() else {
+    if members.is_empty() {
         return vec![minimise(problem, members, held, variance, 20)];
-    };
-    let grid = grid(last.parameters(), problem.design.stroke_m);
-    let fine = last.parameters().iter().any(is_wavelength);
-    let rows = rows(problem.len(), if fine { problem.len() } else { SCAN_ROWS });
-    let scored = scan(problem, members, held, variance, &rows, grid);
+    }
+    let (rows, scored) = surveyed(problem, members, held, variance);
     refine(problem, members, held.len(), variance, &rows, &scored, STARTS)
+}
+
+/// The whole grid of the last member, on the rows that show it: those rows, and every place with its cost, best first.
+fn surveyed(
+    problem: &Problem,
+    members: &[Member],
+    held: &[f64],
+    variance: &[f64],
+) -> (Vec<usize>, Vec<(f64, Vec<f64>)>) {
+    let parameters = members.last().map_or(&[][..], Member::parameters);
+    let fine = parameters.iter().any(is_wavelength);
+    let rows = rows(problem.len(), if fine { problem.len() } else { SCAN_ROWS });
+    let scored = scan(problem, members, held, variance, &rows, grid(parameters, problem.design.stroke_m));
+    (rows, scored)
 }
 
 /// Best cost of a coarse scan of the last member about coordinates that it had alone, with the place it was found.
@@ -99,11 +110,7 @@ pub fn survey(
     held: &[f64],
     variance: &[f64],
 ) -> Option<(f64, Vec<f64>)> {
-    let parameters = members.last()?.parameters();
-    let rows =
-        rows(problem.len(), if parameters.iter().any(is_wavelength) { problem.len() } else { SCAN_ROWS });
-    let grid = grid(parameters, problem.design.stroke_m);
-    scan(problem, members, held, variance, &rows, grid).into_iter().next()
+    surveyed(problem, members, held, variance).1.into_iter().next()
 }
 
 /// Local fit of a pair from one start.

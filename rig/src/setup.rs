@@ -247,7 +247,6 @@ impl Setup {
         let settings =
             crate::drivers::vibrometer::settings(vibrometer).map_err(|e| miette::miette!("{e}"))?;
         settings.covers(frequency_hz).map_err(|e| miette::miette!("{e}"))?;
-        eprintln!("vibrometer: {settings}");
         Ok(settings)
     }
 

@@ -74,12 +74,26 @@ impl Served {
         Served { hands: child.stdin.take().unwrap(), child, said, places }
     }
 
-    /// True peak-to-peak motion of the plate, m.
-    fn look(&mut self) -> f64 {
+    /// What the plate does.
+    fn seen(&mut self) -> serde_json::Value {
         writeln!(self.hands, "look").unwrap();
-        let seen: serde_json::Value = serde_json::from_str(&self.said.next().unwrap().unwrap()).unwrap();
+        serde_json::from_str(&self.said.next().unwrap().unwrap()).unwrap()
+    }
+
+    /// True peak-to-peak motion of the driven plate, m.
+    fn look(&mut self) -> f64 {
+        let seen = self.seen();
         assert!((seen["frequency_hz"].as_f64().unwrap() - FREQUENCY_HZ).abs() < 1.0, "{seen}");
         seen["amplitude_pp_m"].as_f64().unwrap()
+    }
+
+    /// The rig stands still for longer than any of its states may be old: its controller trips.
+    fn stand_still(&self) {
+        for (signal, ms) in [(libc::SIGSTOP, 400), (libc::SIGCONT, 100)] {
+            // SAFETY: a signal to a child that has not been waited for: its id is still its own.
+            assert_eq!(unsafe { libc::kill(self.child.id() as i32, signal) }, 0);
+            std::thread::sleep(Duration::from_millis(ms));
+        }
     }
 }
 
@@ -126,22 +140,33 @@ fn an_amplitude_table_taken_live_finds_the_withheld_scale() {
         .unwrap();
     let said = heard(child.stderr.take().unwrap());
     let mut operator = child.stdin.take().unwrap();
-    let (mut line, mut readings, mut all) = (String::new(), 0, String::new());
+    let (mut line, mut readings, mut trips, mut all) = (String::new(), 0, 0, String::new());
     while let Ok(byte) = said.recv_timeout(Duration::from_secs(60)) {
         line.push(byte as char);
         all.push(byte as char);
         if line.ends_with("volts> ") {
             let w = served.look();
+            if readings == 3 {
+                served.stand_still();
+            }
             // The velocity's amplitude through VD-02, read to half a per cent.
             let volts = std::f64::consts::PI * FREQUENCY_HZ * w / RANGES[0] * (1.0 + 0.005 * draw.normal());
             writeln!(operator, "{volts:.5}").unwrap();
             readings += 1;
             line.clear();
+        } else if line.ends_with("again> ") {
+            // After a trip nothing is driven before the operator says so.
+            std::thread::sleep(Duration::from_millis(300));
+            let still = served.seen()["amplitude_pp_m"].as_f64().unwrap();
+            assert!(still < 1e-9, "{still} m: {all}");
+            trips += 1;
+            writeln!(operator).unwrap();
+            line.clear();
         }
     }
     let done = child.wait_with_output().unwrap();
     assert!(done.status.success(), "{all}");
-    assert!(readings >= 10, "{all}");
+    assert!(readings >= 11 && trips >= 1, "{readings} readings, {trips} trips: {all}");
     assert!(all.contains("decoder VD-02 (number 0) at 25 mm/s/V, delay 8.160 us"), "{all}");
     let document = &tests::documents(&done)[0];
     let [gain, u] = parameter(document, "gain");

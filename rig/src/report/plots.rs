@@ -10,14 +10,16 @@ use plotters::prelude::*;
 use realtime::pacing::LoopReport;
 
 const SIZE: (u32, u32) = (900, 480);
-/// Colours that stay apart for colour-blind readers (Okabe and Ito).
-const COLOURS: [RGBColor; 6] = [
+/// Colours that stay apart on white, also for colour-blind readers (after Okabe and Ito, the yellow darkened).
+pub const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
+    RGBColor(190, 130, 0),
+    RGBColor(0, 0, 0),
+    RGBColor(130, 130, 130),
 ];
 const GREY: RGBColor = RGBColor(90, 90, 90);
 

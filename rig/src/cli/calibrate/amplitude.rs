@@ -108,6 +108,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         (Some(path), false) => (path.clone(), points_of(&mut sources, path, &args.set_point)?, None),
         (Some(path), true) => {
             let settings = with_vibrometer(args)?.vibrometer_settings(args.frequency_hz)?;
+            eprintln!("vibrometer: {settings}");
             let rows = columns(&mut sources, path, [args.set_point.as_str(), "velocity_v"], &[])?;
             let convert = |(row, [at, volts]): (usize, [f64; 2])| {
                 live::displacement(volts, settings.range_m_s_per_v, args.frequency_hz)

@@ -27,10 +27,8 @@ use std::time::{Duration, Instant};
 
 /// Largest amplitude of a decoder's output in V: full scale is taken as 20 V peak-to-peak.
 const FULL_SCALE_V: f64 = 10.0;
-/// A rig that trips (a stalled machine does that) is armed again so often for one set-point.
-const TRIES: u32 = 5;
 /// Time to arm in s.
-const ARM_WITHIN_S: f64 = 2.0;
+const ARM_WITHIN_S: f64 = 10.0;
 /// Time to reach an amplitude in s: the loop limits its rate.
 const REACH_WITHIN_S: f64 = 10.0;
 
@@ -71,8 +69,10 @@ pub fn displacement(volts: f64, range_m_s_per_v: f64, frequency_hz: f64) -> Resu
 pub fn table(setup: &Setup, table: &Table<'_>) -> miette::Result<String> {
     check(setup, table)?;
     let settings = setup.vibrometer_settings(table.frequency_hz)?;
+    eprintln!("vibrometer: {settings}");
     let _claim = RigClaim::take(setup)?;
     let drive = Drive::start(setup)?;
+    drive.arm()?;
     eprintln!(
         "The plate will vibrate at {:.1} Hz, up to {:.2} um peak-to-peak. Nothing may touch it. Each question wants the \
          amplitude of the velocity signal in V, zero to peak; an empty line asks again after another settling.",
@@ -89,12 +89,15 @@ pub fn table(setup: &Setup, table: &Table<'_>) -> miette::Result<String> {
         for set_point in order {
             let amplitude = PeakToPeak::from_metres(set_point);
             let (volts, w) = loop {
-                drive.hold(amplitude, table).map_err(|e| miette::miette!("{e}"))?;
+                if let Err(why) = drive.hold(amplitude, table) {
+                    // A trip stays until somebody at the rig takes it back.
+                    eprint!("  {why}; an empty line arms the rig again> ");
+                    answer(&mut lines)?;
+                    drive.arm()?;
+                    continue;
+                }
                 eprint!("set-point {set_point:.3e} m, volts> ");
-                let Some(line) = lines.next() else {
-                    miette::bail!("the input ended before the last set-point: no table, no certificate");
-                };
-                let line = line.map_err(|e| miette::miette!("the terminal: {e}"))?;
+                let line = answer(&mut lines)?;
                 if !drive.holds(amplitude) {
                     eprintln!("  no reading: the drive did not stand while it was taken; again");
                     continue;
@@ -115,6 +118,14 @@ pub fn table(setup: &Setup, table: &Table<'_>) -> miette::Result<String> {
         miette::bail!("the vibrometer was set otherwise while the table was taken ({after} now): no table");
     }
     Ok(text)
+}
+
+/// What the operator, or the program in his place, says next.
+fn answer(lines: &mut impl Iterator<Item = std::io::Result<String>>) -> miette::Result<String> {
+    match lines.next() {
+        Some(line) => line.map_err(|e| miette::miette!("the terminal: {e}")),
+        None => miette::bail!("the input ended before the last set-point: no table, no certificate"),
+    }
 }
 
 /// Refuses before anything moves.
@@ -236,31 +247,41 @@ impl Drive {
         false
     }
 
+    /// Arms the rig, with nothing driven: once at the beginning, and after a trip when the operator says so.
+    fn arm(&self) -> miette::Result<()> {
+        let began = Instant::now();
+        while !self.row().is_some_and(|row| row.armed) {
+            if began.elapsed().as_secs_f64() > ARM_WITHIN_S {
+                let blocking = self.row().and_then(|row| row.blocking);
+                miette::bail!("the rig does not arm within {ARM_WITHIN_S} s: {blocking:?}");
+            }
+            self.send(Command::Set(Request::default(), Marker::default()));
+            self.send(Command::Reset);
+            std::thread::sleep(Duration::from_millis(60));
+        }
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner).tripped = None;
+        Ok(())
+    }
+
     /// Brings the plate to an amplitude and lets it settle.
     fn hold(&self, amplitude: PeakToPeak, table: &Table<'_>) -> Result<(), String> {
         let request = Request { amplitude, frequency_hz: table.frequency_hz, ..Request::default() };
-        for _ in 0..TRIES {
-            let began = Instant::now();
-            while !self.row().is_some_and(|row| row.armed) && began.elapsed().as_secs_f64() < ARM_WITHIN_S {
-                self.send(Command::Set(Request::default(), Marker::default()));
-                self.send(Command::Reset);
-                std::thread::sleep(Duration::from_millis(60));
+        self.send(Command::Set(request, Marker::default()));
+        let stands =
+            self.until(REACH_WITHIN_S, |row| !row.armed || reached(row, amplitude)) && self.holds(amplitude);
+        if stands {
+            std::thread::sleep(Duration::from_secs_f64(table.settle_s));
+            if self.holds(amplitude) {
+                return Ok(());
             }
-            self.seen.lock().unwrap_or_else(PoisonError::into_inner).tripped = None;
-            self.send(Command::Set(request, Marker::default()));
-            if self.until(REACH_WITHIN_S, |row| !row.armed || reached(row, amplitude))
-                && self.holds(amplitude)
-            {
-                std::thread::sleep(Duration::from_secs_f64(table.settle_s));
-                if self.holds(amplitude) {
-                    return Ok(());
-                }
-            }
-            let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-            let why = seen.tripped.map(|trip| trip.cause).or(seen.row.and_then(|row| row.blocking));
-            eprintln!("  the rig did not stay armed ({why:?}): once more");
         }
-        Err(format!("the rig would not stay armed at {:.3} um in {TRIES} tries", amplitude.micrometres()))
+        self.send(Command::Set(Request::default(), Marker::default()));
+        let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        let why = seen.tripped.map(|trip| trip.cause).or(seen.row.and_then(|row| row.blocking));
+        Err(match why {
+            Some(cause) => format!("the rig has tripped ({cause:?})"),
+            None => format!("{:.3} um are not reached in {REACH_WITHIN_S} s", amplitude.micrometres()),
+        })
     }
 
     /// Whether the drive has stood at an amplitude since it was reached.

@@ -63,7 +63,11 @@ pub struct Args {
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let settings = match &args.setup {
         None => None,
-        Some(name) => Some(Setup::load(name)?.vibrometer_settings(args.frequency_hz)?),
+        Some(name) => {
+            let settings = Setup::load(name)?.vibrometer_settings(args.frequency_hz)?;
+            eprintln!("vibrometer: {settings}");
+            Some(settings)
+        }
     };
     let decoder = |name: &str, range: &Option<String>, delay: &Option<String>| {
         let (range_text, delay_text) =

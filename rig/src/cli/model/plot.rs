@@ -1,23 +1,12 @@
 //! Curves as CSV (long form: series, x, y) and SVG.
 
+use crate::report::plots::COLOURS;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use plotters::prelude::*;
 use std::path::Path;
 
 /// Room for the legend, in pixels.
 const LEGEND_WIDTH: i32 = 190;
-/// Colours that are told apart on white, also by the colour-blind (after Okabe and Ito, the yellow darkened).
-const COLOURS: [RGBColor; 8] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(190, 130, 0),
-    RGBColor(0, 0, 0),
-    RGBColor(130, 130, 130),
-];
-
 /// One curve.
 pub struct Series {
     /// Its name in the legend and in the CSV.
