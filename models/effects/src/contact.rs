@@ -61,8 +61,10 @@ pub struct Contact {
     pub normal_retardation_time: f64,
     /// Mass of the ridges that follow the plate, kg. 0 in the baseline.
     pub mass: f64,
-    /// Index into [`crate::impact::CLASSES`] where there is mass.
-    pub damping_class: usize,
+    /// Damping ratio of the ridges where there is mass.
+    pub ridge_damping_ratio: f64,
+    /// Index into [`crate::impact::LANDINGS`] where there is mass.
+    pub landing: usize,
 }
 
 /// Attraction between skin and plate that friction feels beside the normal force.

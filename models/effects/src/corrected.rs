@@ -26,7 +26,7 @@ pub struct SavedModel {
     pub verdict: String,
     /// Relative standard uncertainty of the relative friction that the diagnosis left.
     pub relative_sd: f64,
-    /// Largest relative error of interpolation; zero where the prediction is evaluated directly.
+    /// Error of mu' by interpolation, root mean square; zero where the prediction is evaluated directly.
     pub interpolation_error: f64,
     /// Recalibrated baseline.
     pub baseline: Baseline,
@@ -188,6 +188,7 @@ impl Corrected {
                 }
                 theta[index] = value;
             }
+            effect.prepare(law, &theta);
             effects.push(Compiled { effect, law, theta, count: expected.len() });
         }
         effects.sort_by_key(|c| {
@@ -202,7 +203,7 @@ impl Corrected {
         })
     }
 
-    /// Stated relative error of interpolation.
+    /// Stated error of mu' by interpolation.
     pub fn interpolation_error(&self) -> f64 {
         self.interpolation_error
     }

@@ -162,6 +162,8 @@ pub trait Effect: Sync {
     fn laws(&self) -> &'static [Law];
     /// What a table must hold before it can be seen.
     fn needs(&self) -> &'static [Need];
+    /// Makes what [`Effect::change`] with these parameters will look up, so that a control loop makes nothing.
+    fn prepare(&self, _law: usize, _theta: &[f64]) {}
     /// Changes what the contact is given. `theta` holds the parameters of the law in its order.
     fn change(
         &self,

@@ -98,7 +98,8 @@ impl Baseline {
             asperity_heights: crate::asperities::Heights::Gaussian,
             normal_retardation_time: 0.0,
             mass: 0.0,
-            damping_class: 0,
+            ridge_damping_ratio: 1.0,
+            landing: 0,
         }
     }
 

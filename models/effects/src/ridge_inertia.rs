@@ -5,16 +5,20 @@ use crate::prelude::*;
 /// See the module.
 pub struct RidgeInertia;
 
-static LAWS: [Law; 4] = [
-    Law { name: "damping ratio 0.3", parameters: &[Parameter::positive("mass", "kg", 4e-6, 40e-6)] },
-    Law { name: "damping ratio 1", parameters: &[Parameter::positive("mass", "kg", 4e-6, 40e-6)] },
+static LAWS: [Law; 2] = [
     Law {
-        name: "rebounding, damping ratio 0.15",
-        parameters: &[Parameter::positive("mass", "kg", 4e-6, 40e-6)],
+        name: "landing without rebound",
+        parameters: &[
+            Parameter::positive("mass", "kg", 4e-6, 40e-6),
+            Parameter::shape("damping_ratio", "1", 0.5, 0.7),
+        ],
     },
     Law {
-        name: "rebounding, damping ratio 0.5",
-        parameters: &[Parameter::positive("mass", "kg", 4e-6, 40e-6)],
+        name: "rebounding",
+        parameters: &[
+            Parameter::positive("mass", "kg", 4e-6, 40e-6),
+            Parameter::shape("damping_ratio", "1", 0.5, 0.7),
+        ],
     },
 ];
 
@@ -29,7 +33,7 @@ impl Effect for RidgeInertia {
         "Ridges thrown off by the plate are touched for a shorter part of the cycle; breaks the collapse on w f."
     }
     fn source(&self) -> &'static str {
-        "areal mass of 0.3 mm of skin over 34 mm2 gives 8 mg; bouncing oscillator with inelastic touch-down"
+        "areal mass of 0.3 mm of skin over 34 mm2 gives 8 mg; damping ratios 0.05 to 1 (Friesen 2016)"
     }
     fn laws(&self) -> &'static [Law] {
         &LAWS
@@ -39,6 +43,10 @@ impl Effect for RidgeInertia {
     }
     fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
         c.mass = theta[0];
-        c.damping_class = law;
+        c.ridge_damping_ratio = theta[1];
+        c.landing = law;
+    }
+    fn prepare(&self, law: usize, theta: &[f64]) {
+        crate::impact::prepare(law, theta[1]);
     }
 }

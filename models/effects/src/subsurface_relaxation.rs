@@ -5,7 +5,7 @@ use crate::prelude::*;
 /// See the module.
 pub struct SubsurfaceRelaxation;
 
-static LAWS: [Law; 3] = [
+static LAWS: [Law; 5] = [
     Law {
         name: "exponential creep",
         parameters: &[
@@ -25,6 +25,22 @@ static LAWS: [Law; 3] = [
         parameters: &[
             Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
             Parameter::shape("time_constant", "s", 30.0, 1.5),
+        ],
+    },
+    Law {
+        name: "normal stiffness alone, logarithmic",
+        parameters: &[
+            Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
+            Parameter::shape("onset_time", "s", 5.0, 1.2),
+        ],
+    },
+    // Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of times.
+    Law {
+        name: "normal stiffness alone, stretched exponential",
+        parameters: &[
+            Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
+            Parameter::shape("time_constant", "s", 30.0, 1.5),
+            Parameter::shape("exponent", "1", 0.6, 0.3),
         ],
     },
 ];
@@ -50,12 +66,13 @@ impl Effect for SubsurfaceRelaxation {
     }
     fn change(&self, law: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
         let factor = match law {
-            1 => 1.0 + theta[0] * (1.0 + pass.time_s / theta[1]).ln(),
+            1 | 3 => 1.0 + theta[0] * (1.0 + pass.time_s / theta[1]).ln(),
+            4 => 1.0 - theta[0] * (-(pass.time_s / theta[1]).powf(theta[2])).exp_m1(),
             _ => 1.0 - theta[0] * (-pass.time_s / theta[1]).exp_m1(),
         }
         .max(0.05);
         c.normal_stiffness *= factor;
-        if law != 2 {
+        if law < 2 {
             c.lateral_stiffness *= factor;
         }
     }

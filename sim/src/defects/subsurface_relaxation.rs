@@ -1,5 +1,5 @@
 //! The tissue under the ridges creeps: the compression under a given load grows with the time in contact, by a power law
-//! that has no single relaxation time (Kohlrausch's stretched exponential, exponent 0.5).
+//! without any relaxation time of its own (fractional viscoelasticity, exponent 0.25).
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;
@@ -10,11 +10,11 @@ pub(super) static KIND: Kind = Kind {
     in_library: true,
     in_tables: true,
     summary: "the tissue under the ridges creeps with the time in contact",
-    parameters: &[Parameter::log("creep", 0.02, 2.0), Parameter::log("time_s", 1.0, 30.0)],
+    parameters: &[Parameter::log("creep", 0.01, 1.0), Parameter::log("time_s", 1.0, 30.0)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {
-    let crept = 1.0 - (-(at.contact_time_s / v[1]).max(0.0).sqrt()).exp();
+    let crept = (1.0 + at.contact_time_s.max(0.0) / v[1]).powf(0.25) - 1.0;
     contact.normal_stiffness_n_per_m /= 1.0 + v[0] * crept;
 }
