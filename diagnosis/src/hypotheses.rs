@@ -276,7 +276,7 @@ fn usable(effect: usize, law: usize, table: &Table) -> bool {
         "warming (temperature)" | "warming about a tuning point" | "offset with temperature" => {
             temperatures.len() == table.len() && span > 0.3
         }
-        "fixed resonance" => {
+        "fixed resonance" | "standing wave, shorter at higher frequency" => {
             let first = table.passes[0].frequency_hz;
             table.passes.iter().any(|p| (p.frequency_hz / first - 1.0).abs() > 1e-3)
         }

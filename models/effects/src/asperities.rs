@@ -76,32 +76,29 @@ pub fn mean_friction(c: &Contact) -> f64 {
         }
         depth = next;
     }
-    let mut friction = 0.0;
-    for &z in nodes {
-        let (share, _) = one_load(depth + z * spread);
-        if share > 0.0 {
-            let phi = (-(depth + z * spread)).clamp(-1.0, 1.0).acos();
-            friction += weight * (share - lost_to_stick(phi, drag) / (2.0 * PI));
+    // Each asperity is a contact of its own under its own load; what belongs to the whole finger it has in its share.
+    let plain = !c.beyond_closed_form();
+    let unit = c.normal_stiffness * half;
+    let one = |&z: &f64| {
+        let own_depth = depth + z * spread;
+        let (carries, _) = one_load(own_depth);
+        if carries <= 0.0 {
+            return 0.0;
         }
-    }
-    // What the sweep knows and this ensemble does not is taken as a common factor on all asperities.
-    let alone = Contact { asperity_height: 0.0, friction_factor: 1.0, mass: 0.0, ..*c };
-    let plain = Contact {
-        adhesion: 0.0,
-        attraction: crate::contact::Attraction::None,
-        load_exponent: 0.0,
-        inverse_recovery_speed: 0.0,
-        lateral_relaxation_time: 0.0,
-        bonding_time: 0.0,
-        normal_retardation_time: 0.0,
-        ..alone
+        if plain {
+            let phi = (-own_depth).clamp(-1.0, 1.0).acos();
+            return (carries - lost_to_stick(phi, drag) / (2.0 * PI)) * c.mu0 * unit;
+        }
+        crate::contact::mean_friction(&Contact {
+            asperity_height: 0.0,
+            friction_factor: 1.0,
+            mass: 0.0,
+            normal_force: carries * unit,
+            solid_share: 1.0,
+            ..*c
+        })
     };
-    let factor = if alone == plain {
-        1.0
-    } else {
-        crate::contact::mean_friction(&alone) / crate::contact::mean_friction(&plain)
-    };
-    friction * c.mu0 * c.normal_stiffness * half * factor
+    weight * nodes.iter().map(one).sum::<f64>()
 }
 
 /// Mean load of one asperity at a depth (units of w/2), and its derivative.

@@ -112,6 +112,10 @@ impl Contact {
         self.lateral_stiffness * self.speed
             / (2.0 * PI * self.frequency * self.mu0 * self.normal_stiffness * self.half_amplitude())
     }
+    /// Whether anything acts on a contact beyond springs and Coulomb friction.
+    pub(crate) fn beyond_closed_form(&self) -> bool {
+        self.adhesion != 0.0 || self.needs_sweep()
+    }
     fn needs_sweep(&self) -> bool {
         self.load_exponent != 0.0
             || self.inverse_recovery_speed > 0.0

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 /// See the module.
 pub struct ModeShape;
 
-static LAWS: [Law; 3] = [
+static LAWS: [Law; 4] = [
     Law {
         name: "standing wave",
         parameters: &[
@@ -23,6 +23,15 @@ static LAWS: [Law; 3] = [
         ],
     },
     Law { name: "gradient", parameters: &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)] },
+    // Flexural waves shorten as the root of the frequency.
+    Law {
+        name: "standing wave, shorter at higher frequency",
+        parameters: &[
+            Parameter::positive("depth", "1", 0.5, 1.0),
+            Parameter::between("node_spacing_at_reference", "m", 0.004, 0.03),
+            Parameter::between("phase", "1", -0.25, 1.25),
+        ],
+    },
 ];
 
 impl Effect for ModeShape {
@@ -47,8 +56,10 @@ impl Effect for ModeShape {
     fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
         let x = pass.position_m;
         c.amplitude_pp *= match law {
-            0 => {
-                let s = (PI * (x / theta[1] + theta[2])).sin();
+            0 | 3 => {
+                let shorter =
+                    if law == 3 { (pass.frequency_hz / design.reference_frequency_hz).sqrt() } else { 1.0 };
+                let s = (PI * (x * shorter / theta[1] + theta[2])).sin();
                 // Depth one is |cos|; the mean over a stroke through nodes is shallower.
                 (1.0 - theta[0].min(1.0) * s * s).max(4e-4).sqrt()
             }
