@@ -6,9 +6,11 @@ use effects::{Parameter, Prior};
 use nalgebra::{DMatrix, DVector};
 
 /// Rows that the scan looks at.
-const SCAN_ROWS: usize = 160;
+const SCAN_ROWS: usize = 128;
 /// Starts that are fitted on the scan's rows, and those of them refined on all.
 const STARTS: (usize, usize) = (4, 2);
+/// Rounds of a local fit on the scan's rows before the starts are compared, and after.
+const ROUNDS: (usize, usize) = (4, 8);
 
 /// Deviations of its prior beyond which a nuisance imitates a cause.
 const DRIVEN: f64 = 3.0;
@@ -25,6 +27,8 @@ fn grid(parameters: &[Parameter], stroke: f64) -> Vec<Vec<f64>> {
             // Further signed parameters enter smoothly: the local fit finds them from zero.
             Prior::Normal(_) if index > 0 => vec![0.0],
             Prior::Normal(_) => vec![-3.0, -1.2, -0.4, -0.1, 0.1, 0.4, 1.2, 3.0],
+            // A third parameter bends the curve: the local fit finds it from either side.
+            Prior::LogNormal(..) if index > 1 => vec![-1.0, 1.0],
             Prior::LogNormal(..) => vec![-2.0, -1.0, 0.0, 1.0, 2.0],
             Prior::Uniform(a, b) if is_wavelength(p) => {
                 // Two wavelengths differ on a stroke if they differ by half a period over it.
@@ -195,7 +199,15 @@ fn refine(
         }
     }
     let mut fits: Vec<Fit> =
-        starts.into_iter().map(|u| minimise(&part, members, u, &part_variance, 12)).collect();
+        starts.into_iter().map(|u| minimise(&part, members, u, &part_variance, ROUNDS.0)).collect();
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    // What is far behind by now does not catch up.
+    let ahead = fits.first().map_or(0.0, |f| f.cost);
+    fits.retain(|f| f.cost < 2.0 * ahead + 30.0);
+    fits.truncate(count.1 + 1);
+    for f in &mut fits {
+        *f = minimise(&part, members, &f.u, &part_variance, ROUNDS.1);
+    }
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let best = fits.first().map_or(0.0, |f| f.cost);
     fits.retain(|f| f.cost < 1.3 * best + 10.0);

@@ -138,11 +138,11 @@ fn stands_out(f: &Forecast) -> f64 {
     0.5 * statrs::function::erf::erfc(-above / (spread.max(1e-12) * std::f64::consts::SQRT_2))
 }
 
-/// A covariate with its values at the places asked, and the levels between which it may be cut.
+/// A covariate, the values at which it may be cut, and for each place asked how many of them it lies above.
 struct Cut {
     covariate: usize,
-    values: Vec<f64>,
     at: Vec<f64>,
+    above: Vec<u8>,
 }
 
 fn cuts(places: &[Operating]) -> Vec<Cut> {
@@ -163,7 +163,8 @@ fn cuts(places: &[Operating]) -> Vec<Cut> {
             .collect();
         let mut at = at;
         at.dedup();
-        (!at.is_empty()).then_some(Cut { covariate, values, at })
+        let above = values.iter().map(|v| at.partition_point(|a| a < v) as u8).collect();
+        (!at.is_empty()).then_some(Cut { covariate, at, above })
     };
     (0..covariates().len()).filter_map(one).collect()
 }
@@ -183,21 +184,20 @@ struct Part {
 fn parts(cuts: &[Cut], chance: &[f64]) -> Vec<Part> {
     let whole =
         Part { bounds: BTreeMap::new(), members: (0..chance.len()).collect(), parent: None, cut: false };
-    let mut best: Vec<Option<(f64, usize, f64)>> = vec![best_cut(cuts, chance, &whole.members)];
+    let mut best: Vec<Option<(f64, usize, usize)>> = vec![best_cut(cuts, chance, &whole.members)];
     let mut list = vec![whole];
     for _ in 1..PARTS {
         let open = (0..list.len()).filter(|&k| !list[k].cut).filter_map(|k| best[k].map(|b| (k, b)));
-        let Some((k, (_, covariate, at))) = open.max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(b.0.cmp(&a.0)))
+        let Some((k, (_, cut, level))) = open.max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(b.0.cmp(&a.0)))
         else {
             break;
         };
         list[k].cut = true;
         for upper in [false, true] {
             let mut part = list[k].clone();
-            part.members.retain(|&i| (cuts[covariate].values[i] > at) == upper);
-            let name = cuts[covariate].covariate;
-            let bound = part.bounds.entry(name).or_insert([f64::NEG_INFINITY, f64::INFINITY]);
-            bound[usize::from(!upper)] = at;
+            part.members.retain(|&i| (usize::from(cuts[cut].above[i]) > level) == upper);
+            let bound = part.bounds.entry(cuts[cut].covariate).or_insert([f64::NEG_INFINITY, f64::INFINITY]);
+            bound[usize::from(!upper)] = cuts[cut].at[level];
             (part.parent, part.cut) = (Some(k), false);
             best.push(best_cut(cuts, chance, &part.members));
             list.push(part);
@@ -206,24 +206,27 @@ fn parts(cuts: &[Cut], chance: &[f64]) -> Vec<Part> {
     list
 }
 
-/// Gain in the sum of squares of the best cut of some places, its covariate and where it is made.
-fn best_cut(cuts: &[Cut], chance: &[f64], members: &[usize]) -> Option<(f64, usize, f64)> {
+/// Gain in the sum of squares of the best cut of some places, and its covariate and level.
+fn best_cut(cuts: &[Cut], chance: &[f64], members: &[usize]) -> Option<(f64, usize, usize)> {
     let all: f64 = members.iter().map(|&i| chance[i]).sum();
     let square = |sum: f64, count: usize| sum * sum / count.max(1) as f64;
-    let mut best: Option<(f64, usize, f64)> = None;
+    let mut best: Option<(f64, usize, usize)> = None;
     for (k, cut) in cuts.iter().enumerate() {
-        for &at in &cut.at {
-            let (sum, count) = members
-                .iter()
-                .filter(|&&i| cut.values[i] > at)
-                .fold((0.0, 0), |(s, c), &i| (s + chance[i], c + 1));
-            if count < LEAST || members.len() - count < LEAST {
+        let mut bins = [(0.0, 0); LEVELS];
+        for &i in members {
+            let bin = &mut bins[usize::from(cut.above[i])];
+            *bin = (bin.0 + chance[i], bin.1 + 1);
+        }
+        let (mut sum, mut count) = (0.0, 0);
+        for level in 0..cut.at.len() {
+            (sum, count) = (sum + bins[level].0, count + bins[level].1);
+            let rest = members.len() - count;
+            if count < LEAST || rest < LEAST {
                 continue;
             }
-            let rest = members.len() - count;
             let gain = square(sum, count) + square(all - sum, rest) - square(all, members.len());
             if gain > best.map_or(0.5, |b| b.0) {
-                best = Some((gain, k, at));
+                best = Some((gain, k, level));
             }
         }
     }

@@ -12,6 +12,13 @@ use rayon::prelude::*;
 const PAIR_SEEDS: usize = 6;
 /// Exact aliases: a pair of them is one cause with the freedom of two.
 const SAME: [[&str; 2]; 1] = [["force_crosstalk", "plate_tilt"]];
+/// Laws whose changes are the same for the same parameter: for any pair with one of them there is the same pair with the
+/// other. Cross-talk and tilt; a factor on normal stiffness and on amplitude; a factor on lateral stiffness and on speed.
+const TWINS: [[(&str, usize); 2]; 3] = [
+    [("force_crosstalk", 0), ("plate_tilt", 1)],
+    [("stiffness_error", 1), ("amplitude_miscalibration", 0)],
+    [("stiffness_error", 0), ("speed_error", 0)],
+];
 /// Cosine between two changes above which they are one.
 const ONE_CHANGE: f64 = 0.98;
 /// Pairs that are fitted in full.
@@ -99,6 +106,28 @@ fn searched_again(
     pairs
 }
 
+/// The same pair with the exact alias of one of its members in its place.
+fn twins(pair: &Explained) -> Vec<(Vec<Member>, Vec<f64>)> {
+    let member = |(name, law): (&str, usize)| {
+        library().iter().position(|e| e.name() == name).map(|effect| Member { effect, law })
+    };
+    let ordered = TWINS.iter().flat_map(|[a, b]| [(*a, *b), (*b, *a)]);
+    let both = ordered.filter_map(|(a, b)| Some((member(a)?, member(b)?)));
+    both.filter_map(|(one, other)| {
+        let place = pair.members.iter().position(|m| *m == one)?;
+        if pair.members.iter().any(|m| m.effect == other.effect) {
+            return None;
+        }
+        let (mut members, mut u) = (pair.members.clone(), pair.u.clone());
+        let before: usize = members[..place].iter().map(|m| m.parameters().len()).sum();
+        let value = one.parameters()[0].value(u[NUISANCES + before]);
+        members[place] = other;
+        u[NUISANCES + before] = other.parameters()[0].coordinate(value);
+        Some((members, u))
+    })
+    .collect()
+}
+
 /// Pairs grown from the best singles, each with every other effect in each of its laws.
 pub fn pairs(
     problem: &Problem,
@@ -146,7 +175,17 @@ pub fn pairs(
             Some((effects, best))
         })
         .collect();
-    let first = searched_again(problem, first, singles, loose, basis);
+    let mut first = searched_again(problem, first, singles, loose, basis);
+    let twins: Vec<(Vec<usize>, Explained)> = first
+        .par_iter()
+        .flat_map_iter(|(_, e)| twins(e))
+        .map(|(members, u)| {
+            let mut effects: Vec<usize> = members.iter().map(|m| m.effect).collect();
+            effects.sort_unstable();
+            (effects, explain(problem, &members, &u, basis, FORMS[1].0, 3))
+        })
+        .collect();
+    first.extend(twins);
     let top = first.iter().map(|(_, e)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     let full: Vec<(Vec<usize>, f64, Explained)> = first
         .into_par_iter()

@@ -12,6 +12,8 @@ use std::sync::OnceLock;
 
 /// Stiffness of the skin's surface over the normal stiffness.
 pub const SURFACE: f64 = 60.0;
+/// Stiffness of the ridge, so that both in series are the normal stiffness.
+const SPRING: f64 = SURFACE / (SURFACE - 1.0);
 /// Damping ratios of the surface under the ridge's mass for which tables are kept: a landing without rebound and one
 /// that gives back about half of the speed.
 pub const LANDINGS: [f64; 2] = [1.0, 0.2];
@@ -83,12 +85,12 @@ fn massless(load: f64, drag: f64) -> f64 {
     carried - lost_to_stick(phi, drag) / (2.0 * PI)
 }
 
-/// Amplitude of the force in a contact that never ends, over that of the massless slider.
+/// Amplitude of the force in a contact that never ends, over that of the massless slider: the dynamic stiffnesses of
+/// ridge and surface in series.
 fn swing(ratio: f64, damping: f64, landing: f64) -> f64 {
-    let [_, pressed] = oscillators(ratio, damping, landing, 1.0);
-    let dashpot = 2.0 * landing * SURFACE.sqrt() * ratio;
-    let (a, b) = (1.0 - pressed.sine, pressed.cosine);
-    (SURFACE * a + dashpot * b).hypot(dashpot * a - SURFACE * b)
+    let ridge = (SPRING - ratio * ratio, 2.0 * damping * ratio);
+    let surface = (SURFACE, 2.0 * landing * SURFACE.sqrt() * ratio);
+    surface.0.hypot(surface.1) * ridge.0.hypot(ridge.1) / (ridge.0 + surface.0).hypot(ridge.1 + surface.1)
 }
 
 /// Ratio of the mean friction with mass to that without.
@@ -218,15 +220,14 @@ impl Oscillator {
 /// The ridge in flight and in contact.
 fn oscillators(ratio: f64, damping: f64, landing: f64, h: f64) -> [Oscillator; 2] {
     let inertia = ratio * ratio;
-    let spring = SURFACE / (SURFACE - 1.0);
     let ridge = 2.0 * damping * ratio;
     let dashpot = 2.0 * landing * SURFACE.sqrt() * ratio;
-    let pull = spring / inertia;
+    let pull = SPRING / inertia;
     [
         Oscillator::new(0.5 * ridge / inertia, pull, (0.0, 0.0), pull, h),
         Oscillator::new(
             0.5 * (ridge + dashpot) / inertia,
-            (spring + SURFACE) / inertia,
+            (SPRING + SURFACE) / inertia,
             (SURFACE / inertia, dashpot / inertia),
             pull,
             h,
