@@ -12,19 +12,11 @@ use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use rayon::prelude::*;
 use serde::Serialize;
-use sim::sealed::{Ask, Set, Stratum, generate};
+use sim::sealed::{ALIASES, Ask, DETECTABLE, Set, Stratum, generate};
 use std::collections::BTreeMap;
 
-/// chi2 by which the truth must beat the recalibrated baseline to be detectable.
-const DETECTABLE: f64 = 30.0;
 /// rms gap over floor on the hidden passes that the truth must leave to be detectable.
 const ABOVE_FLOOR: f64 = 1.0;
-/// chi2 within which another effect makes a set undecidable.
-const DECIDABLE: f64 = 10.0;
-/// Share of form uncertainty that the oracle grants an imitator: it may leave this share of the gap's chi2
-/// without being told from the truth.
-const FORM_SHARE: f64 = 0.0225;
-
 /// What a diagnoser said about one set, beside the truth.
 #[derive(Debug, Clone, Serialize)]
 pub struct Scored {
@@ -46,7 +38,7 @@ pub struct Scored {
     pub verdict: Verdict,
     /// Names of the first entry.
     pub named: Vec<String>,
-    /// Class of the first entry with effects.
+    /// Class that the verdict states: that of the first entry with effects, or the name alone where it names one.
     pub class: Vec<String>,
     /// Stated probability of the truth (`unknown` for causes outside the library, none for no cause).
     pub probability_of_truth: f64,
@@ -92,12 +84,16 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
     let probability_of_truth =
         report.hypotheses.iter().filter(|h| says_truth(&h.effects)).map(|h| h.probability).sum();
     let first = &report.hypotheses[0];
-    let class = report
-        .hypotheses
-        .iter()
-        .find(|h| !h.effects.is_empty() && h.effects != ["unknown"])
-        .map(|h| h.alias_class.clone())
-        .unwrap_or_default();
+    // The class that the verdict states: a name stands alone, whatever else the data would allow.
+    let class = match report.verdict {
+        Verdict::Named => vec![first.effects.join("+")],
+        _ => report
+            .hypotheses
+            .iter()
+            .find(|h| !h.effects.is_empty() && h.effects != ["unknown"])
+            .map(|h| h.alias_class.clone())
+            .unwrap_or_default(),
+    };
 
     // Hidden passes: errors over mu0 F against noise-free truth, in the order of the conditions as given.
     let mu0 = table.still_coefficient().unwrap_or(label.true_mu0);
@@ -143,13 +139,12 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
     let region_f1 = wanted.iter().any(|x| *x).then(|| 2.0 * both / sizes.max(1.0));
 
     let gain = label.chi2_gain;
-    let decidable = label.imitators.iter().all(|i| i.chi2_left > DECIDABLE + FORM_SHARE * gain);
     Ok(Scored {
         seed: label.seed,
         stratum: label.stratum,
         chi2_gain: gain,
         gap_over_floor: label.hidden_recalibrated_rmse / label.hidden_floor_rmse.max(1e-12),
-        decidable,
+        decidable: label.decidable(),
         best_single_leaves: label.best_single_leaves,
         verdict: report.verdict,
         named: first.effects.clone(),
@@ -278,7 +273,8 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let named_right = |s: &Scored| s.verdict == Verdict::Named && s.top_right;
     let named_wrong = |s: &Scored| s.verdict == Verdict::Named && !s.top_right;
     let clear: Vec<&Scored> = all.iter().filter(single).filter(detectable).filter(|s| s.decidable).collect();
-    let faint: Vec<&Scored> = all.iter().filter(single).filter(faint).filter(|s| s.decidable).collect();
+    let faint_singles: Vec<&Scored> =
+        all.iter().filter(single).filter(faint).filter(|s| s.decidable).collect();
     let murky: Vec<&Scored> = all.iter().filter(single).filter(detectable).filter(|s| !s.decidable).collect();
     let none: Vec<&Scored> = all.iter().filter(|s| s.stratum == Stratum::None).collect();
     let outside: Vec<&Scored> =
@@ -291,7 +287,7 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let of = |list: &[&Scored], f: &dyn Fn(&Scored) -> bool| list.iter().map(|s| f(s)).collect::<Vec<bool>>();
     let in_class = |s: &Scored| {
         let joined = s.truth.join("+");
-        s.class.contains(&joined) || s.class.iter().any(|c| s.truth.len() == 1 && *c == s.truth[0])
+        s.class.contains(&joined)
     };
     let any_of = |s: &Scored| s.named.iter().any(|n| s.truth.contains(n));
     let log: Vec<f64> = clear.iter().map(|s| s.probability_of_truth.max(1e-6).ln()).collect();
@@ -301,27 +297,32 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let closed: Vec<f64> = gapped.iter().filter_map(|s| s.achieved_form).collect();
     let closed_full: Vec<f64> = gapped.iter().filter_map(|s| s.achieved).collect();
     let honest: Vec<f64> = gapped.iter().filter_map(|s| Some((s.claimed? - s.achieved?).abs())).collect();
-    let regions: Vec<f64> =
-        all.iter().filter(|s| s.chi2_gain >= DETECTABLE).filter_map(|s| s.region_f1).collect();
+    let regions: Vec<f64> = all.iter().filter(detectable).filter_map(|s| s.region_f1).collect();
+    let faint_regions: Vec<f64> = all.iter().filter(faint).filter_map(|s| s.region_f1).collect();
+    let distinct: Vec<&Scored> =
+        pairs.iter().copied().filter(|s| !s.truth.iter().any(|t| ALIASES.contains(&t.as_str()))).collect();
     vec![
         share("singles, detectable and decidable: named right", ">= 0.90", of(&clear, &named_right)),
         share("  confidently wrong", "<= 0.02", of(&clear, &named_wrong)),
         statistic("  mean probability on the truth", ">= 0.85", &probability, mean),
         statistic("  mean log score, nats", "reported", &log, mean),
-        share("  gap below the floor: named right", "reported", of(&faint, &named_right)),
-        share("  gap below the floor: confidently wrong", "reported", of(&faint, &named_wrong)),
+        share("  gap below the floor: named right", "reported", of(&faint_singles, &named_right)),
+        share("  gap below the floor: confidently wrong", "reported", of(&faint_singles, &named_wrong)),
         share("no gap: an effect named", "<= 0.01", of(&none, &|s| s.verdict == Verdict::Named)),
         share("  gap claimed", "<= 0.05", of(&none, &|s| s.verdict != Verdict::NoGap)),
         share("outside the library: unknown", ">= 0.85", of(&outside, &|s| s.verdict == Verdict::Unknown)),
         share("  confidently misnamed", "<= 0.05", of(&outside, &|s| s.verdict == Verdict::Named)),
         share("undecidable: truth in the stated class", ">= 0.90", of(&murky, &in_class)),
+        share("  named exactly right", "reported", of(&murky, &named_right)),
         share("  confidently wrong", "<= 0.03", of(&murky, &named_wrong)),
         share("pairs whose best single leaves 25 %: both named", ">= 0.80", of(&pairs, &|s| s.top_right)),
         share("  at least one", ">= 0.97", of(&pairs, &any_of)),
+        share("pairs without exact aliases: both named", "reported", of(&distinct, &|s| s.top_right)),
         statistic("gap closed by the named form alone, median", ">= 0.75", &closed, median),
         statistic("gap closed by the verdict's model, median", "reported", &closed_full, median),
         statistic("claimed against achieved, median difference", "<= 0.05", &honest, median),
         statistic("where: mean F1 of the regions", ">= 0.80", &regions, mean),
+        statistic("  gap below the floor: mean F1", "reported", &faint_regions, mean),
         calibration(all),
     ]
 }

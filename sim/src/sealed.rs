@@ -9,12 +9,14 @@
 //! |---|---|
 //! | [`design`] | which passes were made |
 //! | [`oracle`] | what the noise-free data could tell at best |
+//! | [`imitate`] | which other cause would do as well |
 //! | `bench` | fingertip, noise, sizes, and the measurement itself |
 //! | `files` | the folders |
 
 mod bench;
 pub mod design;
 mod files;
+pub mod imitate;
 pub mod oracle;
 
 use models::condition::Condition;
@@ -26,7 +28,7 @@ use crate::noise::Noise;
 use bench::Bench;
 pub use bench::SetNoise;
 use design::{Design, Planned};
-use oracle::Imitator;
+use imitate::Imitator;
 
 /// What kind of truth a set holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,7 +47,7 @@ pub enum Stratum {
 }
 
 /// Causes that others imitate by construction (gains of k_l, k_n, speed, amplitude; tilt and cross-talk).
-const ALIASES: [&str; 5] =
+pub const ALIASES: [&str; 5] =
     ["stiffness_error", "speed_error", "amplitude_miscalibration", "plate_tilt", "force_crosstalk"];
 
 impl Stratum {
@@ -132,8 +134,16 @@ pub struct Label {
     pub design: Design,
     /// The causes, strongest first; none for `none`.
     pub causes: Vec<Cause>,
-    /// Best imitations by other library causes, best first; empty where they were not asked for.
+    /// Best imitations by other library causes, best first; empty where they were not asked for, and where the gain is
+    /// under [`DETECTABLE`].
     pub imitators: Vec<Imitator>,
+}
+
+impl Label {
+    /// Whether no other cause asked for imitates the truth, form uncertainty included.
+    pub fn decidable(&self) -> bool {
+        !self.imitators.iter().any(|i| i.is_near(self.chi2_gain))
+    }
 }
 
 /// One sealed set.
@@ -163,12 +173,14 @@ pub enum Ask {
     /// The gain of the truth over the recalibrated baseline.
     #[default]
     Gain,
-    /// And which cheap library causes imitate it.
+    /// And which library causes imitate it; those dear to compute are tried on a part of the passes first.
     Imitators,
-    /// And the dear ones (ridges that fly or recover late): seconds a set.
+    /// And the dear ones (ridges that fly or recover late) on all passes from the start: seconds a set.
     AllImitators,
 }
 
+/// chi2 by which the truth must beat the recalibrated baseline for a set to show its cause at all.
+pub const DETECTABLE: f64 = 30.0;
 /// Passes hidden for scoring.
 const HIDDEN: usize = 100;
 
@@ -235,7 +247,8 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
         if kinds.len() > 1 { defects.defects.iter().map(alone).fold(1.0, f64::min) } else { 0.0 };
     let imitators = match ask {
         Ask::Gain => Vec::new(),
-        _ => case.imitators(&kinds, &base, ask == Ask::AllImitators),
+        _ if gain < DETECTABLE => Vec::new(),
+        _ => case.imitators(&kinds, &base, truth.chi2, ask == Ask::AllImitators),
     };
 
     let seen_hidden = bench.circumstances(&hidden, false, &mut noise);

@@ -1,20 +1,15 @@
 //! What the generator knows of a set that no diagnoser can know: from its noise-free forces, how large the gap is once
-//! the baseline is recalibrated, how strongly the data speak for the truth, and which other cause would imitate it.
+//! the baseline is recalibrated, and how strongly the data speak for the truth.
 //!
 //! The baseline here is this world's own ideal contact. Recalibration means: stiffnesses and mu0 refitted, the
 //! stiffnesses under their stated scatter, by Gauss-Newton steps on their logarithms.
 
-use serde::{Deserialize, Serialize};
-
-use crate::defects::{ALL, Defect, Defects, Kind, Values, compatible};
+use crate::defects::{Defects, Kind, compatible};
 use crate::finger::Finger;
-use crate::noise::Noise;
 use crate::world::{Point, steady_forces};
 
-/// Causes that take seconds to imitate: ridges that fly or recover late are marched through many cycles.
-const DEAR: [&str; 3] = ["ridge_inertia", "normal_damping", "lateral_recovery"];
 /// Nuisances: ln of k_n, k_l, mu0.
-const NUISANCES: usize = 3;
+pub(super) const NUISANCES: usize = 3;
 
 /// The question put to the oracle.
 pub struct Case<'a> {
@@ -40,18 +35,8 @@ pub struct Fit {
     pub residual_n: Vec<f64>,
 }
 
-/// Another cause, at the size at which it imitates the data best.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Imitator {
-    /// Its name.
-    pub name: String,
-    /// chi2 that it leaves.
-    pub chi2_left: f64,
-    /// The same as a share of what the recalibrated baseline leaves.
-    pub share_left: f64,
-}
-
-fn moved(finger: &Finger, theta: [f64; NUISANCES]) -> Finger {
+/// A fingertip whose nuisances are moved by these logarithms.
+pub(super) fn moved(finger: &Finger, theta: [f64; NUISANCES]) -> Finger {
     let mut out = *finger;
     out.normal_stiffness_n_per_m *= theta[0].exp();
     out.lateral_stiffness_n_per_m *= theta[1].exp();
@@ -61,7 +46,7 @@ fn moved(finger: &Finger, theta: [f64; NUISANCES]) -> Finger {
 
 impl Case<'_> {
     /// Lateral forces of a model, at the true normal forces that would have shown as the measured ones.
-    fn predict(&self, finger: &Finger, defects: &Defects) -> Vec<f64> {
+    pub(super) fn predict(&self, finger: &Finger, defects: &Defects) -> Vec<f64> {
         let one = |known: &Point| {
             let mut point = *known;
             let mut forces = steady_forces(finger, defects, &point);
@@ -78,10 +63,19 @@ impl Case<'_> {
         self.known.iter().map(one).collect()
     }
 
-    fn chi2(&self, model: &[f64], theta: [f64; NUISANCES]) -> f64 {
+    pub(super) fn chi2(&self, model: &[f64], theta: [f64; NUISANCES]) -> f64 {
         let data: f64 =
             self.lateral_n.iter().zip(model).zip(self.sd_n).map(|((y, m), sd)| ((y - m) / sd).powi(2)).sum();
         data + (theta[0] / self.stiffness_sd).powi(2) + (theta[1] / self.stiffness_sd).powi(2)
+    }
+
+    /// Logarithms of a fingertip's nuisances over the nominal ones.
+    pub(super) fn logarithms(&self, finger: &Finger) -> [f64; NUISANCES] {
+        [
+            (finger.normal_stiffness_n_per_m / self.nominal.normal_stiffness_n_per_m).ln(),
+            (finger.lateral_stiffness_n_per_m / self.nominal.lateral_stiffness_n_per_m).ln(),
+            (finger.mu0 / self.nominal.mu0).ln(),
+        ]
     }
 
     /// The best a model can do with the nuisances refitted from the nominal fingertip.
@@ -91,11 +85,7 @@ impl Case<'_> {
 
     /// The same from another start.
     pub fn fit_from(&self, start: &Finger, defects: &Defects, iterations: usize) -> Fit {
-        let mut theta = [
-            (start.normal_stiffness_n_per_m / self.nominal.normal_stiffness_n_per_m).ln(),
-            (start.lateral_stiffness_n_per_m / self.nominal.lateral_stiffness_n_per_m).ln(),
-            (start.mu0 / self.nominal.mu0).ln(),
-        ];
+        let mut theta = self.logarithms(start);
         let mut model = self.predict(&moved(&self.nominal, theta), defects);
         let mut chi2 = self.chi2(&model, theta);
         for _ in 0..iterations {
@@ -125,7 +115,12 @@ impl Case<'_> {
         Fit { chi2, finger: moved(&self.nominal, theta), residual_n }
     }
 
-    fn jacobian(&self, theta: [f64; NUISANCES], defects: &Defects, model: &[f64]) -> [Vec<f64>; NUISANCES] {
+    pub(super) fn jacobian(
+        &self,
+        theta: [f64; NUISANCES],
+        defects: &Defects,
+        model: &[f64],
+    ) -> [Vec<f64>; NUISANCES] {
         std::array::from_fn(|k| {
             let mut up = theta;
             up[k] += 1e-3;
@@ -155,64 +150,24 @@ impl Case<'_> {
             b[i] = pull - if i < 2 { weight * theta[i] } else { 0.0 };
             a[i][i] = a[i][i] * (1.0 + 1e-9) + if i < 2 { weight } else { 1e-9 };
         }
-        solve(a, b)
-    }
-
-    /// Every library cause's best imitation of the data, best first. Causes in `truth` are left out, and so are dear
-    /// ones unless asked for. `base` is the recalibrated baseline.
-    pub fn imitators(&self, truth: &[&Kind], base: &Fit, dear: bool) -> Vec<Imitator> {
-        let mut out: Vec<Imitator> = ALL
-            .iter()
-            .copied()
-            .filter(|kind| kind.in_library && kind.in_tables && !truth.iter().any(|t| t.name == kind.name))
-            .filter(|kind| dear || !DEAR.contains(&kind.name))
-            .map(|kind| self.imitate(kind, base))
-            .collect();
-        out.sort_by(|a, b| a.chi2_left.total_cmp(&b.chi2_left));
-        out
-    }
-
-    /// One cause's best imitation: its size searched on a ladder for a few draws of its other parameters, the
-    /// nuisances refitted to first order; then the best one refitted in full.
-    fn imitate(&self, kind: &'static Kind, base: &Fit) -> Imitator {
-        let (draws, rungs) = if kind.parameters.len() > 1 { (3, 6) } else { (2, 9) };
-        let mut noise = Noise::new(17, kind.name);
-        let mut best: Option<(f64, Values)> = None;
-        let none = Defects::none();
-        let model = self.predict(&base.finger, &none);
-        let theta = [0.0; NUISANCES];
-        let local = Case { nominal: base.finger, ..*self };
-        let jacobian = local.jacobian(theta, &none, &model);
-        for draw in 0..draws {
-            let mut values = kind.draw(&mut noise);
-            kind.turn(&mut values, draw % 2 == 0);
-            for rung in 0..rungs {
-                kind.resize(&mut values, (rung as f64 + 0.5) / rungs as f64);
-                let defects = Defects { defects: vec![Defect { kind, values }], channels: Vec::new() };
-                let with = local.predict(&base.finger, &defects);
-                let left = local.left(&jacobian, &with, theta);
-                if best.is_none_or(|(chi2, _)| left < chi2) {
-                    best = Some((left, values));
-                }
-            }
-        }
-        let mut chi2_left = base.chi2;
-        if let Some((_, values)) = best {
-            let defects = Defects { defects: vec![Defect { kind, values }], channels: Vec::new() };
-            chi2_left = chi2_left.min(self.fit(&defects, 3).chi2);
-        }
-        Imitator { name: kind.name.to_string(), chi2_left, share_left: chi2_left / base.chi2.max(1e-12) }
+        solve(&mut a, b, NUISANCES)
     }
 
     /// chi2 left by a model with the nuisances refitted to first order.
-    fn left(&self, jacobian: &[Vec<f64>; NUISANCES], model: &[f64], theta: [f64; NUISANCES]) -> f64 {
+    pub(super) fn left(
+        &self,
+        jacobian: &[Vec<f64>; NUISANCES],
+        model: &[f64],
+        theta: [f64; NUISANCES],
+    ) -> f64 {
         let Some(step) = self.gauss_newton(jacobian, model, theta) else { return self.chi2(model, theta) };
         let residual =
             self.lateral_n.iter().zip(model).zip(self.sd_n).enumerate().map(|(i, ((y, m), sd))| {
                 let shift: f64 = (0..NUISANCES).map(|k| jacobian[k][i] * step[k]).sum();
                 ((y - m) / sd - shift).powi(2)
             });
-        residual.sum::<f64>() + (step[0] / self.stiffness_sd).powi(2) + (step[1] / self.stiffness_sd).powi(2)
+        let prior: f64 = (0..2).map(|k| ((theta[k] + step[k]) / self.stiffness_sd).powi(2)).sum();
+        residual.sum::<f64>() + prior
     }
 }
 
@@ -221,13 +176,13 @@ pub(super) fn all_compatible(kinds: &[&'static Kind]) -> bool {
     kinds.iter().enumerate().all(|(i, a)| kinds[..i].iter().all(|b| compatible(a, b)))
 }
 
-/// Solves a small symmetric positive system by elimination; `None` where it is singular.
-fn solve(mut a: [[f64; NUISANCES]; NUISANCES], mut b: [f64; NUISANCES]) -> Option<[f64; NUISANCES]> {
-    for i in 0..NUISANCES {
+/// Solves a small symmetric positive system of the first `n` unknowns by elimination; `None` where it is singular.
+pub(super) fn solve<const N: usize>(a: &mut [[f64; N]; N], mut b: [f64; N], n: usize) -> Option<[f64; N]> {
+    for i in 0..n {
         if a[i][i].abs() < 1e-30 || !a[i][i].is_finite() {
             return None;
         }
-        for j in i + 1..NUISANCES {
+        for j in i + 1..n {
             let factor = a[j][i] / a[i][i];
             let upper = a[i];
             for (below, above) in a[j].iter_mut().zip(upper).skip(i) {
@@ -236,8 +191,8 @@ fn solve(mut a: [[f64; NUISANCES]; NUISANCES], mut b: [f64; NUISANCES]) -> Optio
             b[j] -= factor * b[i];
         }
     }
-    for i in (0..NUISANCES).rev() {
-        for k in i + 1..NUISANCES {
+    for i in (0..n).rev() {
+        for k in i + 1..n {
             b[i] -= a[i][k] * b[k];
         }
         b[i] /= a[i][i];

@@ -1,0 +1,394 @@
+//! Which other cause would imitate the data, at the size and shape at which it imitates them best.
+//!
+//! A search in three stages. A ladder of sizes for a few draws of the shapes, the nuisances following to first order;
+//! from the best rungs of two draws a bounded Levenberg-Marquardt search over nuisances, size and shapes together;
+//! and for causes that are dear to compute all this on a part of the passes first, the whole table being asked only
+//! where that comes near.
+
+use serde::{Deserialize, Serialize};
+
+use super::oracle::{Case, Fit, NUISANCES, moved};
+use crate::defects::{ALL, Defect, Defects, Draw, Kind, Parameter, Values};
+use crate::noise::Noise;
+
+/// Causes whose ridges fly or recover late: marched through many cycles, hundred times as dear as the others.
+const DEAR: [&str; 3] = ["ridge_inertia", "normal_damping", "lateral_recovery"];
+/// Passes on which a dear cause is tried first.
+const PART: usize = 36;
+/// chi2 beyond the truth's under which a cause imitates the data whatever their form.
+pub const NEAR: f64 = 10.0;
+/// Share of the gap's chi2 that form uncertainty may leave to an imitator.
+const FORM_SHARE: f64 = 0.0225;
+/// A search is given up where it leaves this many times what would count as near, and a step mends little of it.
+const HOPELESS: f64 = 4.0;
+/// Share of the gap's chi2 that the ladder must mend for a search to follow. Rungs lie a factor of 2.4 apart at most,
+/// so an exact alias is met within a factor of 1.55 and leaves 0.3 of the gap; the rest is room for its shapes.
+const WORTH: f64 = 0.15;
+/// The same for a dear cause where the truth is a cheap one.
+const WORTH_DEAR: f64 = 0.5;
+/// Steps of a search.
+const STEPS: usize = 8;
+/// Most unknowns: nuisances and a kind's four parameters.
+const UNKNOWNS: usize = NUISANCES + 4;
+
+/// Another cause, at the size at which it imitates the data best.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Imitator {
+    /// Its name.
+    pub name: String,
+    /// chi2 that it leaves beyond what the truth leaves (which pays for its stiffnesses' scatter); below zero where
+    /// the imitation lies nearer to the stated calibration than the truth does.
+    pub chi2_left: f64,
+    /// The same as a share of what the recalibrated baseline leaves.
+    pub share_left: f64,
+}
+
+/// Where a search stands: logarithms of the nuisances, then the parameters' coordinates.
+#[derive(Clone, Copy)]
+struct State {
+    x: [f64; UNKNOWNS],
+    chi2: f64,
+}
+
+/// A parameter's coordinate: a share of its range, from the middle for those with two sides.
+fn coordinate(p: &Parameter, value: f64) -> f64 {
+    match p.draw {
+        Draw::Linear => (value - p.low) / (p.high - p.low),
+        Draw::Log => (value / p.low).ln() / (p.high / p.low).ln(),
+        Draw::Signed => value / p.high,
+        Draw::Factor => value.ln() / p.high.ln_1p(),
+    }
+}
+
+fn value(p: &Parameter, u: f64) -> f64 {
+    match p.draw {
+        Draw::Linear => p.low + u * (p.high - p.low),
+        Draw::Log => p.low * (u * (p.high / p.low).ln()).exp(),
+        Draw::Signed => u * p.high,
+        Draw::Factor => (u * p.high.ln_1p()).exp(),
+    }
+}
+
+fn lowest(p: &Parameter) -> f64 {
+    if matches!(p.draw, Draw::Signed | Draw::Factor) { -1.0 } else { 0.0 }
+}
+
+fn with(kind: &'static Kind, values: Values) -> Defects {
+    Defects { defects: vec![Defect { kind, values }], channels: Vec::new() }
+}
+
+fn values_of(kind: &Kind, x: &[f64; UNKNOWNS]) -> Values {
+    let mut values = Values::default();
+    for (i, p) in kind.parameters.iter().enumerate() {
+        values[i] = value(p, x[NUISANCES + i]);
+    }
+    values
+}
+
+fn theta(x: &[f64; UNKNOWNS]) -> [f64; NUISANCES] {
+    std::array::from_fn(|i| x[i])
+}
+
+impl Imitator {
+    /// Whether it cannot be told from a truth of this gain.
+    pub fn is_near(&self, chi2_gain: f64) -> bool {
+        self.chi2_left <= NEAR + FORM_SHARE * chi2_gain
+    }
+}
+
+impl Case<'_> {
+    /// Every library cause's best imitation of the data, best first. Causes in `truth` are left out. `base` is the
+    /// recalibrated baseline, `truth_chi2` what the truth leaves. Dear causes are asked on part of the passes first
+    /// unless `whole`.
+    pub fn imitators(&self, truth: &[&Kind], base: &Fit, truth_chi2: f64, whole: bool) -> Vec<Imitator> {
+        let part = self.part(base);
+        let thinned = part.case(self);
+        let thinned_base = thinned.fit_from(&base.finger, &Defects::none(), 4);
+        let near = NEAR + FORM_SHARE * (base.chi2 - truth_chi2);
+        let dear = |kind: &Kind| DEAR.contains(&kind.name);
+        let among_dear = truth.iter().any(|t| dear(t));
+        let one = |kind: &'static Kind| {
+            let chi2 = if dear(kind) && !whole {
+                let worth = if among_dear { WORTH } else { WORTH_DEAR };
+                let tried = thinned.imitate(kind, &thinned_base, truth_chi2, near, worth);
+                let thinned_near =
+                    near * (thinned_base.chi2 - truth_chi2) / (base.chi2 - truth_chi2).max(1e-9);
+                if tried.chi2 - truth_chi2 < HOPELESS * thinned_near {
+                    self.search(kind, tried, truth_chi2, near).chi2
+                } else {
+                    // A part of the passes stands for the share, not for the chi2, of a gap that few passes may hold.
+                    let gap = (thinned_base.chi2 - truth_chi2).max(1e-9);
+                    truth_chi2 + (tried.chi2 - truth_chi2) / gap * (base.chi2 - truth_chi2)
+                }
+            } else {
+                self.imitate(kind, base, truth_chi2, near, WORTH).chi2
+            };
+            let chi2_left = chi2.min(base.chi2) - truth_chi2;
+            let share_left = chi2_left / (base.chi2 - truth_chi2).max(1e-12);
+            Imitator { name: kind.name.to_string(), chi2_left, share_left }
+        };
+        let mut out: Vec<Imitator> = ALL
+            .iter()
+            .copied()
+            .filter(|kind| kind.in_library && kind.in_tables && !truth.iter().any(|t| t.name == kind.name))
+            .map(one)
+            .collect();
+        out.sort_by(|a, b| a.chi2_left.total_cmp(&b.chi2_left));
+        out
+    }
+
+    /// A part of the passes that holds the gap in proportion: every so many of them in the order of what the baseline
+    /// leaves, each counting for as many.
+    fn part(&self, base: &Fit) -> Part {
+        let mut order: Vec<usize> = (0..self.known.len()).collect();
+        let size = |i: usize| (base.residual_n[i] / self.sd_n[i]).abs();
+        order.sort_by(|a, b| size(*a).total_cmp(&size(*b)));
+        let every = order.len().div_ceil(PART).max(1);
+        let kept: Vec<usize> = order.iter().copied().skip(every / 2).step_by(every).collect();
+        let weight = (kept.len() as f64 / order.len() as f64).sqrt();
+        Part {
+            known: kept.iter().map(|i| self.known[*i]).collect(),
+            lateral_n: kept.iter().map(|i| self.lateral_n[*i]).collect(),
+            sd_n: kept.iter().map(|i| self.sd_n[*i] * weight).collect(),
+        }
+    }
+
+    /// The rungs of each draw's ladder that leave least, best first: chi2 with the nuisances refitted to first order,
+    /// and the parameters.
+    fn ladder(&self, kind: &'static Kind, base: &Fit) -> Vec<(f64, Values)> {
+        let (draws, rungs) = match (kind.parameters.len() > 1, kind.parameters[0].draw) {
+            (true, _) if DEAR.contains(&kind.name) => (2, 5),
+            (true, _) => (3, 6),
+            // Without shapes or sides every draw is the same ladder.
+            (false, Draw::Log | Draw::Linear) => (1, 9),
+            (false, _) => (2, 9),
+        };
+        let mut noise = Noise::new(17, kind.name);
+        let none = Defects::none();
+        let start = self.logarithms(&base.finger);
+        let model = self.predict(&base.finger, &none);
+        let jacobian = self.jacobian(start, &none, &model);
+        let mut out: Vec<(f64, Values)> = Vec::new();
+        for draw in 0..draws {
+            let mut values = kind.draw(&mut noise);
+            kind.turn(&mut values, draw % 2 == 0);
+            let mut best = (f64::INFINITY, values);
+            for rung in 0..rungs {
+                kind.resize(&mut values, (rung as f64 + 0.5) / rungs as f64);
+                let left = self.left(&jacobian, &self.predict(&base.finger, &with(kind, values)), start);
+                if left < best.0 {
+                    best = (left, values);
+                }
+            }
+            out.push(best);
+        }
+        out.sort_by(|a, b| a.0.total_cmp(&b.0));
+        out
+    }
+
+    /// A cause's best imitation from the two best draws of its ladder.
+    fn imitate(&self, kind: &'static Kind, base: &Fit, truth_chi2: f64, near: f64, worth: f64) -> State {
+        let mut best: Option<State> = None;
+        let ladder = self.ladder(kind, base);
+        let first = ladder[0].0;
+        let starts = if DEAR.contains(&kind.name) { 1 } else { 2 };
+        for (left, values) in ladder.into_iter().take(starts) {
+            if left - truth_chi2 > (1.0 - worth) * (base.chi2 - truth_chi2) || left > 2.0 * first {
+                continue;
+            }
+            let mut x = [0.0; UNKNOWNS];
+            x[..NUISANCES].copy_from_slice(&self.logarithms(&base.finger));
+            for (i, p) in kind.parameters.iter().enumerate() {
+                x[NUISANCES + i] = coordinate(p, values[i]).clamp(lowest(p), 1.0);
+            }
+            let state = self.search(kind, State { x, chi2: f64::NAN }, truth_chi2, near);
+            if best.is_none_or(|b| state.chi2 < b.chi2) {
+                best = Some(state);
+            }
+            if best.is_some_and(|b| b.chi2 - truth_chi2 < 0.5 * near) {
+                break;
+            }
+        }
+        best.unwrap_or(State { x: [0.0; UNKNOWNS], chi2: first.min(base.chi2) })
+    }
+
+    /// Levenberg-Marquardt within the bounds of the kind's own ranges.
+    fn search(&self, kind: &'static Kind, start: State, truth_chi2: f64, near: f64) -> State {
+        let n = NUISANCES + kind.parameters.len();
+        let run = |x: &[f64; UNKNOWNS]| {
+            self.predict(&moved(&self.nominal, theta(x)), &with(kind, values_of(kind, x)))
+        };
+        let mut at = start;
+        let mut model = run(&at.x);
+        at.chi2 = self.chi2(&model, theta(&at.x));
+        let mut damping = 1e-3;
+        for _ in 0..STEPS {
+            let columns: Vec<Vec<f64>> = (0..n)
+                .map(|k| {
+                    let mut x = at.x;
+                    let h = if k < NUISANCES || x[k] < 0.5 { 2e-3 } else { -2e-3 };
+                    x[k] += h;
+                    let pairs = run(&x).into_iter().zip(&model).zip(self.sd_n);
+                    pairs.map(|((a, b), sd)| (a - b) / h / sd).collect()
+                })
+                .collect();
+            let (a, b) = self.normal_equations(&columns, &model, theta(&at.x));
+            let before = at.chi2;
+            for _ in 0..5 {
+                let next = bounded_step(kind, &a, &b, damping, &at.x, n);
+                let trial = run(&next);
+                let chi2 = self.chi2(&trial, theta(&next));
+                if chi2 < at.chi2 {
+                    (at, model) = (State { x: next, chi2 }, trial);
+                    damping = (damping * 0.2_f64).max(1e-9);
+                    break;
+                }
+                damping = (damping * 8.0_f64).max(1e-4);
+            }
+            let (gained, left) = (before - at.chi2, at.chi2 - truth_chi2);
+            let hopeless = left > HOPELESS * near && gained < 0.3 * left;
+            if gained < 0.02 * near.min(left.max(0.0)) + 1e-3 || hopeless {
+                break;
+            }
+        }
+        at
+    }
+
+    /// Normal equations of nuisances and parameters, the stiffnesses' priors included.
+    fn normal_equations(
+        &self,
+        columns: &[Vec<f64>],
+        model: &[f64],
+        theta: [f64; NUISANCES],
+    ) -> ([[f64; UNKNOWNS]; UNKNOWNS], [f64; UNKNOWNS]) {
+        let residual: Vec<f64> =
+            self.lateral_n.iter().zip(model).zip(self.sd_n).map(|((y, m), sd)| (y - m) / sd).collect();
+        let dot = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(x, y)| x * y).sum::<f64>();
+        let (mut a, mut b) = ([[0.0; UNKNOWNS]; UNKNOWNS], [0.0; UNKNOWNS]);
+        let weight = self.stiffness_sd.powi(-2);
+        for i in 0..columns.len() {
+            b[i] = dot(&columns[i], &residual);
+            for j in 0..=i {
+                a[i][j] = dot(&columns[i], &columns[j]);
+                a[j][i] = a[i][j];
+            }
+            if i < 2 {
+                a[i][i] += weight;
+                b[i] -= weight * theta[i];
+            }
+        }
+        (a, b)
+    }
+}
+
+/// The damped step, nuisances held within a factor, parameters within their ranges: those that a step would carry out
+/// stay at the bound and the others follow.
+fn bounded_step(
+    kind: &Kind,
+    a: &[[f64; UNKNOWNS]; UNKNOWNS],
+    b: &[f64; UNKNOWNS],
+    damping: f64,
+    at: &[f64; UNKNOWNS],
+    n: usize,
+) -> [f64; UNKNOWNS] {
+    let bounds = |i: usize| match i.checked_sub(NUISANCES) {
+        Some(k) => (lowest(&kind.parameters[k]), 1.0),
+        None => (at[i] - 0.4, at[i] + 0.4),
+    };
+    let mut fixed = [false; UNKNOWNS];
+    let mut next = *at;
+    for _ in 0..=n {
+        // Unknowns at their bounds move by a known amount; the rest solve what is left.
+        let (mut m, mut r) = (*a, *b);
+        for i in 0..n {
+            m[i][i] += damping * a[i][i] + 1e-9;
+            if fixed[i] {
+                let moved = next[i] - at[i];
+                for j in (0..n).filter(|j| !fixed[*j]) {
+                    r[j] -= a[j][i] * moved;
+                }
+            }
+        }
+        for i in (0..n).filter(|i| fixed[*i]) {
+            for j in 0..n {
+                (m[i][j], m[j][i]) = (0.0, 0.0);
+            }
+            (m[i][i], r[i]) = (1.0, 0.0);
+        }
+        let Some(step) = super::oracle::solve(&mut m, r, n) else { return *at };
+        let mut out = false;
+        for i in 0..n {
+            if fixed[i] {
+                continue;
+            }
+            let (low, high) = bounds(i);
+            let wanted = at[i] + step[i];
+            next[i] = wanted.clamp(low, high);
+            if wanted != next[i] {
+                (fixed[i], out) = (true, true);
+            }
+        }
+        if !out {
+            break;
+        }
+    }
+    next
+}
+
+/// Some passes of a case.
+struct Part {
+    known: Vec<crate::world::Point>,
+    lateral_n: Vec<f64>,
+    sd_n: Vec<f64>,
+}
+
+impl Part {
+    fn case<'a>(&'a self, whole: &Case<'_>) -> Case<'a> {
+        Case {
+            known: &self.known,
+            lateral_n: &self.lateral_n,
+            sd_n: &self.sd_n,
+            nominal: whole.nominal,
+            stiffness_sd: whole.stiffness_sd,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sealed::bench::Bench;
+    use crate::sealed::design::Design;
+
+    #[test]
+    fn a_search_leaves_no_more_than_its_ladder() {
+        let mut searched = 0;
+        for (seed, name) in
+            [(3, "adhesion"), (4, "load_dependent_friction"), (5, "subsurface_relaxation"), (6, "mode_shape")]
+        {
+            let mut noise = Noise::new(seed, "ladder");
+            let design = Design::draw(&mut noise);
+            let planned = design.plan(&mut noise);
+            let bench = Bench::draw(&mut noise, seed);
+            let points = bench.circumstances(&planned, true, &mut noise);
+            let truth = Kind::named(name).unwrap();
+            let mut values = truth.draw(&mut noise);
+            truth.resize(&mut values, 0.7);
+            let data = bench.noise_free(&points, &with(truth, values));
+            let case = bench.case(&data);
+            let base = case.fit(&Defects::none(), 8);
+            let found = case.imitators(&[truth], &base, 0.0, false);
+            for imitator in found.iter().filter(|i| !DEAR.contains(&i.name.as_str())) {
+                let kind = Kind::named(&imitator.name).unwrap();
+                // The best rung with its nuisances refitted in full: what a ladder alone would have said.
+                let rung = case.fit(&with(kind, case.ladder(kind, &base)[0].1), 3).chi2.min(base.chi2);
+                // Where not even that mends a quarter of the gap no search follows, and the rung counts to first order.
+                if rung < 0.75 * base.chi2 {
+                    assert!(imitator.chi2_left <= 1.001 * rung + 1e-6, "{name}: {rung} {imitator:?}");
+                    searched += 1;
+                }
+            }
+        }
+        assert!(searched >= 6, "{searched}");
+    }
+}

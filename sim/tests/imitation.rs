@@ -1,0 +1,111 @@
+//! The oracle's imitations against what is known from outside: the groups of gains that the closed forms of the paper
+//! cannot tell apart (k_n w / F and k_l U / (f mu0 k_n w) are all that mu' depends on), and causes of different kinds.
+
+use models::quantity::PeakToPeak;
+use sim::defects::{Defect, Defects, Kind, Surroundings};
+use sim::finger::{Finger, FingerConfig};
+use sim::sealed::imitate::Imitator;
+use sim::sealed::oracle::Case;
+use sim::world::{Point, steady_forces};
+
+fn finger() -> Finger {
+    Finger::new(&FingerConfig { stiffness_relative_sd: 0.0, ..FingerConfig::default() }, 1)
+}
+
+/// A full sweep: six amplitudes, four speeds, three forces, both directions.
+fn sweep() -> Vec<Point> {
+    let mut out = Vec::new();
+    for (i, pp_um) in [0.0, 0.5, 1.0, 1.6, 2.5, 4.0].into_iter().enumerate() {
+        for (j, speed_m_s) in [0.006, 0.02, 0.06, 0.15].into_iter().enumerate() {
+            for (k, normal_force_n) in [0.15, 0.3, 0.7].into_iter().enumerate() {
+                let direction = if (i + j + k) % 2 == 0 { 1.0 } else { -1.0 };
+                let time_s = 10.0 + 7.0 * ((13 * (12 * i + 3 * j + k)) % 72) as f64;
+                let at = Surroundings {
+                    time_s,
+                    contact_time_s: time_s,
+                    position_m: 0.004 * direction,
+                    direction,
+                    frequency_hz: if k == 1 { 27_500.0 } else { 40_000.0 },
+                    normal_force_n,
+                    ambient_pressure_pa: 101_325.0,
+                    temperature_c: 22.0,
+                };
+                let known_pp_m = PeakToPeak::from_metres(pp_um * 1e-6).metres();
+                out.push(Point { at, known_pp_m, speed_m_s });
+            }
+        }
+    }
+    out
+}
+
+/// What the oracle says of forces from a world that differs from the nominal one in `changed` and `defects`.
+fn asked(truth: &str, changed: impl Fn(&mut Finger, &mut Point), defects: &Defects) -> (f64, Vec<Imitator>) {
+    let known = sweep();
+    let nominal = finger();
+    let mut lateral_n = Vec::new();
+    let mut shown = known.clone();
+    for (point, shown) in known.iter().zip(&mut shown) {
+        let (mut own, mut at) = (nominal, *point);
+        changed(&mut own, &mut at);
+        let forces = steady_forces(&own, defects, &at);
+        lateral_n.push(forces.lateral_n);
+        shown.at.normal_force_n = forces.normal_n;
+    }
+    let sd_n: Vec<f64> = lateral_n.iter().map(|l| (0.015 * l).hypot(8e-4)).collect();
+    let case = Case { known: &shown, lateral_n: &lateral_n, sd_n: &sd_n, nominal, stiffness_sd: 0.03 };
+    let base = case.fit(&Defects::none(), 8);
+    let kind = Kind::named(truth).unwrap();
+    (base.chi2, case.imitators(&[kind], &base, 0.0, false))
+}
+
+fn left(list: &[Imitator], name: &str) -> f64 {
+    list.iter().find(|i| i.name == name).unwrap().chi2_left
+}
+
+fn one(name: &str, values: [f64; 4]) -> Defects {
+    Defects { defects: vec![Defect { kind: Kind::named(name).unwrap(), values }], channels: Vec::new() }
+}
+
+#[test]
+fn a_gain_of_the_amplitude_is_a_gain_of_the_normal_stiffness() {
+    // Exact gain, without the bend of this world's own cause.
+    let (gap, list) = asked("amplitude_miscalibration", |_, point| point.known_pp_m *= 1.9, &Defects::none());
+    println!("gap {gap:.0}: {:?}", &list[..3]);
+    assert!(gap > 100.0, "{gap}");
+    assert_eq!(list[0].name, "stiffness_error");
+    assert!(list[0].chi2_left < 1e-2, "{:?}", list[0]);
+    assert!(list[0].is_near(gap));
+}
+
+#[test]
+fn a_gain_of_the_speed_is_a_gain_of_the_lateral_stiffness() {
+    // The cause `speed_error` has a slip of its own, so it comes near but not to nothing.
+    let soft = |own: &mut Finger, _: &mut Point| own.lateral_stiffness_n_per_m /= 1.5;
+    let (gap, list) = asked("stiffness_error", soft, &Defects::none());
+    println!("gap {gap:.0}: {:?}", &list[..3]);
+    assert!(gap > 100.0);
+    assert_eq!(list[0].name, "speed_error");
+    assert!(list[0].chi2_left < 0.15 * gap, "{list:?}");
+}
+
+#[test]
+fn a_straight_tilt_is_a_cross_talk_and_no_squeeze_film() {
+    let (gap, list) = asked("plate_tilt", |_, _| {}, &one("plate_tilt", [0.05, 0.0, 0.0, 0.0]));
+    println!("gap {gap:.0}: {:?}", &list[..3]);
+    assert!(gap > 300.0);
+    assert!(left(&list, "force_crosstalk") < 0.01 * gap, "{list:?}");
+    assert!(left(&list, "squeeze_film") > 0.9 * gap, "a film does not know the direction: {list:?}");
+}
+
+#[test]
+fn ridges_that_fly_are_asked_of_each_other() {
+    for (truth, other, values) in [
+        ("ridge_inertia", "normal_damping", [2e-6, 0.6, 0.3, 0.0]),
+        ("normal_damping", "ridge_inertia", [1e-6, 0.0, 0.0, 0.0]),
+    ] {
+        let (gap, list) = asked(truth, |_, _| {}, &one(truth, values));
+        println!("{truth}, gap {gap:.0}: {:?}", &list[..3]);
+        assert!(left(&list, other) < 0.8 * gap, "{list:?}");
+        assert!(list.iter().any(|i| i.name == "lateral_recovery"));
+    }
+}
