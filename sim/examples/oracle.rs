@@ -1,7 +1,7 @@
 //! Lists what the oracle says of sealed sets: `cargo run --release -p sim --example oracle -- COUNT SEED [STRATUM]`.
 //!
 //! The seeds are those of `muprime blind --sets COUNT --seed SEED`. One line a set: truth, gain, gap over floor, the
-//! three best imitators with what they leave, seconds. STRATUM: single (default) or alias.
+//! verdict, the three best imitators with what they leave, seconds. STRATUM: single (default) or alias.
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -20,13 +20,21 @@ fn main() -> ExitCode {
     for k in 0..count {
         let start = Instant::now();
         let label = generate(seed.wrapping_mul(1_000_003).wrapping_add(k), stratum, Ask::Imitators).label;
-        let best: Vec<String> =
-            label.imitators.iter().take(3).map(|i| format!("{} {:.1}", i.name, i.chi2_left)).collect();
+        let best: Vec<String> = label
+            .imitators
+            .iter()
+            .take(3)
+            .map(|i| {
+                let form = i.form_left.map_or_else(String::new, |left| format!(" (form {left:.1})"));
+                format!("{} {:.1}{form}", i.name, i.chi2_left)
+            })
+            .collect();
         println!(
-            "{k:3} {:24} gain {:9.1} gap/floor {:6.2}  {}  ({:.2} s)",
+            "{k:3} {:24} gain {:9.1} gap/floor {:6.2} {:11} {}  ({:.2} s)",
             label.causes[0].name,
             label.chi2_gain,
             label.hidden_recalibrated_rmse / label.hidden_floor_rmse.max(1e-12),
+            if label.decidable() { "decidable" } else { "undecidable" },
             best.join(", "),
             start.elapsed().as_secs_f64()
         );

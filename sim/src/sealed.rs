@@ -10,12 +10,14 @@
 //! | [`design`] | which passes were made |
 //! | [`oracle`] | what the noise-free data could tell at best |
 //! | [`imitate`] | which other cause would do as well |
+//! | [`form`] | how far a cause may depart from its formula |
 //! | `bench` | fingertip, noise, sizes, and the measurement itself |
 //! | `files` | the folders |
 
 mod bench;
 pub mod design;
 mod files;
+pub mod form;
 pub mod imitate;
 pub mod oracle;
 
@@ -142,7 +144,7 @@ pub struct Label {
 impl Label {
     /// Whether no other cause asked for imitates the truth, form uncertainty included.
     pub fn decidable(&self) -> bool {
-        !self.imitators.iter().any(|i| i.is_near(self.chi2_gain))
+        !self.imitators.iter().any(|i| i.is_near())
     }
 }
 

@@ -7,6 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::form::Kernel;
 use super::oracle::{Case, Fit, NUISANCES, moved};
 use crate::defects::{ALL, Defect, Defects, Draw, Kind, Parameter, Values};
 use crate::noise::Noise;
@@ -15,10 +16,12 @@ use crate::noise::Noise;
 const DEAR: [&str; 3] = ["ridge_inertia", "normal_damping", "lateral_recovery"];
 /// Passes on which a dear cause is tried first.
 const PART: usize = 36;
-/// chi2 beyond the truth's under which a cause imitates the data whatever their form.
+/// chi2 beyond the truth's under which a cause imitates the data.
 pub const NEAR: f64 = 10.0;
-/// Share of the gap's chi2 that form uncertainty may leave to an imitator.
-const FORM_SHARE: f64 = 0.0225;
+/// Share of the gap's chi2 that departures from form could take up: an imitator that leaves more is not asked.
+const FORM_MOST: f64 = 0.5;
+/// Share of the gap's chi2 to which a search is worth its steps.
+const SOUGHT: f64 = 0.05;
 /// A search is given up where it leaves this many times what would count as near, and a step mends little of it.
 const HOPELESS: f64 = 4.0;
 /// Share of the gap's chi2 that the ladder must mend for a search to follow. Rungs lie a factor of 2.4 apart at most,
@@ -41,6 +44,9 @@ pub struct Imitator {
     pub chi2_left: f64,
     /// The same as a share of what the recalibrated baseline leaves.
     pub share_left: f64,
+    /// The same once both, truth and imitator, may depart smoothly from their form ([`super::form`]); none where it leaves
+    /// too much for that to matter.
+    pub form_left: Option<f64>,
 }
 
 /// Where a search stands: logarithms of the nuisances, then the parameters' coordinates.
@@ -48,6 +54,8 @@ pub struct Imitator {
 struct State {
     x: [f64; UNKNOWNS],
     chi2: f64,
+    /// Whether it was searched, not only read off the ladder.
+    searched: bool,
 }
 
 /// A parameter's coordinate: a share of its range, from the middle for those with two sides.
@@ -90,9 +98,9 @@ fn theta(x: &[f64; UNKNOWNS]) -> [f64; NUISANCES] {
 }
 
 impl Imitator {
-    /// Whether it cannot be told from a truth of this gain.
-    pub fn is_near(&self, chi2_gain: f64) -> bool {
-        self.chi2_left <= NEAR + FORM_SHARE * chi2_gain
+    /// Whether the data would not tell it from the truth, form uncertainty included.
+    pub fn is_near(&self) -> bool {
+        self.chi2_left <= NEAR || self.form_left.is_some_and(|left| left <= NEAR)
     }
 }
 
@@ -104,28 +112,40 @@ impl Case<'_> {
         let part = self.part(base);
         let thinned = part.case(self);
         let thinned_base = thinned.fit_from(&base.finger, &Defects::none(), 4);
-        let near = NEAR + FORM_SHARE * (base.chi2 - truth_chi2);
+        let gap = (base.chi2 - truth_chi2).max(1e-9);
+        let near = NEAR + SOUGHT * gap;
         let dear = |kind: &Kind| DEAR.contains(&kind.name);
         let among_dear = truth.iter().any(|t| dear(t));
+        let kernel = std::cell::OnceCell::new();
         let one = |kind: &'static Kind| {
-            let chi2 = if dear(kind) && !whole {
+            let state = if dear(kind) && !whole {
                 let worth = if among_dear { WORTH } else { WORTH_DEAR };
                 let tried = thinned.imitate(kind, &thinned_base, truth_chi2, near, worth);
-                let thinned_near =
-                    near * (thinned_base.chi2 - truth_chi2) / (base.chi2 - truth_chi2).max(1e-9);
-                if tried.chi2 - truth_chi2 < HOPELESS * thinned_near {
-                    self.search(kind, tried, truth_chi2, near).chi2
+                // A part of the passes stands for the share, not for the chi2, of a gap that few passes may hold.
+                let share = (tried.chi2 - truth_chi2) / (thinned_base.chi2 - truth_chi2).max(1e-9);
+                if share * gap < HOPELESS * near && tried.searched {
+                    self.search(kind, tried, truth_chi2, near)
                 } else {
-                    // A part of the passes stands for the share, not for the chi2, of a gap that few passes may hold.
-                    let gap = (thinned_base.chi2 - truth_chi2).max(1e-9);
-                    truth_chi2 + (tried.chi2 - truth_chi2) / gap * (base.chi2 - truth_chi2)
+                    State { chi2: truth_chi2 + share * gap, searched: false, ..tried }
                 }
             } else {
-                self.imitate(kind, base, truth_chi2, near, WORTH).chi2
+                self.imitate(kind, base, truth_chi2, near, WORTH)
             };
-            let chi2_left = chi2.min(base.chi2) - truth_chi2;
-            let share_left = chi2_left / (base.chi2 - truth_chi2).max(1e-12);
-            Imitator { name: kind.name.to_string(), chi2_left, share_left }
+            let chi2_left = state.chi2.min(base.chi2) - truth_chi2;
+            let form_left =
+                (state.searched && chi2_left < FORM_MOST * gap && state.chi2 < base.chi2).then(|| {
+                    let (kernel, truth_cost) = kernel.get_or_init(|| {
+                        let kernel = Kernel::new(self.known);
+                        let cost = self.form_cost(&kernel, self.lateral_n, truth_chi2, base);
+                        (kernel, cost)
+                    });
+                    let at = theta(&state.x);
+                    let model =
+                        self.predict(&moved(&self.nominal, at), &with(kind, values_of(kind, &state.x)));
+                    let prior = self.prior(at);
+                    self.form_cost(kernel, &model, prior, base) - truth_cost
+                });
+            Imitator { name: kind.name.to_string(), chi2_left, share_left: chi2_left / gap, form_left }
         };
         let mut out: Vec<Imitator> = ALL
             .iter()
@@ -201,7 +221,7 @@ impl Case<'_> {
             for (i, p) in kind.parameters.iter().enumerate() {
                 x[NUISANCES + i] = coordinate(p, values[i]).clamp(lowest(p), 1.0);
             }
-            let state = self.search(kind, State { x, chi2: f64::NAN }, truth_chi2, near);
+            let state = self.search(kind, State { x, chi2: f64::NAN, searched: true }, truth_chi2, near);
             if best.is_none_or(|b| state.chi2 < b.chi2) {
                 best = Some(state);
             }
@@ -209,7 +229,7 @@ impl Case<'_> {
                 break;
             }
         }
-        best.unwrap_or(State { x: [0.0; UNKNOWNS], chi2: first.min(base.chi2) })
+        best.unwrap_or(State { x: [0.0; UNKNOWNS], chi2: first.min(base.chi2), searched: false })
     }
 
     /// Levenberg-Marquardt within the bounds of the kind's own ranges.
@@ -239,7 +259,7 @@ impl Case<'_> {
                 let trial = run(&next);
                 let chi2 = self.chi2(&trial, theta(&next));
                 if chi2 < at.chi2 {
-                    (at, model) = (State { x: next, chi2 }, trial);
+                    (at, model) = (State { x: next, chi2, searched: true }, trial);
                     damping = (damping * 0.2_f64).max(1e-9);
                     break;
                 }

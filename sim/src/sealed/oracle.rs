@@ -66,7 +66,12 @@ impl Case<'_> {
     pub(super) fn chi2(&self, model: &[f64], theta: [f64; NUISANCES]) -> f64 {
         let data: f64 =
             self.lateral_n.iter().zip(model).zip(self.sd_n).map(|((y, m), sd)| ((y - m) / sd).powi(2)).sum();
-        data + (theta[0] / self.stiffness_sd).powi(2) + (theta[1] / self.stiffness_sd).powi(2)
+        data + self.prior(theta)
+    }
+
+    /// What the stiffnesses' shifts cost.
+    pub(super) fn prior(&self, theta: [f64; NUISANCES]) -> f64 {
+        (theta[0] / self.stiffness_sd).powi(2) + (theta[1] / self.stiffness_sd).powi(2)
     }
 
     /// Logarithms of a fingertip's nuisances over the nominal ones.
