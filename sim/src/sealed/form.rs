@@ -51,18 +51,12 @@ impl Kernel {
 
     /// Twice the expected negative log likelihood, less that of an exact model without form uncertainty, of a residual
     /// and a net change in standard deviations; `prior` is what the stiffnesses cost.
-    pub(super) fn cost(&self, residual: &[f64], change: &[f64], prior: f64) -> f64 {
+    ///
+    /// The second number is the departure's standard deviation that costs least.
+    pub(super) fn cost(&self, residual: &[f64], change: &[f64], prior: f64) -> (f64, f64) {
         let n = residual.len();
         let costs = SCALES.map(|(s, weight)| {
-            let mut l: Vec<Vec<f64>> = (0..n)
-                .map(|i| {
-                    let mut row: Vec<f64> =
-                        (0..=i).map(|j| s * s * change[i] * change[j] * self.rows[i][j]).collect();
-                    row[i] += 1.0;
-                    row
-                })
-                .collect();
-            cholesky(&mut l);
+            let l = self.root(change, s);
             let log_determinant: f64 = 2.0 * l.iter().enumerate().map(|(i, row)| row[i].ln()).sum::<f64>();
             let squares: f64 = solved(&l, residual, 0).iter().map(|x| x * x).sum();
             // Trace of the inverse: what the noise of the table costs on average.
@@ -76,7 +70,23 @@ impl Kernel {
             squares + trace - n as f64 + log_determinant - 2.0 * f64::ln(weight)
         });
         let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
-        prior + least - 2.0 * costs.iter().map(|c| (-0.5 * (c - least)).exp()).sum::<f64>().ln()
+        let total = prior + least - 2.0 * costs.iter().map(|c| (-0.5 * (c - least)).exp()).sum::<f64>().ln();
+        let best = costs.iter().position(|c| *c == least).map_or(SCALES[0].0, |i| SCALES[i].0);
+        (total, best)
+    }
+
+    /// Root of the covariance of noise and departure, in standard deviations of the noise.
+    pub(super) fn root(&self, change: &[f64], s: f64) -> Vec<Vec<f64>> {
+        let mut l: Vec<Vec<f64>> = (0..change.len())
+            .map(|i| {
+                let mut row: Vec<f64> =
+                    (0..=i).map(|j| s * s * change[i] * change[j] * self.rows[i][j]).collect();
+                row[i] += 1.0;
+                row
+            })
+            .collect();
+        cholesky(&mut l);
+        l
     }
 }
 
@@ -96,7 +106,7 @@ fn cholesky(l: &mut [Vec<f64>]) {
 }
 
 /// Forward substitution of a right side that is zero before `from`.
-fn solved(l: &[Vec<f64>], b: &[f64], from: usize) -> Vec<f64> {
+pub(super) fn solved(l: &[Vec<f64>], b: &[f64], from: usize) -> Vec<f64> {
     let mut x: Vec<f64> = Vec::with_capacity(b.len() - from);
     for i in from..b.len() {
         let dot: f64 = l[i][from..i].iter().zip(&x).map(|(p, q)| p * q).sum();
@@ -105,15 +115,28 @@ fn solved(l: &[Vec<f64>], b: &[f64], from: usize) -> Vec<f64> {
     x
 }
 
+/// What a model costs once it may depart from its form.
+pub(super) struct Departure {
+    /// Twice the expected negative log likelihood.
+    pub(super) cost: f64,
+    /// Standard deviation of the departure that costs least.
+    pub(super) scale: f64,
+    /// The model's net change, in standard deviations.
+    pub(super) change: Vec<f64>,
+}
+
 impl Case<'_> {
     /// Cost of a model of these forces (N), whose stiffnesses cost `prior`; `base` is the recalibrated baseline.
-    pub(super) fn form_cost(&self, kernel: &Kernel, model: &[f64], prior: f64, base: &Fit) -> f64 {
+    pub(super) fn departure(&self, kernel: &Kernel, model: &[f64], prior: f64, base: &Fit) -> Departure {
         let own = Case { lateral_n: model, ..*self }.fit_from(&base.finger, &Defects::none(), 4);
-        let over = |x: f64, i: usize| x / self.sd_n[i];
-        let change: Vec<f64> = own.residual_n.iter().enumerate().map(|(i, d)| over(*d, i)).collect();
-        let residual: Vec<f64> =
-            self.lateral_n.iter().zip(model).enumerate().map(|(i, (y, m))| over(y - m, i)).collect();
-        kernel.cost(&residual, &change, prior)
+        let change: Vec<f64> = own.residual_n.iter().zip(self.sd_n).map(|(d, sd)| d / sd).collect();
+        let (cost, scale) = kernel.cost(&self.standardised(model), &change, prior);
+        Departure { cost, scale, change }
+    }
+
+    /// Data less model in standard deviations.
+    pub(super) fn standardised(&self, model: &[f64]) -> Vec<f64> {
+        self.lateral_n.iter().zip(model).zip(self.sd_n).map(|((y, m), sd)| (y - m) / sd).collect()
     }
 }
 
@@ -134,6 +157,6 @@ mod tests {
             weight * (-0.5 * (squares + (a + b) / determinant - 2.0 + determinant.ln())).exp()
         });
         let expected = 0.4 - 2.0 * each.iter().sum::<f64>().ln();
-        assert!((kernel.cost(&r, &d, 0.4) - expected).abs() < 1e-12);
+        assert!((kernel.cost(&r, &d, 0.4).0 - expected).abs() < 1e-12);
     }
 }

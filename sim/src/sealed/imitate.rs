@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::form::Kernel;
+use super::form::{Kernel, solved};
 use super::oracle::{Case, Fit, NUISANCES, moved};
 use crate::defects::{ALL, Defect, Defects, Draw, Kind, Parameter, Values};
 use crate::noise::Noise;
@@ -31,6 +31,8 @@ const WORTH: f64 = 0.15;
 const WORTH_DEAR: f64 = 0.5;
 /// Steps of a search.
 const STEPS: usize = 8;
+/// Steps of a search under form uncertainty.
+const FORM_STEPS: usize = 3;
 /// Most unknowns: nuisances and a kind's four parameters.
 const UNKNOWNS: usize = NUISANCES + 4;
 
@@ -136,14 +138,10 @@ impl Case<'_> {
                 (state.searched && chi2_left < FORM_MOST * gap && state.chi2 < base.chi2).then(|| {
                     let (kernel, truth_cost) = kernel.get_or_init(|| {
                         let kernel = Kernel::new(self.known);
-                        let cost = self.form_cost(&kernel, self.lateral_n, truth_chi2, base);
+                        let cost = self.departure(&kernel, self.lateral_n, truth_chi2, base).cost;
                         (kernel, cost)
                     });
-                    let at = theta(&state.x);
-                    let model =
-                        self.predict(&moved(&self.nominal, at), &with(kind, values_of(kind, &state.x)));
-                    let prior = self.prior(at);
-                    self.form_cost(kernel, &model, prior, base) - truth_cost
+                    self.form_cost(kind, state.x, kernel, base) - truth_cost
                 });
             Imitator { name: kind.name.to_string(), chi2_left, share_left: chi2_left / gap, form_left }
         };
@@ -235,24 +233,14 @@ impl Case<'_> {
     /// Levenberg-Marquardt within the bounds of the kind's own ranges.
     fn search(&self, kind: &'static Kind, start: State, truth_chi2: f64, near: f64) -> State {
         let n = NUISANCES + kind.parameters.len();
-        let run = |x: &[f64; UNKNOWNS]| {
-            self.predict(&moved(&self.nominal, theta(x)), &with(kind, values_of(kind, x)))
-        };
+        let run = |x: &[f64; UNKNOWNS]| self.run(kind, x);
         let mut at = start;
         let mut model = run(&at.x);
         at.chi2 = self.chi2(&model, theta(&at.x));
         let mut damping = 1e-3;
         for _ in 0..STEPS {
-            let columns: Vec<Vec<f64>> = (0..n)
-                .map(|k| {
-                    let mut x = at.x;
-                    let h = if k < NUISANCES || x[k] < 0.5 { 2e-3 } else { -2e-3 };
-                    x[k] += h;
-                    let pairs = run(&x).into_iter().zip(&model).zip(self.sd_n);
-                    pairs.map(|((a, b), sd)| (a - b) / h / sd).collect()
-                })
-                .collect();
-            let (a, b) = self.normal_equations(&columns, &model, theta(&at.x));
+            let columns = self.columns(kind, &at.x, &model);
+            let (a, b) = self.normal_equations(&columns, &self.standardised(&model), theta(&at.x));
             let before = at.chi2;
             for _ in 0..5 {
                 let next = bounded_step(kind, &a, &b, damping, &at.x, n);
@@ -274,20 +262,57 @@ impl Case<'_> {
         at
     }
 
+    fn run(&self, kind: &'static Kind, x: &[f64; UNKNOWNS]) -> Vec<f64> {
+        self.predict(&moved(&self.nominal, theta(x)), &with(kind, values_of(kind, x)))
+    }
+
+    /// Derivatives of the model in standard deviations.
+    fn columns(&self, kind: &'static Kind, at: &[f64; UNKNOWNS], model: &[f64]) -> Vec<Vec<f64>> {
+        let one = |k: usize| {
+            let mut x = *at;
+            let h = if k < NUISANCES || x[k] < 0.5 { 2e-3 } else { -2e-3 };
+            x[k] += h;
+            let pairs = self.run(kind, &x).into_iter().zip(model).zip(self.sd_n);
+            pairs.map(|((a, b), sd)| (a - b) / h / sd).collect()
+        };
+        (0..NUISANCES + kind.parameters.len()).map(one).collect()
+    }
+
+    /// Cost of an imitation that may depart from its form, from the optimum without departures: where the departure takes
+    /// up what is smooth, another size may do better.
+    fn form_cost(&self, kind: &'static Kind, start: [f64; UNKNOWNS], kernel: &Kernel, base: &Fit) -> f64 {
+        let mut x = start;
+        let mut model = self.run(kind, &x);
+        let mut now = self.departure(kernel, &model, self.prior(theta(&x)), base);
+        for _ in 0..FORM_STEPS {
+            let root = kernel.root(&now.change, now.scale);
+            let whitened: Vec<Vec<f64>> =
+                self.columns(kind, &x, &model).iter().map(|c| solved(&root, c, 0)).collect();
+            let residual = solved(&root, &self.standardised(&model), 0);
+            let (a, b) = self.normal_equations(&whitened, &residual, theta(&x));
+            let next = bounded_step(kind, &a, &b, 1e-3, &x, whitened.len());
+            let trial = self.run(kind, &next);
+            let then = self.departure(kernel, &trial, self.prior(theta(&next)), base);
+            if then.cost > now.cost - 0.1 {
+                break;
+            }
+            (x, model, now) = (next, trial, then);
+        }
+        now.cost
+    }
+
     /// Normal equations of nuisances and parameters, the stiffnesses' priors included.
     fn normal_equations(
         &self,
         columns: &[Vec<f64>],
-        model: &[f64],
+        residual: &[f64],
         theta: [f64; NUISANCES],
     ) -> ([[f64; UNKNOWNS]; UNKNOWNS], [f64; UNKNOWNS]) {
-        let residual: Vec<f64> =
-            self.lateral_n.iter().zip(model).zip(self.sd_n).map(|((y, m), sd)| (y - m) / sd).collect();
         let dot = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(x, y)| x * y).sum::<f64>();
         let (mut a, mut b) = ([[0.0; UNKNOWNS]; UNKNOWNS], [0.0; UNKNOWNS]);
         let weight = self.stiffness_sd.powi(-2);
         for i in 0..columns.len() {
-            b[i] = dot(&columns[i], &residual);
+            b[i] = dot(&columns[i], residual);
             for j in 0..=i {
                 a[i][j] = dot(&columns[i], &columns[j]);
                 a[j][i] = a[i][j];
