@@ -62,6 +62,11 @@ impl Covariance {
         row.dot(&self.inner.solve(row))
     }
 
+    /// Covariance of the smooth part between rows of `Phi`, given the data.
+    pub fn posterior_covariance(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
+        rows * self.inner.solve(&rows.transpose())
+    }
+
     fn scale(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
         let mut m = m.clone();
         for mut column in m.column_iter_mut() {

@@ -1,11 +1,21 @@
 //! Which experiment next: the conditions, or the instrument action, that best part the leading hypotheses.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`grid`] | conditions that a plan can choose, within what the table has shown |
+//! | [`belief`] | what each hypothesis expects there, with how surely it knows it |
+//! | [`design`] | which of them, in which order |
 
+pub mod belief;
+pub mod design;
+pub mod grid;
+
+use crate::attribute::{Decision, Verdict};
 use crate::data::{Rig, Table};
-use crate::evidence::Explained;
 use crate::fit::Problem;
 use crate::hypotheses::{Candidate, Fitted};
+use belief::beliefs;
 use effects::Operating;
-use nalgebra::DMatrix;
 use serde::Serialize;
 
 /// A condition of a plan.
@@ -21,67 +31,102 @@ pub struct Condition {
     pub direction: f64,
     /// Normal force, N.
     pub normal_force_n: f64,
+    /// Middle of the pass along the plate, m.
+    pub position_m: f64,
     /// Ambient pressure, Pa, where it was varied.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ambient_pressure_pa: Option<f64>,
 }
 
+impl Condition {
+    /// The settings of a pass, without its time and environment.
+    pub fn of(p: &Operating) -> Self {
+        Condition {
+            amplitude_pp_m: p.amplitude_pp_m,
+            frequency_hz: p.frequency_hz,
+            speed_m_s: p.speed_m_s,
+            direction: p.direction,
+            normal_force_n: p.normal_force_n,
+            position_m: p.position_m,
+            ambient_pressure_pa: p.ambient_pressure_pa,
+        }
+    }
+}
+
 /// A next experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiment {
-    /// Conditions to run; empty for an action on an instrument.
+    /// Conditions to run, those that tell most first; empty for an action on an instrument.
     pub conditions: Vec<Condition>,
-    /// The two hypotheses that it parts.
+    /// The two hypotheses that it parts: the leader and its strongest rival.
     pub separates: [String; 2],
-    /// Expected gain of the better one's log evidence over the other's.
+    /// Expected gain of the first one's log evidence over the second's, were the first one true.
     pub expected_nats: f64,
     /// In words.
     pub text: String,
 }
 
 /// Passes of a designed experiment.
-const PASSES: usize = 12;
+pub const PASSES: usize = 12;
+/// Nats below which an experiment is not worth asking for.
+const LEAST_NATS: f64 = 0.05;
+/// Probability of no gap from which there is nothing to part.
+const SETTLED: f64 = 0.99;
 
-/// Designs experiments for the two leading hypotheses (indices of candidates).
-pub fn experiments(
-    fitted: &Fitted,
-    table: &Table,
-    rig: &Rig,
-    first: usize,
-    second: usize,
-) -> Vec<Experiment> {
-    let (a, b) = (&fitted.candidates[first], &fitted.candidates[second]);
-    let names = [a.names().join("+"), b.names().join("+")];
-    let mut list = Vec::new();
-    let (rows, nats) = design(fitted, rig, a, b, &grid(table), PASSES);
-    if nats > 0.05 {
-        let conditions = rows.iter().map(condition).collect();
-        list.push(Experiment {
-            conditions,
-            text: format!(
-                "{PASSES} passes where {} and {} differ most; {nats:.1} nats expected",
-                names[0], names[1]
-            ),
-            separates: names.clone(),
-            expected_nats: nats,
-        });
+/// Designs experiments for what a decision left open.
+pub fn experiments(fitted: &Fitted, table: &Table, rig: &Rig, decision: &Decision) -> Vec<Experiment> {
+    if decision.verdict == Verdict::NoGap && decision.none >= SETTLED {
+        return Vec::new();
     }
+    let mut list = Vec::new();
+    let grid = grid::conditions(table);
+    let held = beliefs(fitted, rig, decision, &grid);
+    let chosen = design::greedy(&held, PASSES);
+    if let Some(rival) = design::rival(&held, &chosen) {
+        let nats = design::expected_nats(&held[0], &held[rival], &chosen);
+        let names = [held[0].name.clone(), held[rival].name.clone()];
+        if nats > LEAST_NATS {
+            list.push(Experiment {
+                conditions: chosen.iter().map(|&i| Condition::of(&grid[i])).collect(),
+                text: format!(
+                    "{PASSES} passes that best part {} from {} and the other hypotheses; {nats:.1} nats expected",
+                    names[0], names[1]
+                ),
+                separates: names,
+                expected_nats: nats,
+            });
+        }
+    }
+    if decision.verdict != Verdict::NoGap {
+        list.extend(actions(fitted, decision));
+    }
+    list.sort_by(|x, y| y.expected_nats.total_cmp(&x.expected_nats));
+    list
+}
+
+/// Actions on instruments that part the leader from the next candidate.
+fn actions(fitted: &Fitted, decision: &Decision) -> Vec<Experiment> {
+    let leader = decision.class[0];
+    let second = decision.class.get(1).copied().or_else(|| {
+        (0..fitted.candidates.len()).find(|&i| i != leader && fitted.candidates[i].effects.len() == 1)
+    });
+    let Some(second) = second else { return Vec::new() };
+    let (a, b) = (&fitted.candidates[leader], &fitted.candidates[second]);
+    let mut list = Vec::new();
     for (effect, other) in [(a, b), (b, a)] {
         let own: Vec<&'static str> = effect.names();
         for (name, text, sd) in ACTIONS {
             if own.contains(name) && !other.names().contains(name) {
-                let size = size_of(effect, name);
-                let nats = 0.5 * (size / sd).powi(2);
+                let nats = 0.5 * (size_of(effect, name) / sd).powi(2);
                 list.push(Experiment {
                     conditions: Vec::new(),
-                    separates: names.clone(),
+                    separates: [a.names().join("+"), b.names().join("+")],
                     expected_nats: nats.min(500.0),
                     text: (*text).to_string(),
                 });
             }
         }
     }
-    list.sort_by(|x, y| y.expected_nats.total_cmp(&x.expected_nats));
     list
 }
 
@@ -118,118 +163,4 @@ fn size_of(c: &Candidate, name: &str) -> f64 {
         .zip(thetas)
         .find(|(m, _)| m.name() == name)
         .map_or(0.0, |(_, t)| t.first().copied().unwrap_or(0.0))
-}
-
-/// Conditions within the limits that the table has shown to be safe.
-fn grid(table: &Table) -> Vec<Operating> {
-    let levels = |f: fn(&Operating) -> f64, count: usize| -> Vec<f64> {
-        let mut v: Vec<f64> = table.passes.iter().map(f).collect();
-        v.sort_by(f64::total_cmp);
-        let (low, high) = (v[0], v[v.len() - 1]);
-        if high <= low * 1.05 {
-            return vec![0.5 * (low + high)];
-        }
-        (0..count).map(|i| low * (high / low).powf(i as f64 / (count - 1) as f64)).collect()
-    };
-    let vibrating: Vec<f64> = table.passes.iter().map(|p| p.amplitude_pp_m).filter(|w| *w > 0.0).collect();
-    let (low, high) = vibrating.iter().fold((f64::INFINITY, 0.0f64), |(a, b), w| (a.min(*w), b.max(*w)));
-    let mut amplitudes = vec![0.0];
-    if high > 0.0 {
-        amplitudes.extend((0..5).map(|i| low * (high / low).powf(i as f64 / 4.0)));
-    }
-    let mut frequencies: Vec<f64> = table.passes.iter().map(|p| p.frequency_hz).collect();
-    frequencies.sort_by(f64::total_cmp);
-    frequencies.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-3);
-    let mut pressures: Vec<Option<f64>> = table.passes.iter().map(|p| p.ambient_pressure_pa).collect();
-    pressures.sort_by(|a, b| a.unwrap_or(0.0).total_cmp(&b.unwrap_or(0.0)));
-    pressures.dedup();
-    pressures.truncate(3);
-    let template = *table.passes.last().expect("a table has passes");
-    let mut list = Vec::new();
-    for &w in &amplitudes {
-        for &f in frequencies.iter().take(4) {
-            for &u in &levels(|p| p.speed_m_s, 4) {
-                for &load in &levels(|p| p.normal_force_n, 3) {
-                    for direction in [1.0, -1.0] {
-                        for &p in &pressures {
-                            list.push(Operating {
-                                amplitude_pp_m: w,
-                                frequency_hz: f,
-                                speed_m_s: u,
-                                normal_force_n: load,
-                                direction,
-                                ambient_pressure_pa: p,
-                                ..template
-                            });
-                        }
-                    }
-                }
-            }
-        }
-    }
-    list
-}
-
-fn condition(p: &Operating) -> Condition {
-    Condition {
-        amplitude_pp_m: p.amplitude_pp_m,
-        frequency_hz: p.frequency_hz,
-        speed_m_s: p.speed_m_s,
-        direction: p.direction,
-        normal_force_n: p.normal_force_n,
-        ambient_pressure_pa: p.ambient_pressure_pa,
-    }
-}
-
-/// Greedy design: each pass is the one whose difference of predictions is largest against its noise and both
-/// hypotheses' parameter uncertainty, which shrinks as passes are added. Gives passes and expected nats.
-pub fn design(
-    fitted: &Fitted,
-    rig: &Rig,
-    a: &Candidate,
-    b: &Candidate,
-    grid: &[Operating],
-    count: usize,
-) -> (Vec<Operating>, f64) {
-    let problem = Problem {
-        passes: grid.to_vec(),
-        lateral: vec![0.0; grid.len()],
-        variance: vec![1.0; grid.len()],
-        ..fitted.problem.select(&[])
-    };
-    let side = |e: &Explained| {
-        let m = problem.predict(&e.members, &e.u);
-        let j = problem.jacobian(&e.members, &e.u, &m);
-        (m, j, e.covariance.clone())
-    };
-    let (ma, ja, mut ca) = side(&a.best);
-    let (mb, jb, mut cb) = side(&b.best);
-    let level: Vec<f64> = ma.iter().zip(&mb).map(|(x, y)| x.abs().max(y.abs())).collect();
-    let noise = crate::noise::variance(&problem, rig, &a.best.u, &level, fitted.pure.used);
-    let mut chosen = Vec::new();
-    let mut total = 0.0;
-    for _ in 0..count {
-        let Some((best, gain)) = (0..grid.len())
-            .map(|i| {
-                let (ra, rb) = (ja.row(i).transpose(), jb.row(i).transpose());
-                let spread = ra.dot(&(&ca * &ra)) + rb.dot(&(&cb * &rb));
-                (i, 0.5 * (ma[i] - mb[i]).powi(2) / (noise[i] + spread))
-            })
-            .max_by(|x, y| x.1.total_cmp(&y.1).then(y.0.cmp(&x.0)))
-        else {
-            break;
-        };
-        total += gain;
-        chosen.push(grid[best]);
-        ca = updated(&ca, &ja, best, noise[best]);
-        cb = updated(&cb, &jb, best, noise[best]);
-    }
-    (chosen, total)
-}
-
-fn updated(c: &DMatrix<f64>, j: &DMatrix<f64>, i: usize, noise: f64) -> DMatrix<f64> {
-    let row = j.row(i).transpose();
-    let cr = c * &row;
-    let scale = noise + row.dot(&cr);
-    c - &cr * cr.transpose() / scale
 }

@@ -138,13 +138,7 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
         Some(estimates(&fitted.problem, best, &fitted.basis))
     };
     let hypotheses = hypotheses(&fitted, &decision, parameters.as_ref());
-    let second = decision.class.get(1).copied().or_else(|| {
-        (0..fitted.candidates.len()).find(|&i| i != leader && fitted.candidates[i].effects.len() == 1)
-    });
-    let next_experiment = match (decision.verdict, second) {
-        (Verdict::NoGap, _) | (_, None) => Vec::new(),
-        (_, Some(second)) => experiments(&fitted, table, rig, leader, second),
-    };
+    let next_experiment = experiments(&fitted, table, rig, &decision);
     let mut remarks = Vec::new();
     if table.still_coefficient().is_none() {
         remarks.push("No pass has the plate still: mu0 is unknown and was fitted; add w = 0 passes.".into());

@@ -31,6 +31,7 @@ pub struct Wildcard {
     pub log_evidence: f64,
     friction: f64,
     odd: f64,
+    white: f64,
     weights: DVector<f64>,
     covariance: Covariance,
     center: Vec<f64>,
@@ -176,11 +177,30 @@ impl Wildcard {
             log_evidence,
             friction,
             odd,
+            white,
             weights,
             covariance,
             center: center.to_vec(),
             smooth,
         }
+    }
+
+    /// Predicted lateral forces at other conditions, their covariance without scatter, and the variance of the white
+    /// excess there (N, N^2, N^2).
+    pub fn belief(&self, problem: &Problem, passes: &[Operating]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
+        let (baseline, phi, sizes) = rows(
+            problem,
+            &self.center,
+            passes,
+            &self.coordinates,
+            (&self.kernel, &self.lengths),
+            (self.friction, self.odd),
+        );
+        let r = self.kernel.rank();
+        let shift = phi.columns(2 * r, NUISANCES) * DVector::from_column_slice(&self.center[..NUISANCES]);
+        let mean = baseline - shift + &phi * &self.weights;
+        let white = sizes.iter().map(|s| (self.white * s).powi(2)).collect();
+        (mean, self.covariance.posterior_covariance(&phi), white)
     }
 
     /// Predicted lateral force and its standard deviation (without pass scatter) at other conditions, N.

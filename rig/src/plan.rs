@@ -104,6 +104,8 @@ pub struct Series {
     pub position_m: Vec<f64>,
     /// Pa: needs a chamber; passes are grouped by pressure.
     pub ambient_pressure_pa: Vec<f64>,
+    /// Directions of this series alone, 1 and -1; empty for the plan's.
+    pub directions: Vec<i8>,
 }
 
 const fn yes() -> bool {
@@ -162,7 +164,8 @@ impl Plan {
         if file.series.is_empty() {
             return Err(bad(&["name"], "a plan needs at least one [[series]]").into());
         }
-        if file.directions.is_empty() || file.directions.iter().any(|d| *d != 1 && *d != -1) {
+        let listed = file.directions.iter().chain(file.series.iter().flat_map(|s| &s.directions));
+        if file.directions.is_empty() || listed.into_iter().any(|d| *d != 1 && *d != -1) {
             return Err(bad(&["directions"], "directions are 1, -1 or both").into());
         }
         if !(1..=1000).contains(&file.replicates) {

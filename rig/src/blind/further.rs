@@ -1,11 +1,13 @@
 //! Designed next experiments against random ones: how many further passes until the cause is named.
 //!
 //! A sealed set is thinned until it hardly tells its cause; then batches of passes are measured on the same sealed rig,
-//! once as the diagnosis asks for them and once at random conditions of the same grid, until the truth has a
-//! probability of 0.9 or the passes run out.
+//! once as the diagnosis asks for them and once at conditions drawn evenly from the grid that designs choose from, until
+//! the truth has a probability of 0.9 or the passes run out. Both sides meet the same stream of noise.
 
+use super::{Figure, median, share, statistic};
 use diagnosis::data::{Rig, Table};
 use diagnosis::hypotheses::Options;
+use diagnosis::next;
 use diagnosis::verdict::diagnose;
 use models::condition::Condition;
 use models::quantity::{Direction, PeakToPeak};
@@ -15,13 +17,32 @@ use serde::Serialize;
 use sim::noise::Noise;
 use sim::sealed::{Ask, Stratum, generate_with_rig};
 
-/// Passes that a thinned set keeps, of which at least a sixth with the plate still.
-const KEPT: usize = 36;
+/// Passes that a thinned set keeps: the most of these at which its cause is not plain. A sixth with the plate still.
+const KEPT: [usize; 3] = [48, 36, 24];
 /// Passes of a batch, and batches.
-const BATCH: usize = 12;
-const BATCHES: usize = 8;
+const BATCH: usize = 6;
+const BATCHES: usize = 16;
+/// Passes at which a race is broken off: who has not arrived counts with so many.
+pub const LIMIT: usize = BATCH * BATCHES;
 /// Probability at which a cause counts as found.
 const FOUND: f64 = 0.9;
+/// chi2 by which the whole set tells its cause from the recalibrated baseline: 100 and more enters.
+const TOLD: f64 = 100.0;
+
+/// What the diagnosis said after a batch.
+#[derive(Debug, Clone, Serialize)]
+pub struct Step {
+    /// Further passes so far.
+    pub passes: usize,
+    /// Probability of the truth.
+    pub truth: f64,
+    /// Probability of the open set.
+    pub unknown: f64,
+    /// The likeliest hypothesis.
+    pub leader: String,
+    /// Share of the gap that it closed on left-out regions.
+    pub closure: f64,
+}
 
 /// What it took to name the cause of one set.
 #[derive(Debug, Clone, Serialize)]
@@ -30,12 +51,18 @@ pub struct Race {
     pub seed: u64,
     /// The cause.
     pub truth: String,
+    /// Passes that were kept.
+    pub kept: usize,
     /// Probability of the truth before any further pass.
     pub before: f64,
     /// Further passes as designed; none where they did not suffice.
     pub designed: Option<usize>,
     /// Further passes at random.
     pub random: Option<usize>,
+    /// Batch by batch as designed.
+    pub designed_steps: Vec<Step>,
+    /// Batch by batch at random.
+    pub random_steps: Vec<Step>,
 }
 
 /// Races over `count` sets; those whose cause is plain from the start are left out.
@@ -53,96 +80,147 @@ pub fn run(seed: u64, count: usize) -> miette::Result<Vec<Race>> {
 fn one(seed: u64) -> miette::Result<Option<Race>> {
     let set = generate_with_rig(seed, Stratum::Single, Ask::Imitators).0;
     let imitated = set.label.imitators.iter().any(|i| i.chi2_left < 10.0 + 0.0225 * set.label.chi2_gain);
-    if set.label.chi2_gain < 100.0 || imitated {
+    if set.label.chi2_gain < TOLD || imitated {
         return Ok(None);
     }
     let truth = set.label.causes[0].name.clone();
     let rig: Rig = toml::from_str(&set.rig_toml).map_err(|e| miette::miette!("rig.toml: {e}"))?;
-    let start = thinned(&set.passes);
-    let before = says(&start, &rig, &truth)?.0;
-    if before >= FOUND {
-        return Ok(None);
-    }
-    let race = |designed: bool| -> miette::Result<Option<usize>> {
-        // Each side has the rig to itself: the same finger, its own further noise.
+    let Some((kept, start, first)) = thin(&set.passes, &rig, &truth)? else { return Ok(None) };
+    let grid = grid(&start)?;
+    let race = |designed: bool| -> miette::Result<Vec<Step>> {
+        // Each side has the rig to itself: the same finger, the same stream of further noise.
         let mut sealed = generate_with_rig(seed, Stratum::Single, Ask::Gain).1;
-        let mut noise = Noise::new(seed, "random experiments");
-        let mut passes = start.clone();
+        let mut chance = Noise::new(seed, "random experiments");
+        let (mut passes, mut asked) = (start.clone(), first.asked.clone());
+        let mut steps = Vec::new();
         for batch in 1..=BATCHES {
-            let wanted = if designed { says(&passes, &rig, &truth)?.1 } else { Vec::new() };
-            let wanted = if wanted.is_empty() { at_random(&start, &mut noise) } else { wanted };
+            let wanted = if designed && !asked.is_empty() {
+                std::mem::take(&mut asked)
+            } else {
+                (0..BATCH).map(|_| grid[chance.below(grid.len())]).collect()
+            };
             let mut further = sealed.measure(&wanted);
             for pass in &mut further {
                 pass.run = Some(format!("further {batch}"));
             }
             passes.extend(further);
-            if says(&passes, &rig, &truth)?.0 >= FOUND {
-                return Ok(Some(batch * BATCH));
+            let said = says(&passes, &rig, &truth)?;
+            asked = said.asked;
+            steps.push(Step { passes: batch * BATCH, ..said.step });
+            if said.found >= FOUND {
+                break;
             }
         }
-        Ok(None)
+        Ok(steps)
     };
-    Ok(Some(Race { seed, before, designed: race(true)?, random: race(false)?, truth }))
+    let (designed_steps, random_steps) = (race(true)?, race(false)?);
+    let arrived = |steps: &[Step]| steps.last().filter(|s| s.truth >= FOUND).map(|s| s.passes);
+    Ok(Some(Race {
+        seed,
+        truth,
+        kept,
+        before: first.found,
+        designed: arrived(&designed_steps),
+        random: arrived(&random_steps),
+        designed_steps,
+        random_steps,
+    }))
+}
+
+/// Figures of races: who arrived, and the ratio of passes where at least one side did.
+pub fn figures(races: &[Race]) -> Vec<Figure> {
+    let passes = |n: Option<usize>| n.unwrap_or(LIMIT) as f64;
+    let decided = races.iter().filter(|r| r.designed.is_some() || r.random.is_some());
+    let ratios: Vec<f64> = decided.map(|r| passes(r.designed) / passes(r.random)).collect();
+    let of = |name, side: fn(&Race) -> Option<usize>| {
+        let list: Vec<f64> = races.iter().map(|r| passes(side(r))).collect();
+        statistic(name, "", &list, median)
+    };
+    let geometric = |v: &mut [f64]| (v.iter().map(|x| x.ln()).sum::<f64>() / v.len() as f64).exp();
+    vec![
+        share("designed: arrived", "", races.iter().map(|r| r.designed.is_some()).collect()),
+        share("random: arrived", "", races.iter().map(|r| r.random.is_some()).collect()),
+        of("designed: median passes", |r| r.designed),
+        of("random: median passes", |r| r.random),
+        statistic("passes designed over random, median", "0.5", &ratios, median),
+        statistic("passes designed over random, geometric mean", "", &ratios, geometric),
+    ]
+}
+
+/// The largest thinned set that does not tell its cause, with what the diagnosis says of it.
+fn thin(passes: &[Pass], rig: &Rig, truth: &str) -> miette::Result<Option<(usize, Vec<Pass>, Said)>> {
+    for kept in KEPT {
+        let start = thinned(passes, kept);
+        let said = says(&start, rig, truth)?;
+        if said.found < FOUND {
+            return Ok(Some((kept, start, said)));
+        }
+    }
+    Ok(None)
 }
 
 /// Every so many passes of a set, as if the sweep had been broken off.
-fn thinned(passes: &[Pass]) -> Vec<Pass> {
+fn thinned(passes: &[Pass], keep: usize) -> Vec<Pass> {
     let (still, moving): (Vec<&Pass>, Vec<&Pass>) = passes.iter().partition(|p| p.amplitude.metres() == 0.0);
     let some = |list: &[&Pass], count: usize| -> Vec<Pass> {
         let step = list.len().div_ceil(count.max(1)).max(1);
         list.iter().step_by(step).map(|p| (*p).clone()).collect()
     };
-    let mut kept = some(&still, KEPT / 6);
-    kept.extend(some(&moving, KEPT - KEPT / 6));
+    let mut kept = some(&still, keep / 6);
+    kept.extend(some(&moving, keep - keep / 6));
     for pass in &mut kept {
         pass.run = Some(pass.run.take().unwrap_or_else(|| "first".to_string()));
     }
     kept
 }
 
-/// Probability of the truth, and the conditions asked for next.
-fn says(passes: &[Pass], rig: &Rig, truth: &str) -> miette::Result<(f64, Vec<Condition>)> {
-    let table = Table::measured(passes).map_err(|e| miette::miette!("table of a sealed set: {e}"))?;
-    let options = Options { pairs: false, ..Options::default() };
-    let report = diagnose(&table, rig, &options, String::new()).report;
-    let probability = report.hypotheses.iter().filter(|h| h.effects == [truth]).map(|h| h.probability).sum();
-    let asked = report.next_experiment.iter().find(|e| !e.conditions.is_empty());
-    let conditions = asked.map_or_else(Vec::new, |e| {
-        e.conditions
-            .iter()
-            .take(BATCH)
-            .map(|c| Condition {
-                amplitude: PeakToPeak::from_metres(c.amplitude_pp_m),
-                frequency_hz: c.frequency_hz,
-                speed_m_s: c.speed_m_s,
-                direction: if c.direction < 0.0 { Direction::Backward } else { Direction::Forward },
-                normal_force_n: c.normal_force_n,
-                mu0: 0.5,
-                position_m: passes[0].position_m,
-                time_s: 0.0,
-                ambient_pressure_pa: c.ambient_pressure_pa,
-            })
-            .collect()
-    });
-    Ok((probability, conditions))
+/// What the diagnosis says of some passes.
+struct Said {
+    /// Probability of the truth.
+    found: f64,
+    step: Step,
+    /// The conditions asked for next, a batch of them.
+    asked: Vec<Condition>,
 }
 
-/// Conditions whose values are drawn independently from those of the passes.
-fn at_random(passes: &[Pass], noise: &mut Noise) -> Vec<Condition> {
-    (0..BATCH)
-        .map(|_| {
-            let mut any = || &passes[noise.below(passes.len())];
-            Condition {
-                amplitude: any().amplitude,
-                frequency_hz: any().frequency_hz,
-                speed_m_s: any().speed_m_s,
-                direction: any().direction,
-                normal_force_n: any().normal_force_n,
-                mu0: 0.5,
-                position_m: any().position_m,
-                time_s: 0.0,
-                ambient_pressure_pa: any().ambient_pressure_pa,
-            }
-        })
-        .collect()
+fn says(passes: &[Pass], rig: &Rig, truth: &str) -> miette::Result<Said> {
+    let options = Options { pairs: false, ..Options::default() };
+    let report = diagnose(&table(passes)?, rig, &options, String::new()).report;
+    let of = |name: &str| -> f64 {
+        report.hypotheses.iter().filter(|h| h.effects == [name]).map(|h| h.probability).sum()
+    };
+    let asked = report.next_experiment.iter().find(|e| !e.conditions.is_empty());
+    let asked = asked.map_or_else(Vec::new, |e| e.conditions.iter().take(BATCH).map(condition).collect());
+    let found = of(truth);
+    let step = Step {
+        passes: 0,
+        truth: found,
+        unknown: of("unknown"),
+        leader: report.hypotheses[0].effects.join("+"),
+        closure: report.left_out.pooled_closure,
+    };
+    Ok(Said { found, step, asked })
+}
+
+fn table(passes: &[Pass]) -> miette::Result<Table> {
+    Table::measured(passes).map_err(|e| miette::miette!("table of a sealed set: {e}"))
+}
+
+/// The conditions that a design of these passes may choose from.
+fn grid(passes: &[Pass]) -> miette::Result<Vec<Condition>> {
+    Ok(next::grid::conditions(&table(passes)?).iter().map(|p| condition(&next::Condition::of(p))).collect())
+}
+
+fn condition(c: &next::Condition) -> Condition {
+    Condition {
+        amplitude: PeakToPeak::from_metres(c.amplitude_pp_m),
+        frequency_hz: c.frequency_hz,
+        speed_m_s: c.speed_m_s,
+        direction: if c.direction < 0.0 { Direction::Backward } else { Direction::Forward },
+        normal_force_n: c.normal_force_n,
+        mu0: 0.5,
+        position_m: c.position_m,
+        time_s: 0.0,
+        ambient_pressure_pa: c.ambient_pressure_pa,
+    }
 }

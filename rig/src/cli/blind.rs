@@ -123,38 +123,40 @@ fn same_form(args: &Args, json: bool) -> miette::Result<ExitCode> {
 
 /// Passes until a probability of 0.9, designed and at random.
 fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
-    let races = crate::blind::further::run(args.seed, args.sets)?;
-    // Who does not arrive is counted with infinitely many passes: medians stay right.
-    let median = |of: &dyn Fn(&crate::blind::further::Race) -> Option<usize>| {
-        let mut list: Vec<f64> = races.iter().map(|r| of(r).map_or(f64::INFINITY, |n| n as f64)).collect();
-        list.sort_by(f64::total_cmp);
-        list.get(list.len() / 2).copied().unwrap_or(f64::NAN)
-    };
-    let arrived = |of: &dyn Fn(&crate::blind::further::Race) -> Option<usize>| {
-        races.iter().filter(|r| of(r).is_some()).count()
-    };
-    let (designed, random) = (median(&|r| r.designed), median(&|r| r.random));
+    use crate::blind::further::{self, LIMIT};
+    let races = further::run(args.seed, args.sets)?;
+    let figures = further::figures(&races);
     if json {
         let document = serde_json::json!({
-            "schema": "muprime.blind.further/1", "median_designed": designed, "median_random": random, "races": races,
+            "schema": "muprime.blind.further/2", "limit": LIMIT, "figures": figures, "races": races,
         });
         println!("{}", serde_json::to_string(&document).into_diagnostic()?);
-    } else {
-        println!(
-            "further passes to a probability of 0.9 on the truth, {} sets not plain at first:",
-            races.len()
-        );
-        println!("  designed: median {designed}, arrived {}", arrived(&|r| r.designed));
-        println!("  random:   median {random}, arrived {}", arrived(&|r| r.random));
-        let better = races
-            .iter()
-            .filter(|r| r.designed.unwrap_or(usize::MAX) < r.random.unwrap_or(usize::MAX))
-            .count();
-        let worse = races
-            .iter()
-            .filter(|r| r.designed.unwrap_or(usize::MAX) > r.random.unwrap_or(usize::MAX))
-            .count();
-        println!("  designed sooner in {better}, later in {worse}");
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("further passes to a probability of 0.9 on the truth, {} sets not plain at first:", races.len());
+    for f in figures {
+        let ci = f.ci95.unwrap_or([f64::NAN; 2]);
+        let value = f.value.unwrap_or(f64::NAN);
+        println!("  {:46} {value:7.3} [{:.3}, {:.3}]  n {}  {}", f.name, ci[0], ci[1], f.n, f.target);
+    }
+    let count = |of: &dyn Fn(usize, usize) -> bool| {
+        let passes = |n: Option<usize>| n.unwrap_or(usize::MAX);
+        races.iter().filter(|r| of(passes(r.designed), passes(r.random))).count()
+    };
+    println!("  designed sooner in {}, later in {}", count(&|d, r| d < r), count(&|d, r| d > r));
+    if args.verbose {
+        for r in &races {
+            let passes = |n: Option<usize>| n.map_or(format!("> {LIMIT}"), |n| n.to_string());
+            eprintln!(
+                "{} {:26} kept {} before {:.3} designed {} random {}",
+                r.seed,
+                r.truth,
+                r.kept,
+                r.before,
+                passes(r.designed),
+                passes(r.random)
+            );
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

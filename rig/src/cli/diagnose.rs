@@ -202,22 +202,39 @@ fn predictions(result: &Diagnosis, conditions: &Table) -> String {
     text
 }
 
-/// The plan of a designed experiment: its conditions in the order of their gain.
+/// The plan of a designed experiment, one series a condition: those that tell most first, grouped by pressure, since
+/// a chamber is changed once.
 fn plan(experiment: &diagnosis::next::Experiment) -> String {
+    let mut conditions = experiment.conditions.clone();
+    let pressure = |c: &diagnosis::next::Condition| c.ambient_pressure_pa.unwrap_or(0.0);
+    conditions.sort_by(|a, b| pressure(b).total_cmp(&pressure(a)));
+    let Some(base) = conditions.first() else { return String::new() };
+    let about = toml::Value::String(experiment.text.clone());
     let mut text = format!(
-        "# {}\n# separates {} and {}\n",
-        experiment.text, experiment.separates[0], experiment.separates[1]
+        "name = \"next-experiment\"\nabout = {about}\nrandomise = false\n\n[base]\n{}",
+        settings(base, |name, value| format!("{name} = {value:e}\n"))
     );
-    for c in &experiment.conditions {
-        text.push_str(&format!(
-            "\n[[point]]\namplitude_pp_m = {:e}\nfrequency_hz = {:e}\nspeed_m_s = {:e}\ndirection = {}\nnormal_force_n = {:e}\n",
-            c.amplitude_pp_m, c.frequency_hz, c.speed_m_s, c.direction as i8, c.normal_force_n
-        ));
+    for c in &conditions {
+        text.push_str(&format!("\n[[series]]\ndirections = [{}]\n", c.direction as i8));
+        text.push_str(&settings(c, |name, value| format!("{name} = [{value:e}]\n")));
         if let Some(p) = c.ambient_pressure_pa {
-            text.push_str(&format!("ambient_pressure_pa = {p:e}\n"));
+            text.push_str(&format!("ambient_pressure_pa = [{p:e}]\n"));
         }
     }
     text
+}
+
+fn settings(c: &diagnosis::next::Condition, line: impl Fn(&str, f64) -> String) -> String {
+    [
+        ("amplitude_pp_m", c.amplitude_pp_m),
+        ("frequency_hz", c.frequency_hz),
+        ("speed_m_s", c.speed_m_s),
+        ("normal_force_n", c.normal_force_n),
+        ("position_m", c.position_m),
+    ]
+    .into_iter()
+    .map(|(name, value)| line(name, value))
+    .collect()
 }
 
 fn write_text(path: &Path, text: &str) -> miette::Result<()> {
@@ -293,4 +310,58 @@ pub fn terminal(result: &Diagnosis) -> String {
         text.push_str(&format!("\n{remark}\n"));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plan;
+    use crate::plan::{Plan, Resolution};
+    use diagnosis::next::{Condition, Experiment};
+    use realtime::ports::Nanos;
+    use realtime::safety::Limits;
+
+    #[test]
+    fn a_saved_plan_asks_for_the_designed_passes() {
+        let one = Condition {
+            amplitude_pp_m: 3e-6,
+            frequency_hz: 27_500.0,
+            speed_m_s: 0.02,
+            direction: -1.0,
+            normal_force_n: 0.4,
+            position_m: 0.001,
+            ambient_pressure_pa: Some(101_325.0),
+        };
+        let thin = Condition { ambient_pressure_pa: Some(20_000.0), direction: 1.0, ..one };
+        let conditions = vec![thin, one, Condition { speed_m_s: 0.01, ..thin }, one];
+        let experiment = Experiment {
+            conditions: conditions.clone(),
+            separates: ["a".to_string(), "b".to_string()],
+            expected_nats: 3.0,
+            text: "4 passes that part \"a\" from b".to_string(),
+        };
+        let plan = Plan::parse("next.toml", &plan(&experiment)).expect("a plan that can be read");
+        let resolution = Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
+        let points =
+            plan.points(1, &Limits::paper(Nanos(1_000_000)), &resolution).expect("a plan within limits");
+        let mut asked: Vec<[f64; 4]> = points
+            .iter()
+            .filter(|p| !p.reference)
+            .map(|p| {
+                let c = &p.condition;
+                [c.speed_m_s, c.direction.sign(), c.position_m, c.ambient_pressure_pa.unwrap_or(0.0)]
+            })
+            .collect();
+        let mut wanted: Vec<[f64; 4]> = conditions
+            .iter()
+            .map(|c| [c.speed_m_s, c.direction, c.position_m, c.ambient_pressure_pa.unwrap_or(0.0)])
+            .collect();
+        let order = |a: &[f64; 4], b: &[f64; 4]| a.partial_cmp(b).expect("finite settings");
+        asked.sort_by(order);
+        wanted.sort_by(order);
+        assert_eq!(asked, wanted);
+        // Each pressure is set once.
+        let mut pressures: Vec<_> = points.iter().map(|p| p.condition.ambient_pressure_pa).collect();
+        pressures.dedup();
+        assert_eq!(pressures.len(), 2);
+    }
 }

@@ -60,6 +60,8 @@ pub(super) struct Wanted {
     pub(super) normal_force_n: f64,
     pub(super) position_m: f64,
     pub(super) ambient_pressure_pa: Option<f64>,
+    /// The series' own direction; none where the plan's are made in turn.
+    pub(super) direction: Option<i8>,
 }
 
 impl Wanted {
@@ -102,6 +104,10 @@ impl Plan {
             [] => vec![None],
             listed => listed.iter().copied().map(Some).collect(),
         };
+        let directions: Vec<Option<i8>> = match &series.directions[..] {
+            [] => vec![None],
+            listed => listed.iter().copied().map(Some).collect(),
+        };
         let mut conditions = Vec::new();
         for &ambient_pressure_pa in &pressures {
             for &frequency_hz in &or_base(&series.frequency_hz, base.frequency_hz) {
@@ -109,14 +115,15 @@ impl Plan {
                     for &normal_force_n in &or_base(&series.normal_force_n, base.normal_force_n) {
                         for &position_m in &or_base(&series.position_m, base.position_m) {
                             for &amplitude_pp_m in &or_base(&series.amplitude_pp_m, base.amplitude_pp_m) {
-                                conditions.push(Wanted {
+                                conditions.extend(directions.iter().map(|&direction| Wanted {
                                     amplitude_pp_m: resolution.amplitude(amplitude_pp_m),
                                     frequency_hz: resolution.frequency(frequency_hz),
                                     speed_m_s,
                                     normal_force_n,
                                     position_m,
                                     ambient_pressure_pa,
-                                });
+                                    direction,
+                                }));
                             }
                         }
                     }
@@ -156,7 +163,8 @@ impl Plan {
     }
 
     fn visit(&self, points: &mut Vec<Point>, wanted: &Wanted, replicate: u32, reference: bool) {
-        for sign in &self.file.directions {
+        let own = wanted.direction.map(|d| [d]);
+        for sign in own.as_ref().map_or(&self.file.directions[..], |d| &d[..]) {
             let direction = Direction::try_from(*sign).expect("checked when the plan was read");
             points.push(Point {
                 number: points.len() as u32,

@@ -1,0 +1,277 @@
+//! Which conditions: greedily those after which the hypotheses are least confused.
+//!
+//! Two hypotheses of probabilities p and q are confused by at most `sqrt(p q) exp(-B)`, B the Bhattacharyya distance of
+//! what they expect of all chosen passes together. For Gaussians of like covariance B is an eighth of the sum of both
+//! Kullback-Leibler divergences, and those add up from pass to pass, each given the passes before it. The design
+//! minimises the sum over all pairs: a pair that is parted stops drawing passes, a condition that a hypothesis has
+//! learnt stops telling.
+
+use super::belief::Belief;
+use nalgebra::{DMatrix, DVector};
+
+/// Nats that one pass may count for: beyond them an outlier is the likelier explanation.
+const PASS_NATS: f64 = 4.0;
+
+/// Chooses `count` passes; a condition may come again. Rows of the grid, in the order of their worth.
+pub fn greedy(held: &[Belief], count: usize) -> Vec<usize> {
+    let n = held.first().map_or(0, |b| b.mean.len());
+    let k = held.len();
+    let mut known: Vec<DMatrix<f64>> = held.iter().map(|b| b.covariance.clone()).collect();
+    // What `j` expects once it has seen what `i` expects, at j + k i.
+    let mut seen: Vec<DVector<f64>> = (0..k * k).map(|ij| held[ij % k].mean.clone()).collect();
+    let mut nats = vec![0.0; k * k];
+    let mut chosen = Vec::new();
+    for _ in 0..count {
+        let mut best: Option<(usize, f64)> = None;
+        for c in 0..n {
+            let mut confused = 0.0;
+            for i in 0..k {
+                for j in 0..i {
+                    let told = both(held, &known, &seen, (i, j), c).min(PASS_NATS);
+                    let weight = (held[i].probability * held[j].probability).sqrt();
+                    confused += weight * (-(nats[j + k * i] + told) / 4.0).exp();
+                }
+            }
+            if best.is_none_or(|(_, least)| confused < least) {
+                best = Some((c, confused));
+            }
+        }
+        let Some((c, _)) = best else { break };
+        for i in 0..k {
+            for j in 0..i {
+                nats[j + k * i] += both(held, &known, &seen, (i, j), c).min(PASS_NATS);
+            }
+        }
+        for j in 0..k {
+            let column = known[j].column(c) / (known[j][(c, c)] + held[j].scatter[c]);
+            for i in 0..k {
+                let surprise = held[i].mean[c] - seen[j + k * i][c];
+                seen[j + k * i].axpy(surprise, &column, 1.0);
+            }
+            let row = known[j].row(c).clone_owned();
+            known[j] -= column * row;
+        }
+        chosen.push(c);
+    }
+    chosen
+}
+
+/// Mean of both divergences that a further pass at `c` adds.
+fn both(
+    held: &[Belief],
+    known: &[DMatrix<f64>],
+    seen: &[DVector<f64>],
+    (i, j): (usize, usize),
+    c: usize,
+) -> f64 {
+    let k = held.len();
+    let variance = |h: usize| known[h][(c, c)].max(0.0) + held[h].scatter[c];
+    let one = |i: usize, j: usize| {
+        let (vi, vj) = (variance(i), variance(j));
+        let apart = held[i].mean[c] - seen[j + k * i][c];
+        0.5 * ((vi + apart * apart) / vj - 1.0 + (vj / vi).ln())
+    };
+    0.5 * (one(i, j) + one(j, i))
+}
+
+/// The hypothesis that the leader (the first) is most to be parted from.
+pub fn rival(held: &[Belief], chosen: &[usize]) -> Option<usize> {
+    if chosen.is_empty() {
+        return None;
+    }
+    (1..held.len()).max_by(|&a, &b| held[a].probability.total_cmp(&held[b].probability).then(b.cmp(&a)))
+}
+
+/// Expected gain of the log evidence of `a` over `b`'s by passes at those conditions, were `a` true: the
+/// Kullback-Leibler divergence of what both expect of them together.
+pub fn expected_nats(a: &Belief, b: &Belief, chosen: &[usize]) -> f64 {
+    let joint = |h: &Belief| {
+        let mut m = DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| h.covariance[(chosen[i], chosen[j])]);
+        for (i, &c) in chosen.iter().enumerate() {
+            m[(i, i)] += h.scatter[c];
+        }
+        m
+    };
+    let (ca, cb) = (joint(a), joint(b));
+    let apart = DVector::from_iterator(chosen.len(), chosen.iter().map(|&c| a.mean[c] - b.mean[c]));
+    let (Some(fa), Some(fb)) = (ca.clone().cholesky(), cb.cholesky()) else { return 0.0 };
+    let log_det = |m: &DMatrix<f64>| 2.0 * m.diagonal().iter().map(|d| d.ln()).sum::<f64>();
+    0.5 * (fb.solve(&ca).trace() + apart.dot(&fb.solve(&apart)) - chosen.len() as f64 + log_det(fb.l_dirty())
+        - log_det(fa.l_dirty()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attribute::decide;
+    use crate::data::{Noise, Rig, Table};
+    use crate::evidence::{Explained, explain};
+    use crate::fit::Problem;
+    use crate::hypotheses::{FORM_LENGTHS, Fitted, Options, fit_all};
+    use crate::next::{PASSES, belief::beliefs, grid};
+    use effects::{Active, Baseline, Design, Operating, by_name, lateral_force};
+
+    /// Normal deviates of a linear congruential generator, by the sum of twelve.
+    struct Deviates(u64);
+
+    impl Deviates {
+        fn uniform(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        }
+        fn normal(&mut self) -> f64 {
+            (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+        }
+    }
+
+    const RIG_NOISE: Noise = Noise { pass_relative_sd: 0.02, force_sd_n: 0.001 };
+
+    fn rig() -> Rig {
+        Rig { finger: models::finger::Finger::paper(), noise: RIG_NOISE, calibration: Default::default() }
+    }
+
+    /// Thirty-six passes under a law of friction that depends on speed.
+    fn table(draw: &mut Deviates) -> Table {
+        let finger = rig().finger;
+        let baseline = Baseline {
+            mu0: 0.5,
+            normal_stiffness_n_per_m: finger.normal_stiffness_n_per_m,
+            lateral_stiffness_n_per_m: finger.lateral_stiffness_n_per_m,
+        };
+        let design = Design {
+            duration_s: 180.0,
+            reference_load_n: 0.3,
+            reference_speed_m_s: 0.03,
+            reference_frequency_hz: 30e3,
+            reference_temperature_c: 20.0,
+            stroke_m: 0.0,
+            largest_amplitude_m: 3e-6,
+        };
+        let pick = |list: &[f64], draw: &mut Deviates| list[(draw.uniform() * list.len() as f64) as usize];
+        let passes: Vec<Operating> = (0..36)
+            .map(|i| Operating {
+                time_s: 5.0 * f64::from(i),
+                run_time_s: 5.0 * f64::from(i),
+                amplitude_pp_m: if i % 6 == 0 { 0.0 } else { pick(&[0.8e-6, 1.6e-6, 3e-6], draw) },
+                frequency_hz: 30e3,
+                speed_m_s: pick(&[0.01, 0.03, 0.09], draw),
+                direction: pick(&[1.0, -1.0], draw),
+                position_m: 0.0,
+                normal_force_n: pick(&[0.15, 0.3, 0.6], draw),
+                ambient_pressure_pa: None,
+                temperature_c: None,
+                relative_humidity_pct: None,
+            })
+            .collect();
+        let theta = [0.06];
+        let effect = by_name("rate_dependent_friction").expect("an effect of the library");
+        let active = [Active { effect, law: 0, theta: &theta }];
+        let lateral = passes
+            .iter()
+            .map(|p| {
+                let l = lateral_force(&baseline, &active, p, &design);
+                l * (1.0 + RIG_NOISE.pass_relative_sd * draw.normal()) + RIG_NOISE.force_sd_n * draw.normal()
+            })
+            .collect();
+        Table { points: (0..36).collect(), passes, lateral, runs: vec![0; 36], run_count: 1, design }
+    }
+
+    /// Log evidence of a hypothesis with further passes, or without.
+    fn evidence(fitted: &Fitted, e: &Explained, further: &[(Operating, f64, f64)]) -> f64 {
+        let mut problem = fitted.problem.clone();
+        for (p, force, variance) in further {
+            problem.passes.push(*p);
+            problem.lateral.push(*force);
+            problem.variance.push(*variance);
+        }
+        let largest = problem.design.largest_amplitude_m;
+        let places: Vec<_> =
+            problem.passes.iter().map(|p| fitted.coordinates.place(p, largest, &FORM_LENGTHS)).collect();
+        let problem: Problem = problem;
+        explain(&problem, &e.members, &e.u, &fitted.kernel.matrix(&places), e.share, 8).log_evidence
+    }
+
+    /// The stated nats are what evidence gains on average when the passes are made and the leader is true.
+    #[test]
+    fn expected_nats_are_what_the_evidence_gains_on_average() {
+        let mut draw = Deviates(5);
+        let table = table(&mut draw);
+        let fitted = fit_all(&table, &rig(), &Options { pairs: false, ..Options::default() });
+        let decision = decide(&fitted);
+        let grid = grid::conditions(&table);
+        let held = beliefs(&fitted, &rig(), &decision, &grid);
+        let chosen = greedy(&held, PASSES);
+        assert_eq!(chosen.len(), PASSES);
+        let of = |name: &str| {
+            &fitted.candidates.iter().find(|c| c.names().join("+") == name).expect("a candidate").best
+        };
+        let (a, b) = (of(&held[0].name), of(&held[1].name));
+        let before = evidence(&fitted, a, &[]) - evidence(&fitted, b, &[]);
+        let stated = expected_nats(&held[0], &held[1], &chosen);
+        let k = chosen.len();
+        let root = DMatrix::from_fn(k, k, |i, j| {
+            held[0].covariance[(chosen[i], chosen[j])] + if i == j { held[0].scatter[chosen[i]] } else { 0.0 }
+        })
+        .cholesky()
+        .expect("a covariance with scatter is positive definite")
+        .l();
+        let draws = 60;
+        let gains: Vec<f64> = (0..draws)
+            .map(|_| {
+                let deviates = DVector::from_fn(k, |_, _| draw.normal());
+                let off = &root * deviates;
+                let further: Vec<(Operating, f64, f64)> = chosen
+                    .iter()
+                    .enumerate()
+                    .map(|(i, &c)| (grid[c], held[0].mean[c] + off[i], held[0].scatter[c]))
+                    .collect();
+                evidence(&fitted, a, &further) - evidence(&fitted, b, &further) - before
+            })
+            .collect();
+        let mean = gains.iter().sum::<f64>() / f64::from(draws);
+        let names = (&held[0].name, &held[1].name);
+        assert!(stated > 0.5, "{names:?}: {stated:.2} nats");
+        // A third for what linear predictions leave out, and the scatter of the mean.
+        let sd =
+            (gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / f64::from(draws * (draws - 1))).sqrt();
+        assert!(
+            (mean - stated).abs() < 0.33 * stated + 2.0 * sd,
+            "{names:?}: stated {stated:.2}, gained {mean:.2} with an error of {sd:.2}"
+        );
+    }
+
+    fn belief(probability: f64, mean: [f64; 2], own: f64) -> Belief {
+        Belief {
+            name: String::new(),
+            probability,
+            mean: DVector::from_column_slice(&mean),
+            covariance: DMatrix::from_diagonal_element(2, 2, own),
+            scatter: vec![1.0; 2],
+        }
+    }
+
+    /// For two Gaussians of one known variance the divergence is half the squared distance, pass for pass.
+    #[test]
+    fn nats_of_certain_hypotheses_are_half_the_squared_distance() {
+        let (a, b) = (belief(0.5, [0.0, 3.0], 0.0), belief(0.5, [2.0, 1.0], 0.0));
+        assert!((expected_nats(&a, &b, &[0, 1]) - 4.0).abs() < 1e-12);
+        assert!((expected_nats(&a, &b, &[0, 0, 1]) - 6.0).abs() < 1e-12);
+    }
+
+    /// A condition about which a hypothesis is unsure is learnt by it and stops telling: the design goes on.
+    #[test]
+    fn a_condition_that_is_learnt_stops_drawing_passes() {
+        let sure = [belief(0.5, [0.0, 0.0], 0.0), belief(0.5, [3.0, 2.5], 0.0)];
+        assert_eq!(greedy(&sure, 2), [0, 0]);
+        let unsure = [belief(0.5, [0.0, 0.0], 9.0), belief(0.5, [3.0, 2.5], 9.0)];
+        assert_eq!(greedy(&unsure, 2), [0, 1]);
+    }
+
+    /// Passes go where the likely rival is parted, not where the unlikely one is.
+    #[test]
+    fn passes_go_to_the_likely_rival() {
+        let held =
+            [belief(0.6, [0.0, 0.0], 0.0), belief(0.38, [0.0, 1.0], 0.0), belief(0.02, [1.5, 0.0], 0.0)];
+        assert_eq!(greedy(&held, 1), [1]);
+    }
+}

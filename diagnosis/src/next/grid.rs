@@ -1,0 +1,133 @@
+//! Conditions that a next experiment may choose: every setting of a plan, within what the table has shown to be safe.
+
+use crate::data::Table;
+use effects::Operating;
+
+/// Conditions that a design looks at: the product of the levels, evenly thinned to so many.
+const MOST: usize = 320;
+/// Levels of amplitude above zero, of speed, of load, and of position; frequencies and pressures are the table's own.
+const AMPLITUDES: usize = 5;
+const SPEEDS: usize = 4;
+const LOADS: usize = 3;
+const POSITIONS: usize = 3;
+const FREQUENCIES: usize = 4;
+const PRESSURES: usize = 3;
+/// Stroke below which all passes lie at one place, m.
+const ONE_PLACE_M: f64 = 1e-3;
+/// Passes into a run at which further passes are expected.
+const INTO_RUN: f64 = 6.0;
+
+/// The conditions. Time is that of a further run, the environment that of the last pass.
+pub fn conditions(table: &Table) -> Vec<Operating> {
+    let passes = &table.passes;
+    let of = |f: &dyn Fn(&Operating) -> f64| -> Vec<f64> { passes.iter().map(f).collect() };
+    let vibrating: Vec<f64> = passes.iter().map(|p| p.amplitude_pp_m).filter(|w| *w > 0.0).collect();
+    let mut amplitudes = vec![0.0];
+    if !vibrating.is_empty() {
+        amplitudes.extend(in_ratio(vibrating, AMPLITUDES));
+    }
+    let mut frequencies = of(&|p| p.frequency_hz);
+    frequencies.sort_by(f64::total_cmp);
+    frequencies.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-3);
+    let mut pressures: Vec<Option<f64>> = passes.iter().map(|p| p.ambient_pressure_pa).collect();
+    pressures.sort_by(|a, b| a.unwrap_or(0.0).total_cmp(&b.unwrap_or(0.0)));
+    pressures.dedup();
+    let pressures = spread(&pressures, PRESSURES);
+    let positions = places(of(&|p| p.position_m));
+    let template = further(table);
+    let mut list = Vec::new();
+    for &amplitude_pp_m in &amplitudes {
+        for &frequency_hz in &spread(&frequencies, FREQUENCIES) {
+            for &speed_m_s in &in_ratio(of(&|p| p.speed_m_s), SPEEDS) {
+                for &normal_force_n in &in_ratio(of(&|p| p.normal_force_n), LOADS) {
+                    for &position_m in &positions {
+                        for &ambient_pressure_pa in &pressures {
+                            for direction in directions(table) {
+                                list.push(Operating {
+                                    amplitude_pp_m,
+                                    frequency_hz,
+                                    speed_m_s,
+                                    normal_force_n,
+                                    position_m,
+                                    direction,
+                                    ambient_pressure_pa,
+                                    ..template
+                                });
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+    let (low, high) = (positions[0], positions[positions.len() - 1]);
+    let shown = |p: &Operating| {
+        let as_fast = || passes.iter().filter(|q| q.speed_m_s > 0.95 * p.speed_m_s);
+        // A fast pass takes a long stroke: at the ends only as fast as passes were made there.
+        (p.position_m > low || as_fast().any(|q| q.position_m <= low))
+            && (p.position_m < high || as_fast().any(|q| q.position_m >= high))
+    };
+    if high > low {
+        list.retain(shown);
+    }
+    thinned(&list)
+}
+
+/// Directions of the table.
+fn directions(table: &Table) -> Vec<f64> {
+    [1.0, -1.0].into_iter().filter(|d| table.passes.iter().any(|p| p.direction == *d)).collect()
+}
+
+/// Evenly in the logarithm from the smallest to the largest.
+fn in_ratio(mut values: Vec<f64>, count: usize) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (values[0], values[values.len() - 1]);
+    if high <= low * 1.05 {
+        return vec![0.5 * (low + high)];
+    }
+    (0..count).map(|i| low * (high / low).powf(i as f64 / (count - 1) as f64)).collect()
+}
+
+/// Across the stretch that was used, less a tenth of the passes at each end; one place where there is but one.
+fn places(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (values[0], values[values.len() - 1]);
+    if high - low < ONE_PLACE_M {
+        return vec![values[values.len() / 2]];
+    }
+    let share = |i: usize| 0.1 + 0.8 * i as f64 / (POSITIONS - 1) as f64;
+    (0..POSITIONS).map(|i| values[((values.len() - 1) as f64 * share(i)).round() as usize]).collect()
+}
+
+/// At most so many of a sorted list, both ends among them.
+fn spread<T: Copy>(sorted: &[T], most: usize) -> Vec<T> {
+    if sorted.len() <= most {
+        return sorted.to_vec();
+    }
+    (0..most).map(|i| sorted[i * (sorted.len() - 1) / (most - 1)]).collect()
+}
+
+/// Steps through the product by a share that is far from every fraction, so that every pair of levels stays in.
+fn thinned(list: &[Operating]) -> Vec<Operating> {
+    if list.len() <= MOST {
+        return list.to_vec();
+    }
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    let mut rows: Vec<usize> =
+        (0..MOST).map(|k| ((k as f64 * golden).fract() * list.len() as f64) as usize).collect();
+    rows.sort_unstable();
+    rows.dedup();
+    rows.into_iter().map(|i| list[i]).collect()
+}
+
+/// A pass some way into a further run. Where the runs of a table follow each other in time the run comes last, else
+/// each run counts its own time.
+fn further(table: &Table) -> Operating {
+    let passes = &table.passes;
+    let last = *passes.last().expect("a table has passes");
+    let pace = passes.iter().map(|p| p.run_time_s).fold(0.0, f64::max) * table.run_count as f64
+        / passes.len() as f64;
+    let follow = table.run_count > 1 && table.runs.windows(2).all(|w| w[1] >= w[0]);
+    let into = INTO_RUN * pace;
+    Operating { run_time_s: into, time_s: if follow { last.time_s + into } else { into }, ..last }
+}
