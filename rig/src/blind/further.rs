@@ -79,8 +79,7 @@ pub fn run(seed: u64, count: usize) -> miette::Result<Vec<Race>> {
 
 fn one(seed: u64) -> miette::Result<Option<Race>> {
     let set = generate_with_rig(seed, Stratum::Single, Ask::Imitators).0;
-    let imitated = set.label.imitators.iter().any(|i| i.chi2_left < 10.0 + 0.0225 * set.label.chi2_gain);
-    if set.label.chi2_gain < TOLD || imitated {
+    if set.label.chi2_gain < TOLD || !set.label.decidable() {
         return Ok(None);
     }
     let truth = set.label.causes[0].name.clone();
