@@ -65,14 +65,14 @@ pub struct Race {
     pub random_steps: Vec<Step>,
 }
 
-/// Races over `count` sets; those whose cause is plain from the start are left out.
+/// Races over `count` sets, each told to `each` as it ends; those whose cause is plain from the start are left out.
 ///
 /// # Errors
 /// A set that the diagnosis refuses.
-pub fn run(seed: u64, count: usize) -> miette::Result<Vec<Race>> {
+pub fn run(seed: u64, count: usize, each: &(dyn Fn(&Race) + Sync)) -> miette::Result<Vec<Race>> {
     let all: miette::Result<Vec<Option<Race>>> = (0..count as u64)
         .into_par_iter()
-        .map(|k| one(seed.wrapping_mul(1_000_003).wrapping_add(k)))
+        .map(|k| Ok(one(seed.wrapping_mul(1_000_003).wrapping_add(k))?.inspect(each)))
         .collect();
     Ok(all?.into_iter().flatten().collect())
 }

@@ -124,7 +124,17 @@ fn same_form(args: &Args, json: bool) -> miette::Result<ExitCode> {
 /// Passes until a probability of 0.9, designed and at random.
 fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
     use crate::blind::further::{self, LIMIT};
-    let races = further::run(args.seed, args.sets)?;
+    let each = |r: &further::Race| {
+        let passes = |n: Option<usize>| n.map_or(format!("> {LIMIT}"), |n| n.to_string());
+        let (designed, random) = (passes(r.designed), passes(r.random));
+        if args.verbose {
+            eprintln!(
+                "{} {:26} kept {} before {:.3} designed {designed} random {random}",
+                r.seed, r.truth, r.kept, r.before
+            );
+        }
+    };
+    let races = further::run(args.seed, args.sets, &each)?;
     let figures = further::figures(&races);
     if json {
         let document = serde_json::json!({
@@ -144,19 +154,5 @@ fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
         races.iter().filter(|r| of(passes(r.designed), passes(r.random))).count()
     };
     println!("  designed sooner in {}, later in {}", count(&|d, r| d < r), count(&|d, r| d > r));
-    if args.verbose {
-        for r in &races {
-            let passes = |n: Option<usize>| n.map_or(format!("> {LIMIT}"), |n| n.to_string());
-            eprintln!(
-                "{} {:26} kept {} before {:.3} designed {} random {}",
-                r.seed,
-                r.truth,
-                r.kept,
-                r.before,
-                passes(r.designed),
-                passes(r.random)
-            );
-        }
-    }
     Ok(ExitCode::SUCCESS)
 }
