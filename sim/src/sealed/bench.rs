@@ -173,7 +173,7 @@ impl Bench {
         if self.scatter.tail > 2.0 { noise.heavy(self.scatter.tail) } else { noise.normal() }
     }
 
-    /// The table, with noise.
+    /// The table, with noise. A pass whose mean normal force reads zero or less counts as contact lost and is no pass.
     pub(super) fn measure(
         &self,
         points: &[Point],
@@ -202,6 +202,7 @@ impl Bench {
                 }
                 pass
             })
+            .filter(|pass| pass.normal_force_n > 0.0)
             .collect()
     }
 
