@@ -11,6 +11,7 @@ use crate::fit::{NUISANCES, Problem};
 use crate::hypotheses::{FORM_LENGTHS, Fitted};
 use effects::Operating;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Candidates that a design takes into account, and the probability each hypothesis counts for at least.
 const CANDIDATES: usize = 4;
@@ -48,9 +49,9 @@ pub fn beliefs(fitted: &Fitted, rig: &Rig, decision: &Decision, grid: &[Operatin
     let leader = decision.class[0];
     order.retain(|&i| i != leader);
     order.insert(0, leader);
+    order.truncate(CANDIDATES);
     let mut list: Vec<Belief> = order
-        .into_iter()
-        .take(CANDIDATES)
+        .into_par_iter()
         .map(|i| {
             let c = &fitted.candidates[i];
             let (mean, covariance) = expected(fitted, &problem, &basis, &c.best);

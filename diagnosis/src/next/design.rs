@@ -8,6 +8,7 @@
 
 use super::belief::Belief;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Nats that one pass may count for: beyond them an outlier is the likelier explanation.
 const PASS_NATS: f64 = 4.0;
@@ -22,21 +23,20 @@ pub fn greedy(held: &[Belief], count: usize) -> Vec<usize> {
     let mut nats = vec![0.0; k * k];
     let mut chosen = Vec::new();
     for _ in 0..count {
-        let mut best: Option<(usize, f64)> = None;
-        for c in 0..n {
-            let mut confused = 0.0;
+        let confused = |c: usize| -> f64 {
+            let mut sum = 0.0;
             for i in 0..k {
                 for j in 0..i {
                     let told = both(held, &known, &seen, (i, j), c).min(PASS_NATS);
                     let weight = (held[i].probability * held[j].probability).sqrt();
-                    confused += weight * (-(nats[j + k * i] + told) / 4.0).exp();
+                    sum += weight * (-(nats[j + k * i] + told) / 4.0).exp();
                 }
             }
-            if best.is_none_or(|(_, least)| confused < least) {
-                best = Some((c, confused));
-            }
-        }
-        let Some((c, _)) = best else { break };
+            sum
+        };
+        let left: Vec<f64> = (0..n).into_par_iter().map(confused).collect();
+        let best = (0..n).min_by(|&a, &b| left[a].total_cmp(&left[b]).then(a.cmp(&b)));
+        let Some(c) = best else { break };
         for i in 0..k {
             for j in 0..i {
                 nats[j + k * i] += both(held, &known, &seen, (i, j), c).min(PASS_NATS);

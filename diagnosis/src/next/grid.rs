@@ -4,7 +4,7 @@ use crate::data::Table;
 use effects::Operating;
 
 /// Conditions that a design looks at: the product of the levels, evenly thinned to so many.
-const MOST: usize = 320;
+const MOST: usize = 240;
 /// Levels of amplitude above zero, of speed, of load, and of position; frequencies and pressures are the table's own.
 const AMPLITUDES: usize = 5;
 const SPEEDS: usize = 4;
