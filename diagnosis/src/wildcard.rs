@@ -185,37 +185,28 @@ impl Wildcard {
         }
     }
 
+    /// Expected lateral forces at other conditions (N), the rows of the smooth part there, and the sizes on which a
+    /// departure is measured (N).
+    fn expected(&self, problem: &Problem, passes: &[Operating]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
+        let parts = (self.friction, self.odd);
+        let kernel = (&self.kernel, &self.lengths);
+        let (baseline, phi, sizes) = rows(problem, &self.center, passes, &self.coordinates, kernel, parts);
+        let r = self.kernel.rank();
+        let shift = phi.columns(2 * r, NUISANCES) * DVector::from_column_slice(&self.center[..NUISANCES]);
+        (baseline - shift + &phi * &self.weights, phi, sizes)
+    }
+
     /// Predicted lateral forces at other conditions, their covariance without scatter, and the variance of the white
     /// excess there (N, N^2, N^2).
     pub fn belief(&self, problem: &Problem, passes: &[Operating]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
-        let (baseline, phi, sizes) = rows(
-            problem,
-            &self.center,
-            passes,
-            &self.coordinates,
-            (&self.kernel, &self.lengths),
-            (self.friction, self.odd),
-        );
-        let r = self.kernel.rank();
-        let shift = phi.columns(2 * r, NUISANCES) * DVector::from_column_slice(&self.center[..NUISANCES]);
-        let mean = baseline - shift + &phi * &self.weights;
+        let (mean, phi, sizes) = self.expected(problem, passes);
         let white = sizes.iter().map(|s| (self.white * s).powi(2)).collect();
         (mean, self.covariance.posterior_covariance(&phi), white)
     }
 
     /// Predicted lateral force and its standard deviation (without pass scatter) at other conditions, N.
     pub fn predict(&self, problem: &Problem, passes: &[Operating]) -> (Vec<f64>, Vec<f64>) {
-        let (baseline, phi, _) = rows(
-            problem,
-            &self.center,
-            passes,
-            &self.coordinates,
-            (&self.kernel, &self.lengths),
-            (self.friction, self.odd),
-        );
-        let r = self.kernel.rank();
-        let shift = phi.columns(2 * r, NUISANCES) * DVector::from_column_slice(&self.center[..NUISANCES]);
-        let mean = baseline - shift + &phi * &self.weights;
+        let (mean, phi, _) = self.expected(problem, passes);
         let sd = (0..passes.len())
             .map(|i| self.covariance.posterior_variance(&phi.row(i).transpose()).max(0.0).sqrt())
             .collect();
