@@ -129,7 +129,15 @@ pub fn explain(
         }
     }
     let residual = &y - &m;
-    let (hessian, gradient) = equations(&covariance, &jacobian, &residual, &precision, &u);
+    let (mut hessian, gradient) = equations(&covariance, &jacobian, &residual, &precision, &u);
+    // A uniform prior bounds the integral where the data say nothing: a Gaussian of its own variance stands for it. Without,
+    // a shape that nothing depends on (an exponent, at size zero) would count with an endless volume.
+    let parameters = members.iter().flat_map(|member| member.parameters());
+    for (k, parameter) in parameters.enumerate().map(|(k, p)| (k + NUISANCES, p)) {
+        if let Prior::Uniform(..) = parameter.prior {
+            hessian[(k, k)] += 12.0 / (bounds[k].1 - bounds[k].0).powi(2);
+        }
+    }
     let log_2pi = 1.837_877_066_409_345_3;
     let d = u.len() as f64;
     let mut log_evidence = -0.5
@@ -219,4 +227,56 @@ pub fn over_forms(
     let best = (0..3).max_by(|&a, &b| weighted[a].total_cmp(&weighted[b])).expect("three shares");
     let [a, b, c] = list;
     (total, [a, b, c].into_iter().nth(best).expect("three shares"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::{Deviates, rig, table};
+    use crate::fit::minimise;
+    use crate::hypotheses::FORM_LENGTHS;
+    use crate::smooth::{Coordinates, Kernel};
+
+    /// Without a gap a law can gain no more than its best size does: at size zero its shapes change nothing, and a volume
+    /// that nothing limits must not count for it.
+    #[test]
+    fn a_law_without_effect_gains_nothing() {
+        let table = table(&mut Deviates(11), 0.0);
+        let mut problem = Problem::new(&table, &rig());
+        crate::noise::settle(&table, &rig(), &mut problem);
+        let coordinates = Coordinates::of(&table);
+        let largest = problem.design.largest_amplitude_m;
+        let places: Vec<_> =
+            problem.passes.iter().map(|p| coordinates.place(p, largest, &FORM_LENGTHS)).collect();
+        let basis = Kernel::new(&places, 20, 0.02).matrix(&places);
+        let none = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, 15);
+        let none = explain(&problem, &[], &none.u, &basis, 0.0, 4);
+        let mut tried = 0;
+        for effect in 0..effects::library().len() {
+            for law in 0..effects::library()[effect].laws().len() {
+                let member = Member { effect, law };
+                // Sizes at or near zero, shapes at an end of their range: where a fit without a gap may rest.
+                for (size, end) in [(0.0, false), (0.0, true), (1e-3, false), (1e-3, true)] {
+                    let mut u = none.u.clone();
+                    for (i, p) in member.parameters().iter().enumerate() {
+                        let (low, high) = p.coordinate_bounds();
+                        u.push(if i == 0 {
+                            low.max(0.0) + size
+                        } else if end {
+                            high
+                        } else {
+                            low
+                        });
+                    }
+                    let held = explain(&problem, &[member], &u, &basis, FORMS[1].0, 0);
+                    let gain = held.log_evidence - none.log_evidence;
+                    let name =
+                        (effects::library()[effect].name(), effects::library()[effect].laws()[law].name);
+                    assert!(gain.is_finite() && gain < 3.0, "{name:?}: {gain:.1} nats");
+                    tried += 1;
+                }
+            }
+        }
+        assert!(tried > 200, "{tried}");
+    }
 }

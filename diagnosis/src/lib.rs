@@ -6,6 +6,8 @@
 pub mod attribute;
 pub mod data;
 pub mod evidence;
+#[cfg(test)]
+mod example;
 pub mod explore;
 pub mod fit;
 pub mod held_out;

@@ -12,7 +12,7 @@ use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use rayon::prelude::*;
 use serde::Serialize;
-use sim::sealed::{ALIASES, Ask, DETECTABLE, Set, Stratum, generate};
+use sim::sealed::{Ask, DETECTABLE, PAIR_LEAVES, Set, Stratum, generate};
 use std::collections::BTreeMap;
 
 /// rms gap over floor on the hidden passes that the truth must leave to be detectable.
@@ -33,7 +33,7 @@ pub struct Scored {
     /// Oracle: no other effect imitates the truth.
     pub decidable: bool,
     /// Oracle: share of the gap that the best single of a pair leaves.
-    pub best_single_leaves: f64,
+    pub best_single_leaves: Option<f64>,
     /// The verdict.
     pub verdict: Verdict,
     /// Names of the first entry.
@@ -190,7 +190,7 @@ fn set(seed: u64, k: u64, stratum: Option<Stratum>) -> Set {
     let own = seed.wrapping_mul(1_000_003).wrapping_add(k);
     let stratum = stratum.unwrap_or_else(|| Stratum::draw(own));
     let ask = match stratum {
-        Stratum::Single | Stratum::Alias => Ask::Imitators,
+        Stratum::Single | Stratum::Alias | Stratum::Pair => Ask::Imitators,
         _ => Ask::Gain,
     };
     generate(own, stratum, ask)
@@ -281,7 +281,9 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
         all.iter().filter(|s| s.stratum == Stratum::Outside).filter(detectable).collect();
     let pairs: Vec<&Scored> = all
         .iter()
-        .filter(|s| s.stratum == Stratum::Pair && s.best_single_leaves >= 0.25)
+        .filter(|s| {
+            s.stratum == Stratum::Pair && s.best_single_leaves.is_some_and(|share| share >= PAIR_LEAVES)
+        })
         .filter(detectable)
         .collect();
     let of = |list: &[&Scored], f: &dyn Fn(&Scored) -> bool| list.iter().map(|s| f(s)).collect::<Vec<bool>>();
@@ -299,8 +301,12 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let honest: Vec<f64> = gapped.iter().filter_map(|s| Some((s.claimed? - s.achieved?).abs())).collect();
     let regions: Vec<f64> = all.iter().filter(detectable).filter_map(|s| s.region_f1).collect();
     let faint_regions: Vec<f64> = all.iter().filter(faint).filter_map(|s| s.region_f1).collect();
-    let distinct: Vec<&Scored> =
-        pairs.iter().copied().filter(|s| !s.truth.iter().any(|t| ALIASES.contains(&t.as_str()))).collect();
+    let (pairs, murky_pairs): (Vec<&Scored>, Vec<&Scored>) = pairs.iter().partition(|s| s.decidable);
+    // No gap, or a cause that the data show; of two causes, where no single one all but explains the gap.
+    let told = all.iter().filter(|s| {
+        let both = s.stratum != Stratum::Pair || s.best_single_leaves.is_some_and(|x| x >= PAIR_LEAVES);
+        s.stratum == Stratum::None || (detectable(s) && both)
+    });
     vec![
         share("singles, detectable and decidable: named right", ">= 0.90", of(&clear, &named_right)),
         share("  confidently wrong", "<= 0.02", of(&clear, &named_wrong)),
@@ -317,22 +323,23 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
         share("  confidently wrong", "<= 0.03", of(&murky, &named_wrong)),
         share("pairs whose best single leaves 25 %: both named", ">= 0.80", of(&pairs, &|s| s.top_right)),
         share("  at least one", ">= 0.97", of(&pairs, &any_of)),
-        share("pairs without exact aliases: both named", "reported", of(&distinct, &|s| s.top_right)),
+        share("  an undecidable member: both named", "reported", of(&murky_pairs, &|s| s.top_right)),
+        share("  an undecidable member: truth in the stated class", "reported", of(&murky_pairs, &in_class)),
         statistic("gap closed by the named form alone, median", ">= 0.75", &closed, median),
         statistic("gap closed by the verdict's model, median", "reported", &closed_full, median),
         statistic("claimed against achieved, median difference", "<= 0.05", &honest, median),
         statistic("where: mean F1 of the regions", ">= 0.80", &regions, mean),
         statistic("  gap below the floor: mean F1", "reported", &faint_regions, mean),
-        calibration(all),
+        calibration("calibration error of the first entry, debiased", all.iter()),
+        calibration("  of sets whose truth can be told", told),
     ]
 }
 
 /// Debiased calibration error of the first entry's probability, in ten bins of equal count.
-fn calibration(all: &[Scored]) -> Figure {
+fn calibration<'a>(name: &'static str, sets: impl Iterator<Item = &'a Scored>) -> Figure {
     let mut list: Vec<(f64, f64)> =
-        all.iter().map(|s| (s.top_probability, f64::from(u8::from(s.top_right)))).collect();
+        sets.map(|s| (s.top_probability, f64::from(u8::from(s.top_right)))).collect();
     list.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let name = "calibration error of the first entry, debiased";
     if list.len() < 50 {
         return Figure { name, value: None, ci95: None, n: list.len(), target: "<= 0.05" };
     }

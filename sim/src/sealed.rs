@@ -31,6 +31,7 @@ use bench::Bench;
 pub use bench::SetNoise;
 use design::{Design, Planned};
 use imitate::Imitator;
+use oracle::{Case, Fit};
 
 /// What kind of truth a set holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -116,8 +117,9 @@ pub struct Label {
     /// chi2 by which the truth is better than the recalibrated baseline, from noise-free forces. 30 and more:
     /// detectable.
     pub chi2_gain: f64,
-    /// Share of the recalibrated gap that the best single cause of the truth leaves (pairs only; else 0).
-    pub best_single_leaves: f64,
+    /// Share of the recalibrated gap that the best single cause of the library leaves, its size, its shapes and the
+    /// stiffnesses sought for it alone; none but for detectable pairs of which it was asked.
+    pub best_single_leaves: Option<f64>,
     /// Rms over the hidden passes of the nominal baseline's error over mu0 F.
     pub hidden_before_rmse: f64,
     /// The same for the recalibrated baseline.
@@ -136,8 +138,9 @@ pub struct Label {
     pub design: Design,
     /// The causes, strongest first; none for `none`.
     pub causes: Vec<Cause>,
-    /// Best imitations by other library causes, best first; empty where they were not asked for, and where the gain is
-    /// under [`DETECTABLE`].
+    /// Best imitations by library causes, best first: of each cause while the others act beside it; for pairs of which
+    /// the best single leaves less than [`PAIR_LEAVES`], of both together. Empty where they were not asked for, and
+    /// where the gain is under [`DETECTABLE`].
     pub imitators: Vec<Imitator>,
 }
 
@@ -183,6 +186,8 @@ pub enum Ask {
 
 /// chi2 by which the truth must beat the recalibrated baseline for a set to show its cause at all.
 pub const DETECTABLE: f64 = 30.0;
+/// Share of the gap that the best single cause must leave for both causes to be asked for.
+pub const PAIR_LEAVES: f64 = 0.25;
 /// Passes hidden for scoring.
 const HIDDEN: usize = 100;
 
@@ -241,16 +246,10 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
     let base = case.fit(&Defects::none(), 8);
     let truth = case.fit_from(&bench.finger, &defects, 2);
     let gain = base.chi2 - truth.chi2;
-    let alone = |defect: &Defect| {
-        let one = Defects { defects: vec![*defect], channels: Vec::new() };
-        (case.fit(&one, 5).chi2 - truth.chi2).max(0.0) / gain.max(1e-9)
-    };
-    let best_single_leaves =
-        if kinds.len() > 1 { defects.defects.iter().map(alone).fold(1.0, f64::min) } else { 0.0 };
-    let imitators = match ask {
-        Ask::Gain => Vec::new(),
-        _ if gain < DETECTABLE => Vec::new(),
-        _ => case.imitators(&kinds, &base, truth.chi2, ask == Ask::AllImitators),
+    let (best_single_leaves, imitators) = match ask {
+        Ask::Gain => (None, Vec::new()),
+        _ if gain < DETECTABLE || kinds.is_empty() => (None, Vec::new()),
+        _ => asked(&case, &defects.defects, &base, truth.chi2, ask == Ask::AllImitators),
     };
 
     let seen_hidden = bench.circumstances(&hidden, false, &mut noise);
@@ -295,6 +294,36 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
         label,
     };
     (set, rig)
+}
+
+/// What the best single cause leaves of a pair's gap, and every cause's imitators.
+fn asked(
+    case: &Case<'_>,
+    causes: &[Defect],
+    base: &Fit,
+    truth_chi2: f64,
+    whole: bool,
+) -> (Option<f64>, Vec<Imitator>) {
+    let mut leaves = None;
+    if causes.len() > 1 {
+        let singles = case.imitators(causes, base, truth_chi2, whole);
+        leaves = singles.first().map(|best| best.share_left.max(0.0));
+        // One cause all but explains the data: there is no pair to be told.
+        if leaves.is_some_and(|share| share < PAIR_LEAVES) {
+            return (leaves, singles);
+        }
+    }
+    // Each cause in turn gives way to an imitator while the others stay as they are.
+    let one = |place: usize| {
+        let mut beside = causes.to_vec();
+        let own = beside.remove(place);
+        let case = Case { beside: &beside, place, ..*case };
+        let own_base = (!beside.is_empty()).then(|| case.fit(&Defects::none(), 8));
+        case.imitators(&[own], own_base.as_ref().unwrap_or(base), truth_chi2, whole)
+    };
+    let mut all: Vec<Imitator> = (0..causes.len()).flat_map(one).collect();
+    all.sort_by(|a, b| a.chi2_left.total_cmp(&b.chi2_left));
+    (leaves, all)
 }
 
 fn cause(defect: &Defect) -> Cause {

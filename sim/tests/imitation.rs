@@ -52,10 +52,18 @@ fn asked(truth: &str, changed: impl Fn(&mut Finger, &mut Point), defects: &Defec
         shown.at.normal_force_n = forces.normal_n;
     }
     let sd_n: Vec<f64> = lateral_n.iter().map(|l| (0.015 * l).hypot(8e-4)).collect();
-    let case = Case { known: &shown, lateral_n: &lateral_n, sd_n: &sd_n, nominal, stiffness_sd: 0.03 };
+    let case = Case {
+        known: &shown,
+        lateral_n: &lateral_n,
+        sd_n: &sd_n,
+        nominal,
+        stiffness_sd: 0.03,
+        beside: &[],
+        place: 0,
+    };
     let base = case.fit(&Defects::none(), 8);
-    let kind = Kind::named(truth).unwrap();
-    (base.chi2, case.imitators(&[kind], &base, 0.0, false))
+    let truth = Defect { kind: Kind::named(truth).unwrap(), values: Default::default() };
+    (base.chi2, case.imitators(&[truth], &base, 0.0, false))
 }
 
 fn left(list: &[Imitator], name: &str) -> f64 {

@@ -104,77 +104,12 @@ pub fn expected_nats(a: &Belief, b: &Belief, chosen: &[usize]) -> f64 {
 mod tests {
     use super::*;
     use crate::attribute::decide;
-    use crate::data::{Noise, Rig, Table};
     use crate::evidence::{Explained, explain};
+    use crate::example::{Deviates, rig, table};
     use crate::fit::Problem;
     use crate::hypotheses::{FORM_LENGTHS, Fitted, Options, fit_all};
     use crate::next::{PASSES, belief::beliefs, grid};
-    use effects::{Active, Baseline, Design, Operating, by_name, lateral_force};
-
-    /// Normal deviates of a linear congruential generator, by the sum of twelve.
-    struct Deviates(u64);
-
-    impl Deviates {
-        fn uniform(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1u64 << 53) as f64
-        }
-        fn normal(&mut self) -> f64 {
-            (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-        }
-    }
-
-    const RIG_NOISE: Noise = Noise { pass_relative_sd: 0.02, force_sd_n: 0.001 };
-
-    fn rig() -> Rig {
-        Rig { finger: models::finger::Finger::paper(), noise: RIG_NOISE, calibration: Default::default() }
-    }
-
-    /// Thirty-six passes under a law of friction that depends on speed.
-    fn table(draw: &mut Deviates) -> Table {
-        let finger = rig().finger;
-        let baseline = Baseline {
-            mu0: 0.5,
-            normal_stiffness_n_per_m: finger.normal_stiffness_n_per_m,
-            lateral_stiffness_n_per_m: finger.lateral_stiffness_n_per_m,
-        };
-        let design = Design {
-            duration_s: 180.0,
-            reference_load_n: 0.3,
-            reference_speed_m_s: 0.03,
-            reference_frequency_hz: 30e3,
-            reference_temperature_c: 20.0,
-            stroke_m: 0.0,
-            largest_amplitude_m: 3e-6,
-        };
-        let pick = |list: &[f64], draw: &mut Deviates| list[(draw.uniform() * list.len() as f64) as usize];
-        let passes: Vec<Operating> = (0..36)
-            .map(|i| Operating {
-                time_s: 5.0 * f64::from(i),
-                run_time_s: 5.0 * f64::from(i),
-                amplitude_pp_m: if i % 6 == 0 { 0.0 } else { pick(&[0.8e-6, 1.6e-6, 3e-6], draw) },
-                frequency_hz: 30e3,
-                speed_m_s: pick(&[0.01, 0.03, 0.09], draw),
-                direction: pick(&[1.0, -1.0], draw),
-                position_m: 0.0,
-                normal_force_n: pick(&[0.15, 0.3, 0.6], draw),
-                ambient_pressure_pa: None,
-                temperature_c: None,
-                relative_humidity_pct: None,
-            })
-            .collect();
-        let theta = [0.06];
-        let effect = by_name("rate_dependent_friction").expect("an effect of the library");
-        let active = [Active { effect, law: 0, theta: &theta }];
-        let lateral = passes
-            .iter()
-            .map(|p| {
-                let l = lateral_force(&baseline, &active, p, &design);
-                l * (1.0 + RIG_NOISE.pass_relative_sd * draw.normal()) + RIG_NOISE.force_sd_n * draw.normal()
-            })
-            .collect();
-        Table { points: (0..36).collect(), passes, lateral, runs: vec![0; 36], run_count: 1, design }
-    }
+    use effects::Operating;
 
     /// Log evidence of a hypothesis with further passes, or without.
     fn evidence(fitted: &Fitted, e: &Explained, further: &[(Operating, f64, f64)]) -> f64 {
@@ -195,7 +130,7 @@ mod tests {
     #[test]
     fn expected_nats_are_what_the_evidence_gains_on_average() {
         let mut draw = Deviates(5);
-        let table = table(&mut draw);
+        let table = table(&mut draw, 0.06);
         let fitted = fit_all(&table, &rig(), &Options { pairs: false, ..Options::default() });
         let decision = decide(&fitted);
         let grid = grid::conditions(&table);

@@ -135,6 +135,8 @@ impl Bench {
             sd_n: &data.sd_n,
             nominal: self.nominal,
             stiffness_sd: self.config.stiffness_relative_sd,
+            beside: &[],
+            place: 0,
         }
     }
 

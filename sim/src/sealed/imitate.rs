@@ -9,13 +9,15 @@ use serde::{Deserialize, Serialize};
 
 use super::form::{Kernel, solved};
 use super::oracle::{Case, Fit, NUISANCES, moved};
-use crate::defects::{ALL, Defect, Defects, Draw, Kind, Parameter, Values};
+use crate::defects::{ALL, Defect, Defects, Draw, Kind, Parameter, Values, compatible};
 use crate::noise::Noise;
 
 /// Causes whose ridges fly or recover late: marched through many cycles, hundred times as dear as the others.
 const DEAR: [&str; 3] = ["ridge_inertia", "normal_damping", "lateral_recovery"];
 /// Passes on which a dear cause is tried first.
 const PART: usize = 36;
+/// Share of the whole gap that those passes must show to stand for it: recalibrated alone they may hide it.
+const LIKE: f64 = 0.3;
 /// chi2 beyond the truth's under which a cause imitates the data.
 pub const NEAR: f64 = 10.0;
 /// Share of the gap's chi2 that departures from form could take up: an imitator that leaves more is not asked.
@@ -41,6 +43,8 @@ const UNKNOWNS: usize = NUISANCES + 4;
 pub struct Imitator {
     /// Its name.
     pub name: String,
+    /// The causes of the truth in whose place it stands alone; the others act beside it as they are.
+    pub instead_of: Vec<String>,
     /// chi2 that it leaves beyond what the truth leaves (which pays for its stiffnesses' scatter); below zero where
     /// the imitation lies nearer to the stated calibration than the truth does.
     pub chi2_left: f64,
@@ -107,24 +111,25 @@ impl Imitator {
 }
 
 impl Case<'_> {
-    /// Every library cause's best imitation of the data, best first. Causes in `truth` are left out. `base` is the
-    /// recalibrated baseline, `truth_chi2` what the truth leaves. Dear causes are asked on part of the passes first
-    /// unless `whole`.
-    pub fn imitators(&self, truth: &[&Kind], base: &Fit, truth_chi2: f64, whole: bool) -> Vec<Imitator> {
+    /// Every library cause's best imitation of the data in the place of `truth`, best first. Left out are a cause that
+    /// is itself all of `truth`, and those that act beside it or cannot. `base` is the recalibrated baseline,
+    /// `truth_chi2` what the truth leaves. Dear causes are asked on part of the passes first unless `whole`.
+    pub fn imitators(&self, truth: &[Defect], base: &Fit, truth_chi2: f64, whole: bool) -> Vec<Imitator> {
         let part = self.part(base);
         let thinned = part.case(self);
         let thinned_base = thinned.fit_from(&base.finger, &Defects::none(), 4);
         let gap = (base.chi2 - truth_chi2).max(1e-9);
+        let thinned_gap = thinned_base.chi2 - truth_chi2;
         let near = NEAR + SOUGHT * gap;
         let dear = |kind: &Kind| DEAR.contains(&kind.name);
-        let among_dear = truth.iter().any(|t| dear(t));
+        let among_dear = truth.iter().chain(self.beside).any(|d| dear(d.kind));
         let kernel = std::cell::OnceCell::new();
         let one = |kind: &'static Kind| {
-            let state = if dear(kind) && !whole {
+            let mut state = if dear(kind) && !whole && thinned_gap > LIKE * gap {
                 let worth = if among_dear { WORTH } else { WORTH_DEAR };
                 let tried = thinned.imitate(kind, &thinned_base, truth_chi2, near, worth);
                 // A part of the passes stands for the share, not for the chi2, of a gap that few passes may hold.
-                let share = (tried.chi2 - truth_chi2) / (thinned_base.chi2 - truth_chi2).max(1e-9);
+                let share = (tried.chi2 - truth_chi2) / thinned_gap;
                 if share * gap < HOPELESS * near && tried.searched {
                     self.search(kind, tried, truth_chi2, near)
                 } else {
@@ -133,6 +138,13 @@ impl Case<'_> {
             } else {
                 self.imitate(kind, base, truth_chi2, near, WORTH)
             };
+            // One of several true causes: no worse than from its own size and shapes.
+            if let Some(own) = truth.iter().find(|d| d.kind.name == kind.name) {
+                let own = self.search(kind, self.state(own, base), truth_chi2, near);
+                if own.chi2 < state.chi2 || !state.chi2.is_finite() {
+                    state = own;
+                }
+            }
             let chi2_left = state.chi2.min(base.chi2) - truth_chi2;
             let form_left =
                 (state.searched && chi2_left < FORM_MOST * gap && state.chi2 < base.chi2).then(|| {
@@ -143,12 +155,17 @@ impl Case<'_> {
                     });
                     self.form_cost(kind, state.x, kernel, base) - truth_cost
                 });
-            Imitator { name: kind.name.to_string(), chi2_left, share_left: chi2_left / gap, form_left }
+            let name = kind.name.to_string();
+            let instead_of = truth.iter().map(|d| d.kind.name.to_string()).collect();
+            Imitator { name, instead_of, chi2_left, share_left: chi2_left / gap, form_left }
         };
         let mut out: Vec<Imitator> = ALL
             .iter()
             .copied()
-            .filter(|kind| kind.in_library && kind.in_tables && !truth.iter().any(|t| t.name == kind.name))
+            .filter(|kind| {
+                kind.in_library && kind.in_tables && (truth.len() > 1 || kind.name != truth[0].kind.name)
+            })
+            .filter(|kind| self.beside.iter().all(|d| d.kind.name != kind.name && compatible(d.kind, kind)))
             .map(one)
             .collect();
         out.sort_by(|a, b| a.chi2_left.total_cmp(&b.chi2_left));
@@ -214,12 +231,8 @@ impl Case<'_> {
             if left - truth_chi2 > (1.0 - worth) * (base.chi2 - truth_chi2) || left > 2.0 * first {
                 continue;
             }
-            let mut x = [0.0; UNKNOWNS];
-            x[..NUISANCES].copy_from_slice(&self.logarithms(&base.finger));
-            for (i, p) in kind.parameters.iter().enumerate() {
-                x[NUISANCES + i] = coordinate(p, values[i]).clamp(lowest(p), 1.0);
-            }
-            let state = self.search(kind, State { x, chi2: f64::NAN, searched: true }, truth_chi2, near);
+            let start = self.state(&Defect { kind, values }, base);
+            let state = self.search(kind, start, truth_chi2, near);
             if best.is_none_or(|b| state.chi2 < b.chi2) {
                 best = Some(state);
             }
@@ -228,6 +241,16 @@ impl Case<'_> {
             }
         }
         best.unwrap_or(State { x: [0.0; UNKNOWNS], chi2: first.min(base.chi2), searched: false })
+    }
+
+    /// Where a search starts: the baseline's nuisances, a cause's size and shapes.
+    fn state(&self, defect: &Defect, base: &Fit) -> State {
+        let mut x = [0.0; UNKNOWNS];
+        x[..NUISANCES].copy_from_slice(&self.logarithms(&base.finger));
+        for (i, (p, value)) in defect.kind.parameters.iter().zip(defect.values).enumerate() {
+            x[NUISANCES + i] = coordinate(p, value).clamp(lowest(p), 1.0);
+        }
+        State { x, chi2: f64::NAN, searched: true }
     }
 
     /// Levenberg-Marquardt within the bounds of the kind's own ranges.
@@ -388,13 +411,15 @@ struct Part {
 }
 
 impl Part {
-    fn case<'a>(&'a self, whole: &Case<'_>) -> Case<'a> {
+    fn case<'a>(&'a self, whole: &Case<'a>) -> Case<'a> {
         Case {
             known: &self.known,
             lateral_n: &self.lateral_n,
             sd_n: &self.sd_n,
             nominal: whole.nominal,
             stiffness_sd: whole.stiffness_sd,
+            beside: whole.beside,
+            place: whole.place,
         }
     }
 }
@@ -422,7 +447,7 @@ mod tests {
             let data = bench.noise_free(&points, &with(truth, values));
             let case = bench.case(&data);
             let base = case.fit(&Defects::none(), 8);
-            let found = case.imitators(&[truth], &base, 0.0, false);
+            let found = case.imitators(&[Defect { kind: truth, values }], &base, 0.0, false);
             for imitator in found.iter().filter(|i| !DEAR.contains(&i.name.as_str())) {
                 let kind = Kind::named(&imitator.name).unwrap();
                 // The best rung with its nuisances refitted in full: what a ladder alone would have said.

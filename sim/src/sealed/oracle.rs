@@ -4,7 +4,7 @@
 //! The baseline here is this world's own ideal contact. Recalibration means: stiffnesses and mu0 refitted, the
 //! stiffnesses under their stated scatter, by Gauss-Newton steps on their logarithms.
 
-use crate::defects::{Defects, Kind, compatible};
+use crate::defects::{Defect, Defects, Kind, compatible};
 use crate::finger::Finger;
 use crate::world::{Point, steady_forces};
 
@@ -23,9 +23,14 @@ pub struct Case<'a> {
     pub nominal: Finger,
     /// Stated relative scatter of its stiffnesses.
     pub stiffness_sd: f64,
+    /// Causes that act in every model, the recalibrated baseline too.
+    pub beside: &'a [Defect],
+    /// Place among them at which a model's own causes act.
+    pub place: usize,
 }
 
 /// A fitted model: its chi2 (priors included), its fingertip, its residuals (N).
+#[derive(Clone)]
 pub struct Fit {
     /// Sum of squares in standard deviations, priors included.
     pub chi2: f64,
@@ -46,7 +51,12 @@ pub(super) fn moved(finger: &Finger, theta: [f64; NUISANCES]) -> Finger {
 
 impl Case<'_> {
     /// Lateral forces of a model, at the true normal forces that would have shown as the measured ones.
-    pub(super) fn predict(&self, finger: &Finger, defects: &Defects) -> Vec<f64> {
+    pub(super) fn predict(&self, finger: &Finger, own: &Defects) -> Vec<f64> {
+        let mut defects = own.clone();
+        let (before, after) = self.beside.split_at(self.place);
+        defects.defects.splice(0..0, before.iter().copied());
+        defects.defects.extend_from_slice(after);
+        let defects = &defects;
         let one = |known: &Point| {
             let mut point = *known;
             let mut forces = steady_forces(finger, defects, &point);
