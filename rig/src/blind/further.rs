@@ -17,11 +17,13 @@ use serde::Serialize;
 use sim::noise::Noise;
 use sim::sealed::{Ask, Stratum, generate_with_rig};
 
-/// Passes that a thinned set keeps: the most of these at which its cause is not plain. A sixth with the plate still.
-const KEPT: [usize; 3] = [48, 36, 24];
-/// Passes of a batch, and batches.
-const BATCH: usize = 6;
-const BATCHES: usize = 16;
+/// Passes that a thinned set keeps: the most of these at which its cause is not plain. A sixth with the plate still. Most
+/// causes that the whole set tells are plain from two dozen passes.
+const KEPT: [usize; 5] = [48, 36, 24, 16, 12];
+/// Passes of a batch, and batches. Causes are often found within six passes: larger batches would not show who was
+/// sooner.
+const BATCH: usize = 2;
+const BATCHES: usize = 32;
 /// Passes at which a race is broken off: who has not arrived counts with so many.
 pub const LIMIT: usize = BATCH * BATCHES;
 /// Probability at which a cause counts as found.
