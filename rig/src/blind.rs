@@ -287,9 +287,13 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
         .filter(detectable)
         .collect();
     let of = |list: &[&Scored], f: &dyn Fn(&Scored) -> bool| list.iter().map(|s| f(s)).collect::<Vec<bool>>();
+    // A class joins names in the library's order, the truth stands in that of the alphabet.
     let in_class = |s: &Scored| {
-        let joined = s.truth.join("+");
-        s.class.contains(&joined)
+        s.class.iter().any(|entry| {
+            let mut names: Vec<&str> = entry.split('+').collect();
+            names.sort_unstable();
+            names == s.truth
+        })
     };
     let any_of = |s: &Scored| s.named.iter().any(|n| s.truth.contains(n));
     let log: Vec<f64> = clear.iter().map(|s| s.probability_of_truth.max(1e-6).ln()).collect();

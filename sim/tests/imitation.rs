@@ -40,6 +40,16 @@ fn sweep() -> Vec<Point> {
 
 /// What the oracle says of forces from a world that differs from the nominal one in `changed` and `defects`.
 fn asked(truth: &str, changed: impl Fn(&mut Finger, &mut Point), defects: &Defects) -> (f64, Vec<Imitator>) {
+    asked_beside(&[truth], &[], changed, defects)
+}
+
+/// The same in the place of several causes, while others act beside the imitator.
+fn asked_beside(
+    truth: &[&str],
+    beside: &[Defect],
+    changed: impl Fn(&mut Finger, &mut Point),
+    defects: &Defects,
+) -> (f64, Vec<Imitator>) {
     let known = sweep();
     let nominal = finger();
     let mut lateral_n = Vec::new();
@@ -58,12 +68,15 @@ fn asked(truth: &str, changed: impl Fn(&mut Finger, &mut Point), defects: &Defec
         sd_n: &sd_n,
         nominal,
         stiffness_sd: 0.03,
-        beside: &[],
+        beside,
         place: 0,
     };
     let base = case.fit(&Defects::none(), 8);
-    let truth = Defect { kind: Kind::named(truth).unwrap(), values: Default::default() };
-    (base.chi2, case.imitators(&[truth], &base, 0.0, false))
+    let truth: Vec<Defect> = truth
+        .iter()
+        .map(|name| Defect { kind: Kind::named(name).unwrap(), values: Default::default() })
+        .collect();
+    (base.chi2, case.imitators(&truth, &base, 0.0, false))
 }
 
 fn left(list: &[Imitator], name: &str) -> f64 {
@@ -118,4 +131,28 @@ fn ridges_that_fly_are_asked_of_each_other() {
         assert!(left(&list, other) < 0.8 * gap, "{list:?}");
         assert!(list.iter().any(|i| i.name == "lateral_recovery"));
     }
+}
+
+#[test]
+fn an_alias_stays_one_beside_another_cause() {
+    let tilt = one("plate_tilt", [0.05, 0.0, 0.0, 0.0]);
+    let gain = |_: &mut Finger, point: &mut Point| point.known_pp_m *= 1.9;
+    let (gap, list) = asked_beside(&["amplitude_miscalibration"], &tilt.defects, gain, &tilt);
+    assert!(gap > 100.0, "{gap}");
+    assert_eq!((list[0].name.as_str(), list[0].instead_of.len()), ("stiffness_error", 1));
+    assert!(list[0].chi2_left < 1e-2 && list.iter().all(|i| i.name != "plate_tilt"), "{list:?}");
+}
+
+#[test]
+fn one_gain_stands_for_two_and_for_a_gain_with_a_tilt_does_not() {
+    let two = |own: &mut Finger, point: &mut Point| {
+        point.known_pp_m *= 1.5;
+        own.normal_stiffness_n_per_m *= 1.3;
+    };
+    let names = ["amplitude_miscalibration", "stiffness_error"];
+    let (gap, list) = asked_beside(&names, &[], two, &Defects::none());
+    assert!(gap > 100.0 && list[0].name == "stiffness_error" && list[0].share_left < 1e-3, "{gap} {list:?}");
+    let tilt = one("plate_tilt", [0.006, 0.0, 0.0, 0.0]);
+    let (gap, list) = asked_beside(&["stiffness_error", "plate_tilt"], &[], two, &tilt);
+    assert!(gap > 100.0 && list[0].share_left > 0.2, "{gap} {list:?}");
 }

@@ -51,7 +51,7 @@ pub struct Imitator {
     /// The same as a share of what the recalibrated baseline leaves.
     pub share_left: f64,
     /// The same once both, truth and imitator, may depart smoothly from their form ([`super::form`]); none where it leaves
-    /// too much for that to matter.
+    /// too much for that to matter, and in the place of several causes.
     pub form_left: Option<f64>,
 }
 
@@ -146,15 +146,17 @@ impl Case<'_> {
                 }
             }
             let chi2_left = state.chi2.min(base.chi2) - truth_chi2;
+            // In the place of several causes only the share counts.
             let form_left =
-                (state.searched && chi2_left < FORM_MOST * gap && state.chi2 < base.chi2).then(|| {
-                    let (kernel, truth_cost) = kernel.get_or_init(|| {
-                        let kernel = Kernel::new(self.known);
-                        let cost = self.departure(&kernel, self.lateral_n, truth_chi2, base).cost;
-                        (kernel, cost)
+                (truth.len() == 1 && state.searched && chi2_left < FORM_MOST * gap && state.chi2 < base.chi2)
+                    .then(|| {
+                        let (kernel, truth_cost) = kernel.get_or_init(|| {
+                            let kernel = Kernel::new(self.known);
+                            let cost = self.departure(&kernel, self.lateral_n, truth_chi2, base).cost;
+                            (kernel, cost)
+                        });
+                        self.form_cost(kind, state.x, kernel, base) - truth_cost
                     });
-                    self.form_cost(kind, state.x, kernel, base) - truth_cost
-                });
             let name = kind.name.to_string();
             let instead_of = truth.iter().map(|d| d.kind.name.to_string()).collect();
             Imitator { name, instead_of, chi2_left, share_left: chi2_left / gap, form_left }
