@@ -339,3 +339,64 @@ fn slide<const N: usize>(
         sums[n] += 0.5 * (first + stretch[n]) * h;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Active, Baseline, Design, Operating, by_name, lateral_force};
+
+    fn made() -> usize {
+        table(0).iter().filter(|node| node.get().is_some()).count()
+    }
+
+    /// The control loop asks a prepared model for any condition: no node may be made there, which takes milliseconds.
+    #[test]
+    fn a_prepared_table_makes_no_node_when_asked() {
+        let damping_ratio = 0.35;
+        prepare(0, damping_ratio);
+        let before = made();
+        assert_eq!(before, 2 * LOAD.count * RATIO.count);
+        let baseline = Baseline { mu0: 0.5, normal_stiffness_n_per_m: 1.2e6, lateral_stiffness_n_per_m: 4e5 };
+        let design = Design {
+            duration_s: 100.0,
+            reference_load_n: 0.3,
+            reference_speed_m_s: 0.03,
+            reference_frequency_hz: 30e3,
+            reference_temperature_c: 20.0,
+            stroke_m: 0.0,
+            largest_amplitude_m: 1e-5,
+        };
+        let effect = by_name("ridge_inertia").expect("an effect of the library");
+        let mut changed = 0;
+        for amplitude_pp_m in [0.0, 1e-8, 0.5e-6, 2e-6, 1e-5] {
+            for frequency_hz in [20e3, 33e3, 100e3] {
+                for speed_m_s in [1e-4, 0.02, 0.5] {
+                    for normal_force_n in [1e-3, 0.2, 5.0] {
+                        for mass_kg in [1e-6, 2e-5, 1e-4] {
+                            let pass = Operating {
+                                time_s: 10.0,
+                                run_time_s: 10.0,
+                                amplitude_pp_m,
+                                frequency_hz,
+                                speed_m_s,
+                                direction: 1.0,
+                                position_m: 0.0,
+                                normal_force_n,
+                                ambient_pressure_pa: None,
+                                temperature_c: None,
+                                relative_humidity_pct: None,
+                            };
+                            let theta = [mass_kg, damping_ratio];
+                            let active = [Active { effect, law: 0, theta: &theta }];
+                            let with = lateral_force(&baseline, &active, &pass, &design);
+                            let without = lateral_force(&baseline, &[], &pass, &design);
+                            changed += usize::from((with / without - 1.0).abs() > 0.01);
+                        }
+                    }
+                }
+            }
+        }
+        assert!(changed > 50, "{changed}");
+        assert_eq!(made(), before);
+    }
+}
