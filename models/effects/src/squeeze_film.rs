@@ -12,6 +12,8 @@ const AIR_SCALE_N: f64 = 3.4;
 
 /// Excursion of the plate over the mean gap beyond which the film's formula is not followed (its pole lies at one).
 const MOST_EXCURSION: f64 = 0.95;
+/// Film thickness units beyond which nothing of the load is left to solid contact.
+const FARTHEST: f64 = 60.0;
 
 static LAWS: [Law; 5] = [
     Law {
@@ -93,43 +95,19 @@ fn finite_film_share(a: f64, film: f64, solid: f64, load: f64) -> f64 {
         return 1.0;
     }
     let rest = (solid / load).ln().max(0.2);
-    // exp(rest - u) + lift(u) = 1, falling in u; the share without air is one.
-    let left = |u: f64| {
+    // exp(rest - u) + lift(u) = 1; the share without air is one.
+    let short = |u: f64| {
         let e2 = (a / u).min(MOST_EXCURSION).powi(2);
-        (rest - u).exp() + film / load * (((1.0 + 1.5 * e2) / (1.0 - e2)).sqrt() - 1.0) - 1.0
+        1.0 - (rest - u).exp() - film / load * (((1.0 + 1.5 * e2) / (1.0 - e2)).sqrt() - 1.0)
     };
     let (mut low, mut high) = (rest, rest + 1.0);
-    while left(high) > 0.0 {
+    while short(high) < 0.0 {
         (low, high) = (high, rest + 2.0 * (high - rest));
-        if high > rest + 60.0 {
+        if high > rest + FARTHEST {
             return (rest - high).exp();
         }
     }
-    // Illinois: a bracket whose stale end counts half.
-    let (mut at_low, mut at_high) = (left(low), left(high));
-    let mut side = 0;
-    let mut u = low;
-    for _ in 0..60 {
-        u = (low * at_high - high * at_low) / (at_high - at_low);
-        let value = left(u);
-        if value.abs() < 1e-12 || high - low < 1e-12 * u {
-            break;
-        }
-        if value > 0.0 {
-            (low, at_low) = (u, value);
-            if side == 1 {
-                at_high *= 0.5;
-            }
-            side = 1;
-        } else {
-            (high, at_high) = (u, value);
-            if side == -1 {
-                at_low *= 0.5;
-            }
-            side = -1;
-        }
-    }
-    (rest - u).exp().min(1.0)
+    crate::sweep::root(low, high, 0.0, short).map_or(1.0, |u| (rest - u).exp().min(1.0))
 }
 
 /// Share left to solid contact when `Fn = solid exp(-u) + 1.25 p A (a/u)^2`, u in film thickness units.

@@ -240,7 +240,7 @@ fn retarded_contact(load: f64, lag: f64) -> Retarded {
 }
 
 /// Root of a function that rises through zero between two ends, by regula falsi (Illinois).
-fn root(low: f64, high: f64, width: f64, f: impl Fn(f64) -> f64) -> Option<f64> {
+pub(crate) fn root(low: f64, high: f64, width: f64, f: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut a, mut b) = (low, high);
     let (mut fa, mut fb) = (f(a), f(b));
     if !(fa <= 0.0 && fb >= 0.0) {
