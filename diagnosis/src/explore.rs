@@ -9,8 +9,9 @@ use nalgebra::{DMatrix, DVector};
 const SCAN_ROWS: usize = 128;
 /// Starts that are fitted on the scan's rows, and those of them refined on all.
 const STARTS: (usize, usize) = (4, 2);
-/// Rounds of a local fit on the scan's rows before the starts are compared, and after.
-const ROUNDS: (usize, usize) = (4, 8);
+/// Rounds of a local fit on the scan's rows before the starts are compared, and after, and on all rows: the search under
+/// form uncertainty goes on from there.
+const ROUNDS: (usize, usize, usize) = (4, 8, 4);
 
 /// Deviations of its prior beyond which a nuisance imitates a cause.
 const DRIVEN: f64 = 3.0;
@@ -212,7 +213,8 @@ fn refine(
     let best = fits.first().map_or(0.0, |f| f.cost);
     fits.retain(|f| f.cost < 1.3 * best + 10.0);
     fits.truncate(count.1);
-    let mut whole: Vec<Fit> = fits.iter().map(|f| minimise(problem, members, &f.u, variance, 8)).collect();
+    let mut whole: Vec<Fit> =
+        fits.iter().map(|f| minimise(problem, members, &f.u, variance, ROUNDS.2)).collect();
     whole.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     whole
 }

@@ -27,8 +27,10 @@ pub struct Priors {
 }
 
 impl Default for Priors {
+    /// A gap is as likely as none. Causes have sizes from nothing upwards, so no table without a gap excludes the small
+    /// ones: at a third for none, `no_gap` was stated at 0.76 where it was right in 99 of 100.
     fn default() -> Self {
-        Priors { none: 0.3, single: 0.5, pair: 0.1, unknown: 0.1 }
+        Priors { none: 0.5, single: 0.36, pair: 0.07, unknown: 0.07 }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::data::{Rig, Table};
 use crate::fit::{Problem, minimise};
-use crate::wildcard::Wildcard;
+use crate::wildcard::{LENGTHS, Wildcard};
 use serde::Serialize;
 
 /// What the replicates say about the stated repeatability.
@@ -28,14 +28,14 @@ pub fn settle(table: &Table, rig: &Rig, problem: &mut Problem) -> (Wildcard, Pur
     let start = minimise(problem, &[], &[0.0; 3], &rough(problem, rig), 12);
     problem.variance = variance(problem, rig, &start.u, start.prediction.as_slice(), 1.0);
     // The level of friction enters the variance: it is taken from a smooth surface, not from the baseline.
-    let first = Wildcard::fit(table, problem, &start.u);
+    let first = Wildcard::fit(table, problem, &start.u, &LENGTHS[..1]);
     let level: Vec<f64> = first.smooth.iter().copied().collect();
     problem.variance = variance(problem, rig, &start.u, &level, 1.0);
     let pure = replicates(table, problem, &level);
     for v in &mut problem.variance {
         *v *= pure.used;
     }
-    let second = Wildcard::fit(table, problem, &start.u);
+    let second = Wildcard::fit(table, problem, &start.u, &LENGTHS);
     let far: Vec<f64> = (0..problem.len())
         .map(|i| (problem.lateral[i] - second.smooth[i]).abs() / problem.variance[i].sqrt())
         .collect();

@@ -5,7 +5,7 @@ use crate::data::{Rig, Table};
 use crate::evidence::{Explained, explain, recalibration};
 use crate::fit::{NUISANCES, Problem, minimise};
 use crate::hypotheses::{FORM_LENGTHS, Fitted};
-use crate::wildcard::Wildcard;
+use crate::wildcard::{LENGTHS, Wildcard};
 use effects::Operating;
 use nalgebra::{DMatrix, DVector};
 
@@ -67,7 +67,7 @@ pub fn model(
         }
         Verdict::Unknown => {
             let part = table.select(rows);
-            Model::Open(Box::new(Wildcard::fit(&part, &problem, &baseline.u)))
+            Model::Open(Box::new(Wildcard::fit(&part, &problem, &baseline.u, &LENGTHS)))
         }
     };
     (model, problem, baseline)

@@ -9,12 +9,17 @@ use crate::linear::{Covariance, log_sum_exp};
 use crate::smooth::{Coordinates, Kernel, Lengths};
 use effects::Operating;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Lengths of the wildcard in standard deviations of each covariate.
-pub const LENGTHS: [Lengths; 2] = [
+pub const LENGTHS: [Lengths; 4] = [
     Lengths { condition: 1.2, time: 0.8, position: 0.8 },
     // As smooth as the form uncertainty of a named effect: what that can follow, the open set can follow too.
     Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY },
+    // Smoother yet: a stranger that bends little is then as cheap as an effect that imitates it.
+    Lengths { condition: 2.5, time: 2.5, position: f64::INFINITY },
+    // A spot of the plate, alike at all conditions.
+    Lengths { condition: 4.0, time: 4.0, position: 0.3 },
 ];
 const RANK: usize = 56;
 /// Scales of the friction-like part, of the direction-odd part, and of the white excess.
@@ -79,13 +84,15 @@ fn rows(
 }
 
 impl Wildcard {
-    /// Fits the wildcard about the baseline at `center` (nuisance coordinates): the better of two smoothnesses,
-    /// with the evidence of both.
-    pub fn fit(table: &Table, problem: &Problem, center: &[f64]) -> Self {
-        let [a, b] = LENGTHS.map(|lengths| Self::with_lengths(table, problem, center, lengths));
-        let both = log_sum_exp(&[a.log_evidence, b.log_evidence]) - std::f64::consts::LN_2;
-        let better = if a.log_evidence >= b.log_evidence { a } else { b };
-        Wildcard { log_evidence: both, ..better }
+    /// Fits the wildcard about the baseline at `center` (nuisance coordinates): the best of some smoothnesses (of
+    /// [`LENGTHS`], unless only a level is wanted), with the evidence of their mean.
+    pub fn fit(table: &Table, problem: &Problem, center: &[f64], lengths: &[Lengths]) -> Self {
+        let all: Vec<Self> =
+            lengths.par_iter().map(|l| Self::with_lengths(table, problem, center, *l)).collect();
+        let evidence: Vec<f64> = all.iter().map(|w| w.log_evidence).collect();
+        let mean = log_sum_exp(&evidence) - (lengths.len() as f64).ln();
+        let best = all.into_iter().reduce(|a, b| if b.log_evidence > a.log_evidence { b } else { a });
+        Wildcard { log_evidence: mean, ..best.expect("there are lengths") }
     }
 
     fn with_lengths(table: &Table, problem: &Problem, center: &[f64], lengths: Lengths) -> Self {
@@ -204,12 +211,12 @@ impl Wildcard {
         (mean, self.covariance.posterior_covariance(&phi), white)
     }
 
-    /// Predicted lateral force and its standard deviation (without pass scatter) at other conditions, N.
+    /// Predicted lateral force and its standard deviation (white excess included, pass scatter not) at other
+    /// conditions, N.
     pub fn predict(&self, problem: &Problem, passes: &[Operating]) -> (Vec<f64>, Vec<f64>) {
-        let (mean, phi, _) = self.expected(problem, passes);
-        let sd = (0..passes.len())
-            .map(|i| self.covariance.posterior_variance(&phi.row(i).transpose()).max(0.0).sqrt())
-            .collect();
+        let (mean, phi, sizes) = self.expected(problem, passes);
+        let smooth = |i: usize| self.covariance.posterior_variance(&phi.row(i).transpose()).max(0.0);
+        let sd = (0..passes.len()).map(|i| (smooth(i) + (self.white * sizes[i]).powi(2)).sqrt()).collect();
         (mean.iter().copied().collect(), sd)
     }
 }

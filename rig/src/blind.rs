@@ -228,14 +228,19 @@ pub fn share(name: &'static str, target: &'static str, outcomes: Vec<bool>) -> F
     }
 }
 
-fn statistic(name: &'static str, target: &'static str, values: &[f64], of: fn(&mut [f64]) -> f64) -> Figure {
+fn statistic<T: Copy>(
+    name: &'static str,
+    target: &'static str,
+    values: &[T],
+    of: impl Fn(&mut [T]) -> f64,
+) -> Figure {
     if values.is_empty() {
         return Figure { name, value: None, ci95: None, n: 0, target };
     }
     let mut state = 1u64;
     let mut draws: Vec<f64> = (0..400)
         .map(|_| {
-            let mut sample: Vec<f64> = (0..values.len())
+            let mut sample: Vec<T> = (0..values.len())
                 .map(|_| {
                     state =
                         state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

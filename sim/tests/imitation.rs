@@ -110,6 +110,14 @@ fn a_gain_of_the_speed_is_a_gain_of_the_lateral_stiffness() {
 }
 
 #[test]
+fn a_gain_of_the_speed_leaves_nothing_that_the_lateral_stiffness_would_not_explain() {
+    let (gap, list) = asked("speed_error", |_, point| point.speed_m_s *= 1.7, &Defects::none());
+    println!("gap {gap:.0}: {:?}", &list[..3]);
+    assert!(gap > 100.0);
+    assert!(list[0].name == "stiffness_error" && list[0].is_near(), "{list:?}");
+}
+
+#[test]
 fn a_straight_tilt_is_a_cross_talk_and_no_squeeze_film() {
     let (gap, list) = asked("plate_tilt", |_, _| {}, &one("plate_tilt", [0.05, 0.0, 0.0, 0.0]));
     println!("gap {gap:.0}: {:?}", &list[..3]);

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Candidates that a design takes into account, and the probability each hypothesis counts for at least.
-const CANDIDATES: usize = 4;
+const CANDIDATES: usize = 6;
 const LEAST: f64 = 0.01;
 
 /// One hypothesis' predictions over a grid of conditions.

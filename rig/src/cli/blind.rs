@@ -143,7 +143,10 @@ fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
         println!("{}", serde_json::to_string(&document).into_diagnostic()?);
         return Ok(ExitCode::SUCCESS);
     }
-    println!("further passes to a probability of 0.9 on the truth, {} sets not plain at first:", races.len());
+    println!(
+        "further passes to a probability of 0.9 on the truth, {} sets whose cause is open at first:",
+        races.len()
+    );
     for f in figures {
         let ci = f.ci95.unwrap_or([f64::NAN; 2]);
         let value = f.value.unwrap_or(f64::NAN);
