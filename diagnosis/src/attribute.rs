@@ -1,6 +1,6 @@
 //! Which: from probabilities to a verdict, with what cannot be told apart said so.
 
-use crate::hypotheses::{Candidate, Fitted};
+use crate::hypotheses::Fitted;
 use crate::shrink::{Gate, Region, gate, left_out_regions};
 
 /// The four answers.
@@ -45,8 +45,10 @@ const NAME: f64 = 0.9;
 const ALONE: [f64; 2] = [0.93, 0.993];
 /// chi2 between the forces of two hypotheses below which they say the same of this table. What the data tell of two with
 /// as many parameters is then less than [`ALONE`] asks for, and priors alone may not make a name: a speed that is wrong
-/// by half was called a lateral stiffness because such a stiffness is less of a surprise.
+/// by half was called a lateral stiffness because such a stiffness is less of a surprise. Such a rival is of the class
+/// until it is less likely than the leader by the nats after it.
 const SAME_FORCES: f64 = 4.0;
+const PRIOR_NATS: f64 = 10.0;
 /// Probability of no gap above which none is claimed.
 const NO_CLAIM: f64 = 0.1;
 /// Share of the gap's chi2 that a second cause must add to the evidence before it is believed: single causes whose form
@@ -78,7 +80,7 @@ pub fn decide(fitted: &Fitted) -> Decision {
             *p *= survival;
         }
     }
-    let class = alias_class(candidates, leader);
+    let class = alias_class(fitted, leader);
     let alone = ALONE[usize::from(candidates[leader].effects.len() > 1)];
     let told = class[1..].iter().all(|&i| !same_said(fitted, leader, i));
     let in_class: f64 = class.iter().map(|&i| probabilities[i]).sum();
@@ -95,13 +97,15 @@ pub fn decide(fitted: &Fitted) -> Decision {
 }
 
 /// The leader and every hypothesis of its size that the data does not tell from it.
-fn alias_class(candidates: &[Candidate], leader: usize) -> Vec<usize> {
+fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
+    let candidates = &fitted.candidates;
     let mut class = vec![leader];
     let own = &candidates[leader];
     class.extend((0..candidates.len()).filter(|&i| {
+        let behind = own.log_evidence - candidates[i].log_evidence;
         i != leader
             && candidates[i].effects.len() == own.effects.len()
-            && own.log_evidence - candidates[i].log_evidence < ALIAS_NATS
+            && (behind < ALIAS_NATS || behind < PRIOR_NATS && same_said(fitted, leader, i))
     }));
     class
 }

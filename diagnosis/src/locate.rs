@@ -124,6 +124,7 @@ pub fn regions(fitted: &Fitted, rig: &Rig, model: &(Model, Problem, Explained)) 
             let tail = ChiSquared::new(inside.len() as f64).map_or(1.0, |d| d.sf(excess));
             let p_value = (tail * tries.powi(part.bounds.len().max(1) as i32)).min(1.0);
             let share = part.members.iter().map(|&i| weight[i]).sum::<f64>() / total.max(1e-300);
+            let p_value = (!inside.is_empty()).then_some(p_value);
             region(&part.bounds, &problem.passes, share, p_value)
         })
         .collect();
@@ -260,7 +261,12 @@ fn named_parts<'a>(list: &'a [Part], chance: &[f64]) -> Vec<&'a Part> {
     (0..list.len()).filter(|&k| named[k]).map(|k| &list[k]).collect()
 }
 
-fn region(bounds: &BTreeMap<usize, [f64; 2]>, passes: &[Operating], share: f64, p_value: f64) -> Region {
+fn region(
+    bounds: &BTreeMap<usize, [f64; 2]>,
+    passes: &[Operating],
+    share: f64,
+    p_value: Option<f64>,
+) -> Region {
     let mut named = BTreeMap::new();
     let mut words = Vec::new();
     for (k, b) in bounds {
@@ -285,11 +291,16 @@ fn region(bounds: &BTreeMap<usize, [f64; 2]>, passes: &[Operating], share: f64, 
         });
     }
     let place = if words.is_empty() { "everywhere".to_string() } else { format!("at {}", words.join(", ")) };
-    let p = if p_value < 1e-300 { "p < 1e-300".to_string() } else { format!("p = {p_value:.1e}") };
+    let p = match p_value {
+        None => "no pass inside".to_string(),
+        Some(p) if p < 1e-300 => "p < 1e-300".to_string(),
+        Some(p) if p < 0.01 => format!("p = {p:.1e}"),
+        Some(p) => format!("p = {p:.2}"),
+    };
     Region {
         bounds: named,
         share_of_gap: share,
-        p_value,
+        p_value: p_value.unwrap_or(1.0),
         text: format!("{:.0} % of the gap lies {place} ({p})", 100.0 * share),
     }
 }

@@ -141,6 +141,13 @@ impl Kind {
         }
     }
 
+    /// Sets its first shape to a share of that one's range.
+    pub fn reshape(&self, values: &mut Values, share: f64) {
+        if let Some(shape) = self.parameters.get(1) {
+            values[1] = shape.at(share, values[1]);
+        }
+    }
+
     /// Sets the sign of its size, or whether a factor lies above one.
     pub fn turn(&self, values: &mut Values, up: bool) {
         match self.parameters.first().map(|p| p.draw) {

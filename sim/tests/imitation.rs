@@ -105,8 +105,8 @@ fn a_gain_of_the_speed_is_a_gain_of_the_lateral_stiffness() {
     let (gap, list) = asked("stiffness_error", soft, &Defects::none());
     println!("gap {gap:.0}: {:?}", &list[..3]);
     assert!(gap > 100.0);
-    assert_eq!(list[0].name, "speed_error");
-    assert!(list[0].chi2_left < 0.15 * gap, "{list:?}");
+    // Here all passes lie at one place, where a ripple of the speed is a gain too.
+    assert!(left(&list, "speed_error") < 0.15 * gap, "{list:?}");
 }
 
 #[test]

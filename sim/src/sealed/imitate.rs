@@ -193,12 +193,12 @@ impl Case<'_> {
     /// The rungs of each draw's ladder that leave least, best first: chi2 with the nuisances refitted to first order,
     /// and the parameters.
     fn ladder(&self, kind: &'static Kind, base: &Fit) -> Vec<(f64, Values)> {
-        let (draws, rungs) = match (kind.parameters.len() > 1, kind.parameters[0].draw) {
-            (true, _) if DEAR.contains(&kind.name) => (2, 5),
-            (true, _) => (3, 6),
-            // Without shapes or sides every draw is the same ladder.
-            (false, Draw::Log | Draw::Linear) => (1, 9),
-            (false, _) => (2, 9),
+        let sides = if matches!(kind.parameters[0].draw, Draw::Log | Draw::Linear) { 1 } else { 2 };
+        // Every side of the size with the first shape over its range.
+        let (shapes, rungs) = match kind.parameters.len() > 1 {
+            true if DEAR.contains(&kind.name) => (2, 5),
+            true => (3, 6),
+            false => (1, 9),
         };
         let mut noise = Noise::new(17, kind.name);
         let none = Defects::none();
@@ -206,9 +206,10 @@ impl Case<'_> {
         let model = self.predict(&base.finger, &none);
         let jacobian = self.jacobian(start, &none, &model);
         let mut out: Vec<(f64, Values)> = Vec::new();
-        for draw in 0..draws {
+        for draw in 0..shapes * sides {
             let mut values = kind.draw(&mut noise);
             kind.turn(&mut values, draw % 2 == 0);
+            kind.reshape(&mut values, ((draw / sides) as f64 + 0.5) / shapes as f64);
             let mut best = (f64::INFINITY, values);
             for rung in 0..rungs {
                 kind.resize(&mut values, (rung as f64 + 0.5) / rungs as f64);
