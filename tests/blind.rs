@@ -4,8 +4,9 @@ use diagnosis::data::{Rig, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use models::record::Pass;
+use rayon::prelude::*;
 use rig::blind::score;
-use sim::sealed::{Ask, Stratum, generate};
+use sim::sealed::{ALIASES, Ask, Stratum, generate};
 
 fn rig_of(text: &str) -> Rig {
     toml::from_str(text).expect("rig.toml of a sealed set")
@@ -24,27 +25,83 @@ fn sets_without_a_cause_name_nothing() {
     }
 }
 
-/// The cause taken out of the library: `unknown`, or a declared alias, but not a confident other name.
+/// A sealed set for each cause that tables show. Its chi2 is above 100 and its gap above the floor, but for gains of
+/// speed, amplitude and stiffness: the stiffnesses' own scatter takes those up.
+const ONE_OF_EACH: [(&str, u64); 23] = [
+    ("adhesion", 1_610_004_830_056),
+    ("amplitude_droop", 1_610_004_830_003),
+    ("amplitude_miscalibration", 1_680_005_040_022),
+    ("amplitude_saturation", 1_610_004_830_005),
+    ("contact_ageing", 1_610_004_830_035),
+    ("force_crosstalk", 1_680_005_040_045),
+    ("lateral_offset_drift", 1_610_004_830_006),
+    ("lateral_recovery", 1_610_004_830_058),
+    ("load_dependent_friction", 1_610_004_830_041),
+    ("mode_shape", 1_610_004_830_022),
+    ("moisture_drift", 1_610_004_830_054),
+    ("multi_asperity", 1_610_004_830_046),
+    ("normal_damping", 1_610_004_830_067),
+    ("normal_offset", 1_610_004_830_068),
+    ("plate_tilt", 1_680_005_040_012),
+    ("rate_dependent_friction", 1_610_004_830_028),
+    ("resonance_detuning", 1_610_004_830_020),
+    ("ridge_inertia", 1_610_004_830_053),
+    ("speed_error", 1_680_005_040_015),
+    ("speed_ripple", 1_610_004_830_025),
+    ("squeeze_film", 1_610_004_830_004),
+    ("stiffness_error", 1_680_005_040_032),
+    ("subsurface_relaxation", 1_610_004_830_044),
+];
+
+/// Declared aliases (docs/diagnosis.md): what one of a group does, another nearly does.
+const ALIKE: [&[&str]; 6] = [
+    &["force_crosstalk", "plate_tilt"],
+    &["stiffness_error", "speed_error", "amplitude_miscalibration", "subsurface_relaxation"],
+    &["load_dependent_friction", "adhesion", "normal_offset"],
+    &["resonance_detuning", "subsurface_relaxation"],
+    &["normal_damping", "ridge_inertia"],
+    &["speed_ripple", "mode_shape"],
+];
+
+/// Each cause in turn taken out of the library: `unknown`, or a declared alias, but no confident other name.
 #[test]
 fn a_withheld_cause_is_no_other_cause() {
-    let (mut confident, mut tried) = (Vec::new(), 0);
-    for seed in 9100..9112 {
-        let set = generate(seed, Stratum::Single, Ask::Imitators);
-        // An effect that another imitates on this very table may rightly bear the other's name.
-        let imitated = set.label.imitators.iter().any(|i| i.share_left < 0.1);
-        if set.label.chi2_gain < 60.0 || imitated {
-            continue;
-        }
-        tried += 1;
-        let truth = set.label.causes[0].name.clone();
-        let options = Options { without: vec![truth.clone()], ..quick() };
-        let scored = score(&set, &options).unwrap();
-        if scored.verdict == Verdict::Named {
-            confident.push((seed, truth, scored.named));
-        }
+    let wanted: Vec<&str> =
+        sim::defects::ALL.iter().filter(|k| k.in_library && k.in_tables).map(|k| k.name).collect();
+    let mut listed: Vec<&str> = ONE_OF_EACH.iter().map(|(name, _)| *name).collect();
+    listed.sort_unstable();
+    let mut sorted = wanted.clone();
+    sorted.sort_unstable();
+    assert_eq!(listed, sorted, "a set for each cause that tables show");
+    let confident: Vec<String> = ONE_OF_EACH
+        .par_iter()
+        .filter_map(|&(name, seed)| {
+            let stratum = if ALIASES.contains(&name) { Stratum::Alias } else { Stratum::Single };
+            let set = generate(seed, stratum, Ask::Gain);
+            assert_eq!(set.label.causes[0].name, name, "the set of seed {seed} has another cause by now");
+            assert!(set.label.chi2_gain > 60.0, "{name}: the set of seed {seed} hardly shows it");
+            let without = vec![name.to_string()];
+            let scored = score(&set, &Options { without, ..Options::default() }).unwrap();
+            println!("{name}: {:?} {:?} {:.2}", scored.verdict, scored.named, scored.top_probability);
+            let alias = |n: &String| ALIKE.iter().any(|g| g.contains(&name) && g.contains(&n.as_str()));
+            let confident = scored.verdict == Verdict::Named && !scored.named.iter().all(alias);
+            confident.then(|| format!("{name} as {:?}", scored.named))
+        })
+        .collect();
+    assert!(confident.is_empty(), "{confident:?}");
+}
+
+/// Priors alone make no name: a stage that slides at another speed than it says is, pass for pass, a softer or harder
+/// ridge (the group `k_l U / (pi f mu0 k_n w)` of Eqs. 6-15).
+#[test]
+fn an_exact_alias_is_never_named_for_being_less_of_a_surprise() {
+    for seed in [1_680_005_040_007, 1_680_005_040_015, 1_680_005_040_023] {
+        let set = generate(seed, Stratum::Alias, Ask::Gain);
+        assert_eq!(set.label.causes[0].name, "speed_error");
+        let scored = score(&set, &Options::default()).unwrap();
+        assert!(scored.verdict != Verdict::Named || scored.top_right, "seed {seed}: {:?}", scored.named);
+        assert!(scored.class.contains(&"speed_error".to_string()), "seed {seed}: {:?}", scored.class);
     }
-    assert!(tried >= 4, "only {tried} sets were testable");
-    assert!(confident.len() * 4 <= tried, "{confident:?} of {tried}");
 }
 
 /// The order of rows and the numbers of points carry no meaning.
