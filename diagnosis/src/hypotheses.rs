@@ -165,9 +165,11 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
         }
     }
 
-    // Middle share first, for every law; the other shares where they could matter.
+    // Middle share first, for every law; the other shares where they could matter. Laws cost from one millisecond to two
+    // hundred: each is a task of its own.
     let starts: Vec<Vec<Fit>> = members
         .par_iter()
+        .with_max_len(1)
         .map(|member| {
             let mut fits: Vec<Fit> = nuisance_starts(&held)
                 .iter()
@@ -181,6 +183,7 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
     let middle: Vec<Option<Explained>> = members
         .par_iter()
         .zip(&starts)
+        .with_max_len(1)
         .map(|(member, fits)| {
             let own = fits.first()?.cost;
             // What lies far behind even on the tempered scale gets one look, not a search.
@@ -195,6 +198,7 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
     let top = middle.iter().flatten().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     let laws: Vec<Option<(f64, Explained)>> = middle
         .into_par_iter()
+        .with_max_len(1)
         .map(|found| {
             found.map(|e| {
                 if e.log_evidence > top - PRUNE {
