@@ -6,6 +6,7 @@ use sim::defects::{Defect, Defects, Kind, Surroundings};
 use sim::finger::{Finger, FingerConfig};
 use sim::sealed::imitate::Imitator;
 use sim::sealed::oracle::Case;
+use sim::sealed::{Ask, Stratum};
 use sim::world::{Point, steady_forces};
 
 fn finger() -> Finger {
@@ -163,4 +164,17 @@ fn one_gain_stands_for_two_and_for_a_gain_with_a_tilt_does_not() {
     let tilt = one("plate_tilt", [0.006, 0.0, 0.0, 0.0]);
     let (gap, list) = asked_beside(&["stiffness_error", "plate_tilt"], &[], two, &tilt);
     assert!(gap > 100.0 && list[0].share_left > 0.2, "{gap} {list:?}");
+}
+
+#[test]
+fn a_companion_that_the_stiffness_takes_up_leaves_nothing_to_a_single_cause() {
+    // Ageing of the contact, and a speed 1.8 times what is said: the lateral stiffness moves by five of its deviations.
+    let label = sim::sealed::generate(1_710_005_130_040, Stratum::Pair, Ask::Imitators).label;
+    let names: Vec<&str> = label.causes.iter().map(|c| c.name.as_str()).collect();
+    assert!(
+        names.contains(&"contact_ageing") && names.contains(&"speed_error"),
+        "another set by now: {names:?}"
+    );
+    let left = label.best_single_leaves.expect("a pair");
+    assert!(left < 0.01, "{left}");
 }

@@ -138,11 +138,15 @@ impl Case<'_> {
             } else {
                 self.imitate(kind, base, truth_chi2, near, WORTH)
             };
-            // One of several true causes: no worse than from its own size and shapes.
+            // One of several true causes: no worse than from its own size and shapes, with the stiffnesses as the recalibrated
+            // baseline has them, and as this cause alone would have them.
             if let Some(own) = truth.iter().find(|d| d.kind.name == kind.name) {
-                let own = self.search(kind, self.state(own, base), truth_chi2, near);
-                if own.chi2 < state.chi2 || !state.chi2.is_finite() {
-                    state = own;
+                let alone = self.fit_from(&self.nominal, &with(kind, own.values), STEPS);
+                for start in [base, &alone] {
+                    let own = self.search(kind, self.state(own, start), truth_chi2, near);
+                    if own.chi2 < state.chi2 || !state.chi2.is_finite() {
+                        state = own;
+                    }
                 }
             }
             let chi2_left = state.chi2.min(base.chi2) - truth_chi2;
