@@ -119,12 +119,13 @@ pub fn regions(fitted: &Fitted, rig: &Rig, model: &(Model, Problem, Explained)) 
         .into_iter()
         .map(|part| {
             let inside: Vec<usize> = part.members.iter().copied().filter(|&i| i < n).collect();
-            let excess: f64 = inside.iter().map(|&i| residual[i]).sum();
             // A part between the passes rests on the model alone: the table has no word on it.
-            let tail = ChiSquared::new(inside.len() as f64).map_or(1.0, |d| d.sf(excess));
-            let p_value = (tail * tries.powi(part.bounds.len().max(1) as i32)).min(1.0);
+            let p_value = (!inside.is_empty()).then(|| {
+                let excess: f64 = inside.iter().map(|&i| residual[i]).sum();
+                let tail = ChiSquared::new(inside.len() as f64).map_or(1.0, |d| d.sf(excess));
+                (tail * tries.powi(part.bounds.len().max(1) as i32)).min(1.0)
+            });
             let share = part.members.iter().map(|&i| weight[i]).sum::<f64>() / total.max(1e-300);
-            let p_value = (!inside.is_empty()).then_some(p_value);
             region(&part.bounds, &problem.passes, share, p_value)
         })
         .collect();

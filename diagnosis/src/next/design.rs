@@ -207,6 +207,16 @@ mod tests {
         assert_eq!(greedy(&unsure, 2, None), [0, 1]);
     }
 
+    /// With the open set given, every second pass goes where that is most in doubt, and moves on once it has learnt.
+    #[test]
+    fn every_second_pass_goes_where_nothing_is_known() {
+        let mut open = belief(0.001, [0.0, 0.0], 0.0);
+        open.covariance = DMatrix::from_diagonal(&DVector::from_column_slice(&[1.0, 9.0]));
+        let held = [belief(0.5, [0.0, 0.0], 0.0), belief(0.5, [3.0, 0.0], 0.0), open];
+        assert_eq!(greedy(&held, 4, None), [0, 0, 0, 0]);
+        assert_eq!(greedy(&held, 4, Some(2)), [0, 1, 0, 1]);
+    }
+
     /// Passes go where the likely rival is parted, not where the unlikely one is.
     #[test]
     fn passes_go_to_the_likely_rival() {
