@@ -103,6 +103,31 @@ fn an_exact_alias_is_never_named_for_being_less_of_a_surprise() {
     }
 }
 
+/// A gain that hides in a stiffness, beside another cause: the amplitude is half of what was asked, and the plate is
+/// tilted. The tilt alone explains every pass, with a stiffness twenty deviations from its calibration. The answer is two
+/// causes, with the aliases of both in the class.
+#[test]
+fn a_cause_does_not_hide_in_a_certified_stiffness() {
+    let set = generate(1_710_005_130_388, Stratum::Pair, Ask::Gain);
+    let causes: Vec<&str> = set.label.causes.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!(causes, ["amplitude_miscalibration", "plate_tilt"]);
+    let scored = score(&set, &Options::default()).unwrap();
+    assert_eq!(scored.named.len(), 2, "{:?}", scored.named);
+    let stated = |name: &&String| set.label.causes.iter().all(|c| name.contains(c.name.as_str()));
+    assert!(scored.class.iter().any(|name| stated(&name)), "{:?}", scored.class);
+}
+
+/// An overdamped ridge is loss in the skin, not inertia: what it does is done by the dashpot, whatever the mass.
+#[test]
+fn loss_in_the_skin_is_not_called_inertia() {
+    for seed in [1_710_005_130_155, 1_710_005_130_367, 1_710_005_130_836] {
+        let set = generate(seed, Stratum::Single, Ask::Gain);
+        assert_eq!(set.label.causes[0].name, "normal_damping");
+        let scored = score(&set, &Options::default()).unwrap();
+        assert!(scored.top_right, "seed {seed}: {:?}", scored.named);
+    }
+}
+
 /// The order of rows and the numbers of points carry no meaning.
 #[test]
 fn the_order_of_rows_carries_no_meaning() {

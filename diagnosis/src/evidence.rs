@@ -34,6 +34,13 @@ pub struct Explained {
     pub departure: DVector<f64>,
 }
 
+impl Explained {
+    /// chi2 by which mu0 and the stiffnesses are pulled from their calibration.
+    pub fn pull(&self) -> f64 {
+        self.u[..NUISANCES].iter().map(|x| x * x).sum()
+    }
+}
+
 /// The effect's change net of recalibration: `m - m0` less what the nuisances, under their priors, can take up.
 pub fn net_change(problem: &Problem, u: &[f64], prediction: &DVector<f64>) -> DVector<f64> {
     let (raw, jacobian, shift) = recalibration(problem, u, prediction);

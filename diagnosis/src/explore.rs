@@ -98,10 +98,12 @@ pub fn glance(
     let last = members.last()?;
     let (low, high) = last.parameters()[0].coordinate_bounds();
     let mut list = vec![alone.to_vec()];
-    for factor in [0.15, 0.4, 1.0, 2.0, -0.4, -1.0] {
+    let reach = if alone[0].abs() > 0.05 { alone[0] } else { 0.3 };
+    let own = [0.15, 0.4, 1.0, 2.0, -0.4, -1.0].map(|factor| reach * factor);
+    // What it did alone says little of a large size beside another cause.
+    for size in own.into_iter().chain([-3.0, -1.2, 1.2, 3.0]) {
         let mut tail = alone.to_vec();
-        let reach = if alone[0].abs() > 0.05 { alone[0] } else { 0.3 };
-        tail[0] = (reach * factor).clamp(low, high);
+        tail[0] = size.clamp(low, high);
         list.push(tail);
     }
     let rows = rows(problem.len(), SCAN_ROWS);
@@ -145,9 +147,13 @@ fn scan(
     let jacobian = part.jacobian(others, held, &origin);
     let plain = Covariance::new(&part_variance, &DMatrix::zeros(rows.len(), 0));
     let mut hessian = plain.inner(&jacobian, &jacobian);
-    for (k, p) in problem.prior_precision(others).iter().enumerate() {
+    let precision = problem.prior_precision(others);
+    for (k, p) in precision.iter().enumerate() {
         hessian[(k, k)] += p.max(1e-9);
     }
+    // What the others cost where they are: nuisances that were driven far from their calibration are no bargain.
+    let pull = DVector::from_iterator(held.len(), held.iter().zip(&precision).map(|(x, p)| p * x));
+    let penalty = pull.dot(&DVector::from_column_slice(held));
     let Some(factor) = hessian.cholesky() else { return Vec::new() };
     let mut weighted = jacobian.clone();
     for (i, v) in part_variance.iter().enumerate() {
@@ -161,10 +167,10 @@ fn scan(
             let mut u = held.to_vec();
             u.extend(&tail);
             let residual = &y - part.predict(members, &u);
-            let score = &project * &residual;
+            let score = &project * &residual - &pull;
             let step = factor.solve(&score);
-            let cost: f64 =
-                residual.iter().zip(&part_variance).map(|(r, v)| r * r / v).sum::<f64>() - score.dot(&step);
+            let misfit: f64 = residual.iter().zip(&part_variance).map(|(r, v)| r * r / v).sum();
+            let cost = misfit + penalty - score.dot(&step);
             for (k, s) in step.iter().enumerate() {
                 u[k] += s.clamp(-2.0, 2.0);
             }

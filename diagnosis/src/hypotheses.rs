@@ -225,11 +225,12 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
     sort(&mut candidates);
 
     if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + 3.0) {
-        // A single that leaves nothing needs no second cause.
+        // A single that leaves nothing needs no second cause, unless it is the stiffnesses that took it up.
         let best = &candidates[0].best;
         let misfit: f64 = (0..problem.len())
             .map(|i| (problem.lateral[i] - best.prediction[i]).powi(2) / problem.variance[i])
-            .sum();
+            .sum::<f64>()
+            + best.pull();
         let n = problem.len() as f64;
         if misfit > n + ENOUGH * (2.0 * n).sqrt() {
             let grown = pairs(&problem, &candidates, &loose, &basis);
@@ -292,9 +293,13 @@ fn usable(effect: usize, law: usize, table: &Table) -> bool {
 }
 
 fn candidate(effects: Vec<usize>, laws: Vec<(f64, Explained)>) -> Option<Candidate> {
-    let best = laws.iter().max_by(|a, b| a.0.total_cmp(&b.0))?.1.clone();
-    let evidences: Vec<f64> = laws.iter().map(|l| l.0).collect();
-    let log_evidence = log_sum_exp(&evidences) - (laws.len() as f64).ln();
+    let share = |e: &Explained| e.members.iter().map(|m| library()[m.effect].share(m.law)).product::<f64>();
+    let weighed: Vec<f64> = laws.iter().map(|(log, e)| log + share(e).ln()).collect();
+    let best = (0..laws.len()).max_by(|&a, &b| weighed[a].total_cmp(&weighed[b]))?;
+    let best = laws[best].1.clone();
+    // Laws that the table lacks a covariate for are not among the tried.
+    let tried: f64 = laws.iter().map(|(_, e)| share(e)).sum();
+    let log_evidence = log_sum_exp(&weighed) - tried.ln();
     log_evidence.is_finite().then(|| Candidate::new(effects, log_evidence, best, laws))
 }
 

@@ -13,9 +13,11 @@ const PAIR_SEEDS: usize = 6;
 /// Exact aliases: a pair of them is one cause with the freedom of two.
 const SAME: [[&str; 2]; 1] = [["force_crosstalk", "plate_tilt"]];
 /// Laws whose changes are the same for the same parameter: for any pair with one of them there is the same pair with the
-/// other. Cross-talk and tilt; a factor on normal stiffness and on amplitude; a factor on lateral stiffness and on speed.
-const TWINS: [[(&str, usize); 2]; 3] = [
+/// other. Cross-talk and tilt (which also turns the normal axis, a little); a factor on normal stiffness and on amplitude;
+/// a factor on lateral stiffness and on speed.
+const TWINS: [[(&str, usize); 2]; 4] = [
     [("force_crosstalk", 0), ("plate_tilt", 1)],
+    [("force_crosstalk", 0), ("plate_tilt", 0)],
     [("stiffness_error", 1), ("amplitude_miscalibration", 0)],
     [("stiffness_error", 0), ("speed_error", 0)],
 ];
@@ -148,7 +150,13 @@ pub fn pairs(
             let seed = &seeds[*s].best;
             let pair = vec![seed.members[0], e.members[0]];
             let alone = &e.u[NUISANCES..];
-            glance(problem, &pair, &seed.u, loose, alone).map(|(cost, u)| (cost, pair, u))
+            // A cause that acts as a gain of the stiffness, the amplitude or the speed hides in the stiffnesses that the
+            // single drove to imitate it.
+            nuisance_starts(&seed.u)
+                .iter()
+                .filter_map(|held| glance(problem, &pair, held, loose, alone))
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+                .map(|(cost, u)| (cost, pair, u))
         })
         .collect();
     glances.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -201,9 +209,9 @@ pub fn pairs(
         .collect();
     let mut list: Vec<Candidate> = Vec::new();
     for (effects, evidence, best) in full {
-        let laws: f64 = best.members.iter().map(|m| library()[m.effect].laws().len() as f64).product();
+        let share: f64 = best.members.iter().map(|m| library()[m.effect].share(m.law)).product();
         // Only the best pair of laws was fitted: the others are taken to add nothing.
-        let log_evidence = evidence - laws.ln();
+        let log_evidence = evidence + share.ln();
         match list.iter_mut().find(|c| c.effects == effects) {
             Some(c) if c.log_evidence >= log_evidence => {}
             Some(c) => *c = Candidate::new(effects, log_evidence, best, Vec::new()),

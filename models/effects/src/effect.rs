@@ -69,6 +69,10 @@ impl Parameter {
             upper: f64::INFINITY,
         }
     }
+    /// The same with a largest value of its own, where another effect begins.
+    pub const fn at_most(self, upper: f64) -> Self {
+        Self { upper, ..self }
+    }
     /// A shape parameter anywhere between two ends.
     pub const fn between(name: &'static str, unit: &'static str, lower: f64, upper: f64) -> Self {
         Self { name, unit, zero: None, prior: Prior::Uniform(lower, upper), lower, upper }
@@ -99,7 +103,7 @@ impl Parameter {
         match self.prior {
             Prior::Normal(sd) => ((self.lower / sd).max(-8.0), (self.upper / sd).min(8.0)),
             Prior::HalfNormal(sd) => (0.0, (self.upper / sd).min(8.0)),
-            Prior::LogNormal(..) => (-3.0, 3.0),
+            Prior::LogNormal(..) => (-3.0, self.coordinate(self.upper).min(3.0)),
             Prior::Uniform(..) => (-3.0, 3.0),
         }
     }
@@ -162,6 +166,10 @@ pub trait Effect: Sync {
     fn laws(&self) -> &'static [Law];
     /// What a table must hold before it can be seen.
     fn needs(&self) -> &'static [Need];
+    /// Prior share of a law among those of this effect; all alike unless a law is known to be rare.
+    fn share(&self, _law: usize) -> f64 {
+        1.0 / self.laws().len() as f64
+    }
     /// Makes what [`Effect::change`] with these parameters will look up, so that a control loop makes nothing.
     fn prepare(&self, _law: usize, _theta: &[f64]) {}
     /// Changes what the contact is given. `theta` holds the parameters of the law in its order.

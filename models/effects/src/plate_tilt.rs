@@ -27,6 +27,11 @@ impl Effect for PlateTilt {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
+    /// A frame that turns shows in both axes; that one axis alone turns is a sensor of its own kind, and what it says a
+    /// cross-talk says as well.
+    fn share(&self, law: usize) -> f64 {
+        [0.9, 0.1][law]
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Directions]
     }

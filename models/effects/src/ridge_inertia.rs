@@ -5,19 +5,20 @@ use crate::prelude::*;
 /// See the module.
 pub struct RidgeInertia;
 
+// Beyond critical damping a ridge does not fly, it lags: that is loss in the skin, whatever the mass.
 static LAWS: [Law; 2] = [
     Law {
         name: "landing without rebound",
         parameters: &[
             Parameter::positive("mass", "kg", 4e-6, 40e-6),
-            Parameter::shape("damping_ratio", "1", 0.5, 0.7),
+            Parameter::shape("damping_ratio", "1", 0.5, 0.7).at_most(1.0),
         ],
     },
     Law {
         name: "rebounding",
         parameters: &[
             Parameter::positive("mass", "kg", 4e-6, 40e-6),
-            Parameter::shape("damping_ratio", "1", 0.5, 0.7),
+            Parameter::shape("damping_ratio", "1", 0.5, 0.7).at_most(1.0),
         ],
     },
 ];
