@@ -8,6 +8,7 @@ use crate::hypotheses::{FORM_LENGTHS, Fitted};
 use crate::wildcard::{LENGTHS, Wildcard};
 use effects::Operating;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// A prediction at one condition, N.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,11 +74,50 @@ pub fn model(
     (model, problem, baseline)
 }
 
+/// Conditions that are predicted at a time.
+const PART: usize = 256;
+
 /// Predicts conditions.
 pub fn forecast(
     fitted: &Fitted,
     rig: &Rig,
-    (model, problem, baseline): &(Model, Problem, Explained),
+    model: &(Model, Problem, Explained),
+    passes: &[Operating],
+) -> Vec<Forecast> {
+    let (model, problem, baseline) = model;
+    let ready = match model {
+        Model::Baseline(e) => Ready::Baseline(e),
+        Model::Effects(e) => Ready::Effects {
+            best: e,
+            shift: recalibration(problem, &e.u, &e.prediction).2,
+            departure: departure_covariance(fitted, problem, e),
+        },
+        Model::Open(w) => Ready::Open(w),
+    };
+    passes
+        .par_chunks(PART)
+        .flat_map_iter(|part| forecast_part(fitted, rig, &ready, problem, baseline, part))
+        .collect()
+}
+
+/// A model with what is the same for all conditions.
+enum Ready<'a> {
+    Baseline(&'a Explained),
+    /// With the recalibration that imitates the effect best, and the covariance of the departure's weights.
+    Effects {
+        best: &'a Explained,
+        shift: DVector<f64>,
+        departure: DMatrix<f64>,
+    },
+    Open(&'a Wildcard),
+}
+
+fn forecast_part(
+    fitted: &Fitted,
+    rig: &Rig,
+    model: &Ready<'_>,
+    problem: &Problem,
+    baseline: &Explained,
     passes: &[Operating],
 ) -> Vec<Forecast> {
     let n = passes.len();
@@ -90,31 +130,29 @@ pub fn forecast(
     let nominal = out.predict(&[], &[0.0; NUISANCES]);
     let recalibrated = out.predict(&[], &baseline.u);
     let (form, corrected, spread): (DVector<f64>, DVector<f64>, Vec<f64>) = match model {
-        Model::Baseline(e) => {
+        Ready::Baseline(e) => {
             let spread = parameter_variance(&out, e, &recalibrated);
             (recalibrated.clone(), recalibrated.clone(), spread)
         }
-        Model::Effects(e) => {
+        Ready::Effects { best: e, shift, departure } => {
             let plain = out.predict(&e.members, &e.u);
             let places: Vec<_> = passes
                 .iter()
                 .map(|p| fitted.coordinates.place(p, out.design.largest_amplitude_m, &FORM_LENGTHS))
                 .collect();
             let basis = fitted.kernel.matrix(&places);
-            let (_, _, shift) = recalibration(problem, &e.u, &e.prediction);
             let under = out.predict(&[], &e.u[..NUISANCES]);
             let change = &plain - &under - out.jacobian(&[], &e.u[..NUISANCES], &under) * shift;
             let delta = &basis * &e.departure * e.share;
             let mut spread = parameter_variance(&out, e, &plain);
-            let residual = departure_covariance(fitted, problem, e);
+            let open = &basis * departure;
             for i in 0..n {
-                let row = basis.row(i).transpose();
-                let left = row.dot(&(&residual * &row)).max(0.0);
+                let left = open.row(i).dot(&basis.row(i)).max(0.0);
                 spread[i] += (e.share * change[i]).powi(2) * left;
             }
             (plain.clone(), plain + change.component_mul(&delta), spread)
         }
-        Model::Open(w) => {
+        Ready::Open(w) => {
             let (mean, sd) = w.predict(problem, passes);
             let mean = DVector::from_vec(mean);
             (mean.clone(), mean, sd.iter().map(|s| s * s).collect())
