@@ -124,6 +124,8 @@ const START_SHARE: f64 = 0.15;
 pub(crate) const PRUNE: f64 = 15.0;
 /// A law whose tempered cost is beyond this factor of the best, plus this, is not refined.
 const HOPELESS: (f64, f64) = (1.5, 60.0);
+/// Share of certificates that no longer hold when a table is taken: the instrument was knocked, or changed.
+const OUTLIVED: f64 = 0.02;
 /// Deviations of chi2 above its expectation from which the best single is taken to leave something.
 const ENOUGH: f64 = 2.5;
 
@@ -165,63 +167,34 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
         }
     }
 
-    // Middle share first, for every law; the other shares where they could matter. Laws cost from one millisecond to two
-    // hundred: each is a task of its own.
-    let starts: Vec<Vec<Fit>> = members
-        .par_iter()
-        .with_max_len(1)
-        .map(|member| {
-            let mut fits: Vec<Fit> = nuisance_starts(&held)
-                .iter()
-                .flat_map(|held| optima(&problem, &[*member], held, &loose))
-                .collect();
-            fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-            fits
-        })
-        .collect();
-    let cheapest = starts.iter().flatten().map(|f| f.cost).fold(f64::INFINITY, f64::min);
-    let middle: Vec<Option<Explained>> = members
-        .par_iter()
-        .zip(&starts)
-        .with_max_len(1)
-        .map(|(member, fits)| {
-            let own = fits.first()?.cost;
-            // What lies far behind even on the tempered scale gets one look, not a search.
-            let rounds = if own > HOPELESS.0 * cheapest + HOPELESS.1 { 0 } else { 6 };
-            fits.iter()
-                .filter(|f| rounds > 0 || f.cost == own)
-                .filter(|f| f.cost < 1.2 * own + 10.0)
-                .map(|f| explain(&problem, &[*member], &f.u, &basis, FORMS[1].0, rounds))
-                .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
-        })
-        .collect();
-    let top = middle.iter().flatten().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-    let laws: Vec<Option<(f64, Explained)>> = middle
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|found| {
-            found.map(|e| {
-                if e.log_evidence > top - PRUNE {
-                    let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
-                    over_forms(&problem, &fit, &e.members, &basis)
-                } else {
-                    (e.log_evidence + FORMS[1].1.ln(), e)
-                }
-            })
-        })
-        .collect();
+    let search = Search { held: &held, loose: &loose, basis: &basis };
+    let laws = singles(&problem, &members, &search);
     let mut candidates: Vec<Candidate> = tried
         .iter()
-        .filter_map(|&effect| {
-            let own: Vec<(f64, Explained)> = members
-                .iter()
-                .zip(&laws)
-                .filter(|(m, _)| m.effect == effect)
-                .filter_map(|(_, l)| l.clone())
-                .collect();
-            candidate(vec![effect], own)
-        })
+        .filter_map(|&effect| candidate(vec![effect], of_effect(effect, &members, &laws)))
         .collect();
+    // What a certificate says holds unless the table speaks against it by more than such an accident is rare: then the
+    // effect has its own prior again, here and in all that follows.
+    let bounded: Vec<Member> = members
+        .iter()
+        .copied()
+        .filter(|m| problem.certified.iter().any(|(c, _)| c.effect == m.effect))
+        .collect();
+    if !bounded.is_empty() {
+        let free = Problem { certified: Vec::new(), ..problem.clone() };
+        let laws = singles(&free, &bounded, &search);
+        for own in &mut candidates {
+            let effect = own.effects[0];
+            let Some(mut other) = candidate(vec![effect], of_effect(effect, &bounded, &laws)) else {
+                continue;
+            };
+            other.log_evidence += OUTLIVED.ln();
+            if other.log_evidence > own.log_evidence {
+                problem.certified.retain(|(m, _)| m.effect != effect);
+                *own = other;
+            }
+        }
+    }
     sort(&mut candidates);
 
     if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + 3.0) {
@@ -273,6 +246,66 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
     }
 }
 
+/// What the searches for singles share: where the nuisances start, tempered variances, and the form's basis.
+struct Search<'a> {
+    held: &'a [f64],
+    loose: &'a [f64],
+    basis: &'a DMatrix<f64>,
+}
+
+/// Every law alone: its log evidence over the shares of form uncertainty, and its best solution.
+fn singles(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<Option<(f64, Explained)>> {
+    // Middle share first, for every law; the other shares where they could matter. Laws cost from one millisecond to two
+    // hundred: each is a task of its own.
+    let starts: Vec<Vec<Fit>> = members
+        .par_iter()
+        .with_max_len(1)
+        .map(|member| {
+            let mut fits: Vec<Fit> = nuisance_starts(search.held)
+                .iter()
+                .flat_map(|held| optima(problem, &[*member], held, search.loose))
+                .collect();
+            fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+            fits
+        })
+        .collect();
+    let cheapest = starts.iter().flatten().map(|f| f.cost).fold(f64::INFINITY, f64::min);
+    let middle: Vec<Option<Explained>> = members
+        .par_iter()
+        .zip(&starts)
+        .with_max_len(1)
+        .map(|(member, fits)| {
+            let own = fits.first()?.cost;
+            // What lies far behind even on the tempered scale gets one look, not a search.
+            let rounds = if own > HOPELESS.0 * cheapest + HOPELESS.1 { 0 } else { 6 };
+            fits.iter()
+                .filter(|f| rounds > 0 || f.cost == own)
+                .filter(|f| f.cost < 1.2 * own + 10.0)
+                .map(|f| explain(problem, &[*member], &f.u, search.basis, FORMS[1].0, rounds))
+                .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+        })
+        .collect();
+    let top = middle.iter().flatten().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    middle
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|found| {
+            found.map(|e| {
+                if e.log_evidence > top - PRUNE {
+                    let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
+                    over_forms(problem, &fit, &e.members, search.basis)
+                } else {
+                    (e.log_evidence + FORMS[1].1.ln(), e)
+                }
+            })
+        })
+        .collect()
+}
+
+fn of_effect(effect: usize, members: &[Member], laws: &[Option<(f64, Explained)>]) -> Vec<(f64, Explained)> {
+    members.iter().zip(laws).filter(|(m, _)| m.effect == effect).filter_map(|(_, l)| l.clone()).collect()
+}
+
 /// Laws whose covariate this table lacks are not tried.
 fn usable(effect: usize, law: usize, table: &Table) -> bool {
     let form = &library()[effect].laws()[law];
@@ -293,13 +326,9 @@ fn usable(effect: usize, law: usize, table: &Table) -> bool {
 }
 
 fn candidate(effects: Vec<usize>, laws: Vec<(f64, Explained)>) -> Option<Candidate> {
-    let share = |e: &Explained| e.members.iter().map(|m| library()[m.effect].share(m.law)).product::<f64>();
-    let weighed: Vec<f64> = laws.iter().map(|(log, e)| log + share(e).ln()).collect();
-    let best = (0..laws.len()).max_by(|&a, &b| weighed[a].total_cmp(&weighed[b]))?;
-    let best = laws[best].1.clone();
-    // Laws that the table lacks a covariate for are not among the tried.
-    let tried: f64 = laws.iter().map(|(_, e)| share(e)).sum();
-    let log_evidence = log_sum_exp(&weighed) - tried.ln();
+    let best = laws.iter().max_by(|a, b| a.0.total_cmp(&b.0))?.1.clone();
+    let evidences: Vec<f64> = laws.iter().map(|l| l.0).collect();
+    let log_evidence = log_sum_exp(&evidences) - (laws.len() as f64).ln();
     log_evidence.is_finite().then(|| Candidate::new(effects, log_evidence, best, laws))
 }
 

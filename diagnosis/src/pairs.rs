@@ -10,13 +10,12 @@ use rayon::prelude::*;
 
 /// Single effects from which pairs are grown.
 const PAIR_SEEDS: usize = 6;
-/// Exact aliases: a pair of them is one cause with the freedom of two.
+/// Near aliases: a pair of them is one cause with the freedom of two.
 const SAME: [[&str; 2]; 1] = [["force_crosstalk", "plate_tilt"]];
 /// Laws whose changes are the same for the same parameter: for any pair with one of them there is the same pair with the
 /// other. Cross-talk and tilt (which also turns the normal axis, a little); a factor on normal stiffness and on amplitude;
 /// a factor on lateral stiffness and on speed.
-const TWINS: [[(&str, usize); 2]; 4] = [
-    [("force_crosstalk", 0), ("plate_tilt", 1)],
+const TWINS: [[(&str, usize); 2]; 3] = [
     [("force_crosstalk", 0), ("plate_tilt", 0)],
     [("stiffness_error", 1), ("amplitude_miscalibration", 0)],
     [("stiffness_error", 0), ("speed_error", 0)],
@@ -209,9 +208,9 @@ pub fn pairs(
         .collect();
     let mut list: Vec<Candidate> = Vec::new();
     for (effects, evidence, best) in full {
-        let share: f64 = best.members.iter().map(|m| library()[m.effect].share(m.law)).product();
+        let laws: f64 = best.members.iter().map(|m| library()[m.effect].laws().len() as f64).product();
         // Only the best pair of laws was fitted: the others are taken to add nothing.
-        let log_evidence = evidence + share.ln();
+        let log_evidence = evidence - laws.ln();
         match list.iter_mut().find(|c| c.effects == effects) {
             Some(c) if c.log_evidence >= log_evidence => {}
             Some(c) => *c = Candidate::new(effects, log_evidence, best, Vec::new()),

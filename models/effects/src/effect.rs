@@ -166,10 +166,6 @@ pub trait Effect: Sync {
     fn laws(&self) -> &'static [Law];
     /// What a table must hold before it can be seen.
     fn needs(&self) -> &'static [Need];
-    /// Prior share of a law among those of this effect; all alike unless a law is known to be rare.
-    fn share(&self, _law: usize) -> f64 {
-        1.0 / self.laws().len() as f64
-    }
     /// Makes what [`Effect::change`] with these parameters will look up, so that a control loop makes nothing.
     fn prepare(&self, _law: usize, _theta: &[f64]) {}
     /// Changes what the contact is given. `theta` holds the parameters of the law in its order.

@@ -5,11 +5,10 @@ use crate::prelude::*;
 /// See the module.
 pub struct PlateTilt;
 
-static LAWS: [Law; 2] = [
-    Law { name: "rotation", parameters: &[Parameter::signed("angle", "rad", 0.03, -0.3, 0.3)] },
-    // Where the normal axis is read along the plate's own normal: an exact alias of a cross-talk.
-    Law { name: "lateral axis alone", parameters: &[Parameter::signed("angle", "rad", 0.03, -0.3, 0.3)] },
-];
+// A plate that turns shows in both axes. A lateral cell that is askew by itself reads a share of the normal force: that is a
+// cross-talk by its definition.
+static LAWS: [Law; 1] =
+    [Law { name: "rotation", parameters: &[Parameter::signed("angle", "rad", 0.03, -0.3, 0.3)] }];
 
 impl Effect for PlateTilt {
     fn name(&self) -> &'static str {
@@ -27,16 +26,11 @@ impl Effect for PlateTilt {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
-    /// A frame that turns shows in both axes; that one axis alone turns is a sensor of its own kind, and what it says a
-    /// cross-talk says as well.
-    fn share(&self, law: usize) -> f64 {
-        [0.9, 0.1][law]
-    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Directions]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
-        if law == 0 && theta[0] != 0.0 {
+    fn change(&self, _: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
+        if theta[0] != 0.0 {
             unload(c, pass.direction, theta[0].tan());
             c.normal_force /= theta[0].cos();
         }

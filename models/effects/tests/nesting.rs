@@ -113,16 +113,6 @@ fn every_name_of_the_contract_is_there_once() {
     assert_eq!(wanted, names);
 }
 
-/// Shares of an effect's laws are a distribution over them.
-#[test]
-fn shares_of_laws_add_up() {
-    for effect in library() {
-        let total: f64 = (0..effect.laws().len()).map(|law| effect.share(law)).sum();
-        assert!((total - 1.0).abs() < 1e-12, "{}: {total}", effect.name());
-        assert!((0..effect.laws().len()).all(|law| effect.share(law) > 0.0), "{}", effect.name());
-    }
-}
-
 /// A coordinate within its bounds gives a value within its own, and comes back from it.
 #[test]
 fn bounds_of_coordinates_are_bounds_of_values() {
