@@ -117,6 +117,17 @@ fn a_cause_does_not_hide_in_a_certified_stiffness() {
     assert!(scored.class.iter().any(|name| stated(&name)), "{:?}", scored.class);
 }
 
+/// Friction that heats up goes with load times speed. Nothing in the library does, but two effects together nearly do.
+#[test]
+fn friction_that_heats_up_is_not_named_as_rate_and_load() {
+    for seed in [1_710_005_130_201, 1_710_005_130_512, 1_710_005_130_543] {
+        let set = generate(seed, Stratum::Outside, Ask::Gain);
+        assert_eq!(set.label.causes[0].name, "frictional_heating");
+        let scored = score(&set, &Options::default()).unwrap();
+        assert_ne!(scored.verdict, Verdict::Named, "seed {seed}: {:?}", scored.named);
+    }
+}
+
 /// An overdamped ridge is loss in the skin, not inertia: what it does is done by the dashpot, whatever the mass.
 #[test]
 fn loss_in_the_skin_is_not_called_inertia() {

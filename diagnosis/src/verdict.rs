@@ -1,6 +1,6 @@
 //! The verdict: everything the diagnosis says about one table, in the shape of the contract.
 
-use crate::attribute::{Decision, Verdict, decide};
+use crate::attribute::{Decision, Verdict, decide, imitated};
 use crate::data::{Rig, Table};
 use crate::fit::{NUISANCES, Problem};
 use crate::held_out::{Gap, gap};
@@ -199,6 +199,20 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
             label(fitted, leader),
             decision.probabilities[leader]
         ),
+        Verdict::Ambiguous if decision.class.len() == 1 => {
+            let name = label(fitted, leader);
+            if imitated(&fitted.candidates[leader].names()) {
+                format!(
+                    "{name} together, or friction that heats up with load times speed, which is not in the library: \
+                     this table cannot tell; {closed}."
+                )
+            } else {
+                let probability = decision.probabilities[leader];
+                format!(
+                    "{name} leads with a probability of {probability:.2}, too little to be named; {closed}."
+                )
+            }
+        }
         Verdict::Ambiguous => {
             let names: Vec<String> = decision.class.iter().take(6).map(|&i| label(fitted, i)).collect();
             format!("This table cannot tell {} apart; {closed}.", names.join(", "))
