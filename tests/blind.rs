@@ -124,7 +124,8 @@ fn friction_that_heats_up_is_not_named_as_rate_and_load() {
         let set = generate(seed, Stratum::Outside, Ask::Gain);
         assert_eq!(set.label.causes[0].name, "frictional_heating");
         let scored = score(&set, &Options::default()).unwrap();
-        assert_ne!(scored.verdict, Verdict::Named, "seed {seed}: {:?}", scored.named);
+        let open = matches!(scored.verdict, Verdict::Ambiguous | Verdict::Unknown);
+        assert!(open, "seed {seed}: {:?} {:?}", scored.verdict, scored.named);
     }
 }
 

@@ -180,6 +180,7 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
         .copied()
         .filter(|m| problem.certified.iter().any(|(c, _)| c.effect == m.effect))
         .collect();
+    let mut outlived = Vec::new();
     if !bounded.is_empty() {
         let free = Problem { certified: Vec::new(), ..problem.clone() };
         let laws = singles(&free, &bounded, &search);
@@ -191,6 +192,7 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
             other.log_evidence += OUTLIVED.ln();
             if other.log_evidence > own.log_evidence {
                 problem.certified.retain(|(m, _)| m.effect != effect);
+                outlived.push(effect);
                 *own = other;
             }
         }
@@ -206,7 +208,12 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
             + best.pull();
         let n = problem.len() as f64;
         if misfit > n + ENOUGH * (2.0 * n).sqrt() {
-            let grown = pairs(&problem, &candidates, &loose, &basis);
+            let mut grown = pairs(&problem, &candidates, &loose, &basis);
+            for pair in &mut grown {
+                // A pair pays for the certificates that it frees as its members do alone.
+                let freed = pair.effects.iter().filter(|e| outlived.contains(e)).count();
+                pair.log_evidence += freed as f64 * OUTLIVED.ln();
+            }
             candidates.extend(grown);
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::attribute::{Decision, Verdict, decide, imitated};
 use crate::data::{Rig, Table};
+use crate::evidence::Explained;
 use crate::fit::{NUISANCES, Problem};
 use crate::held_out::{Gap, gap};
 use crate::hypotheses::{Fitted, Options, fit_all};
@@ -247,7 +248,7 @@ fn hypotheses(
             let parameters = if i == leader && parameters.is_some() {
                 parameters.map(|p| p.concat()).unwrap_or_default()
             } else {
-                laplace(&fitted.problem, &c.best)
+                laplace(&c.best)
             };
             Hypothesis {
                 effects: c.names().iter().map(|n| (*n).to_string()).collect(),
@@ -283,8 +284,7 @@ fn hypotheses(
 }
 
 /// Intervals from the curvature at the optimum, for hypotheses that do not lead.
-fn laplace(problem: &Problem, e: &crate::evidence::Explained) -> Vec<Estimate> {
-    let _ = problem;
+fn laplace(e: &Explained) -> Vec<Estimate> {
     let mut at = NUISANCES;
     e.members
         .iter()
