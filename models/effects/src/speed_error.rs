@@ -5,9 +5,17 @@ use crate::prelude::*;
 /// See the module.
 pub struct SpeedError;
 
-static LAWS: [Law; 2] = [
+static LAWS: [Law; 3] = [
     Law { name: "gain", parameters: &[Parameter::signed("log_gain", "1", 0.15, -1.0, 1.0)] },
     Law { name: "constant", parameters: &[Parameter::signed("excess", "m/s", 0.003, -0.02, 0.05)] },
+    // Slip and lag of a drive change with its speed: the error of the gain by this share for each factor of e.
+    Law {
+        name: "gain that changes with speed",
+        parameters: &[
+            Parameter::signed("log_gain", "1", 0.15, -1.0, 1.0),
+            Parameter::signed("growth_with_log_speed", "1", 0.1, -0.5, 0.5),
+        ],
+    },
 ];
 
 impl Effect for SpeedError {
@@ -18,7 +26,7 @@ impl Effect for SpeedError {
         Place::Instrument
     }
     fn summary(&self) -> &'static str {
-        "True speed is a factor (or a constant) away from the commanded one."
+        "True speed is a factor (or a constant) away from the commanded one; the factor may change with speed."
     }
     fn source(&self) -> &'static str {
         "wrong lead or step count; told apart from a stiffness only by an encoder"
@@ -29,10 +37,11 @@ impl Effect for SpeedError {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Operating, design: &Design, c: &mut Contact) {
         match law {
             0 => c.speed *= theta[0].exp(),
-            _ => c.speed = (c.speed + theta[0]).max(0.05 * c.speed),
+            1 => c.speed = (c.speed + theta[0]).max(0.05 * c.speed),
+            _ => c.speed *= (theta[0] * (1.0 + theta[1] * (c.speed / design.reference_speed_m_s).ln())).exp(),
         }
     }
 }
