@@ -26,7 +26,7 @@ const ONE_CHANGE: f64 = 0.98;
 const PAIRS_FITTED: usize = 20;
 /// Of those, pairs that are sought again in every law, and the starts of each that are followed.
 const PAIRS_SEARCHED: usize = 4;
-const LAWS_POLISHED: usize = 6;
+const LAWS_POLISHED: usize = 16;
 
 /// Whether two hypotheses change the forces alike: by name, or by the angle between their changes in deviations of a
 /// pass.
@@ -85,6 +85,13 @@ fn searched_again(
                 })
                 .collect();
             surveys.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            // Each two laws once: on the scale of the starts the better ones do not stand out.
+            let mut seen = std::collections::BTreeSet::new();
+            surveys.retain(|(_, members, _)| {
+                let mut laws = members.clone();
+                laws.sort_unstable();
+                seen.insert(laws)
+            });
             surveys.truncate(LAWS_POLISHED);
             surveys
                 .into_par_iter()

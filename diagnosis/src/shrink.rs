@@ -1,7 +1,7 @@
 //! The gap left on parts of the operating space that the fit did not see.
 
 use crate::evidence::{Explained, FORMS};
-use crate::fit::{Fit, Member, Problem, minimise};
+use crate::fit::{Fit, Member, NUISANCES, Problem, minimise};
 use crate::hypotheses::Fitted;
 use crate::linear::Covariance;
 use nalgebra::{DMatrix, DVector};
@@ -35,7 +35,7 @@ pub struct Region {
     pub rows: Vec<usize>,
     /// Errors there.
     pub errors: Errors,
-    /// Whether the rest of the table holds enough of the gap for a cause to be learnt from it.
+    /// Whether the rest of the table holds enough of the gap, and of each cause's own part, to learn from.
     pub informed: bool,
 }
 
@@ -135,8 +135,29 @@ fn without(problem: &Problem, rows: &[usize]) -> Vec<usize> {
 /// Rounds of a refit without a region.
 const ROUNDS: usize = 6;
 /// Share of the whole gap that the rest of a table must hold before a region is judged: a cause that lives in the
-/// region alone (saturation, in the largest amplitudes) cannot be learnt from what is left.
+/// region alone (saturation, in the largest amplitudes) cannot be learnt from what is left. So it is with each of two.
 const INFORMED: f64 = 0.1;
+
+/// Squared changes by each of two effects beside the other, in deviations of a pass; of a single effect nothing: what it
+/// does is the gap.
+fn own_changes(problem: &Problem, best: &Explained) -> Vec<Vec<f64>> {
+    if best.members.len() < 2 {
+        return Vec::new();
+    }
+    let mut at = NUISANCES;
+    (0..best.members.len())
+        .map(|i| {
+            let count = best.members[i].parameters().len();
+            let (mut members, mut u) = (best.members.clone(), best.u.clone());
+            members.remove(i);
+            u.drain(at..at + count);
+            at += count;
+            let beside = problem.predict(&members, &u);
+            let change = best.prediction.iter().zip(beside.iter()).zip(&problem.variance);
+            change.map(|((with, without), v)| (with - without).powi(2) / v).collect()
+        })
+        .collect()
+}
 
 /// Predicts each region from the rest, by the hypothesis' form alone.
 pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
@@ -144,10 +165,16 @@ pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
     let whole: f64 = (0..problem.len())
         .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.variance[i] - 1.0)
         .sum();
+    let own = own_changes(problem, best);
     regions(problem)
         .into_par_iter()
         .map(|(name, rows)| {
-            let (rest, out) = (problem.select(&without(problem, &rows)), problem.select(&rows));
+            let others = without(problem, &rows);
+            let told = own.iter().all(|change| {
+                let held: f64 = others.iter().map(|&i| change[i]).sum();
+                held > INFORMED * change.iter().sum::<f64>()
+            });
+            let (rest, out) = (problem.select(&others), problem.select(&rows));
             let (hypothesis, _) = left_out(&rest, &out, &best.members, &best.u);
             let (baseline, refit) = left_out(&rest, &out, &[], &fitted.none.u);
             let metric = metric(&rest, &out, &refit);
@@ -157,7 +184,7 @@ pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
             let held: f64 = (0..rest.len())
                 .map(|i| (rest.lateral[i] - refit.prediction[i]).powi(2) / rest.variance[i] - 1.0)
                 .sum();
-            let informed = held > 3.0 * (2.0 * rest.len() as f64).sqrt() && held > INFORMED * whole;
+            let informed = told && held > 3.0 * (2.0 * rest.len() as f64).sqrt() && held > INFORMED * whole;
             Region { name, rows, errors, informed }
         })
         .collect()
