@@ -27,8 +27,7 @@ pub struct Priors {
 }
 
 impl Default for Priors {
-    /// A gap is as likely as none. Causes have sizes from nothing upwards, so no table without a gap excludes the small
-    /// ones: at a third for none, `no_gap` was stated at 0.76 where it was right in 99 of 100.
+    /// A gap is as likely as none.
     fn default() -> Self {
         Priors { none: 0.5, single: 0.36, pair: 0.07, unknown: 0.07 }
     }
@@ -228,12 +227,17 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
     all.push(none_evidence + priors.none.ln());
     all.push(wildcard.log_evidence + priors.unknown.ln());
     let total = log_sum_exp(&all);
-    for (c, v) in candidates.iter_mut().zip(&all) {
-        c.log_probability = v - total;
-        c.probability = c.log_probability.exp();
-    }
     let k = candidates.len();
-    let (none_probability, unknown_probability) = ((all[k] - total).exp(), (all[k + 1] - total).exp());
+    // The rest of each hypothesis' weight is no gap's: see `told`.
+    let mut none_probability = 1.0;
+    for (c, v) in candidates.iter_mut().zip(&all) {
+        c.log_probability = v - total + told(c.log_evidence, none_evidence);
+        c.probability = c.log_probability.exp();
+        none_probability -= c.probability;
+    }
+    let unknown_probability = (all[k + 1] - total + told(wildcard.log_evidence, none_evidence)).exp();
+    // Where hypotheses take all but rounding, no gap's own weight is the better number.
+    let none_probability = (none_probability - unknown_probability).max((all[k] - total).exp());
     candidates
         .sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability).then(a.effects.cmp(&b.effects)));
     Fitted {
@@ -251,6 +255,17 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
         priors,
         singles_tried: tried.len(),
     }
+}
+
+/// Logarithm of the share of a hypothesis' weight that speaks for a gap which the table can tell.
+///
+/// Causes have sizes from nothing upwards. Those too small to tell fit as well as no gap does, and give a cause at most the
+/// evidence of no gap; that part of its weight says that there is nothing to be seen, and counts for no gap. Without, tables
+/// without a gap were given 0.75 to 0.93 for none where that was right in 99 of 100.
+fn told(evidence: f64, none: f64) -> f64 {
+    let behind = none - evidence;
+    // The logarithm of one and an exponential, which must not overflow.
+    -(behind.max(0.0) + (-behind.abs()).exp().ln_1p())
 }
 
 /// What the searches for singles share: where the nuisances start, tempered variances, and the form's basis.

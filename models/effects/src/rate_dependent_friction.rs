@@ -5,7 +5,7 @@ use crate::prelude::*;
 /// See the module.
 pub struct RateDependentFriction;
 
-static LAWS: [Law; 3] = [
+static LAWS: [Law; 4] = [
     Law { name: "power", parameters: &[Parameter::signed("exponent", "1", 0.12, -0.6, 0.8)] },
     Law {
         name: "Stribeck",
@@ -15,6 +15,11 @@ static LAWS: [Law; 3] = [
         ],
     },
     Law { name: "linear", parameters: &[Parameter::signed("slope", "s/m", 4.0, -4.0, 60.0)] },
+    // Thermally activated sliding; the first term of rate-and-state friction.
+    Law {
+        name: "logarithmic",
+        parameters: &[Parameter::signed("slope_per_log_speed", "1", 0.12, -0.4, 0.6)],
+    },
 ];
 
 impl Effect for RateDependentFriction {
@@ -44,7 +49,8 @@ impl Effect for RateDependentFriction {
                 let part = |u: f64| 1.0 + theta[0] * (-(u / theta[1]).powi(2)).exp();
                 part(c.speed)
             }
-            _ => (1.0 + theta[0] * (c.speed - reference)).max(0.05),
+            2 => (1.0 + theta[0] * (c.speed - reference)).max(0.05),
+            _ => (1.0 + theta[0] * (c.speed / reference).ln()).max(0.05),
         };
     }
 }
