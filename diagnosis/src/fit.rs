@@ -1,7 +1,7 @@
 //! Bounded least squares of one hypothesis on a table, in coordinates that are standard normal a priori.
 
 use crate::data::Rig;
-use effects::{Active, Baseline, Design, Operating, Parameter, Place, library};
+use effects::{Active, Baseline, Design, Operating, Parameter, Place, known, library};
 use nalgebra::{DMatrix, DVector};
 
 /// Deviation of the logarithm of mu0 a priori where the still passes give it, and where they do not.
@@ -9,10 +9,10 @@ const MU0_LOG_SD: (f64, f64) = (0.3, 0.8);
 /// Number of baseline parameters: logarithms of mu0, normal and lateral stiffness.
 pub const NUISANCES: usize = 3;
 
-/// One member of a hypothesis: index of the effect in the library, and of its law.
+/// One member of a hypothesis: index of the effect among the known ones, and of its law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Member {
-    /// Index in the library.
+    /// Index among [`known`] causes, the library first.
     pub effect: usize,
     /// Index of the law.
     pub law: usize,
@@ -21,15 +21,15 @@ pub struct Member {
 impl Member {
     /// The law's parameters.
     pub fn parameters(&self) -> &'static [Parameter] {
-        library()[self.effect].laws()[self.law].parameters
+        known()[self.effect].laws()[self.law].parameters
     }
     /// The effect's name.
     pub fn name(&self) -> &'static str {
-        library()[self.effect].name()
+        known()[self.effect].name()
     }
     /// Where the effect sits.
     pub fn place(&self) -> Place {
-        library()[self.effect].place()
+        known()[self.effect].place()
     }
 }
 
@@ -206,7 +206,7 @@ impl Problem {
         order.sort_by_key(|&k| members[k]);
         let active: Vec<Active<'_>> = order
             .into_iter()
-            .map(|k| Active { effect: library()[members[k].effect], law: members[k].law, theta: &thetas[k] })
+            .map(|k| Active { effect: known()[members[k].effect], law: members[k].law, theta: &thetas[k] })
             .collect();
         DVector::from_iterator(
             passes.len(),

@@ -9,7 +9,7 @@ use crate::noise::{PureError, settle};
 use crate::pairs::pairs;
 use crate::smooth::{Coordinates, Kernel, Lengths};
 use crate::wildcard::Wildcard;
-use effects::library;
+use effects::{known, library};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -80,7 +80,7 @@ impl Candidate {
 
     /// Names in the library's order.
     pub fn names(&self) -> Vec<&'static str> {
-        self.effects.iter().map(|&e| library()[e].name()).collect()
+        self.effects.iter().map(|&e| known()[e].name()).collect()
     }
 }
 
@@ -94,8 +94,10 @@ pub struct Fitted {
     pub none: Explained,
     /// Probability of no gap.
     pub none_probability: f64,
-    /// The open set.
+    /// The open set's smooth departure of any kind.
     pub wildcard: Wildcard,
+    /// Causes of known form that the library does not name, best first: part of the open set.
+    pub strangers: Vec<Candidate>,
     /// Its probability.
     pub unknown_probability: f64,
     /// Single effects and pairs, most probable first.
@@ -125,6 +127,8 @@ pub(crate) const PRUNE: f64 = 15.0;
 const HOPELESS: (f64, f64) = (1.5, 60.0);
 /// Share of certificates that no longer hold when a table is taken: the instrument was knocked, or changed.
 const OUTLIVED: f64 = 0.02;
+/// Share of the open set's weight for causes of known form.
+const KNOWN: f64 = 0.1;
 /// Deviations of chi2 above its expectation from which the best single is taken to leave something.
 const ENOUGH: f64 = 2.5;
 
@@ -197,6 +201,7 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
         }
     }
     sort(&mut candidates);
+    let strangers = strangers(&problem, table, &search);
 
     if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + 3.0) {
         // A single that leaves nothing needs no second cause, unless it is the stiffnesses that took it up.
@@ -225,7 +230,8 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
     };
     let mut all: Vec<f64> = candidates.iter().map(|c| c.log_evidence + prior_of(c).ln()).collect();
     all.push(none_evidence + priors.none.ln());
-    all.push(wildcard.log_evidence + priors.unknown.ln());
+    let open = open_evidence(&wildcard, &strangers);
+    all.push(open + priors.unknown.ln());
     let total = log_sum_exp(&all);
     let k = candidates.len();
     // The rest of each hypothesis' weight is no gap's: see `told`.
@@ -235,7 +241,7 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
         c.probability = c.log_probability.exp();
         none_probability -= c.probability;
     }
-    let unknown_probability = (all[k + 1] - total + told(wildcard.log_evidence, none_evidence)).exp();
+    let unknown_probability = (all[k + 1] - total + told(open, none_evidence)).exp();
     // Where hypotheses take all but rounding, no gap's own weight is the better number.
     let none_probability = (none_probability - unknown_probability).max((all[k] - total).exp());
     candidates
@@ -246,6 +252,7 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
         none,
         none_probability,
         wildcard,
+        strangers,
         unknown_probability,
         candidates,
         not_testable,
@@ -266,6 +273,27 @@ fn told(evidence: f64, none: f64) -> f64 {
     let behind = none - evidence;
     // The logarithm of one and an exponential, which must not overflow.
     -(behind.max(0.0) + (-behind.abs()).exp().ln_1p())
+}
+
+/// Causes of known form that the library does not name, best first.
+fn strangers(problem: &Problem, table: &Table, search: &Search<'_>) -> Vec<Candidate> {
+    let testable = |&e: &usize| table.lacks(known()[e].needs()).is_none();
+    let effects: Vec<usize> = (library().len()..known().len()).filter(testable).collect();
+    let laws = |&effect: &usize| (0..known()[effect].laws().len()).map(move |law| Member { effect, law });
+    let members: Vec<Member> = effects.iter().flat_map(laws).collect();
+    let found = singles(problem, &members, search);
+    let mut list: Vec<Candidate> =
+        effects.iter().filter_map(|&e| candidate(vec![e], of_effect(e, &members, &found))).collect();
+    sort(&mut list);
+    list
+}
+
+/// Evidence of the open set: a smooth departure of any kind, or a cause of known form that the library does not name.
+fn open_evidence(wildcard: &Wildcard, strangers: &[Candidate]) -> f64 {
+    let each = (KNOWN / strangers.len().max(1) as f64).ln();
+    let mut parts = vec![wildcard.log_evidence + (1.0 - KNOWN).ln()];
+    parts.extend(strangers.iter().map(|c| c.log_evidence + each));
+    log_sum_exp(&parts)
 }
 
 /// What the searches for singles share: where the nuisances start, tempered variances, and the form's basis.
@@ -330,7 +358,7 @@ fn of_effect(effect: usize, members: &[Member], laws: &[Option<(f64, Explained)>
 
 /// Laws whose covariate this table lacks are not tried.
 fn usable(effect: usize, law: usize, table: &Table) -> bool {
-    let form = &library()[effect].laws()[law];
+    let form = &known()[effect].laws()[law];
     let temperatures: Vec<f64> = table.passes.iter().filter_map(|p| p.temperature_c).collect();
     let span = temperatures.iter().copied().fold(f64::NEG_INFINITY, f64::max)
         - temperatures.iter().copied().fold(f64::INFINITY, f64::min);

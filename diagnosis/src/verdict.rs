@@ -219,8 +219,15 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
             format!("This table cannot tell {} apart; {closed}.", names.join(", "))
         }
         Verdict::Unknown => {
+            let known = fitted.strangers.first().filter(|s| {
+                let leading = &fitted.candidates[leader];
+                s.log_evidence > fitted.wildcard.log_evidence.max(leading.log_evidence)
+            });
+            let hint = known.map_or_else(String::new, |s| {
+                format!(" What comes nearest is not in the library: {}.", s.names().join("+"))
+            });
             format!(
-                "There is a gap, and no effect of the library causes most of it; {closed} with a smooth map."
+                "There is a gap, and no effect of the library causes most of it; {closed} with a smooth map.{hint}"
             )
         }
     }

@@ -20,6 +20,7 @@ pub mod amplitude_miscalibration;
 pub mod amplitude_saturation;
 pub mod contact_ageing;
 pub mod force_crosstalk;
+pub mod frictional_heating;
 pub mod lateral_gain;
 pub mod lateral_offset_drift;
 pub mod lateral_recovery;
@@ -55,36 +56,46 @@ mod prelude {
 /// Every effect of the library, in the order in which a signal passes them: instruments that falsify the
 /// condition first, then plate, finger and contact.
 pub fn library() -> &'static [&'static dyn Effect] {
-    static LIBRARY: [&dyn Effect; 26] = [
-        &normal_offset::NormalOffset,
-        &speed_error::SpeedError,
-        &speed_ripple::SpeedRipple,
-        &amplitude_miscalibration::AmplitudeMiscalibration,
-        &amplitude_saturation::AmplitudeSaturation,
-        &resonance_detuning::ResonanceDetuning,
-        &mode_shape::ModeShape,
-        &amplitude_droop::AmplitudeDroop,
-        &stiffness_error::StiffnessError,
-        &subsurface_relaxation::SubsurfaceRelaxation,
-        &moisture_drift::MoistureDrift,
-        &rate_dependent_friction::RateDependentFriction,
-        &load_dependent_friction::LoadDependentFriction,
-        &adhesion::Adhesion,
-        &multi_asperity::MultiAsperity,
-        &normal_damping::NormalDamping,
-        &lateral_recovery::LateralRecovery,
-        &contact_ageing::ContactAgeing,
-        &ridge_inertia::RidgeInertia,
-        &squeeze_film::SqueezeFilm,
-        &plate_tilt::PlateTilt,
-        &force_crosstalk::ForceCrosstalk,
-        &lateral_gain::LateralGain,
-        &lateral_offset_drift::LateralOffsetDrift,
-        &sensor_lag::SensorLag,
-        &time_misalignment::TimeMisalignment,
-    ];
-    &LIBRARY
+    &KNOWN[..LIBRARY]
 }
+
+/// Number of effects in the library.
+const LIBRARY: usize = 26;
+
+/// The library, and after it causes of known form that it does not name: the open set takes them in.
+pub fn known() -> &'static [&'static dyn Effect] {
+    &KNOWN
+}
+
+static KNOWN: [&dyn Effect; LIBRARY + 1] = [
+    &normal_offset::NormalOffset,
+    &speed_error::SpeedError,
+    &speed_ripple::SpeedRipple,
+    &amplitude_miscalibration::AmplitudeMiscalibration,
+    &amplitude_saturation::AmplitudeSaturation,
+    &resonance_detuning::ResonanceDetuning,
+    &mode_shape::ModeShape,
+    &amplitude_droop::AmplitudeDroop,
+    &stiffness_error::StiffnessError,
+    &subsurface_relaxation::SubsurfaceRelaxation,
+    &moisture_drift::MoistureDrift,
+    &rate_dependent_friction::RateDependentFriction,
+    &load_dependent_friction::LoadDependentFriction,
+    &adhesion::Adhesion,
+    &multi_asperity::MultiAsperity,
+    &normal_damping::NormalDamping,
+    &lateral_recovery::LateralRecovery,
+    &contact_ageing::ContactAgeing,
+    &ridge_inertia::RidgeInertia,
+    &squeeze_film::SqueezeFilm,
+    &plate_tilt::PlateTilt,
+    &force_crosstalk::ForceCrosstalk,
+    &lateral_gain::LateralGain,
+    &lateral_offset_drift::LateralOffsetDrift,
+    &sensor_lag::SensorLag,
+    &time_misalignment::TimeMisalignment,
+    &frictional_heating::FrictionalHeating,
+];
 
 /// The effect of that name.
 pub fn by_name(name: &str) -> Option<&'static dyn Effect> {
