@@ -2,7 +2,7 @@
 //!
 //! An effect changes what the contact is given ([`contact::Contact`]) or what the instruments make of the
 //! force ([`operating::Reading`]); the contact itself is solved in one place. Effects therefore combine, and
-//! each nests the baseline exactly. To add one: a file, and one line in [`library`].
+//! each nests the baseline exactly. To add one: a file, and one line in [`library`]'s list.
 
 pub mod asperities;
 pub mod contact;
@@ -62,7 +62,7 @@ pub fn library() -> &'static [&'static dyn Effect] {
 /// Number of effects in the library.
 const LIBRARY: usize = 26;
 
-/// The library, and after it causes of known form that it does not name: the open set takes them in.
+/// The library, and after it causes of known form that it does not name: a diagnosis' open set takes them in.
 pub fn known() -> &'static [&'static dyn Effect] {
     &KNOWN
 }
