@@ -1,17 +1,17 @@
 //! The hypotheses: no gap, each effect, pairs, and the open set; fitted, with their probabilities.
 
 use crate::data::{Rig, Table};
-use crate::evidence::{Explained, FORMS, explain, over_forms};
-use crate::explore::{held_nuisances, nuisance_starts, optima, tempered};
-use crate::fit::{Fit, Member, Problem, minimise};
+use crate::evidence::{Explained, over_forms};
+use crate::explore::{held_nuisances, tempered};
+use crate::fit::{Problem, minimise};
 use crate::linear::log_sum_exp;
 use crate::noise::{PureError, settle};
 use crate::pairs::pairs;
+use crate::singles::{OUTLIVED, Search, outlived, singles, sort, strangers};
 use crate::smooth::{Coordinates, Kernel, Lengths};
 use crate::wildcard::Wildcard;
 use effects::{known, library};
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 /// Prior probabilities of no gap, of one effect, of two, and of none in the library.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,12 +121,6 @@ pub const FORM_LENGTHS: Lengths = Lengths { condition: 1.5, time: 1.5, position:
 const FORM_RANK: usize = 40;
 /// Share of the smooth gap below which starts do not look.
 const START_SHARE: f64 = 0.15;
-/// Laws this many nats behind the best single keep the middle share only.
-pub(crate) const PRUNE: f64 = 15.0;
-/// A law whose tempered cost is beyond this factor of the best, plus this, is not refined.
-const HOPELESS: (f64, f64) = (1.5, 60.0);
-/// Share of certificates that no longer hold when a table is taken: the instrument was knocked, or changed.
-const OUTLIVED: f64 = 0.02;
 /// Share of the open set's weight for causes of known form.
 const KNOWN: f64 = 0.1;
 /// Deviations of chi2 above its expectation from which the best single is taken to leave something.
@@ -152,98 +146,31 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
     let held = held_nuisances(&minimise(&problem, &[], &none.u, &loose, 10));
 
     let mut not_testable = Vec::new();
-    let mut members = Vec::new();
     let mut tried = Vec::new();
     for (index, effect) in library().iter().enumerate() {
         if options.without.iter().any(|n| n == effect.name()) {
             continue;
         }
-        if let Some(because) = table.lacks(effect.needs()) {
-            not_testable.push((effect.name(), because));
-            continue;
-        }
-        tried.push(index);
-        for law in 0..effect.laws().len() {
-            if usable(index, law, table) {
-                members.push(Member { effect: index, law });
-            }
+        match table.lacks(effect.needs()) {
+            Some(because) => not_testable.push((effect.name(), because)),
+            None => tried.push(index),
         }
     }
 
     let search = Search { held: &held, loose: &loose, basis: &basis };
-    let laws = singles(&problem, &members, &search);
-    let mut candidates: Vec<Candidate> = tried
-        .iter()
-        .filter_map(|&effect| candidate(vec![effect], of_effect(effect, &members, &laws)))
-        .collect();
-    // What a certificate says holds unless the table speaks against it by more than such an accident is rare: then the
-    // effect has its own prior again, here and in all that follows.
-    let bounded: Vec<Member> = members
-        .iter()
-        .copied()
-        .filter(|m| problem.certified.iter().any(|(c, _)| c.effect == m.effect))
-        .collect();
-    let mut outlived = Vec::new();
-    if !bounded.is_empty() {
-        let free = Problem { certified: Vec::new(), ..problem.clone() };
-        let laws = singles(&free, &bounded, &search);
-        for own in &mut candidates {
-            let effect = own.effects[0];
-            let Some(mut other) = candidate(vec![effect], of_effect(effect, &bounded, &laws)) else {
-                continue;
-            };
-            other.log_evidence += OUTLIVED.ln();
-            if other.log_evidence > own.log_evidence {
-                problem.certified.retain(|(m, _)| m.effect != effect);
-                outlived.push(effect);
-                *own = other;
-            }
-        }
-    }
+    let mut candidates = singles(&problem, table, &tried, &search);
+    let outlived = outlived(&mut problem, table, &mut candidates, &search);
     sort(&mut candidates);
     let strangers = strangers(&problem, table, &search);
 
     if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + 3.0) {
-        // A single that leaves nothing needs no second cause, unless it is the stiffnesses that took it up.
-        let best = &candidates[0].best;
-        let misfit: f64 = (0..problem.len())
-            .map(|i| (problem.lateral[i] - best.prediction[i]).powi(2) / problem.variance[i])
-            .sum::<f64>()
-            + best.pull();
-        let n = problem.len() as f64;
-        if misfit > n + ENOUGH * (2.0 * n).sqrt() {
-            let mut grown = pairs(&problem, &candidates, &loose, &basis);
-            for pair in &mut grown {
-                // A pair pays for the certificates that it frees as its members do alone.
-                let freed = pair.effects.iter().filter(|e| outlived.contains(e)).count();
-                pair.log_evidence += freed as f64 * OUTLIVED.ln();
-            }
-            candidates.extend(grown);
-        }
+        let companions = second_causes(&problem, &candidates, &outlived, &search);
+        candidates.extend(companions);
     }
 
-    let priors = options.priors;
-    let count = tried.len().max(1) as f64;
-    let pair_count = (count * (count - 1.0) / 2.0).max(1.0);
-    let prior_of = |c: &Candidate| {
-        if c.effects.len() == 1 { priors.single / count } else { priors.pair / pair_count }
-    };
-    let mut all: Vec<f64> = candidates.iter().map(|c| c.log_evidence + prior_of(c).ln()).collect();
-    all.push(none_evidence + priors.none.ln());
-    let open = open_evidence(&wildcard, &strangers);
-    all.push(open + priors.unknown.ln());
-    let total = log_sum_exp(&all);
-    let k = candidates.len();
-    // The rest of each hypothesis' weight is no gap's: see `told`.
-    let mut none_probability = 1.0;
-    for (c, v) in candidates.iter_mut().zip(&all) {
-        c.log_probability = v - total + told(c.log_evidence, none_evidence);
-        c.probability = c.log_probability.exp();
-        none_probability -= c.probability;
-    }
-    let unknown_probability = (all[k + 1] - total + told(open, none_evidence)).exp();
-    // Where hypotheses take all but rounding, no gap's own weight is the better number.
-    let none_probability = (none_probability - unknown_probability).max((all[k] - total).exp());
+    let evidence = [none_evidence, open_evidence(&wildcard, &strangers)];
+    let [none_probability, unknown_probability] =
+        weigh(&mut candidates, evidence, tried.len(), &options.priors);
     candidates
         .sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability).then(a.effects.cmp(&b.effects)));
     Fitted {
@@ -259,9 +186,63 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
         coordinates,
         kernel,
         basis,
-        priors,
+        priors: options.priors,
         singles_tried: tried.len(),
     }
+}
+
+/// Pairs, where the best single leaves something: one that leaves nothing needs no second cause, unless it is the
+/// stiffnesses that took it up.
+fn second_causes(
+    problem: &Problem,
+    singles: &[Candidate],
+    outlived: &[usize],
+    search: &Search<'_>,
+) -> Vec<Candidate> {
+    let best = &singles[0].best;
+    let misfit: f64 = (0..problem.len())
+        .map(|i| (problem.lateral[i] - best.prediction[i]).powi(2) / problem.variance[i])
+        .sum::<f64>()
+        + best.pull();
+    let n = problem.len() as f64;
+    if misfit <= n + ENOUGH * (2.0 * n).sqrt() {
+        return Vec::new();
+    }
+    let mut grown = pairs(problem, singles, search.loose, search.basis);
+    for pair in &mut grown {
+        // A pair pays for the certificates that it frees as its members do alone.
+        let freed = pair.effects.iter().filter(|e| outlived.contains(e)).count();
+        pair.log_evidence += freed as f64 * OUTLIVED.ln();
+    }
+    grown
+}
+
+/// Gives each candidate its probability beside no gap and the open set, whose log evidences are given; returns theirs.
+fn weigh(
+    candidates: &mut [Candidate],
+    [none, open]: [f64; 2],
+    singles_tried: usize,
+    priors: &Priors,
+) -> [f64; 2] {
+    let count = singles_tried.max(1) as f64;
+    let pair_count = (count * (count - 1.0) / 2.0).max(1.0);
+    let prior_of = |c: &Candidate| {
+        if c.effects.len() == 1 { priors.single / count } else { priors.pair / pair_count }
+    };
+    let mut all: Vec<f64> = candidates.iter().map(|c| c.log_evidence + prior_of(c).ln()).collect();
+    let (no_gap, unknown) = (none + priors.none.ln(), open + priors.unknown.ln());
+    all.extend([no_gap, unknown]);
+    let total = log_sum_exp(&all);
+    // The rest of each hypothesis' weight is no gap's: see `told`.
+    let mut rest = 1.0;
+    for (c, v) in candidates.iter_mut().zip(&all) {
+        c.log_probability = v - total + told(c.log_evidence, none);
+        c.probability = c.log_probability.exp();
+        rest -= c.probability;
+    }
+    let unknown = (unknown - total + told(open, none)).exp();
+    // Where hypotheses take all but rounding, no gap's own weight is the better number.
+    [(rest - unknown).max((no_gap - total).exp()), unknown]
 }
 
 /// Logarithm of the share of a hypothesis' weight that speaks for a gap which the table can tell.
@@ -275,113 +256,10 @@ fn told(evidence: f64, none: f64) -> f64 {
     -(behind.max(0.0) + (-behind.abs()).exp().ln_1p())
 }
 
-/// Causes of known form that the library does not name, best first.
-fn strangers(problem: &Problem, table: &Table, search: &Search<'_>) -> Vec<Candidate> {
-    let testable = |&e: &usize| table.lacks(known()[e].needs()).is_none();
-    let effects: Vec<usize> = (library().len()..known().len()).filter(testable).collect();
-    let laws = |&effect: &usize| (0..known()[effect].laws().len()).map(move |law| Member { effect, law });
-    let members: Vec<Member> = effects.iter().flat_map(laws).collect();
-    let found = singles(problem, &members, search);
-    let mut list: Vec<Candidate> =
-        effects.iter().filter_map(|&e| candidate(vec![e], of_effect(e, &members, &found))).collect();
-    sort(&mut list);
-    list
-}
-
 /// Evidence of the open set: a smooth departure of any kind, or a cause of known form that the library does not name.
 fn open_evidence(wildcard: &Wildcard, strangers: &[Candidate]) -> f64 {
     let each = (KNOWN / strangers.len().max(1) as f64).ln();
     let mut parts = vec![wildcard.log_evidence + (1.0 - KNOWN).ln()];
     parts.extend(strangers.iter().map(|c| c.log_evidence + each));
     log_sum_exp(&parts)
-}
-
-/// What the searches for singles share: where the nuisances start, tempered variances, and the form's basis.
-struct Search<'a> {
-    held: &'a [f64],
-    loose: &'a [f64],
-    basis: &'a DMatrix<f64>,
-}
-
-/// Every law alone: its log evidence over the shares of form uncertainty, and its best solution.
-fn singles(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<Option<(f64, Explained)>> {
-    // Middle share first, for every law; the other shares where they could matter. Laws cost from one millisecond to two
-    // hundred: each is a task of its own.
-    let starts: Vec<Vec<Fit>> = members
-        .par_iter()
-        .with_max_len(1)
-        .map(|member| {
-            let mut fits: Vec<Fit> = nuisance_starts(search.held)
-                .iter()
-                .flat_map(|held| optima(problem, &[*member], held, search.loose))
-                .collect();
-            fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-            fits
-        })
-        .collect();
-    let cheapest = starts.iter().flatten().map(|f| f.cost).fold(f64::INFINITY, f64::min);
-    let middle: Vec<Option<Explained>> = members
-        .par_iter()
-        .zip(&starts)
-        .with_max_len(1)
-        .map(|(member, fits)| {
-            let own = fits.first()?.cost;
-            // What lies far behind even on the tempered scale gets one look, not a search.
-            let rounds = if own > HOPELESS.0 * cheapest + HOPELESS.1 { 0 } else { 6 };
-            fits.iter()
-                .filter(|f| rounds > 0 || f.cost == own)
-                .filter(|f| f.cost < 1.2 * own + 10.0)
-                .map(|f| explain(problem, &[*member], &f.u, search.basis, FORMS[1].0, rounds))
-                .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
-        })
-        .collect();
-    let top = middle.iter().flatten().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-    middle
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|found| {
-            found.map(|e| {
-                if e.log_evidence > top - PRUNE {
-                    let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
-                    over_forms(problem, &fit, &e.members, search.basis)
-                } else {
-                    (e.log_evidence + FORMS[1].1.ln(), e)
-                }
-            })
-        })
-        .collect()
-}
-
-fn of_effect(effect: usize, members: &[Member], laws: &[Option<(f64, Explained)>]) -> Vec<(f64, Explained)> {
-    members.iter().zip(laws).filter(|(m, _)| m.effect == effect).filter_map(|(_, l)| l.clone()).collect()
-}
-
-/// Laws whose covariate this table lacks are not tried.
-fn usable(effect: usize, law: usize, table: &Table) -> bool {
-    let form = &known()[effect].laws()[law];
-    let temperatures: Vec<f64> = table.passes.iter().filter_map(|p| p.temperature_c).collect();
-    let span = temperatures.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-        - temperatures.iter().copied().fold(f64::INFINITY, f64::min);
-    match form.name {
-        "warming (temperature)" | "warming about a tuning point" | "offset with temperature" => {
-            temperatures.len() == table.len() && span > 0.3
-        }
-        "fixed resonance" | "standing wave, shorter at higher frequency" => {
-            let first = table.passes[0].frequency_hz;
-            table.passes.iter().any(|p| (p.frequency_hz / first - 1.0).abs() > 1e-3)
-        }
-        "exponential approach in each run" => table.run_count > 1,
-        _ => true,
-    }
-}
-
-fn candidate(effects: Vec<usize>, laws: Vec<(f64, Explained)>) -> Option<Candidate> {
-    let best = laws.iter().max_by(|a, b| a.0.total_cmp(&b.0))?.1.clone();
-    let evidences: Vec<f64> = laws.iter().map(|l| l.0).collect();
-    let log_evidence = log_sum_exp(&evidences) - (laws.len() as f64).ln();
-    log_evidence.is_finite().then(|| Candidate::new(effects, log_evidence, best, laws))
-}
-
-fn sort(candidates: &mut [Candidate]) {
-    candidates.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence).then(a.effects.cmp(&b.effects)));
 }

@@ -1,7 +1,8 @@
 //! Where simulation and reality part, and why.
 //!
-//! [`data`] takes the table, [`noise`] settles the variance of each pass, [`hypotheses`] fits every candidate
-//! cause and the open set, [`shrink`] asks how each does on passes it has not seen.
+//! [`data`] takes the table, [`noise`] settles the variance of each pass, [`hypotheses`] weighs every candidate cause
+//! ([`singles`], [`pairs`]) and the open set ([`wildcard`]), [`shrink`] asks how each does on passes it has not seen, [`attribute`] decides, [`verdict`]
+//! says it, [`saved`] gives the rig its corrected model.
 
 pub mod attribute;
 pub mod data;
@@ -20,7 +21,9 @@ pub mod noise;
 pub mod pairs;
 pub mod predict;
 pub mod pulls;
+pub mod saved;
 pub mod shrink;
+pub mod singles;
 pub mod smooth;
 pub mod verdict;
 pub mod wildcard;

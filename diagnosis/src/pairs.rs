@@ -3,7 +3,8 @@
 use crate::evidence::{Explained, FORMS, explain, over_forms};
 use crate::explore::{glance, nuisance_starts, polish, survey};
 use crate::fit::{Fit, Member, NUISANCES, Problem};
-use crate::hypotheses::{Candidate, PRUNE};
+use crate::hypotheses::Candidate;
+use crate::singles::PRUNE;
 use effects::library;
 use nalgebra::DMatrix;
 use rayon::prelude::*;

@@ -3,7 +3,7 @@
 use crate::attribute::{Decision, Verdict, decide, imitated};
 use crate::data::{Rig, Table};
 use crate::evidence::Explained;
-use crate::fit::{NUISANCES, Problem};
+use crate::fit::NUISANCES;
 use crate::held_out::{Gap, gap};
 use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::intervals::{Estimate, Shape, estimates};
@@ -12,7 +12,6 @@ use crate::next::{Experiment, experiments};
 use crate::noise::PureError;
 use crate::predict::{Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
-use effects::corrected::{SavedEffect, SavedModel, SavedParameter};
 use effects::library;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -318,80 +317,5 @@ impl Diagnosis {
         let leader = self.decision.class[0];
         let whole = model(&self.fitted, &self.table, self.decision.verdict, leader, None);
         forecast(&self.fitted, &self.rig, &whole, &conditions.passes)
-    }
-
-    /// The model for a run; none where no effect of the library causes most of the gap.
-    pub fn saved_model(&self) -> Option<SavedModel> {
-        let problem = &self.fitted.problem;
-        let leader = self.decision.class[0];
-        let (u, effects, inertia) = match self.decision.verdict {
-            Verdict::Unknown => return None,
-            Verdict::NoGap => (self.fitted.none.u.clone(), Vec::new(), false),
-            Verdict::Named | Verdict::Ambiguous => {
-                let best = &self.fitted.candidates[leader].best;
-                let thetas = Problem::thetas(&best.members, &best.u);
-                let mut at = NUISANCES;
-                let effects = best
-                    .members
-                    .iter()
-                    .zip(thetas)
-                    .map(|(m, theta)| {
-                        let effect = library()[m.effect];
-                        let own = m.parameters();
-                        let first = at;
-                        at += own.len();
-                        // Covariance in the parameters' units, by the slope of each coordinate.
-                        let slope: Vec<f64> = own
-                            .iter()
-                            .enumerate()
-                            .map(|(i, p)| {
-                                let u = best.u[first + i];
-                                (p.value(u + 1e-4) - p.value(u - 1e-4)) / 2e-4
-                            })
-                            .collect();
-                        SavedEffect {
-                            name: effect.name().to_string(),
-                            law: effect.laws()[m.law].name.to_string(),
-                            acts_on: if effect.place() == effects::Place::Instrument {
-                                "reading".to_string()
-                            } else {
-                                "prediction".to_string()
-                            },
-                            parameters: own
-                                .iter()
-                                .zip(&theta)
-                                .map(|(p, v)| SavedParameter {
-                                    name: p.name.to_string(),
-                                    value: *v,
-                                    unit: p.unit.to_string(),
-                                })
-                                .collect(),
-                            covariance: (0..own.len())
-                                .map(|i| {
-                                    (0..own.len())
-                                        .map(|j| {
-                                            best.covariance[(first + i, first + j)] * slope[i] * slope[j]
-                                        })
-                                        .collect()
-                                })
-                                .collect(),
-                        }
-                    })
-                    .collect();
-                let inertia = best.members.iter().any(|m| m.name() == "ridge_inertia");
-                (best.u.clone(), effects, inertia)
-            }
-        };
-        let gap = &self.report.gap;
-        let left = (gap.form_alone_rmse.powi(2) - gap.noise_floor_rmse.powi(2)).max(0.0).sqrt();
-        Some(SavedModel {
-            schema: "muprime.model/1".to_string(),
-            verdict: self.report.text.clone(),
-            relative_sd: left.max(0.005),
-            interpolation_error: if inertia { effects::impact::STATED_ERROR } else { 0.0 },
-            baseline: problem.baseline(&u),
-            design: problem.design,
-            effects,
-        })
     }
 }
