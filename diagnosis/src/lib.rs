@@ -1,8 +1,8 @@
 //! Where simulation and reality part, and why.
 //!
 //! [`data`] takes the table, [`noise`] settles the variance of each pass, [`hypotheses`] weighs every candidate cause
-//! ([`singles`], [`pairs`]) and the open set ([`wildcard`]), [`shrink`] asks how each does on passes it has not seen, [`attribute`] decides, [`verdict`]
-//! says it, [`saved`] gives the rig its corrected model.
+//! ([`singles`], [`pairs`]) and the open set ([`wildcard`]), [`shrink`] asks how each does on passes it has not seen,
+//! [`attribute`] decides, [`verdict`] says it, [`saved`] gives the rig its corrected model.
 
 pub mod attribute;
 pub mod data;
