@@ -98,7 +98,7 @@ pub struct Fitted {
     pub wildcard: Wildcard,
     /// Causes of known form that the library does not name, best first: part of the open set.
     pub strangers: Vec<Candidate>,
-    /// Its probability.
+    /// Probability of the open set.
     pub unknown_probability: f64,
     /// Single effects and pairs, most probable first.
     pub candidates: Vec<Candidate>,
@@ -262,4 +262,19 @@ fn open_evidence(wildcard: &Wildcard, strangers: &[Candidate]) -> f64 {
     let mut parts = vec![wildcard.log_evidence + (1.0 - KNOWN).ln()];
     parts.extend(strangers.iter().map(|c| c.log_evidence + each));
     log_sum_exp(&parts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::told;
+
+    /// `E / (E + E0)` in logarithms, at ratios where that fits a number and where it does not.
+    #[test]
+    fn what_is_too_small_to_tell_is_no_gap() {
+        assert!((told(0.0, 0.0) - 0.5_f64.ln()).abs() < 1e-15);
+        assert!((told(3.0_f64.ln(), 0.0) - 0.75_f64.ln()).abs() < 1e-15);
+        assert!((told(-7.0, -7.0 + 9.0_f64.ln()) - 0.1_f64.ln()).abs() < 1e-14);
+        assert_eq!(told(2e4, -2e4), 0.0);
+        assert_eq!(told(-2e4, 2e4), -4e4);
+    }
 }

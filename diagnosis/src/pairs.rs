@@ -25,7 +25,7 @@ const TWINS: [[(&str, usize); 2]; 3] = [
 const ONE_CHANGE: f64 = 0.98;
 /// Pairs that are fitted in full.
 const PAIRS_FITTED: usize = 20;
-/// Of those, pairs that are sought again in every law, and the starts of each that are followed.
+/// Of those, pairs that are sought again in each two laws, and how many of these are followed.
 const PAIRS_SEARCHED: usize = 4;
 const LAWS_POLISHED: usize = 16;
 
