@@ -131,7 +131,7 @@ fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
 }
 
 /// A pair that says little more than one of its members alone is that single with a form of its own: its weight goes
-/// to such members, in proportion to their evidence.
+/// to such members, and to singles that do better than they, in proportion to their evidence.
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     let problem = &fitted.problem;
     let left = |model: &nalgebra::DVector<f64>| -> f64 {
@@ -158,13 +158,17 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
                 2.0 * gain < PAIR_GAIN * gap && !needed && !pulled
             })
             .collect();
-        if alone.is_empty() {
-            continue;
-        }
-        let evidence: Vec<f64> = alone.iter().map(|&i| candidates[i].log_evidence).collect();
+        let Some(best) = alone.iter().map(|&i| candidates[i].log_evidence).reduce(f64::max) else { continue };
+        // Another single that does better than these is the better short word for what the pair says.
+        let mut heirs = alone;
+        heirs.extend((0..candidates.len()).filter(|&i| {
+            let c = &candidates[i];
+            c.effects.len() == 1 && !own.effects.contains(&c.effects[0]) && c.log_evidence > best
+        }));
+        let evidence: Vec<f64> = heirs.iter().map(|&i| candidates[i].log_evidence).collect();
         let total = crate::linear::log_sum_exp(&evidence);
         let weight = std::mem::take(&mut probabilities[pair]);
-        for (i, e) in alone.iter().zip(&evidence) {
+        for (i, e) in heirs.iter().zip(&evidence) {
             probabilities[*i] += weight * (e - total).exp();
         }
     }
