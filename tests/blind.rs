@@ -141,6 +141,18 @@ fn a_speed_that_is_wrong_by_half_is_found_beside_another_cause() {
     }
 }
 
+/// A vibration in the plane of the plate adds a force that goes with the load, more or less: a cross-talk, were it not off
+/// by a third. A linear map of the readings has no such freedom.
+#[test]
+fn a_vibration_in_the_plane_of_the_plate_is_no_cross_talk() {
+    for seed in [2_110_006_330_095, 1_810_005_430_157] {
+        let set = generate(seed, Stratum::Outside, Ask::Gain);
+        assert_eq!(set.label.causes[0].name, "in_plane_motion");
+        let scored = score(&set, &Options::default()).unwrap();
+        assert_eq!(scored.verdict, Verdict::Unknown, "seed {seed}: {:?}", scored.named);
+    }
+}
+
 /// An overdamped ridge is loss in the skin, not inertia: what it does is done by the dashpot, whatever the mass.
 #[test]
 fn loss_in_the_skin_is_not_called_inertia() {

@@ -214,6 +214,17 @@ fn equations(
     (hessian, gradient)
 }
 
+/// Largest share by which a hypothesis may depart from its form. Of two causes the stricter one sets it: else a companion
+/// that does nothing frees the other.
+fn largest_share(members: &[Member]) -> f64 {
+    members.iter().map(Member::departs_by).fold(f64::INFINITY, f64::min)
+}
+
+/// Share of form uncertainty with which laws are compared before the others are tried.
+pub fn middle_share(members: &[Member]) -> f64 {
+    FORMS[1].0.min(largest_share(members))
+}
+
 /// Evidence of a hypothesis averaged over the shares of form uncertainty, with the best share's solution.
 pub fn over_forms(
     problem: &Problem,
@@ -225,15 +236,19 @@ pub fn over_forms(
         let e = explain(problem, members, &fit.u, basis, 0.0, 4);
         return (e.log_evidence, e);
     }
-    let middle = explain(problem, members, &fit.u, basis, FORMS[1].0, 6);
-    let low = explain(problem, members, &middle.u, basis, FORMS[0].0, 4);
-    let high = explain(problem, members, &middle.u, basis, FORMS[2].0, 3);
-    let list = [low, middle, high];
-    let weighted: Vec<f64> = list.iter().zip(FORMS).map(|(e, (_, w))| e.log_evidence + w.ln()).collect();
+    let most = largest_share(members);
+    let middle = explain(problem, members, &fit.u, basis, middle_share(members), 6);
+    let mut list = vec![explain(problem, members, &middle.u, basis, FORMS[0].0, 4)];
+    let high = (most >= FORMS[2].0).then(|| explain(problem, members, &middle.u, basis, FORMS[2].0, 3));
+    list.extend((most >= FORMS[1].0).then_some(middle));
+    list.extend(high);
+    let weights: f64 = FORMS[..list.len()].iter().map(|f| f.1).sum();
+    let weighted: Vec<f64> =
+        list.iter().zip(FORMS).map(|(e, (_, w))| e.log_evidence + (w / weights).ln()).collect();
     let total = log_sum_exp(&weighted);
-    let best = (0..3).max_by(|&a, &b| weighted[a].total_cmp(&weighted[b])).expect("three shares");
-    let [a, b, c] = list;
-    (total, [a, b, c].into_iter().nth(best).expect("three shares"))
+    let best =
+        (0..list.len()).max_by(|&a, &b| weighted[a].total_cmp(&weighted[b])).expect("at least one share");
+    (total, list.swap_remove(best))
 }
 
 #[cfg(test)]

@@ -27,6 +27,10 @@ impl Member {
     pub fn name(&self) -> &'static str {
         known()[self.effect].name()
     }
+    /// Largest share of its change by which it may depart from its form.
+    pub fn departs_by(&self) -> f64 {
+        known()[self.effect].departs_by()
+    }
     /// Where the effect sits.
     pub fn place(&self) -> Place {
         known()[self.effect].place()

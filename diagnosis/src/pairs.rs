@@ -1,6 +1,6 @@
 //! Two causes at once: pairs grown from the best singles, and sought again in every law where they look best.
 
-use crate::evidence::{Explained, FORMS, explain, over_forms};
+use crate::evidence::{Explained, FORMS, explain, middle_share, over_forms};
 use crate::explore::{glance, nuisance_starts, polish, survey};
 use crate::fit::{Fit, Member, NUISANCES, Problem};
 use crate::hypotheses::Candidate;
@@ -98,7 +98,7 @@ fn searched_again(
                 .into_par_iter()
                 .filter_map(|(_, members, u)| {
                     let fit = polish(problem, &members, u, loose)?;
-                    Some(explain(problem, &members, &fit.u, basis, FORMS[1].0, 5))
+                    Some(explain(problem, &members, &fit.u, basis, middle_share(&members), 5))
                 })
                 .collect()
         })
@@ -185,7 +185,7 @@ pub fn pairs(
             let best = nuisance_starts(&u)
                 .into_iter()
                 .filter_map(|u| polish(problem, &pair, u, loose))
-                .map(|fit| explain(problem, &pair, &fit.u, basis, FORMS[1].0, 5))
+                .map(|fit| explain(problem, &pair, &fit.u, basis, middle_share(&pair), 5))
                 .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
             Some((effects, best))
         })
@@ -197,7 +197,7 @@ pub fn pairs(
         .map(|(members, u)| {
             let mut effects: Vec<usize> = members.iter().map(|m| m.effect).collect();
             effects.sort_unstable();
-            (effects, explain(problem, &members, &u, basis, FORMS[1].0, 3))
+            (effects, explain(problem, &members, &u, basis, middle_share(&members), 3))
         })
         .collect();
     first.extend(twins);

@@ -1,7 +1,7 @@
 //! One effect at a time: every law sought from global starts, and the laws of an effect put together.
 
 use crate::data::Table;
-use crate::evidence::{Explained, FORMS, explain, over_forms};
+use crate::evidence::{Explained, FORMS, explain, middle_share, over_forms};
 use crate::explore::{nuisance_starts, optima};
 use crate::fit::{Fit, Member, Problem};
 use crate::hypotheses::Candidate;
@@ -110,7 +110,7 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
             fits.iter()
                 .filter(|f| rounds > 0 || f.cost == own)
                 .filter(|f| f.cost < 1.2 * own + 10.0)
-                .map(|f| explain(problem, &[*member], &f.u, search.basis, FORMS[1].0, rounds))
+                .map(|f| explain(problem, &[*member], &f.u, search.basis, middle_share(&[*member]), rounds))
                 .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
         })
         .collect();

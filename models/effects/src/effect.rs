@@ -164,6 +164,12 @@ pub trait Effect: Sync {
     fn source(&self) -> &'static str;
     /// Its functional forms.
     fn laws(&self) -> &'static [Law];
+    /// Largest share of its change by which it may depart smoothly from its form. A linear map of the readings has no
+    /// shape of its own: what needs more is something else (a vibration in the plane of the plate looks like a cross-talk
+    /// that is off by a third).
+    fn departs_by(&self) -> f64 {
+        1.0
+    }
     /// What a table must hold before it can be seen.
     fn needs(&self) -> &'static [Need];
     /// Makes what [`Effect::change`] with these parameters will look up, so that a control loop makes nothing.

@@ -26,6 +26,9 @@ impl Effect for PlateTilt {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
+    fn departs_by(&self) -> f64 {
+        0.05
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Directions]
     }
