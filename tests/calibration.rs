@@ -1,7 +1,7 @@
 //! Calibrations on the virtual rig: what was withheld is recovered within the stated intervals, over trials
 //! whose seeds were fixed beforehand; what is unfit is refused with the reason.
 //!
-//! `cargo test --release -p tests --test calibration -- --nocapture` prints coverage and interval lengths.
+//! `cargo test --release -p muprime-tests --test calibration -- --nocapture` prints coverage and interval lengths.
 
 #[path = "calibration/absorbed.rs"]
 mod absorbed;

@@ -1,7 +1,7 @@
 //! Real `kill -9`s of a real `muprime run` over Modbus TCP, at random instants: no acknowledged pass is lost, every file
 //! reads, and the amplifier's own watchdog drops the drive in time by the amplifier's own clock.
 //!
-//! Thirty kills by default; `MUPRIME_KILLS=1000 cargo test --release -p tests --test kills -- --nocapture` makes a thousand.
+//! Thirty kills by default; `MUPRIME_KILLS=1000 cargo test --release -p muprime-tests --test kills -- --nocapture` makes a thousand.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

@@ -1,7 +1,7 @@
 //! Regression against NIST StRD: data and certified values in `nist_strd/`, whose README names the source.
 //!
 //! Agreement is counted in digits: LRE = -log10(|ours - certified| / |certified|), NIST's own measure.
-//! `cargo test --release -p tests --test nist -- --nocapture` prints the table.
+//! `cargo test --release -p muprime-tests --test nist -- --nocapture` prints the table.
 
 use calibration::regression::{Fit, linear, nonlinear};
 use nalgebra::{DMatrix, DVector};

@@ -1,6 +1,6 @@
 //! The table from requirement to test, generated: `docs/safety.md` must say what the code does.
 //!
-//! `MUPRIME_UPDATE=1 cargo test --release -p tests --test requirements` writes it anew.
+//! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements` writes it anew.
 
 use realtime::safety::{Cause, RULES};
 use rig::faults::bench::STEADY_AT;
@@ -52,7 +52,7 @@ fn page() -> String {
     assert_eq!(tally.failed, 0, "{:?}", tally.failures);
     let mut out = String::from(
         "# Safety: requirements, tests, reactions\n\n\
-         Generated: `MUPRIME_UPDATE=1 cargo test --release -p tests --test requirements`. A test fails where this page is not \
+         Generated: `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements`. A test fails where this page is not \
          what the code does.\n\n## From requirement to test\n\n\
          Unit tests are in `realtime/src/safety/tests.rs` and `tests/` beside it; faults are those of the list below, which `tests/faults.rs` runs.\n\n\
          | requirement | cause | it demands | unit tests | faults that trip it |\n|---|---|---|---|---|\n",
@@ -115,7 +115,7 @@ fn every_requirement_has_a_test_and_the_page_says_which() {
     let written = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         written == now,
-        "docs/safety.md is old: MUPRIME_UPDATE=1 cargo test --release -p tests --test requirements"
+        "docs/safety.md is old: MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements"
     );
 }
 

@@ -1,8 +1,8 @@
 //! Long runs: nothing trips, nothing grows.
 //!
 //! Short by default. One simulated day, and thirty minutes of wall-clock time over Modbus TCP to a rig in another process:
-//! `MUPRIME_SOAK_VIRTUAL_S=86400 cargo test --release -p tests --test soak virtual_time -- --nocapture` and
-//! `MUPRIME_SOAK_WIRE_S=1800 cargo test --release -p tests --test soak over_the_wire -- --nocapture`.
+//! `MUPRIME_SOAK_VIRTUAL_S=86400 cargo test --release -p muprime-tests --test soak virtual_time -- --nocapture` and
+//! `MUPRIME_SOAK_WIRE_S=1800 cargo test --release -p muprime-tests --test soak over_the_wire -- --nocapture`.
 
 use models::condition::{Condition, OutOfDomain};
 use models::prediction::{EmpiricalPsi, FrictionModel, Prediction};

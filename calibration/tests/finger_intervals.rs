@@ -1,12 +1,12 @@
 //! The intervals of the finger's certificate stay within what a stiffness, a loss, a modulus or a time can be, and
 //! still hold the truth as often as they say.
 
-use calibration::certificate::{Certificate, Instrument, Occasion, Parameter, RawData, Refusal};
-use calibration::finger::FingerFit;
-use calibration::finger::friction::{FrictionPoint, friction};
-use calibration::finger::stiffness::{UltrasonicPoint, ultrasonic};
-use calibration::identify::Identified;
-use calibration::identify::skin::{IdentifiedSkin, Profile};
+use muprime_calibration::certificate::{Certificate, Instrument, Occasion, Parameter, RawData, Refusal};
+use muprime_calibration::finger::FingerFit;
+use muprime_calibration::finger::friction::{FrictionPoint, friction};
+use muprime_calibration::finger::stiffness::{UltrasonicPoint, ultrasonic};
+use muprime_calibration::identify::Identified;
+use muprime_calibration::identify::skin::{IdentifiedSkin, Profile};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 

@@ -1,10 +1,10 @@
 //! The inverse analysis on the finite element model: phases made by a finer mesh and a smaller step, with
 //! 5 degrees of noise on each reading and ten readings a point as in the paper (section 2.2).
 
-use calibration::identify::{Search, identify};
-use calibration::phase::table::PhasePoint;
 use models::quantity::PeakToPeak;
 use models::ridge::{PhaseCurves, RidgeCase, RunSettings, Skin, SkinGrid, run};
+use muprime_calibration::identify::{Search, identify};
+use muprime_calibration::phase::table::PhasePoint;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 

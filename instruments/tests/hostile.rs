@@ -1,8 +1,8 @@
 //! Every decoder against bytes that nobody sound would send: no panic, no hang, no endless growth.
 //! Sound frames with a few bytes changed reach further than noise does, so both are tried.
 
-use instruments::codec::{can, canopen, checksum::Check, dbc, modbus_rtu, stream, text};
-use instruments::{Profile, vector};
+use muprime_instruments::codec::{can, canopen, checksum::Check, dbc, modbus_rtu, stream, text};
+use muprime_instruments::{Profile, vector};
 use proptest::prelude::*;
 
 /// Sound frames to start from.
@@ -69,7 +69,7 @@ proptest! {
 
     #[test]
     fn conditions(text in "[a-c0-9 &|=<>!()+*/x.-]{0,60}") {
-        if let Ok(expression) = instruments::expression::Expression::compile(&text, &|name| (name == "a").then_some(0)) {
+        if let Ok(expression) = muprime_instruments::expression::Expression::compile(&text, &|name| (name == "a").then_some(0)) {
             let _ = expression.value(&[f64::NAN]);
             let _ = expression.holds(&[1e300]);
         }

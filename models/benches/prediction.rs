@@ -1,11 +1,11 @@
 //! The spring-slider's prediction with its uncertainty, beside the five separate solutions that it stands for.
 //!
-//! `cargo bench -p models --bench prediction`
+//! `cargo bench -p muprime-models --bench prediction`
 
-use models::condition::Condition;
-use models::finger::Finger;
-use models::prediction::{FrictionModel, SpringSlider};
-use models::spring_slider::{half_contact_angle_rad, solve};
+use muprime_models::condition::Condition;
+use muprime_models::finger::Finger;
+use muprime_models::prediction::{FrictionModel, SpringSlider};
+use muprime_models::spring_slider::{half_contact_angle_rad, solve};
 use std::f64::consts::PI;
 use std::hint::black_box;
 
@@ -47,6 +47,6 @@ fn contact_angle(bencher: divan::Bencher) {
 fn contact_angle_bracketed(bencher: divan::Bencher) {
     bencher.bench_local(|| {
         let target = PI * black_box(0.064);
-        models::root::bracketed(|a| a.sin() - a * a.cos() - target, 0.0, PI)
+        muprime_models::root::bracketed(|a| a.sin() - a * a.cos() - target, 0.0, PI)
     });
 }

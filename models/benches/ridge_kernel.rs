@@ -1,9 +1,9 @@
 //! The element kernel on one core beside the roofline of the same run.
 //!
-//! `cargo bench -p models --bench ridge_kernel`. Items are element updates (kernel), elements of the three
+//! `cargo bench -p muprime-models --bench ridge_kernel`. Items are element updates (kernel), elements of the three
 //! vectors (triad) or multiply-adds (fma). Compare within one run: the machine may be shared.
 
-use models::ridge::{Body, FrictionRule, Material, Plate, RidgeGeometry, Strain, stability};
+use muprime_models::ridge::{Body, FrictionRule, Material, Plate, RidgeGeometry, Strain, stability};
 use pulp::{Simd, WithSimd};
 use std::hint::black_box;
 

@@ -1,11 +1,11 @@
 //! One prediction of the surrogate: the loop's budget is 500 ns, and nothing may be allocated.
 //!
-//! `cargo bench -p models --bench surrogate`
+//! `cargo bench -p muprime-models --bench surrogate`
 
-use models::condition::Condition;
-use models::prediction::FrictionModel;
-use models::quantity::PeakToPeak;
-use models::surrogate::Surrogate;
+use muprime_models::condition::Condition;
+use muprime_models::prediction::FrictionModel;
+use muprime_models::quantity::PeakToPeak;
+use muprime_models::surrogate::Surrogate;
 use std::hint::black_box;
 
 #[global_allocator]

@@ -10,7 +10,7 @@ use std::fmt;
 /// Peak-to-peak vibration amplitude `w` of the plate, in metres. The plate moves as `(w/2) sin(2 pi f t)`.
 ///
 /// ```
-/// use models::quantity::PeakToPeak;
+/// use muprime_models::quantity::PeakToPeak;
 /// let w = PeakToPeak::from_metres(2e-6);
 /// assert_eq!(w.sine_amplitude_m(), 1e-6);
 /// assert_eq!(w.to_string(), "2.000 um pp");

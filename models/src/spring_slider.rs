@@ -168,10 +168,10 @@ impl Groups {
 /// Solves the slider at a condition (Eqs. 6-15; section 5.3 where the finger has a recovery speed).
 ///
 /// ```
-/// use models::{condition::Condition, finger::Finger, spring_slider};
+/// use muprime_models::{condition::Condition, finger::Finger, spring_slider};
 /// let cycle = spring_slider::solve(&Condition::paper(), &Finger::paper())?;
 /// assert!(cycle.mu_relative > 0.2 && cycle.mu_relative < 0.3);
-/// # Ok::<(), models::condition::OutOfDomain>(())
+/// # Ok::<(), muprime_models::condition::OutOfDomain>(())
 /// ```
 ///
 /// # Errors

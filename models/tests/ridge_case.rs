@@ -1,8 +1,8 @@
 //! The loaded ridge: what the paper states in words or numbers, and convergence. Coarse meshes keep it quick;
 //! `docs/ridge.md` gives the same figures on fine ones.
 
-use models::prediction::Regime;
-use models::ridge::{FrictionRule, RidgeCase, RidgeError, RidgeRun, RunSettings, Strain, run};
+use muprime_models::prediction::Regime;
+use muprime_models::ridge::{FrictionRule, RidgeCase, RidgeError, RidgeRun, RunSettings, Strain, run};
 
 const QUICK: usize = 300;
 

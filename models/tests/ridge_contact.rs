@@ -1,6 +1,6 @@
 //! Contact and friction against closed forms and published benchmarks.
 
-use models::ridge::{
+use muprime_models::ridge::{
     Body, FrictionRule, Material, Mesh, Plate, RidgeGeometry, RidgeProfile, Strain, Surface, stability,
 };
 

@@ -1,6 +1,8 @@
 //! The element kernel against closed forms. Each test prints the number that it judges.
 
-use models::ridge::{Body, Material, Mesh, Plate, RidgeError, RidgeGeometry, Strain, Surface, stability};
+use muprime_models::ridge::{
+    Body, Material, Mesh, Plate, RidgeError, RidgeGeometry, Strain, Surface, stability,
+};
 
 fn nothing(_: Surface<'_>) {}
 
@@ -299,5 +301,5 @@ fn bad_input_is_refused() {
     let flat = RidgeGeometry { ridge_width_m: f64::NAN, ..RidgeGeometry::TABLE_1 };
     assert!(flat.mesh(good, good, good, 1500).is_err());
     assert!(RidgeGeometry::TABLE_1.mesh(good, good, good, 10).is_err());
-    assert!(Plate::new(vec![1.0], models::ridge::FrictionRule::Local, f64::NAN).is_err());
+    assert!(Plate::new(vec![1.0], muprime_models::ridge::FrictionRule::Local, f64::NAN).is_err());
 }

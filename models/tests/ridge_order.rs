@@ -4,7 +4,7 @@
 //! mesh to the fine one. So the differences of several cases are pooled (root mean square: with the step their sign
 //! varies) before the order is formed; its standard uncertainty is the jackknife's over the cases.
 
-use models::ridge::{RidgeCase, RunSettings, run};
+use muprime_models::ridge::{RidgeCase, RunSettings, run};
 
 /// Two moduli and four amplitudes at which contact is lost and won again, each with its own contact width.
 fn cases() -> Vec<RidgeCase> {

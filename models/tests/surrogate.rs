@@ -1,10 +1,10 @@
 //! The shipped table against the finite element model, and against what it says of itself.
 
-use models::condition::Condition;
-use models::prediction::{FrictionModel, Validity};
-use models::quantity::PeakToPeak;
-use models::ridge::run;
-use models::surrogate::{Grid, Surrogate, TableError};
+use muprime_models::condition::Condition;
+use muprime_models::prediction::{FrictionModel, Validity};
+use muprime_models::quantity::PeakToPeak;
+use muprime_models::ridge::run;
+use muprime_models::surrogate::{Grid, Surrogate, TableError};
 
 #[test]
 fn the_shipped_table_belongs_to_this_model() {

@@ -1,14 +1,14 @@
 //! Sustained sample rates and ages on every transport that needs no hardware: the driver beside a bare client of the
 //! same crate, in turn, against the same emulator in the same run; and what the wire itself would allow.
 //!
-//! `cargo bench -p rig --bench buses` prints the table that BENCHMARKS.md quotes. The bare client does what the bus
+//! `cargo bench -p muprime-rig --bench buses` prints the table that BENCHMARKS.md quotes. The bare client does what the bus
 //! demands (the silence between RTU frames, one answer before the next question) and nothing else: it decodes nothing.
 
 use instruments::codec::can::{CanFrame, SlcanReader, slcan_line};
 use instruments::codec::modbus_rtu as rtu;
+use muprime_rig::drivers::endpoint::Endpoint;
+use muprime_rig::drivers::{self, InstrumentSetup};
 use realtime::ports::{Amplifier, ForceSensor, Nanos};
-use rig::drivers::endpoint::Endpoint;
-use rig::drivers::{self, InstrumentSetup};
 use serialport::{SerialPort, TTYPort};
 use sim::wire::can::{CanDevice, CanEmulator, EmulatedAdapter};
 use sim::wire::device::Device;

@@ -1,6 +1,6 @@
 //! Time of a verdict on 500 passes: single effects alone, and with pairs.
 //!
-//! `cargo bench -p rig --bench diagnosis`
+//! `cargo bench -p muprime-rig --bench diagnosis`
 
 use diagnosis::data::{Rig, Table};
 use diagnosis::hypotheses::Options;

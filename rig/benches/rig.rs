@@ -1,18 +1,18 @@
-//! Speeds of the loop and of the virtual rig: `cargo bench -p rig --bench rig`.
+//! Speeds of the loop and of the virtual rig: `cargo bench -p muprime-rig --bench rig`.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use models::condition::Condition;
 use models::finger::Finger;
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider};
+use muprime_rig::drivers;
+use muprime_rig::plan::Plan;
+use muprime_rig::session::rehearse;
+use muprime_rig::setup::Setup;
 use realtime::cycle::{self, Command, CycleState, Inputs, Marker, Phase};
 use realtime::estimate::Mu0;
 use realtime::ports::{AmplifierState, Forces, Nanos, Quality, Reading, StageState};
 use realtime::safety::{Observation, Request};
-use rig::drivers;
-use rig::plan::Plan;
-use rig::session::rehearse;
-use rig::setup::Setup;
 use sim::wire::SharedPlant;
 use sim::wire::modbus_tcp::ModbusTcpServer;
 use sim::wire::world::WorldPlant;

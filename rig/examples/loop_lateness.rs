@@ -3,11 +3,11 @@
 
 use models::finger::Finger;
 use models::prediction::SpringSlider;
+use muprime_rig::setup::Setup;
 use realtime::pacing::{self, Lifeline, LoopParts};
 use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Stage, StageState};
 use realtime::safety::{DriveCommand, StageCommand};
 use realtime::turn::Ports;
-use rig::setup::Setup;
 use ringbuf::HeapRb;
 use ringbuf::traits::Split;
 use std::sync::Arc;

@@ -5,7 +5,7 @@
 //! ([`ports`]) never blocks, locks or allocates.
 //!
 //! ```no_run
-//! use rig::drivers::{self, InstrumentsSetup};
+//! use muprime_rig::drivers::{self, InstrumentsSetup};
 //! let setup: InstrumentsSetup = toml::from_str(r#"
 //!     [[force]]
 //!     profile = "muprime-force2"

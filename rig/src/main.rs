@@ -1,7 +1,7 @@
 //! The `muprime` command: parses its arguments and hands over to one file per subcommand in `cli/`.
 
 use clap::{CommandFactory, Parser, Subcommand};
-use rig::cli;
+use muprime_rig::cli;
 use std::process::ExitCode;
 
 /// Controller of a hardware-in-the-loop tribometer: ultrasonic friction reduction, measured and explained.

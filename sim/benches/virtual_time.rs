@@ -1,17 +1,17 @@
 //! How much faster than real time the virtual rig runs on one core, loop included, and what its parts cost.
 //!
-//! `cargo bench -p sim`: each item is a simulated second (or a cycle's solution); a second of the world in 1 ms is a
+//! `cargo bench -p muprime-sim`: each item is a simulated second (or a cycle's solution); a second of the world in 1 ms is a
 //! factor of a thousand.
 
 use divan::{Bencher, black_box};
 use models::quantity::PeakToPeak;
+use muprime_sim::amplifier::AmplifierInput;
+use muprime_sim::contact::{Contact, Recovery};
+use muprime_sim::defects::Defects;
+use muprime_sim::stage::StageInput;
+use muprime_sim::virtual_rig::VirtualRig;
+use muprime_sim::world::{ContactMode, WorldConfig};
 use realtime::ports::{Amplifier, ForceSensor, Nanos, Stage};
-use sim::amplifier::AmplifierInput;
-use sim::contact::{Contact, Recovery};
-use sim::defects::Defects;
-use sim::stage::StageInput;
-use sim::virtual_rig::VirtualRig;
-use sim::world::{ContactMode, WorldConfig};
 
 fn main() {
     divan::main();

@@ -1,4 +1,4 @@
-//! Writes sealed data sets: `cargo run --release -p sim --example seal -- FOLDER COUNT FIRST_SEED [STRATUM]`.
+//! Writes sealed data sets: `cargo run --release -p muprime-sim --example seal -- FOLDER COUNT FIRST_SEED [STRATUM]`.
 //!
 //! `FOLDER/open/SEED/` holds what a diagnoser may read, `FOLDER/sealed/SEED/` what only the scorer may. The stratum is
 //! drawn from the seed unless one is named: none, single, pair, alias, outside.
@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use sim::sealed::{Ask, Stratum, generate};
+use muprime_sim::sealed::{Ask, Stratum, generate};
 
 fn main() -> ExitCode {
     match run() {

@@ -1,7 +1,7 @@
 //! The contact against outside truths: published limits, and figures of an independent computation.
 
-use sim::contact::resolved::March;
-use sim::contact::{Contact, Recovery};
+use muprime_sim::contact::resolved::March;
+use muprime_sim::contact::{Contact, Recovery};
 
 /// w/h, then mu' at Psi (Eq. 17) = 0.1, 0.25, 0.5, 1, 2, 3, 4.5, 2 pi: a massless time-domain computation that
 /// shares no code with this one.

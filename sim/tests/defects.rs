@@ -1,9 +1,9 @@
 //! Each defect shows in a table if it says so, grows from nothing, and leaves forces bounded.
 
-use sim::defects::{ALL, Defect, Defects, Surroundings, Values};
-use sim::finger::{Finger, FingerConfig};
-use sim::noise::Noise;
-use sim::world::{Point, steady_forces};
+use muprime_sim::defects::{ALL, Defect, Defects, Surroundings, Values};
+use muprime_sim::finger::{Finger, FingerConfig};
+use muprime_sim::noise::Noise;
+use muprime_sim::world::{Point, steady_forces};
 
 /// Points over the bundled sweep's operating space, both directions, along the stroke and the run.
 fn points(n: usize) -> Vec<Point> {
@@ -56,8 +56,8 @@ fn change(defects: &Defects) -> f64 {
 }
 
 /// The defect with its size at a share of its range and the other parameters at a share of theirs.
-fn sized(kind: &'static sim::defects::Kind, share: f64, shape: f64) -> Defects {
-    use sim::defects::Draw;
+fn sized(kind: &'static muprime_sim::defects::Kind, share: f64, shape: f64) -> Defects {
+    use muprime_sim::defects::Draw;
     let mut values = Values::default();
     for (i, (value, p)) in values.iter_mut().zip(kind.parameters).enumerate() {
         let share = if i == 0 { share } else { shape };

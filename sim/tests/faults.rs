@@ -1,11 +1,11 @@
 //! Faults of the rig's devices, as the world lives through them.
 
 use models::quantity::PeakToPeak;
+use muprime_sim::amplifier::AmplifierInput;
+use muprime_sim::defects::Defects;
+use muprime_sim::stage::StageInput;
+use muprime_sim::world::{World, WorldConfig};
 use realtime::ports::Nanos;
-use sim::amplifier::AmplifierInput;
-use sim::defects::Defects;
-use sim::stage::StageInput;
-use sim::world::{World, WorldConfig};
 
 fn world(defects: &str) -> World {
     let defects = Defects::parse(defects).unwrap();

@@ -2,12 +2,12 @@
 //! cannot tell apart (k_n w / F and k_l U / (f mu0 k_n w) are all that mu' depends on), and causes of different kinds.
 
 use models::quantity::PeakToPeak;
-use sim::defects::{Defect, Defects, Kind, Surroundings};
-use sim::finger::{Finger, FingerConfig};
-use sim::sealed::imitate::Imitator;
-use sim::sealed::oracle::Case;
-use sim::sealed::{Ask, Stratum};
-use sim::world::{Point, steady_forces};
+use muprime_sim::defects::{Defect, Defects, Kind, Surroundings};
+use muprime_sim::finger::{Finger, FingerConfig};
+use muprime_sim::sealed::imitate::Imitator;
+use muprime_sim::sealed::oracle::Case;
+use muprime_sim::sealed::{Ask, Stratum};
+use muprime_sim::world::{Point, steady_forces};
 
 fn finger() -> Finger {
     Finger::new(&FingerConfig { stiffness_relative_sd: 0.0, ..FingerConfig::default() }, 1)
@@ -169,7 +169,7 @@ fn one_gain_stands_for_two_and_for_a_gain_with_a_tilt_does_not() {
 #[test]
 fn a_companion_that_the_stiffness_takes_up_leaves_nothing_to_a_single_cause() {
     // Ageing of the contact, and a speed 1.8 times what is said: the lateral stiffness moves by five of its deviations.
-    let label = sim::sealed::generate(1_710_005_130_040, Stratum::Pair, Ask::Imitators).label;
+    let label = muprime_sim::sealed::generate(1_710_005_130_040, Stratum::Pair, Ask::Imitators).label;
     let names: Vec<&str> = label.causes.iter().map(|c| c.name.as_str()).collect();
     assert!(
         names.contains(&"contact_ageing") && names.contains(&"speed_error"),

@@ -1,6 +1,6 @@
 //! Sealed sets: the same for the same seed, honest in their noise, spread through the limit of detection.
 
-use sim::sealed::{Ask, Label, Stratum, generate, generate_with_rig};
+use muprime_sim::sealed::{Ask, Label, Stratum, generate, generate_with_rig};
 
 #[test]
 fn a_set_is_its_seeds_and_reads_back_from_its_files() {

@@ -4,11 +4,11 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use models::quantity::PeakToPeak;
+use muprime_sim::amplifier::AmplifierInput;
+use muprime_sim::stage::StageInput;
+use muprime_sim::virtual_rig::VirtualRig;
+use muprime_sim::world::WorldConfig;
 use realtime::ports::{Amplifier, ForceSensor, Nanos, Stage};
-use sim::amplifier::AmplifierInput;
-use sim::stage::StageInput;
-use sim::virtual_rig::VirtualRig;
-use sim::world::WorldConfig;
 
 struct Counting;
 

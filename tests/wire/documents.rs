@@ -1,5 +1,5 @@
 //! What is generated from the profiles: the schema for editors and a page for each instrument.
-//! `MUPRIME_WRITE_DOCUMENTS=1 cargo test --release -p tests --test wire documents` writes them anew.
+//! `MUPRIME_WRITE_DOCUMENTS=1 cargo test --release -p muprime-tests --test wire documents` writes them anew.
 
 use super::peers::file;
 use rig::drivers::{bundled, profile};

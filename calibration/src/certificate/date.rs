@@ -3,7 +3,7 @@
 /// `2026-03-01T12:00:00Z` of seconds since 1970-01-01T00:00:00Z.
 ///
 /// ```
-/// use calibration::certificate::date::{format, parse};
+/// use muprime_calibration::certificate::date::{format, parse};
 /// assert_eq!(format(951_782_400), "2000-02-29T00:00:00Z");
 /// assert_eq!(parse("2000-02-29T00:00:00Z"), Some(951_782_400));
 /// ```

@@ -3,7 +3,7 @@
 CPU seconds of this thread, so that a busy machine does not count. Matrix assembled once, then explicit central differences with a lumped mass: the fastest way of that library.
     pip install scikit-fem scipy numpy
     python scikit_fem_block.py
-Compare with `cargo bench -p models --bench ridge_kernel` run beside it on the same machine.
+Compare with `cargo bench -p muprime-models --bench ridge_kernel` run beside it on the same machine.
 """
 import os
 import time

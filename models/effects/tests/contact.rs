@@ -1,8 +1,8 @@
 //! The contact solver against figures that an independent time-domain simulation printed.
-use effects::asperities::Heights;
-use effects::contact::{Attraction, Contact, mean_friction};
-use effects::impact::{Bouncing, LANDINGS, STATED_ERROR};
-use effects::{Baseline, Design, Operating};
+use muprime_effects::asperities::Heights;
+use muprime_effects::contact::{Attraction, Contact, mean_friction};
+use muprime_effects::impact::{Bouncing, LANDINGS, STATED_ERROR};
+use muprime_effects::{Baseline, Design, Operating};
 use std::f64::consts::PI;
 
 const DESIGN: Design = Design {
@@ -200,8 +200,8 @@ fn tabulated_angle_balances_the_load() {
     let mut worst: f64 = 0.0;
     for i in 1..20_000 {
         let load = (i as f64 / 20_000.0).powi(3);
-        let phi = effects::contact::half_contact_angle(load, 0.0);
-        let back = effects::contact::arc_load(phi);
+        let phi = muprime_effects::contact::half_contact_angle(load, 0.0);
+        let back = muprime_effects::contact::arc_load(phi);
         worst = worst.max(((back - load).abs() - 1e-12) / load);
     }
     println!("worst relative error of the load {worst:e}");

@@ -1,5 +1,5 @@
 //! Every effect nests the baseline: at the zero of its size the prediction is the baseline's, bit for bit.
-use effects::{Active, Baseline, Design, Operating, known, library};
+use muprime_effects::{Active, Baseline, Design, Operating, known, library};
 
 fn passes() -> Vec<Operating> {
     let mut list = Vec::new();
@@ -47,7 +47,7 @@ fn zero_is_the_baseline() {
                 let theta: Vec<f64> =
                     form.parameters.iter().map(|p| p.zero.unwrap_or_else(|| p.value(shape))).collect();
                 for pass in passes() {
-                    let with = effects::lateral_force(
+                    let with = muprime_effects::lateral_force(
                         &baseline,
                         &[Active { effect: *effect, law, theta: &theta }],
                         &pass,
@@ -82,7 +82,7 @@ fn small_sizes_are_continuous_and_all_predictions_finite() {
                     .collect();
                 for pass in passes() {
                     let active = [Active { effect: *effect, law, theta: &theta }];
-                    let with = effects::lateral_force(&baseline, &active, &pass, &DESIGN);
+                    let with = muprime_effects::lateral_force(&baseline, &active, &pass, &DESIGN);
                     assert!(with.is_finite(), "{} ({}) at {size}: {pass:?}", effect.name(), form.name);
                     if size == 1e-6 {
                         let without = baseline.lateral_force(&pass, &DESIGN);

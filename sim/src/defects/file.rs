@@ -115,7 +115,7 @@ impl Defects {
     /// Reads a defects file's text.
     ///
     /// ```
-    /// let defects = sim::defects::Defects::parse(
+    /// let defects = muprime_sim::defects::Defects::parse(
     ///     r#"
     ///     [[defect]]
     ///     name = "amplitude_droop"
@@ -134,7 +134,7 @@ impl Defects {
     ///     "#,
     /// )?;
     /// assert_eq!(defects.defects.len(), 2);
-    /// # Ok::<(), sim::defects::DefectsError>(())
+    /// # Ok::<(), muprime_sim::defects::DefectsError>(())
     /// ```
     ///
     /// # Errors
