@@ -9,11 +9,12 @@
 mod bench;
 
 use bench::{Bench, BenchPlant, eventually, now};
+use drivers::socketcan::KernelCan;
+use drivers::{AxisSetup, InstrumentSetup, InstrumentsSetup};
+use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;
 use realtime::ports::NoData;
-use rig::drivers::socketcan::KernelCan;
-use rig::drivers::{self, AxisSetup, InstrumentSetup, InstrumentsSetup};
-use sim::wire::can::{CanDevice, CanEmulator, CanEvent, CanPort};
+use sim::wire::can::{CanDevice, CanEmulator};
 use sim::wire::device::Device;
 use sim::wire::{Quantity, SharedPlant};
 use std::path::Path;

@@ -131,7 +131,7 @@ fn numbers_in_text() {
 
 #[test]
 fn dbc_files() {
-    let mut corpus = files("rig/profiles", ".dbc");
+    let mut corpus = files("drivers/profiles", ".dbc");
     corpus.extend(files("tests/recordings", ".dbc"));
     decoder("dbc_files", &corpus, 20);
 }
@@ -139,12 +139,12 @@ fn dbc_files() {
 /// Objects of any data sheet that is accepted can be asked for their process data.
 #[test]
 fn data_sheets() {
-    decoder("data_sheets", &files("rig/profiles", ".eds"), 20);
+    decoder("data_sheets", &files("drivers/profiles", ".eds"), 20);
 }
 
 #[test]
 fn profiles() {
-    decoder("profiles", &files("rig/profiles", ".toml"), 20);
+    decoder("profiles", &files("drivers/profiles", ".toml"), 20);
 }
 
 #[test]

@@ -52,8 +52,7 @@ fn killed_at_any_instant_nothing_acknowledged_is_lost_and_the_drive_drops() {
     let folder = tempfile::tempdir().unwrap();
     let world = World::new(&WorldConfig::ideal(), 5).unwrap();
     let plant = SharedPlant::new(WorldPlant::new(world), Instant::now());
-    let devices =
-        rig::drivers::emulators(&rig::setup::Setup::load("virtual").unwrap().instruments()).unwrap();
+    let devices = rig::embed::emulators(&rig::setup::Setup::load("virtual").unwrap().instruments()).unwrap();
     let server = ModbusTcpServer::start("127.0.0.1:0".parse().unwrap(), devices, plant).unwrap();
     let (plan, setup_file) = (folder.path().join("plan.toml"), folder.path().join("setup.toml"));
     std::fs::write(&plan, served::plan("kills", 3, &[0.5e-6, 1e-6, 2e-6, 3e-6])).unwrap();

@@ -269,7 +269,7 @@ fn bad_input_is_refused_with_its_place_and_nothing_is_touched() {
 #[test]
 fn everything_bundled_passes_its_own_check() {
     let mut files = Vec::new();
-    for folder in ["rig/plans", "rig/setups", "rig/profiles"] {
+    for folder in ["rig/plans", "rig/setups", "drivers/profiles"] {
         let entries = std::fs::read_dir(file(folder)).unwrap();
         files.extend(
             entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "toml")),

@@ -18,6 +18,7 @@
 //! | [`document`] | a profile as a page for people |
 //! | [`error`] | what is wrong with a profile, where, and what to do |
 
+pub mod bus;
 pub mod codec;
 pub mod document;
 pub mod error;

@@ -4,10 +4,10 @@
 //! `cargo bench -p muprime-rig --bench buses` prints the table that BENCHMARKS.md quotes. The bare client does what the bus
 //! demands (the silence between RTU frames, one answer before the next question) and nothing else: it decodes nothing.
 
+use drivers::InstrumentSetup;
+use drivers::endpoint::Endpoint;
 use instruments::codec::can::{CanFrame, SlcanReader, slcan_line};
 use instruments::codec::modbus_rtu as rtu;
-use muprime_rig::drivers::endpoint::Endpoint;
-use muprime_rig::drivers::{self, InstrumentSetup};
 use realtime::ports::{Amplifier, ForceSensor, Nanos};
 use serialport::{SerialPort, TTYPort};
 use sim::wire::can::{CanDevice, CanEmulator, EmulatedAdapter};

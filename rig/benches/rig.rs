@@ -5,7 +5,6 @@ use divan::counter::ItemsCount;
 use models::condition::Condition;
 use models::finger::Finger;
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider};
-use muprime_rig::drivers;
 use muprime_rig::plan::Plan;
 use muprime_rig::session::rehearse;
 use muprime_rig::setup::Setup;
@@ -119,7 +118,7 @@ fn server() -> ModbusTcpServer {
     let setup = Setup::load("virtual").unwrap();
     let world = World::new(&WorldConfig::ideal(), 1).unwrap();
     let plant = SharedPlant::new(WorldPlant::new(world), Instant::now());
-    let devices = drivers::emulators(&setup.instruments()).unwrap();
+    let devices = muprime_rig::embed::emulators(&setup.instruments()).unwrap();
     ModbusTcpServer::start("127.0.0.1:0".parse().unwrap(), devices, plant).unwrap()
 }
 

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`setup`], [`plan`], [`fingertip`] | what people write: rigs, plans, fingertips, all checked with the place in the file |
 //! | [`certificates`] | a setup's certificates, verified and applied once |
-//! | [`drivers`] | instruments behind the loop's ports |
+//! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 //! | [`sequence`] | the order of a sweep, a pure state machine over rows |
 //! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
 //! | [`run_dir`], [`catalogue`] | a run's folder and the catalogue of runs |
@@ -15,7 +15,7 @@ pub mod blind;
 pub mod catalogue;
 pub mod certificates;
 pub mod cli;
-pub mod drivers;
+pub mod embed;
 pub mod export;
 pub mod faults;
 pub mod fingertip;

@@ -138,7 +138,7 @@ impl Job {
     /// What the setup's amplifier can set, by its profile.
     fn resolution(&self) -> miette::Result<Resolution> {
         let id = &self.setup.file.amplifier.profile;
-        let profile = crate::drivers::profile(id).map_err(|e| miette::miette!("{e}"))?;
+        let profile = drivers::profile(id).map_err(|e| miette::miette!("{e}"))?;
         let step = |name: &str| {
             profile.set(name).map_or(0.0, |set| {
                 let described = &profile.description.set[set.0];

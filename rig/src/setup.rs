@@ -3,11 +3,11 @@
 mod bundled;
 
 use crate::certificates::Certificates;
-use crate::drivers::vibrometer::{Settings, VibrometerSetup};
-use crate::drivers::{InstrumentSetup, InstrumentsSetup};
 use crate::fingertip::{Fingertip, FingertipSetup};
 use crate::input::{self, BadInput};
 use crate::plan::LateralChannel;
+use drivers::vibrometer::{Settings, VibrometerSetup};
+use drivers::{InstrumentSetup, InstrumentsSetup};
 use miette::IntoDiagnostic;
 use models::quantity::PeakToPeak;
 use realtime::compare::PassNoise;
@@ -244,8 +244,7 @@ impl Setup {
                 self.origin
             );
         };
-        let settings =
-            crate::drivers::vibrometer::settings(vibrometer).map_err(|e| miette::miette!("{e}"))?;
+        let settings = drivers::vibrometer::settings(vibrometer).map_err(|e| miette::miette!("{e}"))?;
         settings.covers(frequency_hz).map_err(|e| miette::miette!("{e}"))?;
         Ok(settings)
     }
@@ -256,7 +255,7 @@ impl Setup {
     /// A profile that cannot be used.
     pub fn lateral_channel(&self) -> miette::Result<Option<LateralChannel>> {
         for instrument in &self.file.force {
-            let profile = crate::drivers::profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
+            let profile = drivers::profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
             let named = instrument.lateral.as_ref().map_or("lateral", |axis| axis.signal.as_str());
             let Some(signal) = profile.signal(named) else { continue };
             let gain = instrument.lateral.as_ref().map_or(1.0, |axis| axis.gain).abs();
@@ -344,10 +343,8 @@ fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     }
     let stall = Nanos::from_seconds(stall);
     let timing = |instrument: &InstrumentSetup| -> ChannelTiming {
-        let rate = instrument
-            .rate_hz
-            .or_else(|| crate::drivers::nominal_rate_hz(&instrument.profile))
-            .unwrap_or(100.0);
+        let rate =
+            instrument.rate_hz.or_else(|| drivers::nominal_rate_hz(&instrument.profile)).unwrap_or(100.0);
         let period = Nanos((1e9 / rate) as u64).0.max(cycle.0);
         ChannelTiming { period: Nanos(period), latency: stall, periods: 3 }
     };

@@ -44,7 +44,7 @@ impl Bench {
     fn plug_in(&mut self) {
         let devices: BTreeMap<u8, Device> =
             [(1, "muprime-force2"), (2, "muprime-amplifier"), (3, "muprime-stage")]
-                .map(|(unit, id)| (unit, Device::new(rig::drivers::profile(id).unwrap()).unwrap()))
+                .map(|(unit, id)| (unit, Device::new(drivers::profile(id).unwrap()).unwrap()))
                 .into();
         let server = ModbusTcpServer::start(self.address, devices, self.plant.clone()).unwrap();
         self.address = server.address();

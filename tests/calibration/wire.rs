@@ -14,7 +14,6 @@ use realtime::cycle::{Command, CycleState, Marker};
 use realtime::ports::Nanos;
 use realtime::safety::Request;
 use realtime::turn::{Ports, Tick, turn};
-use rig::drivers;
 use rig::setup::Setup;
 use sim::defects::Defects;
 use sim::noise::Noise;
@@ -242,7 +241,7 @@ struct Bench {
     rig: drivers::Rig,
     setup: Setup,
     epoch: Instant,
-    _embedded: drivers::embed::Embedded,
+    _embedded: rig::embed::Embedded,
 }
 
 impl Bench {
@@ -252,7 +251,7 @@ impl Bench {
         let (world, hands) = WorldPlant::at_hand(World::new(config, 7).unwrap());
         let plant = SharedPlant::new(world, epoch);
         let mut instruments = setup.instruments();
-        let embedded = drivers::embed::embed(&mut instruments, &plant, false).unwrap();
+        let embedded = rig::embed::embed(&mut instruments, &plant, false).unwrap();
         let rig = drivers::open(&instruments, epoch).unwrap();
         Bench { plant, hands, rig, setup, epoch, _embedded: embedded }
     }

@@ -122,8 +122,8 @@ pub fn dbc_files(input: &[u8], chance: &mut Chance) {
 
 /// A profile that is accepted decodes frames of any content and any length without harm.
 pub fn profiles(input: &[u8], chance: &mut Chance) {
-    const DBC: &str = include_str!("../../rig/profiles/muprime-can.dbc");
-    const EDS: &str = include_str!("../../rig/profiles/cia402-profile-velocity.eds");
+    const DBC: &str = include_str!("../../drivers/profiles/muprime-can.dbc");
+    const EDS: &str = include_str!("../../drivers/profiles/cia402-profile-velocity.eds");
     let Ok(text) = std::str::from_utf8(input) else { return };
     let sheet = |name: &str| Some(if name.ends_with(".eds") { EDS.to_string() } else { DBC.to_string() });
     let Ok(profile) = Profile::parse_with(text, &sheet) else { return };

@@ -3,7 +3,7 @@
 use super::bench::{self, Bench, eventually, now};
 use super::lines::{axes, device, expect_forces, plant, pty, setup, standing_forces};
 use super::peers::{file, python};
-use rig::drivers::{self, InstrumentSetup};
+use drivers::InstrumentSetup;
 use sim::wire::serial::SerialEmulator;
 use std::io::{Read, Write};
 use std::sync::Arc;

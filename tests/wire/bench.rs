@@ -91,10 +91,8 @@ impl Plant for BenchPlant {
 /// Serves profiles by unit over the bench.
 pub fn serve(bench: &Bench, units: &[(u8, &str)], epoch: Instant) -> ModbusTcpServer {
     let plant = SharedPlant::new(BenchPlant::new(bench), epoch);
-    let devices: BTreeMap<u8, Device> = units
-        .iter()
-        .map(|(unit, id)| (*unit, Device::new(rig::drivers::profile(id).unwrap()).unwrap()))
-        .collect();
+    let devices: BTreeMap<u8, Device> =
+        units.iter().map(|(unit, id)| (*unit, Device::new(drivers::profile(id).unwrap()).unwrap())).collect();
     ModbusTcpServer::start("127.0.0.1:0".parse().unwrap(), devices, plant).unwrap()
 }
 

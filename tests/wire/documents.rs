@@ -2,7 +2,7 @@
 //! `MUPRIME_WRITE_DOCUMENTS=1 cargo test --release -p muprime-tests --test wire documents` writes them anew.
 
 use super::peers::file;
-use rig::drivers::{bundled, profile};
+use drivers::{bundled, profile};
 
 fn check(path: &str, text: &str) {
     let path = file(path);
@@ -21,13 +21,16 @@ fn check(path: &str, text: &str) {
 #[test]
 fn the_schema_for_editors_is_current() {
     let schema = serde_json::to_string_pretty(&instruments::schema::json_schema()).unwrap();
-    check("rig/profiles/profile.schema.json", &format!("{schema}\n"));
+    check("drivers/profiles/profile.schema.json", &format!("{schema}\n"));
 }
 
 #[test]
 fn the_pages_of_the_instruments_are_current() {
     for id in bundled::ids() {
-        check(&format!("rig/profiles/docs/{id}.md"), &instruments::document::markdown(&profile(id).unwrap()));
+        check(
+            &format!("drivers/profiles/docs/{id}.md"),
+            &instruments::document::markdown(&profile(id).unwrap()),
+        );
     }
 }
 

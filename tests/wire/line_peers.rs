@@ -3,8 +3,8 @@
 use super::bench::{self, Bench, eventually, now};
 use super::lines::{adapter, axes, device, expect_forces, plant, pty, setup, socat_pair, standing_forces};
 use super::peers::{file, python, start};
+use drivers::InstrumentSetup;
 use realtime::ports::Nanos;
-use rig::drivers::{self, InstrumentSetup};
 use sim::wire::can::{CanDevice, CanEmulator};
 use sim::wire::serial::SerialEmulator;
 use sim::wire::{Command, Quantity};
@@ -135,7 +135,7 @@ fn our_driver_commands_a_python_canopen_node() {
 #[test]
 fn the_data_sheet_means_the_same_to_python_canopen() {
     const NODE: i64 = 5;
-    let path = file("rig/profiles/cia402-profile-velocity.eds");
+    let path = file("drivers/profiles/cia402-profile-velocity.eds");
     let said = json(python().arg(file("tests/peers/eds_objects.py")).arg(&path).arg(NODE.to_string()));
     let ours = instruments::codec::eds::parse(&std::fs::read_to_string(path).unwrap()).unwrap();
     let theirs = said.as_array().unwrap();

@@ -2,13 +2,14 @@
 
 use super::bench::{self, Bench, BenchPlant, eventually, now};
 use super::peers::{file, python};
+use drivers::slcan::Slcan;
+use drivers::{AxisSetup, InstrumentSetup, InstrumentsSetup};
+use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;
 use realtime::ports::{Nanos, NoData};
 use realtime::safety::DriveCommand;
-use rig::drivers::slcan::Slcan;
-use rig::drivers::{self, AxisSetup, InstrumentSetup, InstrumentsSetup};
 use serialport::{SerialPort, TTYPort};
-use sim::wire::can::{CanDevice, CanEmulator, CanEvent, CanPort, EmulatedAdapter};
+use sim::wire::can::{CanDevice, CanEmulator, EmulatedAdapter};
 use sim::wire::device::Device;
 use sim::wire::lines::{LineInstrument, TcpLines};
 use sim::wire::serial::SerialEmulator;
@@ -458,7 +459,7 @@ fn python_can_hears_and_answers_our_frames() {
 /// Random frames through cantools and through our packing, for every signal of the bundled DBC file.
 #[test]
 fn dbc_signals_agree_with_cantools() {
-    let dbc = file("rig/profiles/muprime-can.dbc");
+    let dbc = file("drivers/profiles/muprime-can.dbc");
     let output = python().arg(file("tests/peers/dbc_values.py")).arg(&dbc).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = std::fs::read_to_string(dbc).unwrap();

@@ -1,9 +1,9 @@
 //! Modbus TCP: emulators, wrong instruments, late answers.
 
 use super::bench::{self, Bench, eventually, now};
+use drivers::{AxisSetup, InstrumentSetup, InstrumentsSetup};
 use realtime::ports::{NoData, Quality};
 use realtime::safety::{DriveCommand, StageCommand};
-use rig::drivers::{self, AxisSetup, InstrumentSetup, InstrumentsSetup};
 use sim::wire::{Command, Quantity};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener};

@@ -1,7 +1,7 @@
 //! Programs that nobody here wrote, as instruments and as clients. `tests/venv` sets them up.
 
 use super::bench::{self, Bench, now};
-use rig::drivers::{self, InstrumentSetup, InstrumentsSetup};
+use drivers::{InstrumentSetup, InstrumentsSetup};
 use sim::wire::{Command, Quantity};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};

@@ -51,7 +51,7 @@ fn check(path: &Path) -> miette::Result<&'static str> {
         let beside = |file: &str| {
             let path = path.parent().unwrap_or(Path::new(".")).join(file);
             let text = std::fs::read_to_string(path).ok();
-            text.or_else(|| crate::drivers::bundled::file(file).map(String::from))
+            text.or_else(|| drivers::bundled::file(file).map(String::from))
         };
         let wrong = |e: instruments::ProfileError| miette::miette!("{e}");
         instruments::Profile::parse_with(&text, &beside).and_then(|p| p.check(&text)).map_err(wrong)?;

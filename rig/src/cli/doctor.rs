@@ -1,8 +1,8 @@
 //! `muprime doctor`: judges this machine truthfully, and talks to the instruments of a setup.
 
-use crate::drivers::OpenError;
-use crate::drivers::probe::Probed;
 use crate::setup::Setup;
+use drivers::OpenError;
+use drivers::probe::Probed;
 use realtime::pacing;
 use serde::Serialize;
 use std::process::ExitCode;
@@ -217,9 +217,9 @@ fn talk(setup: &Setup) -> Vec<Finding> {
             advice: String::new(),
         }];
     }
-    let probed = crate::drivers::probe::probe(&setup.instruments(), Duration::from_secs(1));
+    let probed = drivers::probe::probe(&setup.instruments(), Duration::from_secs(1));
     let vibrometer = setup.file.vibrometer.as_ref().map(|v| {
-        let settings = crate::drivers::vibrometer::settings(v);
+        let settings = drivers::vibrometer::settings(v);
         Finding {
             subject: format!("vibrometer `{}` at {}", v.profile, v.address),
             good: settings.is_ok(),

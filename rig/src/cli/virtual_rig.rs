@@ -1,7 +1,7 @@
 //! `muprime virtual-rig`: the simulated rig behind real protocols.
 
-use crate::drivers::InstrumentsSetup;
 use crate::setup::Setup;
+use drivers::InstrumentsSetup;
 use instruments::schema::LinkKind;
 use miette::{IntoDiagnostic, WrapErr};
 use sim::wire::SharedPlant;
@@ -64,7 +64,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let line = args.modbus_rtu.as_deref().map(|path| rtu(path, &instruments, &plant)).transpose()?;
     for instrument in instruments.force.iter_mut().chain([&mut instruments.amplifier, &mut instruments.stage])
     {
-        let kind = crate::drivers::profile(&instrument.profile).into_diagnostic()?.description.link.kind;
+        let kind = drivers::profile(&instrument.profile).into_diagnostic()?.description.link.kind;
         let place = match kind {
             LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
                 Some(args.modbus_tcp.to_string())
@@ -82,14 +82,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             args.modbus_tcp
         );
     }
-    let embedded =
-        crate::drivers::embed::embed(&mut instruments, &plant, true).map_err(|e| miette::miette!("{e}"))?;
+    let embedded = crate::embed::embed(&mut instruments, &plant, true).map_err(|e| miette::miette!("{e}"))?;
     let mut embedded = embedded;
     let vibrometer = match setup.file.vibrometer.clone() {
         None => None,
         Some(mut vibrometer) => {
-            let served = crate::drivers::embed::vibrometer(&mut vibrometer, &plant)
-                .map_err(|e| miette::miette!("{e}"))?;
+            let served =
+                crate::embed::vibrometer(&mut vibrometer, &plant).map_err(|e| miette::miette!("{e}"))?;
             embedded.places.push(format!("{} at {}", vibrometer.profile, vibrometer.address));
             Some(served)
         }
@@ -153,7 +152,7 @@ fn at_the_bench(hands: &Hands, plant: &SharedPlant) {
 
 /// Serves the Modbus instruments on one serial line as well.
 fn rtu(path: &str, instruments: &InstrumentsSetup, plant: &SharedPlant) -> miette::Result<SerialEmulator> {
-    let devices = crate::drivers::emulators(instruments)?;
+    let devices = crate::embed::emulators(instruments)?;
     let port = serialport::new(path, 115_200).open().into_diagnostic().wrap_err_with(|| path.to_string())?;
     SerialEmulator::modbus_rtu(port, devices, plant.clone()).into_diagnostic()
 }

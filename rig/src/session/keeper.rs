@@ -75,7 +75,7 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
         .force
         .iter()
         .chain([&job.setup.file.amplifier, &job.setup.file.stage])
-        .filter_map(|i| crate::drivers::bundled::text(&i.profile).map(|text| (i.profile.clone(), text)))
+        .filter_map(|i| drivers::bundled::text(&i.profile).map(|text| (i.profile.clone(), text)))
     {
         files.push((format!("profiles/{id}.toml"), text.to_string()));
     }

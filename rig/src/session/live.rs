@@ -9,7 +9,6 @@ mod writer;
 use super::fast::words;
 use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary, Unfinished};
-use crate::drivers;
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 pub use claim::RigClaim;
@@ -174,7 +173,7 @@ fn embed(
     job: &Job,
     instruments: &mut drivers::InstrumentsSetup,
     epoch: Instant,
-) -> miette::Result<drivers::embed::Embedded> {
+) -> miette::Result<crate::embed::Embedded> {
     let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), epoch);
-    drivers::embed::embed(instruments, &plant, false).map_err(|problem| miette::miette!("{problem}"))
+    crate::embed::embed(instruments, &plant, false).map_err(|problem| miette::miette!("{problem}"))
 }

@@ -1,7 +1,7 @@
 //! A dead-weight series at the terminal: the operator loads, the program reads (or the operator types).
 
-use crate::drivers::{self, Rig};
 use crate::setup::Setup;
+use drivers::Rig;
 use realtime::ports::{Nanos, NoData, Quality};
 use std::fmt::Write as _;
 use std::io::BufRead;

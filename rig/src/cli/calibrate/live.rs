@@ -5,10 +5,10 @@
 //! What stands in this file is only the order of the set-points and the questions. The velocity is a voltage that a
 //! digitiser, an oscilloscope or a lock-in shows: its amplitude comes from the standard input, typed or from a program.
 
-use crate::drivers::{self, Links};
 use crate::session::RigClaim;
 use crate::setup::Setup;
 use crossbeam_queue::ArrayQueue;
+use drivers::Links;
 use miette::IntoDiagnostic;
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;

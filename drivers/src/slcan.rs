@@ -2,8 +2,8 @@
 
 use super::serial::Line;
 use super::session::Ended;
+use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::{CanFrame, SlcanReader, SlcanSaid, slcan_line, slcan_speed};
-use sim::wire::can::{CanEvent, CanPort};
 use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};

@@ -4,8 +4,8 @@
 //! bus-off ends the connection, nothing restarts by itself, and a queue without room is told to the
 //! caller, who sends the newest command instead of queueing more.
 
+use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;
-use sim::wire::can::{CanEvent, CanPort};
 use socketcan::{
     CanDataFrame, CanError, CanFrame as Raw, CanSocket, EmbeddedFrame, ExtendedId, Frame, Id, Socket,
     SocketOptions, StandardId,

@@ -1,25 +1,25 @@
 //! The profiles that come with the program. A new one: a file in `profiles/` and one line here.
 
 const PROFILES: &[(&str, &str)] = &[
-    ("ati-digital-ft", include_str!("../../profiles/ati-digital-ft.toml")),
-    ("ati-netft-can", include_str!("../../profiles/ati-netft-can.toml")),
-    ("cia402-profile-velocity", include_str!("../../profiles/cia402-profile-velocity.toml")),
-    ("hbk-wtx110", include_str!("../../profiles/hbk-wtx110.toml")),
-    ("keysight-33500b", include_str!("../../profiles/keysight-33500b.toml")),
-    ("me-gsv4-can", include_str!("../../profiles/me-gsv4-can.toml")),
-    ("muprime-amplifier", include_str!("../../profiles/muprime-amplifier.toml")),
-    ("muprime-force2", include_str!("../../profiles/muprime-force2.toml")),
-    ("muprime-stage", include_str!("../../profiles/muprime-stage.toml")),
-    ("piezodrive-pdus210", include_str!("../../profiles/piezodrive-pdus210.toml")),
-    ("polytec-ofv5000", include_str!("../../profiles/polytec-ofv5000.toml")),
-    ("robotiq-ft300", include_str!("../../profiles/robotiq-ft300.toml")),
-    ("robotiq-ft300-stream", include_str!("../../profiles/robotiq-ft300-stream.toml")),
+    ("ati-digital-ft", include_str!("../profiles/ati-digital-ft.toml")),
+    ("ati-netft-can", include_str!("../profiles/ati-netft-can.toml")),
+    ("cia402-profile-velocity", include_str!("../profiles/cia402-profile-velocity.toml")),
+    ("hbk-wtx110", include_str!("../profiles/hbk-wtx110.toml")),
+    ("keysight-33500b", include_str!("../profiles/keysight-33500b.toml")),
+    ("me-gsv4-can", include_str!("../profiles/me-gsv4-can.toml")),
+    ("muprime-amplifier", include_str!("../profiles/muprime-amplifier.toml")),
+    ("muprime-force2", include_str!("../profiles/muprime-force2.toml")),
+    ("muprime-stage", include_str!("../profiles/muprime-stage.toml")),
+    ("piezodrive-pdus210", include_str!("../profiles/piezodrive-pdus210.toml")),
+    ("polytec-ofv5000", include_str!("../profiles/polytec-ofv5000.toml")),
+    ("robotiq-ft300", include_str!("../profiles/robotiq-ft300.toml")),
+    ("robotiq-ft300-stream", include_str!("../profiles/robotiq-ft300-stream.toml")),
 ];
 
 /// The files that profiles name.
 const FILES: &[(&str, &str)] = &[
-    ("cia402-profile-velocity.eds", include_str!("../../profiles/cia402-profile-velocity.eds")),
-    ("muprime-can.dbc", include_str!("../../profiles/muprime-can.dbc")),
+    ("cia402-profile-velocity.eds", include_str!("../profiles/cia402-profile-velocity.eds")),
+    ("muprime-can.dbc", include_str!("../profiles/muprime-can.dbc")),
 ];
 
 /// The text of a file that a profile names.

@@ -3,9 +3,9 @@
 //! `127.0.0.1:0` is any free port, `pty` a pseudo-terminal made for the purpose, an interface such as
 //! `vcan0` the kernel's bus. What was chosen is put into the setup, so that the drivers find it.
 
-use super::setup::{InstrumentSetup, InstrumentsSetup};
-use super::socketcan::KernelCan;
-use super::vibrometer::VibrometerSetup;
+use drivers::socketcan::KernelCan;
+use drivers::vibrometer::VibrometerSetup;
+use drivers::{InstrumentSetup, InstrumentsSetup};
 use instruments::schema::LinkKind;
 use serialport::{SerialPort, TTYPort};
 use sim::wire::can::{CanDevice, CanEmulator, EmulatedAdapter};
@@ -60,7 +60,7 @@ pub fn embed(
     let InstrumentsSetup { force, amplifier, stage } = setup;
     let mut all: Vec<&mut InstrumentSetup> = force.iter_mut().chain([amplifier, stage]).collect();
     for instrument in &mut all {
-        let mut profile = super::profile(&instrument.profile).map_err(|error| error.to_string())?;
+        let mut profile = drivers::profile(&instrument.profile).map_err(|error| error.to_string())?;
         if let Some(rate) = instrument.rate_hz {
             // What comes by itself comes as often as the setup expects it.
             let unasked = profile.description.message.iter_mut().filter(|message| message.request.is_none());
@@ -134,7 +134,7 @@ pub fn embed(
 /// # Errors
 /// A line that cannot be served, or a profile that names what the world does not have.
 pub fn vibrometer(setup: &mut VibrometerSetup, plant: &SharedPlant) -> Result<SerialEmulator, String> {
-    let profile = super::profile(&setup.profile).map_err(|error| error.to_string())?;
+    let profile = drivers::profile(&setup.profile).map_err(|error| error.to_string())?;
     let device = Device::new(profile).map_err(|error| error.to_string())?;
     let port = port(&mut setup.address)?;
     SerialEmulator::lines(port, LineInstrument::new(device, plant.clone()), || None)
@@ -167,4 +167,27 @@ fn port(address: &mut String) -> Result<Box<dyn SerialPort>, String> {
         return Ok(Box::new(master));
     }
     serialport::new(&path, 115_200).open().map_err(|error| format!("{path}: {error}"))
+}
+
+/// Emulators of a setup's instruments by Modbus unit, for a virtual rig behind Modbus TCP.
+///
+/// # Errors
+/// A profile that is not bundled or names what the world does not have, or two instruments of one unit.
+pub fn emulators(setup: &InstrumentsSetup) -> miette::Result<BTreeMap<u8, Device>> {
+    let mut devices = BTreeMap::new();
+    for instrument in setup.force.iter().chain([&setup.amplifier, &setup.stage]) {
+        let profile = drivers::profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
+        if !matches!(profile.description.link.kind, LinkKind::ModbusTcp | LinkKind::ModbusRtu) {
+            continue;
+        }
+        let unit = instrument.unit.or(profile.description.link.unit).unwrap_or(1);
+        let device = Device::new(profile).map_err(|e| miette::miette!("{}: {e}", instrument.profile))?;
+        if devices.insert(unit, device).is_some() {
+            miette::bail!(
+                help = "give one of them another `unit`",
+                "two instruments of the virtual rig have Modbus unit {unit}"
+            );
+        }
+    }
+    Ok(devices)
 }

@@ -5,7 +5,7 @@
 //! ([`ports`]) never blocks, locks or allocates.
 //!
 //! ```no_run
-//! use muprime_rig::drivers::{self, InstrumentsSetup};
+//! use muprime_drivers::InstrumentsSetup;
 //! let setup: InstrumentsSetup = toml::from_str(r#"
 //!     [[force]]
 //!     profile = "muprime-force2"
@@ -18,7 +18,7 @@
 //!     address = "127.0.0.1:1502"
 //! "#)?;
 //! // `epoch` is the moment that the loop calls zero.
-//! let rig = drivers::open(&setup, std::time::Instant::now())?;
+//! let rig = muprime_drivers::open(&setup, std::time::Instant::now())?;
 //! // rig.force, rig.amplifier, rig.stage go to the loop; rig.links stays with the supervisor: its
 //! // health counters can be read at any time, and dropping it sends the safe set-points and ends
 //! // the threads.
@@ -41,12 +41,10 @@
 //! | [`serial`] | serial lines |
 //! | [`vibrometer`] | the settings of a vibrometer's controller, read back for a calibration |
 //! | [`probe`] | each instrument asked by itself, for `muprime doctor` |
-//! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 
 pub mod bundled;
 pub mod can;
 pub mod canopen;
-pub mod embed;
 pub mod endpoint;
 pub mod health;
 pub mod modbus;
@@ -263,30 +261,4 @@ pub fn nominal_rate_hz(id: &str) -> Option<f64> {
     let streamed = d.stream.as_ref().map(|stream| stream.rate_hz);
     let sent = d.message.first().map(|message| message.rate_hz);
     streamed.or(polled).or(sent).or_else(|| d.query.first().map(|query| query.rate_hz))
-}
-
-/// Emulators of a setup's instruments by Modbus unit, for a virtual rig behind Modbus TCP.
-///
-/// # Errors
-/// A profile that is not bundled or names what the world does not have, or two instruments of one unit.
-pub fn emulators(
-    setup: &InstrumentsSetup,
-) -> miette::Result<std::collections::BTreeMap<u8, sim::wire::device::Device>> {
-    let mut devices = std::collections::BTreeMap::new();
-    for instrument in setup.force.iter().chain([&setup.amplifier, &setup.stage]) {
-        let profile = profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
-        if !matches!(profile.description.link.kind, LinkKind::ModbusTcp | LinkKind::ModbusRtu) {
-            continue;
-        }
-        let unit = instrument.unit.or(profile.description.link.unit).unwrap_or(1);
-        let device = sim::wire::device::Device::new(profile)
-            .map_err(|e| miette::miette!("{}: {e}", instrument.profile))?;
-        if devices.insert(unit, device).is_some() {
-            miette::bail!(
-                help = "give one of them another `unit`",
-                "two instruments of the virtual rig have Modbus unit {unit}"
-            );
-        }
-    }
-    Ok(devices)
 }

@@ -1,0 +1,31 @@
+//! A CAN bus as drivers and emulators see it: the seam between both and whatever stands behind it.
+
+use crate::codec::can::CanFrame;
+use std::io;
+use std::time::{Duration, Instant};
+
+/// What a bus gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CanEvent {
+    /// A frame, and how long ago it was received by the adapter or the kernel.
+    Frame(CanFrame, Duration),
+    /// The controller warns (error counters at 96) or is passive (128).
+    Warning,
+    /// The controller has left the bus, and comes back only when a person says so.
+    BusOff,
+}
+
+/// A CAN bus, whatever stands behind it.
+pub trait CanPort: Send {
+    /// Sends a frame; `false` where there is no room for it now (back-pressure), and then it is not sent.
+    ///
+    /// # Errors
+    /// Where the bus is gone.
+    fn send(&mut self, frame: &CanFrame) -> io::Result<bool>;
+
+    /// The next event until `deadline`; `None` where none came.
+    ///
+    /// # Errors
+    /// Where the bus is gone.
+    fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>>;
+}
