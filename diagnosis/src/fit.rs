@@ -1,7 +1,9 @@
 //! Bounded least squares of one hypothesis on a table, in coordinates that are standard normal a priori.
 
-use crate::data::Rig;
-use effects::{Active, Baseline, Design, Operating, Parameter, Place, known, library};
+use crate::data::RigFile;
+use effects::{Active, Baseline, Design, Parameter, Place, known, library};
+use models::condition::Condition;
+use models::rig_file::CertifiedKey;
 use nalgebra::{DMatrix, DVector};
 
 /// Deviation of the logarithm of mu0 a priori where the still passes give it, and where they do not.
@@ -31,6 +33,10 @@ impl Member {
     pub fn departs_by(&self) -> f64 {
         known()[self.effect].departs_by()
     }
+    /// The certificate that bounds its size, where there is such a kind.
+    pub fn certified_by(&self) -> Option<CertifiedKey> {
+        certified_by(known()[self.effect].name(), self.law)
+    }
     /// Where the effect sits.
     pub fn place(&self) -> Place {
         known()[self.effect].place()
@@ -41,7 +47,7 @@ impl Member {
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// Conditions.
-    pub passes: Vec<Operating>,
+    pub passes: Vec<Condition>,
     /// Measured lateral forces, N.
     pub lateral: Vec<f64>,
     /// Variances of the lateral forces, N^2.
@@ -56,9 +62,22 @@ pub struct Problem {
     pub certified: Vec<(Member, f64)>,
 }
 
+fn certified_by(effect: &str, law: usize) -> Option<CertifiedKey> {
+    match (effect, law) {
+        ("amplitude_miscalibration", 0) => Some(CertifiedKey::AmplitudeGain),
+        ("lateral_gain", 0) => Some(CertifiedKey::LateralGain),
+        ("speed_error", 0) => Some(CertifiedKey::SpeedGain),
+        ("normal_offset", 0) => Some(CertifiedKey::NormalOffset),
+        ("plate_tilt", 0) => Some(CertifiedKey::Tilt),
+        ("force_crosstalk", 0) => Some(CertifiedKey::Crosstalk),
+        ("force_crosstalk", 1) => Some(CertifiedKey::CrosstalkOntoNormal),
+        _ => None,
+    }
+}
+
 impl Problem {
     /// The problem of a whole table.
-    pub fn new(table: &crate::data::Table, rig: &Rig) -> Self {
+    pub fn new(table: &crate::data::Table, rig: &RigFile) -> Self {
         let mu0 = table.still_coefficient();
         // Without still passes the largest friction seen is the best first word on mu0.
         let guess = mu0.unwrap_or_else(|| {
@@ -66,16 +85,17 @@ impl Problem {
                 .passes
                 .iter()
                 .zip(&table.lateral)
-                .map(|(p, l)| p.direction * l / p.normal_force_n)
+                .map(|(p, l)| p.direction.sign() * l / p.normal_force_n)
                 .fold(0.05, f64::max)
         });
         let sd = rig.finger.stiffness_relative_sd.max(1e-3);
         let mut certified = Vec::new();
         for (index, effect) in library().iter().enumerate() {
             for (law, form) in effect.laws().iter().enumerate() {
-                if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) =
-                    (rig.certified_sd(effect.name(), law), form.parameters[0].prior)
-                {
+                if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) = (
+                    certified_by(effect.name(), law).and_then(|key| rig.calibration.sd(key)),
+                    form.parameters[0].prior,
+                ) {
                     certified.push((Member { effect: index, law }, (sd / wide).min(1.0)));
                 }
             }
@@ -202,7 +222,7 @@ impl Problem {
     }
 
     /// Predicted lateral forces at other conditions, N.
-    pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Operating]) -> DVector<f64> {
+    pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Condition]) -> DVector<f64> {
         let baseline = self.baseline(u);
         let thetas = Self::thetas(members, u);
         // Effects act in the library's order, whatever the order of the hypothesis.

@@ -1,6 +1,6 @@
 //! The hypotheses: no gap, each effect, pairs, and the open set; fitted, with their probabilities.
 
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::evidence::{Explained, over_forms};
 use crate::explore::{held_nuisances, tempered};
 use crate::fit::{Problem, minimise};
@@ -117,7 +117,8 @@ pub struct Fitted {
 }
 
 /// Lengths of the form uncertainty in standard deviations of each covariate.
-pub const FORM_LENGTHS: Lengths = Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY };
+pub const FORM_LENGTHS: Lengths =
+    Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY, climate: f64::INFINITY };
 const FORM_RANK: usize = 40;
 /// Share of the smooth gap below which starts do not look.
 const START_SHARE: f64 = 0.15;
@@ -127,7 +128,7 @@ const KNOWN: f64 = 0.1;
 const ENOUGH: f64 = 2.5;
 
 /// Fits every hypothesis to a table.
-pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
+pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
     let mut problem = Problem::new(table, rig);
     let (wildcard, pure) = settle(table, rig, &mut problem);
     let coordinates = Coordinates::of(table);

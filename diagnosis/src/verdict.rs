@@ -1,7 +1,7 @@
 //! The verdict: everything the diagnosis says about one table, in the shape of the contract.
 
 use crate::attribute::{Decision, Verdict, decide, imitated};
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::evidence::Explained;
 use crate::fit::NUISANCES;
 use crate::held_out::{Gap, gap};
@@ -114,11 +114,11 @@ pub struct Diagnosis {
     /// What was decided.
     pub decision: Decision,
     table: Table,
-    rig: Rig,
+    rig: RigFile,
 }
 
 /// Diagnoses a table.
-pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> Diagnosis {
+pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String) -> Diagnosis {
     let fitted = fit_all(table, rig, options);
     let decision = decide(&fitted);
     let leader = decision.class[0];
@@ -179,7 +179,7 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
         remarks,
         data: DataNote { points: table.len(), sha256 },
     };
-    Diagnosis { report, fitted, decision, table: table.clone(), rig: *rig }
+    Diagnosis { report, fitted, decision, table: table.clone(), rig: rig.clone() }
 }
 
 fn label(fitted: &Fitted, candidate: usize) -> String {

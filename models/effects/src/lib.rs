@@ -43,14 +43,15 @@ pub mod subsurface_relaxation;
 pub mod time_misalignment;
 
 pub use effect::{Effect, Law, Need, Parameter, Place, Prior};
-pub use operating::{Baseline, Design, Operating, Reading};
+pub use operating::{Baseline, Design, Reading};
 pub use predict::{Active, lateral_force};
 
 /// What every effect's file needs.
 mod prelude {
     pub use crate::contact::Contact;
     pub use crate::effect::{Effect, Law, Need, Parameter, Place};
-    pub use crate::operating::{Design, Operating, Reading, atmospheres};
+    pub use crate::operating::{Design, Reading, atmospheres};
+    pub use models::condition::Condition;
 }
 
 /// Every effect of the library, in the order in which a signal passes them: instruments that falsify the
