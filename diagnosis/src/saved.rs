@@ -23,7 +23,7 @@ impl Diagnosis {
             schema: "muprime.model/1".to_string(),
             verdict: self.report.text.clone(),
             relative_sd: left.max(0.005),
-            interpolation_error: if inertia { effects::impact::STATED_ERROR } else { 0.0 },
+            interpolation_error: if inertia { effects::contact::impact::STATED_ERROR } else { 0.0 },
             baseline: problem.baseline(&best.u),
             design: problem.design,
             effects: saved_effects(best),

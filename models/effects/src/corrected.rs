@@ -2,7 +2,7 @@
 //!
 //! It is evaluated directly, without allocation: the contact is a closed form or one short sweep, so no table
 //! and no interpolation error stands between the verdict and the loop. The one exception is ridge inertia,
-//! whose table's error is stated in [`crate::impact::STATED_ERROR`].
+//! whose table's error is stated in [`crate::contact::impact::STATED_ERROR`].
 
 use crate::effect::{Effect, Place};
 use crate::operating::{Baseline, Design, Operating};
@@ -220,7 +220,7 @@ impl Corrected {
 
     fn lateral_force_from(&self, baseline: &Baseline, pass: &Operating) -> f64 {
         let zero: [f64; 0] = [];
-        let idle = Active { effect: &crate::sensor_lag::SensorLag, law: 0, theta: &zero };
+        let idle = Active { effect: &crate::library::sensor_lag::SensorLag, law: 0, theta: &zero };
         let mut active = [idle; MOST_EFFECTS];
         for (slot, c) in active.iter_mut().zip(&self.effects) {
             *slot = Active { effect: c.effect, law: c.law, theta: &c.theta[..c.count] };

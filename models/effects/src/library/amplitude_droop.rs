@@ -1,6 +1,6 @@
 //! The finger loads the plate and its amplitude falls.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct AmplitudeDroop;

@@ -1,6 +1,6 @@
 //! The ridges have mass: they are thrown off and fly.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct RidgeInertia;
@@ -48,6 +48,6 @@ impl Effect for RidgeInertia {
         c.landing = law;
     }
     fn prepare(&self, law: usize, theta: &[f64]) {
-        crate::impact::prepare(law, theta[1]);
+        crate::contact::impact::prepare(law, theta[1]);
     }
 }

@@ -1,8 +1,8 @@
 //! Rubbing warms the contact and softens what is sheared: friction falls with load times speed. A cause that the library
 //! does not name.
 
-use crate::prelude::*;
-use crate::sweep::root;
+use super::prelude::*;
+use crate::contact::sweep::root;
 
 /// See the module.
 pub struct FrictionalHeating;

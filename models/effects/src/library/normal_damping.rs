@@ -1,6 +1,6 @@
 //! The normal spring is retarded: it pushes harder on the way up and lags on the way down.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct NormalDamping;

@@ -1,6 +1,6 @@
 //! The tissue under the ridges creeps: the contact grows, and with it both stiffnesses, while mu0 stays.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct SubsurfaceRelaxation;

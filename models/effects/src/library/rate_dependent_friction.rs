@@ -1,6 +1,6 @@
 //! The friction coefficient depends on the sliding speed.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct RateDependentFriction;

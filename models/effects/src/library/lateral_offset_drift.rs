@@ -1,6 +1,6 @@
 //! The lateral channel's zero is off, or wanders.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct LateralOffsetDrift;

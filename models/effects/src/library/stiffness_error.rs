@@ -1,6 +1,6 @@
 //! A stiffness of the finger is not what its certificate says.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct StiffnessError;

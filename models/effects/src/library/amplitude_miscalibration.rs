@@ -1,6 +1,6 @@
 //! The plate does not move by the amplitude that the drive was calibrated to.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct AmplitudeMiscalibration;

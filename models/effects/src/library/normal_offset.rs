@@ -1,6 +1,6 @@
 //! The normal force that is read is not the one that loads the contact.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct NormalOffset;

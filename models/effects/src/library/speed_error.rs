@@ -1,6 +1,6 @@
 //! The stage does not move at the commanded speed.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct SpeedError;

@@ -1,7 +1,7 @@
 //! Not one slider but many, of unequal height.
 
-use crate::asperities::Heights;
-use crate::prelude::*;
+use super::prelude::*;
+use crate::contact::asperities::Heights;
 
 /// See the module.
 pub struct MultiAsperity;

@@ -1,6 +1,6 @@
 //! The lateral channel's sensitivity is wrong.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct LateralGain;

@@ -1,6 +1,6 @@
 //! The plate's amplitude is not the same everywhere.
 
-use crate::prelude::*;
+use super::prelude::*;
 use std::f64::consts::PI;
 
 /// See the module.

@@ -1,6 +1,6 @@
 //! The friction limit is not proportional to the load.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct LoadDependentFriction;

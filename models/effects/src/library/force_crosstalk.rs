@@ -1,6 +1,6 @@
 //! The lateral channel of the force sensor feels the normal force, or the other way round.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct ForceCrosstalk;
@@ -34,7 +34,7 @@ impl Effect for ForceCrosstalk {
     }
     fn change(&self, law: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
         if law == 1 {
-            crate::plate_tilt::unload(c, pass.direction, -theta[0]);
+            super::plate_tilt::unload(c, pass.direction, -theta[0]);
         }
     }
     fn read(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, reading: &mut Reading) {

@@ -1,6 +1,6 @@
 //! Force and position carry different clocks. A steady mean does not show it.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct TimeMisalignment;

@@ -1,6 +1,6 @@
 //! The skin's lateral stretch does not vanish at lift-off but recovers at a finite rate.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct LateralRecovery;

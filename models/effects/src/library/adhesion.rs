@@ -1,7 +1,7 @@
 //! Adhesion loads the contact beyond what the normal force does, and holds it until it is pulled off.
 
+use super::prelude::*;
 use crate::contact::Attraction;
-use crate::prelude::*;
 
 /// See the module.
 pub struct Adhesion;

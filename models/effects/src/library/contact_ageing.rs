@@ -1,6 +1,6 @@
 //! Bonds need time to form after each touch-down.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct ContactAgeing;

@@ -2,7 +2,7 @@
 //!
 //! A resonance that falls with the amplitude alone is not told from saturation, and belongs there.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct ResonanceDetuning;

@@ -1,6 +1,6 @@
 //! The plate is not level in the sensor's frame.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct PlateTilt;

@@ -1,6 +1,6 @@
 //! The amplifier cannot deliver the largest amplitudes.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct AmplitudeSaturation;

@@ -1,6 +1,6 @@
 //! The stage's speed ripples with the pitch of its screw.
 
-use crate::prelude::*;
+use super::prelude::*;
 use std::f64::consts::PI;
 
 /// See the module.

@@ -1,6 +1,6 @@
 //! Sweat and occlusion change the friction coefficient with time of contact.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct MoistureDrift;

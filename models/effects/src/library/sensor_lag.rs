@@ -1,6 +1,6 @@
 //! The force sensor is slow. A steady mean does not show it.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct SensorLag;

@@ -1,6 +1,6 @@
 //! Air trapped under the vibrating finger carries part of the load.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct SqueezeFilm;
@@ -107,7 +107,7 @@ fn finite_film_share(a: f64, film: f64, solid: f64, load: f64) -> f64 {
             return (rest - high).exp();
         }
     }
-    crate::sweep::root(low, high, 0.0, short).map_or(1.0, |u| (rest - u).exp().min(1.0))
+    crate::contact::sweep::root(low, high, 0.0, short).map_or(1.0, |u| (rest - u).exp().min(1.0))
 }
 
 /// Share left to solid contact when `Fn = solid exp(-u) + 1.25 p A (a/u)^2`, u in film thickness units.
