@@ -11,6 +11,7 @@
 //! | [`psi`] | Eqs. 16-20 |
 //! | [`prediction`] | what every friction law answers |
 //! | [`record`] | the data vocabulary: passes, the point table |
+//! | [`rig_file`] | `rig.toml`: finger, repeatability, what certificates leave open |
 
 pub mod condition;
 pub mod finger;
@@ -21,6 +22,7 @@ pub mod psi_fit;
 pub mod quantity;
 pub mod record;
 pub mod ridge;
+pub mod rig_file;
 pub mod root;
 pub mod spring_slider;
 pub mod surrogate;
