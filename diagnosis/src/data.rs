@@ -2,6 +2,7 @@
 
 use effects::{Design, Need, Operating};
 use models::record::Pass;
+use models::rig_file::CertifiedKey;
 use serde::{Deserialize, Serialize};
 
 /// What rig.toml states about the finger, the noise and the certificates.
@@ -58,17 +59,17 @@ pub struct Certificates {
 }
 
 impl Rig {
-    /// The certificate that bounds the size of an effect's law, where there is one.
-    pub fn certified_sd(&self, effect: &str, law: usize) -> Option<f64> {
+    /// The standard uncertainty that bounds a quantity, where there is a certificate.
+    pub fn certified_sd(&self, key: CertifiedKey) -> Option<f64> {
         let c = &self.calibration;
-        match (effect, law) {
-            ("amplitude_miscalibration", 0) => c.amplitude_gain_sd,
-            ("lateral_gain", 0) => c.lateral_gain_sd,
-            ("speed_error", 0) => c.speed_gain_sd,
-            ("normal_offset", 0) => c.normal_offset_sd_n,
-            ("plate_tilt", 0) => c.tilt_sd_rad,
-            ("force_crosstalk", _) => c.crosstalk_sd,
-            _ => None,
+        match key {
+            CertifiedKey::AmplitudeGain => c.amplitude_gain_sd,
+            CertifiedKey::LateralGain => c.lateral_gain_sd,
+            CertifiedKey::SpeedGain => c.speed_gain_sd,
+            CertifiedKey::NormalOffset => c.normal_offset_sd_n,
+            CertifiedKey::Tilt => c.tilt_sd_rad,
+            CertifiedKey::Crosstalk | CertifiedKey::CrosstalkOntoNormal => c.crosstalk_sd,
+            CertifiedKey::NormalGain | CertifiedKey::LateralOffset => None,
         }
     }
 }
@@ -95,6 +96,11 @@ pub enum DataError {
     #[error("point {0} stands twice; number the points apart")]
     DoublePoint(u64),
 }
+
+/// Relative difference below which two frequencies are one.
+const SAME_FREQUENCY: f64 = 1e-3;
+/// Range of temperatures below which a table shows nothing of them, K.
+const SAME_TEMPERATURE_K: f64 = 0.3;
 
 /// Passes in the order of measurement, with the groups that are held out together.
 #[derive(Debug, Clone)]
@@ -244,24 +250,20 @@ impl Table {
                 }
                 Need::Positions => self.design.stroke_m < 1e-3,
                 Need::Time => self.design.duration_s <= 0.0,
-                Need::Record | Need::OutsideStandard => true,
-            };
-            missing.then(|| {
-                match need {
-                    Need::Vibration => "no pass has the plate vibrating",
-                    Need::Amplitudes => "a second amplitude is missing",
-                    Need::Loads => "normal forces differ by less than a quarter: a second load is missing",
-                    Need::Speeds => "speeds differ by less than a third: a second speed is missing",
-                    Need::Directions => "only one direction was measured: passes in reverse are missing",
-                    Need::Positions => "all passes lie at one position_m: a second place is missing",
-                    Need::Time => "all passes carry one time_s",
-                    Need::Record => "means over passes do not show it; a time-resolved run record is missing",
-                    Need::OutsideStandard => {
-                        "an exact alias of mu0 and lateral stiffness; a dead-weight certificate of the lateral axis is missing"
-                    }
+                Need::Frequencies => {
+                    !p.iter().any(|q| (q.frequency_hz / p[0].frequency_hz - 1.0).abs() > SAME_FREQUENCY)
                 }
-                .to_string()
-            })
+                Need::Runs => self.run_count < 2,
+                Need::Temperatures => {
+                    let known: Vec<f64> = p.iter().filter_map(|q| q.temperature_c).collect();
+                    let (low, high) = known
+                        .iter()
+                        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+                    known.len() < p.len() || high - low <= SAME_TEMPERATURE_K
+                }
+                Need::Record | Need::OutsideStandard | Need::NormalStandard => true,
+            };
+            missing.then(|| need.missing().to_string())
         })
     }
 

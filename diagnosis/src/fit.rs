@@ -1,7 +1,7 @@
 //! Bounded least squares of one hypothesis on a table, in coordinates that are standard normal a priori.
 
 use crate::data::Rig;
-use effects::{Active, Baseline, Design, Operating, Parameter, Place, known, library};
+use effects::{Active, Baseline, Design, Law, Operating, Parameter, Place, known, library};
 use nalgebra::{DMatrix, DVector};
 
 /// Deviation of the logarithm of mu0 a priori where the still passes give it, and where they do not.
@@ -19,9 +19,13 @@ pub struct Member {
 }
 
 impl Member {
+    /// The law.
+    pub fn form(&self) -> &'static Law {
+        &known()[self.effect].laws()[self.law]
+    }
     /// The law's parameters.
     pub fn parameters(&self) -> &'static [Parameter] {
-        known()[self.effect].laws()[self.law].parameters
+        self.form().parameters
     }
     /// The effect's name.
     pub fn name(&self) -> &'static str {
@@ -74,7 +78,7 @@ impl Problem {
         for (index, effect) in library().iter().enumerate() {
             for (law, form) in effect.laws().iter().enumerate() {
                 if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) =
-                    (rig.certified_sd(effect.name(), law), form.parameters[0].prior)
+                    (form.certified_by.and_then(|key| rig.certified_sd(key)), form.parameters[0].prior)
                 {
                     certified.push((Member { effect: index, law }, (sd / wide).min(1.0)));
                 }

@@ -22,7 +22,7 @@ pub mod listing;
 pub mod operating;
 pub mod predict;
 
-pub use effect::{Effect, Law, Need, Parameter, Place, Prior};
-pub use library::{by_name, known, library};
+pub use effect::{Check, Effect, Law, Need, Parameter, Place, Prior};
+pub use library::{by_name, imitated, known, library, near, one_cause, twins};
 pub use operating::{Baseline, Design, Operating, Reading};
 pub use predict::{Active, lateral_force};

@@ -7,12 +7,9 @@ use crate::contact::asperities::Heights;
 pub struct MultiAsperity;
 
 static LAWS: [Law; 3] = [
-    Law { name: "Gaussian heights", parameters: &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)] },
-    Law {
-        name: "exponential heights",
-        parameters: &[Parameter::positive("height_scale", "m", 0.5e-6, 6e-6)],
-    },
-    Law { name: "even heights", parameters: &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)] },
+    Law::new("Gaussian heights", &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)]),
+    Law::new("exponential heights", &[Parameter::positive("height_scale", "m", 0.5e-6, 6e-6)]),
+    Law::new("even heights", &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)]),
 ];
 
 impl Effect for MultiAsperity {

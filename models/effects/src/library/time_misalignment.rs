@@ -5,8 +5,7 @@ use super::prelude::*;
 /// See the module.
 pub struct TimeMisalignment;
 
-static LAWS: [Law; 1] =
-    [Law { name: "constant skew", parameters: &[Parameter::signed("skew", "s", 0.01, -1.0, 1.0)] }];
+static LAWS: [Law; 1] = [Law::new("constant skew", &[Parameter::signed("skew", "s", 0.01, -1.0, 1.0)])];
 
 impl Effect for TimeMisalignment {
     fn name(&self) -> &'static str {

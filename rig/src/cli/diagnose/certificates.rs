@@ -34,7 +34,7 @@ pub fn at_fault(rig: &Rig, path: &Path, report: &serde_json::Value) -> Vec<AtFau
         .iter()
         .filter_map(|e| e.as_str())
         .filter_map(|effect| {
-            let stated_sd = rig.certified_sd(effect, 0)?;
+            let stated_sd = rig.certified_sd(effects::by_name(effect)?.laws()[0].certified_by?)?;
             let kind = if effect == "amplitude_miscalibration" { "amplitude" } else { "force" };
             let certificate = match file(path, kind) {
                 Some(name) => format!("{kind} certificate ({name})"),
@@ -73,7 +73,7 @@ impl InDoubt {
 pub fn in_doubt(path: &Path, pulls: &[Pull]) -> Vec<InDoubt> {
     let mut doubts = Vec::new();
     for pull in pulls.iter().filter(|p| p.remarkable()) {
-        for &imitates in pull.imitated_by {
+        for &imitates in &pull.imitated_by {
             let kind = match imitates {
                 "amplitude_miscalibration" => "amplitude",
                 "normal_gain" | "lateral_gain" => "force",
