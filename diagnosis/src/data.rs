@@ -30,6 +30,11 @@ pub enum DataError {
     DoublePoint(u64),
 }
 
+/// Relative difference below which two frequencies are one.
+const SAME_FREQUENCY: f64 = 1e-3;
+/// Range of temperatures below which a table shows nothing of them, K.
+const SAME_TEMPERATURE_K: f64 = 0.3;
+
 /// Passes in the order of measurement, with the groups that are held out together.
 #[derive(Debug, Clone)]
 pub struct Table {
@@ -166,29 +171,23 @@ impl Table {
                 Need::Amplitudes => spread(&|q| q.amplitude.metres()) < 1.2,
                 Need::Loads => spread(&|q| q.normal_force_n) < 1.25,
                 Need::Speeds => spread(&|q| q.speed_m_s) < 1.3,
-                Need::Directions => {
-                    p.iter().all(|q| q.direction == p[0].direction)
-                }
+                Need::Directions => p.iter().all(|q| q.direction == p[0].direction),
                 Need::Positions => self.design.stroke_m < 1e-3,
                 Need::Time => self.design.duration_s <= 0.0,
-                Need::Record | Need::OutsideStandard => true,
-            };
-            missing.then(|| {
-                match need {
-                    Need::Vibration => "no pass has the plate vibrating",
-                    Need::Amplitudes => "a second amplitude is missing",
-                    Need::Loads => "normal forces differ by less than a quarter: a second load is missing",
-                    Need::Speeds => "speeds differ by less than a third: a second speed is missing",
-                    Need::Directions => "only one direction was measured: passes in reverse are missing",
-                    Need::Positions => "all passes lie at one position_m: a second place is missing",
-                    Need::Time => "all passes carry one time_s",
-                    Need::Record => "means over passes do not show it; a time-resolved run record is missing",
-                    Need::OutsideStandard => {
-                        "an exact alias of mu0 and lateral stiffness; a dead-weight certificate of the lateral axis is missing"
-                    }
+                Need::Frequencies => {
+                    !p.iter().any(|q| (q.frequency_hz / p[0].frequency_hz - 1.0).abs() > SAME_FREQUENCY)
                 }
-                .to_string()
-            })
+                Need::Runs => self.run_count < 2,
+                Need::Temperatures => {
+                    let known: Vec<f64> = p.iter().filter_map(|q| q.temperature_c).collect();
+                    let (low, high) = known
+                        .iter()
+                        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+                    known.len() < p.len() || high - low <= SAME_TEMPERATURE_K
+                }
+                Need::Record | Need::OutsideStandard | Need::NormalStandard => true,
+            };
+            missing.then(|| need.missing().to_string())
         })
     }
 

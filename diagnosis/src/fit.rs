@@ -1,13 +1,16 @@
 //! Bounded least squares of one hypothesis on a table, in coordinates that are standard normal a priori.
 
 use crate::data::RigFile;
-use effects::{Active, Baseline, Design, Parameter, Place, known, library};
+use effects::{Active, Baseline, Design, Law, Parameter, Place, known, library};
 use models::condition::Condition;
 use models::rig_file::CertifiedKey;
 use nalgebra::{DMatrix, DVector};
 
 /// Deviation of the logarithm of mu0 a priori where the still passes give it, and where they do not.
 const MU0_LOG_SD: (f64, f64) = (0.3, 0.8);
+/// Certified deviations below this share of a law's own prior are taken as this: closer to exact than any table can tell,
+/// and still a number to divide by.
+const EXACT: f64 = 1e-6;
 /// Number of baseline parameters: logarithms of mu0, normal and lateral stiffness.
 pub const NUISANCES: usize = 3;
 
@@ -21,9 +24,13 @@ pub struct Member {
 }
 
 impl Member {
+    /// The law.
+    pub fn form(&self) -> &'static Law {
+        &known()[self.effect].laws()[self.law]
+    }
     /// The law's parameters.
     pub fn parameters(&self) -> &'static [Parameter] {
-        known()[self.effect].laws()[self.law].parameters
+        self.form().parameters
     }
     /// The effect's name.
     pub fn name(&self) -> &'static str {
@@ -32,10 +39,6 @@ impl Member {
     /// Largest share of its change by which it may depart from its form.
     pub fn departs_by(&self) -> f64 {
         known()[self.effect].departs_by()
-    }
-    /// The certificate that bounds its size, where there is such a kind.
-    pub fn certified_by(&self) -> Option<CertifiedKey> {
-        certified_by(known()[self.effect].name(), self.law)
     }
     /// Where the effect sits.
     pub fn place(&self) -> Place {
@@ -62,17 +65,15 @@ pub struct Problem {
     pub certified: Vec<(Member, f64)>,
 }
 
-fn certified_by(effect: &str, law: usize) -> Option<CertifiedKey> {
-    match (effect, law) {
-        ("amplitude_miscalibration", 0) => Some(CertifiedKey::AmplitudeGain),
-        ("lateral_gain", 0) => Some(CertifiedKey::LateralGain),
-        ("speed_error", 0) => Some(CertifiedKey::SpeedGain),
-        ("normal_offset", 0) => Some(CertifiedKey::NormalOffset),
-        ("plate_tilt", 0) => Some(CertifiedKey::Tilt),
-        ("force_crosstalk", 0) => Some(CertifiedKey::Crosstalk),
-        ("force_crosstalk", 1) => Some(CertifiedKey::CrosstalkOntoNormal),
-        _ => None,
-    }
+/// Instrument errors that no table of passes tells from another baseline, with the logarithmic change of the baseline's
+/// parameters that each is. What a certificate leaves open of them is part of the recalibration; without a certificate the
+/// instrument is taken at its word, and a pull of the stiffnesses is the only sign.
+fn gains_within_the_baseline() -> impl Iterator<Item = (CertifiedKey, [f64; NUISANCES])> {
+    library()
+        .iter()
+        .filter(|e| e.needs().iter().any(|n| n.is_standard()))
+        .flat_map(|e| e.laws())
+        .filter_map(|law| Some((law.certified_by?, law.acts_as?)))
 }
 
 impl Problem {
@@ -92,12 +93,18 @@ impl Problem {
         let mut certified = Vec::new();
         for (index, effect) in library().iter().enumerate() {
             for (law, form) in effect.laws().iter().enumerate() {
-                if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) = (
-                    certified_by(effect.name(), law).and_then(|key| rig.calibration.sd(key)),
-                    form.parameters[0].prior,
-                ) {
-                    certified.push((Member { effect: index, law }, (sd / wide).min(1.0)));
+                if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) =
+                    (form.certified_by.and_then(|key| rig.calibration.sd(key)), form.parameters[0].prior)
+                {
+                    certified.push((Member { effect: index, law }, (sd / wide).clamp(EXACT, 1.0)));
                 }
+            }
+        }
+        let mut prior_sd = [if mu0.is_some() { MU0_LOG_SD.0 } else { MU0_LOG_SD.1 }, sd, sd];
+        for (key, e_folds) in gains_within_the_baseline() {
+            let open = rig.calibration.sd(key).unwrap_or(0.0);
+            for (own, e_fold) in prior_sd.iter_mut().zip(e_folds) {
+                *own = own.hypot(e_fold * open);
             }
         }
         Problem {
@@ -110,7 +117,7 @@ impl Problem {
                 normal_stiffness_n_per_m: rig.finger.normal_stiffness_n_per_m,
                 lateral_stiffness_n_per_m: rig.finger.lateral_stiffness_n_per_m,
             },
-            prior_sd: [if mu0.is_some() { MU0_LOG_SD.0 } else { MU0_LOG_SD.1 }, sd, sd],
+            prior_sd,
             certified,
         }
     }

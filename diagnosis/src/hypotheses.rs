@@ -10,7 +10,7 @@ use crate::pairs::pairs;
 use crate::singles::{OUTLIVED, Search, outlived, singles, sort, strangers};
 use crate::smooth::{Coordinates, Kernel, Lengths};
 use crate::wildcard::Wildcard;
-use effects::{known, library};
+use effects::{Effect, known, library};
 use nalgebra::DMatrix;
 
 /// Prior probabilities of no gap, of one effect, of two, and of none in the library.
@@ -153,7 +153,7 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
             continue;
         }
         match table.lacks(effect.needs()) {
-            Some(because) => not_testable.push((effect.name(), because)),
+            Some(because) => not_testable.push((effect.name(), certified(*effect, rig).unwrap_or(because))),
             None => tried.push(index),
         }
     }
@@ -190,6 +190,17 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
         priors: options.priors,
         singles_tried: tried.len(),
     }
+}
+
+/// Why an effect is not sought that only an outside standard shows, where rig.toml states that calibration.
+fn certified(effect: &dyn Effect, rig: &RigFile) -> Option<String> {
+    let standard = effect.needs().iter().any(|n| n.is_standard());
+    let key = effect.laws().iter().filter(|_| standard).find_map(|law| law.certified_by)?;
+    let sd = rig.calibration.sd(key)?;
+    Some(format!(
+        "an outside calibration leaves {sd:.1e} of the {} open, and that is part of the recalibrated baseline",
+        key.words()
+    ))
 }
 
 /// Pairs, where the best single leaves something: one that leaves nothing needs no second cause, unless it is the

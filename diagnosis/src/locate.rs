@@ -28,18 +28,11 @@ pub struct Region {
 
 /// Probability by place; `unknown` is the open set's.
 pub fn ledger(fitted: &Fitted, probabilities: &[f64], unknown: f64) -> BTreeMap<&'static str, f64> {
-    let mut map: BTreeMap<&'static str, f64> =
-        ["contact", "finger", "plate", "instrument"].into_iter().map(|k| (k, 0.0)).collect();
+    let mut map: BTreeMap<&'static str, f64> = Place::ALL.iter().map(|place| (place.name(), 0.0)).collect();
     map.insert("unknown", unknown);
     for (c, p) in fitted.candidates.iter().zip(probabilities) {
         for &e in &c.effects {
-            let place = match library()[e].place() {
-                Place::Contact => "contact",
-                Place::Finger => "finger",
-                Place::Plate => "plate",
-                Place::Instrument => "instrument",
-            };
-            *map.get_mut(place).expect("every place is in the map") += p / c.effects.len() as f64;
+            *map.entry(library()[e].place().name()).or_insert(0.0) += p / c.effects.len() as f64;
         }
     }
     let total: f64 = map.values().sum();

@@ -2,13 +2,13 @@
 //!
 //! It is evaluated directly, without allocation: the contact is a closed form or one short sweep, so no table
 //! and no interpolation error stands between the verdict and the loop. The one exception is ridge inertia,
-//! whose table's error is stated in [`crate::impact::STATED_ERROR`].
+//! whose table's error is stated in [`crate::contact::impact::STATED_ERROR`].
 
 use crate::effect::{Effect, Place};
 use crate::operating::{Baseline, Design};
 use crate::predict::{Active, lateral_force};
 use models::condition::{Ambient, Condition, OutOfDomain};
-use models::covariate::{self, Covariate};
+use models::covariate::Covariate;
 use models::prediction::{FrictionModel, Prediction, Regime, Validity};
 use serde::{Deserialize, Serialize};
 
@@ -128,14 +128,6 @@ pub struct Lack {
     pub covariate: &'static Covariate,
 }
 
-fn needs(law: &crate::effect::Law) -> &'static [&'static Covariate] {
-    static WARMTH: [&Covariate; 1] = [&covariate::TEMPERATURE];
-    match law.name {
-        "warming (temperature)" | "warming about a tuning point" | "offset with temperature" => &WARMTH,
-        _ => &[],
-    }
-}
-
 #[derive(Clone, Copy)]
 struct Compiled {
     effect: &'static dyn Effect,
@@ -229,7 +221,8 @@ impl Corrected {
         let known = Condition::paper().within(ambient);
         self.effects.iter().find_map(|c| {
             let law = &c.effect.laws()[c.law];
-            let covariate = needs(law).iter().copied().find(|k| k.of(&known).is_none())?;
+            let needs = c.effect.needs().iter().chain(law.needs);
+            let covariate = needs.filter_map(|n| n.covariate()).find(|k| k.of(&known).is_none())?;
             Some(Lack { effect: c.effect.name(), law: law.name, covariate })
         })
     }
@@ -251,7 +244,7 @@ impl Corrected {
 
     fn lateral_force_from(&self, baseline: &Baseline, pass: &Condition) -> f64 {
         let zero: [f64; 0] = [];
-        let idle = Active { effect: &crate::sensor_lag::SensorLag, law: 0, theta: &zero };
+        let idle = Active { effect: &crate::library::sensor_lag::SensorLag, law: 0, theta: &zero };
         let mut active = [idle; MOST_EFFECTS];
         for (slot, c) in active.iter_mut().zip(&self.effects) {
             *slot = Active { effect: c.effect, law: c.law, theta: &c.theta[..c.count] };

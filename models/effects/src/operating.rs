@@ -69,7 +69,7 @@ impl Baseline {
             bonding_time: 0.0,
             bonding_exponent: 1.0,
             asperity_height: 0.0,
-            asperity_heights: crate::asperities::Heights::Gaussian,
+            asperity_heights: crate::contact::asperities::Heights::Gaussian,
             normal_retardation_time: 0.0,
             mass: 0.0,
             ridge_damping_ratio: 1.0,

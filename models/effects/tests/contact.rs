@@ -1,9 +1,9 @@
 //! The contact solver against figures that an independent time-domain simulation printed.
 use models::condition::Condition;
 use models::quantity::PeakToPeak;
-use muprime_effects::asperities::Heights;
+use muprime_effects::contact::asperities::Heights;
+use muprime_effects::contact::impact::{Bouncing, LANDINGS, STATED_ERROR};
 use muprime_effects::contact::{Attraction, Contact, mean_friction};
-use muprime_effects::impact::{Bouncing, LANDINGS, STATED_ERROR};
 use muprime_effects::{Baseline, Design};
 use std::f64::consts::PI;
 

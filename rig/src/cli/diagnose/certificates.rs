@@ -3,7 +3,7 @@
 use diagnosis::attribute::Verdict;
 use diagnosis::pulls::Pull;
 use diagnosis::verdict::Diagnosis;
-use models::rig_file::{CertifiedKey, RigFile};
+use models::rig_file::RigFile;
 use serde::Serialize;
 
 /// A certificate that speaks for an instrument which is blamed nevertheless.
@@ -33,7 +33,7 @@ pub fn at_fault(result: &Diagnosis, rig: &RigFile) -> Vec<AtFault> {
     }
     let leader = &result.fitted.candidates[result.decision.class[0]].best;
     let blamed = leader.members.iter().filter_map(|member| {
-        let key = member.certified_by()?;
+        let key = member.form().certified_by?;
         let stated_sd = rig.calibration.sd(key)?;
         let certificate = rig.calibration.certificate_of(key);
         Some(AtFault { effect: member.name(), quantity: key.words(), certificate, stated_sd })
@@ -69,13 +69,9 @@ impl InDoubt {
 pub fn in_doubt(rig: &RigFile, pulls: &[Pull]) -> Vec<InDoubt> {
     let mut doubts = Vec::new();
     for pull in pulls.iter().filter(|p| p.remarkable()) {
-        for &imitates in pull.imitated_by {
-            let key = match imitates {
-                "amplitude_miscalibration" => CertifiedKey::AmplitudeGain,
-                "normal_gain" => CertifiedKey::NormalGain,
-                "lateral_gain" => CertifiedKey::LateralGain,
-                _ => CertifiedKey::SpeedGain,
-            };
+        for &imitates in &pull.imitated_by {
+            let laws = effects::by_name(imitates).map_or(&[][..], |e| e.laws());
+            let Some(key) = laws.iter().find_map(|law| law.certified_by) else { continue };
             // Only a certificate that is there can be in doubt.
             let named = key.kind().is_some_and(|kind| rig.calibration.certificates.contains_key(&kind));
             if let (true, Some(pull_sd)) = (named, pull.pull_sd) {

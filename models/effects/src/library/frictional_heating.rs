@@ -1,19 +1,16 @@
 //! Rubbing warms the contact and softens what is sheared: friction falls with load times speed. A cause that the library
 //! does not name.
 
-use crate::prelude::*;
-use crate::sweep::root;
+use super::prelude::*;
+use crate::contact::sweep::root;
 
 /// See the module.
 pub struct FrictionalHeating;
 
-static LAWS: [Law; 1] = [Law {
-    name: "softening with the power rubbed",
-    parameters: &[
-        Parameter::positive("inverse_power", "1/W", 40.0, 1000.0),
-        Parameter::shape("exponent", "1", 0.8, 0.4),
-    ],
-}];
+static LAWS: [Law; 1] = [Law::new(
+    "softening with the power rubbed",
+    &[Parameter::positive("inverse_power", "1/W", 40.0, 1000.0), Parameter::shape("exponent", "1", 0.8, 0.4)],
+)];
 
 impl Effect for FrictionalHeating {
     fn name(&self) -> &'static str {
@@ -30,6 +27,13 @@ impl Effect for FrictionalHeating {
     }
     fn laws(&self) -> &'static [Law] {
         &LAWS
+    }
+    fn imitated_by(&self) -> &'static [&'static str] {
+        // Heat goes with mu N U: so do a dependence on speed and one on load with like exponents.
+        &["rate_dependent_friction", "load_dependent_friction"]
+    }
+    fn words(&self) -> &'static str {
+        "friction that heats up with load times speed"
     }
     fn needs(&self) -> &'static [Need] {
         &[Need::Speeds]

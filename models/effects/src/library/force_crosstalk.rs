@@ -1,13 +1,22 @@
 //! The lateral channel of the force sensor feels the normal force, or the other way round.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct ForceCrosstalk;
 
+/// What sees it without friction.
+const CHECK: &str =
+    "Press on the sensor with a dead weight and no motion, plate levelled; read the lateral axis.";
+
 static LAWS: [Law; 2] = [
-    Law { name: "normal into lateral", parameters: &[Parameter::signed("crosstalk", "1", 0.03, -0.3, 0.3)] },
-    Law { name: "lateral into normal", parameters: &[Parameter::signed("crosstalk", "1", 0.08, -0.5, 0.5)] },
+    Law::new("normal into lateral", &[Parameter::signed("crosstalk", "1", 0.03, -0.3, 0.3)])
+        .certified_by(CertifiedKey::Crosstalk)
+        .same_as("plate_tilt", "rotation")
+        .seen_by(CHECK, 0.001),
+    Law::new("lateral into normal", &[Parameter::signed("crosstalk", "1", 0.08, -0.5, 0.5)])
+        .certified_by(CertifiedKey::CrosstalkOntoNormal)
+        .seen_by(CHECK, 0.001),
 ];
 
 impl Effect for ForceCrosstalk {
@@ -29,12 +38,15 @@ impl Effect for ForceCrosstalk {
     fn departs_by(&self) -> f64 {
         0.05
     }
+    fn near(&self) -> &'static [&'static str] {
+        &["plate_tilt"]
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Directions]
     }
     fn change(&self, law: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
         if law == 1 {
-            crate::plate_tilt::unload(c, pass.direction.sign(), -theta[0]);
+            super::plate_tilt::unload(c, pass.direction.sign(), -theta[0]);
         }
     }
     fn read(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, reading: &mut Reading) {

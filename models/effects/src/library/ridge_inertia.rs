@@ -1,26 +1,26 @@
 //! The ridges have mass: they are thrown off and fly.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct RidgeInertia;
 
 // Beyond critical damping a ridge does not fly, it lags: that is loss in the skin, whatever the mass.
 static LAWS: [Law; 2] = [
-    Law {
-        name: "landing without rebound",
-        parameters: &[
+    Law::new(
+        "landing without rebound",
+        &[
             Parameter::positive("mass", "kg", 4e-6, 40e-6),
             Parameter::shape("damping_ratio", "1", 0.5, 0.7).at_most(1.0),
         ],
-    },
-    Law {
-        name: "rebounding",
-        parameters: &[
+    ),
+    Law::new(
+        "rebounding",
+        &[
             Parameter::positive("mass", "kg", 4e-6, 40e-6),
             Parameter::shape("damping_ratio", "1", 0.5, 0.7).at_most(1.0),
         ],
-    },
+    ),
 ];
 
 impl Effect for RidgeInertia {
@@ -39,6 +39,9 @@ impl Effect for RidgeInertia {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
+    fn interpolation_error(&self) -> f64 {
+        crate::contact::impact::STATED_ERROR
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
@@ -48,6 +51,6 @@ impl Effect for RidgeInertia {
         c.landing = law;
     }
     fn prepare(&self, law: usize, theta: &[f64]) {
-        crate::impact::prepare(law, theta[1]);
+        crate::contact::impact::prepare(law, theta[1]);
     }
 }

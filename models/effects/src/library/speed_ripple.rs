@@ -1,19 +1,19 @@
 //! The stage's speed ripples with the pitch of its screw.
 
-use crate::prelude::*;
+use super::prelude::*;
 use std::f64::consts::PI;
 
 /// See the module.
 pub struct SpeedRipple;
 
-static LAWS: [Law; 1] = [Law {
-    name: "sine along the plate",
-    parameters: &[
+static LAWS: [Law; 1] = [Law::new(
+    "sine along the plate",
+    &[
         Parameter::positive("relative_ripple", "1", 0.2, 0.9),
         Parameter::between("pitch", "m", 0.0008, 0.012),
         Parameter::between("phase", "1", -0.25, 1.25),
     ],
-}];
+)];
 
 impl Effect for SpeedRipple {
     fn name(&self) -> &'static str {
@@ -30,6 +30,9 @@ impl Effect for SpeedRipple {
     }
     fn laws(&self) -> &'static [Law] {
         &LAWS
+    }
+    fn near(&self) -> &'static [&'static str] {
+        &["mode_shape"]
     }
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Positions]
