@@ -2,6 +2,7 @@
 
 use crate::hypotheses::Fitted;
 use crate::shrink::{Gate, Region, gate, left_out_regions};
+use effects::imitated;
 
 /// The four answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -43,9 +44,6 @@ const NAME: f64 = 0.9;
 /// forms err by more nats than one, and pairs were wrong by up to 4.5 of them (the class reaches as far as 5). One
 /// effect was never wrong between 0.93 and 0.98 on 190 sealed sets.
 const ALONE: [f64; 2] = [0.93, 0.993];
-/// Pairs that one cause outside of the library imitates, so that they lead and are not named: friction that falls as the
-/// contact heats up goes with `mu N U`, as a dependence on speed and one on load with like exponents do.
-const IMITATED: [[&str; 2]; 1] = [["rate_dependent_friction", "load_dependent_friction"]];
 /// chi2 between the forces of two hypotheses below which they say the same of this table. What the data tell of two with
 /// as many parameters is then less than [`ALONE`] asks for, and priors alone may not make a name: a speed that is wrong
 /// by half was called a lateral stiffness because such a stiffness is less of a surprise. Such a rival is of the class
@@ -88,8 +86,8 @@ pub fn decide(fitted: &Fitted) -> Decision {
     }
     let class = alias_class(fitted, leader);
     let alone = ALONE[usize::from(candidates[leader].effects.len() > 1)];
-    let told =
-        !imitated(&candidates[leader].names()) && class[1..].iter().all(|&i| !same_said(fitted, leader, i));
+    let told = imitated(&candidates[leader].names()).is_none()
+        && class[1..].iter().all(|&i| !same_said(fitted, leader, i));
     let in_class: f64 = class.iter().map(|&i| probabilities[i]).sum();
     let verdict = if !claimed || none >= in_class.max(unknown) {
         Verdict::NoGap
@@ -101,11 +99,6 @@ pub fn decide(fitted: &Fitted) -> Decision {
         Verdict::Ambiguous
     };
     Decision { verdict, none, unknown, probabilities, class, gate: judged, regions }
-}
-
-/// Whether one cause outside of the library does as these effects together do.
-pub fn imitated(names: &[&str]) -> bool {
-    IMITATED.iter().any(|pair| pair.iter().all(|n| names.contains(n)))
 }
 
 /// The leader and every hypothesis of its size that the data does not tell from it.

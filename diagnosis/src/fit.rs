@@ -1,11 +1,16 @@
 //! Bounded least squares of one hypothesis on a table, in coordinates that are standard normal a priori.
 
-use crate::data::Rig;
-use effects::{Active, Baseline, Design, Operating, Parameter, Place, known, library};
+use crate::data::RigFile;
+use effects::{Active, Baseline, Design, Law, Parameter, Place, known, library};
+use models::condition::Condition;
+use models::rig_file::CertifiedKey;
 use nalgebra::{DMatrix, DVector};
 
 /// Deviation of the logarithm of mu0 a priori where the still passes give it, and where they do not.
 const MU0_LOG_SD: (f64, f64) = (0.3, 0.8);
+/// Certified deviations below this share of a law's own prior are taken as this: closer to exact than any table can tell,
+/// and still a number to divide by.
+const EXACT: f64 = 1e-6;
 /// Number of baseline parameters: logarithms of mu0, normal and lateral stiffness.
 pub const NUISANCES: usize = 3;
 
@@ -19,9 +24,13 @@ pub struct Member {
 }
 
 impl Member {
+    /// The law.
+    pub fn form(&self) -> &'static Law {
+        &known()[self.effect].laws()[self.law]
+    }
     /// The law's parameters.
     pub fn parameters(&self) -> &'static [Parameter] {
-        known()[self.effect].laws()[self.law].parameters
+        self.form().parameters
     }
     /// The effect's name.
     pub fn name(&self) -> &'static str {
@@ -41,7 +50,7 @@ impl Member {
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// Conditions.
-    pub passes: Vec<Operating>,
+    pub passes: Vec<Condition>,
     /// Measured lateral forces, N.
     pub lateral: Vec<f64>,
     /// Variances of the lateral forces, N^2.
@@ -56,9 +65,20 @@ pub struct Problem {
     pub certified: Vec<(Member, f64)>,
 }
 
+/// Instrument errors that no table of passes tells from another baseline, with the logarithmic change of the baseline's
+/// parameters that each is. What a certificate leaves open of them is part of the recalibration; without a certificate the
+/// instrument is taken at its word, and a pull of the stiffnesses is the only sign.
+fn gains_within_the_baseline() -> impl Iterator<Item = (CertifiedKey, [f64; NUISANCES])> {
+    library()
+        .iter()
+        .filter(|e| e.needs().iter().any(|n| n.is_standard()))
+        .flat_map(|e| e.laws())
+        .filter_map(|law| Some((law.certified_by?, law.acts_as?)))
+}
+
 impl Problem {
     /// The problem of a whole table.
-    pub fn new(table: &crate::data::Table, rig: &Rig) -> Self {
+    pub fn new(table: &crate::data::Table, rig: &RigFile) -> Self {
         let mu0 = table.still_coefficient();
         // Without still passes the largest friction seen is the best first word on mu0.
         let guess = mu0.unwrap_or_else(|| {
@@ -66,7 +86,7 @@ impl Problem {
                 .passes
                 .iter()
                 .zip(&table.lateral)
-                .map(|(p, l)| p.direction * l / p.normal_force_n)
+                .map(|(p, l)| p.direction.sign() * l / p.normal_force_n)
                 .fold(0.05, f64::max)
         });
         let sd = rig.finger.stiffness_relative_sd.max(1e-3);
@@ -74,10 +94,17 @@ impl Problem {
         for (index, effect) in library().iter().enumerate() {
             for (law, form) in effect.laws().iter().enumerate() {
                 if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) =
-                    (rig.certified_sd(effect.name(), law), form.parameters[0].prior)
+                    (form.certified_by.and_then(|key| rig.calibration.sd(key)), form.parameters[0].prior)
                 {
-                    certified.push((Member { effect: index, law }, (sd / wide).min(1.0)));
+                    certified.push((Member { effect: index, law }, (sd / wide).clamp(EXACT, 1.0)));
                 }
+            }
+        }
+        let mut prior_sd = [if mu0.is_some() { MU0_LOG_SD.0 } else { MU0_LOG_SD.1 }, sd, sd];
+        for (key, e_folds) in gains_within_the_baseline() {
+            let open = rig.calibration.sd(key).unwrap_or(0.0);
+            for (own, e_fold) in prior_sd.iter_mut().zip(e_folds) {
+                *own = own.hypot(e_fold * open);
             }
         }
         Problem {
@@ -90,7 +117,7 @@ impl Problem {
                 normal_stiffness_n_per_m: rig.finger.normal_stiffness_n_per_m,
                 lateral_stiffness_n_per_m: rig.finger.lateral_stiffness_n_per_m,
             },
-            prior_sd: [if mu0.is_some() { MU0_LOG_SD.0 } else { MU0_LOG_SD.1 }, sd, sd],
+            prior_sd,
             certified,
         }
     }
@@ -202,7 +229,7 @@ impl Problem {
     }
 
     /// Predicted lateral forces at other conditions, N.
-    pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Operating]) -> DVector<f64> {
+    pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Condition]) -> DVector<f64> {
         let baseline = self.baseline(u);
         let thetas = Self::thetas(members, u);
         // Effects act in the library's order, whatever the order of the hypothesis.

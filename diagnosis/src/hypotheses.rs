@@ -1,6 +1,6 @@
 //! The hypotheses: no gap, each effect, pairs, and the open set; fitted, with their probabilities.
 
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::evidence::{Explained, over_forms};
 use crate::explore::{held_nuisances, tempered};
 use crate::fit::{Problem, minimise};
@@ -10,7 +10,7 @@ use crate::pairs::pairs;
 use crate::singles::{OUTLIVED, Search, outlived, singles, sort, strangers};
 use crate::smooth::{Coordinates, Kernel, Lengths};
 use crate::wildcard::Wildcard;
-use effects::{known, library};
+use effects::{Effect, known, library};
 use nalgebra::DMatrix;
 
 /// Prior probabilities of no gap, of one effect, of two, and of none in the library.
@@ -117,7 +117,8 @@ pub struct Fitted {
 }
 
 /// Lengths of the form uncertainty in standard deviations of each covariate.
-pub const FORM_LENGTHS: Lengths = Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY };
+pub const FORM_LENGTHS: Lengths =
+    Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY, climate: f64::INFINITY };
 const FORM_RANK: usize = 40;
 /// Share of the smooth gap below which starts do not look.
 const START_SHARE: f64 = 0.15;
@@ -127,7 +128,7 @@ const KNOWN: f64 = 0.1;
 const ENOUGH: f64 = 2.5;
 
 /// Fits every hypothesis to a table.
-pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
+pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
     let mut problem = Problem::new(table, rig);
     let (wildcard, pure) = settle(table, rig, &mut problem);
     let coordinates = Coordinates::of(table);
@@ -152,7 +153,7 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
             continue;
         }
         match table.lacks(effect.needs()) {
-            Some(because) => not_testable.push((effect.name(), because)),
+            Some(because) => not_testable.push((effect.name(), certified(*effect, rig).unwrap_or(because))),
             None => tried.push(index),
         }
     }
@@ -189,6 +190,17 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
         priors: options.priors,
         singles_tried: tried.len(),
     }
+}
+
+/// Why an effect is not sought that only an outside standard shows, where rig.toml states that calibration.
+fn certified(effect: &dyn Effect, rig: &RigFile) -> Option<String> {
+    let standard = effect.needs().iter().any(|n| n.is_standard());
+    let key = effect.laws().iter().filter(|_| standard).find_map(|law| law.certified_by)?;
+    let sd = rig.calibration.sd(key)?;
+    Some(format!(
+        "an outside calibration leaves {sd:.1e} of the {} open, and that is part of the recalibrated baseline",
+        key.words()
+    ))
 }
 
 /// Pairs, where the best single leaves something: one that leaves nothing needs no second cause, unless it is the

@@ -1,11 +1,14 @@
 //! Where: the parts of the operating space that carry the gap, and the part of the rig.
 
-use crate::data::Rig;
+use crate::data::RigFile;
 use crate::evidence::Explained;
 use crate::fit::Problem;
 use crate::hypotheses::Fitted;
 use crate::predict::{Forecast, Model, forecast};
-use effects::{Operating, Place, library};
+use effects::{Place, library};
+use models::condition::Condition;
+use models::covariate::{self, Role};
+use models::quantity::PeakToPeak;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
@@ -25,18 +28,11 @@ pub struct Region {
 
 /// Probability by place; `unknown` is the open set's.
 pub fn ledger(fitted: &Fitted, probabilities: &[f64], unknown: f64) -> BTreeMap<&'static str, f64> {
-    let mut map: BTreeMap<&'static str, f64> =
-        ["contact", "finger", "plate", "instrument"].into_iter().map(|k| (k, 0.0)).collect();
+    let mut map: BTreeMap<&'static str, f64> = Place::ALL.iter().map(|place| (place.name(), 0.0)).collect();
     map.insert("unknown", unknown);
     for (c, p) in fitted.candidates.iter().zip(probabilities) {
         for &e in &c.effects {
-            let place = match library()[e].place() {
-                Place::Contact => "contact",
-                Place::Finger => "finger",
-                Place::Plate => "plate",
-                Place::Instrument => "instrument",
-            };
-            *map.get_mut(place).expect("every place is in the map") += p / c.effects.len() as f64;
+            *map.entry(library()[e].place().name()).or_insert(0.0) += p / c.effects.len() as f64;
         }
     }
     let total: f64 = map.values().sum();
@@ -44,37 +40,6 @@ pub fn ledger(fitted: &Fitted, probabilities: &[f64], unknown: f64) -> BTreeMap<
         map.values_mut().for_each(|v| *v /= total);
     }
     map
-}
-
-type Covariate = (&'static str, fn(&Operating) -> f64);
-
-fn covariates() -> [Covariate; 9] {
-    [
-        ("amplitude_pp_m", |p| p.amplitude_pp_m),
-        ("speed_m_s", |p| p.speed_m_s),
-        ("normal_force_n", |p| p.normal_force_n),
-        ("frequency_hz", |p| p.frequency_hz),
-        ("direction", |p| p.direction),
-        ("position_m", |p| p.position_m),
-        ("time_s", |p| p.time_s),
-        ("ambient_pressure_pa", |p| p.ambient_pressure_pa.unwrap_or(f64::NAN)),
-        ("temperature_c", |p| p.temperature_c.unwrap_or(f64::NAN)),
-    ]
-}
-
-/// A covariate in words, with the scale and unit in which it is told.
-fn words_for(name: &str) -> (&str, f64, &str) {
-    match name {
-        "amplitude_pp_m" => ("amplitude", 1e6, "um pp"),
-        "speed_m_s" => ("speed", 1e3, "mm/s"),
-        "normal_force_n" => ("normal force", 1.0, "N"),
-        "frequency_hz" => ("frequency", 1e-3, "kHz"),
-        "position_m" => ("position", 1e3, "mm"),
-        "time_s" => ("time", 1.0, "s"),
-        "ambient_pressure_pa" => ("pressure", 1e-3, "kPa"),
-        "temperature_c" => ("temperature", 1.0, "degrees C"),
-        other => (other, 1.0, ""),
-    }
 }
 
 /// Deviations of a pass by which the gap must stand out at a condition to count.
@@ -93,7 +58,7 @@ const ASKED: usize = 10_000;
 /// passes alone would end where the next pass happens to be. A condition counts by its probability of standing out. The
 /// space is cut into parts, each time where that probability differs most; those parts are named that together have
 /// the largest expected F1.
-pub fn regions(fitted: &Fitted, rig: &Rig, model: &(Model, Problem, Explained)) -> Vec<Region> {
+pub fn regions(fitted: &Fitted, rig: &RigFile, model: &(Model, Problem, Explained)) -> Vec<Region> {
     let problem = &fitted.problem;
     let n = problem.len();
     let mut places = problem.passes.clone();
@@ -147,10 +112,20 @@ struct Cut {
     above: Vec<u8>,
 }
 
-fn cuts(places: &[Operating]) -> Vec<Cut> {
+/// Standard deviation.
+fn spread(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+fn cuts(places: &[Condition]) -> Vec<Cut> {
     let one = |covariate: usize| {
-        let values: Vec<f64> = places.iter().map(covariates()[covariate].1).collect();
-        if values.iter().any(|v| v.is_nan()) {
+        let values: Vec<f64> =
+            places.iter().map(|p| covariate::TOLD[covariate].of(p)).collect::<Option<_>>()?;
+        if covariate::TOLD[covariate].role == Role::Climate
+            && spread(&values) < covariate::TOLD[covariate].least_spread
+        {
             return None;
         }
         let mut sorted = values.clone();
@@ -168,7 +143,7 @@ fn cuts(places: &[Operating]) -> Vec<Cut> {
         let above = values.iter().map(|v| at.partition_point(|a| a < v) as u8).collect();
         (!at.is_empty()).then_some(Cut { covariate, at, above })
     };
-    (0..covariates().len()).filter_map(one).collect()
+    (0..covariate::TOLD.len()).filter_map(one).collect()
 }
 
 /// A part of the operating space.
@@ -264,26 +239,26 @@ fn named_parts<'a>(list: &'a [Part], chance: &[f64]) -> Vec<&'a Part> {
 
 fn region(
     bounds: &BTreeMap<usize, [f64; 2]>,
-    passes: &[Operating],
+    passes: &[Condition],
     share: f64,
     p_value: Option<f64>,
 ) -> Region {
     let mut named = BTreeMap::new();
     let mut words = Vec::new();
     for (k, b) in bounds {
-        let (name, value) = covariates()[*k];
+        let covariate = covariate::TOLD[*k];
         // An open side ends where the table does.
         let (low, high) = passes
             .iter()
-            .map(value)
+            .filter_map(|p| covariate.of(p))
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, c), v| (a.min(v), c.max(v)));
         let slack = 0.02 * (high - low);
         let low = if low >= 0.0 { (low - slack).max(0.0) } else { low - slack };
         let high = high + slack;
         let low = if b[0].is_finite() { b[0] } else { low };
         let high = if b[1].is_finite() { b[1] } else { high };
-        named.insert(name, [low, high]);
-        let (word, scale, unit) = words_for(name);
+        named.insert(covariate.name, [low, high]);
+        let (word, (scale, unit)) = (covariate.words, covariate.shown);
         let (low, high) = (low * scale, high * scale);
         words.push(match (b[0].is_finite(), b[1].is_finite()) {
             (true, true) => format!("{word} {low:.3} to {high:.3} {unit}"),
@@ -308,17 +283,17 @@ fn region(
 
 /// Conditions of the same design: what can be set is drawn independently, from the table's levels or from between
 /// two neighbouring ones; what comes together (time and temperature) stays together.
-fn conditions_between(passes: &[Operating], count: usize) -> Vec<Operating> {
+fn conditions_between(passes: &[Condition], count: usize) -> Vec<Condition> {
     let mut state = 0x5DEE_CE66_D2B7_4F1D_u64;
     let mut uniform = || (crate::held_out::split_mix(&mut state) >> 11) as f64 / (1u64 << 53) as f64;
-    let levels = |value: fn(&Operating) -> f64| {
+    let levels = |value: fn(&Condition) -> f64| {
         let mut list: Vec<f64> = passes.iter().map(value).filter(|v| *v > 0.0).collect();
         list.sort_by(f64::total_cmp);
         list.dedup_by(|a, b| *a <= *b * 1.02);
         list
     };
     let (amplitudes, speeds, loads) =
-        (levels(|p| p.amplitude_pp_m), levels(|p| p.speed_m_s), levels(|p| p.normal_force_n));
+        (levels(|p| p.amplitude.metres()), levels(|p| p.speed_m_s), levels(|p| p.normal_force_n));
     let between = |value: f64, levels: &[f64], u: (f64, f64)| {
         let k = levels.partition_point(|v| *v < value * 0.99);
         match (u.0 < 0.5, levels.get(k + 1)) {
@@ -328,8 +303,12 @@ fn conditions_between(passes: &[Operating], count: usize) -> Vec<Operating> {
     };
     let pick = |u: f64| passes[((u * passes.len() as f64) as usize).min(passes.len() - 1)];
     (0..count)
-        .map(|_| Operating {
-            amplitude_pp_m: between(pick(uniform()).amplitude_pp_m, &amplitudes, (uniform(), uniform())),
+        .map(|_| Condition {
+            amplitude: PeakToPeak::from_metres(between(
+                pick(uniform()).amplitude.metres(),
+                &amplitudes,
+                (uniform(), uniform()),
+            )),
             speed_m_s: between(pick(uniform()).speed_m_s, &speeds, (uniform(), uniform())),
             normal_force_n: between(pick(uniform()).normal_force_n, &loads, (uniform(), uniform())),
             frequency_hz: pick(uniform()).frequency_hz,

@@ -1,8 +1,11 @@
 //! The variance of each pass: stated repeatability, checked against replicates, never fitted to a residual.
 
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::fit::{Problem, minimise};
-use crate::wildcard::{LENGTHS, Wildcard};
+use crate::wildcard::{Wildcard, lengths};
+use models::condition::Condition;
+use models::covariate;
+use models::quantity::PeakToPeak;
 use serde::Serialize;
 
 /// What the replicates say about the stated repeatability.
@@ -24,18 +27,19 @@ const OUTLIER: f64 = 3.5;
 const OUTLIER_SHARE: f64 = 0.02;
 
 /// Fills in the problem's variances and gives the smooth surface on which they rest.
-pub fn settle(table: &Table, rig: &Rig, problem: &mut Problem) -> (Wildcard, PureError) {
+pub fn settle(table: &Table, rig: &RigFile, problem: &mut Problem) -> (Wildcard, PureError) {
     let start = minimise(problem, &[], &[0.0; 3], &rough(problem, rig), 12);
     problem.variance = variance(problem, rig, &start.u, start.prediction.as_slice(), 1.0);
     // The level of friction enters the variance: it is taken from a smooth surface, not from the baseline.
-    let first = Wildcard::fit(table, problem, &start.u, &LENGTHS[..1]);
+    let smoothnesses = lengths(table);
+    let first = Wildcard::fit(table, problem, &start.u, &smoothnesses[..1]);
     let level: Vec<f64> = first.smooth.iter().copied().collect();
     problem.variance = variance(problem, rig, &start.u, &level, 1.0);
     let pure = replicates(table, problem, &level);
     for v in &mut problem.variance {
         *v *= pure.used;
     }
-    let second = Wildcard::fit(table, problem, &start.u, &LENGTHS);
+    let second = Wildcard::fit(table, problem, &start.u, smoothnesses);
     let far: Vec<f64> = (0..problem.len())
         .map(|i| (problem.lateral[i] - second.smooth[i]).abs() / problem.variance[i].sqrt())
         .collect();
@@ -50,7 +54,7 @@ pub fn settle(table: &Table, rig: &Rig, problem: &mut Problem) -> (Wildcard, Pur
     (second, pure)
 }
 
-fn rough(problem: &Problem, rig: &Rig) -> Vec<f64> {
+fn rough(problem: &Problem, rig: &RigFile) -> Vec<f64> {
     problem
         .lateral
         .iter()
@@ -64,12 +68,9 @@ fn rough(problem: &Problem, rig: &Rig) -> Vec<f64> {
 
 /// Variances given the level of friction: relative scatter, noise of the lateral axis, and that of the normal
 /// axis through the slope of the prediction (effective variance).
-pub fn variance(problem: &Problem, rig: &Rig, center: &[f64], level: &[f64], factor: f64) -> Vec<f64> {
-    let heavier: Vec<_> = problem
-        .passes
-        .iter()
-        .map(|p| effects::Operating { normal_force_n: p.normal_force_n * 1.01, ..*p })
-        .collect();
+pub fn variance(problem: &Problem, rig: &RigFile, center: &[f64], level: &[f64], factor: f64) -> Vec<f64> {
+    let heavier: Vec<_> =
+        problem.passes.iter().map(|p| Condition { normal_force_n: p.normal_force_n * 1.01, ..*p }).collect();
     let base = problem.predict(&[], center);
     let more = problem.predict_at(&[], center, &heavier);
     let force = rig.noise.force_sd_n;
@@ -84,16 +85,10 @@ pub fn variance(problem: &Problem, rig: &Rig, center: &[f64], level: &[f64], fac
 
 /// Repeats of one condition, compared among themselves after a common drift in time is taken out.
 fn replicates(table: &Table, problem: &Problem, smooth: &[f64]) -> PureError {
-    let mut groups: std::collections::BTreeMap<[i64; 6], Vec<usize>> = std::collections::BTreeMap::new();
+    let mut groups: std::collections::BTreeMap<[Option<i64>; 6], Vec<usize>> =
+        std::collections::BTreeMap::new();
     for (i, p) in table.passes.iter().enumerate() {
-        let key = [
-            (p.amplitude_pp_m * 1e9).round() as i64,
-            p.frequency_hz.round() as i64,
-            (p.speed_m_s.ln() * 50.0).round() as i64,
-            p.direction as i64,
-            (p.normal_force_n.ln() * 8.0).round() as i64,
-            p.ambient_pressure_pa.map_or(-1, |v| (v / 500.0).round() as i64),
-        ];
+        let key = covariate::SETTINGS.map(|c| Some(c.level?(c.of(p)?)));
         groups.entry(key).or_default().push(i);
     }
     let (mut sum, mut freedom) = (0.0, 0usize);
@@ -103,7 +98,7 @@ fn replicates(table: &Table, problem: &Problem, smooth: &[f64]) -> PureError {
             let apart = (table.passes[i].time_s - table.passes[j].time_s).abs();
             let places = (table.passes[i].position_m - table.passes[j].position_m).abs();
             // Only neighbours in time and place: what lies between others may be drift, not scatter.
-            let still = table.passes[i].amplitude_pp_m == 0.0;
+            let still = table.passes[i].amplitude == PeakToPeak::ZERO;
             if apart > 0.1 * table.design.duration_s
                 || (!still && places > 0.01 * table.design.stroke_m.max(1e-9))
             {

@@ -5,22 +5,12 @@ use crate::explore::{glance, nuisance_starts, polish, survey};
 use crate::fit::{Fit, Member, NUISANCES, Problem};
 use crate::hypotheses::Candidate;
 use crate::singles::PRUNE;
-use effects::library;
+use effects::{library, one_cause};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Single effects from which pairs are grown.
 const PAIR_SEEDS: usize = 6;
-/// Near aliases: a pair of them is one cause with the freedom of two.
-const SAME: [[&str; 2]; 1] = [["force_crosstalk", "plate_tilt"]];
-/// Laws whose changes are the same for the same parameter: for any pair with one of them there is the same pair with the
-/// other. Cross-talk and tilt (which also turns the normal axis, a little); a factor on normal stiffness and on amplitude;
-/// a factor on lateral stiffness and on speed.
-const TWINS: [[(&str, usize); 2]; 3] = [
-    [("force_crosstalk", 0), ("plate_tilt", 0)],
-    [("stiffness_error", 1), ("amplitude_miscalibration", 0)],
-    [("stiffness_error", 0), ("speed_error", 0)],
-];
 /// Cosine between two changes above which they are one.
 const ONE_CHANGE: f64 = 0.98;
 /// Pairs that are fitted in full.
@@ -32,8 +22,7 @@ const LAWS_POLISHED: usize = 16;
 /// Whether two hypotheses change the forces alike: by name, or by the angle between their changes in deviations of a
 /// pass.
 fn one_change(problem: &Problem, a: &Explained, b: &Explained) -> bool {
-    let names = [a.members[0].name(), b.members[0].name()];
-    if SAME.iter().any(|same| names.iter().all(|n| same.contains(n))) {
+    if one_cause(a.members[0].name(), b.members[0].name()) {
         return true;
     }
     let product = |x: &Explained, y: &Explained| -> f64 {
@@ -117,11 +106,9 @@ fn searched_again(
 
 /// The same pair with the exact alias of one of its members in its place.
 fn twins(pair: &Explained) -> Vec<(Vec<Member>, Vec<f64>)> {
-    let member = |(name, law): (&str, usize)| {
-        library().iter().position(|e| e.name() == name).map(|effect| Member { effect, law })
-    };
-    let ordered = TWINS.iter().flat_map(|[a, b]| [(*a, *b), (*b, *a)]);
-    let both = ordered.filter_map(|(a, b)| Some((member(a)?, member(b)?)));
+    let member = |(effect, law): (usize, usize)| Member { effect, law };
+    let both = effects::twins().into_iter().flat_map(|[a, b]| [(a, b), (b, a)]);
+    let both = both.map(|(one, other)| (member(one), member(other)));
     both.filter_map(|(one, other)| {
         let place = pair.members.iter().position(|m| *m == one)?;
         if pair.members.iter().any(|m| m.effect == other.effect) {

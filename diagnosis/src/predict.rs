@@ -1,12 +1,12 @@
 //! The verdict's model at any condition: what `--predict` writes and what held-out passes are judged by.
 
 use crate::attribute::Verdict;
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::evidence::{Explained, explain, recalibration};
 use crate::fit::{NUISANCES, Problem, minimise};
 use crate::hypotheses::{FORM_LENGTHS, Fitted};
-use crate::wildcard::{LENGTHS, Wildcard};
-use effects::Operating;
+use crate::wildcard::{Wildcard, lengths};
+use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -68,7 +68,7 @@ pub fn model(
         }
         Verdict::Unknown => {
             let part = table.select(rows);
-            Model::Open(Box::new(Wildcard::fit(&part, &problem, &baseline.u, &LENGTHS)))
+            Model::Open(Box::new(Wildcard::fit(&part, &problem, &baseline.u, lengths(&part))))
         }
     };
     (model, problem, baseline)
@@ -80,9 +80,9 @@ const PART: usize = 256;
 /// Predicts conditions.
 pub fn forecast(
     fitted: &Fitted,
-    rig: &Rig,
+    rig: &RigFile,
     model: &(Model, Problem, Explained),
-    passes: &[Operating],
+    passes: &[Condition],
 ) -> Vec<Forecast> {
     let (model, problem, baseline) = model;
     let ready = match model {
@@ -114,11 +114,11 @@ enum Ready<'a> {
 
 fn forecast_part(
     fitted: &Fitted,
-    rig: &Rig,
+    rig: &RigFile,
     model: &Ready<'_>,
     problem: &Problem,
     baseline: &Explained,
-    passes: &[Operating],
+    passes: &[Condition],
 ) -> Vec<Forecast> {
     let n = passes.len();
     let out = Problem {

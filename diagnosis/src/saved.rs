@@ -16,14 +16,14 @@ impl Diagnosis {
             Verdict::NoGap => &self.fitted.none,
             Verdict::Named | Verdict::Ambiguous => &self.fitted.candidates[self.decision.class[0]].best,
         };
-        let inertia = best.members.iter().any(|m| m.name() == "ridge_inertia");
+        let errors = best.members.iter().map(|m| known()[m.effect].interpolation_error());
         let gap = &self.report.gap;
         let left = (gap.form_alone_rmse.powi(2) - gap.noise_floor_rmse.powi(2)).max(0.0).sqrt();
         Some(SavedModel {
             schema: "muprime.model/1".to_string(),
             verdict: self.report.text.clone(),
             relative_sd: left.max(0.005),
-            interpolation_error: if inertia { effects::impact::STATED_ERROR } else { 0.0 },
+            interpolation_error: errors.fold(0.0, f64::max),
             baseline: problem.baseline(&best.u),
             design: problem.design,
             effects: saved_effects(best),
@@ -55,7 +55,7 @@ fn saved_effect(best: &Explained, member: Member, first: usize, theta: &[f64]) -
     let acts_on = if member.place() == Place::Instrument { "reading" } else { "prediction" };
     SavedEffect {
         name: member.name().to_string(),
-        law: known()[member.effect].laws()[member.law].name.to_string(),
+        law: member.form().name.to_string(),
         acts_on: acts_on.to_string(),
         parameters: (own.iter().zip(theta))
             .map(|(p, v)| SavedParameter { name: p.name.to_string(), value: *v, unit: p.unit.to_string() })

@@ -32,8 +32,10 @@ pub(crate) fn singles(
     search: &Search<'_>,
 ) -> Vec<Candidate> {
     let usable = |&effect: &usize| {
-        let laws = (0..known()[effect].laws().len()).filter(move |&law| usable(effect, law, table));
-        laws.map(move |law| Member { effect, law })
+        // Laws whose covariate this table lacks are not tried.
+        let laws = known()[effect].laws().iter().enumerate();
+        let shown = laws.filter(|(_, form)| table.lacks(form.needs).is_none());
+        shown.map(move |(law, _)| Member { effect, law })
     };
     let members: Vec<Member> = effects.iter().flat_map(usable).collect();
     let laws = each_law(problem, &members, search);
@@ -129,25 +131,6 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
             })
         })
         .collect()
-}
-
-/// Laws whose covariate this table lacks are not tried.
-fn usable(effect: usize, law: usize, table: &Table) -> bool {
-    let form = &known()[effect].laws()[law];
-    let temperatures: Vec<f64> = table.passes.iter().filter_map(|p| p.temperature_c).collect();
-    let span = temperatures.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-        - temperatures.iter().copied().fold(f64::INFINITY, f64::min);
-    match form.name {
-        "warming (temperature)" | "warming about a tuning point" | "offset with temperature" => {
-            temperatures.len() == table.len() && span > 0.3
-        }
-        "fixed resonance" | "standing wave, shorter at higher frequency" => {
-            let first = table.passes[0].frequency_hz;
-            table.passes.iter().any(|p| (p.frequency_hz / first - 1.0).abs() > 1e-3)
-        }
-        "exponential approach in each run" => table.run_count > 1,
-        _ => true,
-    }
 }
 
 fn candidate(effects: Vec<usize>, laws: Vec<(f64, Explained)>) -> Option<Candidate> {

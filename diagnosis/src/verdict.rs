@@ -1,7 +1,7 @@
 //! The verdict: everything the diagnosis says about one table, in the shape of the contract.
 
-use crate::attribute::{Decision, Verdict, decide, imitated};
-use crate::data::{Rig, Table};
+use crate::attribute::{Decision, Verdict, decide};
+use crate::data::{RigFile, Table};
 use crate::evidence::Explained;
 use crate::fit::NUISANCES;
 use crate::held_out::{Gap, gap};
@@ -12,7 +12,7 @@ use crate::next::{Experiment, experiments};
 use crate::noise::PureError;
 use crate::predict::{Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
-use effects::library;
+use effects::imitated;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -114,11 +114,11 @@ pub struct Diagnosis {
     /// What was decided.
     pub decision: Decision,
     table: Table,
-    rig: Rig,
+    rig: RigFile,
 }
 
 /// Diagnoses a table.
-pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> Diagnosis {
+pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String) -> Diagnosis {
     let fitted = fit_all(table, rig, options);
     let decision = decide(&fitted);
     let leader = decision.class[0];
@@ -179,7 +179,7 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
         remarks,
         data: DataNote { points: table.len(), sha256 },
     };
-    Diagnosis { report, fitted, decision, table: table.clone(), rig: *rig }
+    Diagnosis { report, fitted, decision, table: table.clone(), rig: rig.clone() }
 }
 
 fn label(fitted: &Fitted, candidate: usize) -> String {
@@ -201,10 +201,10 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
         ),
         Verdict::Ambiguous if decision.class.len() == 1 => {
             let name = label(fitted, leader);
-            if imitated(&fitted.candidates[leader].names()) {
+            if let Some(cause) = imitated(&fitted.candidates[leader].names()) {
                 format!(
-                    "{name} together, or friction that heats up with load times speed, which is not in the library: \
-                     this table cannot tell; {closed}."
+                    "{name} together, or {}, which is not in the library: this table cannot tell; {closed}.",
+                    cause.words()
                 )
             } else {
                 let probability = decision.probabilities[leader];
@@ -260,12 +260,7 @@ fn hypotheses(
                 effects: c.names().iter().map(|n| (*n).to_string()).collect(),
                 probability: decision.probabilities[i],
                 alias_class: own,
-                laws: c
-                    .best
-                    .members
-                    .iter()
-                    .map(|m| library()[m.effect].laws()[m.law].name.to_string())
-                    .collect(),
+                laws: c.best.members.iter().map(|m| m.form().name.to_string()).collect(),
                 parameters,
             }
         })

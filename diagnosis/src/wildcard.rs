@@ -7,20 +7,31 @@ use crate::data::Table;
 use crate::fit::{NUISANCES, Problem};
 use crate::linear::{Covariance, log_sum_exp};
 use crate::smooth::{Coordinates, Kernel, Lengths};
-use effects::Operating;
+use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Lengths of the wildcard in standard deviations of each covariate.
-pub const LENGTHS: [Lengths; 4] = [
-    Lengths { condition: 1.2, time: 0.8, position: 0.8 },
+const LENGTHS: [Lengths; 6] = [
+    Lengths { condition: 1.2, time: 0.8, position: 0.8, climate: f64::INFINITY },
     // As smooth as the form uncertainty of a named effect: what that can follow, the open set can follow too.
-    Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY },
+    Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY, climate: f64::INFINITY },
     // Smoother yet: a stranger that bends little is then as cheap as an effect that imitates it.
-    Lengths { condition: 2.5, time: 2.5, position: f64::INFINITY },
+    Lengths { condition: 2.5, time: 2.5, position: f64::INFINITY, climate: f64::INFINITY },
     // A spot of the plate, alike at all conditions.
-    Lengths { condition: 4.0, time: 4.0, position: 0.3 },
+    Lengths { condition: 4.0, time: 4.0, position: 0.3, climate: f64::INFINITY },
+    // A cause that goes with temperature or humidity, with the conditions and by itself.
+    Lengths { condition: 2.5, time: 2.5, position: f64::INFINITY, climate: 1.2 },
+    Lengths { condition: 4.0, time: 4.0, position: f64::INFINITY, climate: 0.7 },
 ];
+/// Those of them that see no temperature or humidity.
+const CLIMATE_FREE: usize = 4;
+
+/// The smoothnesses that a table calls for: those with temperature and humidity only where these change by themselves.
+pub fn lengths(table: &Table) -> &'static [Lengths] {
+    if Coordinates::of(table).sees_climate() { &LENGTHS } else { &LENGTHS[..CLIMATE_FREE] }
+}
+
 const RANK: usize = 56;
 /// Scales of the friction-like part, of the direction-odd part, and of the white excess.
 const FRICTION: [f64; 6] = [0.0, 0.015, 0.05, 0.15, 0.45, 1.3];
@@ -52,7 +63,7 @@ fn scale(baseline: f64, full: f64) -> f64 {
 fn rows(
     problem: &Problem,
     center: &[f64],
-    passes: &[Operating],
+    passes: &[Condition],
     coordinates: &Coordinates,
     (kernel, lengths): (&Kernel, &Lengths),
     parts: (f64, f64),
@@ -66,7 +77,7 @@ fn rows(
         let size = scale(baseline[i], mu0 * p.normal_force_n);
         let basis = kernel.basis(&coordinates.place(p, problem.design.largest_amplitude_m, lengths));
         for (j, b) in basis.iter().enumerate() {
-            phi[(i, j)] = parts.0 * p.direction * size * b;
+            phi[(i, j)] = parts.0 * p.direction.sign() * size * b;
             phi[(i, r + j)] = parts.1 * size * b;
         }
         sizes.push(size);
@@ -85,7 +96,7 @@ fn rows(
 
 impl Wildcard {
     /// Fits the wildcard about the baseline at `center` (nuisance coordinates): the best of some smoothnesses (of
-    /// [`LENGTHS`], unless only a level is wanted), with the evidence of their mean.
+    /// [`lengths`], unless only a level is wanted), with the evidence of their mean.
     pub fn fit(table: &Table, problem: &Problem, center: &[f64], lengths: &[Lengths]) -> Self {
         let all: Vec<Self> =
             lengths.par_iter().map(|l| Self::with_lengths(table, problem, center, *l)).collect();
@@ -194,7 +205,7 @@ impl Wildcard {
 
     /// Expected lateral forces at other conditions (N), the rows of the smooth part there, and the sizes on which a
     /// departure is measured (N).
-    fn expected(&self, problem: &Problem, passes: &[Operating]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
+    fn expected(&self, problem: &Problem, passes: &[Condition]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
         let parts = (self.friction, self.odd);
         let kernel = (&self.kernel, &self.lengths);
         let (baseline, phi, sizes) = rows(problem, &self.center, passes, &self.coordinates, kernel, parts);
@@ -205,7 +216,7 @@ impl Wildcard {
 
     /// Predicted lateral forces at other conditions, their covariance without scatter, and the variance of the white
     /// excess there (N, N^2, N^2).
-    pub fn belief(&self, problem: &Problem, passes: &[Operating]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
+    pub fn belief(&self, problem: &Problem, passes: &[Condition]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
         let (mean, phi, sizes) = self.expected(problem, passes);
         let white = sizes.iter().map(|s| (self.white * s).powi(2)).collect();
         (mean, self.covariance.posterior_covariance(&phi), white)
@@ -213,7 +224,7 @@ impl Wildcard {
 
     /// Predicted lateral force and its standard deviation (white excess included, pass scatter not) at other
     /// conditions, N.
-    pub fn predict(&self, problem: &Problem, passes: &[Operating]) -> (Vec<f64>, Vec<f64>) {
+    pub fn predict(&self, problem: &Problem, passes: &[Condition]) -> (Vec<f64>, Vec<f64>) {
         let (mean, phi, sizes) = self.expected(problem, passes);
         let smooth = |i: usize| self.covariance.posterior_variance(&phi.row(i).transpose()).max(0.0);
         let sd = (0..passes.len()).map(|i| (smooth(i) + (self.white * sizes[i]).powi(2)).sqrt()).collect();

@@ -5,11 +5,11 @@
 //! noise, while the hypothesis' own doubt about that condition is gone.
 
 use crate::attribute::Decision;
-use crate::data::Rig;
+use crate::data::RigFile;
 use crate::evidence::{Explained, recalibration};
 use crate::fit::{NUISANCES, Problem};
 use crate::hypotheses::{FORM_LENGTHS, Fitted};
-use effects::Operating;
+use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -32,7 +32,7 @@ pub struct Belief {
 }
 
 /// The hypotheses that a decision leaves: the likeliest candidates, no gap and the open set. The leader comes first.
-pub fn beliefs(fitted: &Fitted, rig: &Rig, decision: &Decision, grid: &[Operating]) -> Vec<Belief> {
+pub fn beliefs(fitted: &Fitted, rig: &RigFile, decision: &Decision, grid: &[Condition]) -> Vec<Belief> {
     let problem = Problem {
         passes: grid.to_vec(),
         lateral: vec![0.0; grid.len()],

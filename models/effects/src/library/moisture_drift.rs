@@ -1,39 +1,40 @@
 //! Sweat and occlusion change the friction coefficient with time of contact.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct MoistureDrift;
 
 static LAWS: [Law; 4] = [
-    Law {
-        name: "exponential approach",
-        parameters: &[
+    Law::new(
+        "exponential approach",
+        &[
             Parameter::signed("relative_change", "1", 0.4, -0.8, 9.0),
             Parameter::shape("time_constant", "s", 60.0, 1.4),
         ],
-    },
-    Law {
-        name: "approach with softening",
-        parameters: &[
+    ),
+    Law::new(
+        "approach with softening",
+        &[
             Parameter::signed("relative_change", "1", 0.4, -0.6, 5.0),
             Parameter::shape("time_constant", "s", 60.0, 1.4),
         ],
-    },
-    Law {
-        name: "logarithm of time",
-        parameters: &[
+    ),
+    Law::new(
+        "logarithm of time",
+        &[
             Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.2, 2.0),
             Parameter::shape("onset_time", "s", 20.0, 1.2),
         ],
-    },
-    Law {
-        name: "exponential approach in each run",
-        parameters: &[
+    ),
+    Law::new(
+        "exponential approach in each run",
+        &[
             Parameter::signed("relative_change", "1", 0.4, -0.8, 9.0),
             Parameter::shape("time_constant", "s", 60.0, 1.4),
         ],
-    },
+    )
+    .needs(&[Need::Runs]),
 ];
 
 impl Effect for MoistureDrift {
@@ -55,8 +56,8 @@ impl Effect for MoistureDrift {
     fn needs(&self) -> &'static [Need] {
         &[Need::Time]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
-        let time = if law == 3 { pass.run_time_s } else { pass.time_s };
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
+        let time = if law == 3 { pass.time_in_run_s() } else { pass.time_s };
         let factor = match law {
             2 => 1.0 + theta[0] * (1.0 + time / theta[1]).ln(),
             _ => 1.0 - theta[0] * (-time / theta[1]).exp_m1(),

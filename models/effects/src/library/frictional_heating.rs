@@ -1,19 +1,16 @@
 //! Rubbing warms the contact and softens what is sheared: friction falls with load times speed. A cause that the library
 //! does not name.
 
-use crate::prelude::*;
-use crate::sweep::root;
+use super::prelude::*;
+use crate::contact::sweep::root;
 
 /// See the module.
 pub struct FrictionalHeating;
 
-static LAWS: [Law; 1] = [Law {
-    name: "softening with the power rubbed",
-    parameters: &[
-        Parameter::positive("inverse_power", "1/W", 40.0, 1000.0),
-        Parameter::shape("exponent", "1", 0.8, 0.4),
-    ],
-}];
+static LAWS: [Law; 1] = [Law::new(
+    "softening with the power rubbed",
+    &[Parameter::positive("inverse_power", "1/W", 40.0, 1000.0), Parameter::shape("exponent", "1", 0.8, 0.4)],
+)];
 
 impl Effect for FrictionalHeating {
     fn name(&self) -> &'static str {
@@ -31,10 +28,17 @@ impl Effect for FrictionalHeating {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
+    fn imitated_by(&self) -> &'static [&'static str] {
+        // Heat goes with mu N U: so do a dependence on speed and one on load with like exponents.
+        &["rate_dependent_friction", "load_dependent_friction"]
+    }
+    fn words(&self) -> &'static str {
+        "friction that heats up with load times speed"
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Speeds]
     }
-    fn change(&self, _: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, _: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         // Heat is made by the friction that is left: mu = mu0 (1 + q mu N U)^-n, whose left side rises faster.
         let full = theta[0] * c.mu0 * c.normal_force * c.speed;
         let least = (1.0 + full).powf(-theta[1]);

@@ -1,20 +1,24 @@
 //! The amplifier cannot deliver the largest amplitudes.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct AmplitudeSaturation;
 
+/// What sees it without friction.
+const CHECK: &str = "Measure the plate with a vibrometer at the largest drives.";
+
 static LAWS: [Law; 3] = [
-    Law { name: "hard limit", parameters: &[Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6)] },
-    Law {
-        name: "limit with a bend",
-        parameters: &[
+    Law::new("hard limit", &[Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6)]).seen_by(CHECK, 2e4),
+    Law::new(
+        "limit with a bend",
+        &[
             Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6),
             Parameter::shape("sharpness", "1", 4.0, 0.6),
         ],
-    },
-    Law { name: "compression", parameters: &[Parameter::positive("inverse_limit", "1/m", 0.2e6, 5e6)] },
+    )
+    .seen_by(CHECK, 2e4),
+    Law::new("compression", &[Parameter::positive("inverse_limit", "1/m", 0.2e6, 5e6)]).seen_by(CHECK, 2e4),
 ];
 
 impl Effect for AmplitudeSaturation {
@@ -36,7 +40,7 @@ impl Effect for AmplitudeSaturation {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Amplitudes]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         let x = theta[0] * c.amplitude_pp;
         c.amplitude_pp *= match law {
             0 => {

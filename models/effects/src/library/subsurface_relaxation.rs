@@ -1,48 +1,48 @@
 //! The tissue under the ridges creeps: the contact grows, and with it both stiffnesses, while mu0 stays.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct SubsurfaceRelaxation;
 
 static LAWS: [Law; 5] = [
-    Law {
-        name: "exponential creep",
-        parameters: &[
+    Law::new(
+        "exponential creep",
+        &[
             Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
             Parameter::shape("time_constant", "s", 30.0, 1.5),
         ],
-    },
-    Law {
-        name: "logarithmic creep",
-        parameters: &[
+    ),
+    Law::new(
+        "logarithmic creep",
+        &[
             Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
             Parameter::shape("onset_time", "s", 5.0, 1.2),
         ],
-    },
-    Law {
-        name: "normal stiffness alone",
-        parameters: &[
+    ),
+    Law::new(
+        "normal stiffness alone",
+        &[
             Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
             Parameter::shape("time_constant", "s", 30.0, 1.5),
         ],
-    },
-    Law {
-        name: "normal stiffness alone, logarithmic",
-        parameters: &[
+    ),
+    Law::new(
+        "normal stiffness alone, logarithmic",
+        &[
             Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
             Parameter::shape("onset_time", "s", 5.0, 1.2),
         ],
-    },
+    ),
     // Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of times.
-    Law {
-        name: "normal stiffness alone, stretched exponential",
-        parameters: &[
+    Law::new(
+        "normal stiffness alone, stretched exponential",
+        &[
             Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
             Parameter::shape("time_constant", "s", 30.0, 1.5),
             Parameter::shape("exponent", "1", 0.6, 0.3),
         ],
-    },
+    ),
 ];
 
 impl Effect for SubsurfaceRelaxation {
@@ -61,10 +61,13 @@ impl Effect for SubsurfaceRelaxation {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
+    fn near(&self) -> &'static [&'static str] {
+        &["speed_error", "amplitude_miscalibration", "resonance_detuning"]
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Time]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
         let factor = match law {
             1 | 3 => 1.0 + theta[0] * (1.0 + pass.time_s / theta[1]).ln(),
             4 => 1.0 - theta[0] * (-(pass.time_s / theta[1]).powf(theta[2])).exp_m1(),

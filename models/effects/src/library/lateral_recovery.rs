@@ -1,34 +1,28 @@
 //! The skin's lateral stretch does not vanish at lift-off but recovers at a finite rate.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct LateralRecovery;
 
 static LAWS: [Law; 5] = [
-    Law {
-        name: "rate limit",
-        parameters: &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)],
-    },
-    Law { name: "exponential", parameters: &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)] },
-    Law {
-        name: "spectrum of times, in flight",
-        parameters: &[
+    Law::new("rate limit", &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)]),
+    Law::new("exponential", &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)]),
+    Law::new(
+        "spectrum of times, in flight",
+        &[
             Parameter::positive("relaxation_time", "s", 30e-6, 1e-3),
             Parameter::between("exponent", "1", 0.2, 1.6),
         ],
-    },
-    Law {
-        name: "rate limit, in flight",
-        parameters: &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)],
-    },
-    Law {
-        name: "rate limit, slower near rest",
-        parameters: &[
+    ),
+    Law::new("rate limit, in flight", &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)]),
+    Law::new(
+        "rate limit, slower near rest",
+        &[
             Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0),
             Parameter::shape("stretch_of_half_speed", "m", 1e-7, 1.0),
         ],
-    },
+    ),
 ];
 
 impl Effect for LateralRecovery {
@@ -50,7 +44,7 @@ impl Effect for LateralRecovery {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         match law {
             0 => c.inverse_recovery_speed = theta[0],
             1 => c.lateral_relaxation_time = theta[0],

@@ -1,12 +1,11 @@
 //! Force and position carry different clocks. A steady mean does not show it.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct TimeMisalignment;
 
-static LAWS: [Law; 1] =
-    [Law { name: "constant skew", parameters: &[Parameter::signed("skew", "s", 0.01, -1.0, 1.0)] }];
+static LAWS: [Law; 1] = [Law::new("constant skew", &[Parameter::signed("skew", "s", 0.01, -1.0, 1.0)])];
 
 impl Effect for TimeMisalignment {
     fn name(&self) -> &'static str {

@@ -1,12 +1,11 @@
 //! The force sensor is slow. A steady mean does not show it.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct SensorLag;
 
-static LAWS: [Law; 1] =
-    [Law { name: "first order", parameters: &[Parameter::positive("time_constant", "s", 0.01, 1.0)] }];
+static LAWS: [Law; 1] = [Law::new("first order", &[Parameter::positive("time_constant", "s", 0.01, 1.0)])];
 
 impl Effect for SensorLag {
     fn name(&self) -> &'static str {

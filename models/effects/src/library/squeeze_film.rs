@@ -1,6 +1,6 @@
 //! Air trapped under the vibrating finger carries part of the load.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct SqueezeFilm;
@@ -15,37 +15,42 @@ const MOST_EXCURSION: f64 = 0.95;
 /// Film thickness units beyond which nothing of the load is left to solid contact.
 const FARTHEST: f64 = 60.0;
 
+/// What sees it without friction.
+const CHECK: &str = "Repeat the largest amplitudes at 0.2 atm.";
+
 static LAWS: [Law; 5] = [
-    Law {
-        name: "load shared with a film",
-        parameters: &[Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6)],
-    },
-    Law {
-        name: "rational share",
-        parameters: &[
+    Law::new("load shared with a film", &[Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6)])
+        .seen_by(CHECK, 5e4),
+    Law::new(
+        "rational share",
+        &[
             Parameter::positive("share_per_amplitude_squared", "1/m^2", 0.4e12, 4e12),
             Parameter::between("load_exponent", "1", 0.0, 1.0),
         ],
-    },
-    Law {
-        name: "exponential on friction",
-        parameters: &[Parameter::positive("decay_per_amplitude_squared", "1/m^2", 0.3e12, 3e12)],
-    },
-    Law {
-        name: "power on friction",
-        parameters: &[
+    )
+    .seen_by(CHECK, 5e4),
+    Law::new(
+        "exponential on friction",
+        &[Parameter::positive("decay_per_amplitude_squared", "1/m^2", 0.3e12, 3e12)],
+    )
+    .seen_by(CHECK, 5e4),
+    Law::new(
+        "power on friction",
+        &[
             Parameter::positive("inverse_amplitude", "1/m", 0.5e6, 4e6),
             Parameter::between("exponent", "1", 1.0, 3.0),
         ],
-    },
-    Law {
-        name: "load shared with a film of finite excursion",
-        parameters: &[
+    )
+    .seen_by(CHECK, 5e4),
+    Law::new(
+        "load shared with a film of finite excursion",
+        &[
             Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6),
             Parameter::shape("film_over_apparent_area", "1", 0.5, 1.0),
             Parameter::shape("solid_load", "N", SOLID_SCALE_N, 0.4),
         ],
-    },
+    )
+    .seen_by(CHECK, 5e4),
 ];
 
 impl Effect for SqueezeFilm {
@@ -68,7 +73,7 @@ impl Effect for SqueezeFilm {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Amplitudes]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
         let air = atmospheres(pass);
         match law {
             0 => c.solid_share *= film_share(theta[0] * c.half_amplitude(), air, c.normal_force),
@@ -107,7 +112,7 @@ fn finite_film_share(a: f64, film: f64, solid: f64, load: f64) -> f64 {
             return (rest - high).exp();
         }
     }
-    crate::sweep::root(low, high, 0.0, short).map_or(1.0, |u| (rest - u).exp().min(1.0))
+    crate::contact::sweep::root(low, high, 0.0, short).map_or(1.0, |u| (rest - u).exp().min(1.0))
 }
 
 /// Share left to solid contact when `Fn = solid exp(-u) + 1.25 p A (a/u)^2`, u in film thickness units.

@@ -1,21 +1,28 @@
 //! The stage does not move at the commanded speed.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct SpeedError;
 
+/// What sees it without friction.
+const CHECK: &str = "Time the stage over its stroke, or read its encoder.";
+
 static LAWS: [Law; 3] = [
-    Law { name: "gain", parameters: &[Parameter::signed("log_gain", "1", 0.15, -1.0, 1.0)] },
-    Law { name: "constant", parameters: &[Parameter::signed("excess", "m/s", 0.003, -0.02, 0.05)] },
+    Law::new("gain", &[Parameter::signed("log_gain", "1", 0.15, -1.0, 1.0)])
+        .certified_by(CertifiedKey::SpeedGain)
+        .acts_as([0.0, 0.0, 1.0])
+        .seen_by(CHECK, 0.003),
+    Law::new("constant", &[Parameter::signed("excess", "m/s", 0.003, -0.02, 0.05)]).seen_by(CHECK, 0.003),
     // Slip and lag of a drive change with its speed: the error of the gain by this share for each factor of e.
-    Law {
-        name: "gain that changes with speed",
-        parameters: &[
+    Law::new(
+        "gain that changes with speed",
+        &[
             Parameter::signed("log_gain", "1", 0.15, -1.0, 1.0),
             Parameter::signed("growth_with_log_speed", "1", 0.1, -0.5, 0.5),
         ],
-    },
+    )
+    .seen_by(CHECK, 0.003),
 ];
 
 impl Effect for SpeedError {
@@ -34,10 +41,13 @@ impl Effect for SpeedError {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
+    fn near(&self) -> &'static [&'static str] {
+        &["amplitude_miscalibration"]
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
         match law {
             0 => c.speed *= theta[0].exp(),
             1 => c.speed = (c.speed + theta[0]).max(0.05 * c.speed),

@@ -1,21 +1,21 @@
 //! The normal spring is retarded: it pushes harder on the way up and lags on the way down.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct NormalDamping;
 
 static LAWS: [Law; 3] = [
-    Law { name: "Kelvin-Voigt", parameters: &[Parameter::positive("retardation_time", "s", 4e-6, 1e-4)] },
-    Law { name: "constant loss factor", parameters: &[Parameter::positive("loss_factor", "1", 0.6, 10.0)] },
+    Law::new("Kelvin-Voigt", &[Parameter::positive("retardation_time", "s", 4e-6, 1e-4)]),
+    Law::new("constant loss factor", &[Parameter::positive("loss_factor", "1", 0.6, 10.0)]),
     // Storage and loss at the vibration's frequency of a spring beside a spring and dashpot in series.
-    Law {
-        name: "standard linear solid",
-        parameters: &[
+    Law::new(
+        "standard linear solid",
+        &[
             Parameter::positive("relaxing_share", "1", 1.0, 10.0),
             Parameter::shape("relaxation_time", "s", 5e-6, 1.0),
         ],
-    },
+    ),
 ];
 
 impl Effect for NormalDamping {
@@ -34,10 +34,13 @@ impl Effect for NormalDamping {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
+    fn near(&self) -> &'static [&'static str] {
+        &["ridge_inertia"]
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         let omega = 2.0 * std::f64::consts::PI * c.frequency;
         c.normal_retardation_time = match law {
             0 => theta[0],

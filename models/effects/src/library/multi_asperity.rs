@@ -1,18 +1,15 @@
 //! Not one slider but many, of unequal height.
 
-use crate::asperities::Heights;
-use crate::prelude::*;
+use super::prelude::*;
+use crate::contact::asperities::Heights;
 
 /// See the module.
 pub struct MultiAsperity;
 
 static LAWS: [Law; 3] = [
-    Law { name: "Gaussian heights", parameters: &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)] },
-    Law {
-        name: "exponential heights",
-        parameters: &[Parameter::positive("height_scale", "m", 0.5e-6, 6e-6)],
-    },
-    Law { name: "even heights", parameters: &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)] },
+    Law::new("Gaussian heights", &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)]),
+    Law::new("exponential heights", &[Parameter::positive("height_scale", "m", 0.5e-6, 6e-6)]),
+    Law::new("even heights", &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)]),
 ];
 
 impl Effect for MultiAsperity {
@@ -34,7 +31,7 @@ impl Effect for MultiAsperity {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Amplitudes]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         c.asperity_height = theta[0];
         c.asperity_heights = match law {
             0 => Heights::Gaussian,

@@ -1,23 +1,14 @@
 //! The friction limit is not proportional to the load.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct LoadDependentFriction;
 
 static LAWS: [Law; 3] = [
-    Law {
-        name: "power of the momentary load",
-        parameters: &[Parameter::signed("exponent_minus_one", "1", 0.2, -0.6, 0.4)],
-    },
-    Law {
-        name: "power of the mean load",
-        parameters: &[Parameter::signed("exponent_minus_one", "1", 0.2, -0.8, 0.6)],
-    },
-    Law {
-        name: "saturating with the mean load",
-        parameters: &[Parameter::signed("inverse_load", "1/N", 0.8, -0.6, 8.0)],
-    },
+    Law::new("power of the momentary load", &[Parameter::signed("exponent_minus_one", "1", 0.2, -0.6, 0.4)]),
+    Law::new("power of the mean load", &[Parameter::signed("exponent_minus_one", "1", 0.2, -0.8, 0.6)]),
+    Law::new("saturating with the mean load", &[Parameter::signed("inverse_load", "1/N", 0.8, -0.6, 8.0)]),
 ];
 
 impl Effect for LoadDependentFriction {
@@ -36,10 +27,13 @@ impl Effect for LoadDependentFriction {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
+    fn near(&self) -> &'static [&'static str] {
+        &["adhesion", "normal_offset"]
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Loads]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
         let relative = (c.normal_force / design.reference_load_n).max(1e-3);
         match law {
             0 => c.load_exponent = theta[0],

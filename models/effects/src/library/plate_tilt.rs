@@ -1,14 +1,15 @@
 //! The plate is not level in the sensor's frame.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct PlateTilt;
 
 // A plate that turns shows in both axes. A lateral cell that is askew by itself reads a share of the normal force: that is a
 // cross-talk by its definition.
-static LAWS: [Law; 1] =
-    [Law { name: "rotation", parameters: &[Parameter::signed("angle", "rad", 0.03, -0.3, 0.3)] }];
+static LAWS: [Law; 1] = [Law::new("rotation", &[Parameter::signed("angle", "rad", 0.03, -0.3, 0.3)])
+    .certified_by(CertifiedKey::Tilt)
+    .seen_by("Put a spirit level (or the sensor, unloaded and turned by 180 degrees) on the plate.", 0.002)];
 
 impl Effect for PlateTilt {
     fn name(&self) -> &'static str {
@@ -32,13 +33,13 @@ impl Effect for PlateTilt {
     fn needs(&self) -> &'static [Need] {
         &[Need::Directions]
     }
-    fn change(&self, _: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, _: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
         if theta[0] != 0.0 {
-            unload(c, pass.direction, theta[0].tan());
+            unload(c, pass.direction.sign(), theta[0].tan());
             c.normal_force /= theta[0].cos();
         }
     }
-    fn read(&self, _: usize, theta: &[f64], _: &Operating, _: &Design, reading: &mut Reading) {
+    fn read(&self, _: usize, theta: &[f64], _: &Condition, _: &Design, reading: &mut Reading) {
         reading.gain *= theta[0].cos();
         reading.crosstalk += theta[0].sin();
     }

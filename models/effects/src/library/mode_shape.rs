@@ -1,37 +1,44 @@
 //! The plate's amplitude is not the same everywhere.
 
-use crate::prelude::*;
+use super::prelude::*;
 use std::f64::consts::PI;
 
 /// See the module.
 pub struct ModeShape;
 
+/// What sees it without friction.
+const CHECK: &str = "Scan the plate with a vibrometer along the stroke.";
+
 static LAWS: [Law; 4] = [
-    Law {
-        name: "standing wave",
-        parameters: &[
+    Law::new(
+        "standing wave",
+        &[
             Parameter::positive("depth", "1", 0.5, 1.0),
             Parameter::between("node_spacing", "m", 0.004, 0.03),
             Parameter::between("phase", "1", -0.25, 1.25),
         ],
-    },
-    Law {
-        name: "one antinode",
-        parameters: &[
+    )
+    .seen_by(CHECK, 0.03),
+    Law::new(
+        "one antinode",
+        &[
             Parameter::positive("fall_per_square", "1/m^2", 800.0, 4e4),
             Parameter::between("centre_over_stroke", "1", -1.0, 2.0),
         ],
-    },
-    Law { name: "gradient", parameters: &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)] },
+    )
+    .seen_by(CHECK, 0.03),
+    Law::new("gradient", &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)]).seen_by(CHECK, 0.03),
     // Flexural waves shorten as the root of the frequency.
-    Law {
-        name: "standing wave, shorter at higher frequency",
-        parameters: &[
+    Law::new(
+        "standing wave, shorter at higher frequency",
+        &[
             Parameter::positive("depth", "1", 0.5, 1.0),
             Parameter::between("node_spacing_at_reference", "m", 0.004, 0.03),
             Parameter::between("phase", "1", -0.25, 1.25),
         ],
-    },
+    )
+    .needs(&[Need::Frequencies])
+    .seen_by(CHECK, 0.03),
 ];
 
 impl Effect for ModeShape {
@@ -53,7 +60,7 @@ impl Effect for ModeShape {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Positions]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
         let x = pass.position_m;
         c.amplitude_pp *= match law {
             0 | 3 => {

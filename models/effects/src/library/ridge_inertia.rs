@@ -1,26 +1,26 @@
 //! The ridges have mass: they are thrown off and fly.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct RidgeInertia;
 
 // Beyond critical damping a ridge does not fly, it lags: that is loss in the skin, whatever the mass.
 static LAWS: [Law; 2] = [
-    Law {
-        name: "landing without rebound",
-        parameters: &[
+    Law::new(
+        "landing without rebound",
+        &[
             Parameter::positive("mass", "kg", 4e-6, 40e-6),
             Parameter::shape("damping_ratio", "1", 0.5, 0.7).at_most(1.0),
         ],
-    },
-    Law {
-        name: "rebounding",
-        parameters: &[
+    ),
+    Law::new(
+        "rebounding",
+        &[
             Parameter::positive("mass", "kg", 4e-6, 40e-6),
             Parameter::shape("damping_ratio", "1", 0.5, 0.7).at_most(1.0),
         ],
-    },
+    ),
 ];
 
 impl Effect for RidgeInertia {
@@ -39,15 +39,18 @@ impl Effect for RidgeInertia {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
+    fn interpolation_error(&self) -> f64 {
+        crate::contact::impact::STATED_ERROR
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         c.mass = theta[0];
         c.ridge_damping_ratio = theta[1];
         c.landing = law;
     }
     fn prepare(&self, law: usize, theta: &[f64]) {
-        crate::impact::prepare(law, theta[1]);
+        crate::contact::impact::prepare(law, theta[1]);
     }
 }

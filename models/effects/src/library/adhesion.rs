@@ -1,25 +1,22 @@
 //! Adhesion loads the contact beyond what the normal force does, and holds it until it is pulled off.
 
+use super::prelude::*;
 use crate::contact::Attraction;
-use crate::prelude::*;
 
 /// See the module.
 pub struct Adhesion;
 
 static LAWS: [Law; 4] = [
-    Law { name: "DMT", parameters: &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)] },
-    Law {
-        name: "constant shear on the touching time",
-        parameters: &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)],
-    },
-    Law {
-        name: "developing with the momentary load",
-        parameters: &[
+    Law::new("DMT", &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)]),
+    Law::new("constant shear on the touching time", &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)]),
+    Law::new(
+        "developing with the momentary load",
+        &[
             Parameter::positive("adhesive_force", "N", 0.06, 1.0),
             Parameter::shape("load_of_half_attraction", "N", 0.04, 1.0),
         ],
-    },
-    Law { name: "JKR", parameters: &[Parameter::positive("pull_off_force", "N", 0.015, 0.5)] },
+    ),
+    Law::new("JKR", &[Parameter::positive("pull_off_force", "N", 0.015, 0.5)]),
 ];
 
 impl Effect for Adhesion {
@@ -38,10 +35,13 @@ impl Effect for Adhesion {
     fn laws(&self) -> &'static [Law] {
         &LAWS
     }
+    fn near(&self) -> &'static [&'static str] {
+        &["normal_offset"]
+    }
     fn needs(&self) -> &'static [Need] {
         &[Need::Loads]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         if law == 0 {
             c.adhesion = theta[0];
         } else if law == 2 {

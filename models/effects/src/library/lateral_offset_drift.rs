@@ -1,35 +1,45 @@
 //! The lateral channel's zero is off, or wanders.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct LateralOffsetDrift;
 
+/// What sees it without friction.
+const CHECK: &str = "Lift the finger every few passes and read the lateral force.";
+
 static LAWS: [Law; 5] = [
-    Law { name: "constant", parameters: &[Parameter::signed("offset", "N", 0.01, -0.3, 0.3)] },
-    Law { name: "linear drift", parameters: &[Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4)] },
-    Law {
-        name: "settling",
-        parameters: &[
+    Law::new("constant", &[Parameter::signed("offset", "N", 0.01, -0.3, 0.3)])
+        .certified_by(CertifiedKey::LateralOffset)
+        .seen_by(CHECK, 0.0005),
+    Law::new("linear drift", &[Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4)])
+        .seen_by(CHECK, 0.0005),
+    Law::new(
+        "settling",
+        &[
             Parameter::signed("change", "N", 0.015, -0.4, 0.4),
             Parameter::shape("time_constant_over_duration", "1", 0.3, 0.8),
         ],
-    },
-    Law {
-        name: "offset with curved drift",
-        parameters: &[
+    )
+    .seen_by(CHECK, 0.0005),
+    Law::new(
+        "offset with curved drift",
+        &[
             Parameter::signed("offset", "N", 0.01, -0.3, 0.3),
             Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4),
             Parameter::signed("curvature_over_table", "N", 0.015, -0.4, 0.4),
         ],
-    },
-    Law {
-        name: "offset with temperature",
-        parameters: &[
+    )
+    .seen_by(CHECK, 0.0005),
+    Law::new(
+        "offset with temperature",
+        &[
             Parameter::signed("offset", "N", 0.01, -0.3, 0.3),
             Parameter::signed("per_kelvin", "N/K", 0.003, -0.1, 0.1),
         ],
-    },
+    )
+    .needs(&[Need::Temperatures])
+    .seen_by(CHECK, 0.0005),
 ];
 
 impl Effect for LateralOffsetDrift {
@@ -51,7 +61,7 @@ impl Effect for LateralOffsetDrift {
     fn needs(&self) -> &'static [Need] {
         &[Need::Directions]
     }
-    fn read(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, reading: &mut Reading) {
+    fn read(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, reading: &mut Reading) {
         let s = pass.time_s / design.duration_s.max(1e-9);
         reading.offset_n += match law {
             0 => theta[0],

@@ -1,25 +1,22 @@
 //! The friction coefficient depends on the sliding speed.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct RateDependentFriction;
 
 static LAWS: [Law; 4] = [
-    Law { name: "power", parameters: &[Parameter::signed("exponent", "1", 0.12, -0.6, 0.8)] },
-    Law {
-        name: "Stribeck",
-        parameters: &[
+    Law::new("power", &[Parameter::signed("exponent", "1", 0.12, -0.6, 0.8)]),
+    Law::new(
+        "Stribeck",
+        &[
             Parameter::signed("static_excess", "1", 0.4, -0.8, 3.0),
             Parameter::shape("stribeck_speed", "m/s", 0.025, 0.8),
         ],
-    },
-    Law { name: "linear", parameters: &[Parameter::signed("slope", "s/m", 4.0, -4.0, 60.0)] },
+    ),
+    Law::new("linear", &[Parameter::signed("slope", "s/m", 4.0, -4.0, 60.0)]),
     // Thermally activated sliding; the first term of rate-and-state friction.
-    Law {
-        name: "logarithmic",
-        parameters: &[Parameter::signed("slope_per_log_speed", "1", 0.12, -0.4, 0.6)],
-    },
+    Law::new("logarithmic", &[Parameter::signed("slope_per_log_speed", "1", 0.12, -0.4, 0.6)]),
 ];
 
 impl Effect for RateDependentFriction {
@@ -41,7 +38,7 @@ impl Effect for RateDependentFriction {
     fn needs(&self) -> &'static [Need] {
         &[Need::Speeds]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
         let reference = design.reference_speed_m_s;
         c.mu0 *= match law {
             0 => (c.speed / reference).powf(theta[0]),

@@ -1,16 +1,20 @@
 //! The plate does not move by the amplitude that the drive was calibrated to.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct AmplitudeMiscalibration;
 
+/// What sees it without friction.
+const CHECK: &str = "Measure the plate with a vibrometer at three drives.";
+
 static LAWS: [Law; 2] = [
-    Law { name: "gain", parameters: &[Parameter::signed("log_gain", "1", 0.3, -1.5, 1.5)] },
-    Law {
-        name: "dead zone",
-        parameters: &[Parameter::signed("missing_amplitude", "m", 0.2e-6, -1e-6, 1e-6)],
-    },
+    Law::new("gain", &[Parameter::signed("log_gain", "1", 0.3, -1.5, 1.5)])
+        .certified_by(CertifiedKey::AmplitudeGain)
+        .acts_as([0.0, 1.0, 0.0])
+        .seen_by(CHECK, 0.02),
+    Law::new("dead zone", &[Parameter::signed("missing_amplitude", "m", 0.2e-6, -1e-6, 1e-6)])
+        .seen_by(CHECK, 0.02),
 ];
 
 impl Effect for AmplitudeMiscalibration {
@@ -32,7 +36,7 @@ impl Effect for AmplitudeMiscalibration {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         if c.amplitude_pp <= 0.0 {
             return;
         }

@@ -1,24 +1,21 @@
 //! Bonds need time to form after each touch-down.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct ContactAgeing;
 
 static LAWS: [Law; 4] = [
-    Law { name: "first order", parameters: &[Parameter::positive("bonding_time", "s", 15e-6, 1e-3)] },
-    Law { name: "stretched (root)", parameters: &[Parameter::positive("bonding_time", "s", 15e-6, 1e-3)] },
-    Law {
-        name: "by mean contact time",
-        parameters: &[Parameter::positive("bonding_time", "s", 10e-6, 1e-3)],
-    },
-    Law {
-        name: "a share at once, the rest by mean contact time",
-        parameters: &[
+    Law::new("first order", &[Parameter::positive("bonding_time", "s", 15e-6, 1e-3)]),
+    Law::new("stretched (root)", &[Parameter::positive("bonding_time", "s", 15e-6, 1e-3)]),
+    Law::new("by mean contact time", &[Parameter::positive("bonding_time", "s", 10e-6, 1e-3)]),
+    Law::new(
+        "a share at once, the rest by mean contact time",
+        &[
             Parameter::positive("bonding_time", "s", 15e-6, 1e-3),
             Parameter::between("share_that_waits", "1", 0.1, 1.0),
         ],
-    },
+    ),
 ];
 
 impl Effect for ContactAgeing {
@@ -40,7 +37,7 @@ impl Effect for ContactAgeing {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         if law < 2 {
             c.bonding_time = theta[0];
             c.bonding_exponent = if law == 0 { 1.0 } else { 0.5 };

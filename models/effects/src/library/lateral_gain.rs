@@ -1,12 +1,14 @@
 //! The lateral channel's sensitivity is wrong.
 
-use crate::prelude::*;
+use super::prelude::*;
 
 /// See the module.
 pub struct LateralGain;
 
-static LAWS: [Law; 1] =
-    [Law { name: "gain", parameters: &[Parameter::signed("log_gain", "1", 0.1, -1.0, 1.0)] }];
+static LAWS: [Law; 1] = [Law::new("gain", &[Parameter::signed("log_gain", "1", 0.1, -1.0, 1.0)])
+    .certified_by(CertifiedKey::LateralGain)
+    .acts_as([1.0, 0.0, 1.0])
+    .seen_by("Hang a dead weight on the lateral axis of the force sensor.", 0.005)];
 
 impl Effect for LateralGain {
     fn name(&self) -> &'static str {
@@ -27,7 +29,7 @@ impl Effect for LateralGain {
     fn needs(&self) -> &'static [Need] {
         &[Need::OutsideStandard]
     }
-    fn read(&self, _: usize, theta: &[f64], _: &Operating, _: &Design, reading: &mut Reading) {
+    fn read(&self, _: usize, theta: &[f64], _: &Condition, _: &Design, reading: &mut Reading) {
         reading.gain *= theta[0].exp();
     }
 }
