@@ -1,17 +1,15 @@
 //! The verdict: everything the diagnosis says about one table, in the shape of the contract.
 
-use crate::attribute::{Decision, Verdict, decide};
 use crate::data::{Rig, Table};
-use crate::evidence::Explained;
-use crate::fit::NUISANCES;
-use crate::held_out::{Gap, gap};
+use crate::decision::{Decision, Verdict, decide};
 use crate::hypotheses::{Fitted, Options, fit_all};
-use crate::intervals::{Estimate, Shape, estimates};
+use crate::intervals::{Estimate, curvature, estimates};
 use crate::locate::{Region, ledger, regions};
 use crate::next::{Experiment, experiments};
 use crate::noise::PureError;
 use crate::predict::{Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
+use crate::shrinkage::{Gap, gap};
 use effects::imitated;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -117,6 +115,9 @@ pub struct Diagnosis {
     rig: Rig,
 }
 
+/// Probability from which a pair is listed.
+const LISTED: f64 = 1e-6;
+
 /// Diagnoses a table.
 pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> Diagnosis {
     let fitted = fit_all(table, rig, options);
@@ -218,9 +219,9 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
             format!("This table cannot tell {} apart; {closed}.", names.join(", "))
         }
         Verdict::Unknown => {
-            let known = fitted.strangers.first().filter(|s| {
+            let known = fitted.unlisted.first().filter(|s| {
                 let leading = &fitted.candidates[leader];
-                s.log_evidence > fitted.wildcard.log_evidence.max(leading.log_evidence)
+                s.log_evidence > fitted.discrepancy.log_evidence.max(leading.log_evidence)
             });
             let hint = known.map_or_else(String::new, |s| {
                 format!(" What comes nearest is not in the library: {}.", s.names().join("+"))
@@ -242,7 +243,7 @@ fn hypotheses(
         .candidates
         .iter()
         .enumerate()
-        .filter(|(i, c)| decision.probabilities[*i] > 1e-6 || c.effects.len() == 1)
+        .filter(|(i, c)| decision.probabilities[*i] > LISTED || c.effects.len() == 1)
         .map(|(i, c)| {
             let own = if decision.class.contains(&i) {
                 let mut class = vec![label(fitted, i)];
@@ -254,7 +255,7 @@ fn hypotheses(
             let parameters = if i == leader && parameters.is_some() {
                 parameters.map(|p| p.concat()).unwrap_or_default()
             } else {
-                laplace(&c.best)
+                curvature(&c.best)
             };
             Hypothesis {
                 effects: c.names().iter().map(|n| (*n).to_string()).collect(),
@@ -282,28 +283,6 @@ fn hypotheses(
     }
     list.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.effects.cmp(&b.effects)));
     list
-}
-
-/// Intervals from the curvature at the optimum, for hypotheses that do not lead.
-fn laplace(e: &Explained) -> Vec<Estimate> {
-    let mut at = NUISANCES;
-    e.members
-        .iter()
-        .flat_map(|m| m.parameters())
-        .map(|p| {
-            let u = e.u[at];
-            let reach = 1.96 * e.covariance[(at, at)].max(0.0).sqrt();
-            at += 1;
-            let (low, high) = p.coordinate_bounds();
-            Estimate {
-                name: p.name,
-                value: p.value(u),
-                ci95: [p.value((u - reach).max(low)), p.value((u + reach).min(high))],
-                unit: p.unit,
-                shape: if u - reach < low || u + reach > high { Shape::OneSided } else { Shape::Bounded },
-            }
-        })
-        .collect()
 }
 
 impl Diagnosis {

@@ -6,7 +6,7 @@
 pub mod further;
 pub mod same_form;
 
-use diagnosis::attribute::Verdict;
+use diagnosis::Verdict;
 use diagnosis::data::{Rig, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;

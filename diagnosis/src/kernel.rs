@@ -22,6 +22,10 @@ pub struct Coordinates {
     sd: [f64; COUNT],
 }
 
+/// Deviations of a covariate beyond which a place counts as the edge of the design.
+const EDGE_SD: f64 = 4.0;
+/// Deviation of the logarithm of a regulated load below which it is noise.
+const REGULATED_LOAD_SD: f64 = 0.08;
 /// Number of covariates.
 const COUNT: usize = 8;
 const TIME: usize = 5;
@@ -54,7 +58,7 @@ impl Coordinates {
             sd[k] = (rows.iter().map(|r| (r[k] - mean[k]).powi(2)).sum::<f64>() / n).sqrt();
         }
         // Load is regulated: below a few per cent it carries no information, only noise.
-        if sd[3] < 0.08 {
+        if sd[3] < REGULATED_LOAD_SD {
             sd[3] = 0.0;
         }
         // Temperature stands in for time only where it was measured; as a covariate it adds nothing smooth.
@@ -72,8 +76,8 @@ impl Coordinates {
                 _ => lengths.condition,
             };
             if self.sd[k] > 1e-12 && length.is_finite() {
-                // What lies far outside the design is held at its edge.
-                ((r[k] - self.mean[k]) / self.sd[k]).clamp(-4.0, 4.0) / length
+                // What lies far outside the design counts as its edge.
+                ((r[k] - self.mean[k]) / self.sd[k]).clamp(-EDGE_SD, EDGE_SD) / length
             } else {
                 0.0
             }
