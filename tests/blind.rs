@@ -1,6 +1,6 @@
 //! The diagnosis on sealed sets: few, fixed seeds; the full figures come from `muprime blind`.
 use diagnosis::Verdict;
-use diagnosis::data::{Rig, Table};
+use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use models::record::Pass;
@@ -9,7 +9,7 @@ use rig::blind::score;
 use sim::sealed::{Ask, Stratum, generate};
 use std::collections::BTreeSet;
 
-fn rig_of(text: &str) -> Rig {
+fn rig_of(text: &str) -> RigFile {
     toml::from_str(text).expect("rig.toml of a sealed set")
 }
 

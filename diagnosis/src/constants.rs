@@ -82,6 +82,8 @@ macro_rules! constants {
     };
 }
 
+/// A covariate that a kernel does not see.
+const FAR: f64 = f64::INFINITY;
 /// Sources that several constants share.
 const JUDGEMENT: &str = "judgement: chosen without a measurement";
 const NUMERICAL: &str = "numerical: effort of a search";
@@ -111,9 +113,10 @@ constants! {
     form_rank: usize = 40, "Most pivots of the departure's kernel.", "numerical: incomplete Cholesky (Fine & Scheinberg 2001)";
     kernel_rest: f64 = 0.02, "Share of variance that a kernel's pivots may leave at a pass.", "numerical: incomplete Cholesky";
 
-    discrepancy_lengths: [f64; 4] = [1.2, 1.5, 2.5, 4.0], "Correlation lengths of the open set over conditions, in standard deviations of each covariate.", JUDGEMENT;
-    discrepancy_time_lengths: [f64; 4] = [0.8, 1.5, 2.5, 4.0], "The same over time.", JUDGEMENT;
-    discrepancy_position_lengths: [f64; 4] = [0.8, f64::INFINITY, f64::INFINITY, 0.3], "The same along the plate; infinite leaves the position out.", JUDGEMENT;
+    discrepancy_lengths: [f64; 6] = [1.2, 1.5, 2.5, 4.0, 2.5, 4.0], "Correlation lengths of the open set over conditions, in standard deviations of each covariate.", JUDGEMENT;
+    discrepancy_time_lengths: [f64; 6] = [0.8, 1.5, 2.5, 4.0, 2.5, 4.0], "The same over time.", JUDGEMENT;
+    discrepancy_position_lengths: [f64; 6] = [0.8, FAR, FAR, 0.3, FAR, FAR], "The same along the plate; infinite leaves the position out.", JUDGEMENT;
+    discrepancy_climate_lengths: [f64; 6] = [FAR, FAR, FAR, FAR, 1.2, 0.7], "The same over temperature and humidity; tried only where these change by themselves.", JUDGEMENT;
     discrepancy_rank: usize = 56, "Most pivots of the open set's kernel.", "numerical: incomplete Cholesky";
     discrepancy_even: [f64; 6] = [0.0, 0.015, 0.05, 0.15, 0.45, 1.3], "Scales of the open set's part that turns with the direction, in units of friction.", "judgement: a factor of three from the noise to more than all friction";
     discrepancy_odd: [f64; 4] = [0.0, 0.012, 0.06, 0.4], "Scales of its part that does not turn with the direction.", "judgement: as above";

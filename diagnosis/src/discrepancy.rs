@@ -9,19 +9,22 @@ use crate::fit::Problem;
 use crate::gaussian::{Covariance, log_sum_exp};
 use crate::kernel::{Coordinates, Kernel, Lengths};
 use crate::layout::NUISANCES;
-use effects::Operating;
+use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// The smoothnesses that are tried: rough; as smooth as the form uncertainty of an effect, so that the open set can follow
-/// what that can; smoother yet, so that a cause that bends little is as cheap as an effect that imitates it; and a spot
-/// of the plate, alike at all conditions.
-pub fn lengths(k: &Constants) -> [Lengths; 4] {
-    std::array::from_fn(|i| Lengths {
+/// what that can; smoother yet, so that a cause that bends little is as cheap as an effect that imitates it; a spot of the
+/// plate, alike at all conditions; and two that go with temperature and humidity, where these change by themselves.
+pub fn lengths(k: &Constants, table: &Table) -> Vec<Lengths> {
+    let all = (0..k.discrepancy_lengths.len()).map(|i| Lengths {
         condition: k.discrepancy_lengths[i],
         time: k.discrepancy_time_lengths[i],
         position: k.discrepancy_position_lengths[i],
-    })
+        climate: k.discrepancy_climate_lengths[i],
+    });
+    let sees = Coordinates::of(table).sees_climate();
+    all.filter(|l| sees || !l.climate.is_finite()).collect()
 }
 
 /// Step of a difference in a nuisance's coordinate.
@@ -52,7 +55,7 @@ fn scale(baseline: f64, full: f64) -> f64 {
 fn rows(
     problem: &Problem,
     center: &[f64],
-    passes: &[Operating],
+    passes: &[Condition],
     coordinates: &Coordinates,
     (kernel, lengths): (&Kernel, &Lengths),
     parts: (f64, f64),
@@ -66,7 +69,7 @@ fn rows(
         let size = scale(baseline[i], mu0 * p.normal_force_n);
         let basis = kernel.basis(&coordinates.place(p, problem.design.largest_amplitude_m, lengths));
         for (j, b) in basis.iter().enumerate() {
-            phi[(i, j)] = parts.0 * p.direction * size * b;
+            phi[(i, j)] = parts.0 * p.direction.sign() * size * b;
             phi[(i, r + j)] = parts.1 * size * b;
         }
         sizes.push(size);
@@ -195,7 +198,7 @@ impl Discrepancy {
 
     /// Expected lateral forces at other conditions (N), the rows of the smooth part there, and the sizes on which a
     /// departure is measured (N).
-    fn expected(&self, problem: &Problem, passes: &[Operating]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
+    fn expected(&self, problem: &Problem, passes: &[Condition]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
         let parts = (self.friction, self.odd);
         let kernel = (&self.kernel, &self.lengths);
         let (baseline, phi, sizes) = rows(problem, &self.center, passes, &self.coordinates, kernel, parts);
@@ -206,7 +209,7 @@ impl Discrepancy {
 
     /// Predicted lateral forces at other conditions, their covariance without scatter, and the variance of the white
     /// excess there (N, N^2, N^2).
-    pub fn belief(&self, problem: &Problem, passes: &[Operating]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
+    pub fn belief(&self, problem: &Problem, passes: &[Condition]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
         let (mean, phi, sizes) = self.expected(problem, passes);
         let white = sizes.iter().map(|s| (self.white * s).powi(2)).collect();
         (mean, self.covariance.posterior_covariance(&phi), white)
@@ -214,7 +217,7 @@ impl Discrepancy {
 
     /// Predicted lateral force and its standard deviation (white excess included, pass scatter not) at other
     /// conditions, N.
-    pub fn predict(&self, problem: &Problem, passes: &[Operating]) -> (Vec<f64>, Vec<f64>) {
+    pub fn predict(&self, problem: &Problem, passes: &[Condition]) -> (Vec<f64>, Vec<f64>) {
         let (mean, phi, sizes) = self.expected(problem, passes);
         let smooth = |i: usize| self.covariance.posterior_variance(&phi.row(i).transpose()).max(0.0);
         let sd = (0..passes.len()).map(|i| (smooth(i) + (self.white * sizes[i]).powi(2)).sqrt()).collect();

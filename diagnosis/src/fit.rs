@@ -1,9 +1,11 @@
 //! The regression problem: one hypothesis on a table, in coordinates that are standard normal a priori.
 
 use crate::constants::Constants;
-use crate::data::Rig;
+use crate::data::RigFile;
 use crate::layout::{Layout, NUISANCES};
-use effects::{Active, Baseline, Design, Law, Operating, Parameter, Place, known, library};
+use effects::{Active, Baseline, Design, Law, Parameter, Place, known, library};
+use models::condition::Condition;
+use models::rig_file::CertifiedKey;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -42,6 +44,10 @@ impl Member {
     pub fn departs_by(&self) -> f64 {
         known()[self.effect].departs_by()
     }
+    /// The certificate that bounds its size, where there is such a kind.
+    pub fn certified_by(&self) -> Option<CertifiedKey> {
+        self.form().certified_by
+    }
     /// Where the effect sits.
     pub fn place(&self) -> Place {
         known()[self.effect].place()
@@ -52,7 +58,7 @@ impl Member {
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// Conditions.
-    pub passes: Vec<Operating>,
+    pub passes: Vec<Condition>,
     /// Measured lateral forces, N.
     pub lateral: Vec<f64>,
     /// Variances of the lateral forces, N^2.
@@ -71,7 +77,7 @@ pub struct Problem {
 
 impl Problem {
     /// The problem of a whole table.
-    pub fn new(table: &crate::data::Table, rig: &Rig, constants: &Arc<Constants>) -> Self {
+    pub fn new(table: &crate::data::Table, rig: &RigFile, constants: &Arc<Constants>) -> Self {
         let mu0 = table.still_coefficient();
         // Without still passes the largest friction seen is the best first word on mu0.
         let guess = mu0.unwrap_or_else(|| {
@@ -79,7 +85,7 @@ impl Problem {
                 .passes
                 .iter()
                 .zip(&table.lateral)
-                .map(|(p, l)| p.direction * l / p.normal_force_n)
+                .map(|(p, l)| p.direction.sign() * l / p.normal_force_n)
                 .fold(LEAST_MU0, f64::max)
         });
         let sd = rig.finger.stiffness_relative_sd.max(constants.stiffness_sd_floor);
@@ -87,7 +93,7 @@ impl Problem {
         for (index, effect) in library().iter().enumerate() {
             for (law, form) in effect.laws().iter().enumerate() {
                 if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) =
-                    (form.certified_by.and_then(|key| rig.certified_sd(key)), form.parameters[0].prior)
+                    (form.certified_by.and_then(|key| rig.calibration.sd(key)), form.parameters[0].prior)
                 {
                     certified.push((Member { effect: index, law }, (sd / wide).min(1.0)));
                 }
@@ -195,7 +201,7 @@ impl Problem {
     }
 
     /// Predicted lateral forces at other conditions, N.
-    pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Operating]) -> DVector<f64> {
+    pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Condition]) -> DVector<f64> {
         let baseline = self.baseline(u);
         let thetas = Self::thetas(members, u);
         // Effects act in the library's order, whatever the order of the hypothesis.

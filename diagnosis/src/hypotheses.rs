@@ -1,7 +1,7 @@
 //! The hypotheses: no gap, each effect, pairs, and the open set; fitted, with their probabilities.
 
 use crate::constants::Constants;
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::discrepancy::Discrepancy;
 use crate::evidence::{Posterior, averaged_over_form};
 use crate::fit::Problem;
@@ -98,14 +98,14 @@ pub struct Fitted {
 
 /// Lengths of the form uncertainty in standard deviations of each covariate; a form does not depend on the place.
 pub fn form_lengths(k: &Constants) -> Lengths {
-    Lengths { condition: k.form_length, time: k.form_length, position: f64::INFINITY }
+    Lengths { condition: k.form_length, time: k.form_length, position: f64::INFINITY, climate: f64::INFINITY }
 }
 
 /// Rounds of the baseline's fit, and of its fit to what the gap looks like at large.
 const ROUNDS: [usize; 2] = [15, 10];
 
 /// Fits every hypothesis to a table.
-pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
+pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
     let k = &*options.constants;
     let mut problem = Problem::new(table, rig, &options.constants);
     let (discrepancy, pure) = settle(table, rig, &mut problem);

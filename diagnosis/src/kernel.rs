@@ -1,88 +1,104 @@
 //! Smooth functions over the operating space: standardised covariates and a low-rank kernel on them.
 
 use crate::data::Table;
-use effects::Operating;
-use nalgebra::DMatrix;
+use models::condition::Condition;
+use models::covariate::{Role, SMOOTH};
+use nalgebra::{DMatrix, DVector};
 
-/// Which covariates a kernel sees, each with its length in standard deviations.
+/// Which covariates a kernel sees, each kind with its length in standard deviations; an infinite one leaves it out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lengths {
-    /// Amplitude, frequency, speed, load, pressure.
+    /// Settings: amplitude, frequency, speed, load, pressure.
     pub condition: f64,
     /// Time.
     pub time: f64,
-    /// Position along the plate; infinite leaves it out.
+    /// Position along the plate.
     pub position: f64,
+    /// Temperature and humidity.
+    pub climate: f64,
+}
+
+impl Lengths {
+    fn of(&self, role: Role) -> f64 {
+        match role {
+            Role::Setting => self.condition,
+            Role::Time => self.time,
+            Role::Place => self.position,
+            Role::Climate => self.climate,
+        }
+    }
 }
 
 /// Standardised covariates of passes.
 #[derive(Debug, Clone)]
 pub struct Coordinates {
     mean: [f64; COUNT],
+    /// Zero where the table says nothing of a covariate.
     sd: [f64; COUNT],
 }
 
 /// Deviations of a covariate beyond which a place counts as the edge of the design.
 const EDGE_SD: f64 = 4.0;
-/// Deviation of the logarithm of a regulated load below which it is noise.
-const REGULATED_LOAD_SD: f64 = 0.08;
 /// Number of covariates.
-const COUNT: usize = 8;
-const TIME: usize = 5;
-const POSITION: usize = 6;
-
-fn raw(p: &Operating, largest_amplitude: f64) -> [f64; COUNT] {
-    let scale = (0.2 * largest_amplitude).max(1e-9);
-    [
-        (1.0 + p.amplitude_pp_m / scale).ln(),
-        p.frequency_hz.ln(),
-        p.speed_m_s.ln(),
-        p.normal_force_n.ln(),
-        p.ambient_pressure_pa.map_or(0.0, |v| v / 101_325.0),
-        p.time_s,
-        p.position_m,
-        p.temperature_c.unwrap_or(0.0),
-    ]
-}
+const COUNT: usize = SMOOTH.len();
+/// Temperature or humidity of which time explains more than this share of the deviation is time by another name.
+const OF_ITS_OWN: f64 = 0.5;
 
 impl Coordinates {
-    /// Mean and deviation of each covariate over the table.
+    /// Mean and deviation of each covariate over the table. One that some passes lack is left out.
     pub fn of(table: &Table) -> Self {
         let n = table.len() as f64;
-        let rows: Vec<[f64; COUNT]> =
-            table.passes.iter().map(|p| raw(p, table.design.largest_amplitude_m)).collect();
+        let largest = table.design.largest_amplitude_m;
         let mut mean = [0.0; COUNT];
         let mut sd = [0.0; COUNT];
-        for k in 0..COUNT {
-            mean[k] = rows.iter().map(|r| r[k]).sum::<f64>() / n;
-            sd[k] = (rows.iter().map(|r| (r[k] - mean[k]).powi(2)).sum::<f64>() / n).sqrt();
+        for (k, c) in SMOOTH.iter().enumerate() {
+            let all: Option<Vec<f64>> =
+                table.passes.iter().map(|p| c.of(p).map(|v| c.scaled(v, largest))).collect();
+            let Some(values) = all else { continue };
+            mean[k] = values.iter().sum::<f64>() / n;
+            sd[k] = (values.iter().map(|v| (v - mean[k]).powi(2)).sum::<f64>() / n).sqrt();
+            let own = match c.role {
+                Role::Climate => without_time(table, &values),
+                _ => sd[k],
+            };
+            if own < c.least_spread || own < OF_ITS_OWN * sd[k] {
+                sd[k] = 0.0;
+            }
         }
-        // Load is regulated: below a few per cent it carries no information, only noise.
-        if sd[3] < REGULATED_LOAD_SD {
-            sd[3] = 0.0;
-        }
-        // Temperature stands in for time only where it was measured; as a covariate it adds nothing smooth.
-        sd[7] = 0.0;
         Self { mean, sd }
     }
 
-    /// Standardised covariates divided by the lengths.
-    pub fn place(&self, p: &Operating, largest_amplitude: f64, lengths: &Lengths) -> [f64; COUNT] {
-        let r = raw(p, largest_amplitude);
+    /// Whether temperature or humidity changes in a way that time does not tell.
+    pub fn sees_climate(&self) -> bool {
+        SMOOTH.iter().zip(&self.sd).any(|(c, sd)| c.role == Role::Climate && *sd > 0.0)
+    }
+
+    /// Standardised covariates divided by the lengths. What a condition does not say is taken as the table's mean.
+    pub fn place(&self, p: &Condition, largest_amplitude: f64, lengths: &Lengths) -> [f64; COUNT] {
         std::array::from_fn(|k| {
-            let length = match k {
-                TIME => lengths.time,
-                POSITION => lengths.position,
-                _ => lengths.condition,
-            };
-            if self.sd[k] > 1e-12 && length.is_finite() {
-                // What lies far outside the design counts as its edge.
-                ((r[k] - self.mean[k]) / self.sd[k]).clamp(-EDGE_SD, EDGE_SD) / length
-            } else {
-                0.0
+            let c = SMOOTH[k];
+            let length = lengths.of(c.role);
+            match c.of(p) {
+                Some(value) if self.sd[k] > 1e-12 && length.is_finite() => {
+                    // What lies far outside the design counts as its edge.
+                    let place = (c.scaled(value, largest_amplitude) - self.mean[k]) / self.sd[k];
+                    place.clamp(-EDGE_SD, EDGE_SD) / length
+                }
+                _ => 0.0,
             }
         })
     }
+}
+
+/// Standard deviation of what a cubic in time leaves of the values.
+fn without_time(table: &Table, values: &[f64]) -> f64 {
+    let n = values.len();
+    let half = (0.5 * table.design.duration_s).max(1e-9);
+    let powers = DMatrix::from_fn(n, 4, |i, j| (table.passes[i].time_s / half - 1.0).powi(j as i32));
+    let measured = DVector::from_column_slice(values);
+    let fitted = powers.clone().svd(true, true).solve(&measured, 1e-9);
+    let left = fitted.map_or_else(|_| measured.clone(), |c| &measured - &powers * c);
+    (left.norm_squared() / n as f64).sqrt()
 }
 
 /// A squared-exponential kernel, represented by pivots chosen by incomplete Cholesky.

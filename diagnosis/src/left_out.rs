@@ -73,8 +73,8 @@ pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
             }
         };
     let all: Vec<usize> = (0..n).collect();
-    let vibrating: Vec<usize> = (0..n).filter(|&i| p[i].amplitude_pp_m > 0.0).collect();
-    ends("amplitude", &|i| p[i].amplitude_pp_m, &vibrating, &mut list);
+    let vibrating: Vec<usize> = (0..n).filter(|&i| p[i].amplitude.metres() > 0.0).collect();
+    ends("amplitude", &|i| p[i].amplitude.metres(), &vibrating, &mut list);
     ends("speed", &|i| p[i].speed_m_s, &all, &mut list);
     ends("load", &|i| p[i].normal_force_n, &all, &mut list);
     let mut frequencies: Vec<f64> = p.iter().map(|q| q.frequency_hz).collect();
@@ -271,7 +271,7 @@ mod tests {
         let mut problem = Problem::new(&table, &rig, &Default::default());
         crate::noise::settle(&table, &rig, &mut problem);
         let still: Vec<usize> =
-            (0..problem.len()).filter(|&i| problem.passes[i].amplitude_pp_m == 0.0).collect();
+            (0..problem.len()).filter(|&i| problem.passes[i].amplitude.metres() == 0.0).collect();
         let nominal = problem.jacobian(&[], &[0.0; 3], &problem.predict(&[], &[0.0; 3]));
         let telling = nominal.column(1).iamax();
         let (rest, out) = (problem.select(&still), problem.select(&[telling]));

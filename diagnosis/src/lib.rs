@@ -22,7 +22,7 @@
 //!
 //! ```
 //! use models::record::read_passes;
-//! use muprime_diagnosis::{Verdict, data::{Rig, Table}, hypotheses::Options, verdict::diagnose};
+//! use muprime_diagnosis::{Verdict, data::{RigFile, Table}, hypotheses::Options, verdict::diagnose};
 //!
 //! // Twelve passes of a plate that stands still: friction of 0.5 N/N in both directions, repeatable to half a per cent.
 //! let mut csv = String::from("point,time_s,amplitude_pp_m,frequency_hz,speed_m_s,direction,position_m,normal_force_n,lateral_force_n\n");
@@ -31,7 +31,7 @@
 //!     let force = 0.5 * load * direction * (1.0 + 0.005 * [1.0, -1.0, -1.0, 1.0, 0.0][i % 5]);
 //!     csv += &format!("{i},{},0,27500,0.02,{direction},0.01,{load},{force}\n", 5 * i);
 //! }
-//! let rig = Rig { finger: models::finger::Finger::paper(), noise: Default::default(), calibration: Default::default() };
+//! let rig = RigFile { finger: models::finger::Finger::paper(), noise: Default::default(), calibration: Default::default() };
 //! let table = Table::measured(&read_passes(csv.as_bytes())?)?;
 //! let diagnosis = diagnose(&table, &rig, &Options::default(), String::new());
 //! assert_eq!(diagnosis.report.verdict, Verdict::NoGap);

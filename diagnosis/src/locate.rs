@@ -2,12 +2,15 @@
 
 mod partition;
 
-use crate::data::Rig;
+use crate::data::RigFile;
 use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::hypotheses::Fitted;
 use crate::predict::{Forecast, Model, forecast};
-use effects::{Operating, Place, library};
+use effects::{Place, library};
+use models::condition::Condition;
+use models::covariate;
+use models::quantity::PeakToPeak;
 use partition::{cuts, named_parts, parts};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -42,37 +45,6 @@ pub fn ledger(fitted: &Fitted, probabilities: &[f64], unknown: f64) -> BTreeMap<
     map
 }
 
-type Covariate = (&'static str, fn(&Operating) -> f64);
-
-fn covariates() -> [Covariate; 9] {
-    [
-        ("amplitude_pp_m", |p| p.amplitude_pp_m),
-        ("speed_m_s", |p| p.speed_m_s),
-        ("normal_force_n", |p| p.normal_force_n),
-        ("frequency_hz", |p| p.frequency_hz),
-        ("direction", |p| p.direction),
-        ("position_m", |p| p.position_m),
-        ("time_s", |p| p.time_s),
-        ("ambient_pressure_pa", |p| p.ambient_pressure_pa.unwrap_or(f64::NAN)),
-        ("temperature_c", |p| p.temperature_c.unwrap_or(f64::NAN)),
-    ]
-}
-
-/// A covariate in words, with the scale and unit in which it is said.
-fn words_for(name: &str) -> (&str, f64, &str) {
-    match name {
-        "amplitude_pp_m" => ("amplitude", 1e6, "um pp"),
-        "speed_m_s" => ("speed", 1e3, "mm/s"),
-        "normal_force_n" => ("normal force", 1.0, "N"),
-        "frequency_hz" => ("frequency", 1e-3, "kHz"),
-        "position_m" => ("position", 1e3, "mm"),
-        "time_s" => ("time", 1.0, "s"),
-        "ambient_pressure_pa" => ("pressure", 1e-3, "kPa"),
-        "temperature_c" => ("temperature", 1.0, "degrees C"),
-        other => (other, 1.0, ""),
-    }
-}
-
 /// Conditions at which the verdict's model is asked for its gap.
 const ASKED: usize = 10_000;
 /// Expected number of passes that stand out from which there is a region.
@@ -84,7 +56,7 @@ const LEAST_PASSES: f64 = 3.0;
 /// passes alone would end where the next pass happens to be. A condition counts by its probability of standing out. The
 /// space is cut into parts, each time where that probability differs most; those parts are named that together have
 /// the largest expected F1.
-pub fn regions(fitted: &Fitted, rig: &Rig, model: &(Model, Problem, Posterior)) -> Vec<Region> {
+pub fn regions(fitted: &Fitted, rig: &RigFile, model: &(Model, Problem, Posterior)) -> Vec<Region> {
     let problem = &fitted.problem;
     let n = problem.len();
     let mut places = problem.passes.clone();
@@ -133,26 +105,26 @@ fn stands_out(f: &Forecast, deviations: f64) -> f64 {
 
 fn region(
     bounds: &BTreeMap<usize, [f64; 2]>,
-    passes: &[Operating],
+    passes: &[Condition],
     share: f64,
     p_value: Option<f64>,
 ) -> Region {
     let mut named = BTreeMap::new();
     let mut words = Vec::new();
     for (k, b) in bounds {
-        let (name, value) = covariates()[*k];
+        let covariate = covariate::TOLD[*k];
         // An open side ends where the table does.
         let (low, high) = passes
             .iter()
-            .map(value)
+            .filter_map(|p| covariate.of(p))
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, c), v| (a.min(v), c.max(v)));
         let slack = 0.02 * (high - low);
         let low = if low >= 0.0 { (low - slack).max(0.0) } else { low - slack };
         let high = high + slack;
         let low = if b[0].is_finite() { b[0] } else { low };
         let high = if b[1].is_finite() { b[1] } else { high };
-        named.insert(name, [low, high]);
-        let (word, scale, unit) = words_for(name);
+        named.insert(covariate.name, [low, high]);
+        let (word, (scale, unit)) = (covariate.words, covariate.shown);
         let (low, high) = (low * scale, high * scale);
         words.push(match (b[0].is_finite(), b[1].is_finite()) {
             (true, true) => format!("{word} {low:.3} to {high:.3} {unit}"),
@@ -177,17 +149,17 @@ fn region(
 
 /// Conditions of the same design: what can be set is drawn independently, from the table's levels or from between
 /// two neighbouring ones; what comes together (time and temperature) stays together.
-fn conditions_between(passes: &[Operating], count: usize) -> Vec<Operating> {
+fn conditions_between(passes: &[Condition], count: usize) -> Vec<Condition> {
     let mut state = 0x5DEE_CE66_D2B7_4F1D_u64;
     let mut uniform = || (crate::shrinkage::split_mix(&mut state) >> 11) as f64 / (1u64 << 53) as f64;
-    let levels = |value: fn(&Operating) -> f64| {
+    let levels = |value: fn(&Condition) -> f64| {
         let mut list: Vec<f64> = passes.iter().map(value).filter(|v| *v > 0.0).collect();
         list.sort_by(f64::total_cmp);
         list.dedup_by(|a, b| *a <= *b * 1.02);
         list
     };
     let (amplitudes, speeds, loads) =
-        (levels(|p| p.amplitude_pp_m), levels(|p| p.speed_m_s), levels(|p| p.normal_force_n));
+        (levels(|p| p.amplitude.metres()), levels(|p| p.speed_m_s), levels(|p| p.normal_force_n));
     let between = |value: f64, levels: &[f64], u: (f64, f64)| {
         let k = levels.partition_point(|v| *v < value * 0.99);
         match (u.0 < 0.5, levels.get(k + 1)) {
@@ -197,8 +169,12 @@ fn conditions_between(passes: &[Operating], count: usize) -> Vec<Operating> {
     };
     let pick = |u: f64| passes[((u * passes.len() as f64) as usize).min(passes.len() - 1)];
     (0..count)
-        .map(|_| Operating {
-            amplitude_pp_m: between(pick(uniform()).amplitude_pp_m, &amplitudes, (uniform(), uniform())),
+        .map(|_| Condition {
+            amplitude: PeakToPeak::from_metres(between(
+                pick(uniform()).amplitude.metres(),
+                &amplitudes,
+                (uniform(), uniform()),
+            )),
             speed_m_s: between(pick(uniform()).speed_m_s, &speeds, (uniform(), uniform())),
             normal_force_n: between(pick(uniform()).normal_force_n, &loads, (uniform(), uniform())),
             frequency_hz: pick(uniform()).frequency_hz,

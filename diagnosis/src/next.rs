@@ -10,53 +10,21 @@ pub mod design;
 pub mod grid;
 pub mod predictive;
 
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict};
 use crate::fit::Problem;
 use crate::hypotheses::Fitted;
-use effects::Operating;
+use models::condition::Condition;
+use models::covariate;
 use predictive::predictives;
-use serde::Serialize;
-
-/// A condition of a plan.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Condition {
-    /// Amplitude, peak to peak, m.
-    pub amplitude_pp_m: f64,
-    /// Frequency, Hz.
-    pub frequency_hz: f64,
-    /// Speed, m/s.
-    pub speed_m_s: f64,
-    /// Direction.
-    pub direction: f64,
-    /// Normal force, N.
-    pub normal_force_n: f64,
-    /// Middle of the pass along the plate, m.
-    pub position_m: f64,
-    /// Ambient pressure, Pa, where it was varied.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ambient_pressure_pa: Option<f64>,
-}
-
-impl Condition {
-    /// The settings of a pass, without its time and environment.
-    pub fn of(p: &Operating) -> Self {
-        Condition {
-            amplitude_pp_m: p.amplitude_pp_m,
-            frequency_hz: p.frequency_hz,
-            speed_m_s: p.speed_m_s,
-            direction: p.direction,
-            normal_force_n: p.normal_force_n,
-            position_m: p.position_m,
-            ambient_pressure_pa: p.ambient_pressure_pa,
-        }
-    }
-}
+use serde::{Serialize, Serializer};
+use std::collections::BTreeMap;
 
 /// A next experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiment {
     /// Conditions to run, those that tell most first; empty for an action on an instrument.
+    #[serde(serialize_with = "settings")]
     pub conditions: Vec<Condition>,
     /// The two hypotheses that it parts: the leader and its strongest rival.
     pub separates: [String; 2],
@@ -66,10 +34,18 @@ pub struct Experiment {
     pub text: String,
 }
 
+/// Conditions by what a plan can set of them, under the names of the point table.
+fn settings<S: Serializer>(conditions: &[Condition], serializer: S) -> Result<S::Ok, S::Error> {
+    let of = |c: &Condition| -> BTreeMap<&str, f64> {
+        covariate::planned().filter_map(|k| k.of(c).map(|v| (k.name, v))).collect()
+    };
+    serializer.collect_seq(conditions.iter().map(of))
+}
+
 /// Passes of a designed experiment.
 pub const PASSES: usize = 12;
 /// Designs experiments for what a decision left open.
-pub fn experiments(fitted: &Fitted, table: &Table, rig: &Rig, decision: &Decision) -> Vec<Experiment> {
+pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Decision) -> Vec<Experiment> {
     let k = &fitted.problem.constants;
     if decision.verdict == Verdict::NoGap && decision.none >= k.settled_probability {
         return Vec::new();
@@ -87,7 +63,7 @@ pub fn experiments(fitted: &Fitted, table: &Table, rig: &Rig, decision: &Decisio
         let names = [hypotheses[0].name.clone(), hypotheses[rival].name.clone()];
         if nats > k.design_least_nats {
             list.push(Experiment {
-                conditions: chosen.iter().map(|&i| Condition::of(&grid[i])).collect(),
+                conditions: chosen.iter().map(|&i| grid[i]).collect(),
                 text: format!(
                     "{PASSES} passes that best part {} from {} and the other hypotheses; {nats:.1} nats expected",
                     names[0], names[1]

@@ -1,9 +1,12 @@
 //! The variance of each pass: stated repeatability, checked against replicates, never fitted to a residual.
 
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::discrepancy::{Discrepancy, lengths};
 use crate::fit::Problem;
 use crate::least_squares::minimise;
+use models::condition::Condition;
+use models::covariate;
+use models::quantity::PeakToPeak;
 use serde::Serialize;
 
 /// What the replicates say about the stated repeatability.
@@ -29,12 +32,12 @@ const ROUGH_SD: f64 = 0.1;
 const ROUGH_LEVEL: f64 = 0.05;
 
 /// Fills in the problem's variances and gives the smooth surface on which they rest.
-pub fn settle(table: &Table, rig: &Rig, problem: &mut Problem) -> (Discrepancy, PureError) {
+pub fn settle(table: &Table, rig: &RigFile, problem: &mut Problem) -> (Discrepancy, PureError) {
     let start = minimise(problem, &[], &[0.0; 3], &rough(problem, rig), 12);
     problem.variance = variance(problem, rig, &start.u, start.prediction.as_slice(), 1.0);
     // The level of friction enters the variance: it is taken from a smooth surface, not from the baseline.
     let k = problem.constants.clone();
-    let lengths = lengths(&k);
+    let lengths = lengths(&k, table);
     let first = Discrepancy::fit(table, problem, &start.u, &lengths[..1]);
     let level: Vec<f64> = first.smooth.iter().copied().collect();
     problem.variance = variance(problem, rig, &start.u, &level, 1.0);
@@ -57,7 +60,7 @@ pub fn settle(table: &Table, rig: &Rig, problem: &mut Problem) -> (Discrepancy, 
     (second, pure)
 }
 
-fn rough(problem: &Problem, rig: &Rig) -> Vec<f64> {
+fn rough(problem: &Problem, rig: &RigFile) -> Vec<f64> {
     problem
         .lateral
         .iter()
@@ -71,11 +74,11 @@ fn rough(problem: &Problem, rig: &Rig) -> Vec<f64> {
 
 /// Variances given the level of friction: relative scatter, noise of the lateral axis, and that of the normal
 /// axis through the slope of the prediction (effective variance).
-pub fn variance(problem: &Problem, rig: &Rig, center: &[f64], level: &[f64], factor: f64) -> Vec<f64> {
+pub fn variance(problem: &Problem, rig: &RigFile, center: &[f64], level: &[f64], factor: f64) -> Vec<f64> {
     let heavier: Vec<_> = problem
         .passes
         .iter()
-        .map(|p| effects::Operating { normal_force_n: p.normal_force_n * (1.0 + LOAD_STEP), ..*p })
+        .map(|p| Condition { normal_force_n: p.normal_force_n * (1.0 + LOAD_STEP), ..*p })
         .collect();
     let base = problem.predict(&[], center);
     let more = problem.predict_at(&[], center, &heavier);
@@ -91,16 +94,10 @@ pub fn variance(problem: &Problem, rig: &Rig, center: &[f64], level: &[f64], fac
 
 /// Repeats of one condition, compared among themselves after a common drift in time is taken out.
 fn replicates(table: &Table, problem: &Problem, smooth: &[f64]) -> PureError {
-    let mut groups: std::collections::BTreeMap<[i64; 6], Vec<usize>> = std::collections::BTreeMap::new();
+    let mut groups: std::collections::BTreeMap<[Option<i64>; 6], Vec<usize>> =
+        std::collections::BTreeMap::new();
     for (i, p) in table.passes.iter().enumerate() {
-        let key = [
-            (p.amplitude_pp_m * 1e9).round() as i64,
-            p.frequency_hz.round() as i64,
-            (p.speed_m_s.ln() * 50.0).round() as i64,
-            p.direction as i64,
-            (p.normal_force_n.ln() * 8.0).round() as i64,
-            p.ambient_pressure_pa.map_or(-1, |v| (v / 500.0).round() as i64),
-        ];
+        let key = covariate::SETTINGS.map(|c| Some(c.level?(c.of(p)?)));
         groups.entry(key).or_default().push(i);
     }
     let (mut sum, mut freedom) = (0.0, 0usize);
@@ -110,7 +107,7 @@ fn replicates(table: &Table, problem: &Problem, smooth: &[f64]) -> PureError {
             let apart = (table.passes[i].time_s - table.passes[j].time_s).abs();
             let places = (table.passes[i].position_m - table.passes[j].position_m).abs();
             // Only neighbours in time and place: what lies between others may be drift, not scatter.
-            let still = table.passes[i].amplitude_pp_m == 0.0;
+            let still = table.passes[i].amplitude == PeakToPeak::ZERO;
             if apart > NEAR_IN_TIME * table.design.duration_s
                 || (!still && places > NEAR_IN_PLACE * table.design.stroke_m.max(1e-9))
             {

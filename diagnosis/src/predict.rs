@@ -1,6 +1,6 @@
 //! The verdict's model at any condition: what `--predict` writes and what held-out passes are judged by.
 
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::decision::Verdict;
 use crate::discrepancy::{Discrepancy, lengths};
 use crate::evidence::{Posterior, laplace, recalibration};
@@ -8,7 +8,7 @@ use crate::fit::Problem;
 use crate::hypotheses::{Fitted, form_lengths};
 use crate::layout::NUISANCES;
 use crate::least_squares::minimise;
-use effects::Operating;
+use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -70,12 +70,8 @@ pub fn model(
         }
         Verdict::Unknown => {
             let part = table.select(rows);
-            Model::Open(Box::new(Discrepancy::fit(
-                &part,
-                &problem,
-                &baseline.u,
-                &lengths(&problem.constants),
-            )))
+            let lengths = lengths(&problem.constants, &part);
+            Model::Open(Box::new(Discrepancy::fit(&part, &problem, &baseline.u, &lengths)))
         }
     };
     (model, problem, baseline)
@@ -89,9 +85,9 @@ const PART: usize = 256;
 /// Predicts conditions.
 pub fn forecast(
     fitted: &Fitted,
-    rig: &Rig,
+    rig: &RigFile,
     model: &(Model, Problem, Posterior),
-    passes: &[Operating],
+    passes: &[Condition],
 ) -> Vec<Forecast> {
     let (model, problem, baseline) = model;
     let ready = match model {
@@ -123,11 +119,11 @@ enum Ready<'a> {
 
 fn forecast_part(
     fitted: &Fitted,
-    rig: &Rig,
+    rig: &RigFile,
     model: &Ready<'_>,
     problem: &Problem,
     baseline: &Posterior,
-    passes: &[Operating],
+    passes: &[Condition],
 ) -> Vec<Forecast> {
     let n = passes.len();
     let out = Problem {

@@ -1,10 +1,11 @@
 //! How far the gap shrinks on passes held out by group.
 
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::decision::Verdict;
 use crate::hypotheses::Fitted;
 use crate::left_out::full_friction;
 use crate::predict::{forecast, model};
+use models::covariate;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -47,19 +48,12 @@ pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
         return table.runs.clone();
     }
     // Conditions with all their replicates, in an order that keeps neighbours together, cut into blocks.
-    let level = |v: f64, step: f64| (v / step).round() as i64;
-    let mut keyed: Vec<([i64; 5], usize)> = table
+    let mut keyed: Vec<([Option<i64>; 5], usize)> = table
         .passes
         .iter()
         .enumerate()
         .map(|(i, p)| {
-            let key = [
-                level((1.0 + p.amplitude_pp_m * 1e6).ln(), 0.02),
-                level(p.speed_m_s.ln(), 0.05),
-                level(p.frequency_hz.ln(), 0.02),
-                level(p.normal_force_n.ln(), 0.15),
-                p.ambient_pressure_pa.map_or(0, |v| level(v, 2000.0)),
-            ];
+            let key = covariate::NEIGHBOURS.map(|c| Some(c.neighbourhood?(c.of(p)?)));
             (key, i)
         })
         .collect();
@@ -81,7 +75,7 @@ pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
 }
 
 /// Errors on held-out passes under the verdict's model.
-pub fn gap(fitted: &Fitted, table: &Table, rig: &Rig, verdict: Verdict, leader: usize) -> Gap {
+pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, leader: usize) -> Gap {
     let k = &fitted.problem.constants;
     let groups = groups(table, k.folds);
     let full = full_friction(&fitted.problem);

@@ -1,6 +1,6 @@
 //! The verdict: everything the diagnosis says about one table, in the shape of the contract.
 
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
 use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::intervals::{Estimate, curvature, estimates};
@@ -112,14 +112,14 @@ pub struct Diagnosis {
     /// What was decided.
     pub decision: Decision,
     table: Table,
-    rig: Rig,
+    rig: RigFile,
 }
 
 /// Probability from which a pair is listed.
 const LISTED: f64 = 1e-6;
 
 /// Diagnoses a table.
-pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> Diagnosis {
+pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String) -> Diagnosis {
     let fitted = fit_all(table, rig, options);
     let decision = decide(&fitted);
     let leader = decision.class[0];
@@ -180,7 +180,7 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
         remarks,
         data: DataNote { points: table.len(), sha256 },
     };
-    Diagnosis { report, fitted, decision, table: table.clone(), rig: *rig }
+    Diagnosis { report, fitted, decision, table: table.clone(), rig: rig.clone() }
 }
 
 fn label(fitted: &Fitted, candidate: usize) -> String {

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`quantity`] | `PeakToPeak` and its one conversion |
 //! | [`condition`], [`finger`] | one operating point; the fingertip |
+//! | [`covariate`] | what tells one condition from another: name, unit, words, range, getter |
 //! | [`spring_slider`] | Eqs. 6-15 and section 5.3 |
 //! | [`psi`] | Eqs. 16-20 |
 //! | [`prediction`] | what every friction law answers |
@@ -14,6 +15,7 @@
 //! | [`rig_file`] | `rig.toml`: finger, repeatability, what certificates leave open |
 
 pub mod condition;
+pub mod covariate;
 pub mod finger;
 pub mod inverse;
 pub mod prediction;

@@ -12,18 +12,9 @@ mod sequential;
 use crate::estimate::Mu0;
 use models::condition::{Condition, OutOfDomain};
 use models::prediction::{FrictionModel, Validity};
+use models::rig_file::PassNoise;
 pub use sequential::{ALARM_LEVEL, Sequential};
 use serde::{Deserialize, Serialize};
-
-/// What is known of the noise of a pass's mean forces (rig.toml, section `noise`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PassNoise {
-    /// Repeatability of the lateral force from pass to pass, one relative standard deviation.
-    pub pass_relative_sd: f64,
-    /// Standard deviation of a pass's mean force, each axis, in N.
-    pub force_sd_n: f64,
-}
 
 /// A pass held against the model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -164,7 +164,8 @@ impl Job {
             &self.setup.tip,
             self.setup.file.noise,
         )
-        .watching(&self.setup.certificates.temperature_ranges);
+        .watching(&self.setup.certificates.temperature_ranges)
+        .in_air(self.setup.ambient());
         for pass in &dir.made {
             sequence.remember(pass);
         }

@@ -281,7 +281,7 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
     };
     let set = Set {
         conditions: rig.bench.conditions(&at_hidden, &hidden),
-        rig_toml: rig.bench.rig_toml(),
+        rig_toml: rig.bench.rig_file().to_toml().expect("a sealed set's rig is within every range"),
         recalibrated_n: rig.bench.ideal(&at_hidden, &base.finger),
         sd_n: at_hidden.sd_n,
         passes,

@@ -1,7 +1,7 @@
 //! The operating space cut into parts, as a regression tree is grown (Breiman et al. 1984), by the chance of standing out.
 
-use super::covariates;
-use effects::Operating;
+use models::condition::Condition;
+use models::covariate::{self, Role};
 use std::collections::BTreeMap;
 
 /// Largest number of parts that the operating space is cut into, and the least number of places in one.
@@ -19,10 +19,20 @@ pub(super) struct Cut {
     above: Vec<u8>,
 }
 
-pub(super) fn cuts(places: &[Operating]) -> Vec<Cut> {
+/// Standard deviation.
+fn spread(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+pub(super) fn cuts(places: &[Condition]) -> Vec<Cut> {
     let one = |covariate: usize| {
-        let values: Vec<f64> = places.iter().map(covariates()[covariate].1).collect();
-        if values.iter().any(|v| v.is_nan()) {
+        let values: Vec<f64> =
+            places.iter().map(|p| covariate::TOLD[covariate].of(p)).collect::<Option<_>>()?;
+        if covariate::TOLD[covariate].role == Role::Climate
+            && spread(&values) < covariate::TOLD[covariate].least_spread
+        {
             return None;
         }
         let mut sorted = values.clone();
@@ -40,7 +50,7 @@ pub(super) fn cuts(places: &[Operating]) -> Vec<Cut> {
         let above = values.iter().map(|v| at.partition_point(|a| a < v) as u8).collect();
         (!at.is_empty()).then_some(Cut { covariate, at, above })
     };
-    (0..covariates().len()).filter_map(one).collect()
+    (0..covariate::TOLD.len()).filter_map(one).collect()
 }
 
 /// A part of the operating space.

@@ -113,10 +113,10 @@ mod tests {
     use crate::fit::Problem;
     use crate::hypotheses::{Fitted, Options, fit_all, form_lengths};
     use crate::next::{PASSES, grid, predictive::predictives};
-    use effects::Operating;
+    use models::condition::Condition;
 
     /// Log evidence of a hypothesis with further passes, or without.
-    fn evidence(fitted: &Fitted, e: &Posterior, further: &[(Operating, f64, f64)]) -> f64 {
+    fn evidence(fitted: &Fitted, e: &Posterior, further: &[(Condition, f64, f64)]) -> f64 {
         let mut problem = fitted.problem.clone();
         for (p, force, variance) in further {
             problem.passes.push(*p);
@@ -163,7 +163,7 @@ mod tests {
             .map(|_| {
                 let deviates = DVector::from_fn(k, |_, _| draw.normal());
                 let off = &root * deviates;
-                let further: Vec<(Operating, f64, f64)> = chosen
+                let further: Vec<(Condition, f64, f64)> = chosen
                     .iter()
                     .enumerate()
                     .map(|(i, &c)| (grid[c], hypotheses[0].mean[c] + off[i], hypotheses[0].scatter[c]))

@@ -4,13 +4,13 @@
 //! all in the baseline. A second pass at a condition therefore tells less than the first: what the first left open is
 //! noise, while the hypothesis' own doubt about that condition is gone.
 
-use crate::data::Rig;
+use crate::data::RigFile;
 use crate::decision::Decision;
 use crate::evidence::{Posterior, recalibration};
 use crate::fit::Problem;
 use crate::hypotheses::{Fitted, form_lengths};
 use crate::layout::NUISANCES;
-use effects::Operating;
+use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -29,7 +29,12 @@ pub struct Predictive {
 }
 
 /// The hypotheses that a decision leaves: the likeliest candidates, no gap and the open set. The leader comes first.
-pub fn predictives(fitted: &Fitted, rig: &Rig, decision: &Decision, grid: &[Operating]) -> Vec<Predictive> {
+pub fn predictives(
+    fitted: &Fitted,
+    rig: &RigFile,
+    decision: &Decision,
+    grid: &[Condition],
+) -> Vec<Predictive> {
     let k = &fitted.problem.constants;
     let problem = Problem {
         passes: grid.to_vec(),

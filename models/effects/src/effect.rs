@@ -1,7 +1,8 @@
 //! What a candidate effect is.
 
 use crate::contact::Contact;
-use crate::operating::{Design, Operating, Reading};
+use crate::operating::{Design, Reading};
+use models::condition::Condition;
 use models::rig_file::CertifiedKey;
 use serde::Serialize;
 
@@ -299,12 +300,12 @@ pub trait Effect: Sync {
         &self,
         _law: usize,
         _theta: &[f64],
-        _pass: &Operating,
+        _pass: &Condition,
         _design: &Design,
         _contact: &mut Contact,
     ) {
     }
     /// Changes what the instruments make of the friction force.
-    fn read(&self, _law: usize, _theta: &[f64], _pass: &Operating, _design: &Design, _reading: &mut Reading) {
+    fn read(&self, _law: usize, _theta: &[f64], _pass: &Condition, _design: &Design, _reading: &mut Reading) {
     }
 }

@@ -24,5 +24,5 @@ pub mod predict;
 
 pub use effect::{Check, Effect, Law, Need, Parameter, Place, Prior};
 pub use library::{by_name, imitated, known, library, near, one_cause, twins};
-pub use operating::{Baseline, Design, Operating, Reading};
+pub use operating::{Baseline, Design, Reading};
 pub use predict::{Active, lateral_force};

@@ -10,7 +10,8 @@ use crate::effect::{Effect, Law};
 mod prelude {
     pub use crate::contact::Contact;
     pub use crate::effect::{Effect, Law, Need, Parameter, Place};
-    pub use crate::operating::{Design, Operating, Reading, atmospheres};
+    pub use crate::operating::{Design, Reading, atmospheres};
+    pub use models::condition::Condition;
     pub use models::rig_file::CertifiedKey;
 }
 

@@ -1,6 +1,8 @@
 //! What the library says of its causes is true: names exist, exact aliases are exact, checks and certificates fit.
+use models::condition::Condition;
+use models::quantity::{Direction, PeakToPeak};
 use models::rig_file::CertifiedKey;
-use muprime_effects::{Active, Baseline, Design, Effect, Operating, by_name, known, lateral_force, library};
+use muprime_effects::{Active, Baseline, Design, Effect, by_name, known, lateral_force, library};
 use std::collections::BTreeSet;
 
 const BASELINE: Baseline =
@@ -16,24 +18,21 @@ const DESIGN: Design = Design {
     largest_amplitude_m: 5e-6,
 };
 
-fn passes() -> Vec<Operating> {
+fn passes() -> Vec<Condition> {
     let mut list = Vec::new();
     for amplitude_pp_m in [0.0, 0.4e-6, 1.5e-6, 5e-6] {
         for speed_m_s in [2e-3, 0.02, 0.2] {
             for normal_force_n in [0.15, 0.8] {
-                for direction in [1.0, -1.0] {
-                    list.push(Operating {
+                for direction in [Direction::Forward, Direction::Backward] {
+                    list.push(Condition {
                         time_s: 10.0,
-                        run_time_s: 10.0,
-                        amplitude_pp_m,
+                        amplitude: PeakToPeak::from_metres(amplitude_pp_m),
                         frequency_hz: 27_500.0,
                         speed_m_s,
                         direction,
                         position_m: 0.01,
                         normal_force_n,
-                        ambient_pressure_pa: None,
-                        temperature_c: None,
-                        relative_humidity_pct: None,
+                        ..Condition::paper()
                     });
                 }
             }

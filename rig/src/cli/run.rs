@@ -111,7 +111,7 @@ fn job(args: Args) -> miette::Result<Job> {
         None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
         Some((_, text)) => {
             let path = args.model.as_ref().map_or_else(String::new, |p| p.display().to_string());
-            crate::model_file::load(&path, text)?
+            crate::model_file::load_for(&setup, &path, text)?
         }
     };
     let seed = args.seed.unwrap_or(plan.file.seed);

@@ -63,7 +63,7 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     let mut files = vec![
         ("setup.toml".to_string(), job.setup.text.clone()),
         ("plan.toml".to_string(), job.plan.text.clone()),
-        ("rig.toml".to_string(), job.setup.rig_toml()?),
+        ("rig.toml".to_string(), job.setup.rig_file().to_toml().into_diagnostic()?),
     ];
     let replayed = Replayable { config: job.setup.config, finger: job.setup.tip.finger };
     files.push((REPLAYABLE.to_string(), serde_json::to_string_pretty(&replayed).into_diagnostic()?));
@@ -89,7 +89,7 @@ impl Keeper {
     /// # Errors
     /// Whatever file system and SQLite say.
     pub fn begin(job: &Job, dir: RunDir, planned: usize, start_unix_ns: u64) -> miette::Result<Self> {
-        dir.write("rig.toml", job.setup.rig_toml()?.as_bytes())?;
+        dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())?;
         let runs = dir
             .path()
             .parent()

@@ -343,7 +343,9 @@ fn slide<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Active, Baseline, Design, Operating, by_name, lateral_force};
+    use crate::{Active, Baseline, Design, by_name, lateral_force};
+    use models::condition::Condition;
+    use models::quantity::PeakToPeak;
 
     fn made() -> usize {
         table(0).iter().filter(|node| node.get().is_some()).count()
@@ -373,18 +375,13 @@ mod tests {
                 for speed_m_s in [1e-4, 0.02, 0.5] {
                     for normal_force_n in [1e-3, 0.2, 5.0] {
                         for mass_kg in [1e-6, 2e-5, 1e-4] {
-                            let pass = Operating {
+                            let pass = Condition {
                                 time_s: 10.0,
-                                run_time_s: 10.0,
-                                amplitude_pp_m,
+                                amplitude: PeakToPeak::from_metres(amplitude_pp_m),
                                 frequency_hz,
                                 speed_m_s,
-                                direction: 1.0,
-                                position_m: 0.0,
                                 normal_force_n,
-                                ambient_pressure_pa: None,
-                                temperature_c: None,
-                                relative_humidity_pct: None,
+                                ..Condition::paper()
                             };
                             let theta = [mass_kg, damping_ratio];
                             let active = [Active { effect, law: 0, theta: &theta }];

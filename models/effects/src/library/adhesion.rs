@@ -41,7 +41,7 @@ impl Effect for Adhesion {
     fn needs(&self) -> &'static [Need] {
         &[Need::Loads]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         if law == 0 {
             c.adhesion = theta[0];
         } else if law == 2 {

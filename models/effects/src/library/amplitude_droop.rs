@@ -35,7 +35,7 @@ impl Effect for AmplitudeDroop {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Loads]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         c.amplitude_pp *= match law {
             0 => 1.0 / (1.0 + theta[0] * c.normal_force),
             1 => 1.0 / (1.0 + theta[0] * c.normal_force.max(0.0).powf(2.0 / 3.0)),

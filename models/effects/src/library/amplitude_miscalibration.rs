@@ -36,7 +36,7 @@ impl Effect for AmplitudeMiscalibration {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         if c.amplitude_pp <= 0.0 {
             return;
         }

@@ -40,7 +40,7 @@ impl Effect for AmplitudeSaturation {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Amplitudes]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         let x = theta[0] * c.amplitude_pp;
         c.amplitude_pp *= match law {
             0 => {

@@ -37,7 +37,7 @@ impl Effect for ContactAgeing {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         if law < 2 {
             c.bonding_time = theta[0];
             c.bonding_exponent = if law == 0 { 1.0 } else { 0.5 };

@@ -44,12 +44,12 @@ impl Effect for ForceCrosstalk {
     fn needs(&self) -> &'static [Need] {
         &[Need::Directions]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
         if law == 1 {
-            super::plate_tilt::unload(c, pass.direction, -theta[0]);
+            super::plate_tilt::unload(c, pass.direction.sign(), -theta[0]);
         }
     }
-    fn read(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, reading: &mut Reading) {
+    fn read(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, reading: &mut Reading) {
         if law == 0 {
             reading.crosstalk += theta[0];
         }

@@ -38,7 +38,7 @@ impl Effect for FrictionalHeating {
     fn needs(&self) -> &'static [Need] {
         &[Need::Speeds]
     }
-    fn change(&self, _: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, _: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         // Heat is made by the friction that is left: mu = mu0 (1 + q mu N U)^-n, whose left side rises faster.
         let full = theta[0] * c.mu0 * c.normal_force * c.speed;
         let least = (1.0 + full).powf(-theta[1]);

@@ -29,7 +29,7 @@ impl Effect for LateralGain {
     fn needs(&self) -> &'static [Need] {
         &[Need::OutsideStandard]
     }
-    fn read(&self, _: usize, theta: &[f64], _: &Operating, _: &Design, reading: &mut Reading) {
+    fn read(&self, _: usize, theta: &[f64], _: &Condition, _: &Design, reading: &mut Reading) {
         reading.gain *= theta[0].exp();
     }
 }

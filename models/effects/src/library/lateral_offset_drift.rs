@@ -61,7 +61,7 @@ impl Effect for LateralOffsetDrift {
     fn needs(&self) -> &'static [Need] {
         &[Need::Directions]
     }
-    fn read(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, reading: &mut Reading) {
+    fn read(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, reading: &mut Reading) {
         let s = pass.time_s / design.duration_s.max(1e-9);
         reading.offset_n += match law {
             0 => theta[0],

@@ -44,7 +44,7 @@ impl Effect for LateralRecovery {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         match law {
             0 => c.inverse_recovery_speed = theta[0],
             1 => c.lateral_relaxation_time = theta[0],

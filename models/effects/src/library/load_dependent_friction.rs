@@ -33,7 +33,7 @@ impl Effect for LoadDependentFriction {
     fn needs(&self) -> &'static [Need] {
         &[Need::Loads]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
         let relative = (c.normal_force / design.reference_load_n).max(1e-3);
         match law {
             0 => c.load_exponent = theta[0],

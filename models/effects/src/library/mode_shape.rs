@@ -60,7 +60,7 @@ impl Effect for ModeShape {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Positions]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
         let x = pass.position_m;
         c.amplitude_pp *= match law {
             0 | 3 => {

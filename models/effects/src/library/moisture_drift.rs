@@ -56,8 +56,8 @@ impl Effect for MoistureDrift {
     fn needs(&self) -> &'static [Need] {
         &[Need::Time]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
-        let time = if law == 3 { pass.run_time_s } else { pass.time_s };
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
+        let time = if law == 3 { pass.time_in_run_s() } else { pass.time_s };
         let factor = match law {
             2 => 1.0 + theta[0] * (1.0 + time / theta[1]).ln(),
             _ => 1.0 - theta[0] * (-time / theta[1]).exp_m1(),

@@ -31,7 +31,7 @@ impl Effect for MultiAsperity {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Amplitudes]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         c.asperity_height = theta[0];
         c.asperity_heights = match law {
             0 => Heights::Gaussian,

@@ -40,7 +40,7 @@ impl Effect for NormalDamping {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         let omega = 2.0 * std::f64::consts::PI * c.frequency;
         c.normal_retardation_time = match law {
             0 => theta[0],

@@ -29,7 +29,7 @@ impl Effect for NormalGain {
     fn needs(&self) -> &'static [Need] {
         &[Need::NormalStandard]
     }
-    fn change(&self, _: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, _: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         c.normal_force *= (-theta[0]).exp();
     }
 }

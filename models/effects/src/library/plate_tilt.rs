@@ -33,13 +33,13 @@ impl Effect for PlateTilt {
     fn needs(&self) -> &'static [Need] {
         &[Need::Directions]
     }
-    fn change(&self, _: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, _: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
         if theta[0] != 0.0 {
-            unload(c, pass.direction, theta[0].tan());
+            unload(c, pass.direction.sign(), theta[0].tan());
             c.normal_force /= theta[0].cos();
         }
     }
-    fn read(&self, _: usize, theta: &[f64], _: &Operating, _: &Design, reading: &mut Reading) {
+    fn read(&self, _: usize, theta: &[f64], _: &Condition, _: &Design, reading: &mut Reading) {
         reading.gain *= theta[0].cos();
         reading.crosstalk += theta[0].sin();
     }

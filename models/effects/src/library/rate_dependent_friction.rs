@@ -38,7 +38,7 @@ impl Effect for RateDependentFriction {
     fn needs(&self) -> &'static [Need] {
         &[Need::Speeds]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
         let reference = design.reference_speed_m_s;
         c.mu0 *= match law {
             0 => (c.speed / reference).powf(theta[0]),

@@ -81,7 +81,7 @@ impl Effect for ResonanceDetuning {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
         if law == 3 {
             let tau = theta[1] * design.duration_s.max(1e-9);
             c.amplitude_pp /= 1.0 - theta[0] * (-pass.time_s / tau).exp_m1();

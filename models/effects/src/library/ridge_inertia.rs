@@ -45,7 +45,7 @@ impl Effect for RidgeInertia {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         c.mass = theta[0];
         c.ridge_damping_ratio = theta[1];
         c.landing = law;

@@ -47,7 +47,7 @@ impl Effect for SpeedError {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
         match law {
             0 => c.speed *= theta[0].exp(),
             1 => c.speed = (c.speed + theta[0]).max(0.05 * c.speed),

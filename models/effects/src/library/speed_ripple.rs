@@ -37,7 +37,7 @@ impl Effect for SpeedRipple {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Positions]
     }
-    fn change(&self, _: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, _: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
         let wave = (2.0 * PI * (pass.position_m / theta[1] + theta[2])).sin();
         c.speed *= (1.0 + theta[0] * wave).max(0.05);
     }

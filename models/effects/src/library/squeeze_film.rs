@@ -73,7 +73,7 @@ impl Effect for SqueezeFilm {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Amplitudes]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, design: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
         let air = atmospheres(pass);
         match law {
             0 => c.solid_share *= film_share(theta[0] * c.half_amplitude(), air, c.normal_force),

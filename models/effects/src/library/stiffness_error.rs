@@ -35,7 +35,7 @@ impl Effect for StiffnessError {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
         let factor = theta[0].exp();
         if law != 1 {
             c.lateral_stiffness *= factor;

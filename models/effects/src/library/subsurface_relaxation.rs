@@ -67,7 +67,7 @@ impl Effect for SubsurfaceRelaxation {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Time]
     }
-    fn change(&self, law: usize, theta: &[f64], pass: &Operating, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
         let factor = match law {
             1 | 3 => 1.0 + theta[0] * (1.0 + pass.time_s / theta[1]).ln(),
             4 => 1.0 - theta[0] * (-(pass.time_s / theta[1]).powf(theta[2])).exp_m1(),
