@@ -12,11 +12,24 @@ mod value;
 
 pub use value::Value;
 
+/// The stage of a diagnosis at which a constant enters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// The fits and evidences of all hypotheses, and all that follows.
+    Fit,
+    /// The verdict rule, from finished fits.
+    Decision,
+    /// What is reported beside the verdict.
+    Report,
+}
+
 /// One constant as the table shows it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Name.
     pub name: &'static str,
+    /// Stage at which it enters.
+    pub stage: Stage,
     /// Value or values.
     pub values: Vec<f64>,
     /// Meaning, with its unit.
@@ -42,39 +55,40 @@ pub enum ConstantError {
 }
 
 macro_rules! constants {
-    ($($name:ident: $kind:ty = $value:expr, $meaning:literal, $source:expr;)*) => {
+    ($($stage:ident { $($name:ident: $kind:ty = $value:expr, $meaning:literal, $source:expr;)* })*) => {
         /// The constants; [`rows`](Constants::rows) says what each means.
         #[derive(Debug, Clone, PartialEq)]
         pub struct Constants {
-            $(#[doc = $meaning] pub $name: $kind,)*
+            $($(#[doc = $meaning] pub $name: $kind,)*)*
         }
 
         impl Default for Constants {
             fn default() -> Self {
-                Constants { $($name: $value,)* }
+                Constants { $($($name: $value,)*)* }
             }
         }
 
         impl Constants {
             /// Every constant with its present value.
             pub fn rows(&self) -> Vec<Row> {
-                vec![$(Row {
+                vec![$($(Row {
                     name: stringify!($name),
+                    stage: Stage::$stage,
                     values: self.$name.numbers(),
                     meaning: $meaning,
                     source: $source,
-                }),*]
+                },)*)*]
             }
 
             fn replace(&mut self, name: &str, numbers: &mut dyn Iterator<Item = f64>) -> Option<bool> {
                 match name {
-                    $(stringify!($name) => Some(match Value::from_numbers(numbers) {
+                    $($(stringify!($name) => Some(match Value::from_numbers(numbers) {
                         Some(value) => {
                             self.$name = value;
                             true
                         }
                         None => false,
-                    }),)*
+                    }),)*)*
                     _ => None,
                 }
             }
@@ -92,6 +106,7 @@ const MIMICS: &str = "development: 243 single causes of the simulation under oth
     of the library";
 
 constants! {
+    Fit {
     prior_null: f64 = 0.5, "Prior probability of no gap.", "a gap is as likely as none (indifference)";
     prior_single: f64 = 0.36, "Prior probability of one cause of the library, shared evenly by the testable ones.", JUDGEMENT;
     prior_pair: f64 = 0.07, "Prior probability of two causes, shared evenly by their pairs.", JUDGEMENT;
@@ -134,6 +149,8 @@ constants! {
     laws_refined: usize = 16, "Laws of those pairs that are followed.", NUMERICAL;
     one_change_cosine: f64 = 0.98, "Cosine between two changes above which they are one.", JUDGEMENT;
 
+    }
+    Decision {
     region_cuts: [f64; 2] = [0.28, 0.72], "Quantiles that bound the lower and upper region of a covariate.", "judgement: a little more than a quarter each, so that two levels of four are not parted";
     region_least: usize = 6, "Fewest passes of a region.", JUDGEMENT;
     region_most: f64 = 0.6, "Largest share of the passes in the end of a covariate.", JUDGEMENT;
@@ -164,6 +181,8 @@ constants! {
     pair_nats: f64 = 50.0, "and raises the log evidence by these nats.", "development: spurious companions gained up to 34";
     pair_pull_chi2: f64 = 50.0, "Or: chi2 by which it frees the nuisances.", "development: true single causes pull them by up to 30, a gain that hides in a stiffness by hundreds";
 
+    }
+    Report {
     folds: usize = 5, "Parts that are held out in turn.", "Hastie, Tibshirani & Friedman 2009, sec. 7.10: five or ten";
     resamples: usize = 400, "Resamples of the bootstrap.", "numerical: Efron & Tibshirani 1993";
     gapless_sd: f64 = 2.0, "Deviations of the mean square's scatter within which held-out passes show no gap to shrink.", "two standard deviations";
@@ -176,6 +195,7 @@ constants! {
     design_least_probability: f64 = 0.01, "Probability that each hypothesis counts for at least.", JUDGEMENT;
     design_pass_nats: f64 = 4.0, "Nats that one pass may count for: beyond them an outlier is the likelier explanation.", JUDGEMENT;
     check_most_nats: f64 = 500.0, "Nats of an instrument's check beyond which more says nothing.", NUMERICAL;
+    }
 }
 
 impl Constants {

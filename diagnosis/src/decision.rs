@@ -28,12 +28,19 @@ pub struct Decision {
     pub unknown: f64,
     /// Probabilities of the candidates, in their order, after the regions have spoken.
     pub probabilities: Vec<f64>,
-    /// Indices of the leader's alias class among the candidates, the leader first.
+    /// Indices of the leader's alias class among the candidates, the leader first; empty where no effect could be tried.
     pub class: Vec<usize>,
     /// What the left-out regions say about the leader.
     pub gate: Gate,
     /// Those regions.
     pub regions: Vec<Region>,
+}
+
+impl Decision {
+    /// Index of the leading candidate; none where no effect could be tried.
+    pub fn leader(&self) -> Option<usize> {
+        self.class.first().copied()
+    }
 }
 
 /// Probability below which a pair is not looked at.
@@ -46,10 +53,15 @@ pub fn decide(fitted: &Fitted) -> Decision {
     let mut probabilities: Vec<f64> = candidates.iter().map(|c| c.probability).collect();
     let (none, mut unknown) = (fitted.none_probability, fitted.unknown_probability);
     fold_pairs(fitted, &mut probabilities);
-    let leader = (0..candidates.len())
-        // Candidates come in the order of their own probability, which decides where all are too small for a number.
-        .max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)))
-        .expect("the library is not empty");
+    // Candidates come in the order of their own probability, which decides where all are too small for a number.
+    let leading =
+        (0..candidates.len()).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
+    let Some(leader) = leading else {
+        // No effect could be tried: there is a gap of an unknown cause, or none.
+        let verdict = if none < k.claim_probability { Verdict::Unknown } else { Verdict::NoGap };
+        let (class, regions, gate) = (Vec::new(), Vec::new(), gate(k, &[]));
+        return Decision { verdict, none, unknown, probabilities, class, gate, regions };
+    };
     let regions = left_out_regions(fitted, &candidates[leader].best);
     let judged = gate(k, &regions);
     let claimed = none < k.claim_probability;
@@ -145,6 +157,57 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
         let weight = std::mem::take(&mut probabilities[pair]);
         for (i, e) in heirs.iter().zip(&evidence) {
             probabilities[*i] += weight * (e - total).exp();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Verdict;
+    use crate::example::{Deviates, rig, table};
+    use crate::hypotheses::Options;
+    use crate::verdict::diagnose;
+    use models::quantity::PeakToPeak;
+
+    fn no_effects() -> Options {
+        let without = effects::library().iter().map(|e| e.name().to_string()).collect();
+        Options { without, ..Options::default() }
+    }
+
+    /// With nothing to try the answer is `no_gap` or `unknown`, with a remark, and no model but the baseline's.
+    #[test]
+    fn a_library_without_effects_gives_an_answer() {
+        for (exponent, wanted) in [(0.0, Verdict::NoGap), (0.6, Verdict::Unknown)] {
+            let table = table(&mut Deviates(5), exponent);
+            let result = diagnose(&table, &rig(), &no_effects(), String::new());
+            assert_eq!(result.report.verdict, wanted, "exponent {exponent}: {}", result.report.text);
+            assert!(result.report.remarks.iter().any(|r| r.contains("could be tried")));
+            let sum: f64 = result.report.hypotheses.iter().map(|h| h.probability).sum();
+            assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+            assert_eq!(result.saved_model().is_some(), wanted == Verdict::NoGap);
+            assert!(result.predict(&table).iter().all(|f| f.corrected.is_finite() && f.corrected_sd > 0.0));
+        }
+    }
+
+    /// Values at the ends of what a table may hold give an answer too.
+    #[test]
+    fn values_at_the_ends_of_their_range_give_an_answer() {
+        type Change = fn(&mut models::condition::Condition, &mut f64);
+        let changes: [(&str, Change); 5] = [
+            ("lateral force", |_, l| *l = 500.0),
+            ("normal force", |p, _| p.normal_force_n = 500.0),
+            ("frequency", |p, _| p.frequency_hz = 1e7),
+            ("amplitude", |p, _| p.amplitude = PeakToPeak::from_metres(1e-3)),
+            ("speed", |p, _| p.speed_m_s = 100.0),
+        ];
+        for (what, change) in changes {
+            let mut table = table(&mut Deviates(5), 0.0);
+            change(&mut table.passes[3], &mut table.lateral[3]);
+            let report =
+                diagnose(&table, &rig(), &Options { pairs: false, ..Options::default() }, String::new())
+                    .report;
+            let sum: f64 = report.hypotheses.iter().map(|h| h.probability).sum();
+            assert!((sum - 1.0).abs() < 1e-9, "{what}: {sum}");
         }
     }
 }

@@ -233,3 +233,29 @@ impl Problem {
         jacobian
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::{Deviates, rig, table};
+    use models::rig_file::RigFile;
+
+    /// Whatever certificate rig.toml may state reaches the prior of the law that it bounds.
+    #[test]
+    fn every_certificate_narrows_the_prior_of_its_law() {
+        let table = table(&mut Deviates(2), 0.0);
+        for key in CertifiedKey::ALL {
+            let text = format!("{}\n[calibration]\n{} = 1e-4\n", rig().to_toml().unwrap(), key.name());
+            let rig = RigFile::parse(&text).unwrap();
+            let problem = Problem::new(&table, &rig, &Arc::default());
+            let narrowed: Vec<_> =
+                problem.certified.iter().filter(|(m, _)| m.certified_by() == Some(key)).collect();
+            // A cross-talk certificate stands for the other direction too.
+            assert!(!narrowed.is_empty(), "{} bounds no law", key.name());
+            for (member, sd) in narrowed {
+                let precision = problem.prior_precision(&[*member])[Layout::of(&[*member]).size(0)];
+                assert!(*sd < 0.2 && (precision * sd * sd - 1.0).abs() < 1e-9, "{}: {sd}", key.name());
+            }
+        }
+    }
+}

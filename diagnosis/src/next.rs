@@ -82,7 +82,7 @@ pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Dec
 
 /// Actions on instruments that part the leader from the next candidate.
 fn actions(fitted: &Fitted, decision: &Decision) -> Vec<Experiment> {
-    let leader = decision.class[0];
+    let Some(leader) = decision.leader() else { return Vec::new() };
     let second = decision.class.get(1).copied().or_else(|| {
         (0..fitted.candidates.len()).find(|&i| i != leader && fitted.candidates[i].effects.len() == 1)
     });

@@ -44,7 +44,7 @@ pub fn model(
     fitted: &Fitted,
     table: &Table,
     verdict: Verdict,
-    leader: usize,
+    leader: Option<usize>,
     rows: Option<&[usize]>,
 ) -> (Model, Problem, Posterior) {
     let all: Vec<usize> = (0..fitted.problem.len()).collect();
@@ -58,9 +58,9 @@ pub fn model(
         let fit = minimise(&problem, &[], &fitted.none.u, &problem.variance, ROUNDS[0]);
         laplace(&problem, &[], &fit.u, &basis, 0.0, ROUNDS[1])
     };
-    let model = match verdict {
-        Verdict::NoGap => Model::Baseline(baseline.clone()),
-        Verdict::Named | Verdict::Ambiguous => {
+    let model = match (verdict, leader) {
+        (Verdict::NoGap, _) => Model::Baseline(baseline.clone()),
+        (Verdict::Named | Verdict::Ambiguous, Some(leader)) => {
             let best = &fitted.candidates[leader].best;
             Model::Effects(if whole {
                 best.clone()
@@ -68,7 +68,7 @@ pub fn model(
                 laplace(&problem, &best.members, &best.u, &basis, best.share, ROUNDS[2])
             })
         }
-        Verdict::Unknown => {
+        (Verdict::Unknown, _) | (_, None) => {
             let part = table.select(rows);
             let lengths = lengths(&problem.constants, &part);
             Model::Open(Box::new(Discrepancy::fit(&part, &problem, &baseline.u, &lengths)))

@@ -75,7 +75,7 @@ pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
 }
 
 /// Errors on held-out passes under the verdict's model.
-pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, leader: usize) -> Gap {
+pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, leader: Option<usize>) -> Gap {
     let k = &fitted.problem.constants;
     let groups = groups(table, k.folds);
     let full = full_friction(&fitted.problem);

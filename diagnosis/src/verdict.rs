@@ -122,8 +122,8 @@ const LISTED: f64 = 1e-6;
 pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String) -> Diagnosis {
     let fitted = fit_all(table, rig, options);
     let decision = decide(&fitted);
-    let leader = decision.class[0];
-    let best = &fitted.candidates[leader].best;
+    let leader = decision.leader();
+    let best = leader.map(|l| &fitted.candidates[l].best);
     let gap = gap(&fitted, table, rig, decision.verdict, leader);
     let location = Where {
         place: ledger(&fitted, &decision.probabilities, decision.unknown),
@@ -133,14 +133,17 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
             regions(&fitted, rig, &model(&fitted, table, decision.verdict, leader, None))
         },
     };
-    let parameters = if decision.verdict == Verdict::NoGap {
-        None
-    } else {
-        Some(estimates(&fitted.problem, best, &fitted.basis))
-    };
+    let asked = best.filter(|_| decision.verdict != Verdict::NoGap);
+    let parameters = asked.map(|best| estimates(&fitted.problem, best, &fitted.basis));
     let hypotheses = hypotheses(&fitted, &decision, parameters.as_ref());
     let next_experiment = experiments(&fitted, table, rig, &decision);
     let mut remarks = Vec::new();
+    if leader.is_none() {
+        remarks.push(
+            "No effect of the library could be tried on this table: `not_testable` says what is missing."
+                .into(),
+        );
+    }
     if table.still_coefficient().is_none() {
         remarks.push("No pass has the plate still: mu0 is unknown and was fitted; add w = 0 passes.".into());
     }
@@ -152,7 +155,9 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     }
     let stiffness_pulls = match decision.verdict {
         Verdict::NoGap => pulls(&fitted.problem, &fitted.none, &fitted.none),
-        Verdict::Named | Verdict::Ambiguous => pulls(&fitted.problem, &fitted.none, best),
+        Verdict::Named | Verdict::Ambiguous => {
+            best.map_or_else(Vec::new, |best| pulls(&fitted.problem, &fitted.none, best))
+        }
         Verdict::Unknown => Vec::new(),
     };
     remarks.extend(stiffness_pulls.iter().filter_map(Pull::remark));
@@ -188,11 +193,11 @@ fn label(fitted: &Fitted, candidate: usize) -> String {
 }
 
 fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
-    let leader = decision.class[0];
     let closed = gap.shrinkage.map_or_else(
         || "held-out passes leave no gap to shrink".to_string(),
         |s| format!("the gap shrinks by {:.0} % on held-out passes", 100.0 * s),
     );
+    let leader = decision.leader().unwrap_or_default();
     match decision.verdict {
         Verdict::NoGap => "The recalibrated baseline explains the table: no gap.".to_string(),
         Verdict::Named => format!(
@@ -220,8 +225,8 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
         }
         Verdict::Unknown => {
             let known = fitted.unlisted.first().filter(|s| {
-                let leading = &fitted.candidates[leader];
-                s.log_evidence > fitted.discrepancy.log_evidence.max(leading.log_evidence)
+                let leading = fitted.candidates.get(leader).map_or(f64::NEG_INFINITY, |c| c.log_evidence);
+                s.log_evidence > fitted.discrepancy.log_evidence.max(leading)
             });
             let hint = known.map_or_else(String::new, |s| {
                 format!(" What comes nearest is not in the library: {}.", s.names().join("+"))
@@ -238,7 +243,6 @@ fn hypotheses(
     decision: &Decision,
     parameters: Option<&Vec<Vec<Estimate>>>,
 ) -> Vec<Hypothesis> {
-    let leader = decision.class[0];
     let mut list: Vec<Hypothesis> = fitted
         .candidates
         .iter()
@@ -252,7 +256,7 @@ fn hypotheses(
             } else {
                 vec![label(fitted, i)]
             };
-            let parameters = if i == leader && parameters.is_some() {
+            let parameters = if Some(i) == decision.leader() && parameters.is_some() {
                 parameters.map(|p| p.concat()).unwrap_or_default()
             } else {
                 curvature(&c.best)
@@ -288,7 +292,7 @@ fn hypotheses(
 impl Diagnosis {
     /// Predicts conditions with the verdict's model.
     pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {
-        let leader = self.decision.class[0];
+        let leader = self.decision.leader();
         let whole = model(&self.fitted, &self.table, self.decision.verdict, leader, None);
         forecast(&self.fitted, &self.rig, &whole, &conditions.passes)
     }

@@ -5,6 +5,7 @@
 
 pub mod further;
 pub mod same_form;
+pub mod sensitivity;
 
 use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};

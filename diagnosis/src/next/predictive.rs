@@ -49,9 +49,10 @@ pub fn predictives(
     let basis = fitted.kernel.matrix(&places);
     let mut order: Vec<usize> = (0..fitted.candidates.len()).collect();
     order.sort_by(|&a, &b| decision.probabilities[b].total_cmp(&decision.probabilities[a]).then(a.cmp(&b)));
-    let leader = decision.class[0];
-    order.retain(|&i| i != leader);
-    order.insert(0, leader);
+    if let Some(leader) = decision.leader() {
+        order.retain(|&i| i != leader);
+        order.insert(0, leader);
+    }
     order.truncate(k.design_candidates);
     let mut list: Vec<Predictive> = order
         .into_par_iter()

@@ -8,7 +8,7 @@ use crate::effect::{Effect, Place};
 use crate::operating::{Baseline, Design};
 use crate::predict::{Active, lateral_force};
 use models::condition::{Ambient, Condition, OutOfDomain};
-use models::covariate::{self, Covariate};
+use models::covariate::Covariate;
 use models::prediction::{FrictionModel, Prediction, Regime, Validity};
 use serde::{Deserialize, Serialize};
 
@@ -128,14 +128,6 @@ pub struct Lack {
     pub covariate: &'static Covariate,
 }
 
-fn needs(law: &crate::effect::Law) -> &'static [&'static Covariate] {
-    static WARMTH: [&Covariate; 1] = [&covariate::TEMPERATURE];
-    match law.name {
-        "warming (temperature)" | "warming about a tuning point" | "offset with temperature" => &WARMTH,
-        _ => &[],
-    }
-}
-
 #[derive(Clone, Copy)]
 struct Compiled {
     effect: &'static dyn Effect,
@@ -229,7 +221,8 @@ impl Corrected {
         let known = Condition::paper().within(ambient);
         self.effects.iter().find_map(|c| {
             let law = &c.effect.laws()[c.law];
-            let covariate = needs(law).iter().copied().find(|k| k.of(&known).is_none())?;
+            let mut covariates = law.needs.iter().filter_map(|need| need.covariate());
+            let covariate = covariates.find(|k| k.of(&known).is_none())?;
             Some(Lack { effect: c.effect.name(), law: law.name, covariate })
         })
     }

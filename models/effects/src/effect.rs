@@ -3,6 +3,7 @@
 use crate::contact::Contact;
 use crate::operating::{Design, Reading};
 use models::condition::Condition;
+use models::covariate::{self, Covariate};
 use models::rig_file::CertifiedKey;
 use serde::Serialize;
 
@@ -233,6 +234,14 @@ pub enum Need {
 }
 
 impl Need {
+    /// The covariate without which a law that needs this does nothing.
+    pub const fn covariate(self) -> Option<&'static Covariate> {
+        match self {
+            Need::Temperatures => Some(&covariate::TEMPERATURE),
+            _ => None,
+        }
+    }
+
     /// What is missing from a table that does not meet it.
     pub const fn missing(self) -> &'static str {
         match self {
