@@ -17,6 +17,9 @@ const FARTHEST_NUISANCE: f64 = 40.0;
 const HALF_LN_2PI: f64 = 0.918_938_533_204_672_8;
 /// Least guess of mu0 where no pass has the plate still.
 const LEAST_MU0: f64 = 0.05;
+/// Certified deviations below this share of a law's own prior are taken as this: closer to exact than any table can tell,
+/// and still a number to divide by.
+const EXACT: f64 = 1e-6;
 
 /// One member of a hypothesis: index of the effect among the known ones, and of its law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -43,10 +46,6 @@ impl Member {
     /// Largest share of its change by which it may depart from its form.
     pub fn departs_by(&self) -> f64 {
         known()[self.effect].departs_by()
-    }
-    /// The certificate that bounds its size, where there is such a kind.
-    pub fn certified_by(&self) -> Option<CertifiedKey> {
-        self.form().certified_by
     }
     /// Where the effect sits.
     pub fn place(&self) -> Place {
@@ -75,6 +74,17 @@ pub struct Problem {
     pub constants: Arc<Constants>,
 }
 
+/// Instrument errors that no table of passes tells from another baseline, with the logarithmic change of the baseline's
+/// parameters that each is. What a certificate leaves open of them is part of the recalibration; without a certificate the
+/// instrument is taken at its word, and a pull of the stiffnesses is the only sign.
+fn gains_within_the_baseline() -> impl Iterator<Item = (CertifiedKey, [f64; NUISANCES])> {
+    library()
+        .iter()
+        .filter(|e| e.needs().iter().any(|n| n.is_standard()))
+        .flat_map(|e| e.laws())
+        .filter_map(|law| Some((law.certified_by?, law.acts_as?)))
+}
+
 impl Problem {
     /// The problem of a whole table.
     pub fn new(table: &crate::data::Table, rig: &RigFile, constants: &Arc<Constants>) -> Self {
@@ -95,8 +105,15 @@ impl Problem {
                 if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) =
                     (form.certified_by.and_then(|key| rig.calibration.sd(key)), form.parameters[0].prior)
                 {
-                    certified.push((Member { effect: index, law }, (sd / wide).min(1.0)));
+                    certified.push((Member { effect: index, law }, (sd / wide).clamp(EXACT, 1.0)));
                 }
+            }
+        }
+        let mut prior_sd = [constants.mu0_log_sd[usize::from(mu0.is_none())], sd, sd];
+        for (key, e_folds) in gains_within_the_baseline() {
+            let open = rig.calibration.sd(key).unwrap_or(0.0);
+            for (own, e_fold) in prior_sd.iter_mut().zip(e_folds) {
+                *own = own.hypot(e_fold * open);
             }
         }
         Problem {
@@ -109,7 +126,7 @@ impl Problem {
                 normal_stiffness_n_per_m: rig.finger.normal_stiffness_n_per_m,
                 lateral_stiffness_n_per_m: rig.finger.lateral_stiffness_n_per_m,
             },
-            prior_sd: [constants.mu0_log_sd[usize::from(mu0.is_none())], sd, sd],
+            prior_sd,
             certified,
             constants: constants.clone(),
         }
@@ -249,7 +266,7 @@ mod tests {
             let rig = RigFile::parse(&text).unwrap();
             let problem = Problem::new(&table, &rig, &Arc::default());
             let narrowed: Vec<_> =
-                problem.certified.iter().filter(|(m, _)| m.certified_by() == Some(key)).collect();
+                problem.certified.iter().filter(|(m, _)| m.form().certified_by == Some(key)).collect();
             // A cross-talk certificate stands for the other direction too.
             assert!(!narrowed.is_empty(), "{} bounds no law", key.name());
             for (member, sd) in narrowed {

@@ -13,7 +13,7 @@ use crate::noise::{PureError, settle};
 use crate::pairs::pairs;
 use crate::singles::{Search, lapsed, singles, sort, unlisted};
 use crate::starts::{nuisances_of, tempered};
-use effects::{known, library};
+use effects::{Effect, known, library};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -131,7 +131,7 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
             continue;
         }
         match table.lacks(effect.needs()) {
-            Some(because) => not_testable.push((effect.name(), because)),
+            Some(because) => not_testable.push((effect.name(), certified(*effect, rig).unwrap_or(because))),
             None => tried.push(index),
         }
     }
@@ -166,6 +166,17 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
         kernel,
         basis,
     }
+}
+
+/// Why an effect is not sought that only an outside standard shows, where rig.toml states that calibration.
+fn certified(effect: &dyn Effect, rig: &RigFile) -> Option<String> {
+    let standard = effect.needs().iter().any(|n| n.is_standard());
+    let key = effect.laws().iter().filter(|_| standard).find_map(|law| law.certified_by)?;
+    let sd = rig.calibration.sd(key)?;
+    Some(format!(
+        "an outside calibration leaves {sd:.1e} of the {} open, and that is part of the recalibrated baseline",
+        key.words()
+    ))
 }
 
 /// Pairs, where the best single leaves something: one that leaves nothing needs no second cause, unless it is the

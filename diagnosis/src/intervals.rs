@@ -59,9 +59,8 @@ pub fn estimates(problem: &Problem, best: &Posterior, basis: &DMatrix<f64>) -> V
                 .zip(places)
                 .map(|(p, k)| {
                     let bounds = p.coordinate_bounds();
-                    let sd = best.covariance[(k, k)].max(1e-16).sqrt();
                     let ends =
-                        [-1.0, 1.0].map(|side| end(problem, best, &covariance, floor, k, side, sd, bounds));
+                        [-1.0, 1.0].map(|side| end(problem, best, &covariance, floor, k, side, bounds));
                     let value = p.value(best.u[k]);
                     let [low, high] = ends.map(|e| e.unwrap_or(f64::NAN));
                     let shape = match (ends[0], ends[1]) {
@@ -105,7 +104,6 @@ fn cost(problem: &Problem, best: &Posterior, c: &Covariance, u: &[f64], m: &DVec
 }
 
 /// The coordinate at which the profile has fallen by [`FALL`]; `None` where it never does within the bounds.
-#[allow(clippy::too_many_arguments)]
 fn end(
     problem: &Problem,
     best: &Posterior,
@@ -113,9 +111,9 @@ fn end(
     floor: f64,
     k: usize,
     side: f64,
-    sd: f64,
     bounds: (f64, f64),
 ) -> Option<f64> {
+    let sd = best.covariance[(k, k)].max(1e-16).sqrt();
     let limit = if side < 0.0 { best.u[k] - bounds.0 } else { bounds.1 - best.u[k] };
     if limit <= 0.0 {
         return None;

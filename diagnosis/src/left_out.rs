@@ -104,7 +104,7 @@ pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
     list
 }
 
-/// Full friction at each pass, N: the unit of the contract's errors.
+/// Full friction at each pass, N: the unit of the errors of docs/contract.md.
 pub fn full_friction(problem: &Problem) -> Vec<f64> {
     problem.passes.iter().map(|p| problem.nominal.mu0 * p.normal_force_n).collect()
 }

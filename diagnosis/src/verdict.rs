@@ -1,4 +1,4 @@
-//! The verdict: everything the diagnosis says about one table, in the shape of the contract.
+//! The verdict: everything the diagnosis says about one table, in the shape of docs/contract.md.
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};

@@ -221,8 +221,8 @@ impl Corrected {
         let known = Condition::paper().within(ambient);
         self.effects.iter().find_map(|c| {
             let law = &c.effect.laws()[c.law];
-            let mut covariates = law.needs.iter().filter_map(|need| need.covariate());
-            let covariate = covariates.find(|k| k.of(&known).is_none())?;
+            let needs = c.effect.needs().iter().chain(law.needs);
+            let covariate = needs.filter_map(|n| n.covariate()).find(|k| k.of(&known).is_none())?;
             Some(Lack { effect: c.effect.name(), law: law.name, covariate })
         })
     }

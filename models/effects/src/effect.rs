@@ -234,8 +234,13 @@ pub enum Need {
 }
 
 impl Need {
-    /// The covariate without which a law that needs this does nothing.
-    pub const fn covariate(self) -> Option<&'static Covariate> {
+    /// Whether a calibration against an outside standard alone shows it: no table of passes does.
+    pub fn is_standard(self) -> bool {
+        matches!(self, Need::OutsideStandard | Need::NormalStandard)
+    }
+
+    /// What every condition must say for it, beyond what every table says.
+    pub fn covariate(self) -> Option<&'static Covariate> {
         match self {
             Need::Temperatures => Some(&covariate::TEMPERATURE),
             _ => None,
@@ -268,7 +273,7 @@ impl Need {
 
 /// A candidate cause of the gap. It nests the baseline: at the zero of its size nothing changes, bit for bit.
 pub trait Effect: Sync {
-    /// Name as the contract has it.
+    /// Name as docs/contract.md has it.
     fn name(&self) -> &'static str;
     /// Where it sits.
     fn place(&self) -> Place;

@@ -3,7 +3,7 @@
 use diagnosis::Verdict;
 use diagnosis::pulls::Pull;
 use diagnosis::verdict::Diagnosis;
-use models::rig_file::{CertifiedKey, RigFile};
+use models::rig_file::RigFile;
 use serde::Serialize;
 
 /// A certificate that speaks for an instrument which is blamed nevertheless.
@@ -33,7 +33,7 @@ pub fn at_fault(result: &Diagnosis, rig: &RigFile) -> Vec<AtFault> {
     }
     let leader = &result.fitted.candidates[result.decision.class[0]].best;
     let blamed = leader.members.iter().filter_map(|member| {
-        let key = member.certified_by()?;
+        let key = member.form().certified_by?;
         let stated_sd = rig.calibration.sd(key)?;
         let certificate = rig.calibration.certificate_of(key);
         Some(AtFault { effect: member.name(), quantity: key.words(), certificate, stated_sd })
