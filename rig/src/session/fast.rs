@@ -54,7 +54,7 @@ fn sweep(
     let [force, amplifier, stage] = rig.split();
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
-    let mut ports = Ports { force, amplifier, stage: Box::new(stage) };
+    let mut ports = Ports::new(force, amplifier, Box::new(stage));
     let file = kept.new_record()?;
     let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
     let config = job.setup.config;
@@ -129,7 +129,7 @@ pub fn rehearse(
         Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise);
     let [force, amplifier, stage] =
         VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
-    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let mut ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let config = setup.config;
     let mut state = CycleState::default();
     let mut queue: VecDeque<Command> = VecDeque::new();

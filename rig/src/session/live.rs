@@ -12,11 +12,11 @@ use super::{Job, News, Signals, Summary, Unfinished};
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 pub use claim::RigClaim;
-use crossbeam_queue::ArrayQueue;
 use miette::{IntoDiagnostic, WrapErr};
 use realtime::cycle::Command;
 use realtime::pacing::{self, Lifeline, LoopParts};
 use realtime::ports::Nanos;
+use realtime::queue::CommandQueue;
 use realtime::turn::{Ports, Row};
 use realtime::witness::Witnesses;
 use ringbuf::HeapRb;
@@ -66,17 +66,17 @@ pub fn run(
 
     let (row_in, row_out) = HeapRb::<Row>::new(RING).split();
     let (watch_in, mut watch) = HeapRb::<Row>::new(RING).split();
-    let commands = Arc::new(ArrayQueue::new(64));
+    let commands = Arc::new(CommandQueue::new(64));
     let life = Arc::new(Lifeline::default());
     let lost = Arc::new(AtomicBool::new(false));
     let parts = LoopParts {
         config: job.setup.config,
         model: Arc::clone(&job.model),
-        ports: Ports {
-            force: job.setup.certificates.calibrated(rig.force),
-            amplifier: job.setup.certificates.calibrated_amplifier(rig.amplifier),
-            stage: rig.stage,
-        },
+        ports: Ports::new(
+            job.setup.certificates.calibrated(rig.force),
+            job.setup.certificates.calibrated_amplifier(rig.amplifier),
+            rig.stage,
+        ),
         commands: Arc::clone(&commands),
         rows: row_in,
         watch: watch_in,

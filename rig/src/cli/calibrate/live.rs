@@ -7,13 +7,13 @@
 
 use crate::session::RigClaim;
 use crate::setup::Setup;
-use crossbeam_queue::ArrayQueue;
 use drivers::Links;
 use miette::IntoDiagnostic;
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
 use realtime::cycle::{Command, Marker};
 use realtime::pacing::{self, Lifeline, LoopParts};
+use realtime::queue::CommandQueue;
 use realtime::safety::{Request, Trip};
 use realtime::turn::{Ports, Row};
 use ringbuf::HeapRb;
@@ -162,7 +162,7 @@ struct Seen {
 
 /// The loop with the rig, driven to one amplitude after another; dropping it stops the drive.
 struct Drive {
-    commands: Arc<ArrayQueue<Command>>,
+    commands: Arc<CommandQueue>,
     life: Arc<Lifeline>,
     seen: Arc<Mutex<Seen>>,
     ended: Arc<AtomicBool>,
@@ -176,7 +176,7 @@ impl Drive {
         let origin_ns = pacing::monotonic_ns();
         let rig = drivers::open(&setup.instruments(), epoch).map_err(|e| miette::miette!("{e}"))?;
         let model = SpringSlider::new(setup.tip.finger).map_err(|e| miette::miette!("{e}"))?;
-        let commands = Arc::new(ArrayQueue::new(64));
+        let commands = Arc::new(CommandQueue::new(64));
         let life = Arc::new(Lifeline::default());
         // Nobody records here: a ring of one is full at once, and what is lost is not missed.
         let (rows, _) = HeapRb::<Row>::new(1).split();
@@ -185,7 +185,7 @@ impl Drive {
             config: setup.config,
             model: Arc::new(model),
             // The raw set-point is what is calibrated: a certificate of the setup is not applied.
-            ports: Ports { force: rig.force, amplifier: rig.amplifier, stage: rig.stage },
+            ports: Ports::new(rig.force, rig.amplifier, rig.stage),
             commands: Arc::clone(&commands),
             rows,
             watch,

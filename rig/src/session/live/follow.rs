@@ -2,9 +2,9 @@
 
 use super::{Note, Signals};
 use crate::sequence::{Outcome, Sequence};
-use crossbeam_queue::ArrayQueue;
 use realtime::cycle::Command;
 use realtime::pacing::Lifeline;
+use realtime::queue::CommandQueue;
 use realtime::turn::Row;
 use ringbuf::traits::Consumer;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,7 +16,7 @@ const LOST_AFTER: Duration = Duration::from_millis(2000);
 
 /// What ties this thread to the others.
 pub(super) struct Strands<'a> {
-    pub commands: &'a ArrayQueue<Command>,
+    pub commands: &'a CommandQueue,
     pub life: &'a Lifeline,
     pub signals: &'a Signals,
     /// Set where the record cannot be kept.
