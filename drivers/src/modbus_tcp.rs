@@ -6,6 +6,7 @@
 //! and made anew. An answer that comes late then finds no socket: it can never become a force.
 
 use super::modbus::{Conversation, Registers, Trouble};
+use super::off::Closed;
 use super::session::{Ended, Session};
 use super::setup::InstrumentSetup;
 use instruments::schema::Table;
@@ -21,7 +22,7 @@ use tokio_modbus::prelude::Slave;
 ///
 /// # Errors
 /// Where the address makes no sense or no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<()>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
     let link = &session.endpoint.profile().description.link;
     let address = resolve(&instrument.address, link.port)?;
     let unit = instrument.unit.or(link.unit).unwrap_or(255);
@@ -130,5 +131,9 @@ impl Registers for Tcp<'_> {
 
     fn write(&mut self, _session: &Session, address: u16, registers: &[u16]) -> Result<(), Trouble> {
         part(within(self.runtime, self.answer_ms, self.context.write_multiple_registers(address, registers)))
+    }
+
+    fn wait_up_to(&mut self, answer_ms: u32) {
+        self.answer_ms = answer_ms;
     }
 }

@@ -319,7 +319,7 @@ fn supply_switch(c: &Context<'_>) -> Option<(f64, f64)> {
     let timing = &c.limits.timing.supply;
     let limit = timing.age_limit().seconds();
     match c.seen.supply {
-        Err(NoData::NotFitted) => None,
+        Err(NoData::NotFitted) if !c.limits.supply_required => None,
         Err(_) => Some((f64::INFINITY, limit)),
         Ok(state) if !timing.is_fresh(state.taken_at, c.now) => {
             Some((c.now.since(state.taken_at).seconds(), limit))
