@@ -419,7 +419,8 @@ fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     limits.supply_required = file.supply_relay.is_some();
     limits.load_commanded = file.stage.dead_weight_n.is_none();
     if let Ok(profile) = drivers::profile(&file.amplifier.profile) {
-        limits.amplifier_watchdog = profile.set("heartbeat").is_some();
+        // A virtual rig inside this program drives nothing real: it may go without what a real one must have.
+        limits.amplifier_watchdog = profile.set("heartbeat").is_some() || file.virtual_rig.is_some();
         let noisy = profile.signal("amplitude").and_then(|s| profile.description.signal[s.0].noise);
         limits.amplitude_frozen_after = l.amplitude_frozen_after.or(noisy.map(|_| 200));
     }
