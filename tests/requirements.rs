@@ -158,6 +158,22 @@ fn every_requirement_has_a_test_and_the_page_says_which() {
     );
 }
 
+/// The safety case names its evidence as `file::test`: each is there.
+#[test]
+fn the_safety_cases_evidence_exists() {
+    let page = std::fs::read_to_string(file("docs/safety-case.md")).unwrap();
+    let named: Vec<(&str, &str)> = page
+        .split('`')
+        .filter_map(|word| word.split_once(".rs::"))
+        .filter(|(path, name)| !path.contains(char::is_whitespace) && !name.is_empty())
+        .collect();
+    assert!(named.len() > 20, "{named:?}");
+    for (path, name) in named {
+        let source = std::fs::read_to_string(file(&format!("{path}.rs"))).unwrap_or_default();
+        assert!(source.contains(&format!("fn {name}(")), "no test {name} in {path}.rs");
+    }
+}
+
 #[test]
 fn start_up_is_no_rule() {
     assert!(RULES.iter().all(|r| r.cause != Cause::StartUp));

@@ -3,7 +3,8 @@
 //! Numbers to 50 are those of the project's fault list; what no row of it names comes after. Bounds count from the first
 //! cycle whose inputs show the fault, that cycle included. They are stated in what the limits allow for (the age of a force
 //! sample or of a state, the time in which a set-point must show), so that they hold at every [`Pace`]. Garbage is random over
-//! 400 N: one sample in some hundreds is plausible by chance, so its bound allows for that.
+//! 400 N: one sample in some hundreds is plausible by chance, so its bound allows for that. Two spikes side by side are an
+//! overforce.
 
 use super::tamper::Tamper;
 use realtime::ports::Nanos;
@@ -229,12 +230,12 @@ rows! {
     2 "forces_stuck" ALL Channel(T::Force, F::Stuck, 0.0, ON) => Off(cycles(FROZEN + 1)), LateralFrozen | NormalFrozen;
     2 "normal_stuck" ALL Channel(T::Normal, F::Stuck, 0.0, ON) => Off(cycles(FROZEN + 1)), NormalFrozen;
     2 "amplitude_stuck" STEADY Shown(Tamper::AmplitudeStuck) => Off(cycles(AMPLITUDE_FROZEN + 2)), AmplitudeFrozen;
-    2 "normal_counter_stuck_at_40_n" ALL Shown(Tamper::NormalStuckCounter(40.0)) => Off(cycles(3)), NormalOverforce;
+    2 "normal_counter_stuck_at_40_n" ALL Shown(Tamper::NormalStuckCounter(40.0)) => Off(cycles(4)), NormalOverforce;
     3 "forces_invalid" ALL Channel(T::Force, F::Invalid, 0.0, ON) => Off(cycles(4)), LateralInvalid | NormalInvalid;
     3 "lateral_invalid" ALL Channel(T::Lateral, F::Invalid, 0.0, ON) => Off(cycles(4)), LateralInvalid;
     3 "two_invalid_samples" ALL Channel(T::Force, F::Invalid, 0.0, 2) => NoTrip;
     4 "single_spike" ALL Channel(T::Force, F::Spikes, 1e9, ON) => NoTrip;
-    5 "repeated_spikes" DRIVEN Channel(T::Force, F::Spikes, 8.0, ON) => Off(cycles(51)), Noisy;
+    5 "repeated_spikes" DRIVEN Channel(T::Force, F::Spikes, 8.0, ON) => Off(cycles(51)), Noisy | NormalOverforce | LateralOverforce;
     6 "forces_saturated" ALL Channel(T::Force, F::Saturated, 0.0, ON) => Off(cycles(2)), LateralSaturated | NormalSaturated;
     6 "normal_saturated" ALL Channel(T::Normal, F::Saturated, 0.0, ON) => Off(cycles(2)), NormalSaturated;
     6 "normal_saturated_by_turns" ALL Shown(Tamper::NormalRailsByTurns) => Off(cycles(10)), NormalSaturated;
