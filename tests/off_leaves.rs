@@ -126,7 +126,7 @@ impl Bench {
         let (rig, reins, _) = WallLoop::start(Parts {
             config: setup.config,
             model: Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap()),
-            ports: Ports { force: opened.force, amplifier: opened.amplifier, stage: opened.stage },
+            ports: Ports::new(opened.force, opened.amplifier, opened.stage),
             links: opened.links,
             priority: None,
             origin_ns,

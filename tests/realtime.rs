@@ -63,7 +63,7 @@ fn no_allocation_in_a_hundred_thousand_cycles_of_a_sweep() {
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
     let config = setup.config;
     let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::bundled(), 3).unwrap().split();
-    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let mut ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let (mut rows, mut drain) = HeapRb::<Row>::new(64).split();
     let queue = crossbeam_queue::ArrayQueue::<Command>::new(64);
     let mut state = CycleState::default();
@@ -107,7 +107,7 @@ fn a_record_takes_no_more_memory_the_longer_it_gets() {
     let setup = Setup::load("virtual-ideal").unwrap();
     let model = SpringSlider::new(setup.tip.finger).unwrap();
     let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::ideal(), 3).unwrap().split();
-    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let mut ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut state = CycleState::default();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("long.mcap");

@@ -3,11 +3,11 @@
 //! Overrun policy: a cycle that ends past the next deadline skips the deadlines it has missed (they are counted), so
 //! the loop never runs two cycles back to back to catch up.
 
-use crate::cycle::{Command, Config, CycleState};
+use crate::cycle::{Config, CycleState};
 use crate::ports::Nanos;
+use crate::queue::CommandQueue;
 use crate::safety::{DriveCommand, StageCommand};
 use crate::turn::{Ports, Row, Tick, turn};
-use crossbeam_queue::ArrayQueue;
 use hdrhistogram::Histogram;
 use models::prediction::FrictionModel;
 use ringbuf::HeapProd;
@@ -78,7 +78,7 @@ pub struct LoopParts {
     /// The rig.
     pub ports: Ports,
     /// Commands in.
-    pub commands: Arc<ArrayQueue<Command>>,
+    pub commands: Arc<CommandQueue>,
     /// Rows out, to the record.
     pub rows: HeapProd<Row>,
     /// The same rows, to the sweep: so that a slow disk cannot hold the sweep up.

@@ -3,7 +3,7 @@
 
 use crate::cycle::{self, COMMANDS_PER_CYCLE, Config, CycleState, Inputs, Marker, Online, Outputs};
 use crate::estimate::{MuRelative, NoMu};
-use crate::ports::{Amplifier, ForceSensor, Nanos, Stage};
+use crate::ports::{Absent, Amplifier, ForceSensor, Nanos, SafetyInputs, Stage, SupplyCommand, SupplySwitch};
 use crate::safety::{Cause, Observation, Remark, Trip};
 use models::prediction::FrictionModel;
 use serde::{Deserialize, Serialize};
@@ -16,6 +16,29 @@ pub struct Ports {
     pub amplifier: Box<dyn Amplifier>,
     /// Moves and loads the finger.
     pub stage: Box<dyn Stage>,
+    /// The second switch-off channel; [`Absent`] where the rig has none.
+    pub supply: Box<dyn SupplySwitch>,
+    /// Emergency stop, interlock and dead-man; [`Absent`] where the rig has none.
+    pub contacts: Box<dyn SafetyInputs>,
+}
+
+impl Ports {
+    /// A rig without a second switch-off channel and without safety contacts.
+    pub fn new(force: Box<dyn ForceSensor>, amplifier: Box<dyn Amplifier>, stage: Box<dyn Stage>) -> Self {
+        Ports { force, amplifier, stage, supply: Box::new(Absent), contacts: Box::new(Absent) }
+    }
+
+    /// The same rig with a second switch-off channel.
+    #[must_use]
+    pub fn with_supply(self, supply: Box<dyn SupplySwitch>) -> Self {
+        Ports { supply, ..self }
+    }
+
+    /// The same rig with safety contacts.
+    #[must_use]
+    pub fn with_contacts(self, contacts: Box<dyn SafetyInputs>) -> Self {
+        Ports { contacts, ..self }
+    }
 }
 
 /// One cycle for the record: what came in, what was decided. Plain data, `Copy`.
@@ -128,7 +151,7 @@ pub fn turn(
     ports.amplifier.command(out.drive, now);
     ports.stage.command(out.stage, now);
     if out.cut_supply {
-        ports.amplifier.cut_supply(now);
+        ports.supply.command(SupplyCommand::Cut, now);
     }
     Row::of(number, now, &inputs, &out)
 }

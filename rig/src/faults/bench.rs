@@ -223,11 +223,11 @@ pub fn run(scene: &Scene, keep: bool) -> Found {
     let shown = Arc::new(AtomicU64::new(0));
     let tamper = scene.tampers();
     let tampered = |inner| Tampered { inner, tamper, shown: Arc::clone(&shown) };
-    let mut ports = Ports {
-        force: Box::new(FaultyForce::new(tampered(force), &faults, scene.seed)),
-        amplifier: Box::new(FaultyAmplifier::new(tampered(amplifier), &faults, scene.seed)),
-        stage: Box::new(FaultyStage::new(tampered(stage), &faults, scene.seed)),
-    };
+    let mut ports = Ports::new(
+        Box::new(FaultyForce::new(tampered(force), &faults, scene.seed)),
+        Box::new(FaultyAmplifier::new(tampered(amplifier), &faults, scene.seed)),
+        Box::new(FaultyStage::new(tampered(stage), &faults, scene.seed)),
+    );
     let mut state = CycleState::default();
     let mut watch = Watch::new(scene);
     let mut rows = Vec::new();

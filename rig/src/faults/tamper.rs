@@ -119,10 +119,6 @@ impl<P: Amplifier> Amplifier for Tampered<P> {
         self.show(now);
         Ok(state)
     }
-
-    fn cut_supply(&mut self, now: Nanos) -> bool {
-        self.inner.cut_supply(now)
-    }
 }
 
 impl<P: Stage> Stage for Tampered<P> {

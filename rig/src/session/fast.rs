@@ -54,7 +54,7 @@ fn sweep(
     let [force, amplifier, stage] = rig.split();
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
-    let ports = Ports { force, amplifier, stage: Box::new(stage) };
+    let ports = Ports::new(force, amplifier, Box::new(stage));
     let file = kept.new_record()?;
     let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
     let mut rig = VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports);
@@ -133,7 +133,7 @@ pub fn rehearse(
         Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise);
     let [force, amplifier, stage] =
         VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
-    let ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let mut passes = Vec::new();
     let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut || None, &mut |_, _, reaction| {

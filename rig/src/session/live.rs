@@ -64,11 +64,11 @@ pub fn run(
     let (rig, mut reins, row_out) = WallLoop::start(Parts {
         config: job.setup.config,
         model: Arc::clone(&job.model),
-        ports: Ports {
-            force: job.setup.certificates.calibrated(rig.force),
-            amplifier: job.setup.certificates.calibrated_amplifier(rig.amplifier),
-            stage: rig.stage,
-        },
+        ports: Ports::new(
+            job.setup.certificates.calibrated(rig.force),
+            job.setup.certificates.calibrated_amplifier(rig.amplifier),
+            rig.stage,
+        ),
         links: rig.links,
         priority,
         origin_ns,

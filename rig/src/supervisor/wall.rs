@@ -1,12 +1,12 @@
 //! The loop in wall-clock time: a thread of its own, instruments behind links.
 
 use super::{Loop, OffReport};
-use crossbeam_queue::ArrayQueue;
 use drivers::Links;
 use miette::IntoDiagnostic;
 use models::prediction::FrictionModel;
 use realtime::cycle::{Command, Config};
 use realtime::pacing::{self, Lifeline, LoopParts, LoopReport};
+use realtime::queue::CommandQueue;
 use realtime::turn::{Ports, Row};
 use ringbuf::traits::{Consumer, Split};
 use ringbuf::{HeapCons, HeapProd, HeapRb};
@@ -46,7 +46,7 @@ pub struct Parts {
 
 /// A running loop and its rig. Ending or dropping it stops the loop, switches the rig off and reads it back.
 pub struct WallLoop {
-    commands: Arc<ArrayQueue<Command>>,
+    commands: Arc<CommandQueue>,
     life: Arc<Lifeline>,
     looping: Option<JoinHandle<LoopReport>>,
     links: Option<Links>,
@@ -82,7 +82,7 @@ impl WallLoop {
 
     fn start_into(parts: Parts, rows: HeapProd<Row>, watch: HeapProd<Row>) -> miette::Result<Self> {
         let Parts { config, model, ports, links, priority, origin_ns } = parts;
-        let commands = Arc::new(ArrayQueue::new(QUEUE));
+        let commands = Arc::new(CommandQueue::new(QUEUE));
         let life = Arc::new(Lifeline::default());
         let mut rig = WallLoop {
             commands: Arc::clone(&commands),
@@ -98,7 +98,7 @@ impl WallLoop {
 
     /// Stops the rig at once; the loop goes on, and shows it.
     pub fn stop(&self) {
-        stop(&self.commands);
+        self.commands.stop();
     }
 
     /// Hands a command to the loop. False: the loop does not live any more.
@@ -145,13 +145,9 @@ impl Drop for WallLoop {
     }
 }
 
-fn stop(commands: &ArrayQueue<Command>) {
-    let _ = commands.force_push(Command::Stop);
-}
-
 /// Puts a command into the queue. After a pause of the caller the rows come in a burst, and so do its commands: a full queue
 /// means only that the loop has not taken them yet, as long as its heart beats.
-fn send(commands: &ArrayQueue<Command>, life: &Lifeline, command: Command) -> bool {
+fn send(commands: &CommandQueue, life: &Lifeline, command: Command) -> bool {
     let mut beat = life.heartbeat.load(Ordering::Relaxed);
     let mut since = Instant::now();
     let mut waiting = command;
@@ -170,7 +166,7 @@ fn send(commands: &ArrayQueue<Command>, life: &Lifeline, command: Command) -> bo
 
 /// What leads a loop in wall-clock time: its commands, and its rows as they come.
 pub struct Reins {
-    commands: Arc<ArrayQueue<Command>>,
+    commands: Arc<CommandQueue>,
     life: Arc<Lifeline>,
     watch: HeapCons<Row>,
     heard: Instant,
@@ -180,7 +176,7 @@ impl Reins {
     /// Something that stops the rig at once, from any thread.
     pub fn stopper(&self) -> impl Fn() + Send + Sync + 'static {
         let commands = Arc::clone(&self.commands);
-        move || stop(&commands)
+        move || commands.stop()
     }
 }
 
@@ -199,7 +195,7 @@ impl Loop for Reins {
     }
 
     fn stop(&mut self) {
-        stop(&self.commands);
+        self.commands.stop();
     }
 
     fn is_lost(&self) -> bool {

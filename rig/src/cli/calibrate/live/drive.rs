@@ -54,7 +54,7 @@ impl Drive {
             config: setup.config,
             model: Arc::new(model),
             // The raw set-point is what is calibrated: a certificate of the setup is not applied.
-            ports: Ports { force: rig.force, amplifier: rig.amplifier, stage: rig.stage },
+            ports: Ports::new(rig.force, rig.amplifier, rig.stage),
             links: rig.links,
             priority: (setup.file.pace.priority > 0).then_some(setup.file.pace.priority),
             origin_ns,
