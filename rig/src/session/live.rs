@@ -68,7 +68,9 @@ pub fn run(
             job.setup.certificates.calibrated(rig.force),
             job.setup.certificates.calibrated_amplifier(rig.amplifier),
             rig.stage,
-        ),
+        )
+        .with_supply(rig.supply)
+        .with_contacts(rig.contacts),
         links: rig.links,
         priority,
         origin_ns,
