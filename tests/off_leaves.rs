@@ -130,7 +130,7 @@ impl Bench {
                 .with_supply(opened.supply)
                 .with_contacts(opened.contacts),
             links: opened.links,
-            priority: None,
+            pacing: realtime::pacing::Pacing::default(),
             origin_ns,
         })
         .unwrap();

@@ -33,7 +33,11 @@ impl InstrumentsSetup {
 
     /// Every instrument.
     pub fn all(&self) -> impl Iterator<Item = &InstrumentSetup> {
-        self.force.iter().chain([&self.amplifier, &self.stage]).chain(&self.supply_relay).chain(&self.safety_inputs)
+        self.force
+            .iter()
+            .chain([&self.amplifier, &self.stage])
+            .chain(&self.supply_relay)
+            .chain(&self.safety_inputs)
     }
 
     /// Every instrument, to be changed.

@@ -62,6 +62,12 @@ pub struct Row {
     pub marker: Marker,
     /// Whether the rig is armed.
     pub armed: bool,
+    /// Whether the second switch-off channel was being proved.
+    #[serde(default)]
+    pub proving: bool,
+    /// Whether the supply was told to be cut.
+    #[serde(default)]
+    pub supply_cut: bool,
     /// A trip latched in this cycle.
     pub tripped: Option<Trip>,
     /// The first rule that is broken now, latched or not.
@@ -90,6 +96,8 @@ impl Row {
             load_n: out.stage.normal_force_n(),
             marker: out.marker,
             armed: out.armed,
+            proving: out.proving,
+            supply_cut: out.supply == SupplyCommand::Cut,
             tripped: out.tripped,
             blocking: out.blocking,
             mu_relative: out.mu_relative,
@@ -123,7 +131,7 @@ pub struct Tick {
     pub now: Nanos,
 }
 
-/// One turn: read the ports, step, command the ports.
+/// One turn: read the ports, decide, command the ports, and only then estimate and compare: a slow model delays no 'off'.
 pub fn turn(
     config: &Config,
     model: &dyn FrictionModel,
@@ -145,13 +153,14 @@ pub fn turn(
         amplifier: ports.amplifier.state(now),
         stage: ports.stage.state(now),
         lateness,
+        supply: ports.supply.state(now),
+        contacts: ports.contacts.read(now),
     };
     let inputs = Inputs { commands: taken, seen };
-    let out = cycle::step(config, model, state, &inputs, now);
-    ports.amplifier.command(out.drive, now);
-    ports.stage.command(out.stage, now);
-    if out.cut_supply {
-        ports.supply.command(SupplyCommand::Cut, now);
-    }
+    let decision = cycle::decide(config, state, &inputs, now);
+    ports.amplifier.command(decision.drive, now);
+    ports.supply.command(decision.supply, now);
+    ports.stage.command(decision.stage, now);
+    let out = cycle::judge(config, model, state, &inputs, &decision, now);
     Row::of(number, now, &inputs, &out)
 }

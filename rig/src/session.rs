@@ -170,7 +170,8 @@ impl Job {
             &self.setup.tip,
             self.setup.file.noise,
         )
-        .watching(&self.setup.certificates.temperature_ranges);
+        .watching(&self.setup.certificates.temperature_ranges)
+        .guarded_by(&self.setup.config.limits);
         for pass in &dir.made {
             sequence.remember(pass);
         }
@@ -198,6 +199,11 @@ impl Job {
         config.finger.normal_stiffness_n_per_m = finger.normal_stiffness_n_per_m;
         config.finger.lateral_stiffness_n_per_m = finger.lateral_stiffness_n_per_m;
         config.finger.stiffness_relative_sd = 0.0;
-        sim::world::World::new(&config, self.seed).map_err(wrong)
+        let mut world = sim::world::World::new(&config, self.seed).map_err(wrong)?;
+        if virtual_rig.hand_holds {
+            let holds_dead_man_from = Some(realtime::ports::Nanos(200_000_000));
+            world.set_operator(sim::world::Operator { holds_dead_man_from, ..world.operator() });
+        }
+        Ok(world)
     }
 }

@@ -13,8 +13,9 @@ use models::quantity::PeakToPeak;
 use realtime::compare::PassNoise;
 use realtime::cycle::Config;
 use realtime::estimate::EstimateConfig;
+use realtime::pacing::Pacing;
 use realtime::ports::Nanos;
-use realtime::safety::{ChannelTiming, LimitError, Limits};
+use realtime::safety::{ChannelTiming, LimitError, Limits, Timing};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -35,6 +36,13 @@ pub struct SetupFile {
     pub amplifier: InstrumentSetup,
     /// The stage.
     pub stage: InstrumentSetup,
+    /// The second switch-off channel: an output that cuts the amplifier's supply, with readback. It is proved before every
+    /// arming. A human finger, and an amplifier without a watchdog of its own, need one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supply_relay: Option<InstrumentSetup>,
+    /// Emergency stop, interlock and dead-man device, as digital inputs. A human finger needs the first and the last.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub safety_inputs: Option<InstrumentSetup>,
     /// The vibrometer's controller, whose settings calibrations read back; it takes no part in a run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vibrometer: Option<VibrometerSetup>,
@@ -71,11 +79,30 @@ pub struct Pace {
     pub rate_hz: f64,
     /// SCHED_FIFO priority to ask for, 1 to 98; 0 asks for none.
     pub priority: i32,
+    /// CPU to run on and no other: for one that is kept free of other work.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cpu: Option<usize>,
+    /// Keeps CPUs out of deep sleep while the loop runs, for some watts.
+    pub keep_cpus_awake: bool,
+    /// us before each deadline that are spun, not slept; at 1 kHz 100 us cost a tenth of a CPU.
+    pub spin_us: f64,
 }
 
 impl Default for Pace {
     fn default() -> Self {
-        Pace { rate_hz: 1000.0, priority: 80 }
+        Pace { rate_hz: 1000.0, priority: 80, cpu: None, keep_cpus_awake: false, spin_us: 0.0 }
+    }
+}
+
+impl Pace {
+    /// What the loop's thread is to ask of the machine.
+    pub fn pacing(&self) -> Pacing {
+        Pacing {
+            priority: (self.priority > 0).then_some(self.priority),
+            cpu: self.cpu,
+            keep_cpus_awake: self.keep_cpus_awake,
+            spin_ns: (self.spin_us * 1e3) as u64,
+        }
     }
 }
 
@@ -87,6 +114,9 @@ pub struct VirtualRig {
     pub ideal: bool,
     /// Seed of the finger's true stiffnesses about those that the setup states.
     pub finger_seed: u64,
+    /// A hand grips the virtual dead-man device a fifth of a second after the start, and holds it: for trials with a human
+    /// finger that is none.
+    pub hand_holds: bool,
 }
 
 /// Soft limits as a setup states them.
@@ -121,10 +151,20 @@ pub struct LimitsFile {
     pub temperature_fitted: Option<bool>,
     /// Equal raw samples in a row.
     pub frozen_after: Option<u32>,
+    /// Equal raw amplitudes in a row, while driven; left out, 200 where the profile states the readback's noise.
+    pub amplitude_frozen_after: Option<u32>,
     /// A human finger is in the rig.
     pub human_contact: Option<bool>,
-    /// s.
+    /// A key held at the terminal stands for a dead-man device: for trials.
+    pub dead_man_key: Option<bool>,
+    /// s in one go.
     pub exposure_max_s: Option<f64>,
+    /// s of rest that end a go.
+    pub exposure_rest_s: Option<f64>,
+    /// Share of the last hour.
+    pub exposure_duty_max: Option<f64>,
+    /// m2/s: the squared rms velocity of the plate, summed over the last hour.
+    pub exposure_dose_max_m2_s: Option<f64>,
     /// s that a link's thread may be held up before its channel counts as stale, beyond three of its periods.
     pub link_stall_s: Option<f64>,
     /// Late cycles among a thousand.
@@ -191,6 +231,11 @@ impl Setup {
         if !(0..=98).contains(&file.pace.priority) {
             return Err(bad(&["loop", "priority"], "a priority is 0 (none) to 98".into()).into());
         }
+        let half_period_us = 0.5e6 / file.pace.rate_hz;
+        if !(0.0..=half_period_us).contains(&file.pace.spin_us) {
+            let problem = format!("spin_us = {}: 0 to {half_period_us} (half a period)", file.pace.spin_us);
+            return Err(bad(&["loop", "spin_us"], problem).into());
+        }
         if !(1..=realtime::estimate::WINDOW_MAX).contains(&file.estimate.window) {
             let most = realtime::estimate::WINDOW_MAX;
             return Err(bad(&["estimate", "window"], format!("a window has 1 to {most} samples")).into());
@@ -209,11 +254,16 @@ impl Setup {
         let tip = Fingertip::resolve(&file.finger, folder).map_err(|p| bad(&["finger"], p))?;
         let cycle = Nanos((1e9 / file.pace.rate_hz).round() as u64);
         let limits = limits(&file, cycle).map_err(|error| {
-            let name = match error {
-                LimitError::AboveHard { name, .. } | LimitError::Unusable { name, .. } => name,
-            };
-            bad(&["limits", name], error.to_string())
+            // The rate of a channel stands with its instrument, every other limit under [limits].
+            match error.name() {
+                table @ ("amplifier" | "stage" | "supply_relay" | "safety_inputs") => {
+                    bad(&[table, "rate_hz"], error.to_string())
+                }
+                "force" => bad(&["force"], error.to_string()),
+                name => bad(&["limits", name], error.to_string()),
+            }
         })?;
+        guarded(&file).map_err(|problem| bad(&["limits", "human_contact"], problem))?;
         let config = Config { limits, estimate: file.estimate };
         let now_unix_s = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
@@ -315,6 +365,37 @@ impl Setup {
 const LINK_STALL_S: f64 = 0.02;
 const LINK_STALL_MAX_S: f64 = 0.05;
 
+/// A human finger needs its guards, and is refused with what is missing.
+fn guarded(file: &SetupFile) -> Result<(), String> {
+    let human = file.limits.human_contact == Some(true);
+    let key = file.limits.dead_man_key == Some(true);
+    let missing = match (&file.supply_relay, &file.safety_inputs) {
+        _ if !human => None,
+        (None, _) => Some("a second switch-off channel ([supply_relay])"),
+        (_, None) if key => Some("an emergency stop ([safety_inputs])"),
+        (_, None) => Some("an emergency stop and a dead-man device ([safety_inputs])"),
+        _ => None,
+    };
+    missing.map_or(Ok(()), |what| Err(format!("human_contact = true: a finger needs {what}")))
+}
+
+/// Rates at which a channel may be read, by who it is: what [`Limits::checked`] demands of periods, said of rates.
+fn rate(instrument: &InstrumentSetup, name: &'static str, low: f64) -> Result<f64, LimitError> {
+    let stated = instrument.rate_hz.or_else(|| drivers::nominal_rate_hz(&instrument.profile));
+    let value = stated.unwrap_or(100.0);
+    let high = 1e5;
+    if value >= low && value <= high {
+        Ok(value)
+    } else {
+        let why = "samples a second: a slower channel shows what goes wrong too late";
+        Err(LimitError::OutOfRange { name, value, low, high, why })
+    }
+}
+
+/// Slowest rates of forces and of states, in Hz.
+const FORCE_RATE_MIN_HZ: f64 = 20.0;
+const STATE_RATE_MIN_HZ: f64 = 10.0;
+
 /// Soft limits over the paper's, timing from the instruments' profiles.
 fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     let l = &file.limits;
@@ -332,14 +413,27 @@ fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     set(&mut limits.travel_m.1, l.travel_max_m);
     set(&mut limits.temperature_max_c, l.temperature_max_c);
     set(&mut limits.exposure_max_s, l.exposure_max_s);
+    set(&mut limits.exposure_rest_s, l.exposure_rest_s);
+    set(&mut limits.exposure_duty_max, l.exposure_duty_max);
+    set(&mut limits.exposure_dose_max_m2_s, l.exposure_dose_max_m2_s);
     limits.amplitude_max = l.amplitude_max_pp_m.map_or(limits.amplitude_max, PeakToPeak::from_metres);
     limits.temperature_fitted = l.temperature_fitted.unwrap_or(limits.temperature_fitted);
     limits.frozen_after = l.frozen_after.unwrap_or(limits.frozen_after);
     limits.late_cycles_max = l.late_cycles_max.unwrap_or(limits.late_cycles_max);
     limits.late_in_a_row_max = l.late_in_a_row_max.unwrap_or(limits.late_in_a_row_max);
     limits.human_contact = l.human_contact.unwrap_or(limits.human_contact);
-    limits.timing.ring_time = l.plate_ring_time_s.map_or(limits.timing.ring_time, Nanos::from_seconds);
-    limits.timing.command_expiry = Nanos((2 * cycle.0).max(20_000_000));
+    limits.dead_man_key = l.dead_man_key.unwrap_or(false);
+    limits.supply_required = file.supply_relay.is_some();
+    limits.load_commanded = file.stage.dead_weight_n.is_none();
+    if let Ok(profile) = drivers::profile(&file.amplifier.profile) {
+        limits.amplifier_watchdog = profile.set("heartbeat").is_some();
+        let noisy = profile.signal("amplitude").and_then(|s| profile.description.signal[s.0].noise);
+        limits.amplitude_frozen_after = l.amplitude_frozen_after.or(noisy.map(|_| 200));
+    }
+    // What is no number of seconds stays one that is refused: a cast would make it zero, or the largest there is.
+    let ring_s = l.plate_ring_time_s.unwrap_or(limits.timing.ring_time.seconds());
+    limits.timing.ring_time = if ring_s.is_finite() { Nanos::from_seconds(ring_s) } else { Nanos(u64::MAX) };
+    limits.timing.command_expiry = Timing::longest_expiry(cycle);
 
     // A channel is stale after a number of its own periods, never of the loop's cycles. On a general-purpose kernel a
     // link thread may be held up for some milliseconds: the latency allows for that and is stated.
@@ -349,19 +443,24 @@ fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
         return Err(LimitError::Unusable { name: "link_stall_s", value: stall, needed });
     }
     let stall = Nanos::from_seconds(stall);
-    let timing = |instrument: &InstrumentSetup| -> ChannelTiming {
-        let rate =
-            instrument.rate_hz.or_else(|| drivers::nominal_rate_hz(&instrument.profile)).unwrap_or(100.0);
-        let period = Nanos((1e9 / rate) as u64).0.max(cycle.0);
-        ChannelTiming { period: Nanos(period), latency: stall, periods: 3 }
+    let timing = |instrument: &InstrumentSetup, name: &'static str| -> Result<ChannelTiming, LimitError> {
+        let low = if name == "force" { FORCE_RATE_MIN_HZ } else { STATE_RATE_MIN_HZ };
+        let period = ((1e9 / rate(instrument, name, low)?) as u64).max(cycle.0);
+        Ok(ChannelTiming { period: Nanos(period), latency: stall, periods: 3 })
     };
     if let (Some(first), Some(last)) = (file.force.first(), file.force.last()) {
         let normal_first = file.force.len() == 2 && first.normal.is_some() && first.lateral.is_none();
         let (lateral, normal) = if normal_first { (last, first) } else { (first, last) };
-        limits.timing.lateral = timing(lateral);
-        limits.timing.normal = timing(normal);
+        limits.timing.lateral = timing(lateral, "force")?;
+        limits.timing.normal = timing(normal, "force")?;
     }
-    limits.timing.amplifier = timing(&file.amplifier);
-    limits.timing.stage = timing(&file.stage);
+    limits.timing.amplifier = timing(&file.amplifier, "amplifier")?;
+    limits.timing.stage = timing(&file.stage, "stage")?;
+    if let Some(relay) = &file.supply_relay {
+        limits.timing.supply = timing(relay, "supply_relay")?;
+    }
+    if let Some(inputs) = &file.safety_inputs {
+        limits.timing.contacts = timing(inputs, "safety_inputs")?;
+    }
     limits.checked()
 }

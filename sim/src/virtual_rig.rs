@@ -135,7 +135,7 @@ impl SafetyInputs for VirtualRig {
         Contacts {
             emergency_stop: contact(!operator.presses_emergency_stop),
             interlock: contact(!operator.opens_guard),
-            dead_man: contact(operator.holds_dead_man),
+            dead_man: contact(operator.holds_dead_man_from.is_some_and(|from| taken_at >= from)),
         }
     }
 }

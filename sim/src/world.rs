@@ -55,14 +55,14 @@ pub struct Operator {
     pub presses_emergency_stop: bool,
     /// The guard is open.
     pub opens_guard: bool,
-    /// The dead-man device is held.
-    pub holds_dead_man: bool,
+    /// The dead-man device is held, from this time on; `None`: never.
+    pub holds_dead_man_from: Option<Nanos>,
 }
 
 impl Default for Operator {
     /// Nothing pressed, the guard shut, the dead-man device released.
     fn default() -> Self {
-        Operator { presses_emergency_stop: false, opens_guard: false, holds_dead_man: false }
+        Operator { presses_emergency_stop: false, opens_guard: false, holds_dead_man_from: None }
     }
 }
 

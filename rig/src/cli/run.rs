@@ -180,6 +180,11 @@ fn print_line(value: &serde_json::Value) {
 fn describe(event: &Event) -> String {
     match event {
         Event::Armed => "armed".into(),
+        Event::NoSecondChannel => {
+            "no second switch-off channel: what the amplifier refuses, only a hand at its supply switches off"
+                .into()
+        }
+        Event::NoWatchdog => "the amplifier has no watchdog: the second channel stands for it".into(),
         Event::Zeros { lateral_n, normal_n, after } => {
             let mn = |v: &Option<f64>| v.map_or("none".into(), |v| format!("{:+.2} mN", v * 1e3));
             let when = if *after { "after" } else { "before" };

@@ -54,7 +54,13 @@ fn sweep(
     let [force, amplifier, stage] = rig.split();
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
-    let ports = Ports::new(force, amplifier, Box::new(stage));
+    let mut ports = Ports::new(force, amplifier, Box::new(stage.clone()));
+    if job.setup.file.supply_relay.is_some() {
+        ports = ports.with_supply(Box::new(stage.clone()));
+    }
+    if job.setup.file.safety_inputs.is_some() {
+        ports = ports.with_contacts(Box::new(stage));
+    }
     let file = kept.new_record()?;
     let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
     let mut rig = VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports);

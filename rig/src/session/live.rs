@@ -58,7 +58,6 @@ pub fn run(
     let file = kept.new_record()?;
     let preamble = keeper::preamble(&job, start_unix_ns)?;
 
-    let priority = (job.setup.file.pace.priority > 0).then_some(job.setup.file.pace.priority);
     let lost = Arc::new(AtomicBool::new(false));
     let witnesses = Witnesses::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
     let (rig, mut reins, row_out) = WallLoop::start(Parts {
@@ -72,7 +71,7 @@ pub fn run(
         .with_supply(rig.supply)
         .with_contacts(rig.contacts),
         links: rig.links,
-        priority,
+        pacing: job.setup.file.pace.pacing(),
         origin_ns,
     })
     .wrap_err(Unfinished::Internal)?;

@@ -5,7 +5,7 @@ use drivers::Links;
 use miette::IntoDiagnostic;
 use models::prediction::FrictionModel;
 use realtime::cycle::{Command, Config};
-use realtime::pacing::{self, Lifeline, LoopParts, LoopReport};
+use realtime::pacing::{self, Lifeline, LoopParts, LoopReport, Pacing};
 use realtime::queue::CommandQueue;
 use realtime::turn::{Ports, Row};
 use ringbuf::traits::{Consumer, Split};
@@ -38,8 +38,8 @@ pub struct Parts {
     pub ports: Ports,
     /// The threads behind them.
     pub links: Links,
-    /// Priority to ask for; `None` leaves scheduling alone.
-    pub priority: Option<i32>,
+    /// What the loop's thread asks of the machine.
+    pub pacing: Pacing,
     /// CLOCK_MONOTONIC in ns that counts as loop time zero.
     pub origin_ns: u64,
 }
@@ -81,7 +81,7 @@ impl WallLoop {
     }
 
     fn start_into(parts: Parts, rows: HeapProd<Row>, watch: HeapProd<Row>) -> miette::Result<Self> {
-        let Parts { config, model, ports, links, priority, origin_ns } = parts;
+        let Parts { config, model, ports, links, pacing, origin_ns } = parts;
         let commands = Arc::new(CommandQueue::new(QUEUE));
         let life = Arc::new(Lifeline::default());
         let mut rig = WallLoop {
@@ -91,7 +91,7 @@ impl WallLoop {
             links: Some(links),
         };
         let parts = LoopParts { config, model, ports, commands, rows, watch, life, origin_ns };
-        let run = move || pacing::run(parts, priority);
+        let run = move || pacing::run(parts, pacing);
         rig.looping = Some(std::thread::Builder::new().name("loop".into()).spawn(run).into_diagnostic()?);
         Ok(rig)
     }

@@ -120,7 +120,10 @@ impl Plant for WorldPlant {
             Quantity::SupplyClosed => truth(self.world.supply_closed()),
             Quantity::EmergencyStop => truth(!self.world.operator().presses_emergency_stop),
             Quantity::Interlock => truth(!self.world.operator().opens_guard),
-            Quantity::DeadMan => truth(self.world.operator().holds_dead_man),
+            Quantity::DeadMan => {
+                let now = self.world.now();
+                truth(self.world.operator().holds_dead_man_from.is_some_and(|from| now >= from))
+            }
             Quantity::DeviceTime => self.world.now().seconds(),
             // The emulator counts its own reads; the world knows nothing of them.
             Quantity::DeviceReads => 0.0,

@@ -58,7 +58,7 @@ impl Drive {
                 .with_supply(rig.supply)
                 .with_contacts(rig.contacts),
             links: rig.links,
-            priority: (setup.file.pace.priority > 0).then_some(setup.file.pace.priority),
+            pacing: setup.file.pace.pacing(),
             origin_ns,
         })?;
         let seen = Arc::new(Mutex::new(Seen::default()));
