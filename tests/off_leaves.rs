@@ -126,7 +126,9 @@ impl Bench {
         let (rig, reins, _) = WallLoop::start(Parts {
             config: setup.config,
             model: Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap()),
-            ports: Ports::new(opened.force, opened.amplifier, opened.stage),
+            ports: Ports::new(opened.force, opened.amplifier, opened.stage)
+                .with_supply(opened.supply)
+                .with_contacts(opened.contacts),
             links: opened.links,
             pacing: realtime::pacing::Pacing::default(),
             origin_ns,

@@ -7,7 +7,9 @@ mod orders;
 mod view;
 
 use super::health::Health;
-use super::ports::{self, AmplifierLink, AmplifierPort, ForcePort, StageLink, StagePort};
+use super::ports::{
+    self, AmplifierLink, AmplifierPort, ContactsPort, ForcePort, StageLink, StagePort, SupplyLink, SupplyPort,
+};
 use super::setup::{AxisSetup, InstrumentSetup};
 use super::timebase::{Counter, DeviceClock, Step};
 use instruments::schema::{Severity, Stamp};
@@ -15,7 +17,9 @@ use instruments::{FrameId, Profile, SetId, SignalId, Values};
 use models::quantity::PeakToPeak;
 pub use orders::Due;
 use orders::Orders;
-use realtime::ports::{AmplifierState, Forces, Nanos, NoData, Reading, StageState};
+use realtime::ports::{
+    AmplifierState, Contact, Contacts, Forces, Nanos, NoData, Reading, StageState, SupplyState,
+};
 use ringbuf::HeapProd;
 use ringbuf::traits::Producer;
 use std::sync::Arc;
@@ -74,6 +78,50 @@ enum Part {
     Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: HeapProd<Forces> },
     Amplifier { signals: AmplifierSignals, link: AmplifierLink },
     Stage { signals: StageSignals, link: StageLink, dead_weight_n: Option<f64> },
+    Supply { closed: SignalId, link: SupplyLink },
+    Contacts(ContactsLink),
+}
+
+/// Safety contacts by their signals: emergency stop, interlock, dead-man.
+struct ContactsLink {
+    signals: [Option<SignalId>; 3],
+    last: Contacts,
+    ring: HeapProd<Contacts>,
+}
+
+impl ContactsLink {
+    /// The contacts that a profile has, and their port; `None` where it has none.
+    fn of(profile: &Profile) -> Option<(Self, ContactsPort)> {
+        let signals = ["emergency_stop", "interlock", "dead_man"].map(|name| profile.signal(name));
+        let (ring, port) = ports::contacts();
+        let link = Self { signals, last: Contacts::missing(NoData::NotFitted), ring };
+        signals.iter().any(Option::is_some).then_some((link, port))
+    }
+
+    /// Takes what a frame says of them. `None` where it says nothing; else whether the loop's ring was full.
+    fn take(&mut self, view: &View<'_>) -> Option<bool> {
+        let kept = [&mut self.last.emergency_stop, &mut self.last.interlock, &mut self.last.dead_man];
+        let mut touched = false;
+        for (signal, kept) in self.signals.iter().zip(kept) {
+            if let Some(signal) = signal.filter(|signal| view.profile.frame_of(*signal) == view.frame) {
+                *kept = view.channel(signal).map(|reading| Contact {
+                    closed: reading.value != 0.0,
+                    taken_at: reading.taken_at,
+                    sequence: reading.sequence,
+                });
+                touched = true;
+            }
+        }
+        touched.then(|| self.ring.try_push(self.last).is_err())
+    }
+
+    fn lost(&mut self, reason: NoData) {
+        let kept = [&mut self.last.emergency_stop, &mut self.last.interlock, &mut self.last.dead_man];
+        for (signal, kept) in self.signals.iter().zip(kept) {
+            *kept = Err(if signal.is_some() { reason } else { NoData::NotFitted });
+        }
+        let _ = self.ring.try_push(self.last);
+    }
 }
 
 /// The clock and the counter of one frame.
@@ -193,6 +241,33 @@ impl Endpoint {
         }
         let (link, port) = ports::stage();
         Ok((Self::new(profile, Part::Stage { signals, link, dead_weight_n }), port))
+    }
+
+    /// A switch in the amplifier's supply, and its port.
+    ///
+    /// # Errors
+    /// Where the profile lacks the signal that reads the switch back, the set-point, or its safe value.
+    pub fn supply(profile: Profile) -> Result<(Self, SupplyPort), String> {
+        let closed = need(&profile, "closed")?;
+        need_set(&profile, "closed")?;
+        let (link, port) = ports::supply();
+        let endpoint = Self::new(profile, Part::Supply { closed, link });
+        if endpoint.safe_set_points().is_empty() {
+            return Err(
+                "its set-point `closed` has no `safe` value: it could not be opened at the end".into()
+            );
+        }
+        Ok((endpoint, port))
+    }
+
+    /// An instrument that reads safety contacts, and its port.
+    ///
+    /// # Errors
+    /// Where the profile has none of their signals.
+    pub fn contacts(profile: Profile) -> Result<(Self, ContactsPort), String> {
+        let (link, port) = ContactsLink::of(&profile)
+            .ok_or("the profile has none of the signals `emergency_stop`, `interlock`, `dead_man`")?;
+        Ok((Self::new(profile, Part::Contacts(link)), port))
     }
 
     fn new(profile: Profile, part: Part) -> Self {
@@ -360,7 +435,17 @@ impl Endpoint {
                 self.orders.read_back(!rests, mark.arrived);
                 link.states.try_push(Ok(state)).is_err()
             }
-            Part::Amplifier { .. } | Part::Stage { .. } => return,
+            Part::Supply { closed, link } if view.profile.frame_of(*closed) == frame => {
+                let closed = view.values.get(*closed) != 0.0;
+                self.orders.read_back(closed, mark.arrived);
+                let state = SupplyState { cut: !closed, taken_at: mark.taken_at, sequence: mark.sequence };
+                link.states.try_push(Ok(state)).is_err()
+            }
+            Part::Contacts(contacts) => match contacts.take(&view) {
+                Some(full) => full,
+                None => return,
+            },
+            Part::Amplifier { .. } | Part::Stage { .. } | Part::Supply { .. } => return,
         };
         self.health.count(if full { &self.health.ring_full } else { &self.health.samples });
     }

@@ -14,7 +14,7 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 /// A profile that does not exist, or an address that stands for nothing.
 pub fn identities(setup: &InstrumentsSetup) -> Result<BTreeSet<String>, OpenError> {
     let mut all = BTreeSet::new();
-    for instrument in setup.force.iter().chain([&setup.amplifier, &setup.stage]) {
+    for instrument in setup.all() {
         all.extend(place(instrument)?);
         all.extend(
             instrument.serial.as_ref().map(|serial| format!("serial/{}/{serial}", instrument.profile)),

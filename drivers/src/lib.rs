@@ -27,7 +27,7 @@
 //!
 //! | room | purpose |
 //! |---|---|
-//! | [`setup`] | the `[[force]]`, `[amplifier]` and `[stage]` sections of a setup |
+//! | [`setup`] | the instruments' sections of a setup |
 //! | [`ports`] | the loop's side: port objects over rings |
 //! | [`endpoint`] | the wire's side, whatever the wire: frames to samples, commands to set-points |
 //! | [`timebase`] | an instrument's clock and counter, mapped to the loop's |
@@ -74,7 +74,7 @@ pub use setup::{AxisSetup, InstrumentSetup, InstrumentsSetup};
 use endpoint::Endpoint;
 use instruments::Profile;
 use instruments::schema::LinkKind;
-use realtime::ports::{Amplifier, ForceSensor, Stage};
+use realtime::ports::{Absent, Amplifier, ForceSensor, SafetyInputs, Stage, SupplySwitch};
 use session::Session;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -89,6 +89,10 @@ pub struct Rig {
     pub amplifier: Box<dyn Amplifier>,
     /// The stage.
     pub stage: Box<dyn Stage>,
+    /// The switch in the amplifier's supply; [`Absent`] where the setup has none.
+    pub supply: Box<dyn SupplySwitch>,
+    /// The safety contacts; [`Absent`] where the setup has none.
+    pub contacts: Box<dyn SafetyInputs>,
     /// The threads beside the loop.
     pub links: Links,
 }
@@ -143,6 +147,18 @@ pub enum Role {
     Amplifier,
     /// It moves and loads the finger.
     Stage,
+    /// It switches the amplifier's supply.
+    Supply,
+    /// It reads the safety contacts.
+    Contacts,
+}
+
+impl Role {
+    /// Whether it takes no set-points.
+    #[must_use]
+    pub const fn only_measures(self) -> bool {
+        matches!(self, Self::Force | Self::Contacts)
+    }
 }
 
 /// How the link of one instrument was closed.
@@ -231,7 +247,31 @@ pub fn open(setup: &InstrumentsSetup, epoch: Instant) -> Result<Rig, OpenError> 
     let (endpoint, stage) = Endpoint::stage(profile(&setup.stage.profile)?, &setup.stage)
         .map_err(|problem| mismatch(&setup.stage, problem))?;
     start(&mut links, &setup.stage, endpoint, epoch)?;
-    Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), links })
+    let (supply, contacts) = open_safety(setup, &mut links, epoch)?;
+    Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), supply, contacts, links })
+}
+
+/// The second switch-off channel and the safety contacts.
+fn open_safety(
+    setup: &InstrumentsSetup,
+    links: &mut Links,
+    epoch: Instant,
+) -> Result<(Box<dyn SupplySwitch>, Box<dyn SafetyInputs>), OpenError> {
+    let mut supply: Box<dyn SupplySwitch> = Box::new(Absent);
+    let mut contacts: Box<dyn SafetyInputs> = Box::new(Absent);
+    if let Some(instrument) = &setup.supply_relay {
+        let (endpoint, port) = Endpoint::supply(profile(&instrument.profile)?)
+            .map_err(|problem| mismatch(instrument, problem))?;
+        start(links, instrument, endpoint, epoch)?;
+        supply = Box::new(port);
+    }
+    if let Some(instrument) = &setup.safety_inputs {
+        let (endpoint, port) = Endpoint::contacts(profile(&instrument.profile)?)
+            .map_err(|problem| mismatch(instrument, problem))?;
+        start(links, instrument, endpoint, epoch)?;
+        contacts = Box::new(port);
+    }
+    Ok((supply, contacts))
 }
 
 /// The bundled profile of that name, its golden vectors run.
@@ -287,7 +327,7 @@ fn start(
             modbus_tcp::spawn(instrument, session)
         }
         LinkKind::ModbusTcp | LinkKind::ModbusRtu => modbus_rtu::spawn(instrument, session),
-        LinkKind::Can if session.endpoint.role() != Role::Force => {
+        LinkKind::Can if !session.endpoint.role().only_measures() => {
             Err("set-points do not go by plain CAN messages; only sensors can be reached so".into())
         }
         LinkKind::Can => can::spawn(instrument, session),

@@ -4,7 +4,7 @@ use super::endpoint::Due;
 use super::off::{self, OFF_ANSWER_MS, OffWay};
 use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
 use instruments::profile::FrameKind;
-use instruments::schema::{Poll, Table};
+use instruments::schema::{Poll, Table, Write};
 use instruments::{FrameId, SetId};
 use std::convert::Infallible;
 
@@ -28,11 +28,17 @@ pub trait Registers {
     fn read(&mut self, session: &Session, table: Table, address: u16, count: u16)
     -> Result<Vec<u8>, Trouble>;
 
-    /// Writes neighbouring holding registers.
+    /// Writes neighbouring registers of a table that can be written.
     ///
     /// # Errors
     /// See [`Trouble`].
-    fn write(&mut self, session: &Session, address: u16, registers: &[u16]) -> Result<(), Trouble>;
+    fn write(
+        &mut self,
+        session: &Session,
+        table: Table,
+        address: u16,
+        registers: &[u16],
+    ) -> Result<(), Trouble>;
 
     /// From now on an answer may take so long.
     fn wait_up_to(&mut self, answer_ms: u32);
@@ -97,7 +103,7 @@ impl Conversation {
             {
                 match session.endpoint.due(now) {
                     Due::Nothing => {}
-                    Due::SetPoints(set_points) => self.command(session, wire, block.address, &set_points)?,
+                    Due::SetPoints(set_points) => self.command(session, wire, block, &set_points)?,
                     Due::Safe(_) => Way { conversation: &mut self, wire }.send_off(session)?,
                 }
                 periodic.advance(session.now());
@@ -135,10 +141,10 @@ impl Conversation {
         &mut self,
         session: &mut Session,
         wire: &mut dyn Registers,
-        address: u16,
+        block: &Write,
         set_points: &[(SetId, f64)],
     ) -> Result<(), Ended> {
-        let answer = self.write(session, wire, address, set_points);
+        let answer = self.write(session, wire, block, set_points);
         if self.judge(session, answer)?.is_none() {
             session.endpoint.refused();
             Way { conversation: self, wire }.send_off(session)?;
@@ -150,14 +156,14 @@ impl Conversation {
         &mut self,
         session: &Session,
         wire: &mut dyn Registers,
-        address: u16,
+        block: &Write,
         set_points: &[(SetId, f64)],
     ) -> Result<(), Trouble> {
         for (set, value) in set_points {
             // Ranges were checked when the command was taken.
             let _ = session.endpoint.profile().encode_set(*set, *value, &mut self.block);
         }
-        wire.write(session, address, &words(&self.block))
+        wire.write(session, block.table, block.address, &words(&self.block))
     }
 
     /// One set-point by itself, in its own registers.
@@ -165,7 +171,7 @@ impl Conversation {
         &mut self,
         session: &Session,
         wire: &mut dyn Registers,
-        address: u16,
+        block: &Write,
         (set, value): (SetId, f64),
     ) -> Result<(), Trouble> {
         let profile = session.endpoint.profile();
@@ -175,7 +181,7 @@ impl Conversation {
         let registers = described.number.map_or(1, |number| number.bytes().div_ceil(2));
         let words = words(&self.block);
         let own = words.get(first..first + registers).unwrap_or(&words);
-        wire.write(session, address + described.register, own)
+        wire.write(session, block.table, block.address + described.register, own)
     }
 
     /// Tells 'the instrument refused' from 'we could not talk'. A few bad answers are borne.
@@ -229,14 +235,14 @@ impl OffWay for Way<'_> {
                 Ok(false)
             }
         };
-        let whole = self.conversation.write(session, self.wire, block.address, &safe);
+        let whole = self.conversation.write(session, self.wire, &block, &safe);
         if whole.map_or_else(&mut not_taken, |()| Ok(true))? {
             return Ok(());
         }
         // Some instruments refuse a block for the sake of one value in it: each by itself then, whatever becomes of the others.
         let mut all = true;
         for one in safe {
-            let taken = self.conversation.write_one(session, self.wire, block.address, one);
+            let taken = self.conversation.write_one(session, self.wire, &block, one);
             all &= taken.map_or_else(&mut not_taken, |()| Ok(true))?;
         }
         if !all {

@@ -60,6 +60,14 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
     })
 }
 
+fn write_request(unit: u8, table: Table, address: u16, registers: &[u16]) -> Request {
+    if table.is_bits() {
+        rtu::write_coils(unit, address, registers)
+    } else {
+        rtu::write(unit, address, registers)
+    }
+}
+
 struct Rtu {
     line: Line,
     unit: u8,
@@ -79,7 +87,7 @@ impl Rtu {
         }
         let words: Vec<u16> = bytes.chunks_exact(2).map(|p| u16::from_be_bytes([p[0], p[1]])).collect();
         std::thread::sleep(Duration::from_secs_f64(self.silence));
-        self.line.write(&rtu::write(self.unit, block.address, &words).bytes)
+        self.line.write(&write_request(self.unit, block.table, block.address, &words).bytes)
     }
 
     /// One request and its answer.
@@ -140,7 +148,7 @@ impl Rtu {
                     self.read(session, Table::Holding, from, count).and_then(|bytes| {
                         let pairs = bytes.chunks_exact(2);
                         let words: Vec<u16> = pairs.map(|p| u16::from_be_bytes([p[0], p[1]])).collect();
-                        self.write(session, to, &words)
+                        self.write(session, Table::Holding, to, &words)
                     })
                 }
                 (None, None) => Ok(()),
@@ -216,7 +224,7 @@ impl Rtu {
         let mut last = Ended::Io("the profile says no way to start the stream".into());
         for _ in 0..BAD_IN_A_ROW {
             let started = if let Some((address, value)) = stream.start_register {
-                self.write(session, address, &[value])
+                self.write(session, Table::Holding, address, &[value])
             } else if let Some((function, data)) = stream.start_function {
                 self.own_function(function, data)
             } else {
@@ -245,8 +253,14 @@ impl Registers for Rtu {
         self.judged(rtu::registers(&request, &answer))
     }
 
-    fn write(&mut self, _session: &Session, address: u16, registers: &[u16]) -> Result<(), Trouble> {
-        let request = rtu::write(self.unit, address, registers);
+    fn write(
+        &mut self,
+        _session: &Session,
+        table: Table,
+        address: u16,
+        registers: &[u16],
+    ) -> Result<(), Trouble> {
+        let request = write_request(self.unit, table, address, registers);
         let answer = self.ask(&request)?;
         let length = rtu::answer_length(&request, &answer).unwrap_or(answer.len()).min(answer.len());
         // A stream that this write starts may follow its answer at once.

@@ -100,10 +100,17 @@ impl<'a> Tcp<'a> {
     /// See [`Trouble`].
     pub fn read_registers(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
         let (runtime, limit) = (self.runtime, self.answer_ms);
-        let registers = part(match table {
-            Table::Holding => within(runtime, limit, self.context.read_holding_registers(address, count)),
-            Table::Input => within(runtime, limit, self.context.read_input_registers(address, count)),
-        })?;
+        let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
+        let registers: Vec<u16> = match table {
+            Table::Holding => {
+                part(within(runtime, limit, self.context.read_holding_registers(address, count)))?
+            }
+            Table::Input => part(within(runtime, limit, self.context.read_input_registers(address, count)))?,
+            Table::Coil => bits(part(within(runtime, limit, self.context.read_coils(address, count)))?),
+            Table::Discrete => {
+                bits(part(within(runtime, limit, self.context.read_discrete_inputs(address, count)))?)
+            }
+        };
         Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect())
     }
 }
@@ -129,8 +136,19 @@ impl Registers for Tcp<'_> {
         self.read_registers(table, address, count)
     }
 
-    fn write(&mut self, _session: &Session, address: u16, registers: &[u16]) -> Result<(), Trouble> {
-        part(within(self.runtime, self.answer_ms, self.context.write_multiple_registers(address, registers)))
+    fn write(
+        &mut self,
+        _session: &Session,
+        table: Table,
+        address: u16,
+        registers: &[u16],
+    ) -> Result<(), Trouble> {
+        let (runtime, limit) = (self.runtime, self.answer_ms);
+        if table.is_bits() {
+            let coils: Vec<bool> = registers.iter().map(|register| *register != 0).collect();
+            return part(within(runtime, limit, self.context.write_multiple_coils(address, &coils)));
+        }
+        part(within(runtime, limit, self.context.write_multiple_registers(address, registers)))
     }
 
     fn wait_up_to(&mut self, answer_ms: u32) {

@@ -4,7 +4,10 @@
 //! Nothing here blocks, locks or allocates after it was made.
 
 use crate::mailbox::Mailbox;
-use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Stage, StageState};
+use realtime::ports::{
+    Amplifier, AmplifierState, Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs, Stage, StageState,
+    SupplyCommand, SupplyState, SupplySwitch,
+};
 use realtime::safety::{DriveCommand, StageCommand};
 use ringbuf::traits::{Consumer, Split};
 use ringbuf::{HeapCons, HeapProd, HeapRb};
@@ -205,6 +208,74 @@ impl Stage for StagePort {
 
     fn state(&mut self, _now: Nanos) -> Result<StageState, NoData> {
         latest(&mut self.states, &mut self.last);
+        self.last
+    }
+}
+
+/// The supply opens where the loop has said nothing for so long: a loop that is dead closes no supply.
+const SUPPLY_EXPIRES: Nanos = Nanos(250_000_000);
+
+/// What the loop wants of the supply, as the link's thread takes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SupplySetPoint {
+    /// Closed; else open.
+    pub closed: bool,
+    /// It must not leave after this.
+    pub expires_at: Nanos,
+}
+
+/// The switch in the amplifier's supply.
+pub struct SupplyPort {
+    states: HeapCons<Result<SupplyState, NoData>>,
+    commands: Mailbox<SupplySetPoint>,
+    last: Result<SupplyState, NoData>,
+}
+
+/// The ends that a supply's link holds.
+pub struct SupplyLink {
+    /// Into the loop.
+    pub states: HeapProd<Result<SupplyState, NoData>>,
+    /// Out of the loop.
+    pub commands: Mailbox<SupplySetPoint>,
+}
+
+/// A supply's port, and the ends that the link holds.
+#[must_use]
+pub fn supply() -> (SupplyLink, SupplyPort) {
+    let (into_loop, states) = HeapRb::new(SAMPLES).split();
+    let commands = Mailbox::default();
+    let port = SupplyPort { states, commands: commands.clone(), last: Err(NoData::NeverRead) };
+    (SupplyLink { states: into_loop, commands }, port)
+}
+
+impl SupplySwitch for SupplyPort {
+    fn command(&mut self, command: SupplyCommand, now: Nanos) {
+        let closed = command == SupplyCommand::Restore;
+        self.commands.put(SupplySetPoint { closed, expires_at: now.plus(SUPPLY_EXPIRES) }, !closed);
+    }
+
+    fn state(&mut self, _now: Nanos) -> Result<SupplyState, NoData> {
+        latest(&mut self.states, &mut self.last);
+        self.last
+    }
+}
+
+/// The safety contacts.
+pub struct ContactsPort {
+    ring: HeapCons<Contacts>,
+    last: Contacts,
+}
+
+/// A port of safety contacts, and the end into which the link pushes.
+#[must_use]
+pub fn contacts() -> (HeapProd<Contacts>, ContactsPort) {
+    let (producer, ring) = HeapRb::new(SAMPLES).split();
+    (producer, ContactsPort { ring, last: Contacts::missing(NoData::NeverRead) })
+}
+
+impl SafetyInputs for ContactsPort {
+    fn read(&mut self, _now: Nanos) -> Contacts {
+        latest(&mut self.ring, &mut self.last);
         self.last
     }
 }

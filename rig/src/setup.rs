@@ -279,7 +279,14 @@ impl Setup {
         // A certificate of the drive's current is what the setup would otherwise have to state.
         amplifier.amplitude_m_per_unit =
             self.certificates.amplitude_m_per_unit.or(amplifier.amplitude_m_per_unit);
-        InstrumentsSetup { force: self.file.force.clone(), amplifier, stage: self.file.stage.clone() }
+        let SetupFile { force, stage, supply_relay, safety_inputs, .. } = &self.file;
+        InstrumentsSetup {
+            force: force.clone(),
+            amplifier,
+            stage: stage.clone(),
+            supply_relay: supply_relay.clone(),
+            safety_inputs: safety_inputs.clone(),
+        }
     }
 
     /// The settings of the vibrometer's controller, read back now; they must cover the drive's frequency.

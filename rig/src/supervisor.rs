@@ -109,11 +109,16 @@ impl OffReport {
         OffReport { read_back: true, not_read_back: Vec::new() }
     }
 
-    /// From how the links were closed.
+    /// From how the links were closed. A supply that was read back open switches the drive off, whatever its amplifier shows; one
+    /// that was not takes nothing from an amplifier that was read back off.
     #[must_use]
     pub fn of(ends: &[LinkEnd]) -> Self {
+        let cut = ends.iter().any(|end| end.role == Role::Supply && end.closed == Closed::ReadBackOff);
         let not_off = |end: &LinkEnd| match &end.closed {
             Closed::NothingToSwitch | Closed::ReadBackOff => None,
+            Closed::NotReadBack(_) if end.role == Role::Supply || (cut && end.role == Role::Amplifier) => {
+                None
+            }
             Closed::NotReadBack(why) => Some(NotOff {
                 instrument: end.name.clone(),
                 drives: end.role == Role::Amplifier,
@@ -158,6 +163,16 @@ mod tests {
             end(Role::Amplifier, Closed::NotReadBack("silent".into())),
         ]);
         assert!(!on.read_back && on.words().contains(MAY_BE_ON) && on.words().contains("silent"), "{on:?}");
+        let cut = OffReport::of(&[
+            end(Role::Amplifier, Closed::NotReadBack("dead".into())),
+            end(Role::Supply, Closed::ReadBackOff),
+        ]);
+        assert!(cut.read_back, "an open supply is off: {cut:?}");
+        let welded = OffReport::of(&[
+            end(Role::Amplifier, Closed::NotReadBack("dead".into())),
+            end(Role::Supply, Closed::NotReadBack("welded".into())),
+        ]);
+        assert!(!welded.read_back && welded.words().contains(MAY_BE_ON), "{welded:?}");
         let moves = OffReport::of(&[end(Role::Stage, Closed::NotReadBack("silent".into()))]);
         assert!(!moves.words().contains("is off") && moves.words().contains("may still move"), "{moves:?}");
         assert!(!OffReport::default().read_back, "nothing known is not 'off'");

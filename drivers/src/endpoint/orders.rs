@@ -79,15 +79,21 @@ impl Endpoint {
             }
             Part::Amplifier { link, .. } => link.states.try_push(Err(reason)).is_ok(),
             Part::Stage { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+            Part::Supply { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+            Part::Contacts(contacts) => {
+                contacts.lost(reason);
+                true
+            }
         };
     }
 
     /// Drops all commands that wait.
     pub fn discard_commands(&mut self) {
         match &self.part {
-            Part::Force { .. } => {}
+            Part::Force { .. } | Part::Contacts(_) => {}
             Part::Amplifier { link, .. } => link.commands.drop_waiting(),
             Part::Stage { link, .. } => link.commands.drop_waiting(),
+            Part::Supply { link, .. } => link.commands.drop_waiting(),
         }
         self.orders.wanted = None;
     }
@@ -187,13 +193,15 @@ impl Endpoint {
             Part::Force { .. } => Role::Force,
             Part::Amplifier { .. } => Role::Amplifier,
             Part::Stage { .. } => Role::Stage,
+            Part::Supply { .. } => Role::Supply,
+            Part::Contacts(_) => Role::Contacts,
         }
     }
 
     /// Whether there is anything to switch off: a drive, a stage or a supply that takes safe set-points.
     #[must_use]
     pub fn is_actuator(&self) -> bool {
-        self.role() != Role::Force && !self.safe_set_points().is_empty()
+        !self.role().only_measures() && !self.safe_set_points().is_empty()
     }
 
     /// Whether the instrument may be on: it was driven, or showed itself on, and has not shown 'off' since.
@@ -224,17 +232,19 @@ impl Endpoint {
 
     fn take_off(&self) -> bool {
         match &self.part {
-            Part::Force { .. } => false,
+            Part::Force { .. } | Part::Contacts(_) => false,
             Part::Amplifier { link, .. } => link.commands.take_off(),
             Part::Stage { link, .. } => link.commands.take_off(),
+            Part::Supply { link, .. } => link.commands.take_off(),
         }
     }
 
     fn off_waits(&self) -> bool {
         match &self.part {
-            Part::Force { .. } => false,
+            Part::Force { .. } | Part::Contacts(_) => false,
             Part::Amplifier { link, .. } => link.commands.off_waits(),
             Part::Stage { link, .. } => link.commands.off_waits(),
+            Part::Supply { link, .. } => link.commands.off_waits(),
         }
     }
 
@@ -247,7 +257,12 @@ impl Endpoint {
             profile.set("heartbeat").map(|set| (set, f64::from(sequence) % profile.heartbeat_turns(set)))
         };
         match &self.part {
-            Part::Force { .. } => None,
+            Part::Force { .. } | Part::Contacts(_) => None,
+            Part::Supply { link, .. } => {
+                let command = link.commands.take()?;
+                let set_points = set("closed", f64::from(u8::from(command.closed))).into_iter().collect();
+                Some(Wanted { set_points, on: command.closed, expires_at: command.expires_at, sent: false })
+            }
             Part::Amplifier { link, .. } => {
                 let command = link.commands.take()?;
                 let mut set_points = if command.enable {

@@ -72,10 +72,8 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     files.extend(job.setup.certificates.files.iter().cloned());
     for (id, text) in job
         .setup
-        .file
-        .force
-        .iter()
-        .chain([&job.setup.file.amplifier, &job.setup.file.stage])
+        .instruments()
+        .all()
         .filter_map(|i| drivers::bundled::text(&i.profile).map(|text| (i.profile.clone(), text)))
     {
         files.push((format!("profiles/{id}.toml"), text.to_string()));

@@ -67,7 +67,9 @@ pub fn run(
             job.setup.certificates.calibrated(rig.force),
             job.setup.certificates.calibrated_amplifier(rig.amplifier),
             rig.stage,
-        ),
+        )
+        .with_supply(rig.supply)
+        .with_contacts(rig.contacts),
         links: rig.links,
         pacing: job.setup.file.pace.pacing(),
         origin_ns,
