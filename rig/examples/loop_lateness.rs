@@ -44,8 +44,8 @@ fn main() {
     let parts = LoopParts {
         config: setup.config,
         model: Arc::new(SpringSlider::new(Finger::paper()).expect("the paper's finger")),
-        ports: Ports { force: Box::new(Idle), amplifier: Box::new(Idle), stage: Box::new(Idle) },
-        commands: Arc::new(crossbeam_queue::ArrayQueue::new(4)),
+        ports: Ports::new(Box::new(Idle), Box::new(Idle), Box::new(Idle)),
+        commands: Arc::new(realtime::queue::CommandQueue::new(4)),
         rows,
         watch,
         life: Arc::clone(&life),

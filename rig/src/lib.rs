@@ -6,6 +6,8 @@
 //! | [`certificates`] | a setup's certificates, verified and applied once |
 //! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 //! | [`sequence`] | the order of a sweep, a pure state machine over rows |
+//! | [`supervisor`] | the one way to lead a loop: it stops first, switches off, reads back |
+//! | [`claim`] | one controller a rig |
 //! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
 //! | [`run_dir`], [`catalogue`] | a run's folder and the catalogue of runs |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
@@ -14,6 +16,7 @@
 pub mod blind;
 pub mod catalogue;
 pub mod certificates;
+pub mod claim;
 pub mod cli;
 pub mod embed;
 pub mod export;
@@ -27,3 +30,4 @@ pub mod run_dir;
 pub mod sequence;
 pub mod session;
 pub mod setup;
+pub mod supervisor;
