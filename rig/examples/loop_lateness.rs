@@ -1,5 +1,6 @@
 //! Prints the lateness of the loop's thread with idle ports, as quantiles in us: `p50 p99 p99.9 max`.
 //! `benches/lateness` runs it in turn with cyclictest.
+#![allow(clippy::disallowed_methods, reason = "it measures time")]
 
 use models::finger::Finger;
 use models::prediction::SpringSlider;

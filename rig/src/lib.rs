@@ -10,6 +10,7 @@
 //! | [`claim`] | one controller a rig |
 //! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
 //! | [`run_dir`], [`catalogue`] | a run's folder and the catalogue of runs |
+//! | [`figures`] | the paper's figures recomputed |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
 //! | [`cli`] | one file a subcommand |
 
@@ -21,6 +22,7 @@ pub mod cli;
 pub mod embed;
 pub mod export;
 pub mod faults;
+pub mod figures;
 pub mod fingertip;
 pub mod input;
 pub mod model_file;

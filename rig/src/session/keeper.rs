@@ -1,4 +1,5 @@
 //! Keeps what a sweep yields: record, point table, catalogue. It runs beside the loop and may touch files.
+#![allow(clippy::disallowed_methods, reason = "a run says when it began")]
 
 use super::{Job, News, Summary};
 use crate::catalogue::{Catalogue, RunEntry};
