@@ -178,6 +178,8 @@ pub struct Sequence {
     poisson_ratio: f64,
     temperature_ranges: Vec<TemperatureRange>,
     temperature_flags: Vec<TemperatureFlag>,
+    session: Option<u64>,
+    start_s: f64,
 }
 
 impl Sequence {
@@ -205,7 +207,14 @@ impl Sequence {
             poisson_ratio: tip.finger.poisson_ratio,
             temperature_ranges: Vec::new(),
             temperature_flags: Vec::new(),
+            session: None,
+            start_s: 0.0,
         }
+    }
+
+    /// The same, as a session of a run that had begun `start_s` before the loop's time zero, in s: passes tell the run's time.
+    pub fn in_session(self, session: u64, start_s: f64) -> Self {
+        Sequence { session: Some(session), start_s, ..self }
     }
 
     /// The same, with certificates that are held against the amplifier's temperature at the start of each pass.
@@ -492,7 +501,7 @@ impl Sequence {
             speed_m_s: sums.speed.mean().unwrap_or(point.condition.speed_m_s),
             position_m: sums.position.mean().unwrap_or(point.condition.position_m),
             normal_force_n: normal,
-            time_s: since.seconds(),
+            time_s: self.start_s + since.seconds(),
             ..point.condition
         };
         Pass {
@@ -501,6 +510,7 @@ impl Sequence {
             samples: Some(sums.lateral.count()),
             temperature_c: sums.temperature.mean(),
             replicate: Some(u64::from(point.replicate)),
+            session: self.session,
             ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
         }
     }

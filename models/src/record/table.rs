@@ -48,7 +48,7 @@ const REQUIRED: [&str; 8] = [
     "position_m",
     "normal_force_n",
 ];
-const OPTIONAL: [&str; 10] = [
+const OPTIONAL: [&str; 11] = [
     "lateral_force_n",
     "normal_force_sd_n",
     "lateral_force_sd_n",
@@ -59,6 +59,7 @@ const OPTIONAL: [&str; 10] = [
     "phase_shift_deg",
     "replicate",
     "run",
+    "session",
 ];
 
 /// Where each known column stands in a file.
@@ -181,6 +182,7 @@ impl Row<'_> {
             phase_shift_deg: self.maybe_number(7, ANY, "an angle in degrees")?,
             replicate: self.maybe_count(8)?,
             run: self.optional(9).map(str::to_string),
+            session: self.maybe_count(10)?,
         })
     }
 }
@@ -251,6 +253,7 @@ fn cells(p: &Pass) -> [String; REQUIRED.len() + OPTIONAL.len()] {
         number(p.phase_shift_deg),
         count(p.replicate),
         p.run.clone().unwrap_or_default(),
+        count(p.session),
     ]
 }
 
@@ -265,6 +268,7 @@ mod tests {
         let mut pass = Pass::at(7, &crate::condition::Condition::paper(), Some(-0.123_456_789_012_345_6));
         pass.replicate = Some(3);
         pass.run = Some("a, \"b\"".into());
+        pass.session = Some(2);
         let mut bytes = Vec::new();
         write_passes(std::slice::from_ref(&pass), &mut bytes).unwrap();
         assert_eq!(read_passes(&bytes[..]).unwrap(), [pass]);

@@ -11,6 +11,7 @@ mod ridge;
 mod store;
 mod table;
 
+use crate::say;
 use clap::{Args, Subcommand};
 use std::process::ExitCode;
 
@@ -54,6 +55,6 @@ pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
 
 /// Bad input: says why and gives the exit status of the contract.
 fn refused(why: impl std::fmt::Display) -> miette::Result<ExitCode> {
-    eprintln!("refused: {why}");
+    say!("refused: {why}");
     Ok(ExitCode::from(2))
 }

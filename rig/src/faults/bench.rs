@@ -2,6 +2,7 @@
 
 use super::rows::{Expect, Moment, ROWS, What};
 use super::tamper::Tampered;
+use calibration::certificate::sha256_hex;
 use models::condition::{Condition, OutOfDomain};
 use models::finger::Finger;
 
@@ -15,7 +16,6 @@ use realtime::safety::{Limits, Request, Trip};
 use realtime::turn::{Ports, Row, Tick, turn};
 use realtime::wrap::fault::{Fault, FaultyAmplifier, FaultyForce, FaultyStage};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use sim::amplifier::AmplifierInput;
 use sim::virtual_rig::VirtualRig;
 use sim::world::WorldConfig;
@@ -275,11 +275,9 @@ pub fn run(scene: &Scene, keep: bool) -> Found {
     }
     let mut found = watch.judge(scene);
     if keep {
-        let mut hash = Sha256::new();
-        for row in &rows {
-            hash.update(serde_json::to_vec(row).unwrap_or_default());
-        }
-        found.hash = Some(hash.finalize().iter().map(|b| format!("{b:02x}")).collect());
+        let written: Vec<u8> =
+            rows.iter().flat_map(|row| serde_json::to_vec(row).unwrap_or_default()).collect();
+        found.hash = Some(sha256_hex(&written));
         // What a record would hold, run again.
         let written = rows.iter().filter_map(|r| serde_json::from_slice(&serde_json::to_vec(r).ok()?).ok());
         let again = replay(&config, &model, written.collect::<Vec<Row>>());

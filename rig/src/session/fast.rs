@@ -1,7 +1,7 @@
 //! A sweep in virtual time: one thread, no clock, the same bytes for the same seed.
 
 use super::keeper::{self, Keeper};
-use super::{Job, News, Signals, Summary, Unfinished};
+use super::{Job, News, Signals, Summary};
 use crate::plan::{Plan, Resolution};
 use crate::run_dir::RunDir;
 use crate::sequence::{MeasuredPass, Outcome, Sequence};
@@ -10,7 +10,7 @@ use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::FrictionModel;
 use realtime::cycle::{Command, CycleState};
 use realtime::ports::Nanos;
-use realtime::recorder::Recorder;
+use realtime::recorder::{Preamble, Recorder};
 use realtime::turn::{Ports, Tick, turn};
 use sim::virtual_rig::VirtualRig;
 use std::collections::{BTreeMap, VecDeque};
@@ -22,10 +22,11 @@ const EPOCH_UNIX_NS: u64 = 946_684_800_000_000_000;
 /// Rows between two flushes of the record: 50 ms at 1 kHz.
 const FLUSH_EVERY: u64 = 50;
 
-/// Runs a job in virtual time.
+/// Runs a job in virtual time, which begins at `start_s` s.
 pub fn run(
     job: Job,
     dir: RunDir,
+    start_s: f64,
     mut sequence: Sequence,
     planned: usize,
     signals: &Signals,
@@ -39,46 +40,60 @@ pub fn run(
         );
     }
     let rig = VirtualRig::of(job.world()?);
-    let kept = Keeper::begin(&job, dir, planned, EPOCH_UNIX_NS)?;
-    sweep(job, rig, kept, &mut sequence, signals, news).wrap_err(Unfinished::NotKept)
+    let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
+    let mut kept = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
+    let swept =
+        sweep(job, rig, Nanos::from_seconds(start_s), preamble, &mut kept, &mut sequence, signals, news);
+    let outcome = swept.unwrap_or_else(|why| {
+        tracing::error!("the record could not be kept: the sweep was stopped: {why:#}");
+        Outcome::RecordLost
+    });
+    Ok(kept.end(outcome, sequence.departed(), None, 0, BTreeMap::new()))
 }
 
 fn sweep(
     job: Job,
     rig: VirtualRig,
-    mut kept: Keeper,
+    start: Nanos,
+    preamble: Preamble,
+    kept: &mut Keeper,
     sequence: &mut Sequence,
     signals: &Signals,
     news: &mut dyn FnMut(News<'_>),
-) -> miette::Result<Summary> {
+) -> miette::Result<Outcome> {
     let [force, amplifier, stage] = rig.split();
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
     let mut ports = Ports { force, amplifier, stage: Box::new(stage) };
     let file = kept.new_record()?;
-    let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
+    let disk = file.handle()?;
+    let mut recorder = Recorder::begin(file, preamble).into_diagnostic()?;
     let config = job.setup.config;
     let mut state = CycleState::default();
     let mut queue: VecDeque<Command> = VecDeque::new();
     let mut number = 0u64;
-    let outcome = loop {
+    let mut next = |queue: &mut VecDeque<Command>| {
         number += 1;
-        let now = Nanos(number * config.limits.timing.cycle.0);
+        let now = Nanos(start.0 + number * config.limits.timing.cycle.0);
         let tick = Tick { number, lateness: Nanos(0), now };
-        let row = turn(&config, &*job.model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
+        turn(&config, &*job.model, &mut state, &mut ports, &mut || queue.pop_front(), tick)
+    };
+    let outcome = loop {
+        let row = next(&mut queue);
         recorder.row(&row).into_diagnostic()?;
         if signals.stops.swap(0, Ordering::Relaxed) > 0 {
             sequence.stop();
         }
         let reaction = sequence.on_row(&row);
-        keeper::record(&mut recorder, now, &reaction.events, reaction.pass.as_ref())?;
+        keeper::record(&mut recorder, row.now, &reaction.events, reaction.pass.as_ref())?;
         kept.keep(&reaction.events, reaction.pass.as_ref(), news)?;
         if reaction.pass.is_some() {
+            disk.still_there()?;
             let (done, all) = sequence.progress();
             news(News::Progress(done, all, sequence.remaining_s()));
         }
         queue.extend(reaction.commands);
-        if number.is_multiple_of(FLUSH_EVERY) {
+        if row.cycle.is_multiple_of(FLUSH_EVERY) {
             recorder.flush().into_diagnostic()?;
         }
         if let Some(outcome) = reaction.outcome {
@@ -87,16 +102,12 @@ fn sweep(
     };
     // Let the stop reach the rig, so that the record shows the safe state.
     for _ in 0..20 {
-        number += 1;
-        let now = Nanos(number * config.limits.timing.cycle.0);
-        let tick = Tick { number, lateness: Nanos(0), now };
-        let row = turn(&config, &*job.model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
-        recorder.row(&row).into_diagnostic()?;
+        recorder.row(&next(&mut queue)).into_diagnostic()?;
     }
     let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
     recorder.end(last).into_diagnostic().wrap_err("the record")?;
-    let departed = sequence.departed();
-    Ok(kept.end(outcome, departed, None, 0, BTreeMap::new()))
+    disk.sync()?;
+    Ok(outcome)
 }
 
 /// What a sweep in memory comes to.

@@ -7,6 +7,7 @@
 
 use crate::session::RigClaim;
 use crate::setup::Setup;
+use crate::{ask, say};
 use crossbeam_queue::ArrayQueue;
 use drivers::Links;
 use miette::IntoDiagnostic;
@@ -69,11 +70,11 @@ pub fn displacement(volts: f64, range_m_s_per_v: f64, frequency_hz: f64) -> Resu
 pub fn table(setup: &Setup, table: &Table<'_>) -> miette::Result<String> {
     check(setup, table)?;
     let settings = setup.vibrometer_settings(table.frequency_hz)?;
-    eprintln!("vibrometer: {settings}");
+    say!("vibrometer: {settings}");
     let _claim = RigClaim::take(setup)?;
     let drive = Drive::start(setup)?;
     drive.arm()?;
-    eprintln!(
+    say!(
         "The plate will vibrate at {:.1} Hz, up to {:.2} um peak-to-peak. Nothing may touch it. Each question wants the \
          amplitude of the velocity signal in V, zero to peak; an empty line asks again after another settling.",
         table.frequency_hz,
@@ -91,24 +92,24 @@ pub fn table(setup: &Setup, table: &Table<'_>) -> miette::Result<String> {
             let (volts, w) = loop {
                 if let Err(why) = drive.hold(amplitude, table) {
                     // A trip stays until somebody at the rig takes it back.
-                    eprint!("  {why}; an empty line arms the rig again> ");
+                    ask!("  {why}; an empty line arms the rig again> ");
                     answer(&mut lines)?;
                     drive.arm()?;
                     continue;
                 }
-                eprint!("set-point {set_point:.3e} m, volts> ");
+                ask!("set-point {set_point:.3e} m, volts> ");
                 let line = answer(&mut lines)?;
                 if !drive.holds(amplitude) {
-                    eprintln!("  no reading: the drive did not stand while it was taken; again");
+                    say!("  no reading: the drive did not stand while it was taken; again");
                     continue;
                 }
                 let volts = line.trim().parse().unwrap_or(f64::NAN);
                 match displacement(volts, settings.range_m_s_per_v, table.frequency_hz) {
                     Ok(w) => break (volts, w),
-                    Err(why) => eprintln!("  no reading: {why}"),
+                    Err(why) => say!("  no reading: {why}"),
                 }
             };
-            eprintln!("  {volts} V are {:.4} um peak-to-peak", w.micrometres());
+            say!("  {volts} V are {:.4} um peak-to-peak", w.micrometres());
             let _ = writeln!(text, "{set_point:e},{volts},{:e}", w.metres());
         }
     }
@@ -216,7 +217,7 @@ impl Drive {
                     // The main thread waits for a line: the stop goes out from here, and the program ends.
                     let _ = queue.force_push(Command::Stop);
                     std::thread::sleep(Duration::from_millis(200));
-                    eprintln!("stopped: the drive is off");
+                    say!("stopped: the drive is off");
                     std::process::exit(1);
                 }
                 if !news {

@@ -89,7 +89,7 @@ pub fn in_doubt(path: &Path, pulls: &[Pull]) -> Vec<InDoubt> {
 
 /// File name of the certificate of a kind, as rig.toml states it.
 fn file(path: &Path, kind: &str) -> Option<String> {
-    let text = std::fs::read_to_string(path).ok()?;
+    let text = crate::input::text_of(path).ok()?;
     let stated: toml::Table = toml::from_str(&text).ok()?;
     let name = stated.get("calibration")?.get("certificates")?.get(kind)?.as_str()?;
     Some(name.to_string())
