@@ -8,7 +8,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// What the name of a file ends with while it is being written.
-pub const PART: &str = ".part";
+pub const PART: &str = ".new";
 
 /// Where a file is written before it is moved to its place.
 pub fn beside(path: &Path) -> PathBuf {

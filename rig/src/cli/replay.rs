@@ -67,8 +67,11 @@ fn tell(found: &Found) {
     for sentence in found.integrity.sentences() {
         out!("  {sentence}");
     }
+    if *missing > found.integrity.missing(CYCLES) {
+        out!("  {missing} cycles are missing from the record");
+    }
     if *missing > 0 {
-        out!("  {missing} cycles are missing from the record: what follows them cannot be expected to agree");
+        out!("  what follows missing cycles cannot be expected to agree");
     }
     if let Some(cycle) = first_difference {
         out!("  the first that differs is cycle {cycle}");
