@@ -68,8 +68,11 @@ pub fn read(log: &str, root: &Path) -> Vec<Op> {
             continue;
         };
         assert!(!call.contains("unfinished"), "two threads change the disk at once: {call}");
-        let (arguments, result) = rest.rsplit_once(") = ").unwrap_or_else(|| panic!("no result: {line}"));
-        let result: i64 = result.split_whitespace().next().unwrap().parse().unwrap();
+        let (arguments, result) = rest.rsplit_once(" = ").unwrap_or_else(|| panic!("no result: {line}"));
+        let arguments = arguments.trim_end().strip_suffix(')').unwrap_or_else(|| panic!("no end: {line}"));
+        let Ok(result) = result.split_whitespace().next().unwrap_or_default().parse::<i64>() else {
+            continue;
+        };
         if result >= 0 {
             reading.call(name, &arguments.split(", ").collect::<Vec<_>>(), result);
         }
