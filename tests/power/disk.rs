@@ -106,7 +106,8 @@ pub fn after_a_cut(ops: &[Op], root: &Path, into: &Path, rng: &mut ChaCha8Rng, d
     }
     let place = |path: &Path| into.join(path.strip_prefix(root).unwrap());
     for folder in safe.folders.iter().filter(|f| *f != root) {
-        std::fs::create_dir_all(place(folder)).unwrap();
+        // A folder whose own folder is gone is gone with it.
+        let _ = std::fs::create_dir(place(folder));
     }
     for (path, inode) in &safe.files {
         // The index of the write-ahead log is memory that is mapped: SQLite makes it anew.
