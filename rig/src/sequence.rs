@@ -192,6 +192,8 @@ pub struct Sequence {
     ambient: Ambient,
     ambient_sent: Ambient,
     has_watchdog: bool,
+    session: Option<u64>,
+    start_s: f64,
 }
 
 impl Sequence {
@@ -222,12 +224,19 @@ impl Sequence {
             ambient: Ambient::default(),
             ambient_sent: Ambient::default(),
             has_watchdog: true,
+            session: None,
+            start_s: 0.0,
         }
     }
 
     /// The same in air of which the setup states this; what a plan or a channel says of it goes first.
     pub fn in_air(self, ambient: Ambient) -> Self {
         Sequence { ambient, ..self }
+    }
+
+    /// The same, as a session of a run that had begun `start_s` before the loop's time zero, in s: passes tell the run's time.
+    pub fn in_session(self, session: u64, start_s: f64) -> Self {
+        Sequence { session: Some(session), start_s, ..self }
     }
 
     /// The same, with certificates that are held against the amplifier's temperature at the start of each pass.
@@ -538,7 +547,7 @@ impl Sequence {
             speed_m_s: sums.speed.mean().unwrap_or(point.condition.speed_m_s),
             position_m: sums.position.mean().unwrap_or(point.condition.position_m),
             normal_force_n: normal,
-            time_s: since.seconds(),
+            time_s: self.start_s + since.seconds(),
             ..point.condition.within(&self.ambient)
         };
         Pass {
@@ -548,6 +557,7 @@ impl Sequence {
             // The channel's, or none: two thermometers in one column would look like a change.
             temperature_c: sums.temperature.mean(),
             replicate: Some(u64::from(point.replicate)),
+            session: self.session,
             ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
         }
     }

@@ -114,9 +114,10 @@ pub fn run(
         });
         let mut keep = |notes: &Receiver<Note>, news: &mut dyn FnMut(News<'_>)| {
             for note in notes {
-                if unkept.is_none() {
-                    unkept = kept.keep(&note.events, note.pass.as_ref(), news).err();
-                    lost.fetch_or(unkept.is_some(), Ordering::Relaxed);
+                // Passes that come until the sweep has stopped are kept where they can be.
+                if let Err(why) = kept.keep(&note.events, note.pass.as_ref(), news) {
+                    lost.store(true, Ordering::Relaxed);
+                    unkept.get_or_insert(why);
                 }
                 if note.pass.is_some() {
                     let (done, all, left_s) = note.progress;
