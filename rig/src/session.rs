@@ -17,6 +17,7 @@ use crate::run_dir::{Identity, RunDir};
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use crate::setup::Setup;
 use models::prediction::FrictionModel;
+use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
 use realtime::witness::StallReport;
 use serde::{Deserialize, Serialize};
@@ -70,6 +71,9 @@ pub struct Summary {
     pub planned: usize,
     /// Whether the model has left the measurement.
     pub model_departed: bool,
+    /// What the comparison of all passes says.
+    #[serde(default = "nothing_said")]
+    pub agreement: Agreement,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
     /// When the machine kept ordinary threads from running; `None` in virtual time.
@@ -79,6 +83,11 @@ pub struct Summary {
     pub record_lost: u64,
     /// What the links counted, by instrument.
     pub links: BTreeMap<String, serde_json::Value>,
+}
+
+/// The finding of a summary that was written before it had one.
+fn nothing_said() -> Agreement {
+    Agreement::of(None, false)
 }
 
 /// Why a run that had begun did not come to an orderly end. Anything else that goes wrong is a refusal: it comes before

@@ -236,14 +236,9 @@ fn tell(summary: &Summary, json: bool) {
     if summary.passes < summary.planned {
         let _ = writeln!(err, "the same command with --out {} goes on", summary.folder.display());
     }
-    let finding = if summary.model_departed {
-        format!(
-            "the model has left the measurement: 'muprime diagnose {}' says where and why",
-            summary.folder.display()
-        )
-    } else {
-        "the measurement agrees with the model".into()
-    };
-    let _ = writeln!(err, "{finding}");
+    let _ = writeln!(err, "{}", summary.agreement);
+    if summary.model_departed {
+        let _ = writeln!(err, "'muprime diagnose {}' says where and why", summary.folder.display());
+    }
     let _ = writeln!(err, "report: {}", summary.folder.join("report.html").display());
 }

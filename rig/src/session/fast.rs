@@ -95,8 +95,8 @@ fn sweep(
     }
     let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
     recorder.end(last).into_diagnostic().wrap_err("the record")?;
-    let departed = sequence.departed();
-    Ok(kept.end(outcome, departed, None, 0, BTreeMap::new()))
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, None, 0, BTreeMap::new()))
 }
 
 /// What a sweep in memory comes to.

@@ -6,6 +6,7 @@ use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome};
 use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
+use realtime::compare::Agreement;
 use realtime::cycle::Config;
 use realtime::pacing::LoopReport;
 use realtime::ports::Nanos;
@@ -139,7 +140,7 @@ impl Keeper {
     pub fn end(
         self,
         outcome: Outcome,
-        departed: bool,
+        agreement: Agreement,
         machine: Option<(LoopReport, StallReport)>,
         record_lost: u64,
         links: BTreeMap<String, serde_json::Value>,
@@ -150,7 +151,8 @@ impl Keeper {
             folder: self.dir.path().to_path_buf(),
             passes: self.passes,
             planned: self.planned,
-            model_departed: departed,
+            model_departed: agreement == Agreement::Departed,
+            agreement,
             loop_report,
             stalls,
             record_lost,
