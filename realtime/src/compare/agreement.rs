@@ -98,17 +98,20 @@ impl std::fmt::Display for Agreement {
                  deviations (rms); a departure of mu' by {visible_departure:.3} would have been seen"
             ),
             Agreement::TooLittle { why, judged, visible_departure } => {
-                let reason = match why {
+                write!(f, "too little to say whether model and measurement agree: ")?;
+                match why {
                     Lack::Passes => {
-                        format!("{judged} passes with vibration were judged, {ENOUGH_PASSES} are needed")
+                        write!(f, "{judged} passes with vibration were judged, {ENOUGH_PASSES} are needed")
                     }
-                    Lack::Power => visible_departure.map_or_else(String::new, |d| {
-                        format!("only a departure of mu' by {d:.2} or more would have been seen")
-                    }),
-                    Lack::Scatter => "the residuals scatter more than the stated noise".to_string(),
-                    Lack::Unfinished => format!("the sweep did not come to its end ({judged} passes judged)"),
-                };
-                write!(f, "too little to say whether model and measurement agree: {reason}")
+                    Lack::Power => {
+                        let visible = visible_departure.unwrap_or(f64::INFINITY);
+                        write!(f, "only a departure of mu' by {visible:.2} or more would have been seen")
+                    }
+                    Lack::Scatter => write!(f, "the residuals scatter more than the stated noise"),
+                    Lack::Unfinished => {
+                        write!(f, "the sweep did not come to its end ({judged} passes judged)")
+                    }
+                }
             }
         }
     }
