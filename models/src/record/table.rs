@@ -59,7 +59,8 @@ impl Columns {
             columns.place(name).ok_or(TableError::MissingColumn(name))?;
         }
         let optional = covariate::OPTIONAL.iter().map(|c| c.name);
-        let known = ["point", "samples", "replicate", "run", "session"].into_iter().chain(NUMBERS.map(|n| n.0));
+        let known =
+            ["point", "samples", "replicate", "run", "session"].into_iter().chain(NUMBERS.map(|n| n.0));
         for name in known.chain(covariate::REQUIRED.iter().map(|c| c.name)).chain(optional) {
             if columns.0.iter().filter(|h| h.trim() == name).count() > 1 {
                 return Err(TableError::DoubleColumn(name.to_string()));
@@ -208,7 +209,12 @@ fn cells(p: &Pass) -> Vec<String> {
     cells.extend([p.lateral_force_n, p.normal_force_sd_n, p.lateral_force_sd_n].map(text));
     cells.push(text(p.samples));
     cells.extend(covariate::OPTIONAL.iter().map(covariate));
-    cells.extend([text(p.phase_shift_deg), text(p.replicate), p.run.clone().unwrap_or_default(), text(p.session)]);
+    cells.extend([
+        text(p.phase_shift_deg),
+        text(p.replicate),
+        p.run.clone().unwrap_or_default(),
+        text(p.session),
+    ]);
     cells
 }
 

@@ -1,8 +1,8 @@
 //! `muprime blind`: the diagnosis scored on sealed sets.
 
 use crate::blind::{confusion, figures, run as score_all};
-use diagnosis::constants::{Constants, Stage};
 use crate::{out, say};
+use diagnosis::constants::{Constants, Stage};
 use diagnosis::hypotheses::Options;
 use miette::IntoDiagnostic;
 use sim::sealed::Stratum;
