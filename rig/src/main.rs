@@ -3,6 +3,9 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use muprime_rig::cli;
 use std::process::ExitCode;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Controller of a hardware-in-the-loop tribometer: ultrasonic friction reduction, measured and explained.
 #[derive(Parser)]
@@ -59,9 +62,18 @@ fn main() -> ExitCode {
             return ExitCode::from(if error.use_stderr() { cli::REFUSED } else { cli::DONE });
         }
     };
-    let filter = tracing_subscriber::EnvFilter::try_from_env("MUPRIME_LOG")
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let wanted = std::env::var("MUPRIME_LOG").unwrap_or_else(|_| "warn".into());
+    let filter: Targets = match wanted.parse() {
+        Ok(filter) => filter,
+        Err(error) => {
+            eprintln!("MUPRIME_LOG={wanted}: {error}; a level, or as in 'warn,muprime_drivers=debug'");
+            return ExitCode::from(cli::REFUSED);
+        }
+    };
+    tracing_subscriber::registry()
+        .with(tracing_subscriber::fmt::layer().with_writer(std::io::stderr))
+        .with(filter)
+        .init();
     let json = cli.json;
     // A panic is a fault of this program: status 3, after the threads have put the rig in its safe state.
     let outcome = std::panic::catch_unwind(|| match cli.verb {

@@ -1,6 +1,6 @@
 //! The list: what strikes, what must follow, within how many cycles. Add a fault: one line.
 //!
-//! Numbers are those of the project's fault list (`docs/faults.md`). Bounds count from the first cycle whose inputs show
+//! Numbers are those of the project's fault list (`docs/safety.md`). Bounds count from the first cycle whose inputs show
 //! the fault, that cycle included, at the bench's timing: a 1 kHz loop, forces at 1 kHz that may be five periods old
 //! (three and the stated latency), states of amplifier and stage that may be nine. Garbage is random over 400 N: one sample
 //! in some hundreds is plausible by chance, so its bound allows for that.
