@@ -164,3 +164,16 @@ fn the_contract_names_the_commands_and_flags_that_there_are() {
         assert!(unknown.is_empty(), "docs/contract.md, muprime {command}: no such flags: {unknown:?}");
     }
 }
+
+#[test]
+fn a_log_filter_that_cannot_be_read_is_refused() {
+    let started = |filter: &str| {
+        let output =
+            tests::muprime().args(["completions", "bash"]).env("MUPRIME_LOG", filter).output().unwrap();
+        (output.status.code(), tests::texts(&output).1)
+    };
+    assert_eq!(started("warn,muprime_drivers=debug").0, Some(0));
+    let (status, said) = started("warn,muprime_drivers=loud");
+    assert_eq!(status, Some(2), "{said}");
+    assert!(said.contains("MUPRIME_LOG=warn,muprime_drivers=loud"), "{said}");
+}
