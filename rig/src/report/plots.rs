@@ -336,8 +336,16 @@ pub fn errors_against(
     before: &[(f64, f64)],
     after: &[(f64, f64)],
 ) -> miette::Result<String> {
-    let range = before.iter().fold(f64::INFINITY..f64::NEG_INFINITY, |r, p| r.start.min(p.0)..r.end.max(p.0));
-    let x = if logarithmic { Axis::logarithmic(range) } else { Axis::linear(range) };
+    let (low, high) =
+        before.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.0), h.max(p.0)));
+    // Within a decade a logarithmic axis has a single label.
+    let x = if logarithmic && high > 10.0 * low {
+        let margin = (high / low).powf(0.03);
+        Axis::logarithmic(low / margin..high * margin)
+    } else {
+        let margin = 0.03 * (high - low);
+        Axis::linear(low - margin..high + margin)
+    };
     let svg = figure((430, 240), (x, name), (Axis::linear(-limit..limit), "error, sd"), |chart| {
         for (points, colour) in [(before, COLOURS[1]), (after, COLOURS[0])] {
             let dot =
