@@ -1,6 +1,6 @@
 //! The list: what strikes, what must follow, for which cause, within how many cycles. Add a fault: one line.
 //!
-//! Numbers to 50 are those of the project's fault list; what no row of it names comes after. Bounds count from the first
+//! Numbers to 50 are those of the project's fault list (docs/safety.md); what no row of it names comes after. Bounds count from the first
 //! cycle whose inputs show the fault, that cycle included. They are stated in what the limits allow for (the age of a force
 //! sample or of a state, the time in which a set-point must show), so that they hold at every [`Pace`]. Garbage is random over
 //! 400 N: one sample in some hundreds is plausible by chance, so its bound allows for that. Two spikes side by side are an
