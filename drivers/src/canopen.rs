@@ -6,7 +6,7 @@
 
 use super::can;
 use super::endpoint::{BadFrame, Due};
-use super::off::{self, Closed, OffWay};
+use super::off::{self, Closed, OFF_ANSWER_MS, OffWay};
 use super::session::{Ended, LONGEST_SLEEP, Periodic, Session};
 use super::setup::InstrumentSetup;
 use instruments::bus::{CanEvent, CanPort};
@@ -243,6 +243,10 @@ impl OffWay for Master {
             (Ok(()), Ok(()) | Err(Ended::Refused(_) | Ended::Timeout(_))) | (Err(_), Ok(())) => Ok(()),
             (Err(ended), _) | (Ok(()), Err(ended)) => Err(ended),
         }
+    }
+
+    fn be_patient(&mut self, _session: &Session) {
+        self.limit_ms = self.limit_ms.max(OFF_ANSWER_MS);
     }
 
     fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {

@@ -93,8 +93,6 @@ impl Conversation {
         let mut write = block.as_ref().map(|block| Periodic::new(block.rate_hz.unwrap_or(100.0), now));
         loop {
             if session.stopping() {
-                let limit = session.endpoint.profile().description.link.response_timeout_ms;
-                wire.wait_up_to(limit.max(OFF_ANSWER_MS));
                 return Err(off::at_the_end(session, &mut Way { conversation: &mut self, wire }));
             }
             let now = session.now();
@@ -249,6 +247,11 @@ impl OffWay for Way<'_> {
             session.endpoint.refused();
         }
         Ok(())
+    }
+
+    fn be_patient(&mut self, session: &Session) {
+        let limit = session.endpoint.profile().description.link.response_timeout_ms;
+        self.wire.wait_up_to(limit.max(OFF_ANSWER_MS));
     }
 
     fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {

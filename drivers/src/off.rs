@@ -37,6 +37,9 @@ pub trait OffWay {
     /// Only where the connection carries nothing more.
     fn send_off(&mut self, session: &mut Session) -> Result<(), Ended>;
 
+    /// From now on answers are waited for as long as [`OFF_ANSWER_MS`], where the profile allows less.
+    fn be_patient(&mut self, session: &Session);
+
     /// Gets the next state of the instrument into the endpoint.
     ///
     /// # Errors
@@ -52,6 +55,7 @@ pub fn switch_off(session: &mut Session, way: &mut dyn OffWay) -> Result<(), End
     if !session.endpoint.is_actuator() {
         return Ok(());
     }
+    way.be_patient(session);
     loop {
         way.send_off(session)?;
         way.read_state(session)?;

@@ -385,7 +385,8 @@ impl Talk {
 impl OffWay for Talk {
     fn send_off(&mut self, session: &mut Session) -> Result<(), Ended> {
         let safe = session.endpoint.hand_out_off(session.now());
-        self.patience_ms = self.link.response_timeout_ms.max(OFF_ANSWER_MS);
+        let patience_ms = self.patience_ms;
+        self.be_patient(session);
         self.sent.clear();
         let mut all = true;
         for one in safe {
@@ -399,16 +400,16 @@ impl OffWay for Talk {
         if !all {
             session.endpoint.refused();
         }
-        self.patience_ms = self.link.response_timeout_ms;
+        self.patience_ms = patience_ms;
         Ok(())
     }
 
-    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
+    fn be_patient(&mut self, _session: &Session) {
         self.patience_ms = self.link.response_timeout_ms.max(OFF_ANSWER_MS);
-        let asked =
-            queries(session).into_iter().try_for_each(|(frame, query)| self.ask(session, frame, &query));
-        self.patience_ms = self.link.response_timeout_ms;
-        asked
+    }
+
+    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
+        queries(session).into_iter().try_for_each(|(frame, query)| self.ask(session, frame, &query))
     }
 }
 

@@ -9,8 +9,9 @@ use crate::input::{self, BadInput};
 use crate::plan::LateralChannel;
 use drivers::vibrometer::{Settings, VibrometerSetup};
 use drivers::{InstrumentSetup, InstrumentsSetup};
-use miette::IntoDiagnostic;
-use realtime::compare::PassNoise;
+use models::condition::Ambient;
+use models::covariate;
+use models::rig_file::{PassNoise, RigFile, RigFileError};
 use realtime::cycle::Config;
 use realtime::estimate::EstimateConfig;
 use realtime::pacing::Pacing;
@@ -63,12 +64,32 @@ pub struct SetupFile {
     /// temperatures asks for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
+    /// Ambient pressure in Pa, where a plan does not set it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ambient_pressure_pa: Option<f64>,
+    /// Relative humidity in per cent, as read at the bench.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_humidity_pct: Option<f64>,
+    /// Standard uncertainty of the stage's speed, relative, where an encoder or a timed stroke gives it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed_gain_sd: Option<f64>,
     /// Zero of the force channels in counts, lateral and normal, where it is not the force certificate's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero_counts: Option<[f64; 2]>,
     /// Present: this is a virtual rig, served on its instruments' loopback addresses by `muprime run` itself.
     #[serde(default, rename = "virtual")]
     pub virtual_rig: Option<VirtualRig>,
+}
+
+impl SetupFile {
+    /// What the setup states of the air.
+    fn ambient(&self) -> Ambient {
+        Ambient {
+            ambient_pressure_pa: self.ambient_pressure_pa,
+            temperature_c: self.temperature_c,
+            relative_humidity_pct: self.relative_humidity_pct,
+        }
+    }
 }
 
 /// Pace of the loop.
@@ -195,6 +216,12 @@ impl Setup {
                 .into());
             }
         }
+        let air = models::condition::Condition::paper().within(&file.ambient());
+        for c in covariate::OPTIONAL {
+            if let Some(value) = c.of(&air).filter(|v| !c.admits(*v)) {
+                return Err(bad(&[c.name], format!("{} = {value}: {} is needed", c.name, c.needed)).into());
+            }
+        }
         let tip = Fingertip::resolve(&file.finger, folder).map_err(|p| bad(&["finger"], p))?;
         let cycle = Nanos((1e9 / file.pace.rate_hz).round() as u64);
         let limits = limits::of(&file, cycle).map_err(|error| {
@@ -209,12 +236,32 @@ impl Setup {
         })?;
         limits::guarded(&file).map_err(|problem| bad(&["limits", "human_contact"], problem))?;
         let config = Config { limits, estimate: file.estimate };
+        #[allow(clippy::disallowed_methods, reason = "a certificate is good until a date")]
         let now_unix_s = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
             .map_or(0, |since| since.as_secs() as i64);
         let certificates =
             Certificates::load(&file, folder, now_unix_s).map_err(|p| bad(&["certificates"], p))?;
-        Ok(Setup { file, text: text.to_string(), origin: origin.to_string(), tip, config, certificates })
+        let setup =
+            Setup { file, text: text.to_string(), origin: origin.to_string(), tip, config, certificates };
+        // What goes beside the point table in the end is known now.
+        if let Err(error) = setup.rig_file().check() {
+            let path: &[&str] = match &error {
+                RigFileError::Value { section: "noise", key, .. } => &["noise", key],
+                RigFileError::Value { section: "calibration", key: "speed_gain_sd", .. } => {
+                    &["speed_gain_sd"]
+                }
+                RigFileError::Value { section: "calibration", .. } => &["certificates"],
+                _ => &["finger"],
+            };
+            return Err(bad(path, error.to_string()).into());
+        }
+        Ok(setup)
+    }
+
+    /// What the setup states of the air.
+    pub fn ambient(&self) -> Ambient {
+        self.file.ambient()
     }
 
     /// The instruments' part, for the drivers.
@@ -279,28 +326,12 @@ impl Setup {
         Ok(None)
     }
 
-    /// The `rig.toml` that goes beside a point table (contract).
-    ///
-    /// # Errors
-    /// Only if TOML cannot express a number.
-    pub fn rig_toml(&self) -> miette::Result<String> {
-        #[derive(Serialize)]
-        struct Rig<'a> {
-            finger: &'a models::finger::Finger,
-            noise: &'a PassNoise,
-            calibration: Calibration<'a>,
+    /// What is known of this rig, for the `rig.toml` beside a point table (contract).
+    pub fn rig_file(&self) -> RigFile {
+        RigFile {
+            finger: models::finger::Finger { lateral_recovery_m_per_s: None, ..self.tip.finger },
+            noise: self.file.noise,
+            calibration: self.certificates.calibration.clone(),
         }
-        #[derive(Serialize)]
-        struct Calibration<'a> {
-            #[serde(flatten)]
-            priors: &'a calibration::prior::CalibrationPriors,
-            /// Which certificate says so, by its kind.
-            #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty")]
-            certificates: &'a std::collections::BTreeMap<String, String>,
-        }
-        let calibration =
-            Calibration { priors: &self.certificates.priors, certificates: &self.certificates.names };
-        let finger = models::finger::Finger { lateral_recovery_m_per_s: None, ..self.tip.finger };
-        toml::to_string(&Rig { finger: &finger, noise: &self.file.noise, calibration }).into_diagnostic()
     }
 }

@@ -42,8 +42,10 @@ pub(super) struct Orders {
     driven: bool,
     /// What the last state showed: whether the instrument is on, and when that arrived.
     shown: Option<(bool, Nanos)>,
-    /// When an 'off' was last handed out and not refused.
+    /// When an 'off' was last handed out.
     off_sent: Option<Nanos>,
+    /// It was refused, wholly or in part.
+    refused: bool,
 }
 
 impl Orders {
@@ -172,6 +174,7 @@ impl Endpoint {
     pub fn hand_out_off(&mut self, now: Nanos) -> Vec<(SetId, f64)> {
         self.orders.wanted = None;
         self.orders.off_sent = Some(now);
+        self.orders.refused = false;
         let _ = self.take_off();
         self.health.count(&self.health.safe_sent);
         self.safe_set_points()
@@ -180,7 +183,7 @@ impl Endpoint {
     /// What was handed out last was refused, wholly or in part, or its answer made no sense. An 'off' stays owed; a command
     /// that drives or moves is dropped, and an 'off' owed for it.
     pub fn refused(&mut self) {
-        self.orders.off_sent = None;
+        self.orders.refused = true;
         if self.wants_on() {
             self.orders.wanted = None;
         }
@@ -220,8 +223,9 @@ impl Endpoint {
     fn once_more(&mut self, now: Nanos) -> Due {
         let ignored = match (self.orders.off_sent, self.orders.shown) {
             (None, _) => true,
-            (Some(sent), Some((on, arrived))) => on && sent < arrived,
-            (Some(_), None) => false,
+            (Some(sent), Some((true, arrived))) => sent < arrived || self.orders.refused,
+            // What the instrument shows counts, not what it says of a set-point.
+            (Some(_), _) => self.orders.refused && !self.orders.shown_off(),
         };
         if ignored { self.safe(now) } else { Due::Nothing }
     }

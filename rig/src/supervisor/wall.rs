@@ -1,4 +1,5 @@
 //! The loop in wall-clock time: a thread of its own, instruments behind links.
+#![allow(clippy::disallowed_methods, reason = "the supervisor waits in wall-clock time, beside the loop")]
 
 use super::{Loop, OffReport};
 use drivers::Links;
