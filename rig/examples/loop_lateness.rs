@@ -1,11 +1,7 @@
 //! Prints the lateness of the loop's thread with idle ports, as quantiles in us: `p50 p99 p99.9 max`.
-<<<<<<< HEAD
 //! `benches/lateness` runs it in turn with cyclictest. After the seconds come, in any order, `cpu=1`, `spin_us=100`, `awake`: what a
 //! setup's `[loop]` may ask for.
-=======
-//! `benches/lateness` runs it in turn with cyclictest.
 #![allow(clippy::disallowed_methods, reason = "it measures time")]
->>>>>>> step17
 
 use models::finger::Finger;
 use models::prediction::SpringSlider;
