@@ -10,7 +10,7 @@ use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::FrictionModel;
 use realtime::cycle::{Command, CycleState};
 use realtime::ports::Nanos;
-use realtime::recorder::{Preamble, Recorder};
+use realtime::recorder::Recorder;
 use realtime::turn::{Ports, Tick, turn};
 use sim::virtual_rig::VirtualRig;
 use std::collections::{BTreeMap, VecDeque};
@@ -40,10 +40,8 @@ pub fn run(
         );
     }
     let rig = VirtualRig::of(job.world()?);
-    let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
     let mut kept = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
-    let swept =
-        sweep(job, rig, Nanos::from_seconds(start_s), preamble, &mut kept, &mut sequence, signals, news);
+    let swept = sweep(job, rig, Nanos::from_seconds(start_s), &mut kept, &mut sequence, signals, news);
     let outcome = swept.unwrap_or_else(|why| {
         tracing::error!("the record could not be kept: the sweep was stopped: {why:#}");
         Outcome::RecordLost
@@ -55,7 +53,6 @@ fn sweep(
     job: Job,
     rig: VirtualRig,
     start: Nanos,
-    preamble: Preamble,
     kept: &mut Keeper,
     sequence: &mut Sequence,
     signals: &Signals,
@@ -67,7 +64,7 @@ fn sweep(
     let mut ports = Ports { force, amplifier, stage: Box::new(stage) };
     let file = kept.new_record()?;
     let disk = file.handle()?;
-    let mut recorder = Recorder::begin(file, preamble).into_diagnostic()?;
+    let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
     let config = job.setup.config;
     let mut state = CycleState::default();
     let mut queue: VecDeque<Command> = VecDeque::new();
