@@ -1,6 +1,7 @@
 //! Reading files that people wrote: every refusal shows the place in the file and what would do.
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
+use models::rig_file::{RigFile, RigFileError};
 use serde::de::DeserializeOwned;
 use std::io::Read;
 use std::path::Path;
@@ -78,6 +79,24 @@ pub fn bytes_of(path: &Path, most: u64) -> miette::Result<Vec<u8>> {
 /// What TOML or the schema says, with the place. Unknown keys are errors wherever the schema says so.
 pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, BadInput> {
     toml::from_str(text).map_err(|e| BadInput::new(name, text, e.span(), e.message().to_string(), None))
+}
+
+/// Reads a rig.toml.
+///
+/// # Errors
+/// A file that cannot be read, and what [`RigFile::parse`] refuses, with the place.
+pub fn rig_file(path: &Path) -> miette::Result<RigFile> {
+    let text = text_of(path)?;
+    let name = path.display().to_string();
+    let file: RigFile = parse_toml(&name, &text)?;
+    file.check().map_err(|error| {
+        let place = match &error {
+            RigFileError::Value { section, key, .. } => place_of(&text, &[section, key]),
+            RigFileError::Form(error) => error.span(),
+        };
+        BadInput::new(&name, &text, place, error.to_string(), None)
+    })?;
+    Ok(file)
 }
 
 /// Where the value of a key stands: `path` names tables and the key, for instance `["limits", "speed_max_m_s"]`.

@@ -5,6 +5,8 @@ mod points;
 mod visible;
 
 use crate::input::{self, BadInput};
+use models::condition::Condition;
+use models::covariate::{self, Covariate};
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -131,6 +133,35 @@ pub struct Series {
     pub ambient_pressure_pa: Vec<f64>,
     /// Directions of this series alone, 1 and -1; empty for the plan's.
     pub directions: Vec<i8>,
+}
+
+impl Base {
+    /// The base as a condition; what it does not say is the paper's.
+    pub(crate) fn condition(&self) -> Condition {
+        Condition {
+            amplitude: PeakToPeak::from_metres(self.amplitude_pp_m),
+            frequency_hz: self.frequency_hz,
+            speed_m_s: self.speed_m_s,
+            normal_force_n: self.normal_force_n,
+            position_m: self.position_m,
+            mu0: 1.0,
+            ..Condition::paper()
+        }
+    }
+}
+
+impl Series {
+    /// What the series varies, slowest first; an empty list stands for the base's value.
+    pub(crate) fn lists(&self) -> [(&'static Covariate, &[f64]); 6] {
+        [
+            (&covariate::AMBIENT_PRESSURE, &self.ambient_pressure_pa),
+            (&covariate::FREQUENCY, &self.frequency_hz),
+            (&covariate::SPEED, &self.speed_m_s),
+            (&covariate::NORMAL_FORCE, &self.normal_force_n),
+            (&covariate::POSITION, &self.position_m),
+            (&covariate::AMPLITUDE, &self.amplitude_pp_m),
+        ]
+    }
 }
 
 const fn yes() -> bool {

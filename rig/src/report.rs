@@ -33,11 +33,6 @@ pub struct RunData {
     pub damage: Vec<String>,
 }
 
-#[derive(serde::Deserialize)]
-struct RigToml {
-    finger: Finger,
-}
-
 /// Reads a run's folder.
 ///
 /// # Errors
@@ -71,8 +66,7 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
     damage.extend(differences(folder, &passes)?);
     let summary =
         std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
-    let rig = std::fs::read_to_string(folder.join("rig.toml")).into_diagnostic().wrap_err("rig.toml")?;
-    let rig: RigToml = toml::from_str(&rig).into_diagnostic().wrap_err("rig.toml")?;
+    let rig = crate::input::rig_file(&folder.join("rig.toml"))?;
     Ok(RunData { facts, passes, events, summary, finger: rig.finger, damage })
 }
 

@@ -140,13 +140,14 @@ fn now_unix_s() -> miette::Result<i64> {
 }
 
 fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
-    let mut priors = calibration::prior::CalibrationPriors::default();
+    let mut priors = models::rig_file::Calibration::default();
     for path in &args.certificates {
         let name = path.display().to_string();
         let certificate = Certificate::from_toml(&crate::input::text_of(path)?)
             .map_err(|e| miette::miette!("{name}: {e}"))?;
         let verified = verify(&name, &certificate, certificate.kind, &certificate.instrument.serial)?;
-        priors.take(verified).map_err(|refusal| miette::miette!("{name}: {refusal}"))?;
+        calibration::prior::take(&mut priors, verified)
+            .map_err(|refusal| miette::miette!("{name}: {refusal}"))?;
     }
     if json {
         out!("{}", serde_json::json!({ "calibration": priors }));

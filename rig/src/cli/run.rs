@@ -6,6 +6,7 @@ use crate::print::clean;
 use crate::sequence::{Event, Outcome};
 use crate::session::{Job, News, Signals, Summary, unix_ns};
 use crate::setup::Setup;
+use crate::supervisor::MAY_BE_ON;
 use crate::{out, say};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
@@ -86,7 +87,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     bar.finish_and_clear();
     tell(&summary, json);
     super::exit(match summary.outcome {
-        Outcome::Complete => super::DONE,
+        Outcome::Complete if summary.off.read_back => super::DONE,
         _ => super::FAILED,
     })
 }
@@ -113,7 +114,7 @@ fn job(args: Args) -> miette::Result<Job> {
         None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
         Some((_, text)) => {
             let path = args.model.as_ref().map_or_else(String::new, |p| p.display().to_string());
-            crate::model_file::load(&path, text)?
+            crate::model_file::load_for(&setup, &path, text)?
         }
     };
     let seed = args.seed.unwrap_or(plan.file.seed);
@@ -138,9 +139,10 @@ fn watch_signals(signals: &Signals) -> miette::Result<()> {
             for (i, _) in caught.forever().enumerate() {
                 stops.fetch_add(1, Ordering::Relaxed);
                 if i > 0 {
-                    // The first one has sent the stop; the amplifier's watchdog covers the rest.
+                    // The first one has sent the stop; nobody can wait here for what was read back.
                     std::thread::sleep(std::time::Duration::from_millis(1500));
-                    std::process::exit(i32::from(super::FAILED));
+                    say!("leaving at once: {MAY_BE_ON}");
+                    super::leave_now(super::FAILED);
                 }
             }
         })
@@ -161,6 +163,11 @@ fn progress_bar(json: bool) -> ProgressBar {
 fn describe(event: &Event) -> String {
     match event {
         Event::Armed => "armed".into(),
+        Event::NoSecondChannel => {
+            "no second switch-off channel: what the amplifier refuses, only a hand at its supply switches off"
+                .into()
+        }
+        Event::NoWatchdog => "the amplifier has no watchdog: the second channel stands for it".into(),
         Event::Zeros { lateral_n, normal_n, after } => {
             let mn = |v: &Option<f64>| v.map_or("none".into(), |v| format!("{:+.2} mN", v * 1e3));
             let when = if *after { "after" } else { "before" };
@@ -197,6 +204,9 @@ fn tell(summary: &Summary, json: bool) {
         out!("{}", serde_json::json!({ "summary": summary }));
         return;
     }
+    if !summary.off.read_back {
+        say!("{}", summary.off.words());
+    }
     if summary.finished_before {
         say!("every pass of this run was made before: nothing was driven, nothing was recorded");
     }
@@ -221,14 +231,9 @@ fn tell(summary: &Summary, json: bool) {
     if summary.passes < summary.planned {
         say!("the same command with --out {} goes on", summary.folder.display());
     }
-    let finding = if summary.model_departed {
-        format!(
-            "the model has left the measurement: 'muprime diagnose {}' says where and why",
-            summary.folder.display()
-        )
-    } else {
-        "the measurement agrees with the model".into()
-    };
-    say!("{finding}");
+    say!("{}", summary.agreement);
+    if summary.model_departed {
+        say!("'muprime diagnose {}' says where and why", summary.folder.display());
+    }
     say!("report: {}", summary.folder.join("report.html").display());
 }

@@ -93,7 +93,9 @@ fn verdict(w: &mut String, run: &RunData) {
                  Run <code>muprime diagnose</code> on this folder to learn where and why."
         )
     } else {
-        "The measurement agrees with the model.".to_string()
+        let complete = run.summary.as_ref().is_some_and(|s| s.outcome == crate::sequence::Outcome::Complete);
+        let last = run.passes.iter().rev().find_map(|p| p.comparison.as_ref());
+        escape(&format!("Finding: {}.", realtime::compare::Agreement::of(last, complete)))
     };
     let class = if departed { "verdict departed" } else { "verdict" };
     let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}</p>");

@@ -1,12 +1,15 @@
 //! Keeps what a sweep yields: record, point table, catalogue. It runs beside the loop and may touch files.
+#![allow(clippy::disallowed_methods, reason = "a run says when it began")]
 
 use super::{Job, News, Summary, Unfinished};
 use crate::catalogue::{Catalogue, RunEntry};
 use crate::files::Placed;
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome};
+use crate::supervisor::OffReport;
 use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
+use realtime::compare::Agreement;
 use realtime::cycle::Config;
 use realtime::pacing::LoopReport;
 use realtime::ports::Nanos;
@@ -68,7 +71,7 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     let mut files = vec![
         ("setup.toml".to_string(), job.setup.text.clone()),
         ("plan.toml".to_string(), job.plan.text.clone()),
-        ("rig.toml".to_string(), job.setup.rig_toml()?),
+        ("rig.toml".to_string(), job.setup.rig_file().to_toml().into_diagnostic()?),
     ];
     let replayed = Replayable { config: job.setup.config, finger: job.setup.tip.finger };
     files.push((REPLAYABLE.to_string(), serde_json::to_string_pretty(&replayed).into_diagnostic()?));
@@ -76,10 +79,8 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     files.extend(job.setup.certificates.files.iter().cloned());
     for (id, text) in job
         .setup
-        .file
-        .force
-        .iter()
-        .chain([&job.setup.file.amplifier, &job.setup.file.stage])
+        .instruments()
+        .all()
         .filter_map(|i| drivers::bundled::text(&i.profile).map(|text| (i.profile.clone(), text)))
     {
         files.push((format!("profiles/{id}.toml"), text.to_string()));
@@ -104,7 +105,12 @@ impl Keeper {
     ///
     /// # Errors
     /// Whatever file system and SQLite say.
-    pub fn finish(job: &Job, mut dir: RunDir, planned: usize, departed: bool) -> miette::Result<Summary> {
+    pub fn finish(
+        job: &Job,
+        mut dir: RunDir,
+        planned: usize,
+        agreement: Agreement,
+    ) -> miette::Result<Summary> {
         dir.stay();
         let written = std::fs::read(dir.path().join(SUMMARY)).ok();
         let written: Option<Summary> = written.and_then(|text| serde_json::from_slice(&text).ok());
@@ -115,7 +121,7 @@ impl Keeper {
         let kept = Self::enter(job, dir, catalogue, planned, unix_ns()).wrap_err(Unfinished::NotKept)?;
         Ok(Summary {
             finished_before: true,
-            ..kept.end(Outcome::Complete, departed, None, 0, BTreeMap::new())
+            ..kept.end(Outcome::Complete, agreement, None, 0, BTreeMap::new(), OffReport::off())
         })
     }
 
@@ -135,7 +141,7 @@ impl Keeper {
         planned: usize,
         start_unix_ns: u64,
     ) -> miette::Result<Self> {
-        dir.write("rig.toml", job.setup.rig_toml()?.as_bytes())?;
+        dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())?;
         let folder = dir.path().file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let passes = dir.made.len();
         catalogue.begin(&RunEntry {
@@ -186,10 +192,11 @@ impl Keeper {
     pub fn end(
         mut self,
         outcome: Outcome,
-        departed: bool,
+        agreement: Agreement,
         machine: Option<(LoopReport, StallReport)>,
         record_lost: u64,
         links: BTreeMap<String, serde_json::Value>,
+        off: OffReport,
     ) -> Summary {
         let (loop_report, stalls) = machine.unzip();
         let mut summary = Summary {
@@ -197,14 +204,16 @@ impl Keeper {
             folder: self.dir.path().to_path_buf(),
             passes: self.passes,
             planned: self.planned,
-            model_departed: departed,
+            model_departed: agreement == Agreement::Departed,
+            agreement,
             loop_report,
             stalls,
             record_lost,
             links,
+            off,
             finished_before: false,
         };
-        self.departed |= departed;
+        self.departed |= summary.model_departed;
         // The catalogue last: what it calls complete has its summary and its report.
         let written = [self.write_end(&summary), self.note_end(&summary)];
         let mut kept = true;
