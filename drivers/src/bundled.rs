@@ -59,7 +59,7 @@ mod tests {
     #[test]
     fn a_gage_at_its_rail_saturates_every_force() {
         use instruments::profile::Refusal;
-        let profile = crate::drivers::profile("ati-digital-ft").unwrap();
+        let profile = crate::profile("ati-digital-ft").unwrap();
         let mut values = profile.values();
         let frame = |name: &str| profile.frame(name).unwrap();
         for vector in profile.description.vector.iter().filter(|vector| vector.registers.is_some()) {

@@ -1,6 +1,6 @@
 use super::*;
-use crate::drivers::ports::DriveSetPoint;
-use crate::drivers::profile;
+use crate::ports::DriveSetPoint;
+use crate::profile;
 
 fn amplifier() -> (Endpoint, AmplifierPort) {
     Endpoint::amplifier(profile("muprime-amplifier").unwrap(), &InstrumentSetup::new("muprime-amplifier", ""))
