@@ -97,6 +97,13 @@ fn verdict(w: &mut String, run: &RunData) {
     };
     let class = if departed { "verdict departed" } else { "verdict" };
     let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}</p>");
+    if !run.damage.is_empty() {
+        let items: String = run.damage.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
+        let _ = writeln!(
+            w,
+            "<div class=\"verdict departed\"><strong>The records of this run are not whole</strong><ul>{items}</ul></div>"
+        );
+    }
     let flagged = run.passes.iter().filter(|p| !p.temperature_flags.is_empty()).count();
     if let Some(flag) = run.passes.iter().find_map(|p| p.temperature_flags.first()) {
         let _ = writeln!(
