@@ -62,7 +62,7 @@ pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
             if sorted.len() < 2 * k.region_least || sorted[sorted.len() - 1] <= sorted[0] * ONE_LEVEL {
                 return;
             }
-            let cut = |q: f64| sorted[((sorted.len() - 1) as f64 * q) as usize];
+            let cut = |q: f64| sorted[((sorted.len() - 1) as f64 * q.min(1.0)) as usize];
             let (low, high) = (cut(k.region_cuts[0]), cut(k.region_cuts[1]));
             let below: Vec<usize> = of.iter().copied().filter(|&i| value(i) <= low).collect();
             let above: Vec<usize> = of.iter().copied().filter(|&i| value(i) >= high).collect();
@@ -101,6 +101,8 @@ pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
             list.push(("low pressure".to_string(), rows));
         }
     }
+    // A region needs a rest to be predicted from.
+    list.retain(|(_, rows)| rows.len() < n);
     list
 }
 

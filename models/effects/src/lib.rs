@@ -13,6 +13,29 @@
 //! An effect changes what the contact is given ([`contact::Contact`]) or what the instruments make of the
 //! force ([`operating::Reading`]); the contact itself is solved in one place. Effects therefore combine, and
 //! each nests the baseline exactly. To add one: a file in `library/`, and its line in [`library`]'s list.
+//!
+//! ```
+//! use models::condition::Condition;
+//! use muprime_effects::{Active, Baseline, Design, by_name, lateral_force};
+//!
+//! let baseline = Baseline { mu0: 0.5, normal_stiffness_n_per_m: 3.9e6, lateral_stiffness_n_per_m: 1.5e6 };
+//! let design = Design {
+//!     duration_s: 60.0,
+//!     reference_load_n: 0.25,
+//!     reference_speed_m_s: 0.02,
+//!     reference_frequency_hz: 27_500.0,
+//!     reference_temperature_c: 20.0,
+//!     stroke_m: 0.0,
+//!     largest_amplitude_m: 2e-6,
+//! };
+//! let pass = Condition::paper();
+//! let effect = by_name("amplitude_miscalibration").ok_or("no effect of that name")?;
+//! // The plate moves by half of what was asked: friction falls less.
+//! let half = [Active { effect, law: 0, theta: &[0.5_f64.ln()] }];
+//! let expected = lateral_force(&baseline, &[], &pass, &design);
+//! assert!(lateral_force(&baseline, &half, &pass, &design) > expected);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod contact;
 pub mod corrected;

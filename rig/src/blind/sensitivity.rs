@@ -4,7 +4,7 @@
 //! reported beside the verdict does not enter the score and is left out.
 
 use diagnosis::Verdict;
-use diagnosis::constants::{Constants, Stage};
+use diagnosis::constants::{self, Constants, Stage};
 use diagnosis::data::{RigFile, Table};
 use diagnosis::decision::decide;
 use diagnosis::hypotheses::{Fitted, Options, fit_all};
@@ -94,7 +94,7 @@ fn tried(
     Ok(list)
 }
 
-/// The study on `count` sets from a seed. `only` restricts it to one stage of constants.
+/// The study on `count` sets from a seed, of the constants that `asked` picks.
 ///
 /// # Errors
 /// A set that the diagnosis refuses.
@@ -103,12 +103,12 @@ pub fn run(
     count: usize,
     stratum: Option<Stratum>,
     options: &Options,
-    only: Option<Stage>,
+    asked: &dyn Fn(&constants::Row) -> bool,
 ) -> miette::Result<Vec<Row>> {
     let base = &*options.constants;
     let mut labels = vec![("as it is", 1.0)];
     let mut changes = Vec::new();
-    for row in base.rows().iter().filter(|r| r.stage != Stage::Report && only.is_none_or(|s| s == r.stage)) {
+    for row in base.rows().iter().filter(|r| r.stage != Stage::Report && asked(r)) {
         for factor in FACTORS {
             let mut constants = base.clone();
             constants.scale(row.name, factor).map_err(|e| miette::miette!("{e}"))?;

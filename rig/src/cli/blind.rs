@@ -2,7 +2,7 @@
 
 use crate::blind::{confusion, figures, run as score_all};
 use crate::{out, say};
-use diagnosis::constants::{Constants, Stage};
+use diagnosis::constants::{Constants, Row, Stage};
 use diagnosis::hypotheses::Options;
 use miette::IntoDiagnostic;
 use sim::sealed::Stratum;
@@ -39,8 +39,8 @@ pub struct Args {
     /// Set a constant of the diagnosis for this study (may be repeated); docs/diagnosis/constants.md lists them.
     #[arg(long, value_name = "NAME=VALUE", hide = true)]
     pub constant: Vec<String>,
-    /// Instead: the verdicts with each constant halved and doubled. `fit` or `decision` restricts it to those constants.
-    #[arg(long, value_name = "STAGE", num_args = 0..=1, default_missing_value = "all", hide = true,
+    /// Instead: the verdicts with each constant halved and doubled. `fit`, `decision` or a name restricts it.
+    #[arg(long, value_name = "WHICH", num_args = 0..=1, default_missing_value = "all", hide = true,
           conflicts_with_all = ["further", "write", "same_form"])]
     pub sensitivity: Option<String>,
     /// Instead: the table of constants, as docs/diagnosis/constants.md has it.
@@ -92,8 +92,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let options =
         Options { constants: Arc::new(constants), pairs: !args.no_pairs, without: args.without.clone() };
-    if let Some(stage) = args.sensitivity.as_deref() {
-        return sensitivity(&args, stage, stratum, &options, json);
+    if let Some(asked) = args.sensitivity.as_deref() {
+        return sensitivity(&args, asked, stratum, &options, json);
     }
     let scored = score_all(args.seed, args.sets, stratum, &options, |s| {
         if args.verbose {
@@ -127,18 +127,21 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
 /// Verdicts with each constant halved and doubled.
 fn sensitivity(
     args: &Args,
-    stage: &str,
+    asked: &str,
     stratum: Option<Stratum>,
     options: &Options,
     json: bool,
 ) -> miette::Result<ExitCode> {
-    let only = match stage {
-        "all" => None,
-        "fit" => Some(Stage::Fit),
-        "decision" => Some(Stage::Decision),
-        other => miette::bail!("--sensitivity {other}: fit, decision or nothing is needed"),
+    let picked = |row: &Row| match asked {
+        "all" => true,
+        "fit" => row.stage == Stage::Fit,
+        "decision" => row.stage == Stage::Decision,
+        name => row.name == name,
     };
-    let rows = crate::blind::sensitivity::run(args.seed, args.sets, stratum, options, only)?;
+    if !options.constants.rows().iter().any(picked) {
+        miette::bail!("--sensitivity {asked}: fit, decision, the name of a constant, or nothing is needed");
+    }
+    let rows = crate::blind::sensitivity::run(args.seed, args.sets, stratum, options, &picked)?;
     if json {
         let document = serde_json::json!({
             "schema": "muprime.blind.sensitivity/1", "seed": args.seed, "sets": args.sets, "rows": rows,
