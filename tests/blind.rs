@@ -1,5 +1,5 @@
 //! The diagnosis on sealed sets: few, fixed seeds; the full figures come from `muprime blind`.
-use diagnosis::attribute::Verdict;
+use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;

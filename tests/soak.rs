@@ -79,7 +79,7 @@ fn a_day_in_virtual_time_without_a_trip() {
     let mut recorder = Recorder::begin(file, preamble).unwrap();
 
     let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::ideal(), 1).unwrap().split();
-    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let mut ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut state = CycleState::default();
     let mut queue: VecDeque<Command> = VecDeque::new();
     let (mut sweeps, mut passes, mut rows, mut ended, mut rest) = (0u64, 0u64, 0u64, false, 0);

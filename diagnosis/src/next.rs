@@ -3,20 +3,20 @@
 //! | room | purpose |
 //! |---|---|
 //! | [`grid`] | conditions that a plan can choose, within what the table has shown |
-//! | [`belief`] | what each hypothesis expects there, with how surely it knows it |
+//! | [`predictive`] | what each hypothesis expects there, with how surely it knows it |
 //! | [`design`] | which of them, in which order |
 
-pub mod belief;
 pub mod design;
 pub mod grid;
+pub mod predictive;
 
-use crate::attribute::{Decision, Verdict};
 use crate::data::{RigFile, Table};
+use crate::decision::{Decision, Verdict};
 use crate::fit::Problem;
 use crate::hypotheses::Fitted;
-use belief::beliefs;
 use models::condition::Condition;
 use models::covariate;
+use predictive::predictives;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
@@ -44,30 +44,24 @@ fn settings<S: Serializer>(conditions: &[Condition], serializer: S) -> Result<S:
 
 /// Passes of a designed experiment.
 pub const PASSES: usize = 12;
-/// Nats below which an experiment is not worth asking for.
-const LEAST_NATS: f64 = 0.05;
-/// Nats of a check beyond which more says nothing.
-const MOST_NATS: f64 = 500.0;
-/// Probability of no gap from which there is nothing to part.
-const SETTLED: f64 = 0.99;
-
 /// Designs experiments for what a decision left open.
 pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Decision) -> Vec<Experiment> {
-    if decision.verdict == Verdict::NoGap && decision.none >= SETTLED {
+    let k = &fitted.problem.constants;
+    if decision.verdict == Verdict::NoGap && decision.none >= k.settled_probability {
         return Vec::new();
     }
     let mut list = Vec::new();
     let grid = grid::conditions(table);
-    let held = beliefs(fitted, rig, decision, &grid);
+    let hypotheses = predictives(fitted, rig, decision, &grid);
     // Where the evidence is for an effect and the left-out regions are against it, passes that part hypotheses come back to
     // a few conditions and leave the regions as empty as they are. Every second one then goes where nothing is known.
     let empty = decision.unknown > 0.5 && fitted.unknown_probability < 0.5;
-    let open = held.len() - 1;
-    let chosen = design::greedy(&held, PASSES, empty.then_some(open));
-    if let Some(rival) = design::rival(&held, &chosen) {
-        let nats = design::expected_nats(&held[0], &held[rival], &chosen);
-        let names = [held[0].name.clone(), held[rival].name.clone()];
-        if nats > LEAST_NATS {
+    let open = hypotheses.len() - 1;
+    let chosen = design::greedy(&hypotheses, PASSES, empty.then_some(open), k.design_pass_nats);
+    if let Some(rival) = design::rival(&hypotheses, &chosen) {
+        let nats = design::expected_nats(&hypotheses[0], &hypotheses[rival], &chosen);
+        let names = [hypotheses[0].name.clone(), hypotheses[rival].name.clone()];
+        if nats > k.design_least_nats {
             list.push(Experiment {
                 conditions: chosen.iter().map(|&i| grid[i]).collect(),
                 text: format!(
@@ -88,7 +82,7 @@ pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Dec
 
 /// Actions on instruments that part the leader from the next candidate.
 fn actions(fitted: &Fitted, decision: &Decision) -> Vec<Experiment> {
-    let leader = decision.class[0];
+    let Some(leader) = decision.leader() else { return Vec::new() };
     let second = decision.class.get(1).copied().or_else(|| {
         (0..fitted.candidates.len()).find(|&i| i != leader && fitted.candidates[i].effects.len() == 1)
     });
@@ -105,7 +99,8 @@ fn actions(fitted: &Fitted, decision: &Decision) -> Vec<Experiment> {
             list.push(Experiment {
                 conditions: Vec::new(),
                 separates: [a.names().join("+"), b.names().join("+")],
-                expected_nats: (0.5 * (theta[0] / check.sd).powi(2)).min(MOST_NATS),
+                expected_nats: (0.5 * (theta[0] / check.sd).powi(2))
+                    .min(fitted.problem.constants.check_most_nats),
                 text: check.action.to_string(),
             });
         }

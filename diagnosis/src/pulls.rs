@@ -6,7 +6,7 @@
 //! where its own calibration does not want it. The pull says how far: the shift in units of the deviation that such a
 //! shift has when prior and table agree (prior variance less posterior variance).
 
-use crate::evidence::Explained;
+use crate::evidence::Posterior;
 use crate::fit::{Member, Problem};
 use effects::{Law, Place, library};
 use serde::Serialize;
@@ -65,8 +65,6 @@ impl Pull {
 
 /// Pull from which the remark is made: one table in 185 passes it by chance, two stiffnesses counted.
 pub const REMARKABLE: f64 = 3.0;
-/// Least share of the prior variance that the table must take away before a pull is stated.
-const TOLD: f64 = 0.05;
 
 /// The stiffnesses, in the order of the baseline's parameters after mu0.
 const STIFFNESSES: [&str; 2] = ["normal_stiffness", "lateral_stiffness"];
@@ -83,7 +81,7 @@ fn imitators(parameter: usize) -> Vec<&'static str> {
 
 /// Pulls of both stiffnesses in a model. Where `model` explains the table by an error of a stiffness, that error is what
 /// was pulled: how far is then asked of the recalibrated baseline, `none`, and the fitted value is the model's whole one.
-pub fn pulls(problem: &Problem, none: &Explained, model: &Explained) -> Vec<Pull> {
+pub fn pulls(problem: &Problem, none: &Posterior, model: &Posterior) -> Vec<Pull> {
     let named = model.members.iter().any(errs_in_the_finger);
     let judged = if named { none } else { model };
     let fitted = problem.baseline(&model.u);
@@ -100,13 +98,14 @@ pub fn pulls(problem: &Problem, none: &Explained, model: &Explained) -> Vec<Pull
         .map(|(i, (&quantity, (stated_n_per_m, fitted_n_per_m)))| {
             // Coordinates are standard normal a priori: mu0 first, then the stiffnesses.
             let at = i + 1;
-            let told = 1.0 - judged.covariance[(at, at)];
+            let contraction = 1.0 - judged.covariance[(at, at)];
             Pull {
                 quantity,
                 stated_n_per_m,
                 fitted_n_per_m,
                 stated_relative_sd: problem.prior_sd[at],
-                pull_sd: (told > TOLD).then(|| judged.u[at] / told.sqrt()),
+                pull_sd: (contraction > problem.constants.least_contraction)
+                    .then(|| judged.u[at] / contraction.sqrt()),
                 imitated_by: imitators(at),
             }
         })
@@ -119,7 +118,7 @@ fn errs_in_the_finger(member: &Member) -> bool {
 }
 
 /// Factors on normal and lateral stiffness that a named error of a stiffness adds to the baseline's.
-fn stiffness_factors(model: &Explained) -> [f64; 2] {
+fn stiffness_factors(model: &Posterior) -> [f64; 2] {
     let thetas = Problem::thetas(&model.members, &model.u);
     let mut factors = [1.0; 2];
     for (member, theta) in model.members.iter().zip(thetas).filter(|(m, _)| errs_in_the_finger(m)) {

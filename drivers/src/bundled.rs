@@ -9,6 +9,7 @@ const PROFILES: &[(&str, &str)] = &[
     ("me-gsv4-can", include_str!("../profiles/me-gsv4-can.toml")),
     ("muprime-amplifier", include_str!("../profiles/muprime-amplifier.toml")),
     ("muprime-force2", include_str!("../profiles/muprime-force2.toml")),
+    ("muprime-relay", include_str!("../profiles/muprime-relay.toml")),
     ("muprime-stage", include_str!("../profiles/muprime-stage.toml")),
     ("piezodrive-pdus210", include_str!("../profiles/piezodrive-pdus210.toml")),
     ("polytec-ofv5000", include_str!("../profiles/polytec-ofv5000.toml")),
@@ -59,7 +60,7 @@ mod tests {
     #[test]
     fn a_gage_at_its_rail_saturates_every_force() {
         use instruments::profile::Refusal;
-        let profile = crate::drivers::profile("ati-digital-ft").unwrap();
+        let profile = crate::profile("ati-digital-ft").unwrap();
         let mut values = profile.values();
         let frame = |name: &str| profile.frame(name).unwrap();
         for vector in profile.description.vector.iter().filter(|vector| vector.registers.is_some()) {

@@ -1,4 +1,5 @@
 //! Speeds of the loop and of the virtual rig: `cargo bench -p muprime-rig --bench rig`.
+#![allow(clippy::disallowed_methods, reason = "it measures time")]
 
 use divan::Bencher;
 use divan::counter::ItemsCount;

@@ -1,5 +1,6 @@
 //! Prints the lateness of the loop's thread with idle ports, as quantiles in us: `p50 p99 p99.9 max`.
 //! `benches/lateness` runs it in turn with cyclictest.
+#![allow(clippy::disallowed_methods, reason = "it measures time")]
 
 use models::finger::Finger;
 use models::prediction::SpringSlider;
@@ -44,8 +45,8 @@ fn main() {
     let parts = LoopParts {
         config: setup.config,
         model: Arc::new(SpringSlider::new(Finger::paper()).expect("the paper's finger")),
-        ports: Ports { force: Box::new(Idle), amplifier: Box::new(Idle), stage: Box::new(Idle) },
-        commands: Arc::new(crossbeam_queue::ArrayQueue::new(4)),
+        ports: Ports::new(Box::new(Idle), Box::new(Idle), Box::new(Idle)),
+        commands: Arc::new(realtime::queue::CommandQueue::new(4)),
         rows,
         watch,
         life: Arc::clone(&life),

@@ -5,8 +5,9 @@
 
 pub mod further;
 pub mod same_form;
+pub mod sensitivity;
 
-use diagnosis::attribute::Verdict;
+use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;

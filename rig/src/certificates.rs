@@ -233,8 +233,4 @@ impl Amplifier for CalibratedAmplifier {
             ..state
         })
     }
-
-    fn cut_supply(&mut self, now: Nanos) -> bool {
-        self.inner.cut_supply(now)
-    }
 }

@@ -6,18 +6,23 @@
 //! | [`certificates`] | a setup's certificates, verified and applied once |
 //! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 //! | [`sequence`] | the order of a sweep, a pure state machine over rows |
+//! | [`supervisor`] | the one way to lead a loop: it stops first, switches off, reads back |
+//! | [`claim`] | one controller a rig |
 //! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
 //! | [`run_dir`], [`catalogue`] | a run's folder and the catalogue of runs |
+//! | [`figures`] | the paper's figures recomputed |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
 //! | [`cli`] | one file a subcommand |
 
 pub mod blind;
 pub mod catalogue;
 pub mod certificates;
+pub mod claim;
 pub mod cli;
 pub mod embed;
 pub mod export;
 pub mod faults;
+pub mod figures;
 pub mod fingertip;
 pub mod input;
 pub mod model_file;
@@ -27,3 +32,4 @@ pub mod run_dir;
 pub mod sequence;
 pub mod session;
 pub mod setup;
+pub mod supervisor;

@@ -63,8 +63,12 @@ fn main() -> ExitCode {
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let json = cli.json;
+    cli::until_the_end(move || run(cli.verb, json))
+}
+
+fn run(verb: Verb, json: bool) -> ExitCode {
     // A panic is a fault of this program: status 3, after the threads have put the rig in its safe state.
-    let outcome = std::panic::catch_unwind(|| match cli.verb {
+    let outcome = std::panic::catch_unwind(|| match verb {
         Verb::Run(args) => cli::run::run(args, json),
         Verb::VirtualRig(args) => cli::virtual_rig::run(args, json),
         Verb::Calibrate(args) => cli::calibrate::run(args, json),

@@ -7,8 +7,6 @@ mod fast;
 mod keeper;
 mod live;
 
-pub use live::RigClaim;
-
 pub use fast::{Rehearsal, rehearse};
 pub use keeper::{REPLAYABLE, Replayable};
 
@@ -16,6 +14,7 @@ use crate::plan::{Plan, Point, Resolution};
 use crate::run_dir::{Identity, RunDir};
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use crate::setup::Setup;
+use crate::supervisor::OffReport;
 use models::prediction::FrictionModel;
 use realtime::pacing::LoopReport;
 use realtime::witness::StallReport;
@@ -24,7 +23,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::AtomicUsize;
 
 /// What is to be run.
 pub struct Job {
@@ -79,11 +78,14 @@ pub struct Summary {
     pub record_lost: u64,
     /// What the links counted, by instrument.
     pub links: BTreeMap<String, serde_json::Value>,
+    /// Whether the rig was read back off in the end.
+    #[serde(default)]
+    pub off: OffReport,
 }
 
 /// Why a run that had begun did not come to an orderly end. Anything else that goes wrong is a refusal: it comes before
 /// the rig or the folder of the run is touched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error, miette::Diagnostic)]
 pub enum Unfinished {
     /// The sweep ran, and its record could not be kept.
     #[error("the sweep had begun, and what came of it could not be kept")]
@@ -91,15 +93,19 @@ pub enum Unfinished {
     /// A thread hangs or has panicked: a fault of this program.
     #[error("the sweep had begun; the instruments' own watchdogs switch off; what was measured is kept")]
     Internal,
+    /// A signal ended it.
+    #[error("stopped by a signal")]
+    Interrupted,
+    /// The drive was not read back off.
+    #[error("the output may still be on: switch the supply off")]
+    NotOff,
 }
 
-/// Signals that a run looks at: how often a stop was asked for, and whether to leave at once.
+/// Signals that a run looks at: how often a stop was asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Signals {
     /// SIGINT, SIGTERM or SIGHUP so far.
     pub stops: Arc<AtomicUsize>,
-    /// For tests: pretend the process dies.
-    pub abandon: Arc<AtomicBool>,
 }
 
 /// Hex SHA-256 of a text.
@@ -165,7 +171,8 @@ impl Job {
             self.setup.file.noise,
         )
         .watching(&self.setup.certificates.temperature_ranges)
-        .in_air(self.setup.ambient());
+        .in_air(self.setup.ambient())
+        .guarded_by(&self.setup.config.limits);
         for pass in &dir.made {
             sequence.remember(pass);
         }
@@ -193,6 +200,11 @@ impl Job {
         config.finger.normal_stiffness_n_per_m = finger.normal_stiffness_n_per_m;
         config.finger.lateral_stiffness_n_per_m = finger.lateral_stiffness_n_per_m;
         config.finger.stiffness_relative_sd = 0.0;
-        sim::world::World::new(&config, self.seed).map_err(wrong)
+        let mut world = sim::world::World::new(&config, self.seed).map_err(wrong)?;
+        if virtual_rig.hand_holds {
+            let holds_dead_man_from = Some(realtime::ports::Nanos(200_000_000));
+            world.set_operator(sim::world::Operator { holds_dead_man_from, ..world.operator() });
+        }
+        Ok(world)
     }
 }

@@ -273,7 +273,7 @@ impl Need {
 
 /// A candidate cause of the gap. It nests the baseline: at the zero of its size nothing changes, bit for bit.
 pub trait Effect: Sync {
-    /// Name as the contract has it.
+    /// Name as docs/contract.md has it.
     fn name(&self) -> &'static str;
     /// Where it sits.
     fn place(&self) -> Place;

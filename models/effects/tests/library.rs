@@ -1,6 +1,8 @@
 //! What the library says of its causes is true: names exist, exact aliases are exact, checks and certificates fit.
+use models::condition::Condition;
+use models::quantity::{Direction, PeakToPeak};
 use models::rig_file::CertifiedKey;
-use muprime_effects::{Active, Baseline, Condition, Design, Effect, by_name, known, lateral_force, library};
+use muprime_effects::{Active, Baseline, Design, Effect, Prior, by_name, known, lateral_force, library};
 use std::collections::BTreeSet;
 
 const BASELINE: Baseline =
@@ -21,19 +23,16 @@ fn passes() -> Vec<Condition> {
     for amplitude_pp_m in [0.0, 0.4e-6, 1.5e-6, 5e-6] {
         for speed_m_s in [2e-3, 0.02, 0.2] {
             for normal_force_n in [0.15, 0.8] {
-                for direction in [1.0, -1.0] {
+                for direction in [Direction::Forward, Direction::Backward] {
                     list.push(Condition {
                         time_s: 10.0,
-                        run_time_s: 10.0,
-                        amplitude_pp_m,
+                        amplitude: PeakToPeak::from_metres(amplitude_pp_m),
                         frequency_hz: 27_500.0,
                         speed_m_s,
                         direction,
                         position_m: 0.01,
                         normal_force_n,
-                        ambient_pressure_pa: None,
-                        temperature_c: None,
-                        relative_humidity_pct: None,
+                        ..Condition::paper()
                     });
                 }
             }
@@ -141,4 +140,21 @@ fn heating_is_imitated_by_rate_and_load_together() {
     let pair = ["load_dependent_friction", "rate_dependent_friction"];
     assert_eq!(muprime_effects::imitated(&pair).map(Effect::name), Some("frictional_heating"));
     assert!(muprime_effects::imitated(&pair[..1]).is_none());
+}
+
+/// What a check measures is of the unit of the law's size: its deviation is a part of the size's prior, neither more than
+/// half of it nor next to nothing.
+#[test]
+fn checks_measure_in_the_unit_of_the_size() {
+    let mut checked = 0;
+    for (effect, law) in library().iter().flat_map(|e| e.laws().iter().map(move |l| (e, l))) {
+        let Some(check) = law.seen_by else { continue };
+        let (Prior::Normal(sd) | Prior::HalfNormal(sd)) = law.parameters[0].prior else {
+            panic!("{} ({}): the size comes first", effect.name(), law.name)
+        };
+        let share = check.sd / sd;
+        assert!((5e-3..=0.5).contains(&share), "{} ({}): {share:.1e} of the prior", effect.name(), law.name);
+        checked += 1;
+    }
+    assert!(checked > 20, "{checked}");
 }

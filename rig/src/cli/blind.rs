@@ -1,10 +1,12 @@
 //! `muprime blind`: the diagnosis scored on sealed sets.
 
 use crate::blind::{confusion, figures, run as score_all};
+use diagnosis::constants::{Constants, Stage};
 use diagnosis::hypotheses::Options;
 use miette::IntoDiagnostic;
 use sim::sealed::Stratum;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 /// Score the diagnosis on sealed sets of the independent simulation.
 #[derive(Debug, clap::Args)]
@@ -33,6 +35,16 @@ pub struct Args {
     /// Instead: designed next experiments against random ones.
     #[arg(long, conflicts_with_all = ["write", "stratum"])]
     pub further: bool,
+    /// Set a constant of the diagnosis for this study (may be repeated); docs/diagnosis/constants.md lists them.
+    #[arg(long, value_name = "NAME=VALUE", hide = true)]
+    pub constant: Vec<String>,
+    /// Instead: the verdicts with each constant halved and doubled. `fit` or `decision` restricts it to those constants.
+    #[arg(long, value_name = "STAGE", num_args = 0..=1, default_missing_value = "all", hide = true,
+          conflicts_with_all = ["further", "write", "same_form"])]
+    pub sensitivity: Option<String>,
+    /// Instead: the table of constants, as docs/diagnosis/constants.md has it.
+    #[arg(long, hide = true)]
+    pub constants: bool,
     /// Print one line a set on stderr.
     #[arg(long)]
     pub verbose: bool,
@@ -60,13 +72,28 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         return Ok(ExitCode::SUCCESS);
     }
+    if args.constants {
+        print!("{}", diagnosis::constants::markdown());
+        return Ok(ExitCode::SUCCESS);
+    }
     if args.same_form {
         return same_form(&args, json);
     }
     if args.further {
         return further(&args, json);
     }
-    let options = Options { pairs: !args.no_pairs, without: args.without.clone(), ..Options::default() };
+    let mut constants = Constants::default();
+    for setting in &args.constant {
+        let (name, value) = setting
+            .split_once('=')
+            .ok_or_else(|| miette::miette!("--constant {setting}: NAME=VALUE is needed"))?;
+        constants.set(name.trim(), value).map_err(|e| miette::miette!("--constant {setting}: {e}"))?;
+    }
+    let options =
+        Options { constants: Arc::new(constants), pairs: !args.no_pairs, without: args.without.clone() };
+    if let Some(stage) = args.sensitivity.as_deref() {
+        return sensitivity(&args, stage, stratum, &options, json);
+    }
     let scored = score_all(args.seed, args.sets, stratum, &options, |s| {
         if args.verbose {
             eprintln!("{}", serde_json::to_string(s).unwrap_or_default());
@@ -92,6 +119,39 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             let list: Vec<String> = answers.iter().map(|(a, n)| format!("{a} {n}")).collect();
             println!("  {truth:40} {}", list.join("; "));
         }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Verdicts with each constant halved and doubled.
+fn sensitivity(
+    args: &Args,
+    stage: &str,
+    stratum: Option<Stratum>,
+    options: &Options,
+    json: bool,
+) -> miette::Result<ExitCode> {
+    let only = match stage {
+        "all" => None,
+        "fit" => Some(Stage::Fit),
+        "decision" => Some(Stage::Decision),
+        other => miette::bail!("--sensitivity {other}: fit, decision or nothing is needed"),
+    };
+    let rows = crate::blind::sensitivity::run(args.seed, args.sets, stratum, options, only)?;
+    if json {
+        let document = serde_json::json!({
+            "schema": "muprime.blind.sensitivity/1", "seed": args.seed, "sets": args.sets, "rows": rows,
+        });
+        println!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("| constant | factor | right | misnamed | changed | probability on the truth | n |");
+    println!("|---|---|---|---|---|---|---|");
+    for r in rows {
+        println!(
+            "| `{}` | {} | {} | {} | {} | {:.3} | {} |",
+            r.constant, r.factor, r.right, r.misnamed, r.changed, r.probability, r.sets
+        );
     }
     Ok(ExitCode::SUCCESS)
 }

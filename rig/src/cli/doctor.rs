@@ -217,6 +217,18 @@ fn talk(setup: &Setup) -> Vec<Finding> {
             advice: String::new(),
         }];
     }
+    // Every driver ends with an 'off': that must not reach a rig that another program drives.
+    let _claim = match crate::claim::RigClaim::take(setup) {
+        Ok(claim) => claim,
+        Err(why) => {
+            return vec![Finding {
+                subject: "instruments".into(),
+                good: false,
+                found: format!("{why}: {}", why.root_cause()),
+                advice: "wait until it ends, or end it".into(),
+            }];
+        }
+    };
     let probed = drivers::probe::probe(&setup.instruments(), Duration::from_secs(1));
     let vibrometer = setup.file.vibrometer.as_ref().map(|v| {
         let settings = drivers::vibrometer::settings(v);

@@ -1,5 +1,6 @@
 //! `muprime faults`: the fault list in virtual time, from seeds.
 
+use crate::faults::Pace;
 use crate::faults::bench::{Scene, run as run_scene};
 use crate::faults::search::{Search, Tally, search};
 use miette::IntoDiagnostic;
@@ -21,6 +22,9 @@ pub struct Args {
     /// Every seed twice: equal hashes, and its rows replayed to equal decisions
     #[arg(long)]
     twice: bool,
+    /// At the limits that a setup has by default (links held up for 20 ms), not at those of fast links
+    #[arg(long)]
+    default_limits: bool,
     /// Run one scene again, as a failure printed it
     #[arg(long, value_name = "SCENE.json")]
     scene: Option<PathBuf>,
@@ -41,9 +45,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         println!("{}", serde_json::to_string(&found).into_diagnostic()?);
         return super::exit(if found.wrong.is_empty() { super::DONE } else { super::FAILED });
     }
-    let Args { seeds, first, pairs, twice, .. } = args;
+    let Args { seeds, first, pairs, twice, default_limits, .. } = args;
+    let pace = if default_limits { Pace::Default } else { Pace::Fast };
     let (begun, cpu_ns) = (std::time::Instant::now(), realtime::pacing::process_cpu_ns());
-    let tally = search(Search { first, seeds, pairs, twice });
+    let tally = search(Search { first, seeds, pairs, twice, pace });
     let cpu_s = (realtime::pacing::process_cpu_ns() - cpu_ns) as f64 * 1e-9;
     let simulated_s = tally.cycles as f64 * crate::faults::bench::T.seconds();
     let speed = simulated_s / cpu_s.max(1e-9);

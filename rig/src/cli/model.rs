@@ -3,12 +3,9 @@
 mod amplitude_for;
 mod conditions;
 mod effects;
-mod figures;
-mod plot;
 mod point;
 mod reproduce;
 mod ridge;
-mod store;
 mod table;
 
 use clap::{Args, Subcommand};

@@ -5,6 +5,7 @@ use crate::plan::Plan;
 use crate::sequence::{Event, Outcome};
 use crate::session::{Job, News, Signals, Summary};
 use crate::setup::Setup;
+use crate::supervisor::MAY_BE_ON;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
 use models::prediction::{FrictionModel, SpringSlider};
@@ -84,7 +85,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     bar.finish_and_clear();
     tell(&summary, json);
     super::exit(match summary.outcome {
-        Outcome::Complete | Outcome::Stopped => super::DONE,
+        Outcome::Complete | Outcome::Stopped if summary.off.read_back => super::DONE,
         _ => super::FAILED,
     })
 }
@@ -148,9 +149,10 @@ fn watch_signals(signals: &Signals) -> miette::Result<()> {
             for (i, _) in caught.forever().enumerate() {
                 stops.fetch_add(1, Ordering::Relaxed);
                 if i > 0 {
-                    // The first one has sent the stop; the amplifier's watchdog covers the rest.
+                    // The first one has sent the stop; nobody can wait here for what was read back.
                     std::thread::sleep(std::time::Duration::from_millis(1500));
-                    std::process::exit(i32::from(super::FAILED));
+                    let _ = writeln!(std::io::stderr(), "leaving at once: {MAY_BE_ON}");
+                    super::leave_now(super::FAILED);
                 }
             }
         })
@@ -178,6 +180,11 @@ fn print_line(value: &serde_json::Value) {
 fn describe(event: &Event) -> String {
     match event {
         Event::Armed => "armed".into(),
+        Event::NoSecondChannel => {
+            "no second switch-off channel: what the amplifier refuses, only a hand at its supply switches off"
+                .into()
+        }
+        Event::NoWatchdog => "the amplifier has no watchdog: the second channel stands for it".into(),
         Event::Zeros { lateral_n, normal_n, after } => {
             let mn = |v: &Option<f64>| v.map_or("none".into(), |v| format!("{:+.2} mN", v * 1e3));
             let when = if *after { "after" } else { "before" };
@@ -215,6 +222,9 @@ fn tell(summary: &Summary, json: bool) {
         return;
     }
     let mut err = std::io::stderr().lock();
+    if !summary.off.read_back {
+        let _ = writeln!(err, "{}", summary.off.words());
+    }
     let _ = writeln!(err, "{} of {} passes", summary.passes, summary.planned);
     if let Some(report) = &summary.loop_report {
         let [p50, _, p99, _, max] = report.lateness_ns.map(|ns| ns as f64 / 1e3);

@@ -62,8 +62,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let plant = SharedPlant::new(world, Instant::now());
     let mut instruments = setup.instruments();
     let line = args.modbus_rtu.as_deref().map(|path| rtu(path, &instruments, &plant)).transpose()?;
-    for instrument in instruments.force.iter_mut().chain([&mut instruments.amplifier, &mut instruments.stage])
-    {
+    for instrument in instruments.all_mut() {
         let kind = drivers::profile(&instrument.profile).into_diagnostic()?.description.link.kind;
         let place = match kind {
             LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {

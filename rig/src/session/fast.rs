@@ -4,16 +4,16 @@ use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary, Unfinished};
 use crate::plan::{Plan, Resolution};
 use crate::run_dir::RunDir;
-use crate::sequence::{MeasuredPass, Outcome, Sequence};
+use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
 use crate::setup::Setup;
+use crate::supervisor::{self, End, VirtualLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::FrictionModel;
-use realtime::cycle::{Command, CycleState};
-use realtime::ports::Nanos;
 use realtime::recorder::Recorder;
-use realtime::turn::{Ports, Tick, turn};
+use realtime::turn::{Ports, Row};
 use sim::virtual_rig::VirtualRig;
-use std::collections::{BTreeMap, VecDeque};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -54,49 +54,59 @@ fn sweep(
     let [force, amplifier, stage] = rig.split();
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
-    let mut ports = Ports { force, amplifier, stage: Box::new(stage) };
+    let mut ports = Ports::new(force, amplifier, Box::new(stage.clone()));
+    if job.setup.file.supply_relay.is_some() {
+        ports = ports.with_supply(Box::new(stage.clone()));
+    }
+    if job.setup.file.safety_inputs.is_some() {
+        ports = ports.with_contacts(Box::new(stage));
+    }
     let file = kept.new_record()?;
     let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
-    let config = job.setup.config;
-    let mut state = CycleState::default();
-    let mut queue: VecDeque<Command> = VecDeque::new();
-    let mut number = 0u64;
-    let outcome = loop {
-        number += 1;
-        let now = Nanos(number * config.limits.timing.cycle.0);
-        let tick = Tick { number, lateness: Nanos(0), now };
-        let row = turn(&config, &*job.model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
-        recorder.row(&row).into_diagnostic()?;
-        if signals.stops.swap(0, Ordering::Relaxed) > 0 {
-            sequence.stop();
+    let mut rig = VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports);
+    // What cannot be kept ends the sweep.
+    let unkept = RefCell::new(None);
+    let mut knows = false;
+    let mut ask = || {
+        if !knows && unkept.borrow().is_some() {
+            knows = true;
+            return Some(End::NotKept);
         }
-        let reaction = sequence.on_row(&row);
-        keeper::record(&mut recorder, now, &reaction.events, reaction.pass.as_ref())?;
+        (signals.stops.swap(0, Ordering::Relaxed) > 0).then_some(End::Asked)
+    };
+    let mut keep = |row: &Row, sequence: &Sequence, reaction: Reaction| -> miette::Result<()> {
+        recorder.row(row).into_diagnostic()?;
+        keeper::record(&mut recorder, row.now, &reaction.events, reaction.pass.as_ref())?;
         kept.keep(&reaction.events, reaction.pass.as_ref(), news)?;
         if reaction.pass.is_some() {
             let (done, all) = sequence.progress();
             news(News::Progress(done, all, sequence.remaining_s()));
         }
-        queue.extend(reaction.commands);
-        if number.is_multiple_of(FLUSH_EVERY) {
+        if row.cycle.is_multiple_of(FLUSH_EVERY) {
             recorder.flush().into_diagnostic()?;
         }
-        if let Some(outcome) = reaction.outcome {
-            break outcome;
-        }
+        Ok(())
     };
-    // Let the stop reach the rig, so that the record shows the safe state.
-    for _ in 0..20 {
-        number += 1;
-        let now = Nanos(number * config.limits.timing.cycle.0);
-        let tick = Tick { number, lateness: Nanos(0), now };
-        let row = turn(&config, &*job.model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
-        recorder.row(&row).into_diagnostic()?;
+    let outcome = supervisor::sweep(&mut rig, sequence, &mut ask, &mut |row, sequence, reaction| {
+        if unkept.borrow().is_none() {
+            *unkept.borrow_mut() = keep(row, sequence, reaction).err();
+        }
+    });
+    if let Some(why) = unkept.into_inner() {
+        return Err(why);
     }
+    // The stop reaches the rig, so that the record shows the safe state.
+    let mut recorded = Ok(());
+    let off = rig.end(&mut |row| {
+        if recorded.is_ok() {
+            recorded = recorder.row(row);
+        }
+    });
+    recorded.into_diagnostic()?;
     let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
     recorder.end(last).into_diagnostic().wrap_err("the record")?;
     let departed = sequence.departed();
-    Ok(kept.end(outcome, departed, None, 0, BTreeMap::new()))
+    Ok(kept.end(outcome, departed, None, 0, BTreeMap::new(), off))
 }
 
 /// What a sweep in memory comes to.
@@ -130,24 +140,13 @@ pub fn rehearse(
             .in_air(setup.ambient());
     let [force, amplifier, stage] =
         VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
-    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
-    let config = setup.config;
-    let mut state = CycleState::default();
-    let mut queue: VecDeque<Command> = VecDeque::new();
+    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
+    let mut rig = VirtualLoop::new(setup.config, model, ports);
     let mut passes = Vec::new();
-    for number in 1.. {
-        let now = Nanos(number * config.limits.timing.cycle.0);
-        let tick = Tick { number, lateness: Nanos(0), now };
-        let row = turn(&config, &*model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
-        let reaction = sequence.on_row(&row);
+    let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut || None, &mut |_, _, reaction| {
         passes.extend(reaction.pass);
-        queue.extend(reaction.commands);
-        if let Some(outcome) = reaction.outcome {
-            let departed = sequence.departed();
-            return Ok(Rehearsal { passes, outcome, departed, cycles: number });
-        }
-    }
-    unreachable!("the sequence ends every sweep")
+    });
+    Ok(Rehearsal { passes, outcome, departed: sequence.departed(), cycles: rig.cycles() })
 }
 
 /// An outcome as JSON, for the record's last words.

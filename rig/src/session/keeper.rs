@@ -1,9 +1,11 @@
 //! Keeps what a sweep yields: record, point table, catalogue. It runs beside the loop and may touch files.
+#![allow(clippy::disallowed_methods, reason = "a run says when it began")]
 
 use super::{Job, News, Summary};
 use crate::catalogue::{Catalogue, RunEntry};
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome};
+use crate::supervisor::OffReport;
 use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
 use realtime::cycle::Config;
@@ -71,10 +73,8 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     files.extend(job.setup.certificates.files.iter().cloned());
     for (id, text) in job
         .setup
-        .file
-        .force
-        .iter()
-        .chain([&job.setup.file.amplifier, &job.setup.file.stage])
+        .instruments()
+        .all()
         .filter_map(|i| drivers::bundled::text(&i.profile).map(|text| (i.profile.clone(), text)))
     {
         files.push((format!("profiles/{id}.toml"), text.to_string()));
@@ -143,6 +143,7 @@ impl Keeper {
         machine: Option<(LoopReport, StallReport)>,
         record_lost: u64,
         links: BTreeMap<String, serde_json::Value>,
+        off: OffReport,
     ) -> Summary {
         let (loop_report, stalls) = machine.unzip();
         let mut summary = Summary {
@@ -155,6 +156,7 @@ impl Keeper {
             stalls,
             record_lost,
             links,
+            off,
         };
         if let Err(why) = self.write_end(&summary) {
             tracing::error!("the end of the run could not be kept: {why:#}");

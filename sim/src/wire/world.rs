@@ -117,6 +117,13 @@ impl Plant for WorldPlant {
             Quantity::StageFault => truth(stage.is_some_and(|s| s.fault)),
             Quantity::StageCount => of_stage(|s| f64::from(s.sequence)),
             Quantity::StageTime => of_stage(|s| s.taken_at.seconds()),
+            Quantity::SupplyClosed => truth(self.world.supply_closed()),
+            Quantity::EmergencyStop => truth(!self.world.operator().presses_emergency_stop),
+            Quantity::Interlock => truth(!self.world.operator().opens_guard),
+            Quantity::DeadMan => {
+                let now = self.world.now();
+                truth(self.world.operator().holds_dead_man_from.is_some_and(|from| now >= from))
+            }
             Quantity::DeviceTime => self.world.now().seconds(),
             // The emulator counts its own reads; the world knows nothing of them.
             Quantity::DeviceReads => 0.0,
@@ -134,13 +141,16 @@ impl Plant for WorldPlant {
                 Command::Velocity => self.motion.velocity_m_s = value,
                 Command::NormalForce => self.motion.normal_force_n = value,
                 Command::StageHeartbeat => {}
+                // The switch has a wire of its own: it moves nothing else.
+                Command::CloseSupply if value != 0.0 => self.world.close_supply(),
+                Command::CloseSupply => self.world.cut_supply(),
             }
             let of_drive = matches!(
                 command,
                 Command::Amplitude | Command::Frequency | Command::Enable | Command::DriveHeartbeat
             );
             drives |= of_drive;
-            moves |= !of_drive;
+            moves |= !of_drive && command != Command::CloseSupply;
         }
         if drives {
             self.world.command_amplifier(self.drive);

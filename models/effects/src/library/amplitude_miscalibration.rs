@@ -14,7 +14,7 @@ static LAWS: [Law; 2] = [
         .acts_as([0.0, 1.0, 0.0])
         .seen_by(CHECK, 0.02),
     Law::new("dead zone", &[Parameter::signed("missing_amplitude", "m", 0.2e-6, -1e-6, 1e-6)])
-        .seen_by(CHECK, 0.02),
+        .seen_by(CHECK, 4e-8),
 ];
 
 impl Effect for AmplitudeMiscalibration {

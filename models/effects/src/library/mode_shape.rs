@@ -26,8 +26,8 @@ static LAWS: [Law; 4] = [
             Parameter::between("centre_over_stroke", "1", -1.0, 2.0),
         ],
     )
-    .seen_by(CHECK, 0.03),
-    Law::new("gradient", &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)]).seen_by(CHECK, 0.03),
+    .seen_by(CHECK, 130.0),
+    Law::new("gradient", &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)]).seen_by(CHECK, 1.0),
     // Flexural waves shorten as the root of the frequency.
     Law::new(
         "standing wave, shorter at higher frequency",

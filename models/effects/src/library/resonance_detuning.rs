@@ -30,7 +30,7 @@ static LAWS: [Law; 6] = [
         ],
     )
     .needs(&[Need::Frequencies])
-    .seen_by(CHECK, 0.05),
+    .seen_by(CHECK, 3.0),
     Law::new(
         "loss with time",
         &[

@@ -28,12 +28,12 @@ static LAWS: [Law; 5] = [
             Parameter::between("load_exponent", "1", 0.0, 1.0),
         ],
     )
-    .seen_by(CHECK, 5e4),
+    .seen_by(CHECK, 3e10),
     Law::new(
         "exponential on friction",
         &[Parameter::positive("decay_per_amplitude_squared", "1/m^2", 0.3e12, 3e12)],
     )
-    .seen_by(CHECK, 5e4),
+    .seen_by(CHECK, 2.5e10),
     Law::new(
         "power on friction",
         &[

@@ -39,10 +39,13 @@ pub fn series(way: &Way<'_>) -> miette::Result<String> {
         miette::bail!("--reconnect-s {}: between 0 and 86400", way.reconnect_s);
     }
     let epoch = Instant::now();
+    // Closing the links switches off what they reach: that must be nobody else's rig.
+    let mut _claim = None;
     let mut rig = match way.setup {
         None => None,
         Some(name) => {
             let setup = Setup::load(name)?;
+            _claim = Some(crate::claim::RigClaim::take(&setup)?);
             Some(drivers::open(&setup.instruments(), epoch).map_err(|e| miette::miette!("{e}"))?)
         }
     };

@@ -1,6 +1,6 @@
 //! What a verdict says of the certificates that stand beside the table in rig.toml.
 
-use diagnosis::attribute::Verdict;
+use diagnosis::Verdict;
 use diagnosis::pulls::Pull;
 use diagnosis::verdict::Diagnosis;
 use models::rig_file::RigFile;
@@ -71,7 +71,7 @@ pub fn in_doubt(rig: &RigFile, pulls: &[Pull]) -> Vec<InDoubt> {
     for pull in pulls.iter().filter(|p| p.remarkable()) {
         for &imitates in &pull.imitated_by {
             let laws = effects::by_name(imitates).map_or(&[][..], |e| e.laws());
-            let Some(key) = laws.iter().find_map(|law| law.certified_by) else { continue };
+            let Some(key) = laws.iter().find_map(|l| l.acts_as.and(l.certified_by)) else { continue };
             // Only a certificate that is there can be in doubt.
             let named = key.kind().is_some_and(|kind| rig.calibration.certificates.contains_key(&kind));
             if let (true, Some(pull_sd)) = (named, pull.pull_sd) {

@@ -1,7 +1,7 @@
 //! `muprime model reproduce`: the paper's figures.
 
-use super::plot::Chart;
-use super::{figures, refused, store};
+use super::refused;
+use crate::figures::{self, store};
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, WrapErr};
 use models::ridge::study::{content_key, fig_9};
@@ -50,14 +50,6 @@ pub struct ReproduceArgs {
     /// Elements of each mesh, about
     #[arg(long, default_value_t = case::ELEMENTS)]
     elements: usize,
-}
-
-/// What a figure gives: its charts, and how it compares with the paper.
-pub struct Reproduced {
-    /// Charts to write.
-    pub charts: Vec<Chart>,
-    /// Lines of comparison.
-    pub lines: Vec<String>,
 }
 
 /// Recomputes the figure or all of them.
@@ -135,7 +127,7 @@ pub fn write_fig_9_table(file: &Path, base: RidgeCase, results: &store::Results)
     .into_diagnostic()?;
     for point in fig_9(base) {
         let c = &point.case;
-        let key = content_key(c, &super::table::settings());
+        let key = content_key(c, &figures::settings());
         let Some(kept) = results.get(&key) else { continue };
         let psi = c.speed_m_s / (c.amplitude.metres() * c.frequency_hz * c.mu0 * (1.0 + c.poisson_ratio));
         csv.write_record([

@@ -1,11 +1,12 @@
 //! `muprime model table`: the study of Fig. 9, or the surrogate's table.
 
-use super::store::{self, Kept};
 use super::{refused, reproduce};
+use crate::figures::store::{self, Kept};
+use crate::figures::fig_9_results;
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr};
 use models::ridge::study::{content_key, fig_9};
-use models::ridge::{RidgeCase, RunSettings, case};
+use models::ridge::{RidgeCase, case};
 use models::surrogate::{Grid, GridPoint, InterpolationError, Surrogate, TableResult};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -58,18 +59,6 @@ pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
         println!("{}: {cases} cases, {failed} failed, {seconds:.1} s", file.display());
     }
     Ok(ExitCode::from(u8::from(failed > 0)))
-}
-
-/// Results of the study of Fig. 9, running what is missing in `out`.
-pub fn fig_9_results(out: &Path, elements: usize) -> miette::Result<(store::Results, usize)> {
-    let base = RidgeCase { elements, ..RidgeCase::paper() };
-    let cases = fig_9(base).into_iter().map(|p| p.case);
-    store::complete(&out.join("ridge.jsonl"), cases, &settings())
-}
-
-/// How the figures' cases are run.
-pub fn settings() -> RunSettings {
-    RunSettings { energy: false, ..RunSettings::default() }
 }
 
 fn fig_9_study(out: &Path, elements: usize) -> miette::Result<(PathBuf, usize, usize)> {

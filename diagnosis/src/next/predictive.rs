@@ -4,21 +4,18 @@
 //! all in the baseline. A second pass at a condition therefore tells less than the first: what the first left open is
 //! noise, while the hypothesis' own doubt about that condition is gone.
 
-use crate::attribute::Decision;
 use crate::data::RigFile;
-use crate::evidence::{Explained, recalibration};
-use crate::fit::{NUISANCES, Problem};
-use crate::hypotheses::{FORM_LENGTHS, Fitted};
+use crate::decision::Decision;
+use crate::evidence::{Posterior, recalibration};
+use crate::fit::Problem;
+use crate::hypotheses::{Fitted, form_lengths};
+use crate::layout::NUISANCES;
 use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Candidates that a design takes into account, and the probability each hypothesis counts for at least.
-const CANDIDATES: usize = 6;
-const LEAST: f64 = 0.01;
-
 /// One hypothesis' predictions over a grid of conditions.
-pub struct Belief {
+pub struct Predictive {
     /// Names joined by `+`; `unknown` for the open set, `no gap` for the baseline.
     pub name: String,
     /// Probability after the verdict's gates.
@@ -32,7 +29,13 @@ pub struct Belief {
 }
 
 /// The hypotheses that a decision leaves: the likeliest candidates, no gap and the open set. The leader comes first.
-pub fn beliefs(fitted: &Fitted, rig: &RigFile, decision: &Decision, grid: &[Condition]) -> Vec<Belief> {
+pub fn predictives(
+    fitted: &Fitted,
+    rig: &RigFile,
+    decision: &Decision,
+    grid: &[Condition],
+) -> Vec<Predictive> {
+    let k = &fitted.problem.constants;
     let problem = Problem {
         passes: grid.to_vec(),
         lateral: vec![0.0; grid.len()],
@@ -41,37 +44,50 @@ pub fn beliefs(fitted: &Fitted, rig: &RigFile, decision: &Decision, grid: &[Cond
     };
     let places: Vec<_> = grid
         .iter()
-        .map(|p| fitted.coordinates.place(p, problem.design.largest_amplitude_m, &FORM_LENGTHS))
+        .map(|p| fitted.coordinates.place(p, problem.design.largest_amplitude_m, &form_lengths(k)))
         .collect();
     let basis = fitted.kernel.matrix(&places);
     let mut order: Vec<usize> = (0..fitted.candidates.len()).collect();
     order.sort_by(|&a, &b| decision.probabilities[b].total_cmp(&decision.probabilities[a]).then(a.cmp(&b)));
-    let leader = decision.class[0];
-    order.retain(|&i| i != leader);
-    order.insert(0, leader);
-    order.truncate(CANDIDATES);
-    let mut list: Vec<Belief> = order
+    if let Some(leader) = decision.leader() {
+        order.retain(|&i| i != leader);
+        order.insert(0, leader);
+    }
+    order.truncate(k.design_candidates);
+    let mut list: Vec<Predictive> = order
         .into_par_iter()
         .map(|i| {
             let c = &fitted.candidates[i];
             let (mean, covariance) = expected(fitted, &problem, &basis, &c.best);
-            let probability = decision.probabilities[i].max(LEAST);
-            Belief { name: c.names().join("+"), probability, mean, covariance, scatter: Vec::new() }
+            let probability = decision.probabilities[i].max(k.design_least_probability);
+            Predictive { name: c.names().join("+"), probability, mean, covariance, scatter: Vec::new() }
         })
         .collect();
     let (mean, covariance) = expected(fitted, &problem, &basis, &fitted.none);
     let name = "no gap".to_string();
-    list.push(Belief { name, probability: decision.none.max(LEAST), mean, covariance, scatter: Vec::new() });
+    list.push(Predictive {
+        name,
+        probability: decision.none.max(k.design_least_probability),
+        mean,
+        covariance,
+        scatter: Vec::new(),
+    });
 
     let level: Vec<f64> = list[0].mean.iter().copied().collect();
     let scatter = crate::noise::variance(&problem, rig, &fitted.none.u, &level, fitted.pure.used);
     for belief in &mut list {
         belief.scatter.clone_from(&scatter);
     }
-    let (mean, covariance, white) = fitted.wildcard.belief(&fitted.problem, grid);
+    let (mean, covariance, white) = fitted.discrepancy.belief(&fitted.problem, grid);
     let scatter = scatter.iter().zip(&white).map(|(s, w)| s + w).collect();
     let name = "unknown".to_string();
-    list.push(Belief { name, probability: decision.unknown.max(LEAST), mean, covariance, scatter });
+    list.push(Predictive {
+        name,
+        probability: decision.unknown.max(k.design_least_probability),
+        mean,
+        covariance,
+        scatter,
+    });
     list
 }
 
@@ -80,7 +96,7 @@ fn expected(
     fitted: &Fitted,
     grid: &Problem,
     basis: &DMatrix<f64>,
-    e: &Explained,
+    e: &Posterior,
 ) -> (DVector<f64>, DMatrix<f64>) {
     let problem = &fitted.problem;
     let plain = grid.predict(&e.members, &e.u);

@@ -37,6 +37,8 @@ pub struct Coordinates {
     sd: [f64; COUNT],
 }
 
+/// Deviations of a covariate beyond which a place counts as the edge of the design.
+const EDGE_SD: f64 = 4.0;
 /// Number of covariates.
 const COUNT: usize = SMOOTH.len();
 /// Temperature or humidity of which time explains more than this share of the deviation is time by another name.
@@ -78,9 +80,9 @@ impl Coordinates {
             let length = lengths.of(c.role);
             match c.of(p) {
                 Some(value) if self.sd[k] > 1e-12 && length.is_finite() => {
-                    // What lies far outside the design is held at its edge.
-                    ((c.scaled(value, largest_amplitude) - self.mean[k]) / self.sd[k]).clamp(-4.0, 4.0)
-                        / length
+                    // What lies far outside the design counts as its edge.
+                    let place = (c.scaled(value, largest_amplitude) - self.mean[k]) / self.sd[k];
+                    place.clamp(-EDGE_SD, EDGE_SD) / length
                 }
                 _ => 0.0,
             }

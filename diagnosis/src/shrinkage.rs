@@ -1,18 +1,23 @@
 //! How far the gap shrinks on passes held out by group.
 
-use crate::attribute::Verdict;
 use crate::data::{RigFile, Table};
+use crate::decision::Verdict;
 use crate::hypotheses::Fitted;
+use crate::left_out::full_friction;
 use crate::predict::{forecast, model};
-use crate::shrink::full_friction;
 use models::covariate;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Number of parts that are held out in turn.
-const FOLDS: usize = 5;
-/// Resamples of the bootstrap.
-const RESAMPLES: usize = 400;
+/// Blocks of neighbouring conditions: passes in one, and the most of them.
+const BLOCK: usize = 6;
+const MOST_BLOCKS: usize = 40;
+/// Fewest passes that a fold may leave to the fit.
+const LEAST_KEPT: usize = 10;
+/// Fewest resamples with a gap for an interval.
+const LEAST_DRAWS: usize = 20;
+/// Quantiles of a 95 % interval.
+const CI95: [f64; 2] = [0.025, 0.975];
 
 /// The gap in units of full friction, on held-out passes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -38,7 +43,7 @@ pub struct Gap {
 }
 
 /// Groups that are held out together: runs where there are at least three, else blocks of like conditions.
-pub fn groups(table: &Table) -> Vec<usize> {
+pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
     if table.run_count >= 3 {
         return table.runs.clone();
     }
@@ -53,7 +58,7 @@ pub fn groups(table: &Table) -> Vec<usize> {
         })
         .collect();
     keyed.sort();
-    let blocks = (table.len() / 6).clamp(FOLDS * 2, 40);
+    let blocks = (table.len() / BLOCK).clamp(folds * 2, MOST_BLOCKS.max(folds * 2));
     let mut group = vec![0; table.len()];
     let mut block = 0;
     let mut filled = 0;
@@ -70,16 +75,17 @@ pub fn groups(table: &Table) -> Vec<usize> {
 }
 
 /// Errors on held-out passes under the verdict's model.
-pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, leader: usize) -> Gap {
-    let groups = groups(table);
+pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, leader: Option<usize>) -> Gap {
+    let k = &fitted.problem.constants;
+    let groups = groups(table, k.folds);
     let full = full_friction(&fitted.problem);
-    let folds = FOLDS.min(groups.iter().copied().max().unwrap_or(0) + 1).max(2);
+    let folds = k.folds.min(groups.iter().copied().max().unwrap_or(0) + 1).max(2);
     let per_fold: Vec<Vec<(usize, [f64; 5])>> = (0..folds)
         .into_par_iter()
         .map(|fold| {
             let (out, kept): (Vec<usize>, Vec<usize>) =
                 (0..table.len()).partition(|&i| groups[i] % folds == fold);
-            if out.is_empty() || kept.len() < 10 {
+            if out.is_empty() || kept.len() < LEAST_KEPT {
                 return Vec::new();
             }
             let fit = model(fitted, table, verdict, leader, Some(&kept));
@@ -121,9 +127,9 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
     };
     let passes = table.len() as f64;
     // The mean square of n scatters about the floor has a relative deviation of sqrt(2/n).
-    let gapless = all[1] <= all[4] * (1.0 + 2.0 * (2.0 / passes).sqrt());
+    let gapless = all[1] <= all[4] * (1.0 + k.gapless_sd * (2.0 / passes).sqrt());
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
-    let mut draws: Vec<f64> = (0..RESAMPLES)
+    let mut draws: Vec<f64> = (0..k.resamples)
         .filter_map(|_| {
             let sample: Vec<_> =
                 (0..list.len()).map(|_| list[(split_mix(&mut state) % list.len() as u64) as usize]).collect();
@@ -141,7 +147,7 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
         form_alone_rmse: all[3].sqrt(),
         noise_floor_rmse: all[4].sqrt(),
         shrinkage: if gapless { None } else { shrink(&all) },
-        shrinkage_ci95: (!gapless && draws.len() > 20).then(|| [quantile(0.025), quantile(0.975)]),
+        shrinkage_ci95: (!gapless && draws.len() > LEAST_DRAWS).then(|| CI95.map(quantile)),
         unexplained_share: (!gapless).then(|| (all[2] - all[4]).max(0.0) / removable),
     }
 }

@@ -1,16 +1,37 @@
-//! The figures of the finite element model, each with a line on how it compares with the paper.
+//! The paper's figures recomputed, each with a line on how it compares with the paper. Here those of the finite element model;
+//! those of the spring-slider in [`slider`], their charts in [`plot`], what was already computed in [`store`].
 
+pub mod plot;
 pub mod slider;
+pub mod store;
 
-use super::plot::{Chart, Series};
-use super::reproduce::Reproduced;
-use super::{store, table};
 use miette::{IntoDiagnostic, miette};
 use models::psi::{PSI_STAR, PSI_STAR_UNCERTAINTY, PsiEq17, relative_friction};
 use models::psi_fit;
 use models::ridge::study::{Panel, StudyPoint, content_key, fig_9};
 use models::ridge::{self, Cycle, RidgeCase, RidgeRun, RunSettings};
+use plot::{Chart, Series};
 use std::path::Path;
+
+/// What a figure gives: its charts, and how it compares with the paper.
+pub struct Reproduced {
+    /// Charts to write.
+    pub charts: Vec<Chart>,
+    /// Lines of comparison.
+    pub lines: Vec<String>,
+}
+
+/// Results of the study of Fig. 9, running what is missing in `out`.
+pub fn fig_9_results(out: &Path, elements: usize) -> miette::Result<(store::Results, usize)> {
+    let base = RidgeCase { elements, ..RidgeCase::paper() };
+    let cases = fig_9(base).into_iter().map(|p| p.case);
+    store::complete(&out.join("ridge.jsonl"), cases, &settings())
+}
+
+/// How the figures' cases are run.
+pub fn settings() -> RunSettings {
+    RunSettings { energy: false, ..RunSettings::default() }
+}
 
 const MOIST_PA: [f64; 4] = [20e6, 28.3e6, 35e6, 50e6];
 const DRY_PA: [f64; 4] = [100e6, 202.4e6, 500e6, 1000e6];
@@ -36,10 +57,10 @@ pub fn phase_shift(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
     };
     let moduli = || MOIST_PA.into_iter().chain(DRY_PA);
     let cases = moduli().flat_map(|e| FIG_4_AMPLITUDES_M.map(|w| at(e, w)));
-    let (results, failed) = store::complete(&out.join("ridge.jsonl"), cases, &table::settings())?;
+    let (results, failed) = store::complete(&out.join("ridge.jsonl"), cases, &settings())?;
     let curve = |e: f64| -> Vec<(f64, f64)> {
         let kept = FIG_4_AMPLITUDES_M.iter().filter_map(|w| {
-            let phase = results.get(&content_key(&at(e, *w), &table::settings()))?.phase_shift_deg?;
+            let phase = results.get(&content_key(&at(e, *w), &settings()))?.phase_shift_deg?;
             // A lead of some degrees in full contact is drawn as such.
             Some((w * 1e6, if phase > 270.0 { phase - 360.0 } else { phase }))
         });
@@ -200,11 +221,11 @@ pub fn lateral_force(base: RidgeCase) -> miette::Result<Reproduced> {
 
 /// mu' of every point of the study that is there.
 fn study(base: RidgeCase, out: &Path) -> miette::Result<Vec<(StudyPoint, store::Kept)>> {
-    let (results, failed) = table::fig_9_results(out, base.elements)?;
+    let (results, failed) = fig_9_results(out, base.elements)?;
     let points = fig_9(base);
     let found: Vec<_> = points
         .iter()
-        .filter_map(|p| results.get(&content_key(&p.case, &table::settings())).map(|k| (*p, k.clone())))
+        .filter_map(|p| results.get(&content_key(&p.case, &settings())).map(|k| (*p, k.clone())))
         .collect();
     if failed > 0 || found.len() < points.len() {
         return Err(miette!(

@@ -1,9 +1,12 @@
 //! The gap left on parts of the operating space that the fit did not see.
 
-use crate::evidence::{Explained, FORMS};
-use crate::fit::{Fit, Member, NUISANCES, Problem, minimise};
+use crate::constants::Constants;
+use crate::evidence::Posterior;
+use crate::fit::{Member, Problem};
+use crate::gaussian::Covariance;
 use crate::hypotheses::Fitted;
-use crate::linear::Covariance;
+use crate::layout::Layout;
+use crate::least_squares::{Fit, minimise};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -39,24 +42,32 @@ pub struct Region {
     pub informed: bool,
 }
 
+/// Ratio of the largest to the smallest value within which a covariate has one level.
+const ONE_LEVEL: f64 = 1.05;
+/// Share of a pass by which a count may miss a bound for rounding.
+const ROUNDING: f64 = 1e-6;
+/// Relative difference within which two frequencies are one.
+const ONE_FREQUENCY: f64 = 1e-3;
+
 /// Parts of the operating space that are worth leaving out: ends of each covariate, each frequency, late passes.
 pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
     let n = problem.len();
     let p = &problem.passes;
     let mut list: Vec<(String, Vec<usize>)> = Vec::new();
+    let k = &problem.constants;
     let ends =
         |name: &str, value: &dyn Fn(usize) -> f64, of: &[usize], list: &mut Vec<(String, Vec<usize>)>| {
             let mut sorted: Vec<f64> = of.iter().map(|&i| value(i)).collect();
             sorted.sort_by(f64::total_cmp);
-            if sorted.len() < 12 || sorted[sorted.len() - 1] <= sorted[0] * 1.05 {
+            if sorted.len() < 2 * k.region_least || sorted[sorted.len() - 1] <= sorted[0] * ONE_LEVEL {
                 return;
             }
             let cut = |q: f64| sorted[((sorted.len() - 1) as f64 * q) as usize];
-            let (low, high) = (cut(0.28), cut(0.72));
+            let (low, high) = (cut(k.region_cuts[0]), cut(k.region_cuts[1]));
             let below: Vec<usize> = of.iter().copied().filter(|&i| value(i) <= low).collect();
             let above: Vec<usize> = of.iter().copied().filter(|&i| value(i) >= high).collect();
             for (word, rows) in [("low", below), ("high", above)] {
-                if rows.len() >= 6 && rows.len() * 10 <= n * 6 {
+                if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most * n as f64 + ROUNDING {
                     list.push((format!("{word} {name}"), rows));
                 }
             }
@@ -68,29 +79,32 @@ pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
     ends("load", &|i| p[i].normal_force_n, &all, &mut list);
     let mut frequencies: Vec<f64> = p.iter().map(|q| q.frequency_hz).collect();
     frequencies.sort_by(f64::total_cmp);
-    frequencies.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-3);
+    frequencies.dedup_by(|a, b| (*a / *b - 1.0).abs() < ONE_FREQUENCY);
     if (2..=4).contains(&frequencies.len()) {
         for f in frequencies {
-            let rows: Vec<usize> = (0..n).filter(|&i| (p[i].frequency_hz / f - 1.0).abs() < 1e-3).collect();
-            if rows.len() >= 6 && rows.len() * 10 <= n * 8 {
+            let rows: Vec<usize> =
+                (0..n).filter(|&i| (p[i].frequency_hz / f - 1.0).abs() < ONE_FREQUENCY).collect();
+            if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most_level * n as f64 + ROUNDING
+            {
                 list.push((format!("{f:.0} Hz"), rows));
             }
         }
     }
-    let late: Vec<usize> = all.iter().copied().filter(|&i| i * 4 >= n * 3).collect();
+    let late: Vec<usize> =
+        all.iter().copied().filter(|&i| i as f64 >= (1.0 - k.late_share) * n as f64).collect();
     list.push(("late".to_string(), late));
     let pressures: Vec<f64> = p.iter().filter_map(|q| q.ambient_pressure_pa).collect();
     if pressures.len() == n {
         let top = pressures.iter().copied().fold(0.0, f64::max);
-        let rows: Vec<usize> = (0..n).filter(|&i| pressures[i] < 0.8 * top).collect();
-        if rows.len() >= 6 && rows.len() * 10 <= n * 8 {
+        let rows: Vec<usize> = (0..n).filter(|&i| pressures[i] < k.low_pressure * top).collect();
+        if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most_level * n as f64 + ROUNDING {
             list.push(("low pressure".to_string(), rows));
         }
     }
     list
 }
 
-/// Full friction at each pass, N: the unit of the contract's errors.
+/// Full friction at each pass, N: the unit of the errors of docs/contract.md.
 pub fn full_friction(problem: &Problem) -> Vec<f64> {
     problem.passes.iter().map(|p| problem.nominal.mu0 * p.normal_force_n).collect()
 }
@@ -99,7 +113,7 @@ pub fn full_friction(problem: &Problem) -> Vec<f64> {
 ///
 /// By least squares: a departure from form would take up part of what the rest shows of the cause, and leave the form
 /// to predict less than it can. On sealed sets causes close more that way (a cause whose standing wave is not the
-/// library's 0.83 of the gap instead of 0.62), and pairs that imitate a stranger less.
+/// library's 0.83 of the gap instead of 0.62), and pairs that imitate a cause outside the library less.
 fn left_out(rest: &Problem, out: &Problem, members: &[Member], start: &[f64]) -> (DVector<f64>, Fit) {
     let refit = minimise(rest, members, start, &rest.variance, ROUNDS);
     let expected = out.predict(members, &refit.u);
@@ -110,7 +124,7 @@ fn left_out(rest: &Problem, out: &Problem, members: &[Member], start: &[f64]) ->
 /// Covariance of a region's passes in their own deviations: scatter, and what the rest leaves open of the baseline.
 ///
 /// Stiffnesses that the rest does not tell carry baseline and hypothesis off together where they begin to matter; that
-/// says nothing of the cause. What the rest leaves open of the hypothesis is not granted: strangers that a free shape
+/// says nothing of the cause. What the rest leaves open of the hypothesis is not granted: unlisted that a free shape
 /// imitates would close by it.
 fn metric(rest: &Problem, out: &Problem, baseline: &Fit) -> Covariance {
     let whitened = |p: &Problem| {
@@ -134,24 +148,19 @@ fn without(problem: &Problem, rows: &[usize]) -> Vec<usize> {
 
 /// Rounds of a refit without a region.
 const ROUNDS: usize = 6;
-/// Share of the whole gap that the rest of a table must hold before a region is judged: a cause that lives in the
-/// region alone (saturation, in the largest amplitudes) cannot be learnt from what is left. So it is with each of two.
-const INFORMED: f64 = 0.1;
 
 /// Squared changes by each of two effects beside the other, in deviations of a pass; of a single effect nothing: what it
 /// does is the gap.
-fn own_changes(problem: &Problem, best: &Explained) -> Vec<Vec<f64>> {
+fn own_changes(problem: &Problem, best: &Posterior) -> Vec<Vec<f64>> {
     if best.members.len() < 2 {
         return Vec::new();
     }
-    let mut at = NUISANCES;
+    let layout = Layout::of(&best.members);
     (0..best.members.len())
         .map(|i| {
-            let count = best.members[i].parameters().len();
             let (mut members, mut u) = (best.members.clone(), best.u.clone());
             members.remove(i);
-            u.drain(at..at + count);
-            at += count;
+            u.drain(layout.member(i));
             let beside = problem.predict(&members, &u);
             let change = best.prediction.iter().zip(beside.iter()).zip(&problem.variance);
             change.map(|((with, without), v)| (with - without).powi(2) / v).collect()
@@ -160,8 +169,9 @@ fn own_changes(problem: &Problem, best: &Explained) -> Vec<Vec<f64>> {
 }
 
 /// Predicts each region from the rest, by the hypothesis' form alone.
-pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
+pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
     let problem = &fitted.problem;
+    let k = &problem.constants;
     let whole: f64 = (0..problem.len())
         .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.variance[i] - 1.0)
         .sum();
@@ -170,9 +180,9 @@ pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
         .into_par_iter()
         .map(|(name, rows)| {
             let others = without(problem, &rows);
-            let told = own.iter().all(|change| {
-                let held: f64 = others.iter().map(|&i| change[i]).sum();
-                held > INFORMED * change.iter().sum::<f64>()
+            let shown = own.iter().all(|change| {
+                let seen: f64 = others.iter().map(|&i| change[i]).sum();
+                seen > k.informed_share * change.iter().sum::<f64>()
             });
             let (rest, out) = (problem.select(&others), problem.select(&rows));
             let (hypothesis, _) = left_out(&rest, &out, &best.members, &best.u);
@@ -181,10 +191,11 @@ pub fn left_out_regions(fitted: &Fitted, best: &Explained) -> Vec<Region> {
             let n = out.len();
             let mean = |r: &DVector<f64>| metric.quadratic(r) / n.max(1) as f64;
             let errors = Errors { passes: n, recalibrated: mean(&baseline), after: mean(&hypothesis) };
-            let held: f64 = (0..rest.len())
+            let gap: f64 = (0..rest.len())
                 .map(|i| (rest.lateral[i] - refit.prediction[i]).powi(2) / rest.variance[i] - 1.0)
                 .sum();
-            let informed = told && held > 3.0 * (2.0 * rest.len() as f64).sqrt() && held > INFORMED * whole;
+            let scatter = (2.0 * rest.len() as f64).sqrt();
+            let informed = shown && gap > k.carrying_sd * scatter && gap > k.informed_share * whole;
             Region { name, rows, errors, informed }
         })
         .collect()
@@ -204,40 +215,21 @@ pub struct Gate {
 impl Gate {
     /// Share of a candidate's probability that survives: one half where it closes just so much as a mimic may, and
     /// ever less below that. `share` is the form uncertainty that it needed.
-    pub fn survival(&self, effects: usize, share: f64) -> f64 {
-        let rank = FORMS.iter().filter(|f| f.0 < share * (1.0 - 1e-9)).count();
-        let middle = MIMIC[usize::from(effects > 1)][rank.min(FORMS.len() - 1)];
-        let pooled = 1.0 / (1.0 + (-(self.pooled - middle) / GRADE).exp());
-        if 2 * self.closed < self.carrying && self.carrying >= FEW { pooled.min(HALF_OPEN) } else { pooled }
+    pub fn survival(&self, k: &Constants, effects: usize, share: f64) -> f64 {
+        let rank = k.form_shares.iter().filter(|s| **s < share * (1.0 - 1e-9)).count();
+        let closures = if effects > 1 { k.closure_pair } else { k.closure_single };
+        let middle = closures[rank.min(closures.len() - 1)];
+        let pooled = 1.0 / (1.0 + (-(self.pooled - middle) / k.closure_scale).exp());
+        let half_open = 2 * self.closed < self.carrying && self.carrying >= k.few_regions;
+        if half_open { pooled.min(k.half_open_survival) } else { pooled }
     }
 }
-
-/// Pooled closure at which cause and mimic are as likely: for one effect and for two, by the form uncertainty needed.
-///
-/// The contract asks for half of the pooled gap. On sealed sets of the simulation (243 single causes under other formulae,
-/// 101 pairs, 127 strangers) single causes that needed the middle uncertainty closed 0.66 and more but for three of 57, with
-/// the largest 0.65 and more but for two of 18; strangers under one name mostly 0.66 and less, and 0.70 and less. Pairs
-/// that needed the middle one closed 0.64 and more; friction that heats up closes 0.66 to 0.82 as a pair of rate and load.
-const MIMIC: [[f64; 3]; 2] = [[0.5, 0.62, 0.67], [0.52, 0.64, 0.7]];
-/// Scale on which that changes.
-const GRADE: f64 = 0.02;
-/// What survives at most where less than half of the regions that carry gap are closed by more than half.
-const HALF_OPEN: f64 = 0.1;
-/// Weight of a region whose rest tells little of the cause.
-const UNINFORMED: f64 = 0.5;
-/// Number of regions below which their count says nothing.
-const FEW: usize = 3;
-
-/// Deviations of its sampling error that a residual is granted before it counts as left open.
-const GRANTED: f64 = 2.0;
-/// The same for the pool: regions overlap, so that each pass counts about four times.
-const GRANTED_POOL: f64 = 3.0;
 
 /// Judges the regions: those count whose gap stands above the floor's own scatter.
 ///
 /// What is left is granted its sampling error, the root of twice the number of passes in units of the floor: a
 /// small gap cannot be shown to stay open by noise alone.
-pub fn gate(regions: &[Region]) -> Gate {
+pub fn gate(k: &Constants, regions: &[Region]) -> Gate {
     let share = |gap: f64, left: f64| (gap > 0.0).then(|| 1.0 - (left.max(0.0) / gap).sqrt());
     let (mut gap, mut left, mut passes) = (0.0, 0.0, 0.0);
     let (mut carrying, mut closed) = (0, 0);
@@ -248,18 +240,19 @@ pub fn gate(regions: &[Region]) -> Gate {
         let own_gap = (e.recalibrated - 1.0) * n;
         // A region that stays wholly open is open, however far off the refit ran: it must not outweigh all others.
         let own_left = ((e.after - 1.0) * n).min(own_gap.max(0.0));
-        let weight = if r.informed { 1.0 } else { UNINFORMED };
+        let weight = if r.informed { 1.0 } else { k.uninformed_weight };
         gap += weight * own_gap;
         left += weight * own_left;
         passes += weight * n;
-        if own_gap > 3.0 * scatter {
+        if own_gap > k.carrying_sd * scatter {
             carrying += 1;
-            if share(own_gap, own_left - GRANTED * scatter).is_some_and(|c| c > 0.5) {
+            if share(own_gap, own_left - k.region_allowance_sd * scatter).is_some_and(|c| c > k.region_closed)
+            {
                 closed += 1;
             }
         }
     }
-    let pooled = share(gap, left - GRANTED_POOL * (2.0 * passes).sqrt()).unwrap_or(1.0);
+    let pooled = share(gap, left - k.pooled_allowance_sd * (2.0 * passes).sqrt()).unwrap_or(1.0);
     Gate { pooled, carrying, closed }
 }
 
@@ -275,7 +268,7 @@ mod tests {
         let table = table(&mut Deviates(3), 0.0);
         let mut rig = rig();
         rig.finger.stiffness_relative_sd = 0.3;
-        let mut problem = Problem::new(&table, &rig);
+        let mut problem = Problem::new(&table, &rig, &Default::default());
         crate::noise::settle(&table, &rig, &mut problem);
         let still: Vec<usize> =
             (0..problem.len()).filter(|&i| problem.passes[i].amplitude.metres() == 0.0).collect();

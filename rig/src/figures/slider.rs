@@ -1,7 +1,7 @@
 //! The figures of the spring-slider (sections 4 and 5.3).
 
-use super::super::plot::{Chart, Series};
-use super::super::reproduce::Reproduced;
+use super::Reproduced;
+use super::plot::{Chart, Series};
 use miette::IntoDiagnostic;
 use models::condition::Condition;
 use models::finger::Finger;

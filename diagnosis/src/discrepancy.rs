@@ -3,43 +3,35 @@
 //! `y = baseline + friction-like part + direction-odd part + white excess + noise`, each part Gaussian with its
 //! scale on a fixed grid, so that no scale is fitted. Its evidence is what a named effect has to beat.
 
+use crate::constants::Constants;
 use crate::data::Table;
-use crate::fit::{NUISANCES, Problem};
-use crate::linear::{Covariance, log_sum_exp};
-use crate::smooth::{Coordinates, Kernel, Lengths};
+use crate::fit::Problem;
+use crate::gaussian::{Covariance, log_sum_exp};
+use crate::kernel::{Coordinates, Kernel, Lengths};
+use crate::layout::NUISANCES;
 use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Lengths of the wildcard in standard deviations of each covariate.
-const LENGTHS: [Lengths; 6] = [
-    Lengths { condition: 1.2, time: 0.8, position: 0.8, climate: f64::INFINITY },
-    // As smooth as the form uncertainty of a named effect: what that can follow, the open set can follow too.
-    Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY, climate: f64::INFINITY },
-    // Smoother yet: a stranger that bends little is then as cheap as an effect that imitates it.
-    Lengths { condition: 2.5, time: 2.5, position: f64::INFINITY, climate: f64::INFINITY },
-    // A spot of the plate, alike at all conditions.
-    Lengths { condition: 4.0, time: 4.0, position: 0.3, climate: f64::INFINITY },
-    // A cause that goes with temperature or humidity, with the conditions and by itself.
-    Lengths { condition: 2.5, time: 2.5, position: f64::INFINITY, climate: 1.2 },
-    Lengths { condition: 4.0, time: 4.0, position: f64::INFINITY, climate: 0.7 },
-];
-/// Those of them that see no temperature or humidity.
-const CLIMATE_FREE: usize = 4;
-
-/// The smoothnesses that a table calls for: those with temperature and humidity only where these change by themselves.
-pub fn lengths(table: &Table) -> &'static [Lengths] {
-    if Coordinates::of(table).sees_climate() { &LENGTHS } else { &LENGTHS[..CLIMATE_FREE] }
+/// The smoothnesses that are tried: rough; as smooth as the form uncertainty of an effect, so that the open set can follow
+/// what that can; smoother yet, so that a cause that bends little is as cheap as an effect that imitates it; a spot of the
+/// plate, alike at all conditions; and two that go with temperature and humidity, where these change by themselves.
+pub fn lengths(k: &Constants, table: &Table) -> Vec<Lengths> {
+    let all = (0..k.discrepancy_lengths.len()).map(|i| Lengths {
+        condition: k.discrepancy_lengths[i],
+        time: k.discrepancy_time_lengths[i],
+        position: k.discrepancy_position_lengths[i],
+        climate: k.discrepancy_climate_lengths[i],
+    });
+    let sees = Coordinates::of(table).sees_climate();
+    all.filter(|l| sees || !l.climate.is_finite()).collect()
 }
 
-const RANK: usize = 56;
-/// Scales of the friction-like part, of the direction-odd part, and of the white excess.
-const FRICTION: [f64; 6] = [0.0, 0.015, 0.05, 0.15, 0.45, 1.3];
-const ODD: [f64; 4] = [0.0, 0.012, 0.06, 0.4];
-const WHITE: [f64; 4] = [0.0, 0.02, 0.08, 0.3];
+/// Step of a difference in a nuisance's coordinate.
+const STEP: f64 = 1e-3;
 
-/// The wildcard fitted to a table.
-pub struct Wildcard {
+/// The discrepancy fitted to a table.
+pub struct Discrepancy {
     lengths: Lengths,
     coordinates: Coordinates,
     kernel: Kernel,
@@ -84,18 +76,18 @@ fn rows(
     }
     let mut moved = center.to_vec();
     for k in 0..NUISANCES {
-        moved[k] += 1e-3;
+        moved[k] += STEP;
         let there = problem.predict_at(&[], &moved, passes);
         moved[k] = center[k];
         for i in 0..passes.len() {
-            phi[(i, 2 * r + k)] = (there[i] - baseline[i]) / 1e-3;
+            phi[(i, 2 * r + k)] = (there[i] - baseline[i]) / STEP;
         }
     }
     (baseline, phi, sizes)
 }
 
-impl Wildcard {
-    /// Fits the wildcard about the baseline at `center` (nuisance coordinates): the best of some smoothnesses (of
+impl Discrepancy {
+    /// Fits the discrepancy about the baseline at `center` (nuisance coordinates): the best of some smoothnesses (of
     /// [`lengths`], unless only a level is wanted), with the evidence of their mean.
     pub fn fit(table: &Table, problem: &Problem, center: &[f64], lengths: &[Lengths]) -> Self {
         let all: Vec<Self> =
@@ -103,17 +95,18 @@ impl Wildcard {
         let evidence: Vec<f64> = all.iter().map(|w| w.log_evidence).collect();
         let mean = log_sum_exp(&evidence) - (lengths.len() as f64).ln();
         let best = all.into_iter().reduce(|a, b| if b.log_evidence > a.log_evidence { b } else { a });
-        Wildcard { log_evidence: mean, ..best.expect("there are lengths") }
+        Discrepancy { log_evidence: mean, ..best.expect("there are lengths") }
     }
 
     fn with_lengths(table: &Table, problem: &Problem, center: &[f64], lengths: Lengths) -> Self {
+        let k = &problem.constants;
         let coordinates = Coordinates::of(table);
         let places: Vec<_> = problem
             .passes
             .iter()
             .map(|p| coordinates.place(p, problem.design.largest_amplitude_m, &lengths))
             .collect();
-        let kernel = Kernel::new(&places, RANK, 0.02);
+        let kernel = Kernel::new(&places, k.discrepancy_rank, k.kernel_rest);
         let r = kernel.rank();
         let (baseline, phi, sizes) =
             rows(problem, center, &problem.passes, &coordinates, (&kernel, &lengths), (1.0, 1.0));
@@ -125,7 +118,7 @@ impl Wildcard {
         let residual = residual + nuisance * pull;
         let mut all = Vec::new();
         let mut best = (f64::NEG_INFINITY, 0.0, 0.0, 0.0);
-        for white in WHITE {
+        for white in k.discrepancy_white {
             let variance: Vec<f64> =
                 (0..n).map(|i| problem.variance[i] + (white * sizes[i]).powi(2)).collect();
             let sqrt: DVector<f64> = DVector::from_iterator(n, variance.iter().map(|v| 1.0 / v.sqrt()));
@@ -139,8 +132,8 @@ impl Wildcard {
             let score = &t * &z;
             let chi = z.norm_squared();
             let log_det: f64 = variance.iter().map(|v| v.ln()).sum();
-            for friction in FRICTION {
-                for odd in ODD {
+            for friction in k.discrepancy_even {
+                for odd in k.discrepancy_odd {
                     if white == 0.0 && friction == 0.0 && odd == 0.0 {
                         continue;
                     }
@@ -188,7 +181,7 @@ impl Wildcard {
         let smooth = baseline
             - scaled.columns(2 * r, NUISANCES) * DVector::from_column_slice(&center[..NUISANCES])
             + &scaled * &weights;
-        Wildcard {
+        Discrepancy {
             lengths,
             coordinates,
             kernel,
