@@ -5,6 +5,7 @@ use models::record::Pass;
 use models::rig_file::{CertifiedKey, RigFile};
 use muprime_diagnosis::data::Table;
 use muprime_diagnosis::fit::{Member, Problem};
+use std::sync::Arc;
 
 /// The forces do not matter for a prior.
 fn table() -> Table {
@@ -27,7 +28,7 @@ fn problem(calibration: &str) -> Problem {
         "[finger]\nnormal_stiffness_n_per_m = 3.9e6\nlateral_stiffness_n_per_m = 1.5e6\n\
          stiffness_relative_sd = 0.05\n[calibration]\n{calibration}\n"
     );
-    Problem::new(&table(), &RigFile::parse(&text).expect("a rig.toml"))
+    Problem::new(&table(), &RigFile::parse(&text).expect("a rig.toml"), &Arc::default())
 }
 
 /// Prior deviation of the size of a law, in the law's unit.

@@ -3,10 +3,10 @@ use models::condition::Condition;
 use models::quantity::{Direction, PeakToPeak};
 use models::record::Pass;
 use models::rig_file::RigFile;
-use muprime_diagnosis::attribute::Verdict;
 use muprime_diagnosis::data::Table;
+use muprime_diagnosis::decision::Verdict;
 use muprime_diagnosis::hypotheses::Options;
-use muprime_diagnosis::smooth::Coordinates;
+use muprime_diagnosis::kernel::Coordinates;
 use muprime_diagnosis::verdict::diagnose;
 use std::f64::consts::PI;
 
