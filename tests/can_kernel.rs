@@ -2,7 +2,7 @@
 //!
 //! `in_every_guest_that_starts` starts `tests/can_guest/can-guest` with this very binary, which then runs the tests that
 //! are marked as ignored, on vcan: in User-mode Linux and in QEMU, where each starts. If neither does, the test fails;
-//! it does not skip. Guests keep coarse time: order and content are tested here, never speed.
+//! it does not skip. User-mode Linux keeps coarse time: order and content are tested here, never speed.
 
 #[path = "wire/bench.rs"]
 #[allow(dead_code)] // the other wire tests use all of it

@@ -46,6 +46,9 @@
 //!     unit = "N"
 //!     si = { factor = 1.0, unit = "N" }
 //!     range = [-20.0, 20.0]
+//!     [[vector]]
+//!     registers = [0, 25000]
+//!     expect = { normal = 0.25 }
 //! "#)?;
 //! let (sample, normal) = (profile.frame("sample").unwrap(), profile.signal("normal").unwrap());
 //! let mut values = profile.values();
