@@ -11,8 +11,11 @@
 //! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
 //! | [`run_dir`], [`catalogue`] | a run's folder and the catalogue of runs |
 //! | [`figures`] | the paper's figures recomputed |
+//! | [`files`], [`print`] | how files are written, and how the program speaks: each in one place |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
 //! | [`cli`] | one file a subcommand |
+
+#![deny(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod blind;
 pub mod catalogue;
@@ -23,10 +26,12 @@ pub mod embed;
 pub mod export;
 pub mod faults;
 pub mod figures;
+pub mod files;
 pub mod fingertip;
 pub mod input;
 pub mod model_file;
 pub mod plan;
+pub mod print;
 pub mod report;
 pub mod run_dir;
 pub mod sequence;

@@ -53,6 +53,31 @@ pub struct PlanFile {
     pub protocol: BTreeMap<String, toml::Value>,
 }
 
+/// Passes that one plan may ask for: a pass takes half a second, so this is half a day, and what a run keeps of its passes
+/// fits into memory.
+pub const MAX_PASSES: u64 = 100_000;
+
+impl PlanFile {
+    /// Passes that the plan asks for, references left out, counted without making them.
+    fn passes(&self) -> u64 {
+        let of_series = |s: &Series| {
+            let lists = [
+                s.amplitude_pp_m.len(),
+                s.frequency_hz.len(),
+                s.speed_m_s.len(),
+                s.normal_force_n.len(),
+                s.position_m.len(),
+                s.ambient_pressure_pa.len(),
+            ];
+            let directions = if s.directions.is_empty() { &self.directions } else { &s.directions };
+            let conditions = lists.iter().fold(1u64, |all, n| all.saturating_mul((*n).max(1) as u64));
+            conditions.saturating_mul(directions.len() as u64)
+        };
+        let conditions = self.series.iter().map(of_series).fold(0, u64::saturating_add);
+        conditions.saturating_mul(u64::from(self.replicates))
+    }
+}
+
 /// Times of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -201,6 +226,15 @@ impl Plan {
         }
         if !(1..=1000).contains(&file.replicates) {
             return Err(bad(&["replicates"], "replicates are 1 to 1000").into());
+        }
+        let passes = file.passes();
+        if passes > MAX_PASSES {
+            let problem =
+                format!("the plan asks for {passes} passes; at most {MAX_PASSES} are made in one run");
+            let remedy = "shorten the lists, or make several plans of it".to_string();
+            return Err(
+                BadInput::new(origin, text, input::place_of(text, &["series"]), problem, remedy).into()
+            );
         }
         let times = [
             ("settle_s", file.pass.settle_s),

@@ -14,7 +14,7 @@ use models::psi::PsiEq17;
 use models::quantity::PeakToPeak;
 use models::record::Pass;
 use models::rig_file::PassNoise;
-use realtime::compare::{Comparator, PassComparison};
+use realtime::compare::{Agreement, Comparator, PassComparison};
 use realtime::cycle::{Command, Marker, Phase};
 use realtime::estimate::Moments;
 use realtime::ports::{Nanos, NoData};
@@ -184,6 +184,8 @@ pub struct Sequence {
     comparator: Comparator,
     stopping: bool,
     departed: bool,
+    /// Of the last pass that could be compared, of earlier sessions too.
+    last_comparison: Option<PassComparison>,
     started: bool,
     poisson_ratio: f64,
     temperature_ranges: Vec<TemperatureRange>,
@@ -192,6 +194,8 @@ pub struct Sequence {
     ambient: Ambient,
     ambient_sent: Ambient,
     has_watchdog: bool,
+    session: Option<u64>,
+    start_s: f64,
 }
 
 impl Sequence {
@@ -215,6 +219,7 @@ impl Sequence {
             comparator,
             stopping: false,
             departed: false,
+            last_comparison: None,
             started: false,
             poisson_ratio: tip.finger.poisson_ratio,
             temperature_ranges: Vec::new(),
@@ -222,12 +227,19 @@ impl Sequence {
             ambient: Ambient::default(),
             ambient_sent: Ambient::default(),
             has_watchdog: true,
+            session: None,
+            start_s: 0.0,
         }
     }
 
     /// The same in air of which the setup states this; what a plan or a channel says of it goes first.
     pub fn in_air(self, ambient: Ambient) -> Self {
         Sequence { ambient, ..self }
+    }
+
+    /// The same, as a session of a run that had begun `start_s` before the loop's time zero, in s: passes tell the run's time.
+    pub fn in_session(self, session: u64, start_s: f64) -> Self {
+        Sequence { session: Some(session), start_s, ..self }
     }
 
     /// The same, with certificates that are held against the amplifier's temperature at the start of each pass.
@@ -245,7 +257,9 @@ impl Sequence {
         if let Some(friction) = pass.friction_force_n() {
             let condition = pass.condition(1.0).within(&self.ambient);
             // A condition outside the model's domain has no comparison, now as then.
-            let _ = self.comparator.pass(&*self.model, &condition, friction);
+            if let Ok(comparison) = self.comparator.pass(&*self.model, &condition, friction) {
+                self.last_comparison = Some(comparison);
+            }
             self.departed = self.comparator.departed();
         }
     }
@@ -269,6 +283,11 @@ impl Sequence {
     /// Whether the model has left the measurement.
     pub fn departed(&self) -> bool {
         self.departed
+    }
+
+    /// What the comparison says, for a sweep that came to its end or did not.
+    pub fn agreement(&self, complete: bool) -> Agreement {
+        Agreement::of(self.last_comparison.as_ref(), complete)
     }
 
     /// Takes a row.
@@ -538,7 +557,7 @@ impl Sequence {
             speed_m_s: sums.speed.mean().unwrap_or(point.condition.speed_m_s),
             position_m: sums.position.mean().unwrap_or(point.condition.position_m),
             normal_force_n: normal,
-            time_s: since.seconds(),
+            time_s: self.start_s + since.seconds(),
             ..point.condition.within(&self.ambient)
         };
         Pass {
@@ -548,6 +567,7 @@ impl Sequence {
             // The channel's, or none: two thermometers in one column would look like a change.
             temperature_c: sums.temperature.mean(),
             replicate: Some(u64::from(point.replicate)),
+            session: self.session,
             ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
         }
     }
@@ -557,6 +577,7 @@ impl Sequence {
         let condition = pass.condition(mu0).within(&self.ambient);
         let comparison =
             pass.friction_force_n().and_then(|f| self.comparator.pass(&*self.model, &condition, f).ok());
+        self.last_comparison = comparison.or(self.last_comparison);
         let regime = self.model.predict(&condition).ok().map(|p| p.regime);
         let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
         let psi_eq17 =

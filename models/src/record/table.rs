@@ -59,7 +59,8 @@ impl Columns {
             columns.place(name).ok_or(TableError::MissingColumn(name))?;
         }
         let optional = covariate::OPTIONAL.iter().map(|c| c.name);
-        let known = ["point", "samples", "replicate", "run"].into_iter().chain(NUMBERS.map(|n| n.0));
+        let known =
+            ["point", "samples", "replicate", "run", "session"].into_iter().chain(NUMBERS.map(|n| n.0));
         for name in known.chain(covariate::REQUIRED.iter().map(|c| c.name)).chain(optional) {
             if columns.0.iter().filter(|h| h.trim() == name).count() > 1 {
                 return Err(TableError::DoubleColumn(name.to_string()));
@@ -143,6 +144,7 @@ impl Row<'_> {
             phase_shift_deg: self.number("phase_shift_deg")?,
             replicate: self.count("replicate")?,
             run: self.cell("run").map(str::to_string),
+            session: self.count("session")?,
             ..Pass::at(point, &condition, self.number("lateral_force_n")?)
         })
     }
@@ -207,7 +209,12 @@ fn cells(p: &Pass) -> Vec<String> {
     cells.extend([p.lateral_force_n, p.normal_force_sd_n, p.lateral_force_sd_n].map(text));
     cells.push(text(p.samples));
     cells.extend(covariate::OPTIONAL.iter().map(covariate));
-    cells.extend([text(p.phase_shift_deg), text(p.replicate), p.run.clone().unwrap_or_default()]);
+    cells.extend([
+        text(p.phase_shift_deg),
+        text(p.replicate),
+        p.run.clone().unwrap_or_default(),
+        text(p.session),
+    ]);
     cells
 }
 
@@ -223,6 +230,7 @@ mod tests {
         let mut pass = Pass::at(7, &crate::condition::Condition::paper(), Some(-0.123_456_789_012_345_6));
         pass.replicate = Some(3);
         pass.run = Some("a, \"b\"".into());
+        pass.session = Some(2);
         let mut bytes = Vec::new();
         write_passes(std::slice::from_ref(&pass), &mut bytes).unwrap();
         assert_eq!(read_passes(&bytes[..]).unwrap(), [pass]);

@@ -1,6 +1,7 @@
 //! `muprime blind`: the diagnosis scored on sealed sets.
 
 use crate::blind::{confusion, figures, run as score_all};
+use crate::{out, say};
 use diagnosis::constants::{Constants, Stage};
 use diagnosis::hypotheses::Options;
 use miette::IntoDiagnostic;
@@ -96,7 +97,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let scored = score_all(args.seed, args.sets, stratum, &options, |s| {
         if args.verbose {
-            eprintln!("{}", serde_json::to_string(s).unwrap_or_default());
+            say!("{}", serde_json::to_string(s).unwrap_or_default());
         }
     })?;
     let figures = figures(&scored);
@@ -106,18 +107,18 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             "schema": "muprime.blind/1", "seed": args.seed, "sets": args.sets,
             "figures": figures, "confusion": confusion, "scored": scored,
         });
-        println!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
     } else {
-        println!("{:52} {:>8}  {:>17}  {:>5}  target", "figure", "value", "95 % interval", "n");
+        out!("{:52} {:>8}  {:>17}  {:>5}  target", "figure", "value", "95 % interval", "n");
         for f in &figures {
             let value = f.value.map_or_else(|| "-".to_string(), |v| format!("{v:.3}"));
             let ci = f.ci95.map_or_else(|| "-".to_string(), |c| format!("[{:.3}, {:.3}]", c[0], c[1]));
-            println!("{:52} {value:>8}  {ci:>17}  {:>5}  {}", f.name, f.n, f.target);
+            out!("{:52} {value:>8}  {ci:>17}  {:>5}  {}", f.name, f.n, f.target);
         }
-        println!("\ntruth -> answers");
+        out!("\ntruth -> answers");
         for (truth, answers) in &confusion {
             let list: Vec<String> = answers.iter().map(|(a, n)| format!("{a} {n}")).collect();
-            println!("  {truth:40} {}", list.join("; "));
+            out!("  {truth:40} {}", list.join("; "));
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -165,10 +166,10 @@ fn same_form(args: &Args, json: bool) -> miette::Result<ExitCode> {
     if json {
         let document =
             serde_json::json!({ "schema": "muprime.blind.same_form/1", "figure": figure, "sets": sets });
-        println!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
     } else {
         let ci = figure.ci95.unwrap_or([f64::NAN; 2]);
-        println!(
+        out!(
             "{}: {:.3} [{:.3}, {:.3}], n {} of {} sets (the others were not named in their own form)",
             figure.name,
             figure.value.unwrap_or(f64::NAN),
@@ -188,9 +189,12 @@ fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
         let passes = |n: Option<usize>| n.map_or(format!("> {LIMIT}"), |n| n.to_string());
         let (designed, random) = (passes(r.designed), passes(r.random));
         if args.verbose {
-            eprintln!(
+            say!(
                 "{} {:26} kept {} before {:.3} designed {designed} random {random}",
-                r.seed, r.truth, r.kept, r.before
+                r.seed,
+                r.truth,
+                r.kept,
+                r.before
             );
         }
     };
@@ -200,22 +204,22 @@ fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
         let document = serde_json::json!({
             "schema": "muprime.blind.further/2", "limit": LIMIT, "figures": figures, "races": races,
         });
-        println!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
         return Ok(ExitCode::SUCCESS);
     }
-    println!(
+    out!(
         "further passes to a probability of 0.9 on the truth, {} sets whose cause is open at first:",
         races.len()
     );
     for f in figures {
         let ci = f.ci95.unwrap_or([f64::NAN; 2]);
         let value = f.value.unwrap_or(f64::NAN);
-        println!("  {:46} {value:7.3} [{:.3}, {:.3}]  n {}  {}", f.name, ci[0], ci[1], f.n, f.target);
+        out!("  {:46} {value:7.3} [{:.3}, {:.3}]  n {}  {}", f.name, ci[0], ci[1], f.n, f.target);
     }
     let count = |of: &dyn Fn(usize, usize) -> bool| {
         let passes = |n: Option<usize>| n.unwrap_or(usize::MAX);
         races.iter().filter(|r| of(passes(r.designed), passes(r.random))).count()
     };
-    println!("  designed sooner in {}, later in {}", count(&|d, r| d < r), count(&|d, r| d > r));
+    out!("  designed sooner in {}, later in {}", count(&|d, r| d < r), count(&|d, r| d > r));
     Ok(ExitCode::SUCCESS)
 }

@@ -2,6 +2,9 @@
 
 mod certificates;
 
+use crate::input::{MAX_TABLE_BYTES, bytes_of};
+use crate::{out, say};
+use calibration::certificate::sha256_hex;
 use clap::Args as ClapArgs;
 use diagnosis::data::Table;
 use diagnosis::hypotheses::Options;
@@ -10,7 +13,6 @@ use miette::{Context, IntoDiagnostic};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::record::{Pass, read_passes};
-use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -63,8 +65,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let rig_path = args.rig.as_deref().unwrap_or(&beside);
     let rig = crate::input::rig_file(rig_path)
         .wrap_err_with(|| format!("the rig's calibration {} (name it with --rig)", rig_path.display()))?;
-    let bytes = fs::read(&table_path)
-        .into_diagnostic()
+    let damage = if args.data.is_dir() { crate::run_dir::damage_in(&args.data)? } else { Vec::new() };
+    let bytes = bytes_of(&table_path, MAX_TABLE_BYTES)
         .wrap_err_with(|| format!("cannot read the table {}", table_path.display()))?;
     let passes = parse_passes(&table_path, &bytes)?;
     let table =
@@ -87,23 +89,22 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         None => None,
     };
     let options = Options { pairs: !args.no_pairs, without: args.without.clone(), ..Options::default() };
-    let result = diagnose(&table, &rig, &options, hex(&Sha256::digest(&bytes)));
+    let result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
     if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
         write_text(out, &predictions(&result, conditions))?;
     }
     if let Some(out) = &args.save_model {
         match result.saved_model() {
             Some(model) => write_text(out, &toml::to_string(&model).into_diagnostic()?)?,
-            None => eprintln!(
-                "no model written to {}: no effect of the library causes most of the gap",
-                out.display()
-            ),
+            None => {
+                say!("no model written to {}: no effect of the library causes most of the gap", out.display())
+            }
         }
     }
     if let Some(out) = &args.save_plan {
         match result.report.next_experiment.iter().find(|e| !e.conditions.is_empty()) {
             Some(experiment) => write_text(out, &plan(experiment))?,
-            None => eprintln!("no plan written to {}: no conditions would tell more", out.display()),
+            None => say!("no plan written to {}: no conditions would tell more", out.display()),
         }
     }
     if let Some(out) = &args.report {
@@ -113,24 +114,28 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let faults = certificates::at_fault(&result, &rig);
     let doubts = certificates::in_doubt(&rig, &result.report.stiffness_pulls);
     if json {
+        if !damage.is_empty() {
+            report["damage"] = serde_json::to_value(&damage).into_diagnostic()?;
+        }
         if !faults.is_empty() {
             report["certificates_at_fault"] = serde_json::to_value(&faults).into_diagnostic()?;
         }
         if !doubts.is_empty() {
             report["certificates_in_doubt"] = serde_json::to_value(&doubts).into_diagnostic()?;
         }
-        println!("{}", serde_json::to_string(&report).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&report).into_diagnostic()?);
     } else {
-        print!("{}", terminal(&result));
-        faults.iter().for_each(|fault| println!("{}", fault.text()));
-        doubts.iter().for_each(|doubt| println!("{}", doubt.text()));
+        damage.iter().for_each(|d| say!("damaged: {d}"));
+        out!("{}", terminal(&result).trim_end());
+        faults.iter().for_each(|fault| out!("{}", fault.text()));
+        doubts.iter().for_each(|doubt| out!("{}", doubt.text()));
     }
     Ok(ExitCode::SUCCESS)
 }
 
 fn read_table(path: &Path) -> miette::Result<Vec<Pass>> {
     let bytes =
-        fs::read(path).into_diagnostic().wrap_err_with(|| format!("cannot read {}", path.display()))?;
+        bytes_of(path, MAX_TABLE_BYTES).wrap_err_with(|| format!("cannot read {}", path.display()))?;
     parse_passes(path, &bytes)
 }
 
@@ -216,11 +221,7 @@ fn plan(experiment: &diagnosis::next::Experiment) -> String {
 }
 
 fn write_text(path: &Path, text: &str) -> miette::Result<()> {
-    fs::write(path, text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
+    crate::files::write_whole(path, text)
 }
 
 /// What a terminal shows.

@@ -35,6 +35,7 @@ pub fn of(passes: &[MeasuredPass]) -> Table {
         ("phase_shift_deg", numbers(&|p| p.pass.phase_shift_deg)),
         ("replicate", counts(&|p| p.pass.replicate)),
         ("run", texts(&|p| p.pass.run.clone())),
+        ("session", counts(&|p| p.pass.session)),
         ("mu_relative", numbers(&|p| p.comparison.and_then(|c| c.mu_relative))),
         ("mu_relative_sd", numbers(&|p| p.comparison.and_then(|c| c.mu_relative_sd))),
         ("mu_relative_predicted", numbers(&|p| p.comparison.map(|c| c.predicted))),

@@ -2,6 +2,7 @@
 
 use super::rows::{Expect, Moment, Pace, ROWS, TOO_LATE, What};
 use super::tamper::{Tamper, Tampered};
+use calibration::certificate::sha256_hex;
 use models::condition::{Condition, OutOfDomain};
 use models::finger::Finger;
 
@@ -15,7 +16,6 @@ use realtime::safety::{Cause, Limits, Request, Trip};
 use realtime::turn::{Ports, Row, Tick, turn};
 use realtime::wrap::fault::{Fault, FaultMode, FaultyAmplifier, FaultyForce, FaultyStage};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use sim::amplifier::AmplifierInput;
 use sim::virtual_rig::{SharedRig, VirtualRig};
 use sim::world::{Operator, WorldConfig};
@@ -349,11 +349,9 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     }
     let mut found = watch.judge(scene);
     if keep {
-        let mut hash = Sha256::new();
-        for row in &rows {
-            hash.update(serde_json::to_vec(row).unwrap_or_default());
-        }
-        found.hash = Some(hash.finalize().iter().map(|b| format!("{b:02x}")).collect());
+        let written: Vec<u8> =
+            rows.iter().flat_map(|row| serde_json::to_vec(row).unwrap_or_default()).collect();
+        found.hash = Some(sha256_hex(&written));
         // What a record would hold, run again.
         let written = rows.iter().filter_map(|r| serde_json::from_slice(&serde_json::to_vec(r).ok()?).ok());
         let again = replay(&config, &model, written.collect::<Vec<Row>>());
