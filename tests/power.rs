@@ -70,6 +70,9 @@ fn said(ops: &[Op]) -> (BTreeSet<u64>, bool) {
     (points, ended)
 }
 
+/// Picks syncs that do nothing.
+type Deaf = Box<dyn Fn(&Op) -> bool + Sync>;
+
 /// Holds what is left after a cut against what was acknowledged.
 fn judge(root: &Path, acknowledged: &BTreeSet<u64>, ended: bool) -> Result<(), String> {
     let run = root.join("runs/r");
@@ -141,7 +144,7 @@ fn a_power_cut_at_any_instant_loses_nothing_that_was_acknowledged() {
     let of = |name: &'static str| move |op: &Op| matches!(op, Op::Sync { name: file, .. } if file.file_name().unwrap() == name);
     let names = |folder: PathBuf| move |op: &Op| matches!(op, Op::SyncFolder(synced) if *synced == folder);
     let (root, runs) = (watched.root.clone(), watched.root.join("runs"));
-    let controls: [(&str, Box<dyn Fn(&Op) -> bool + Sync>); 8] = [
+    let controls: [(&str, Deaf); 8] = [
         ("points.csv", Box::new(of("points.csv"))),
         ("passes.jsonl", Box::new(of("passes.jsonl"))),
         ("run-1.mcap", Box::new(of("run-1.mcap"))),

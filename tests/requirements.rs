@@ -1,4 +1,5 @@
-//! The table from requirement to test, generated: `docs/safety.md` must say what the code does.
+//! Pages that must say what the program does: `docs/safety.md`, the table from requirement to test, generated; and
+//! `docs/contract.md`, whose commands and flags must be the program's.
 //!
 //! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements` writes it anew.
 
@@ -121,9 +122,10 @@ fn page() -> String {
          Threads, files, buses and the network are no part of that bench; these rows of the list name the tests that strike them.\n\n\
          | # | fault | tests |\n|---|---|---|\n",
     );
-    for (number, what, tests) in ELSEWHERE {
+    for (number, what, tests, note) in ELSEWHERE {
         let named: Vec<String> = tests.iter().map(|(path, name)| format!("`{name}` ({path})")).collect();
-        let cell = if named.is_empty() { "open: no test strikes it".into() } else { named.join(", ") };
+        assert!(named.is_empty() != note.is_empty(), "{number} {what}: tests, or why there is none");
+        let cell = if named.is_empty() { (*note).into() } else { named.join(", ") };
         let _ = writeln!(out, "| {number} | {what} | {cell} |");
     }
     out
@@ -136,7 +138,7 @@ fn every_fault_of_the_list_is_on_the_page() {
         let here = ROWS.iter().any(|r| r.number == number);
         assert!(here || ELSEWHERE.iter().any(|(n, ..)| *n == number), "fault {number} is nowhere");
     }
-    for (number, what, tests) in ELSEWHERE {
+    for (number, what, tests, _) in ELSEWHERE {
         for (path, name) in *tests {
             let source = std::fs::read_to_string(file(path)).unwrap_or_default();
             assert!(source.contains(&format!("fn {name}(")), "{number} {what}: no test {name} in {path}");
@@ -177,4 +179,57 @@ fn the_safety_cases_evidence_exists() {
 #[test]
 fn start_up_is_no_rule() {
     assert!(RULES.iter().all(|r| r.cause != Cause::StartUp));
+}
+
+/// What `muprime WORDS --help` prints.
+fn help(words: &[&str]) -> String {
+    let output = tests::muprime().args(words).arg("--help").output().unwrap();
+    assert!(output.status.success(), "muprime {words:?} --help: {}", tests::texts(&output).1);
+    tests::texts(&output).0
+}
+
+/// The flags that stand in a text: `--` and a word.
+fn flags(text: &str) -> BTreeSet<String> {
+    let word =
+        |rest: &str| rest.chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '-').collect::<String>();
+    text.split("--").skip(1).map(word).filter(|w| w.starts_with(|c: char| c.is_ascii_lowercase())).collect()
+}
+
+#[test]
+fn the_contract_names_the_commands_and_flags_that_there_are() {
+    let contract = std::fs::read_to_string(file("docs/contract.md")).unwrap();
+    let rows = contract.lines().filter_map(|line| line.strip_prefix("| `muprime "));
+    let named: BTreeSet<&str> = rows.filter_map(|row| row.split([' ', '`']).next()).collect();
+    let all = help(&[]);
+    let listed = all.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
+    let there: BTreeSet<&str> = listed
+        // A command stands two spaces in, the rest of its words further.
+        .filter_map(|line| line.strip_prefix("  ").filter(|l| !l.starts_with(' ')))
+        .filter_map(|line| line.split(' ').next())
+        .filter(|command| *command != "help")
+        .collect();
+    assert_eq!(named, there);
+
+    let sections: Vec<(&str, &str)> =
+        contract.split("\n### `muprime ").skip(1).filter_map(|s| s.split_once("`\n")).collect();
+    assert!(sections.len() >= 7, "{sections:?}");
+    for (command, text) in sections {
+        let words: Vec<&str> = command.split(' ').collect();
+        let (text, help) = (text.split("\n## ").next().unwrap_or_default(), flags(&help(&words)));
+        let unknown: Vec<String> = flags(text).into_iter().filter(|flag| !help.contains(flag)).collect();
+        assert!(unknown.is_empty(), "docs/contract.md, muprime {command}: no such flags: {unknown:?}");
+    }
+}
+
+#[test]
+fn a_log_filter_that_cannot_be_read_is_refused() {
+    let started = |filter: &str| {
+        let output =
+            tests::muprime().args(["completions", "bash"]).env("MUPRIME_LOG", filter).output().unwrap();
+        (output.status.code(), tests::texts(&output).1)
+    };
+    assert_eq!(started("warn,muprime_drivers=debug").0, Some(0));
+    let (status, said) = started("warn,muprime_drivers=loud");
+    assert_eq!(status, Some(2), "{said}");
+    assert!(said.contains("MUPRIME_LOG=warn,muprime_drivers=loud"), "{said}");
 }

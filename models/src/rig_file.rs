@@ -329,3 +329,98 @@ const STIFFNESS_N_PER_M: [f64; 2] = [1e2, 1e10];
 const STIFFNESS_RELATIVE_SD_MAX: f64 = 2.0;
 /// Young's modulus in Pa: from gels to diamond.
 const YOUNG_MODULUS_PA: [f64; 2] = [1e2, 2e12];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "[finger]\nnormal_stiffness_n_per_m = 3.9e6\nlateral_stiffness_n_per_m = 1.5e6\n\
+                        stiffness_relative_sd = 0.05\n\n[noise]\npass_relative_sd = 0.015\nforce_sd_n = 0.0008\n";
+
+    fn refusal(text: &str) -> String {
+        RigFile::parse(text).expect_err(text).to_string()
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_bit_for_bit() {
+        let mut file = RigFile::parse(TEXT).expect("the contract's file");
+        assert!(file.calibration.is_empty());
+        let third = 1.0 / 3.0;
+        file.finger.stiffness_relative_sd = third;
+        file.finger.young_modulus_pa = Some(28.3e6 * third);
+        file.noise.force_sd_n = 1e-5 * third;
+        file.calibration = Calibration {
+            amplitude_gain_sd: Some(0.1 * third),
+            lateral_gain_sd: Some(0.2 * third),
+            normal_gain_sd: Some(0.3 * third),
+            speed_gain_sd: Some(0.4 * third),
+            lateral_offset_sd_n: Some(0.5 * third),
+            normal_offset_sd_n: Some(0.6 * third),
+            tilt_sd_rad: Some(0.7 * third),
+            crosstalk_sd: Some(0.8 * third),
+            crosstalk_onto_normal_sd: Some(0.9 * third),
+            certificates: [(CertificateKind::Force, "cell \"7\".toml".to_string())].into(),
+        };
+        let text = file.to_toml().expect("a file that passes its own check");
+        assert_eq!(RigFile::parse(&text).expect(&text), file);
+        // Each key is one that the file has, and reads what stands there.
+        for key in CertifiedKey::ALL {
+            assert!(text.contains(&format!("\n{} = ", key.name())), "{text}");
+            let written = text.lines().find_map(|l| l.strip_prefix(&format!("{} = ", key.name())));
+            assert_eq!(written.and_then(|v| v.parse().ok()), file.calibration.sd(key), "{}", key.name());
+        }
+    }
+
+    #[test]
+    fn a_key_that_no_file_has_is_refused_in_every_section() {
+        for wrong in [
+            "[fingers]\n",
+            "[calibration]\nnormal_gain = 0.1\n",
+            "[calibration.certificates]\nspeed = \"s.toml\"\n",
+        ] {
+            let said = refusal(&format!("{TEXT}\n{wrong}"));
+            assert!(said.contains("unknown"), "{wrong}: {said}");
+        }
+        assert!(refusal(&TEXT.replace("force_sd_n", "force_sd")).contains("unknown field `force_sd`"));
+    }
+
+    #[test]
+    fn values_that_cannot_be_meant_are_refused_with_their_place() {
+        for (from, to, place) in [
+            (
+                "stiffness_relative_sd = 0.05",
+                "stiffness_relative_sd = 1e6",
+                "[finger] stiffness_relative_sd = 1000000",
+            ),
+            (
+                "stiffness_relative_sd = 0.05",
+                "stiffness_relative_sd = nan",
+                "[finger] stiffness_relative_sd = NaN",
+            ),
+            ("3.9e6", "-3.9e6", "[finger] normal_stiffness_n_per_m"),
+            ("1.5e6", "inf", "[finger] lateral_stiffness_n_per_m"),
+            ("pass_relative_sd = 0.015", "pass_relative_sd = inf", "[noise] pass_relative_sd = inf"),
+            ("force_sd_n = 0.0008", "force_sd_n = inf", "[noise] force_sd_n = inf"),
+            ("force_sd_n = 0.0008", "force_sd_n = -1e-3", "[noise] force_sd_n"),
+            ("[noise]", "poisson_ratio = 0.6\n[noise]", "[finger] poisson_ratio = 0.6"),
+        ] {
+            assert!(TEXT.contains(from), "{from}");
+            let said = refusal(&TEXT.replacen(from, to, 1));
+            assert!(said.contains(place) && said.contains("is needed"), "{to}: {said}");
+        }
+        for key in CertifiedKey::ALL {
+            for value in ["nan", "-0.01", "1e3"] {
+                let said = refusal(&format!("{TEXT}[calibration]\n{} = {value}\n", key.name()));
+                assert!(said.contains(&format!("[calibration] {}", key.name())), "{said}");
+            }
+        }
+        let silent = TEXT.replace("= 0.015", "= 0.0").replace("= 0.0008", "= 0.0");
+        assert!(refusal(&silent).contains("at least one kind"));
+    }
+
+    #[test]
+    fn the_schema_beside_is_that_of_the_code() {
+        let stored = include_str!("../rig.schema.json");
+        assert_eq!(RigFile::json_schema(), stored, "write RigFile::json_schema() to models/rig.schema.json");
+    }
+}

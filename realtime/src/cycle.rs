@@ -271,11 +271,9 @@ fn compare(
         mu0: mu0.value,
         position_m: stage.position_m,
         time_s: now.seconds(),
-        run_time_s: None,
-        ambient_pressure_pa: None,
         // The table of a run holds this channel's temperature: what a model was diagnosed on.
         temperature_c: amplifier.temperature_c.ok().map(|r| r.value).filter(|t| t.is_finite()),
-        relative_humidity_pct: None,
+        ..Condition::paper()
     }
     .within(&state.ambient);
     let prediction = model.predict(&condition).ok()?;

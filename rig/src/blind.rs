@@ -261,7 +261,7 @@ fn median(v: &mut [f64]) -> f64 {
     0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2])
 }
 
-/// The figures of the issue over scored sets.
+/// The figures of a study over scored sets: each with what it counts and out of how many.
 pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let single = |s: &&Scored| matches!(s.stratum, Stratum::Single | Stratum::Alias);
     // Both words of the definition: the data speak for the truth, and its gap stands above the floor.

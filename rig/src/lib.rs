@@ -13,7 +13,22 @@
 //! | [`figures`] | the paper's figures recomputed |
 //! | [`files`], [`print`] | how files are written, and how the program speaks: each in one place |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
+//! | [`model_file`] | a corrected model from its file to the loop |
+//! | [`faults`], [`blind`] | what validates: the fault list in virtual time, the diagnosis scored on sealed sets |
+//! | [`input`] | files that people wrote, refused with the place |
 //! | [`cli`] | one file a subcommand |
+//!
+//! ```
+//! use muprime_rig::plan::Plan;
+//! use muprime_rig::setup::Setup;
+//!
+//! let setup = Setup::load("virtual-ideal")?;
+//! assert!(!setup.instruments().force.is_empty());
+//! // What people write is refused with the place and the remedy, and nothing is touched.
+//! let refused = Plan::parse("plan.toml", "name = 'p'\nspeed = 1").err().unwrap();
+//! assert!(format!("{refused:?}").contains("speed"));
+//! # Ok::<(), miette::Report>(())
+//! ```
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 

@@ -8,6 +8,9 @@ use muprime_rig::print::Remarks;
 use muprime_rig::say;
 use std::io::IsTerminal;
 use std::process::ExitCode;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Controller of a hardware-in-the-loop tribometer: ultrasonic friction reduction, measured and explained.
 #[derive(Parser)]
@@ -71,10 +74,19 @@ fn main() -> ExitCode {
             return ExitCode::from(if error.use_stderr() { cli::REFUSED } else { cli::DONE });
         }
     };
-    let filter = tracing_subscriber::EnvFilter::try_from_env("MUPRIME_LOG")
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
+    let wanted = std::env::var("MUPRIME_LOG").unwrap_or_else(|_| "warn".into());
+    let filter: Targets = match wanted.parse() {
+        Ok(filter) => filter,
+        Err(error) => {
+            say!("MUPRIME_LOG={wanted}: {error}; a level, or as in 'warn,muprime_drivers=debug'");
+            return ExitCode::from(cli::REFUSED);
+        }
+    };
     let colours = std::io::stderr().is_terminal();
-    tracing_subscriber::fmt().with_env_filter(filter).with_ansi(colours).with_writer(|| Remarks).init();
+    tracing_subscriber::registry()
+        .with(tracing_subscriber::fmt::layer().with_ansi(colours).with_writer(|| Remarks))
+        .with(filter)
+        .init();
     let json = cli.json;
     cli::until_the_end(move || run(cli.verb, json))
 }

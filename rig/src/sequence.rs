@@ -14,7 +14,7 @@ use models::psi::PsiEq17;
 use models::quantity::PeakToPeak;
 use models::record::Pass;
 use models::rig_file::PassNoise;
-use realtime::compare::{Comparator, PassComparison};
+use realtime::compare::{Agreement, Comparator, PassComparison};
 use realtime::cycle::{Command, Marker, Phase};
 use realtime::estimate::Moments;
 use realtime::ports::{Nanos, NoData};
@@ -184,6 +184,8 @@ pub struct Sequence {
     comparator: Comparator,
     stopping: bool,
     departed: bool,
+    /// Of the last pass that could be compared, of earlier sessions too.
+    last_comparison: Option<PassComparison>,
     started: bool,
     poisson_ratio: f64,
     temperature_ranges: Vec<TemperatureRange>,
@@ -217,6 +219,7 @@ impl Sequence {
             comparator,
             stopping: false,
             departed: false,
+            last_comparison: None,
             started: false,
             poisson_ratio: tip.finger.poisson_ratio,
             temperature_ranges: Vec::new(),
@@ -254,7 +257,9 @@ impl Sequence {
         if let Some(friction) = pass.friction_force_n() {
             let condition = pass.condition(1.0).within(&self.ambient);
             // A condition outside the model's domain has no comparison, now as then.
-            let _ = self.comparator.pass(&*self.model, &condition, friction);
+            if let Ok(comparison) = self.comparator.pass(&*self.model, &condition, friction) {
+                self.last_comparison = Some(comparison);
+            }
             self.departed = self.comparator.departed();
         }
     }
@@ -278,6 +283,11 @@ impl Sequence {
     /// Whether the model has left the measurement.
     pub fn departed(&self) -> bool {
         self.departed
+    }
+
+    /// What the comparison says, for a sweep that came to its end or did not.
+    pub fn agreement(&self, complete: bool) -> Agreement {
+        Agreement::of(self.last_comparison.as_ref(), complete)
     }
 
     /// Takes a row.
@@ -567,6 +577,7 @@ impl Sequence {
         let condition = pass.condition(mu0).within(&self.ambient);
         let comparison =
             pass.friction_force_n().and_then(|f| self.comparator.pass(&*self.model, &condition, f).ok());
+        self.last_comparison = comparison.or(self.last_comparison);
         let regime = self.model.predict(&condition).ok().map(|p| p.regime);
         let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
         let psi_eq17 =

@@ -18,6 +18,7 @@ use crate::supervisor::OffReport;
 use calibration::certificate::sha256_hex;
 use keeper::Keeper;
 use models::prediction::FrictionModel;
+use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
 use realtime::witness::StallReport;
 use serde::{Deserialize, Serialize};
@@ -70,6 +71,9 @@ pub struct Summary {
     pub planned: usize,
     /// Whether the model has left the measurement.
     pub model_departed: bool,
+    /// What the comparison of all passes says.
+    #[serde(default = "nothing_said")]
+    pub agreement: Agreement,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
     /// When the machine kept ordinary threads from running; `None` in virtual time.
@@ -85,6 +89,11 @@ pub struct Summary {
     /// Every pass had been made before: nothing was driven.
     #[serde(default)]
     pub finished_before: bool,
+}
+
+/// The finding of a summary that was written before it had one.
+fn nothing_said() -> Agreement {
+    Agreement::of(None, false)
 }
 
 /// Why a run that had begun did not come to an orderly end. Anything else that goes wrong is a refusal: it comes before
@@ -181,7 +190,7 @@ impl Job {
             sequence.remember(pass);
         }
         if sequence.progress().1 == 0 {
-            return Keeper::finish(&self, dir, planned, sequence.departed());
+            return Keeper::finish(&self, dir, planned, sequence.agreement(true));
         }
         if self.fast {
             fast::run(self, dir, session.start_s, sequence, planned, signals, news)

@@ -174,7 +174,7 @@ pub fn read_passes(from: impl Read) -> Result<Vec<Pass>, TableError> {
     Ok(passes)
 }
 
-/// Writes a point table with every column of the contract; missing values are empty cells. Numbers have as many
+/// Writes a point table with every column of docs/contract.md; missing values are empty cells. Numbers have as many
 /// digits as it takes to read them back unchanged.
 ///
 /// # Errors

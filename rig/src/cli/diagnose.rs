@@ -13,7 +13,6 @@ use miette::{Context, IntoDiagnostic};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::record::{Pass, read_passes};
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -108,7 +107,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
     }
     if let Some(out) = &args.report {
-        write_text(out, &crate::report::diagnosis::page(&result, &table))?;
+        write_text(out, &crate::report::diagnosis::page(&result, &table)?)?;
     }
     let mut report = serde_json::to_value(&result.report).into_diagnostic()?;
     let faults = certificates::at_fault(&result, &rig);
@@ -141,44 +140,10 @@ fn read_table(path: &Path) -> miette::Result<Vec<Pass>> {
 
 fn parse_passes(path: &Path, bytes: &[u8]) -> miette::Result<Vec<Pass>> {
     if bytes.starts_with(b"PAR1") {
-        let csv = parquet_as_csv(path).wrap_err_with(|| path.display().to_string())?;
+        let csv = crate::export::parquet_as_csv(path).wrap_err_with(|| path.display().to_string())?;
         return read_passes(csv.as_bytes()).into_diagnostic().wrap_err_with(|| path.display().to_string());
     }
     read_passes(bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())
-}
-
-/// The columns of a Parquet point table as CSV text: one reader judges both formats.
-fn parquet_as_csv(path: &Path) -> miette::Result<String> {
-    use parquet::file::reader::{FileReader, SerializedFileReader};
-    use parquet::record::Field;
-    let reader = SerializedFileReader::new(fs::File::open(path).into_diagnostic()?).into_diagnostic()?;
-    let mut text = String::new();
-    let names: Vec<String> = reader
-        .metadata()
-        .file_metadata()
-        .schema_descr()
-        .columns()
-        .iter()
-        .map(|c| c.name().to_string())
-        .collect();
-    text.push_str(&names.join(","));
-    text.push('\n');
-    for row in reader.get_row_iter(None).into_diagnostic()? {
-        let row = row.into_diagnostic()?;
-        let cells: Vec<String> = row
-            .get_column_iter()
-            .map(|(_, field)| match field {
-                Field::Null => String::new(),
-                Field::Str(s) => format!("\"{}\"", s.replace('"', "\"\"")),
-                Field::Double(v) => format!("{v:e}"),
-                Field::Float(v) => format!("{v:e}"),
-                other => other.to_string(),
-            })
-            .collect();
-        text.push_str(&cells.join(","));
-        text.push('\n');
-    }
-    Ok(text)
 }
 
 fn predictions(result: &Diagnosis, conditions: &Table) -> String {

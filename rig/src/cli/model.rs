@@ -50,7 +50,7 @@ pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
     }
 }
 
-/// Bad input: says why and gives the exit status of the contract.
+/// Bad input: says why and gives its exit status (docs/contract.md).
 fn refused(why: impl std::fmt::Display) -> miette::Result<ExitCode> {
     say!("refused: {why}");
     Ok(ExitCode::from(2))

@@ -231,14 +231,9 @@ fn tell(summary: &Summary, json: bool) {
     if summary.passes < summary.planned {
         say!("the same command with --out {} goes on", summary.folder.display());
     }
-    let finding = if summary.model_departed {
-        format!(
-            "the model has left the measurement: 'muprime diagnose {}' says where and why",
-            summary.folder.display()
-        )
-    } else {
-        "the measurement agrees with the model".into()
-    };
-    say!("{finding}");
+    say!("{}", summary.agreement);
+    if summary.model_departed {
+        say!("'muprime diagnose {}' says where and why", summary.folder.display());
+    }
     say!("report: {}", summary.folder.join("report.html").display());
 }

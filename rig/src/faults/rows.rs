@@ -1,6 +1,6 @@
 //! The list: what strikes, what must follow, for which cause, within how many cycles. Add a fault: one line.
 //!
-//! Numbers to 50 are those of the project's fault list; what no row of it names comes after. Bounds count from the first
+//! Numbers to 50 are those of the project's fault list (docs/safety.md); what no row of it names comes after. Bounds count from the first
 //! cycle whose inputs show the fault, that cycle included. They are stated in what the limits allow for (the age of a force
 //! sample or of a state, the time in which a set-point must show), so that they hold at every [`Pace`]. Garbage is random over
 //! 400 N: one sample in some hundreds is plausible by chance, so its bound allows for that. Two spikes side by side are an
@@ -302,8 +302,8 @@ rows! {
 }
 
 /// Rows of the fault list that strike what this bench does not hold (threads, files, the network): the tests that strike them.
-/// Each is a test file of the workspace and a test in it.
-pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)])] = &[
+/// Number, fault, tests (a file of the workspace and a test in it), and what is to be said beside.
+pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)], &str)] = &[
     (
         12,
         "a late reply after a timeout",
@@ -311,6 +311,7 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)])] = &[
             ("tests/wire/modbus_tcp.rs", "no_prank_ever_becomes_a_force"),
             ("tests/wire/lines.rs", "no_prank_on_an_rtu_line_becomes_a_force"),
         ],
+        "",
     ),
     (
         13,
@@ -319,11 +320,13 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)])] = &[
             ("tests/wire/modbus_tcp.rs", "swapped_words_are_refused_at_connection"),
             ("tests/wire/modbus_tcp.rs", "another_instrument_is_refused_before_anything_is_commanded"),
         ],
+        "",
     ),
     (
         15,
         "corruption that passes its check",
         &[("tests/wire/lines.rs", "no_prank_on_an_rtu_line_becomes_a_force")],
+        "",
     ),
     (
         16,
@@ -332,13 +335,15 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)])] = &[
             ("tests/can_kernel.rs", "bus_off_ends_the_link_and_nothing_restarts_by_itself"),
             ("tests/can_kernel.rs", "no_command_from_before_a_bus_off_leaves_after_it"),
         ],
+        "",
     ),
-    (17, "CAN warning, passive", &[]),
-    (19, "frame flood", &[]),
+    (17, "CAN warning, passive", &[], "open: no test strikes it"),
+    (19, "frame flood", &[], "open: no test strikes it"),
     (
         21,
         "wall-clock jump",
         &[("tests/wire_faults.rs", "a_jump_of_the_wall_clock_trips_nothing_and_stamps_nothing_wrong")],
+        "",
     ),
     (
         23,
@@ -351,16 +356,19 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)])] = &[
                 "a_stopped_controller_is_outlived_by_the_amplifiers_watchdog_and_trips_when_it_goes_on",
             ),
         ],
+        "",
     ),
     (
         25,
         "panic of the loop",
         &[("realtime/src/pacing/tests.rs", "a_port_that_panics_ends_the_loop_with_the_drive_off")],
+        "",
     ),
     (
         26,
         "slow recorder, full ring",
         &[("realtime/src/pacing/tests.rs", "a_full_ring_is_counted_and_holds_nothing_up")],
+        "",
     ),
     (
         27,
@@ -369,11 +377,13 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)])] = &[
             ("tests/disk.rs", "a_disk_that_fails_stops_the_sweep_in_order_and_keeps_what_was_measured"),
             ("tests/crash.rs", "a_read_only_folder_is_refused_before_anything_moves"),
         ],
+        "",
     ),
     (
         28,
         "kill -9",
         &[("tests/kills.rs", "killed_at_any_instant_nothing_acknowledged_is_lost_and_the_drive_drops")],
+        "",
     ),
     (
         29,
@@ -382,6 +392,7 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)])] = &[
             ("tests/session.rs", "an_interrupt_stops_safely_and_keeps_what_was_measured"),
             ("realtime/src/pacing/tests.rs", "a_stop_is_off_within_two_cycles_however_full_the_queue"),
         ],
+        "",
     ),
     (
         30,
@@ -390,6 +401,7 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)])] = &[
             ("tests/record.rs", "a_short_record_cut_at_every_byte_is_read_up_to_the_cut_and_recovered"),
             ("tests/record.rs", "flipped_bits_never_give_a_silently_wrong_value"),
         ],
+        "",
     ),
     (
         41,
@@ -399,20 +411,28 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)])] = &[
             ("tests/fuzz.rs", "setups_plans_models_and_certificates"),
             ("realtime/src/safety/tests/bounds.rs", "every_range_is_closed_at_both_ends"),
         ],
+        "",
     ),
-    (42, "certificates that do not hold", &[("tests/fuzz.rs", "certificates")]),
-    (43, "slow model", &[("tests/realtime.rs", "what_is_decided_leaves_before_the_model_is_asked")]),
-    (44, "two controllers", &[("tests/session.rs", "two_controllers_never_share_a_run")]),
-    (45, "cross-site requests", &[]),
+    (42, "certificates that do not hold", &[("tests/fuzz.rs", "certificates")], ""),
+    (43, "slow model", &[("tests/realtime.rs", "what_is_decided_leaves_before_the_model_is_asked")], ""),
+    (44, "two controllers", &[("tests/session.rs", "two_controllers_never_share_a_run")], ""),
+    (45, "cross-site requests", &[], "no dashboard is served"),
     (
         46,
-        "floods of a dashboard",
+        "floods",
         &[("tests/wire/modbus_tcp.rs", "more_clients_than_allowed_are_turned_away_and_a_place_is_freed")],
+        "",
     ),
-    (49, "markup in names", &[]),
+    (
+        49,
+        "markup in names",
+        &[("rig/src/report/page.rs", "markup_and_terminal_escapes_in_names_are_harmless")],
+        "",
+    ),
     (
         50,
         "a crash at every step",
         &[("tests/crash.rs", "a_crash_at_every_step_of_a_sweep_loses_and_doubles_nothing")],
+        "",
     ),
 ];

@@ -51,7 +51,8 @@ pub fn run(
         tracing::error!("the record could not be kept: the sweep was stopped: {why:#}");
         Outcome::RecordLost
     });
-    Ok(kept.end(outcome, sequence.departed(), None, 0, BTreeMap::new(), off))
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, None, 0, BTreeMap::new(), off))
 }
 
 fn sweep(

@@ -9,6 +9,7 @@ use crate::sequence::{Event, MeasuredPass, Outcome};
 use crate::supervisor::OffReport;
 use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
+use realtime::compare::Agreement;
 use realtime::cycle::Config;
 use realtime::pacing::LoopReport;
 use realtime::ports::Nanos;
@@ -104,7 +105,12 @@ impl Keeper {
     ///
     /// # Errors
     /// Whatever file system and SQLite say.
-    pub fn finish(job: &Job, mut dir: RunDir, planned: usize, departed: bool) -> miette::Result<Summary> {
+    pub fn finish(
+        job: &Job,
+        mut dir: RunDir,
+        planned: usize,
+        agreement: Agreement,
+    ) -> miette::Result<Summary> {
         dir.stay();
         let written = std::fs::read(dir.path().join(SUMMARY)).ok();
         let written: Option<Summary> = written.and_then(|text| serde_json::from_slice(&text).ok());
@@ -115,7 +121,7 @@ impl Keeper {
         let kept = Self::enter(job, dir, catalogue, planned, unix_ns()).wrap_err(Unfinished::NotKept)?;
         Ok(Summary {
             finished_before: true,
-            ..kept.end(Outcome::Complete, departed, None, 0, BTreeMap::new(), OffReport::off())
+            ..kept.end(Outcome::Complete, agreement, None, 0, BTreeMap::new(), OffReport::off())
         })
     }
 
@@ -186,7 +192,7 @@ impl Keeper {
     pub fn end(
         mut self,
         outcome: Outcome,
-        departed: bool,
+        agreement: Agreement,
         machine: Option<(LoopReport, StallReport)>,
         record_lost: u64,
         links: BTreeMap<String, serde_json::Value>,
@@ -198,7 +204,8 @@ impl Keeper {
             folder: self.dir.path().to_path_buf(),
             passes: self.passes,
             planned: self.planned,
-            model_departed: departed,
+            model_departed: agreement == Agreement::Departed,
+            agreement,
             loop_report,
             stalls,
             record_lost,
@@ -206,7 +213,7 @@ impl Keeper {
             off,
             finished_before: false,
         };
-        self.departed |= departed;
+        self.departed |= summary.model_departed;
         // The catalogue last: what it calls complete has its summary and its report.
         let written = [self.write_end(&summary), self.note_end(&summary)];
         let mut kept = true;

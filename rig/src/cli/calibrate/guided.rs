@@ -156,7 +156,7 @@ impl Kept {
     }
 
     fn write(&self) -> miette::Result<()> {
-        crate::files::write_whole(&self.part, &self.text())
+        crate::files::write_whole(&self.part, self.text())
     }
 
     /// Writes the series and returns its text; only then the file so far goes.
