@@ -74,7 +74,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     if args.constants {
-        print!("{}", diagnosis::constants::markdown());
+        out!("{}", diagnosis::constants::markdown().trim_end());
         return Ok(ExitCode::SUCCESS);
     }
     if args.same_form {
@@ -143,15 +143,21 @@ fn sensitivity(
         let document = serde_json::json!({
             "schema": "muprime.blind.sensitivity/1", "seed": args.seed, "sets": args.sets, "rows": rows,
         });
-        println!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
         return Ok(ExitCode::SUCCESS);
     }
-    println!("| constant | factor | right | misnamed | changed | probability on the truth | n |");
-    println!("|---|---|---|---|---|---|---|");
+    out!("| constant | factor | right | misnamed | changed | probability on the truth | n |");
+    out!("|---|---|---|---|---|---|---|");
     for r in rows {
-        println!(
+        out!(
             "| `{}` | {} | {} | {} | {} | {:.3} | {} |",
-            r.constant, r.factor, r.right, r.misnamed, r.changed, r.probability, r.sets
+            r.constant,
+            r.factor,
+            r.right,
+            r.misnamed,
+            r.changed,
+            r.probability,
+            r.sets
         );
     }
     Ok(ExitCode::SUCCESS)
