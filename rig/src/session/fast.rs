@@ -2,6 +2,7 @@
 
 use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary};
+use crate::files::Placed;
 use crate::plan::{Plan, Resolution};
 use crate::run_dir::RunDir;
 use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
@@ -10,7 +11,7 @@ use crate::supervisor::{self, End, OffReport, VirtualLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::FrictionModel;
 use realtime::ports::Nanos;
-use realtime::recorder::{Preamble, Recorder};
+use realtime::recorder::Recorder;
 use realtime::turn::{Ports, Row};
 use sim::virtual_rig::VirtualRig;
 use std::cell::RefCell;
@@ -40,13 +41,20 @@ pub fn run(
             job.setup.file.name
         );
     }
-    let rig = VirtualRig::of(job.world()?);
+    let ports = ports_of(&job, VirtualRig::of(job.world()?));
     let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
     let mut kept = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
-    let start = Nanos::from_seconds(start_s);
-    // Before the first row nothing has been driven.
-    let mut off = OffReport::off();
-    let swept = sweep(job, rig, start, preamble, &mut kept, &mut sequence, signals, news, &mut off);
+    let rig =
+        VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports).from(Nanos::from_seconds(start_s));
+    let record = kept.new_record().and_then(|file| {
+        let disk = file.handle()?;
+        Ok((Recorder::begin(file, preamble).into_diagnostic()?, disk))
+    });
+    let (swept, off) = match record {
+        Ok(record) => sweep(rig, record, &mut kept, &mut sequence, signals, news),
+        // Before the first row nothing has been driven.
+        Err(why) => (Err(why), OffReport::off()),
+    };
     let outcome = swept.unwrap_or_else(|why| {
         tracing::error!("the record could not be kept: the sweep was stopped: {why:#}");
         Outcome::RecordLost
@@ -55,17 +63,8 @@ pub fn run(
     Ok(kept.end(outcome, agreement, None, 0, BTreeMap::new(), off))
 }
 
-fn sweep(
-    job: Job,
-    rig: VirtualRig,
-    start: Nanos,
-    preamble: Preamble,
-    kept: &mut Keeper,
-    sequence: &mut Sequence,
-    signals: &Signals,
-    news: &mut dyn FnMut(News<'_>),
-    off: &mut OffReport,
-) -> miette::Result<Outcome> {
+/// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
+fn ports_of(job: &Job, rig: VirtualRig) -> Ports {
     let [force, amplifier, stage] = rig.split();
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
@@ -76,10 +75,18 @@ fn sweep(
     if job.setup.file.safety_inputs.is_some() {
         ports = ports.with_contacts(Box::new(stage));
     }
-    let file = kept.new_record()?;
-    let disk = file.handle()?;
-    let mut recorder = Recorder::begin(file, preamble).into_diagnostic()?;
-    let mut rig = VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports).from(start);
+    ports
+}
+
+/// Sweeps, and ends the record; says what became of the output too.
+fn sweep(
+    mut rig: VirtualLoop,
+    (mut recorder, disk): (Recorder<Placed>, Placed),
+    kept: &mut Keeper,
+    sequence: &mut Sequence,
+    signals: &Signals,
+    news: &mut dyn FnMut(News<'_>),
+) -> (miette::Result<Outcome>, OffReport) {
     // What cannot be kept ends the sweep.
     let unkept = RefCell::new(None);
     let mut knows = false;
@@ -111,19 +118,20 @@ fn sweep(
     });
     // The stop reaches the rig, so that the record shows the safe state; kept or not, off comes first.
     let mut recorded = Ok(());
-    *off = rig.end(&mut |row| {
+    let off = rig.end(&mut |row| {
         if recorded.is_ok() {
             recorded = recorder.row(row);
         }
     });
-    if let Some(why) = unkept.into_inner() {
-        return Err(why);
-    }
-    recorded.into_diagnostic()?;
-    let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
-    recorder.end(last).into_diagnostic().wrap_err("the record")?;
-    disk.sync()?;
-    Ok(outcome)
+    let ended = || {
+        unkept.into_inner().map_or(Ok(()), Err)?;
+        recorded.into_diagnostic()?;
+        let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
+        recorder.end(last).into_diagnostic().wrap_err("the record")?;
+        disk.sync()?;
+        Ok(outcome)
+    };
+    (ended(), off)
 }
 
 /// What a sweep in memory comes to.
