@@ -1,8 +1,8 @@
 //! `muprime model table`: the study of Fig. 9, or the surrogate's table.
 
 use super::{refused, reproduce};
-use crate::figures::store::{self, Kept};
 use crate::figures::fig_9_results;
+use crate::figures::store::{self, Kept};
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr};
 use models::ridge::study::{content_key, fig_9};
