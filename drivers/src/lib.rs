@@ -25,6 +25,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! The profiles that come with the program can be looked at without an instrument:
+//!
+//! ```
+//! let profile = muprime_drivers::profile("ati-netft-can")?;
+//! assert!(profile.signals().any(|(name, _)| name == "fz"));
+//! assert!(muprime_drivers::profile("no-such-cell").is_err());
+//! # Ok::<(), muprime_drivers::OpenError>(())
+//! ```
+//!
 //! | room | purpose |
 //! |---|---|
 //! | [`setup`] | the instruments' sections of a setup |

@@ -88,7 +88,7 @@ impl Expression {
     }
 }
 
-#[allow(clippy::float_cmp)] // raw counts and bits are whole numbers, exactly
+// raw counts and bits are whole numbers, exactly
 fn evaluate(node: &Node, signals: &[f64]) -> f64 {
     let truth = |yes: bool| f64::from(u8::from(yes));
     match node {
@@ -119,7 +119,7 @@ fn evaluate(node: &Node, signals: &[f64]) -> f64 {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // status words have at most 32 bits
+// status words have at most 32 bits
 fn bits(a: f64, b: f64, operation: impl Fn(i64, i64) -> i64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { operation(a as i64, b as i64) as f64 }
 }
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    #[allow(clippy::float_cmp)] // whole numbers
+    // whole numbers
     fn arithmetic_and_logic() {
         for (text, expected) in [
             ("1 + 2 * 3", 7.0),

@@ -97,7 +97,6 @@ impl Field {
     /// The number; `None` where the frame is too short for it.
     #[must_use]
     // The casts between equal widths are the two's complement they look like; the others only drop zeros.
-    #[allow(clippy::cast_possible_wrap, clippy::cast_possible_truncation)]
     pub fn read(&self, frame: &[u8]) -> Option<f64> {
         let word = self.word(frame)?;
         if let Some((first, width)) = self.bits {
@@ -115,7 +114,7 @@ impl Field {
 
     /// What stands in the frame, as a whole number: of floating-point numbers the bits, of the others the value.
     #[must_use]
-    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // whole numbers of 32 bits are exact
+    // whole numbers of 32 bits are exact
     pub fn counts(&self, frame: &[u8]) -> Option<i64> {
         match self.number {
             NumberType::F32 | NumberType::F64 => self.word(frame).map(|word| word as i64),
@@ -127,7 +126,6 @@ impl Field {
     /// converter does. Other bits of the same word are kept. A value that is no number is stored
     /// as one only in floating point; integers take zero.
     /// Returns `false` where the frame is too short.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn write(&self, frame: &mut [u8], value: f64) -> bool {
         let Some(old) = self.word(frame) else { return false };
         let word = if let Some((first, width)) = self.bits {

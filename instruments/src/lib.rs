@@ -1,7 +1,7 @@
 //! Instrument profiles, codecs and golden vectors.
 //!
 //! One TOML file describes an instrument: its link, its frames, the signals in them, the set-points
-//! it takes, its faults, and golden byte vectors. The driver (crate `rig`), the emulator (crate
+//! it takes, its faults, and golden byte vectors. The driver (crate `drivers`), the emulator (crate
 //! `sim`) and the generated documentation all stand on that one description, so they cannot drift
 //! apart; the vectors and the independent peers of the system tests say whether it is right.
 //!
@@ -14,9 +14,48 @@
 //! | [`expression`] | the tiny total language of `when`, `valid_when` and `scale_expr` |
 //! | [`field`] | one number in a frame: type, byte order, bit range |
 //! | [`codec`] | frames of the wires themselves |
+//! | [`bus`] | the seam of a CAN bus: frames, and what a bus may report instead |
 //! | [`vector`] | golden vectors: bytes beside the values they stand for |
 //! | [`document`] | a profile as a page for people |
 //! | [`error`] | what is wrong with a profile, where, and what to do |
+//!
+//! ```
+//! use muprime_instruments::Profile;
+//!
+//! let profile = Profile::parse(r#"
+//!     [profile]
+//!     schema = 1
+//!     id = "a-cell"
+//!     maker = "A maker"
+//!     models = ["one axis"]
+//!     roles = ["force.normal"]
+//!     provenance = "its manual, page 12"
+//!     verified = "emulator-only"
+//!     [link]
+//!     kind = "modbus_tcp"
+//!     [[poll]]
+//!     name = "sample"
+//!     address = 0
+//!     count = 2
+//!     rate_hz = 500
+//!     [[signal]]
+//!     name = "normal"
+//!     register = 0
+//!     type = "i32"
+//!     scale = 1e-5
+//!     unit = "N"
+//!     si = { factor = 1.0, unit = "N" }
+//!     range = [-20.0, 20.0]
+//!     [[vector]]
+//!     registers = [0, 25000]
+//!     expect = { normal = 0.25 }
+//! "#)?;
+//! let (sample, normal) = (profile.frame("sample").unwrap(), profile.signal("normal").unwrap());
+//! let mut values = profile.values();
+//! profile.decode(sample, &[0x00, 0x00, 0x61, 0xA8], &mut values)?;
+//! assert_eq!(profile.si(normal, &values), 0.25);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod bus;
 pub mod codec;

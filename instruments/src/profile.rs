@@ -112,7 +112,7 @@ impl Place {
     fn counts(&self, frame: &[u8]) -> Option<i64> {
         match self {
             Place::Bytes(field) => field.counts(frame),
-            #[allow(clippy::cast_possible_truncation)] // counts of at most 32 bits
+            // counts of at most 32 bits
             Place::Dbc(at, signal) => signal.read(frame.get(*at..)?).map(|value| value as i64),
             Place::Computed(_) => None,
         }
@@ -310,7 +310,7 @@ impl Profile {
     #[must_use]
     pub fn raw(&self, signal: SignalId, frame: &[u8], values: &Values) -> i64 {
         match &self.signals[signal.0].place {
-            #[allow(clippy::cast_possible_truncation)] // saturates, and NaN gives zero
+            // saturates, and NaN gives zero
             Place::Computed(_) => (self.si(signal, values) / self.lsb_si(signal, values)).round() as i64,
             place => place.counts(frame).unwrap_or(0),
         }
@@ -444,7 +444,6 @@ impl Profile {
         // Counts are whole numbers; the scale says how many decimals the unit's value needs.
         let scale = self.sets[set.0].scale;
         let decimals = (-scale.log10()).ceil().clamp(0.0, 12.0);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let text = format!("{:.*}", decimals as usize, self.quantise(set, value));
         description.send.as_ref().map(|send| (send.replace("{}", &text), for_value))
     }

@@ -7,12 +7,35 @@
 //! |---|---|
 //! | [`quantity`] | `PeakToPeak` and its one conversion |
 //! | [`condition`], [`finger`] | one operating point; the fingertip |
+//! | [`covariate`] | what tells one condition from another: name, unit, words, range, getter |
 //! | [`spring_slider`] | Eqs. 6-15 and section 5.3 |
 //! | [`psi`] | Eqs. 16-20 |
+//! | [`psi_fit`] | its constant Psi* fitted, with an interval |
+//! | [`ridge`] | the finite element model of section 3 |
+//! | [`surrogate`], [`inverse`] | a table of the ridge that is quick to read; the amplitude for a wanted friction |
 //! | [`prediction`] | what every friction law answers |
 //! | [`record`] | the data vocabulary: passes, the point table |
+//! | [`rig_file`] | `rig.toml`: finger, repeatability, what certificates leave open |
+//! | [`root`] | roots in a bracket |
+//!
+//! ```
+//! use muprime_models::condition::Condition;
+//! use muprime_models::finger::Finger;
+//! use muprime_models::prediction::{FrictionModel, SpringSlider};
+//! use muprime_models::quantity::PeakToPeak;
+//!
+//! let model = SpringSlider::new(Finger::paper())?;
+//! // The paper's nominal point: 2 um peak-to-peak at 27.5 kHz, a finger of 0.25 N sliding at 20 mm/s.
+//! let vibrating = model.predict(&Condition::paper())?;
+//! assert!((vibrating.mu_relative - 0.296).abs() < 1e-3);
+//! // Without vibration the whole friction is there.
+//! let still = Condition { amplitude: PeakToPeak::ZERO, ..Condition::paper() };
+//! assert_eq!(model.predict(&still)?.mu_relative, 1.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod condition;
+pub mod covariate;
 pub mod finger;
 pub mod inverse;
 pub mod prediction;
@@ -21,6 +44,7 @@ pub mod psi_fit;
 pub mod quantity;
 pub mod record;
 pub mod ridge;
+pub mod rig_file;
 pub mod root;
 pub mod spring_slider;
 pub mod surrogate;

@@ -11,7 +11,7 @@ use crate::safety::{
     Cause, Controls, Decision, DriveCommand, Limits, Observation, Remark, Request, Safety, StageCommand,
     State, Trip,
 };
-use models::condition::Condition;
+use models::condition::{Ambient, Condition};
 use models::prediction::FrictionModel;
 use models::quantity::{Direction, PeakToPeak};
 use serde::{Deserialize, Serialize};
@@ -56,6 +56,8 @@ pub enum Command {
     DeadMan(bool),
     /// `mu_0` as known now.
     Mu0(Mu0),
+    /// What is known of the air from now on, where no channel reads it.
+    Ambient(Ambient),
 }
 
 /// Time after which a dead-man key that was not said to be held again counts as released: a terminal repeats a held key after
@@ -83,6 +85,7 @@ pub struct CycleState {
     marker: Marker,
     key_held_at: Option<Nanos>,
     mu0: Option<Mu0>,
+    ambient: Ambient,
 }
 
 impl CycleState {
@@ -230,6 +233,7 @@ fn take_commands(state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Control
             Command::Stop => controls.stop = true,
             Command::DeadMan(held) => state.key_held_at = held.then_some(now),
             Command::Mu0(mu0) => state.mu0 = Some(*mu0),
+            Command::Ambient(ambient) => state.ambient = *ambient,
         }
     }
     controls.dead_man = state.key_held_at.is_some_and(|at| now.since(at) <= KEY_AGE);
@@ -267,8 +271,11 @@ fn compare(
         mu0: mu0.value,
         position_m: stage.position_m,
         time_s: now.seconds(),
-        ambient_pressure_pa: None,
-    };
+        // The table of a run holds this channel's temperature: what a model was diagnosed on.
+        temperature_c: amplifier.temperature_c.ok().map(|r| r.value).filter(|t| t.is_finite()),
+        ..Condition::paper()
+    }
+    .within(&state.ambient);
     let prediction = model.predict(&condition).ok()?;
     let sd = mu.sd.hypot(prediction.mu_relative_sd);
     // A model that has diverged has no opinion; nothing that is commanded depends on it.

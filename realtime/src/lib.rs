@@ -15,6 +15,17 @@
 //! | [`replay`] | recorded cycles through the same code again |
 //! | [`recorder`] | rows, passes and events as MCAP; tolerant reading and recovery |
 //!
+//! ```
+//! use muprime_realtime::ports::Nanos;
+//! use muprime_realtime::safety::Limits;
+//!
+//! // A setup may narrow the limits, and widen them up to bounds that are compiled in.
+//! let wide = Limits { normal_force_max_n: 4.0, ..Limits::paper(Nanos(1_000_000)) };
+//! assert!(wide.checked().is_ok());
+//! let wider = Limits { normal_force_max_n: 40.0, ..wide };
+//! assert!(wider.checked().is_err());
+//! ```
+//!
 //! The wall clock is forbidden here, and the monotonic clock is read by `pacing` alone.
 
 pub mod compare;

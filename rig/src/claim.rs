@@ -56,7 +56,7 @@ fn folder() -> miette::Result<PathBuf> {
 
 /// Takes the lock of one instrument.
 fn take(folder: &Path, identity: &str) -> miette::Result<File> {
-    let name = &crate::session::sha256(identity)[..16];
+    let name = &calibration::certificate::sha256_hex(identity.as_bytes())[..16];
     let path = folder.join(format!("muprime-{name}.lock"));
     let wrong = |e: io::Error| {
         miette::miette!(help = "see what it is, and remove it", "the lock {}: {e}", path.display())

@@ -1,15 +1,40 @@
 //! Conversions of a run's tables. Written beside the goal, synced and moved there: never half a file.
 
+#[cfg(feature = "arrow")]
 mod arrow;
 mod columns;
 mod csv;
+#[cfg(feature = "parquet")]
 mod parquet;
+
+/// Stands in where the feature is off: every call says how to get it.
+#[cfg(not(feature = "arrow"))]
+mod arrow {
+    pub fn bytes(_: &super::columns::Table) -> miette::Result<Vec<u8>> {
+        Err(super::absent("arrow"))
+    }
+}
+
+/// Stands in where the feature is off: every call says how to get it.
+#[cfg(not(feature = "parquet"))]
+mod parquet {
+    pub fn bytes(_: &super::columns::Table) -> miette::Result<Vec<u8>> {
+        Err(super::absent("parquet"))
+    }
+    /// Refuses.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn as_csv(_: &std::path::Path) -> miette::Result<String> {
+        Err(super::absent("parquet"))
+    }
+}
 
 use crate::report::RunData;
 use clap::ValueEnum;
-use miette::IntoDiagnostic;
-use std::io::Write;
 use std::path::Path;
+
+pub use parquet::as_csv as parquet_as_csv;
 
 /// A format to export to. Add one: a file in `export/`, a variant, and a line in [`export`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -33,6 +58,14 @@ impl Format {
     }
 }
 
+#[cfg(not(all(feature = "arrow", feature = "parquet")))]
+fn absent(feature: &str) -> miette::Report {
+    miette::miette!(
+        help = "build it with `cargo install --path rig` (the feature is on by default), or take CSV",
+        "this muprime was built without its feature `{feature}`"
+    )
+}
+
 /// Exports a run's passes.
 ///
 /// # Errors
@@ -44,9 +77,5 @@ pub fn export(run: &RunData, format: Format, to: &Path) -> miette::Result<()> {
         Format::Parquet => parquet::bytes(&table)?,
         Format::Arrow => arrow::bytes(&table)?,
     };
-    let beside = to.with_extension("part");
-    let mut file = std::fs::File::create(&beside).into_diagnostic()?;
-    file.write_all(&bytes).into_diagnostic()?;
-    file.sync_all().into_diagnostic()?;
-    std::fs::rename(&beside, to).into_diagnostic()
+    crate::files::write_whole(to, &bytes)
 }

@@ -11,8 +11,26 @@
 //! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
 //! | [`run_dir`], [`catalogue`] | a run's folder and the catalogue of runs |
 //! | [`figures`] | the paper's figures recomputed |
+//! | [`files`], [`print`] | how files are written, and how the program speaks: each in one place |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
+//! | [`model_file`] | a corrected model from its file to the loop |
+//! | [`faults`], [`blind`] | what validates: the fault list in virtual time, the diagnosis scored on sealed sets |
+//! | [`input`] | files that people wrote, refused with the place |
 //! | [`cli`] | one file a subcommand |
+//!
+//! ```
+//! use muprime_rig::plan::Plan;
+//! use muprime_rig::setup::Setup;
+//!
+//! let setup = Setup::load("virtual-ideal")?;
+//! assert!(!setup.instruments().force.is_empty());
+//! // What people write is refused with the place and the remedy, and nothing is touched.
+//! let refused = Plan::parse("plan.toml", "name = 'p'\nspeed = 1").err().unwrap();
+//! assert!(format!("{refused:?}").contains("speed"));
+//! # Ok::<(), miette::Report>(())
+//! ```
+
+#![deny(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod blind;
 pub mod catalogue;
@@ -23,10 +41,12 @@ pub mod embed;
 pub mod export;
 pub mod faults;
 pub mod figures;
+pub mod files;
 pub mod fingertip;
 pub mod input;
 pub mod model_file;
 pub mod plan;
+pub mod print;
 pub mod report;
 pub mod run_dir;
 pub mod sequence;

@@ -1,8 +1,16 @@
 //! The `muprime` command: parses its arguments and hands over to one file per subcommand in `cli/`.
 
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 use clap::{CommandFactory, Parser, Subcommand};
 use muprime_rig::cli;
+use muprime_rig::print::Remarks;
+use muprime_rig::say;
+use std::io::IsTerminal;
 use std::process::ExitCode;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Controller of a hardware-in-the-loop tribometer: ultrasonic friction reduction, measured and explained.
 #[derive(Parser)]
@@ -52,6 +60,13 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    // Places are named in records, catalogues and JSON, all of which are text.
+    let unreadable =
+        std::env::args_os().chain(std::env::var_os("MUPRIME_RUNS")).find(|a| a.to_str().is_none());
+    if let Some(argument) = unreadable {
+        say!("{} is not text in UTF-8: give the file or folder another name", argument.display());
+        return ExitCode::from(cli::REFUSED);
+    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -59,9 +74,19 @@ fn main() -> ExitCode {
             return ExitCode::from(if error.use_stderr() { cli::REFUSED } else { cli::DONE });
         }
     };
-    let filter = tracing_subscriber::EnvFilter::try_from_env("MUPRIME_LOG")
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let wanted = std::env::var("MUPRIME_LOG").unwrap_or_else(|_| "warn".into());
+    let filter: Targets = match wanted.parse() {
+        Ok(filter) => filter,
+        Err(error) => {
+            say!("MUPRIME_LOG={wanted}: {error}; a level, or as in 'warn,muprime_drivers=debug'");
+            return ExitCode::from(cli::REFUSED);
+        }
+    };
+    let colours = std::io::stderr().is_terminal();
+    tracing_subscriber::registry()
+        .with(tracing_subscriber::fmt::layer().with_ansi(colours).with_writer(|| Remarks))
+        .with(filter)
+        .init();
     let json = cli.json;
     cli::until_the_end(move || run(cli.verb, json))
 }
@@ -89,7 +114,7 @@ fn run(verb: Verb, json: bool) -> ExitCode {
     match outcome {
         Ok(Ok(code)) => code,
         Ok(Err(report)) => {
-            eprintln!("{report:?}");
+            say!("{report:?}");
             ExitCode::from(cli::status_of(&report))
         }
         Err(_) => ExitCode::from(cli::INTERNAL),

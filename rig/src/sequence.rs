@@ -8,12 +8,13 @@
 
 use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
 use crate::plan::{PassTimes, Point};
-use models::condition::Condition;
+use models::condition::{Ambient, Condition};
 use models::prediction::{FrictionModel, Regime};
 use models::psi::PsiEq17;
 use models::quantity::PeakToPeak;
 use models::record::Pass;
-use realtime::compare::{Comparator, PassComparison, PassNoise};
+use models::rig_file::PassNoise;
+use realtime::compare::{Agreement, Comparator, PassComparison};
 use realtime::cycle::{Command, Marker, Phase};
 use realtime::estimate::Moments;
 use realtime::ports::{Nanos, NoData};
@@ -183,11 +184,18 @@ pub struct Sequence {
     comparator: Comparator,
     stopping: bool,
     departed: bool,
+    /// Of the last pass that could be compared, of earlier sessions too.
+    last_comparison: Option<PassComparison>,
     started: bool,
     poisson_ratio: f64,
     temperature_ranges: Vec<TemperatureRange>,
     temperature_flags: Vec<TemperatureFlag>,
+    /// What the setup states of the air, and what the loop was last told of it.
+    ambient: Ambient,
+    ambient_sent: Ambient,
     has_watchdog: bool,
+    session: Option<u64>,
+    start_s: f64,
 }
 
 impl Sequence {
@@ -211,12 +219,27 @@ impl Sequence {
             comparator,
             stopping: false,
             departed: false,
+            last_comparison: None,
             started: false,
             poisson_ratio: tip.finger.poisson_ratio,
             temperature_ranges: Vec::new(),
             temperature_flags: Vec::new(),
+            ambient: Ambient::default(),
+            ambient_sent: Ambient::default(),
             has_watchdog: true,
+            session: None,
+            start_s: 0.0,
         }
+    }
+
+    /// The same in air of which the setup states this; what a plan or a channel says of it goes first.
+    pub fn in_air(self, ambient: Ambient) -> Self {
+        Sequence { ambient, ..self }
+    }
+
+    /// The same, as a session of a run that had begun `start_s` before the loop's time zero, in s: passes tell the run's time.
+    pub fn in_session(self, session: u64, start_s: f64) -> Self {
+        Sequence { session: Some(session), start_s, ..self }
     }
 
     /// The same, with certificates that are held against the amplifier's temperature at the start of each pass.
@@ -232,9 +255,11 @@ impl Sequence {
     /// Takes in a pass of an earlier session of the same run: `mu_0` and the evidence go on from there.
     pub fn remember(&mut self, pass: &Pass) {
         if let Some(friction) = pass.friction_force_n() {
-            let condition = pass.condition(1.0);
+            let condition = pass.condition(1.0).within(&self.ambient);
             // A condition outside the model's domain has no comparison, now as then.
-            let _ = self.comparator.pass(&*self.model, &condition, friction);
+            if let Ok(comparison) = self.comparator.pass(&*self.model, &condition, friction) {
+                self.last_comparison = Some(comparison);
+            }
             self.departed = self.comparator.departed();
         }
     }
@@ -258,6 +283,11 @@ impl Sequence {
     /// Whether the model has left the measurement.
     pub fn departed(&self) -> bool {
         self.departed
+    }
+
+    /// What the comparison says, for a sweep that came to its end or did not.
+    pub fn agreement(&self, complete: bool) -> Agreement {
+        Agreement::of(self.last_comparison.as_ref(), complete)
     }
 
     /// Takes a row.
@@ -377,6 +407,11 @@ impl Sequence {
             return;
         }
         self.sums = Sums::default();
+        let ambient = Ambient::of(&self.points[self.next].condition.within(&self.ambient));
+        if ambient != self.ambient_sent {
+            self.ambient_sent = ambient;
+            out.commands.push(Command::Ambient(ambient));
+        }
         self.stage = Stage::Approach { since: row.now };
         self.approach(row, row.now, out);
     }
@@ -522,23 +557,27 @@ impl Sequence {
             speed_m_s: sums.speed.mean().unwrap_or(point.condition.speed_m_s),
             position_m: sums.position.mean().unwrap_or(point.condition.position_m),
             normal_force_n: normal,
-            time_s: since.seconds(),
-            ..point.condition
+            time_s: self.start_s + since.seconds(),
+            ..point.condition.within(&self.ambient)
         };
         Pass {
             normal_force_sd_n: sums.normal.sd(),
             lateral_force_sd_n: sums.lateral.sd(),
             samples: Some(sums.lateral.count()),
+            // The channel's, or none: two thermometers in one column would look like a change.
             temperature_c: sums.temperature.mean(),
             replicate: Some(u64::from(point.replicate)),
+            session: self.session,
             ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
         }
     }
 
     fn compare(&mut self, pass: Pass, reference: bool) -> MeasuredPass {
-        let condition = pass.condition(self.comparator.mu0().map_or(1.0, |m| m.value));
+        let mu0 = self.comparator.mu0().map_or(1.0, |m| m.value);
+        let condition = pass.condition(mu0).within(&self.ambient);
         let comparison =
             pass.friction_force_n().and_then(|f| self.comparator.pass(&*self.model, &condition, f).ok());
+        self.last_comparison = comparison.or(self.last_comparison);
         let regime = self.model.predict(&condition).ok().map(|p| p.regime);
         let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
         let psi_eq17 =

@@ -8,18 +8,20 @@ mod keeper;
 mod live;
 
 pub use fast::{Rehearsal, rehearse};
-pub use keeper::{REPLAYABLE, Replayable};
+pub use keeper::{REPLAYABLE, Replayable, unix_ns};
 
 use crate::plan::{Plan, Point, Resolution};
 use crate::run_dir::{Identity, RunDir};
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use crate::setup::Setup;
 use crate::supervisor::OffReport;
+use calibration::certificate::sha256_hex;
+use keeper::Keeper;
 use models::prediction::FrictionModel;
+use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
 use realtime::witness::StallReport;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -69,6 +71,9 @@ pub struct Summary {
     pub planned: usize,
     /// Whether the model has left the measurement.
     pub model_departed: bool,
+    /// What the comparison of all passes says.
+    #[serde(default = "nothing_said")]
+    pub agreement: Agreement,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
     /// When the machine kept ordinary threads from running; `None` in virtual time.
@@ -81,6 +86,14 @@ pub struct Summary {
     /// Whether the rig was read back off in the end.
     #[serde(default)]
     pub off: OffReport,
+    /// Every pass had been made before: nothing was driven.
+    #[serde(default)]
+    pub finished_before: bool,
+}
+
+/// The finding of a summary that was written before it had one.
+fn nothing_said() -> Agreement {
+    Agreement::of(None, false)
 }
 
 /// Why a run that had begun did not come to an orderly end. Anything else that goes wrong is a refusal: it comes before
@@ -108,19 +121,16 @@ pub struct Signals {
     pub stops: Arc<AtomicUsize>,
 }
 
-/// Hex SHA-256 of a text.
-pub fn sha256(text: &str) -> String {
-    Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect()
-}
-
 impl Job {
     /// What the run is of.
     pub fn identity(&self) -> Identity {
-        let model =
-            self.model_file.as_ref().map_or_else(|| self.model.name().to_string(), |(_, text)| sha256(text));
+        let model = self
+            .model_file
+            .as_ref()
+            .map_or_else(|| self.model.name().to_string(), |(_, text)| sha256_hex(text.as_bytes()));
         Identity {
-            setup_sha256: sha256(&self.setup.text),
-            plan_sha256: sha256(&self.plan.text),
+            setup_sha256: sha256_hex(self.setup.text.as_bytes()),
+            plan_sha256: sha256_hex(self.plan.text.as_bytes()),
             seed: self.seed,
             model,
         }
@@ -161,8 +171,9 @@ impl Job {
     pub fn run(self, signals: &Signals, news: &mut dyn FnMut(News<'_>)) -> miette::Result<Summary> {
         let points = self.points()?;
         let planned = points.len();
-        let dir = RunDir::open(&self.out, &self.identity())?;
+        let mut dir = RunDir::open(&self.out, &self.identity())?;
         let left = dir.left_of(points);
+        let session = dir.plan_session(keeper::unix_ns(), self.plan.file.pass.measure_s, self.fast);
         let mut sequence = Sequence::new(
             left,
             self.plan.file.pass,
@@ -171,12 +182,18 @@ impl Job {
             self.setup.file.noise,
         )
         .watching(&self.setup.certificates.temperature_ranges)
-        .guarded_by(&self.setup.config.limits);
+        .in_air(self.setup.ambient())
+        .guarded_by(&self.setup.config.limits)
+        // In virtual time the loop's own time goes on from session to session.
+        .in_session(session.session, if self.fast { 0.0 } else { session.start_s });
         for pass in &dir.made {
             sequence.remember(pass);
         }
+        if sequence.progress().1 == 0 {
+            return Keeper::finish(&self, dir, planned, sequence.agreement(true));
+        }
         if self.fast {
-            fast::run(self, dir, sequence, planned, signals, news)
+            fast::run(self, dir, session.start_s, sequence, planned, signals, news)
         } else {
             live::run(self, dir, sequence, planned, signals, news)
         }

@@ -12,6 +12,18 @@
 //! | [`noise`] | named streams of random numbers |
 //! | [`wire`] | the same world behind real protocols |
 //!
+//! ```
+//! use muprime_sim::virtual_rig::VirtualRig;
+//! use muprime_sim::world::WorldConfig;
+//! use realtime::ports::{ForceSensor, Nanos};
+//!
+//! let mut rig = VirtualRig::new(&WorldConfig::ideal(), 1)?;
+//! // Virtual time is what the caller says it is; the finger has not touched the plate yet.
+//! let forces = rig.read(Nanos::from_seconds(0.1));
+//! assert!(forces.normal.is_ok_and(|reading| reading.value.abs() < 0.05));
+//! # Ok::<(), muprime_sim::world::ConfigError>(())
+//! ```
+//!
 //! It shares nouns with `models` and nothing else: no friction law of the project's is called here.
 
 pub mod amplifier;

@@ -14,13 +14,13 @@ impl Chance {
     }
 
     /// A number below `end`; 0 where there is none.
-    #[allow(clippy::cast_possible_truncation)] // below `end`
+    // below `end`
     pub fn below(&mut self, end: usize) -> usize {
         (self.bits() % end.max(1) as u64) as usize
     }
 
     /// A byte, every other one of those that mean something to a parser.
-    #[allow(clippy::cast_possible_truncation)] // one byte is meant
+    // one byte is meant
     pub fn byte(&mut self) -> u8 {
         const TELLING: [u8; 16] = *b"\0\x01\x7f\x80\xff\r\n\"'-.=[]#9";
         if self.below(2) == 0 { TELLING[self.below(TELLING.len())] } else { self.bits() as u8 }

@@ -58,7 +58,6 @@ impl Plant for BenchPlant {
         self.now = self.now.max(now);
     }
 
-    #[allow(clippy::cast_precision_loss)]
     fn measure(&mut self, quantity: Quantity) -> f64 {
         let sample = self.now.0 / 1_000_000;
         match quantity {

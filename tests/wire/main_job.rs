@@ -65,7 +65,6 @@ fn compare(setup: &str, reference: &Passes, found: &Passes) {
         })
         .collect();
     let worst = z.iter().fold(0.0_f64, |most, z| most.max(z.abs()));
-    #[allow(clippy::cast_precision_loss)]
     let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
     println!(
         "{setup}: {} passes, difference {rms:.2} standard uncertainties rms, {worst:.2} at worst",

@@ -31,7 +31,6 @@ pub fn start(command: &mut std::process::Command) -> (Peer, String) {
 }
 
 /// Lateral and normal counts of each row of the recording, by the rule that its README states.
-#[allow(clippy::cast_possible_truncation)]
 fn recorded_counts(path: &Path) -> Vec<(i64, i64)> {
     let text = std::fs::read_to_string(path).unwrap();
     let rows: Vec<Vec<f64>> = text
@@ -82,7 +81,6 @@ fn a_replayed_friction_trace_comes_out_of_the_driver() {
     for (row, (lateral, normal)) in &seen {
         let (l, n) = trace[*row as usize];
         assert_eq!((lateral.raw, normal.raw), (l, n), "row {row}");
-        #[allow(clippy::cast_precision_loss)]
         let (l, n) = (l as f64 * 1e-5, n as f64 * 1e-5);
         assert!((lateral.value - l).abs() < 1e-12 && (normal.value - n).abs() < 1e-12, "row {row}");
     }

@@ -228,7 +228,6 @@ mod tests {
     fn both_sides_agree() {
         for (bytes, value) in [(1, 3_i64), (2, 0xF00F), (4, -12345)] {
             let frame = sdo_write(5, 0x60FF, 1, bytes, value);
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let expected = value as u32 & (u32::MAX >> (32 - 8 * u32::from(bytes)));
             assert_eq!(sdo_request(&frame, 5), Some(SdoRequest::Write(0x60FF, 1, bytes, expected)));
             assert_eq!(sdo_request(&frame, 6), None);

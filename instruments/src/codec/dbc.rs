@@ -84,14 +84,13 @@ impl DbcSignal {
 
     /// The value; `None` where the frame is too short.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // a force of more than 53 bits does not exist
+    // a force of more than 53 bits does not exist
     pub fn read(&self, frame: &[u8]) -> Option<f64> {
         Some(self.raw(frame)? as f64 * self.factor + self.offset)
     }
 
     /// The raw number; `None` where the frame is too short.
     #[must_use]
-    #[allow(clippy::cast_possible_wrap)]
     pub fn raw(&self, frame: &[u8]) -> Option<i64> {
         let mut word: u64 = 0;
         for (significance, bit) in self.bits().enumerate() {
@@ -104,7 +103,6 @@ impl DbcSignal {
 
     /// Stores `value`, rounded and held to what the bits can say. Other bits are kept.
     /// Returns `false` where the frame is too short.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn write(&self, frame: &mut [u8], value: f64) -> bool {
         let raw = ((value - self.offset) / self.factor).round();
         let width = i32::from(self.size);
@@ -130,7 +128,7 @@ mod tests {
     const TEXT: &str = "VERSION \"\"\nNS_ :\nBS_:\nBU_: RIG\n\nBO_ 1552 Meas: 8 RIG\n SG_ Ch1 : 7|16@0+ (1,-32768) [0|0] \"\" RIG\n SG_ Ch4 : 55|16@0+ (1,-32768) [0|0] \"\" RIG\n\nBO_ 437 Short: 8 RIG\n SG_ Fx : 0|16@1- (1,0) [0|0] \"\" RIG\n SG_ Odd : 19|13@1- (0.5,1) [0|0] \"\" RIG\n";
 
     #[test]
-    #[allow(clippy::float_cmp)] // whole numbers and halves
+    // whole numbers and halves
     fn both_orders() {
         let messages = parse(TEXT).unwrap();
         let frame = [0x80, 0x00, 0x81, 0x00, 0x7E, 0x00, 0xFF, 0xFF];
@@ -145,7 +143,6 @@ mod tests {
     }
 
     #[test]
-    #[allow(clippy::float_cmp)]
     fn what_is_written_is_read_and_neighbours_stay() {
         let messages = parse(TEXT).unwrap();
         for (message, name) in [("Meas", "Ch1"), ("Meas", "Ch4"), ("Short", "Fx"), ("Short", "Odd")] {

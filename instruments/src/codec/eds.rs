@@ -164,7 +164,7 @@ pub fn mapping(objects: &Objects, first: u16, cob: u32) -> Result<(Vec<(Key, usi
     for sub in 1..=u8::try_from(count).unwrap_or(0) {
         // Index, subindex, length in bits (CiA 301, 7.5.2.36).
         let entry = value(sub).ok_or(format!("object {map:04X}sub{sub} has no default"))?;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // taken apart byte by byte
+        // taken apart byte by byte
         let (key, bits) = (((entry >> 16) as u16, (entry >> 8) as u8), (entry & 0xFF) as usize);
         if bits % 8 != 0 || bits == 0 {
             return Err(format!("object {map:04X}sub{sub} maps {bits} bits: only whole bytes are read"));

@@ -489,7 +489,7 @@ impl Compiler<'_> {
             );
         }
         if let Some((first, width)) = field.bits {
-            #[allow(clippy::cast_possible_truncation)] // a number has at most 4 bytes
+            // a number has at most 4 bytes
             let most = 8 * field.number.bytes() as u32;
             if width == 0 || first >= most || width > most - first {
                 return Err(self.at(span, format!("the bits of `{name}` lie outside its {most} bits")));

@@ -223,6 +223,18 @@ impl LastCycle for ringbuf::HeapCons<Row> {
     }
 }
 
+/// A record that takes no rows (a slow disk) costs the loop its rows, counted, and nothing else.
+#[test]
+fn a_full_ring_is_counted_and_holds_nothing_up() {
+    let running = Running::start(50);
+    sleep_until(monotonic_ns() + 300_000_000);
+    let (report, _) = running.end();
+    // The ring of the watch has one place, and nobody takes from it.
+    assert_eq!(report.watch_drops, report.cycles - 1);
+    assert_eq!(report.ring_drops, 0);
+    assert!(report.cycles + report.overruns >= 50, "{report:?}");
+}
+
 #[test]
 fn a_port_that_panics_ends_the_loop_with_the_drive_off() {
     let running = Running::driving(50);

@@ -408,6 +408,15 @@ impl Timing {
         Nanos((2 * cycle.0).max(20_000_000))
     }
 
+    /// A ring time as a setup states it, in s.
+    ///
+    /// # Errors
+    /// One that is outside its hard range.
+    pub fn ring_time_of(seconds: f64) -> Result<Nanos, LimitError> {
+        range::RING_S.check("plate_ring_time_s", seconds)?;
+        Ok(Nanos::from_seconds(seconds))
+    }
+
     fn check(&self) -> Result<(), LimitError> {
         range::CYCLE_S.check("cycle", self.cycle.seconds())?;
         let channels = [

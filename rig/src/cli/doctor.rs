@@ -1,5 +1,6 @@
 //! `muprime doctor`: judges this machine truthfully, and talks to the instruments of a setup.
 
+use crate::out;
 use crate::setup::Setup;
 use drivers::OpenError;
 use drivers::probe::Probed;
@@ -57,18 +58,18 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let good = findings.iter().chain(&instruments).all(|f| f.good);
     let judgement = Judgement { findings, lateness_us, instruments };
     if json {
-        println!("{}", serde_json::json!({ "good": good, "judgement": judgement }));
+        out!("{}", serde_json::json!({ "good": good, "judgement": judgement }));
     } else {
         for f in judgement.findings.iter().chain(&judgement.instruments) {
             let mark = if f.good { "good" } else { "POOR" };
-            println!("{mark}  {}: {}", f.subject, f.found);
+            out!("{mark}  {}: {}", f.subject, f.found);
             if !f.good {
-                println!("      {}", f.advice);
+                out!("      {}", f.advice);
             }
         }
         if let Some(late) = &judgement.lateness_us {
             for (when, [p50, p99, p999, max]) in [("idle", late.idle), ("loaded", late.loaded)] {
-                println!(
+                out!(
                     "      lateness {when}: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us"
                 );
             }

@@ -8,6 +8,7 @@ mod reproduce;
 mod ridge;
 mod table;
 
+use crate::say;
 use clap::{Args, Subcommand};
 use std::process::ExitCode;
 
@@ -49,8 +50,8 @@ pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
     }
 }
 
-/// Bad input: says why and gives the exit status of the contract.
+/// Bad input: says why and gives its exit status (docs/contract.md).
 fn refused(why: impl std::fmt::Display) -> miette::Result<ExitCode> {
-    eprintln!("refused: {why}");
+    say!("refused: {why}");
     Ok(ExitCode::from(2))
 }

@@ -1,12 +1,15 @@
-//! Parquet, one row group.
+//! Parquet: written as one row group, and read for the diagnosis.
 
 use super::columns::{Column, Table};
 use miette::IntoDiagnostic;
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
+use parquet::record::Field;
 use parquet::schema::types::Type;
+use std::path::Path;
 use std::sync::Arc;
 
 pub fn bytes(table: &Table) -> miette::Result<Vec<u8>> {
@@ -63,4 +66,39 @@ fn present<T>(values: impl Iterator<Item = Option<T>>) -> (Vec<T>, Vec<i16>) {
         })
         .collect();
     (there, levels)
+}
+
+/// The columns of a Parquet point table as CSV text: one reader judges both formats.
+///
+/// # Errors
+/// A file that is no Parquet table.
+pub fn as_csv(path: &Path) -> miette::Result<String> {
+    let reader = SerializedFileReader::new(std::fs::File::open(path).into_diagnostic()?).into_diagnostic()?;
+    let mut text = String::new();
+    let names: Vec<String> = reader
+        .metadata()
+        .file_metadata()
+        .schema_descr()
+        .columns()
+        .iter()
+        .map(|c| c.name().to_string())
+        .collect();
+    text.push_str(&names.join(","));
+    text.push('\n');
+    for row in reader.get_row_iter(None).into_diagnostic()? {
+        let row = row.into_diagnostic()?;
+        let cells: Vec<String> = row
+            .get_column_iter()
+            .map(|(_, field)| match field {
+                Field::Null => String::new(),
+                Field::Str(s) => format!("\"{}\"", s.replace('"', "\"\"")),
+                Field::Double(v) => format!("{v:e}"),
+                Field::Float(v) => format!("{v:e}"),
+                other => other.to_string(),
+            })
+            .collect();
+        text.push_str(&cells.join(","));
+        text.push('\n');
+    }
+    Ok(text)
 }

@@ -1,6 +1,7 @@
 //! Results of a study in a file of JSON lines, one a case, under the case's content key: a study that was
 //! stopped goes on where it was, and a case that is there is not run again.
 
+use crate::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use models::ridge::study::content_key;
@@ -68,7 +69,7 @@ pub fn read(path: &Path) -> miette::Result<Results> {
                 results.insert(kept.key.clone(), kept);
             }
             Err(_) if n + 1 == lines.len() => {
-                eprintln!("{}: the last line was cut short; its case is run again", path.display());
+                say!("{}: the last line was cut short; its case is run again", path.display());
             }
             Err(why) => return Err(miette!("{} line {}: {why}", path.display(), n + 1)),
         }
@@ -111,7 +112,7 @@ pub fn complete(
                 Ok(Some(kept))
             }
             Err(why) => {
-                bar.suspend(|| eprintln!("{why}: {case:?}"));
+                bar.suspend(|| say!("{why}: {case:?}"));
                 Ok(None)
             }
         }

@@ -1,34 +1,29 @@
 //! One self-contained HTML page of a verdict: ranking, residual maps before and after, regions, next experiment.
 
+use super::page::{escape, shell};
+use super::plots;
 use diagnosis::data::Table;
 use diagnosis::verdict::Diagnosis;
+use models::covariate::{self, Scale};
 
 /// Parts of the operating space that are told in words, the largest first.
 const TOLD: usize = 12;
 
 /// The page.
-pub fn page(result: &Diagnosis, table: &Table) -> String {
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn page(result: &Diagnosis, table: &Table) -> miette::Result<String> {
     let r = &result.report;
-    let mut body = format!("<h1>Diagnosis</h1><p class=\"verdict\">{}</p>", escape(&r.text));
-    body.push_str(&ranking(result));
-    body.push_str(&gap(result));
-    body.push_str(&maps(result, table));
-    body.push_str(&lists(result));
-    format!(
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Diagnosis</title><style>{STYLE}</style></head><body><main>{body}<footer>{} passes, SHA-256 {}</footer></main></body></html>\n",
-        r.data.points,
-        escape(&r.data.sha256)
-    )
-}
-
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#222;margin:0;background:#fafafa}main{max-width:62rem;margin:0 auto;padding:1.5rem}\
-h1{font-size:1.5rem;margin:0 0 .5rem}h2{font-size:1.1rem;margin:1.8rem 0 .4rem}.verdict{font-size:1.1rem;padding:.7rem 1rem;background:#fff;border-left:4px solid #2b6cb0}\
-table{border-collapse:collapse;background:#fff}td,th{padding:.25rem .7rem;border-bottom:1px solid #e3e3e3;text-align:left;vertical-align:top}\
-td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}.bar{display:inline-block;height:.7em;background:#2b6cb0}.maps{display:flex;flex-wrap:wrap;gap:1rem}\
-figure{margin:0;background:#fff;padding:.5rem}figcaption{font-size:.85rem;color:#555}footer{margin-top:2rem;font-size:.75rem;color:#777;word-break:break-all}";
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    let body = [
+        format!("<h1>Diagnosis</h1><p class=\"verdict\">{}</p>", escape(&r.text)),
+        ranking(result),
+        gap(result),
+        maps(result, table)?,
+        lists(result),
+        format!("<p><small>{} passes, SHA-256 {}</small></p>", r.data.points, escape(&r.data.sha256)),
+    ];
+    Ok(shell("Diagnosis", &body.concat()))
 }
 
 fn ranking(result: &Diagnosis) -> String {
@@ -93,67 +88,38 @@ fn gap(result: &Diagnosis) -> String {
 }
 
 /// Scatter of the error in deviations against each covariate, before and after.
-fn maps(result: &Diagnosis, table: &Table) -> String {
+fn maps(result: &Diagnosis, table: &Table) -> miette::Result<String> {
     let problem = &result.fitted.problem;
     let forecasts = result.predict(table);
-    let covariates: [(&str, fn(&effects::Operating) -> f64, bool); 6] = [
-        ("amplitude, um peak to peak", |p| p.amplitude_pp_m * 1e6, false),
-        ("speed, mm/s (log)", |p| p.speed_m_s * 1e3, true),
-        ("normal force, N", |p| p.normal_force_n, false),
-        ("frequency, kHz", |p| p.frequency_hz * 1e-3, false),
-        ("time, s", |p| p.time_s, false),
-        ("position, mm", |p| p.position_m * 1e3, false),
-    ];
     let z: Vec<(f64, f64)> = forecasts
         .iter()
         .enumerate()
         .map(|(i, f)| {
             let sd = problem.variance[i].sqrt();
-            let d = table.passes[i].direction;
+            let d = table.passes[i].direction.sign();
             (d * (table.lateral[i] - f.recalibrated) / sd, d * (table.lateral[i] - f.corrected) / sd)
         })
         .collect();
     let limit = z.iter().fold(4.0f64, |a, (b, _)| a.max(b.abs())).min(40.0);
     let mut figures = String::new();
-    for (name, value, log) in covariates {
-        let x: Vec<f64> = table.passes.iter().map(|p| if log { value(p).ln() } else { value(p) }).collect();
+    for c in covariate::TOLD {
+        let (factor, unit) = c.shown;
+        let logarithmic = c.scale == Scale::Log;
+        let all: Option<Vec<f64>> = table.passes.iter().map(|p| c.of(p).map(|v| factor * v)).collect();
+        let Some(x) = all else { continue };
+        let name = format!("{}, {unit}", c.words);
         let (low, high) =
             x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         if high - low <= 1e-12 * high.abs().max(1e-12) {
             continue;
         }
-        let mut dots = String::new();
-        for (k, colour) in [(0, "#c05621"), (1, "#2b6cb0")] {
-            for (i, v) in x.iter().enumerate() {
-                let e = if k == 0 { z[i].0 } else { z[i].1 };
-                let cx = 30.0 + 270.0 * (v - low) / (high - low);
-                let cy = 80.0 - 70.0 * (e / limit).clamp(-1.0, 1.0);
-                dots.push_str(&format!(
-                    "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"1.6\" fill=\"{colour}\" fill-opacity=\".55\"/>"
-                ));
-            }
-        }
-        let [first, last] = [low, high].map(|v| short(if log { v.exp() } else { v }));
-        figures.push_str(&format!(
-            "<figure><svg width=\"310\" height=\"165\" viewBox=\"0 0 310 165\" role=\"img\" aria-label=\"error against {name}\">\
-             <line x1=\"30\" y1=\"80\" x2=\"300\" y2=\"80\" stroke=\"#999\"/><line x1=\"30\" y1=\"10\" x2=\"30\" y2=\"150\" stroke=\"#999\"/>\
-             <text x=\"2\" y=\"16\" font-size=\"9\">{limit:.0} sd</text><text x=\"2\" y=\"152\" font-size=\"9\">-{limit:.0}</text>\
-             <text x=\"30\" y=\"163\" font-size=\"9\">{first}</text><text x=\"300\" y=\"163\" font-size=\"9\" text-anchor=\"end\">{last}</text>{dots}\
-             </svg><figcaption>{name}</figcaption></figure>"
-        ));
+        let before: Vec<(f64, f64)> = x.iter().zip(&z).map(|(x, z)| (*x, z.0)).collect();
+        let after: Vec<(f64, f64)> = x.iter().zip(&z).map(|(x, z)| (*x, z.1)).collect();
+        figures.push_str(&plots::errors_against(&name, logarithmic, limit, &before, &after)?);
     }
-    format!(
-        "<h2>Residuals</h2><p>Error along the motion in standard deviations of a pass: <span style=\"color:#c05621\">recalibrated baseline</span>, <span style=\"color:#2b6cb0\">verdict's model</span>.</p><div class=\"maps\">{figures}</div>"
-    )
-}
-
-/// A number with about three digits.
-fn short(v: f64) -> String {
-    match v.abs() {
-        a if a >= 100.0 => format!("{v:.0}"),
-        a if a >= 1.0 || a == 0.0 => format!("{v:.1}"),
-        _ => format!("{v:.3}"),
-    }
+    Ok(format!(
+        "<h2>Residuals</h2><p>Error along the motion in standard deviations of a pass: <span style=\"color:#d55e00\">recalibrated baseline</span>, <span style=\"color:#0072b2\">verdict's model</span>.</p><div class=\"maps\">{figures}</div>"
+    ))
 }
 
 fn lists(result: &Diagnosis) -> String {

@@ -26,18 +26,22 @@ h1{font-size:1.6rem}h2{font-size:1.15rem;margin-top:2rem}table{border-collapse:c
 td,th{border-bottom:1px solid #ddd;padding:.25rem .7rem;text-align:left}td.n{text-align:right;font-variant-numeric:tabular-nums}\
 figure{margin:1rem 0}figcaption{color:#555;font-size:.9rem}svg{max-width:100%;height:auto}\
 .verdict{padding:.7rem 1rem;border-left:5px solid #2a7;background:#f2faf5}.departed{border-color:#c50;background:#fdf4ee}\
-details{margin-top:1.5rem}";
+details{margin-top:1.5rem}.bar{display:inline-block;height:.7em;background:#0072b2}.maps{display:flex;flex-wrap:wrap}";
+
+/// A self-contained page around a body; the title is HTML already.
+pub(super) fn shell(title: &str, body: &str) -> String {
+    format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>muprime: {title}</title>\
+         <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}</style></head><body>\n{body}</body></html>\n"
+    )
+}
 
 pub(super) fn page(run: &RunData) -> miette::Result<String> {
     let fact = |name: &str| escape(run.facts.get(name).map_or("unknown", String::as_str));
     let mut html = String::new();
     let w = &mut html;
     let title = format!("{} on {}", fact("plan"), fact("setup"));
-    let _ = write!(
-        w,
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>muprime: {title}</title>\
-         <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}</style></head><body>\n<h1>{title}</h1>\n"
-    );
+    let _ = writeln!(w, "<h1>{title}</h1>");
     verdict(w, run);
     let _ = write!(
         w,
@@ -63,8 +67,7 @@ pub(super) fn page(run: &RunData) -> miette::Result<String> {
     events(w, run);
     passes(w, run);
     facts(w, run);
-    html.push_str("</body></html>\n");
-    Ok(html)
+    Ok(shell(&title, &html))
 }
 
 fn caption(text: &str) -> String {
@@ -93,10 +96,19 @@ fn verdict(w: &mut String, run: &RunData) {
                  Run <code>muprime diagnose</code> on this folder to learn where and why."
         )
     } else {
-        "The measurement agrees with the model.".to_string()
+        let complete = run.summary.as_ref().is_some_and(|s| s.outcome == crate::sequence::Outcome::Complete);
+        let last = run.passes.iter().rev().find_map(|p| p.comparison.as_ref());
+        escape(&format!("Finding: {}.", realtime::compare::Agreement::of(last, complete)))
     };
     let class = if departed { "verdict departed" } else { "verdict" };
     let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}</p>");
+    if !run.damage.is_empty() {
+        let items: String = run.damage.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
+        let _ = writeln!(
+            w,
+            "<div class=\"verdict departed\"><strong>The records of this run are not whole</strong><ul>{items}</ul></div>"
+        );
+    }
     let flagged = run.passes.iter().filter(|p| !p.temperature_flags.is_empty()).count();
     if let Some(flag) = run.passes.iter().find_map(|p| p.temperature_flags.first()) {
         let _ = writeln!(

@@ -6,8 +6,12 @@ use models::condition::Condition;
 use models::prediction::{FrictionModel, SpringSlider};
 use models::psi::{self, PsiEq17};
 use models::quantity::PeakToPeak;
+use plotters::coord::combinators::LogCoord;
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use realtime::pacing::LoopReport;
+use std::ops::Range;
 
 const SIZE: (u32, u32) = (900, 480);
 /// Colours that stay apart on white, also for colour-blind readers (after Okabe and Ito, the yellow darkened).
@@ -25,6 +29,92 @@ const GREY: RGBColor = RGBColor(90, 90, 90);
 
 fn wrong(e: impl std::fmt::Display) -> miette::Report {
     miette::miette!("a figure: {e}")
+}
+
+/// One axis of a figure.
+enum Axis {
+    Linear(RangedCoordf64),
+    Logarithmic(LogCoord<f64>),
+}
+
+impl Axis {
+    fn linear(range: Range<f64>) -> Axis {
+        Axis::Linear(range.into())
+    }
+
+    fn logarithmic(range: Range<f64>) -> Axis {
+        Axis::Logarithmic(range.log_scale().into())
+    }
+}
+
+impl Ranged for Axis {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        match self {
+            Axis::Linear(axis) => axis.map(value, limit),
+            Axis::Logarithmic(axis) => axis.map(value, limit),
+        }
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        match self {
+            Axis::Linear(axis) => axis.key_points(hint),
+            Axis::Logarithmic(axis) => axis.key_points(hint),
+        }
+    }
+
+    fn range(&self) -> Range<f64> {
+        match self {
+            Axis::Linear(axis) => axis.range(),
+            Axis::Logarithmic(axis) => axis.range(),
+        }
+    }
+}
+
+impl ValueFormatter<f64> for Axis {
+    fn format_ext(&self, value: &f64) -> String {
+        match self {
+            Axis::Linear(axis) => axis.format_ext(value),
+            Axis::Logarithmic(axis) => axis.format_ext(value),
+        }
+    }
+}
+
+type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
+
+/// A figure with named axes as SVG; `draw` puts the curves in.
+fn figure(
+    size: (u32, u32),
+    (x, x_name): (Axis, &str),
+    (y, y_name): (Axis, &str),
+    draw: impl for<'a> FnOnce(&mut Chart<'a>) -> miette::Result<()>,
+) -> miette::Result<String> {
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        area.fill(&WHITE).map_err(wrong)?;
+        let letters = if size.0 < SIZE.0 / 2 { 11 } else { 14 };
+        let mut chart = ChartBuilder::on(&area)
+            .margin(12)
+            .x_label_area_size(3 * letters)
+            .y_label_area_size(4 * letters)
+            .build_cartesian_2d(x, y)
+            .map_err(wrong)?;
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .x_labels((size.0 / 75) as usize)
+            .x_desc(x_name)
+            .y_desc(y_name)
+            .label_style(("sans-serif", letters))
+            .draw()
+            .map_err(wrong)?;
+        draw(&mut chart)?;
+        area.present().map_err(wrong)?;
+    }
+    Ok(svg)
 }
 
 /// A measured `mu'` of a pass with vibration: amplitude in um, value, sd.
@@ -74,71 +164,60 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     let model = SpringSlider::new(run.finger).map_err(wrong)?;
     let mu0 =
         models::record::coulomb_coefficient(&run.passes.iter().map(|p| p.pass.clone()).collect::<Vec<_>>());
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        area.fill(&WHITE).map_err(wrong)?;
-        let mut chart = ChartBuilder::on(&area)
-            .margin(12)
-            .x_label_area_size(42)
-            .y_label_area_size(52)
-            .build_cartesian_2d(0.0..widest, 0.0..1.1f64)
-            .map_err(wrong)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .x_desc("amplitude w, um peak-to-peak")
-            .y_desc("relative friction mu'")
-            .label_style(("sans-serif", 14))
-            .draw()
-            .map_err(wrong)?;
-        for (i, speed) in speeds.iter().enumerate() {
-            let colour = COLOURS[i % COLOURS.len()];
-            let of_speed: Vec<&&MeasuredPass> = chosen.iter().filter(|p| setting(p).0 == *speed).collect();
-            if let (Some(mu0), Some(first)) = (mu0, of_speed.first()) {
-                let at = |w: f64| {
-                    let c = Condition {
-                        amplitude: PeakToPeak::from_metres(w * 1e-6),
-                        ..first.pass.condition(mu0)
+    let svg = figure(
+        SIZE,
+        (Axis::linear(0.0..widest), "amplitude w, um peak-to-peak"),
+        (Axis::linear(0.0..1.1), "relative friction mu'"),
+        |chart| {
+            for (i, speed) in speeds.iter().enumerate() {
+                let colour = COLOURS[i % COLOURS.len()];
+                let of_speed: Vec<&&MeasuredPass> =
+                    chosen.iter().filter(|p| setting(p).0 == *speed).collect();
+                if let (Some(mu0), Some(first)) = (mu0, of_speed.first()) {
+                    let at = |w: f64| {
+                        let c = Condition {
+                            amplitude: PeakToPeak::from_metres(w * 1e-6),
+                            ..first.pass.condition(mu0)
+                        };
+                        model.predict(&c).ok()
                     };
-                    model.predict(&c).ok()
-                };
-                let grid: Vec<f64> = (1..=200).map(|k| widest * f64::from(k) / 200.0).collect();
-                let line: Vec<(f64, f64, f64)> = grid
-                    .iter()
-                    .filter_map(|w| at(*w).map(|p| (*w, p.mu_relative, p.mu_relative_sd)))
-                    .collect();
-                let upper = line.iter().map(|(w, m, s)| (*w, (m + 2.0 * s).min(1.1)));
-                let lower = line.iter().rev().map(|(w, m, s)| (*w, (m - 2.0 * s).max(0.0)));
-                let band: Vec<(f64, f64)> = upper.chain(lower).collect();
-                chart.draw_series([Polygon::new(band, colour.mix(0.18))]).map_err(wrong)?;
+                    let grid: Vec<f64> = (1..=200).map(|k| widest * f64::from(k) / 200.0).collect();
+                    let line: Vec<(f64, f64, f64)> = grid
+                        .iter()
+                        .filter_map(|w| at(*w).map(|p| (*w, p.mu_relative, p.mu_relative_sd)))
+                        .collect();
+                    let upper = line.iter().map(|(w, m, s)| (*w, (m + 2.0 * s).min(1.1)));
+                    let lower = line.iter().rev().map(|(w, m, s)| (*w, (m - 2.0 * s).max(0.0)));
+                    let band: Vec<(f64, f64)> = upper.chain(lower).collect();
+                    chart.draw_series([Polygon::new(band, colour.mix(0.18))]).map_err(wrong)?;
+                    chart
+                        .draw_series(LineSeries::new(
+                            line.iter().map(|(w, m, _)| (*w, *m)),
+                            colour.stroke_width(2),
+                        ))
+                        .map_err(wrong)?
+                        .label(format!("{speed} mm/s"))
+                        .legend(move |(x, y)| {
+                            PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(3))
+                        });
+                }
+                let points = of_speed.iter().filter_map(|p| measured(p));
                 chart
-                    .draw_series(LineSeries::new(
-                        line.iter().map(|(w, m, _)| (*w, *m)),
-                        colour.stroke_width(2),
-                    ))
-                    .map_err(wrong)?
-                    .label(format!("{speed} mm/s"))
-                    .legend(move |(x, y)| {
-                        PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(3))
-                    });
+                    .draw_series(points.map(|(w, m, s)| {
+                        ErrorBar::new_vertical(w, m - s, m.min(1.09), m + s, colour.filled(), 6)
+                    }))
+                    .map_err(wrong)?;
             }
-            let points = of_speed.iter().filter_map(|p| measured(p));
             chart
-                .draw_series(points.map(|(w, m, s)| {
-                    ErrorBar::new_vertical(w, m - s, m.min(1.09), m + s, colour.filled(), 6)
-                }))
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperRight)
+                .label_font(("sans-serif", 14))
+                .background_style(WHITE.mix(0.8))
+                .draw()
                 .map_err(wrong)?;
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .label_font(("sans-serif", 14))
-            .background_style(WHITE.mix(0.8))
-            .draw()
-            .map_err(wrong)?;
-        area.present().map_err(wrong)?;
-    }
+            Ok(())
+        },
+    )?;
     Ok(format!("<figure>{svg}<figcaption>at {f} kHz and {n} N</figcaption></figure>"))
 }
 
@@ -154,39 +233,27 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
     }
     let lowest = points.iter().map(|p| p.0).fold(0.1, f64::min) * 0.8;
     let highest = points.iter().map(|p| p.0).fold(10.0, f64::max) * 1.2;
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        area.fill(&WHITE).map_err(wrong)?;
-        let mut chart = ChartBuilder::on(&area)
-            .margin(12)
-            .x_label_area_size(42)
-            .y_label_area_size(52)
-            .build_cartesian_2d((lowest..highest).log_scale(), 0.0..1.1f64)
-            .map_err(wrong)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .x_desc("Psi of Eq. 17")
-            .y_desc("relative friction mu'")
-            .label_style(("sans-serif", 14))
-            .draw()
-            .map_err(wrong)?;
-        let grid: Vec<f64> =
-            (0..=200).map(|k| lowest * (highest / lowest).powf(f64::from(k) / 200.0)).collect();
-        let law = |star: f64| grid.iter().map(move |p| (*p, psi::relative_friction(PsiEq17(*p), star)));
-        let (star, sd) = (psi::PSI_STAR, psi::PSI_STAR_UNCERTAINTY);
-        let mut band: Vec<(f64, f64)> = law(star - sd).collect();
-        band.extend(law(star + sd).collect::<Vec<_>>().into_iter().rev());
-        chart.draw_series([Polygon::new(band, GREY.mix(0.2))]).map_err(wrong)?;
-        chart.draw_series(LineSeries::new(law(star), GREY.stroke_width(2))).map_err(wrong)?;
-        chart
-            .draw_series(points.iter().map(|(p, m, s)| {
-                ErrorBar::new_vertical(*p, m - s, m.min(1.09), m + s, COLOURS[0].filled(), 6)
-            }))
-            .map_err(wrong)?;
-        area.present().map_err(wrong)?;
-    }
+    let svg = figure(
+        SIZE,
+        (Axis::logarithmic(lowest..highest), "Psi of Eq. 17"),
+        (Axis::linear(0.0..1.1), "relative friction mu'"),
+        |chart| {
+            let grid: Vec<f64> =
+                (0..=200).map(|k| lowest * (highest / lowest).powf(f64::from(k) / 200.0)).collect();
+            let law = |star: f64| grid.iter().map(move |p| (*p, psi::relative_friction(PsiEq17(*p), star)));
+            let (star, sd) = (psi::PSI_STAR, psi::PSI_STAR_UNCERTAINTY);
+            let mut band: Vec<(f64, f64)> = law(star - sd).collect();
+            band.extend(law(star + sd).collect::<Vec<_>>().into_iter().rev());
+            chart.draw_series([Polygon::new(band, GREY.mix(0.2))]).map_err(wrong)?;
+            chart.draw_series(LineSeries::new(law(star), GREY.stroke_width(2))).map_err(wrong)?;
+            chart
+                .draw_series(points.iter().map(|(p, m, s)| {
+                    ErrorBar::new_vertical(*p, m - s, m.min(1.09), m + s, COLOURS[0].filled(), 6)
+                }))
+                .map_err(wrong)?;
+            Ok(())
+        },
+    )?;
     Ok(format!("<figure>{svg}</figure>"))
 }
 
@@ -206,36 +273,24 @@ pub fn residuals(run: &RunData) -> miette::Result<String> {
     }
     let end = points.iter().map(|p| p.0).fold(1.0, f64::max) * 1.02;
     let most = points.iter().map(|p| p.1.abs()).fold(3.0, f64::max).min(40.0) * 1.1;
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, (900, 360)).into_drawing_area();
-        area.fill(&WHITE).map_err(wrong)?;
-        let mut chart = ChartBuilder::on(&area)
-            .margin(12)
-            .x_label_area_size(42)
-            .y_label_area_size(52)
-            .build_cartesian_2d(0.0..end, -most..most)
-            .map_err(wrong)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .x_desc("time, s")
-            .y_desc("residual, standard deviations")
-            .label_style(("sans-serif", 14))
-            .draw()
-            .map_err(wrong)?;
-        for level in [-1.96, 1.96] {
-            let dashes = DashedLineSeries::new([(0.0, level), (end, level)], 6, 5, GREY.stroke_width(1));
-            chart.draw_series(dashes).map_err(wrong)?;
-        }
-        chart
-            .draw_series(points.iter().map(|(t, z, reference)| {
-                let colour = if *reference { GREY } else { COLOURS[1] };
-                Circle::new((*t, z.clamp(-most, most)), 3, colour.filled())
-            }))
-            .map_err(wrong)?;
-        area.present().map_err(wrong)?;
-    }
+    let svg = figure(
+        (900, 360),
+        (Axis::linear(0.0..end), "time, s"),
+        (Axis::linear(-most..most), "residual, standard deviations"),
+        |chart| {
+            for level in [-1.96, 1.96] {
+                let dashes = DashedLineSeries::new([(0.0, level), (end, level)], 6, 5, GREY.stroke_width(1));
+                chart.draw_series(dashes).map_err(wrong)?;
+            }
+            chart
+                .draw_series(points.iter().map(|(t, z, reference)| {
+                    let colour = if *reference { GREY } else { COLOURS[1] };
+                    Circle::new((*t, z.clamp(-most, most)), 3, colour.filled())
+                }))
+                .map_err(wrong)?;
+            Ok(())
+        },
+    )?;
     Ok(format!("<figure>{svg}<figcaption>grey: references without vibration</figcaption></figure>"))
 }
 
@@ -255,29 +310,49 @@ pub fn lateness(report: &LoopReport) -> miette::Result<String> {
     }
     let highest = bars.iter().map(|b| b.0).fold(10.0, f64::max) * 2.0;
     let most = bars.iter().map(|b| b.1).fold(10.0, f64::max) * 2.0;
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, (900, 300)).into_drawing_area();
-        area.fill(&WHITE).map_err(wrong)?;
-        let mut chart = ChartBuilder::on(&area)
-            .margin(12)
-            .x_label_area_size(42)
-            .y_label_area_size(62)
-            .build_cartesian_2d((0.5..highest).log_scale(), (0.7..most).log_scale())
-            .map_err(wrong)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .x_desc("lateness, us")
-            .y_desc("cycles")
-            .label_style(("sans-serif", 14))
-            .draw()
-            .map_err(wrong)?;
-        let bar = |(upper, n): &(f64, f64)| {
-            Rectangle::new([(upper / 2.0, 0.7), (*upper, *n)], COLOURS[0].mix(0.6).filled())
-        };
-        chart.draw_series(bars.iter().map(bar)).map_err(wrong)?;
-        area.present().map_err(wrong)?;
-    }
+    let svg = figure(
+        (900, 300),
+        (Axis::logarithmic(0.5..highest), "lateness, us"),
+        (Axis::logarithmic(0.7..most), "cycles"),
+        |chart| {
+            let bar = |(upper, n): &(f64, f64)| {
+                Rectangle::new([(upper / 2.0, 0.7), (*upper, *n)], COLOURS[0].mix(0.6).filled())
+            };
+            chart.draw_series(bars.iter().map(bar)).map_err(wrong)?;
+            Ok(())
+        },
+    )?;
+    Ok(format!("<figure>{svg}</figure>"))
+}
+
+/// Errors of passes in standard deviations against one covariate, before and after a cause was added.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn errors_against(
+    name: &str,
+    logarithmic: bool,
+    limit: f64,
+    before: &[(f64, f64)],
+    after: &[(f64, f64)],
+) -> miette::Result<String> {
+    let (low, high) =
+        before.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.0), h.max(p.0)));
+    // Within a decade a logarithmic axis has a single label.
+    let x = if logarithmic && high > 10.0 * low {
+        let margin = (high / low).powf(0.03);
+        Axis::logarithmic(low / margin..high * margin)
+    } else {
+        let margin = 0.03 * (high - low);
+        Axis::linear(low - margin..high + margin)
+    };
+    let svg = figure((430, 240), (x, name), (Axis::linear(-limit..limit), "error, sd"), |chart| {
+        for (points, colour) in [(before, COLOURS[1]), (after, COLOURS[0])] {
+            let dot =
+                |(x, e): &(f64, f64)| Circle::new((*x, e.clamp(-limit, limit)), 2, colour.mix(0.55).filled());
+            chart.draw_series(points.iter().map(dot)).map_err(wrong)?;
+        }
+        Ok(())
+    })?;
     Ok(format!("<figure>{svg}</figure>"))
 }

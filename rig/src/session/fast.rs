@@ -1,14 +1,16 @@
 //! A sweep in virtual time: one thread, no clock, the same bytes for the same seed.
 
 use super::keeper::{self, Keeper};
-use super::{Job, News, Signals, Summary, Unfinished};
+use super::{Job, News, Signals, Summary};
+use crate::files::Placed;
 use crate::plan::{Plan, Resolution};
 use crate::run_dir::RunDir;
 use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
 use crate::setup::Setup;
-use crate::supervisor::{self, End, VirtualLoop};
+use crate::supervisor::{self, End, OffReport, VirtualLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::FrictionModel;
+use realtime::ports::Nanos;
 use realtime::recorder::Recorder;
 use realtime::turn::{Ports, Row};
 use sim::virtual_rig::VirtualRig;
@@ -22,10 +24,11 @@ const EPOCH_UNIX_NS: u64 = 946_684_800_000_000_000;
 /// Rows between two flushes of the record: 50 ms at 1 kHz.
 const FLUSH_EVERY: u64 = 50;
 
-/// Runs a job in virtual time.
+/// Runs a job in virtual time, which begins at `start_s` s.
 pub fn run(
     job: Job,
     dir: RunDir,
+    start_s: f64,
     mut sequence: Sequence,
     planned: usize,
     signals: &Signals,
@@ -38,19 +41,30 @@ pub fn run(
             job.setup.file.name
         );
     }
-    let rig = VirtualRig::of(job.world()?);
-    let kept = Keeper::begin(&job, dir, planned, EPOCH_UNIX_NS)?;
-    sweep(job, rig, kept, &mut sequence, signals, news).wrap_err(Unfinished::NotKept)
+    let ports = ports_of(&job, VirtualRig::of(job.world()?));
+    let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
+    let mut kept = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
+    let rig =
+        VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports).from(Nanos::from_seconds(start_s));
+    let record = kept.new_record().and_then(|file| {
+        let disk = file.handle()?;
+        Ok((Recorder::begin(file, preamble).into_diagnostic()?, disk))
+    });
+    let (swept, off) = match record {
+        Ok(record) => sweep(rig, record, &mut kept, &mut sequence, signals, news),
+        // Before the first row nothing has been driven.
+        Err(why) => (Err(why), OffReport::off()),
+    };
+    let outcome = swept.unwrap_or_else(|why| {
+        tracing::error!("the record could not be kept: the sweep was stopped: {why:#}");
+        Outcome::RecordLost
+    });
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, None, 0, BTreeMap::new(), off))
 }
 
-fn sweep(
-    job: Job,
-    rig: VirtualRig,
-    mut kept: Keeper,
-    sequence: &mut Sequence,
-    signals: &Signals,
-    news: &mut dyn FnMut(News<'_>),
-) -> miette::Result<Summary> {
+/// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
+fn ports_of(job: &Job, rig: VirtualRig) -> Ports {
     let [force, amplifier, stage] = rig.split();
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
@@ -61,9 +75,18 @@ fn sweep(
     if job.setup.file.safety_inputs.is_some() {
         ports = ports.with_contacts(Box::new(stage));
     }
-    let file = kept.new_record()?;
-    let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
-    let mut rig = VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports);
+    ports
+}
+
+/// Sweeps, and ends the record; says what became of the output too.
+fn sweep(
+    mut rig: VirtualLoop,
+    (mut recorder, disk): (Recorder<Placed>, Placed),
+    kept: &mut Keeper,
+    sequence: &mut Sequence,
+    signals: &Signals,
+    news: &mut dyn FnMut(News<'_>),
+) -> (miette::Result<Outcome>, OffReport) {
     // What cannot be kept ends the sweep.
     let unkept = RefCell::new(None);
     let mut knows = false;
@@ -79,6 +102,7 @@ fn sweep(
         keeper::record(&mut recorder, row.now, &reaction.events, reaction.pass.as_ref())?;
         kept.keep(&reaction.events, reaction.pass.as_ref(), news)?;
         if reaction.pass.is_some() {
+            disk.still_there()?;
             let (done, all) = sequence.progress();
             news(News::Progress(done, all, sequence.remaining_s()));
         }
@@ -92,21 +116,22 @@ fn sweep(
             *unkept.borrow_mut() = keep(row, sequence, reaction).err();
         }
     });
-    if let Some(why) = unkept.into_inner() {
-        return Err(why);
-    }
-    // The stop reaches the rig, so that the record shows the safe state.
+    // The stop reaches the rig, so that the record shows the safe state; kept or not, off comes first.
     let mut recorded = Ok(());
     let off = rig.end(&mut |row| {
         if recorded.is_ok() {
             recorded = recorder.row(row);
         }
     });
-    recorded.into_diagnostic()?;
-    let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
-    recorder.end(last).into_diagnostic().wrap_err("the record")?;
-    let departed = sequence.departed();
-    Ok(kept.end(outcome, departed, None, 0, BTreeMap::new(), off))
+    let ended = || {
+        unkept.into_inner().map_or(Ok(()), Err)?;
+        recorded.into_diagnostic()?;
+        let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
+        recorder.end(last).into_diagnostic().wrap_err("the record")?;
+        disk.sync()?;
+        Ok(outcome)
+    };
+    (ended(), off)
 }
 
 /// What a sweep in memory comes to.
@@ -136,7 +161,8 @@ pub fn rehearse(
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
     let points = plan.points(seed, &setup.config.limits, &resolution)?;
     let mut sequence =
-        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise);
+        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
+            .in_air(setup.ambient());
     let [force, amplifier, stage] =
         VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));

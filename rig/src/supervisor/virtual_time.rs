@@ -19,6 +19,7 @@ pub struct VirtualLoop {
     state: CycleState,
     queue: VecDeque<Command>,
     number: u64,
+    start: Nanos,
     last: Option<Row>,
 }
 
@@ -26,12 +27,18 @@ impl VirtualLoop {
     /// A loop over a rig, before its first cycle.
     pub fn new(config: Config, model: Arc<dyn FrictionModel>, ports: Ports) -> Self {
         let (state, queue) = (CycleState::default(), VecDeque::new());
-        VirtualLoop { config, model, ports, state, queue, number: 0, last: None }
+        VirtualLoop { config, model, ports, state, queue, number: 0, start: Nanos(0), last: None }
+    }
+
+    /// The same, with a loop time that goes on from an earlier session's.
+    #[must_use]
+    pub fn from(self, start: Nanos) -> Self {
+        VirtualLoop { start, ..self }
     }
 
     /// The next cycle, on time.
     pub fn cycle(&mut self) -> Row {
-        let now = Nanos((self.number + 1) * self.config.limits.timing.cycle.0);
+        let now = self.start.plus(Nanos((self.number + 1) * self.config.limits.timing.cycle.0));
         self.cycle_at(now, Nanos(0))
     }
 

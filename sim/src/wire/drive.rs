@@ -191,7 +191,7 @@ impl Drive {
                 let known = match (index, sub) {
                     (0x6040, 0) => {
                         self.heard_at = now;
-                        #[allow(clippy::cast_possible_truncation)] // an object of 16 bits
+                        // an object of 16 bits
                         self.obey(value as u16, plant);
                         true
                     }
@@ -200,7 +200,7 @@ impl Drive {
                         return reply(index, sub, 1, SdoAnswer::Aborted(0x0800_0022));
                     }
                     (0x6060, 0) => {
-                        #[allow(clippy::cast_possible_truncation)] // an object of 8 bits
+                        // an object of 8 bits
                         {
                             self.mode = value as u8;
                         }

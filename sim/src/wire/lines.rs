@@ -43,7 +43,7 @@ impl LineInstrument {
     pub fn live(&mut self) {
         if self.feeds_watchdog {
             let (mut plant, now) = self.plant.now();
-            #[allow(clippy::cast_precision_loss)] // only change counts
+            // only change counts
             plant.command(&[(Command::DriveHeartbeat, (now.0 / 1_000_000 % 65_536) as f64)]);
         }
     }

@@ -10,6 +10,7 @@ mod drive;
 use crate::claim::RigClaim;
 use crate::session::Unfinished;
 use crate::setup::Setup;
+use crate::{ask, say};
 use drive::Drive;
 use drivers::vibrometer::Settings;
 use models::quantity::PeakToPeak;
@@ -60,7 +61,7 @@ pub fn displacement(volts: f64, range_m_s_per_v: f64, frequency_hz: f64) -> Resu
 pub fn table(setup: &Setup, table: &Table<'_>) -> miette::Result<String> {
     check(setup, table)?;
     let settings = setup.vibrometer_settings(table.frequency_hz)?;
-    eprintln!("vibrometer: {settings}");
+    say!("vibrometer: {settings}");
     let _claim = RigClaim::take(setup)?;
     let drive = Drive::start(setup)?;
     let taken = take(table, &drive, &settings);
@@ -84,7 +85,7 @@ pub fn table(setup: &Setup, table: &Table<'_>) -> miette::Result<String> {
 /// The set-points and the questions.
 fn take(table: &Table<'_>, drive: &Drive, settings: &Settings) -> miette::Result<String> {
     drive.arm()?;
-    eprintln!(
+    say!(
         "The plate will vibrate at {:.1} Hz, up to {:.2} um peak-to-peak. Nothing may touch it. Each question wants the \
          amplitude of the velocity signal in V, zero to peak; an empty line asks again after another settling.",
         table.frequency_hz,
@@ -102,24 +103,24 @@ fn take(table: &Table<'_>, drive: &Drive, settings: &Settings) -> miette::Result
             let (volts, w) = loop {
                 if let Err(why) = drive.hold(amplitude, table.frequency_hz, table.settle_s) {
                     // A trip stays until somebody at the rig takes it back.
-                    eprint!("  {why}; an empty line arms the rig again> ");
+                    ask!("  {why}; an empty line arms the rig again> ");
                     answer(&lines, drive)?;
                     drive.arm()?;
                     continue;
                 }
-                eprint!("set-point {set_point:.3e} m, volts> ");
+                ask!("set-point {set_point:.3e} m, volts> ");
                 let line = answer(&lines, drive)?;
                 if !drive.holds(amplitude) {
-                    eprintln!("  no reading: the drive did not stand while it was taken; again");
+                    say!("  no reading: the drive did not stand while it was taken; again");
                     continue;
                 }
                 let volts = line.trim().parse().unwrap_or(f64::NAN);
                 match displacement(volts, settings.range_m_s_per_v, table.frequency_hz) {
                     Ok(w) => break (volts, w),
-                    Err(why) => eprintln!("  no reading: {why}"),
+                    Err(why) => say!("  no reading: {why}"),
                 }
             };
-            eprintln!("  {volts} V are {:.4} um peak-to-peak", w.micrometres());
+            say!("  {volts} V are {:.4} um peak-to-peak", w.micrometres());
             let _ = writeln!(text, "{set_point:e},{volts},{:e}", w.metres());
         }
     }

@@ -2,6 +2,7 @@
 
 use super::refused;
 use crate::figures::{self, store};
+use crate::out;
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, WrapErr};
 use models::ridge::study::{content_key, fig_9};
@@ -85,15 +86,12 @@ pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
             chart.write(&args.out)?;
         }
         let text = reproduced.lines.join("\n");
-        std::fs::write(args.out.join(format!("{name}.txt")), format!("{text}\n")).into_diagnostic()?;
+        crate::files::write_whole(&args.out.join(format!("{name}.txt")), format!("{text}\n"))?;
         if json {
             let files: Vec<String> = reproduced.charts.iter().map(|c| format!("{}.csv", c.name)).collect();
-            println!(
-                "{}",
-                serde_json::json!({"figure": name, "files": files, "comparison": reproduced.lines})
-            );
+            out!("{}", serde_json::json!({"figure": name, "files": files, "comparison": reproduced.lines}));
         } else {
-            println!("{name}\n  {}", text.replace('\n', "\n  "));
+            out!("{name}\n  {}", text.replace('\n', "\n  "));
         }
     }
     Ok(ExitCode::SUCCESS)
