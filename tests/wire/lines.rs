@@ -302,7 +302,7 @@ fn pdus210_over_its_serial_line() {
     assert!(!state.output_on && !state.fault);
     rig.amplifier.command(DriveCommand::off(1, now(epoch).plus(Nanos::from_seconds(5.0))), now(epoch));
     eventually("off", || bench.commanded(Command::Enable).filter(|&on| on == 0.0));
-    assert_eq!(bench.commanded(Command::Amplitude), Some(0.0));
+    eventually("and the amplitude after it", || bench.commanded(Command::Amplitude).filter(|&w| w == 0.0));
     // Error lines from now on, also into the binary block and between question and answer.
     alarms.store(true, Ordering::SeqCst);
     eventually("a fault", || rig.amplifier.state(now(epoch)).ok().filter(|state| state.fault));
