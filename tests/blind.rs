@@ -1,15 +1,15 @@
 //! The diagnosis on sealed sets: few, fixed seeds; the full figures come from `muprime blind`.
-use diagnosis::attribute::Verdict;
-use diagnosis::data::{Rig, Table};
+use diagnosis::Verdict;
+use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use models::record::Pass;
 use rayon::prelude::*;
 use rig::blind::score;
-use sim::sealed::{ALIASES, Ask, Stratum, generate};
+use sim::sealed::{Ask, Stratum, generate};
 use std::collections::BTreeSet;
 
-fn rig_of(text: &str) -> Rig {
+fn rig_of(text: &str) -> RigFile {
     toml::from_str(text).expect("rig.toml of a sealed set")
 }
 
@@ -54,17 +54,7 @@ const ONE_OF_EACH: [(&str, u64); 23] = [
     ("subsurface_relaxation", 1_610_004_830_044),
 ];
 
-/// Declared aliases (docs/diagnosis.md): what one of a group does, another nearly does.
-const ALIKE: [&[&str]; 6] = [
-    &["force_crosstalk", "plate_tilt"],
-    &["stiffness_error", "speed_error", "amplitude_miscalibration", "subsurface_relaxation"],
-    &["load_dependent_friction", "adhesion", "normal_offset"],
-    &["resonance_detuning", "subsurface_relaxation"],
-    &["normal_damping", "ridge_inertia"],
-    &["speed_ripple", "mode_shape"],
-];
-
-/// Each cause in turn taken out of the library: `unknown`, or a declared alias, but no confident other name.
+/// Each cause in turn taken out of the library: `unknown`, or an effect that is declared near it, but no confident other name.
 #[test]
 fn a_withheld_cause_is_no_other_cause() {
     let wanted: BTreeSet<&str> =
@@ -74,15 +64,15 @@ fn a_withheld_cause_is_no_other_cause() {
     let confident: Vec<String> = ONE_OF_EACH
         .par_iter()
         .filter_map(|&(name, seed)| {
-            let stratum = if ALIASES.contains(&name) { Stratum::Alias } else { Stratum::Single };
+            let imitated = sim::defects::Kind::named(name).is_some_and(|kind| kind.imitated);
+            let stratum = if imitated { Stratum::Alias } else { Stratum::Single };
             let set = generate(seed, stratum, Ask::Gain);
             assert_eq!(set.label.causes[0].name, name, "the set of seed {seed} has another cause by now");
             assert!(set.label.chi2_gain > 100.0, "{name}: the set of seed {seed} hardly shows it");
             let without = vec![name.to_string()];
             let scored = score(&set, &Options { without, ..Options::default() }).unwrap();
             println!("{name}: {:?} {:?} {:.2}", scored.verdict, scored.named, scored.top_probability);
-            let alias =
-                |n: &String| n != name && ALIKE.iter().any(|g| g.contains(&name) && g.contains(&n.as_str()));
+            let alias = |n: &String| effects::near(n, name);
             let confident = scored.verdict == Verdict::Named && !scored.named.iter().all(alias);
             confident.then(|| format!("{name} as {:?}", scored.named))
         })

@@ -1,7 +1,10 @@
-//! The fault list in virtual time: each fault in each phase, its worst reaction beside its bound.
+//! The fault list in virtual time: each fault in each phase, its worst reaction beside its bound, and its cause.
 
 use rig::faults::bench::STEADY_AT;
-use rig::faults::{Moment, ROWS, Scene, Search, Strike, Tally, run, search};
+use rig::faults::rows::What;
+use rig::faults::{Core, Expect, Moment, Pace, ROWS, Scene, Search, Strike, Tally, run, run_with, search};
+
+const PACES: [Pace; 2] = [Pace::Fast, Pace::Default];
 
 fn assert_clean(tally: &Tally) {
     rig::cli::faults::table(tally);
@@ -10,52 +13,92 @@ fn assert_clean(tally: &Tally) {
 }
 
 #[test]
-fn every_fault_in_every_phase_is_answered_within_its_bound() {
-    let mut tally = Tally::default();
-    for (row, fault) in ROWS.iter().enumerate() {
-        for moment in fault.moments {
-            for seed in 0..3 {
-                let strikes = vec![Strike { row, at: STEADY_AT + 37 * seed }];
-                tally.take(&Scene { moment: *moment, seed, strikes }, seed == 0);
+fn every_fault_in_every_phase_is_answered_within_its_bound_and_for_its_cause() {
+    for pace in PACES {
+        let mut tally = Tally::default();
+        for (row, fault) in ROWS.iter().enumerate() {
+            for moment in fault.moments {
+                for seed in 0..3 {
+                    let strikes = vec![Strike { row, at: STEADY_AT + 37 * seed }];
+                    tally.take(&Scene { moment: *moment, seed, strikes, pace }, seed == 0);
+                }
             }
         }
+        assert_clean(&tally);
     }
-    assert_clean(&tally);
 }
 
 #[test]
 fn without_a_fault_nothing_trips() {
-    for moment in [Moment::Idle, Moment::Ramp, Moment::Hold, Moment::Slide] {
-        for seed in 0..40 {
-            let found = run(&Scene { moment, seed, strikes: Vec::new() }, false);
-            assert!(found.wrong.is_empty() && found.trip.is_none(), "{moment:?} {seed}: {found:?}");
+    for pace in PACES {
+        for moment in [Moment::Idle, Moment::Ramp, Moment::Hold, Moment::Slide] {
+            for seed in 0..40 {
+                let found = run(&Scene { moment, seed, strikes: Vec::new(), pace }, false);
+                assert!(found.wrong.is_empty() && found.trip.is_none(), "{moment:?} {seed}: {found:?}");
+            }
         }
     }
 }
 
 #[test]
 fn two_thousand_seeds_and_none_over_a_bound() {
-    assert_clean(&search(Search { first: 1, seeds: 2000, pairs: false, twice: false }));
+    for pace in PACES {
+        assert_clean(&search(Search { first: 1, seeds: 2000, pairs: false, twice: false, pace }));
+    }
 }
 
 #[test]
 fn random_pairs_of_faults() {
-    let tally = search(Search { first: 1, seeds: 1000, pairs: true, twice: false });
+    let pace = Pace::Fast;
+    let tally = search(Search { first: 1, seeds: 1000, pairs: true, twice: false, pace });
     assert!(tally.reactions.values().map(|r| r.runs).sum::<u64>() > 1900, "pairs have two faults");
     assert_clean(&tally);
 }
 
+/// Pairs that hide each other: a rogue master that sets half the amplitude, with a readback of twice of it, or garbage, or a link
+/// that is cut while its heartbeat goes on. The slower of the two bounds counts.
 #[test]
-fn seeds_run_twice_give_equal_hashes_and_replay_to_equal_decisions() {
-    assert_clean(&search(Search { first: 1, seeds: 100, pairs: false, twice: true }));
+fn faults_that_hide_each_other_are_off_within_the_slower_bound() {
+    let row = |name: &str| ROWS.iter().position(|r| r.name == name).unwrap();
+    let rogue = row("rogue_master");
+    for other in ["amplitude_times_two", "amplifier_link_cut", "amplifier_garbage", "amplitude_sensor_zero"] {
+        for moment in [Moment::Hold, Moment::Slide] {
+            for (seed, apart) in [(15_898, 19), (46_578, 1), (48_970, 0), (1, 40)] {
+                for (first, second) in [(rogue, row(other)), (row(other), rogue)] {
+                    let strikes = vec![
+                        Strike { row: first, at: STEADY_AT },
+                        Strike { row: second, at: STEADY_AT + apart },
+                    ];
+                    let found = run(&Scene { moment, seed, strikes, pace: Pace::Fast }, false);
+                    assert!(found.wrong.is_empty(), "{other} {moment:?} {seed} {apart}: {found:?}");
+                }
+            }
+        }
+    }
 }
 
 #[test]
-fn the_bench_sees_a_safety_core_that_sleeps() {
-    // A row whose bound is too tight by one must fail: the harness can say no.
-    let row = ROWS.iter().position(|r| r.name == "forces_stuck").unwrap();
-    let found =
-        run(&Scene { moment: Moment::Slide, seed: 1, strikes: vec![Strike { row, at: STEADY_AT }] }, false);
-    let took = found.command_off[0].unwrap();
-    assert!(took > rig::faults::rows::FROZEN - 1, "a frozen value cannot be known sooner: {took}");
+fn seeds_run_twice_give_equal_hashes_and_replay_to_equal_decisions() {
+    let pace = Pace::Fast;
+    assert_clean(&search(Search { first: 1, seeds: 100, pairs: false, twice: true, pace }));
+}
+
+/// Negative controls: a core that sleeps, that is deaf, or that trips for a wrong cause, and the bench says so for every fault
+/// that must switch off.
+#[test]
+fn a_core_that_sleeps_is_deaf_or_mistaken_is_found_out_by_every_fault() {
+    for core in [Core::Sleeps, Core::Deaf, Core::Mistaken] {
+        for (row, fault) in ROWS.iter().enumerate() {
+            // What the world itself shows a deaf core: a slide that stands, a watchdog that fired meanwhile, its own clock.
+            let heard = matches!(fault.what, What::StageStalls | What::Paused(_) | What::Exposure);
+            if !matches!(fault.expect, Expect::Off(_)) || (core == Core::Deaf && heard) {
+                continue;
+            }
+            let moment = *fault.moments.last().unwrap();
+            let strikes = vec![Strike { row, at: STEADY_AT }];
+            let scene = Scene { moment, seed: 1, strikes, pace: Pace::Fast };
+            let found = run_with(&scene, false, core);
+            assert!(!found.wrong.is_empty(), "{core:?} passes for sound with {}: {found:?}", fault.name);
+        }
+    }
 }

@@ -108,7 +108,7 @@ fn killed_at_any_instant_nothing_acknowledged_is_lost_and_the_drive_drops() {
                 assert!(acknowledged.is_subset(&unique), "acknowledged {acknowledged:?}, kept {kept:?}");
                 for record in rig::run_dir::records_in(&out).unwrap() {
                     let read = realtime::recorder::read(&std::fs::read(&record).unwrap());
-                    assert_eq!(read.damaged, 0, "{}", record.display());
+                    assert_eq!(read.integrity.damaged_places, 0, "{}", record.display());
                 }
             }
             if made == kills {

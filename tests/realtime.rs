@@ -54,8 +54,14 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
+/// Cycles of the sweep below: a million, or as many as `MUPRIME_CYCLES` says.
+fn cycles() -> u64 {
+    std::env::var("MUPRIME_CYCLES").ok().and_then(|n| n.parse().ok()).unwrap_or(1_000_000)
+}
+
 #[test]
-fn no_allocation_in_a_hundred_thousand_cycles_of_a_sweep() {
+fn no_allocation_in_a_million_cycles_of_a_sweep() {
+    let cycles = cycles();
     let setup = Setup::load("virtual").unwrap();
     let plan = Plan::load("first-sweep").unwrap();
     let model: Arc<dyn models::prediction::FrictionModel> =
@@ -63,13 +69,13 @@ fn no_allocation_in_a_hundred_thousand_cycles_of_a_sweep() {
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
     let config = setup.config;
     let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::bundled(), 3).unwrap().split();
-    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let mut ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let (mut rows, mut drain) = HeapRb::<Row>::new(64).split();
     let queue = crossbeam_queue::ArrayQueue::<Command>::new(64);
     let mut state = CycleState::default();
     let mut sequence = None;
     let (mut armed, mut driven) = (0u64, 0u64);
-    for number in 1..=100_000u64 {
+    for number in 1..=cycles {
         let fresh = || {
             let points = plan.points(number, &config.limits, &resolution).unwrap();
             Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
@@ -95,9 +101,177 @@ fn no_allocation_in_a_hundred_thousand_cycles_of_a_sweep() {
             sequence = None;
         }
     }
-    println!("100000 cycles, {armed} armed, {driven} driving, {} allocations", COUNT.get());
-    assert!(driven > 30_000, "the cycles must be those of a real sweep: {driven}");
+    println!("{cycles} cycles, {armed} armed, {driven} driving, {} allocations", COUNT.get());
+    assert!(driven > cycles * 3 / 10, "the cycles must be those of a real sweep: {driven}");
     assert_eq!(COUNT.get(), 0);
+}
+
+/// A force port that counts the allocations of the loop's own thread between two of its cycles.
+struct Counted {
+    inner: Box<dyn realtime::ports::ForceSensor>,
+    reads: u64,
+    counted: Arc<std::sync::atomic::AtomicU64>,
+}
+
+/// The cycles between which is counted: the first ones touch what the loop touches once.
+const COUNTED: std::ops::Range<u64> = 200..3200;
+
+impl realtime::ports::ForceSensor for Counted {
+    fn read(&mut self, now: Nanos) -> realtime::ports::Forces {
+        self.reads += 1;
+        if self.reads == COUNTED.start {
+            COUNT.set(0);
+            COUNTING.set(true);
+        } else if self.reads == COUNTED.end {
+            COUNTING.set(false);
+            self.counted.store(COUNT.get(), std::sync::atomic::Ordering::Release);
+        }
+        self.inner.read(now)
+    }
+}
+
+/// The loop's own thread, `pacing::run` and all, over the ports of real drivers (Modbus TCP on loopback), armed and driving.
+#[test]
+fn the_loops_thread_allocates_nothing_behind_real_drivers() {
+    use realtime::safety::Request;
+    use rig::supervisor::Loop;
+    use rig::supervisor::wall::{Parts, WallLoop};
+    use std::sync::atomic::{AtomicU64, Ordering};
+    let setup = Setup::load("virtual-ideal").unwrap();
+    let (epoch, origin_ns) = (std::time::Instant::now(), realtime::pacing::monotonic_ns());
+    let world = sim::world::World::new(&WorldConfig::ideal(), 1).unwrap();
+    let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(world), epoch);
+    let mut instruments = setup.instruments();
+    let _emulators = rig::embed::embed(&mut instruments, &plant, false).unwrap();
+    let opened = drivers::open(&instruments, epoch).unwrap();
+    let counted = Arc::new(AtomicU64::new(u64::MAX));
+    let force = setup.certificates.calibrated(opened.force);
+    let force = Box::new(Counted { inner: force, reads: 0, counted: Arc::clone(&counted) });
+    let amplifier = setup.certificates.calibrated_amplifier(opened.amplifier);
+    let (rig, mut reins, mut record) = WallLoop::start(Parts {
+        config: setup.config,
+        model: Arc::new(SpringSlider::new(setup.tip.finger).unwrap()),
+        ports: Ports::new(force, amplifier, opened.stage),
+        links: opened.links,
+        pacing: realtime::pacing::Pacing::default(),
+        origin_ns,
+    })
+    .unwrap();
+    let request = Request {
+        amplitude: models::quantity::PeakToPeak::from_metres(2e-6),
+        frequency_hz: 27_500.0,
+        velocity_m_s: 0.0,
+        normal_force_n: 0.25,
+    };
+    let (mut driven, mut last_asked) = (0u64, 0);
+    let began = std::time::Instant::now();
+    while counted.load(Ordering::Acquire) == u64::MAX && began.elapsed().as_secs() < 60 {
+        while record.try_pop().is_some() {}
+        let Some(row) = reins.next_row() else { continue };
+        driven += u64::from(row.drive_pp_m > 0.0 && COUNTED.contains(&row.cycle));
+        if row.cycle > last_asked + 60 {
+            last_asked = row.cycle;
+            let ask = if row.armed {
+                Command::Set(request, realtime::cycle::Marker::default())
+            } else {
+                Command::Reset
+            };
+            reins.send(ask);
+        }
+    }
+    let allocations = counted.load(Ordering::Acquire);
+    println!("{} cycles behind drivers, {driven} driving, {allocations} allocations", COUNTED.count());
+    rig.end();
+    assert_eq!(allocations, 0);
+    assert!(driven > 500, "the cycles must be those of a driven rig: {driven}");
+}
+
+/// A model that looks, when it is asked, whether the commands of its cycle have left.
+struct Late {
+    inner: SpringSlider,
+    commands: Arc<std::sync::atomic::AtomicU64>,
+    cycle: Arc<std::sync::atomic::AtomicU64>,
+    asked: Arc<std::sync::atomic::AtomicU64>,
+}
+
+impl models::prediction::FrictionModel for Late {
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    fn predict(
+        &self,
+        condition: &models::condition::Condition,
+    ) -> Result<models::prediction::Prediction, models::condition::OutOfDomain> {
+        use std::sync::atomic::Ordering::Relaxed;
+        self.asked.fetch_add(1, Relaxed);
+        assert_eq!(
+            self.commands.load(Relaxed),
+            self.cycle.load(Relaxed),
+            "the model is asked before the drive"
+        );
+        self.inner.predict(condition)
+    }
+}
+
+/// An amplifier that counts the commands that reach it.
+struct Counts<P> {
+    inner: P,
+    commands: Arc<std::sync::atomic::AtomicU64>,
+}
+
+impl<P: realtime::ports::Amplifier> realtime::ports::Amplifier for Counts<P> {
+    fn command(&mut self, command: realtime::safety::DriveCommand, now: Nanos) {
+        self.commands.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        self.inner.command(command, now);
+    }
+
+    fn state(&mut self, now: Nanos) -> Result<realtime::ports::AmplifierState, realtime::ports::NoData> {
+        self.inner.state(now)
+    }
+}
+
+/// However long a model takes, what was decided has left: in no cycle is it asked first.
+#[test]
+fn what_is_decided_leaves_before_the_model_is_asked() {
+    use realtime::estimate::Mu0;
+    use realtime::safety::Request;
+    use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+    let setup = Setup::load("virtual-ideal").unwrap();
+    let [commands, cycle, asked] = [(); 3].map(|()| Arc::new(AtomicU64::new(0)));
+    let model = Late {
+        inner: SpringSlider::new(setup.tip.finger).unwrap(),
+        commands: Arc::clone(&commands),
+        cycle: Arc::clone(&cycle),
+        asked: Arc::clone(&asked),
+    };
+    let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::ideal(), 3).unwrap().split();
+    let amplifier = Counts { inner: amplifier, commands };
+    let mut ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
+    let mut state = CycleState::default();
+    let request = Request {
+        amplitude: models::quantity::PeakToPeak::from_metres(2e-6),
+        frequency_hz: 27_500.0,
+        velocity_m_s: 0.02,
+        normal_force_n: 0.25,
+    };
+    let mut stopped = None;
+    for number in 1..=1000u64 {
+        let mut queue = match number {
+            1 => Some(Command::Mu0(Mu0 { value: 0.5, sd: 0.01 })),
+            60 => Some(Command::Reset),
+            80 => Some(Command::Set(request, realtime::cycle::Marker::default())),
+            900 => Some(Command::Stop),
+            _ => None,
+        };
+        cycle.store(number, Relaxed);
+        let tick = Tick { number, lateness: Nanos(0), now: Nanos(number * 1_000_000) };
+        let row = turn(&setup.config, &model, &mut state, &mut ports, &mut || queue.take(), tick);
+        assert!(!(100..900).contains(&number) || row.drive_pp_m > 0.0, "{number}");
+        stopped = stopped.or(row.tripped.map(|_| number));
+    }
+    assert_eq!(stopped, Some(900));
+    assert!(asked.load(Relaxed) > 500, "{asked:?}");
 }
 
 /// Three minutes of rows, flushed as a run flushes them, and the end of the file with its index of 3600 chunks.
@@ -107,7 +281,7 @@ fn a_record_takes_no_more_memory_the_longer_it_gets() {
     let setup = Setup::load("virtual-ideal").unwrap();
     let model = SpringSlider::new(setup.tip.finger).unwrap();
     let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::ideal(), 3).unwrap().split();
-    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
+    let mut ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut state = CycleState::default();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("long.mcap");

@@ -82,7 +82,7 @@ fn a_sweep_over_real_modbus_tcp_ends_with_table_record_and_report() {
     assert_eq!(Some(counted), summary["loop_report"]["cycles"].as_u64(), "the histogram holds every cycle");
     // The record says the same, with setup, plan and the loop's report inside.
     let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
-    assert_eq!(record.cut, None);
+    assert!(record.integrity.complete(), "{:?}", record.integrity);
     assert_eq!(record.rows().count() as u64 + summary["record_lost"].as_u64().unwrap(), counted);
     assert!(
         record.files.iter().any(|f| f.0 == "plan.toml") && record.files.iter().any(|f| f.0 == "rig.toml")
@@ -180,7 +180,7 @@ fn a_killed_record_is_recovered_and_an_ordinary_reader_opens_it() {
     let out = (1..=5).find_map(killed).expect("a machine that is not too busy for wall-clock time");
     let record = out.join("run-1.mcap");
     let before = realtime::recorder::read(&std::fs::read(&record).unwrap());
-    assert!(before.cut.is_some());
+    assert!(before.integrity.cut.is_some() && before.integrity.damaged_places == 0);
     let recovered = muprime().args(["--json", "recover"]).arg(&record).output().unwrap();
     assert_eq!(recovered.status.code(), Some(0), "{}", texts(&recovered).1);
     assert_eq!(documents(&recovered)[0]["messages"], before.messages.len());
@@ -204,11 +204,15 @@ fn an_interrupt_stops_safely_and_keeps_what_was_measured() {
     // SAFETY: sends SIGINT to the child that this test has started and not yet waited for.
     unsafe { libc::kill(child.id() as libc::pid_t, libc::SIGINT) };
     let rest: Vec<serde_json::Value> = lines.map(|l| serde_json::from_str(&l.unwrap()).unwrap()).collect();
-    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert_eq!(
+        child.wait().unwrap().code(),
+        Some(1),
+        "stopped is not done: 'run && diagnose' must not go on"
+    );
     assert_eq!(rest.last().unwrap()["summary"]["outcome"], "stopped");
     assert!(!points(&out).is_empty());
     let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
-    assert_eq!(record.cut, None, "the record was ended properly");
+    assert!(record.integrity.complete(), "the record was ended properly: {:?}", record.integrity);
     let last = record.rows().last().unwrap();
     assert!(!last.armed && last.drive_pp_m == 0.0 && last.load_n == 0.0 && last.velocity_m_s == 0.0);
 }

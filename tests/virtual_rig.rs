@@ -98,10 +98,9 @@ fn marching_every_cycle_and_averaging_agree_in_the_mean() {
 }
 
 #[test]
-fn repeatability_and_pass_noise_are_those_of_rig_toml() {
+fn repeatability_and_pass_noise_are_those_that_the_world_states() {
     let config = WorldConfig::ideal();
-    let text = config.rig_toml();
-    assert!(text.contains("pass_relative_sd = 0.015"), "{text}");
+    assert_eq!(config.pass_relative_sd, 0.015);
     let n = 400;
     let strokes: Vec<_> = (0..n).map(|seed| stroke(&config, 1000 + seed, 0.0, 0.05, 0.5)).collect();
     let ratio: Vec<f64> = strokes.iter().map(|(_, l, f)| l / f / 0.5 - 1.0).collect();

@@ -8,6 +8,7 @@
 pub mod date;
 mod verify;
 
+pub use models::rig_file::CertificateKind as Kind;
 pub use verify::{Circumstances, Refusal, Verified};
 
 use nalgebra::DMatrix;
@@ -17,37 +18,6 @@ use std::collections::BTreeMap;
 
 /// The schema that this version writes and reads.
 pub const SCHEMA: &str = "muprime.certificate/1";
-
-/// What was calibrated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Kind {
-    /// Counts of the force sensor to newtons.
-    Force,
-    /// Drive set-point to peak-to-peak amplitude.
-    Amplitude,
-    /// Delay and clock of a channel.
-    Latency,
-    /// Phase shift of the skin against the plate.
-    Phase,
-    /// Stiffness and friction of a fingertip.
-    Finger,
-    /// What a force sensor is besides its matrix: creep, orientation, noise, dynamics.
-    Sensor,
-}
-
-impl std::fmt::Display for Kind {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Kind::Force => "force",
-            Kind::Amplitude => "amplitude",
-            Kind::Latency => "latency",
-            Kind::Phase => "phase",
-            Kind::Finger => "finger",
-            Kind::Sensor => "sensor",
-        })
-    }
-}
 
 /// The instrument (or fingertip) that a certificate is about.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,77 +1,11 @@
 //! The table as the diagnosis sees it: what was measured, and what the design can show.
 
-use effects::{Design, Need, Operating};
+use effects::{Design, Need};
+use models::condition::Condition;
+use models::covariate::{self, Scale};
+use models::quantity::PeakToPeak;
 use models::record::Pass;
-use serde::{Deserialize, Serialize};
-
-/// What rig.toml states about the finger, the noise and the certificates.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Rig {
-    /// The finger's calibration.
-    pub finger: models::finger::Finger,
-    /// The repeatability.
-    #[serde(default)]
-    pub noise: Noise,
-    /// Certificates that narrow what can be blamed.
-    #[serde(default)]
-    pub calibration: Certificates,
-}
-
-/// Stated repeatability.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Noise {
-    /// Repeatability of the lateral force from pass to pass, relative.
-    pub pass_relative_sd: f64,
-    /// Noise of a pass's mean force, each axis, N.
-    pub force_sd_n: f64,
-}
-
-impl Default for Noise {
-    fn default() -> Self {
-        Noise { pass_relative_sd: 0.015, force_sd_n: 0.0008 }
-    }
-}
-
-/// Standard uncertainties from outside calibrations; `None` where there is no certificate.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Certificates {
-    /// Of the amplitude's gain (vibrometer), relative.
-    #[serde(default)]
-    pub amplitude_gain_sd: Option<f64>,
-    /// Of the lateral force's gain (dead weight), relative.
-    #[serde(default)]
-    pub lateral_gain_sd: Option<f64>,
-    /// Of the speed (encoder), relative.
-    #[serde(default)]
-    pub speed_gain_sd: Option<f64>,
-    /// Of the normal force's zero, N.
-    #[serde(default)]
-    pub normal_offset_sd_n: Option<f64>,
-    /// Of the level of the plate in the sensor's frame, rad.
-    #[serde(default)]
-    pub tilt_sd_rad: Option<f64>,
-    /// Of the cross-talk, as a share.
-    #[serde(default)]
-    pub crosstalk_sd: Option<f64>,
-}
-
-impl Rig {
-    /// The certificate that bounds the size of an effect's law, where there is one.
-    pub fn certified_sd(&self, effect: &str, law: usize) -> Option<f64> {
-        let c = &self.calibration;
-        match (effect, law) {
-            ("amplitude_miscalibration", 0) => c.amplitude_gain_sd,
-            ("lateral_gain", 0) => c.lateral_gain_sd,
-            ("speed_error", 0) => c.speed_gain_sd,
-            ("normal_offset", 0) => c.normal_offset_sd_n,
-            ("plate_tilt", 0) => c.tilt_sd_rad,
-            ("force_crosstalk", _) => c.crosstalk_sd,
-            _ => None,
-        }
-    }
-}
+pub use models::rig_file::RigFile;
 
 /// A table that the diagnosis refuses, and what would mend it.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -96,13 +30,18 @@ pub enum DataError {
     DoublePoint(u64),
 }
 
+/// Relative difference below which two frequencies are one.
+const SAME_FREQUENCY: f64 = 1e-3;
+/// Range of temperatures below which a table shows nothing of them, K.
+const SAME_TEMPERATURE_K: f64 = 0.3;
+
 /// Passes in the order of measurement, with the groups that are held out together.
 #[derive(Debug, Clone)]
 pub struct Table {
     /// Numbers of the points.
     pub points: Vec<u64>,
     /// Conditions.
-    pub passes: Vec<Operating>,
+    pub passes: Vec<Condition>,
     /// Measured lateral force, N (zero in a table of conditions).
     pub lateral: Vec<f64>,
     /// Run of each pass, numbered in the order of appearance.
@@ -164,21 +103,14 @@ impl Table {
                     .map_or(*first, |(_, t)| *t)
             })
             .collect();
-        let passes: Vec<Operating> = rows
+        let passes: Vec<Condition> = rows
             .iter()
             .zip(&runs)
-            .map(|(p, &run)| Operating {
+            .map(|(p, &run)| Condition {
                 time_s: p.time_s - start,
-                run_time_s: p.time_s - starts[run],
-                amplitude_pp_m: p.amplitude.metres(),
-                frequency_hz: p.frequency_hz,
-                speed_m_s: p.speed_m_s,
-                direction: p.direction.sign(),
-                position_m: p.position_m,
-                normal_force_n: p.normal_force_n,
-                ambient_pressure_pa: p.ambient_pressure_pa,
-                temperature_c: p.temperature_c,
-                relative_humidity_pct: p.relative_humidity_pct,
+                run_time_s: Some(p.time_s - starts[run]),
+                // What friction is without vibration is the baseline's to say, not the condition's.
+                ..p.condition(1.0)
             })
             .collect();
         let design = origin.map_or_else(|| scales(&passes), |o| o.design);
@@ -217,8 +149,8 @@ impl Table {
     pub fn still_coefficient(&self) -> Option<f64> {
         let (mut top, mut bottom) = (0.0, 0.0);
         for (p, l) in self.passes.iter().zip(&self.lateral) {
-            if p.amplitude_pp_m == 0.0 {
-                top += p.direction * l * p.normal_force_n;
+            if p.amplitude == PeakToPeak::ZERO {
+                top += p.direction.sign() * l * p.normal_force_n;
                 bottom += p.normal_force_n * p.normal_force_n;
             }
         }
@@ -228,40 +160,34 @@ impl Table {
     /// The first need of an effect that this table does not meet, in words.
     pub fn lacks(&self, needs: &[Need]) -> Option<String> {
         let p = &self.passes;
-        let spread = |f: &dyn Fn(&Operating) -> f64| -> f64 {
-            let vibrating = p.iter().filter(|q| q.amplitude_pp_m > 0.0);
+        let spread = |f: &dyn Fn(&Condition) -> f64| -> f64 {
+            let vibrating = p.iter().filter(|q| q.amplitude > PeakToPeak::ZERO);
             let (low, high) = vibrating.fold((f64::INFINITY, 0.0f64), |(a, b), q| (a.min(f(q)), b.max(f(q))));
             if low > 0.0 { high / low } else { f64::INFINITY }
         };
         needs.iter().find_map(|need| {
             let missing = match need {
-                Need::Vibration => !p.iter().any(|q| q.amplitude_pp_m > 0.0),
-                Need::Amplitudes => spread(&|q| q.amplitude_pp_m) < 1.2,
+                Need::Vibration => !p.iter().any(|q| q.amplitude > PeakToPeak::ZERO),
+                Need::Amplitudes => spread(&|q| q.amplitude.metres()) < 1.2,
                 Need::Loads => spread(&|q| q.normal_force_n) < 1.25,
                 Need::Speeds => spread(&|q| q.speed_m_s) < 1.3,
-                Need::Directions => {
-                    !(p.iter().any(|q| q.direction > 0.0) && p.iter().any(|q| q.direction < 0.0))
-                }
+                Need::Directions => p.iter().all(|q| q.direction == p[0].direction),
                 Need::Positions => self.design.stroke_m < 1e-3,
                 Need::Time => self.design.duration_s <= 0.0,
-                Need::Record | Need::OutsideStandard => true,
-            };
-            missing.then(|| {
-                match need {
-                    Need::Vibration => "no pass has the plate vibrating",
-                    Need::Amplitudes => "a second amplitude is missing",
-                    Need::Loads => "normal forces differ by less than a quarter: a second load is missing",
-                    Need::Speeds => "speeds differ by less than a third: a second speed is missing",
-                    Need::Directions => "only one direction was measured: passes in reverse are missing",
-                    Need::Positions => "all passes lie at one position_m: a second place is missing",
-                    Need::Time => "all passes carry one time_s",
-                    Need::Record => "means over passes do not show it; a time-resolved run record is missing",
-                    Need::OutsideStandard => {
-                        "an exact alias of mu0 and lateral stiffness; a dead-weight certificate of the lateral axis is missing"
-                    }
+                Need::Frequencies => {
+                    !p.iter().any(|q| (q.frequency_hz / p[0].frequency_hz - 1.0).abs() > SAME_FREQUENCY)
                 }
-                .to_string()
-            })
+                Need::Runs => self.run_count < 2,
+                Need::Temperatures => {
+                    let known: Vec<f64> = p.iter().filter_map(|q| q.temperature_c).collect();
+                    let (low, high) = known
+                        .iter()
+                        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+                    known.len() < p.len() || high - low <= SAME_TEMPERATURE_K
+                }
+                Need::Record | Need::OutsideStandard | Need::NormalStandard => true,
+            };
+            missing.then(|| need.missing().to_string())
         })
     }
 
@@ -291,33 +217,38 @@ pub struct Origin {
     design: Design,
 }
 
+/// Largest lateral force over normal force that a finger on a plate can have, offsets of the sensor included.
+const LARGEST_RATIO: f64 = 100.0;
+
+/// The first value of a pass that no pass can have.
 fn check(p: &Pass) -> Result<(), DataError> {
     let refuse = |column, value, needed| Err(DataError::BadValue { point: p.point, column, value, needed });
-    for (column, value) in
-        [("frequency_hz", p.frequency_hz), ("speed_m_s", p.speed_m_s), ("normal_force_n", p.normal_force_n)]
-    {
-        if !(value.is_finite() && value > 0.0) {
-            return refuse(column, value, "a finite number above zero");
+    let condition = p.condition(1.0);
+    for c in covariate::TOLD {
+        let Some(value) = c.of(&condition) else { continue };
+        if c.scale == Scale::Log && value.is_nan() | (value <= 0.0) {
+            return refuse(c.name, value, "a finite number above zero");
+        }
+        if !c.admits(value) {
+            return refuse(c.name, value, c.needed);
         }
     }
-    let w = p.amplitude.metres();
-    if !(w.is_finite() && w >= 0.0) {
-        return refuse("amplitude_pp_m", w, "a finite number, zero or more");
-    }
-    if !p.time_s.is_finite() {
-        return refuse("time_s", p.time_s, "a finite number");
-    }
-    if let Some(l) = p.lateral_force_n.filter(|l| !l.is_finite()) {
-        return refuse("lateral_force_n", l, "a finite number");
+    if let Some(l) = p.lateral_force_n {
+        if !l.is_finite() {
+            return refuse("lateral_force_n", l, "a finite number");
+        }
+        if l.abs() > LARGEST_RATIO * p.normal_force_n {
+            return refuse("lateral_force_n", l, "a force of at most a hundred times the normal force");
+        }
     }
     Ok(())
 }
 
-fn scales(passes: &[Operating]) -> Design {
-    let mean = |f: &dyn Fn(&Operating) -> f64| {
+fn scales(passes: &[Condition]) -> Design {
+    let mean = |f: &dyn Fn(&Condition) -> f64| {
         (passes.iter().map(|p| f(p).ln()).sum::<f64>() / passes.len().max(1) as f64).exp()
     };
-    let range = |f: &dyn Fn(&Operating) -> f64| {
+    let range = |f: &dyn Fn(&Condition) -> f64| {
         let (low, high) =
             passes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(f(p)), b.max(f(p))));
         (high - low).max(0.0)
@@ -329,6 +260,6 @@ fn scales(passes: &[Operating]) -> Design {
         reference_frequency_hz: mean(&|p| p.frequency_hz),
         reference_temperature_c: passes.iter().find_map(|p| p.temperature_c).unwrap_or(20.0),
         stroke_m: range(&|p| p.position_m),
-        largest_amplitude_m: passes.iter().map(|p| p.amplitude_pp_m).fold(0.0, f64::max),
+        largest_amplitude_m: passes.iter().map(|p| p.amplitude.metres()).fold(0.0, f64::max),
     }
 }

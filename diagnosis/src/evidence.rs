@@ -4,18 +4,32 @@
 //! could imitate, delta a smooth Gaussian process of unit variance over the operating space, s on a grid.
 //! The integral over the parameters is Laplace's, with the half-line of a size that cannot be negative.
 
-use crate::fit::{Fit, Member, NUISANCES, Problem, bounded_step};
-use crate::linear::{Covariance, log_sum_exp};
+use crate::constants::Constants;
+use crate::fit::{Member, Problem};
+use crate::gaussian::{Covariance, log_sum_exp};
+use crate::layout::{Layout, NUISANCES};
+use crate::least_squares::{Fit, bounded_step};
 use effects::Prior;
 use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
 
-/// Shares of its own change by which a cause may depart from its form, with their prior weights.
-pub const FORMS: [(f64, f64); 3] = [(0.05, 0.4), (0.15, 0.4), (0.35, 0.2)];
+/// Rounds of the search for a mode, at the three shares of form uncertainty.
+const MODE_ROUNDS: [usize; 3] = [4, 6, 3];
+/// Damping of that search: at the start, its factors after a step that helps and one that does not, and its bounds.
+const DAMPING: f64 = 1e-3;
+const EASED: f64 = 0.1;
+const STIFFENED: f64 = 20.0;
+const DAMPING_BOUNDS: [f64; 2] = [1e-9, 1e6];
+/// Dampings that one round tries.
+const TRIALS: usize = 4;
+/// Gain in minus twice the log posterior below which a mode is found.
+const CONVERGED: f64 = 0.05;
+/// Deviations below which the tail of a Gaussian is taken by Mills' ratio.
+const MILLS: f64 = -6.0;
 
-/// One hypothesis at its best, with form uncertainty `share`.
+/// One hypothesis at the mode of its posterior, with Laplace's approximation about it, at one share of form uncertainty.
 #[derive(Clone)]
-pub struct Explained {
+pub struct Posterior {
     /// Members and their laws.
     pub members: Vec<Member>,
     /// Coordinates.
@@ -34,7 +48,7 @@ pub struct Explained {
     pub departure: DVector<f64>,
 }
 
-impl Explained {
+impl Posterior {
     /// chi2 by which mu0 and the stiffnesses are pulled from their calibration.
     pub fn pull(&self) -> f64 {
         self.u[..NUISANCES].iter().map(|x| x * x).sum()
@@ -81,14 +95,14 @@ fn form_matrix(change: &DVector<f64>, basis: &DMatrix<f64>, share: f64) -> DMatr
 
 /// Improves a fit under the covariance of one share and gives its evidence. `members` may be empty (no gap):
 /// then there is no form uncertainty.
-pub fn explain(
+pub fn laplace(
     problem: &Problem,
     members: &[Member],
     start: &[f64],
     basis: &DMatrix<f64>,
     share: f64,
     rounds: usize,
-) -> Explained {
+) -> Posterior {
     let n = problem.len();
     let bounds = problem.bounds(members);
     let precision = problem.prior_precision(members);
@@ -108,12 +122,12 @@ pub fn explain(
     let penalty = |u: &[f64]| -> f64 { u.iter().zip(&precision).map(|(x, p)| p * x * x).sum() };
     let mut covariance = build(&change);
     let mut cost = covariance.quadratic(&(&y - &m)) + covariance.log_det() + penalty(&u);
-    let mut damping = 1e-3;
+    let mut damping = DAMPING;
     let mut jacobian = problem.jacobian(members, &u, &m);
     for _ in 0..rounds {
         let (hessian, gradient) = equations(&covariance, &jacobian, &(&y - &m), &precision, &u);
         let mut gained = 0.0;
-        for _ in 0..4 {
+        for _ in 0..TRIALS {
             let Some(next) = bounded_step(&hessian, &gradient, damping, &u, &bounds) else { break };
             let there = problem.predict(members, &next);
             let moved = if members.is_empty() { zero.clone() } else { net_change(problem, &next, &there) };
@@ -122,16 +136,16 @@ pub fn explain(
             if value < cost {
                 gained = cost - value;
                 (u, m, change, covariance, cost) = (next, there, moved, trial, value);
-                damping = (damping * 0.1).max(1e-9);
+                damping = (damping * EASED).max(DAMPING_BOUNDS[0]);
                 break;
             }
-            damping = (damping * 20.0).min(1e6);
+            damping = (damping * STIFFENED).min(DAMPING_BOUNDS[1]);
         }
         if gained == 0.0 {
             break;
         }
         jacobian = problem.jacobian(members, &u, &m);
-        if gained < 0.05 {
+        if gained < CONVERGED {
             break;
         }
     }
@@ -161,18 +175,18 @@ pub fn explain(
             DMatrix::identity(u.len(), u.len())
         }
     };
-    let mut at = NUISANCES;
-    for member in members {
+    let layout = Layout::of(members);
+    for (index, member) in members.iter().enumerate() {
+        let at = layout.size(index);
         if let Prior::HalfNormal(_) = member.parameters()[0].prior {
             // At the bound the optimum may lie beyond: the quadratic is integrated over the half line.
             let sd = posterior[(at, at)].sqrt();
             let beyond = if u[at] <= bounds[at].0 { gradient[at].max(0.0) * sd } else { 0.0 };
             log_evidence += log_half_line(u[at] / sd, beyond);
         }
-        at += member.parameters().len();
     }
     let departure = if members.is_empty() { DVector::zeros(0) } else { covariance.weights(&residual) };
-    Explained {
+    Posterior {
         members: members.to_vec(),
         u,
         share,
@@ -188,7 +202,7 @@ pub fn explain(
 fn log_half_line(reach: f64, beyond: f64) -> f64 {
     let z = reach - beyond;
     // ln(exp(b^2/2) Phi(z)); for large b the two nearly cancel: Mills' ratio.
-    if z < -6.0 {
+    if z < MILLS {
         0.5 * beyond * beyond - 0.5 * z * z - (-z).ln() - 0.918_938_533_204_672_8 - (1.0 / (z * z))
     } else {
         0.5 * beyond * beyond + (0.5 * erfc(-z / std::f64::consts::SQRT_2)).max(1e-300).ln()
@@ -221,30 +235,33 @@ fn largest_share(members: &[Member]) -> f64 {
 }
 
 /// Share of form uncertainty with which laws are compared before the others are tried.
-pub fn middle_share(members: &[Member]) -> f64 {
-    FORMS[1].0.min(largest_share(members))
+pub fn middle_form_share(k: &Constants, members: &[Member]) -> f64 {
+    k.form_shares[1].min(largest_share(members))
 }
 
 /// Evidence of a hypothesis averaged over the shares of form uncertainty, with the best share's solution.
-pub fn over_forms(
+pub fn averaged_over_form(
     problem: &Problem,
     fit: &Fit,
     members: &[Member],
     basis: &DMatrix<f64>,
-) -> (f64, Explained) {
+) -> (f64, Posterior) {
     if members.is_empty() {
-        let e = explain(problem, members, &fit.u, basis, 0.0, 4);
+        let e = laplace(problem, members, &fit.u, basis, 0.0, MODE_ROUNDS[0]);
         return (e.log_evidence, e);
     }
     let most = largest_share(members);
-    let middle = explain(problem, members, &fit.u, basis, middle_share(members), 6);
-    let mut list = vec![explain(problem, members, &middle.u, basis, FORMS[0].0, 4)];
-    let high = (most >= FORMS[2].0).then(|| explain(problem, members, &middle.u, basis, FORMS[2].0, 3));
-    list.extend((most >= FORMS[1].0).then_some(middle));
+    let k = &problem.constants;
+    let [small, medium, large] = k.form_shares;
+    let [first, second, third] = MODE_ROUNDS;
+    let middle = laplace(problem, members, &fit.u, basis, middle_form_share(k, members), second);
+    let mut list = vec![laplace(problem, members, &middle.u, basis, small, first)];
+    let high = (most >= large).then(|| laplace(problem, members, &middle.u, basis, large, third));
+    list.extend((most >= medium).then_some(middle));
     list.extend(high);
-    let weights: f64 = FORMS[..list.len()].iter().map(|f| f.1).sum();
+    let weights: f64 = k.form_weights[..list.len()].iter().sum();
     let weighted: Vec<f64> =
-        list.iter().zip(FORMS).map(|(e, (_, w))| e.log_evidence + (w / weights).ln()).collect();
+        list.iter().zip(k.form_weights).map(|(e, w)| e.log_evidence + (w / weights).ln()).collect();
     let total = log_sum_exp(&weighted);
     let best =
         (0..list.len()).max_by(|&a, &b| weighted[a].total_cmp(&weighted[b])).expect("at least one share");
@@ -255,24 +272,27 @@ pub fn over_forms(
 mod tests {
     use super::*;
     use crate::example::{Deviates, rig, table};
-    use crate::fit::minimise;
-    use crate::hypotheses::FORM_LENGTHS;
-    use crate::smooth::{Coordinates, Kernel};
+    use crate::hypotheses::form_lengths;
+    use crate::kernel::{Coordinates, Kernel};
+    use crate::least_squares::minimise;
 
     /// Without a gap a law can gain no more than its best size does: at size zero its shapes change nothing, and a volume
     /// that nothing limits must not count for it.
     #[test]
     fn a_law_without_effect_gains_nothing() {
         let table = table(&mut Deviates(11), 0.0);
-        let mut problem = Problem::new(&table, &rig());
+        let mut problem = Problem::new(&table, &rig(), &Default::default());
         crate::noise::settle(&table, &rig(), &mut problem);
         let coordinates = Coordinates::of(&table);
         let largest = problem.design.largest_amplitude_m;
-        let places: Vec<_> =
-            problem.passes.iter().map(|p| coordinates.place(p, largest, &FORM_LENGTHS)).collect();
+        let places: Vec<_> = problem
+            .passes
+            .iter()
+            .map(|p| coordinates.place(p, largest, &form_lengths(&problem.constants)))
+            .collect();
         let basis = Kernel::new(&places, 20, 0.02).matrix(&places);
         let none = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, 15);
-        let none = explain(&problem, &[], &none.u, &basis, 0.0, 4);
+        let none = laplace(&problem, &[], &none.u, &basis, 0.0, 4);
         let mut tried = 0;
         for effect in 0..effects::library().len() {
             for law in 0..effects::library()[effect].laws().len() {
@@ -290,8 +310,8 @@ mod tests {
                             low
                         });
                     }
-                    let held = explain(&problem, &[member], &u, &basis, FORMS[1].0, 0);
-                    let gain = held.log_evidence - none.log_evidence;
+                    let with = laplace(&problem, &[member], &u, &basis, problem.constants.form_shares[1], 0);
+                    let gain = with.log_evidence - none.log_evidence;
                     let name =
                         (effects::library()[effect].name(), effects::library()[effect].laws()[law].name);
                     assert!(gain.is_finite() && gain < 3.0, "{name:?}: {gain:.1} nats");

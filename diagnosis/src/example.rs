@@ -1,7 +1,10 @@
 //! A small table for tests.
 
-use crate::data::{Noise, Rig, Table};
-use effects::{Active, Baseline, Design, Operating, by_name, lateral_force};
+use crate::data::{RigFile, Table};
+use effects::{Active, Baseline, Design, by_name, lateral_force};
+use models::condition::Condition;
+use models::quantity::{Direction, PeakToPeak};
+use models::rig_file::PassNoise;
 
 /// Normal deviates of a linear congruential generator, by the sum of twelve.
 pub struct Deviates(pub u64);
@@ -18,11 +21,11 @@ impl Deviates {
     }
 }
 
-const RIG_NOISE: Noise = Noise { pass_relative_sd: 0.02, force_sd_n: 0.001 };
+const RIG_NOISE: PassNoise = PassNoise { pass_relative_sd: 0.02, force_sd_n: 0.001 };
 
 /// A rig with the fingertip of the paper.
-pub fn rig() -> Rig {
-    Rig { finger: models::finger::Finger::paper(), noise: RIG_NOISE, calibration: Default::default() }
+pub fn rig() -> RigFile {
+    RigFile { finger: models::finger::Finger::paper(), noise: RIG_NOISE, calibration: Default::default() }
 }
 
 /// Thirty-six passes under friction that depends on speed with this exponent.
@@ -43,19 +46,20 @@ pub fn table(draw: &mut Deviates, exponent: f64) -> Table {
         largest_amplitude_m: 3e-6,
     };
     let pick = |list: &[f64], draw: &mut Deviates| list[(draw.uniform() * list.len() as f64) as usize];
-    let passes: Vec<Operating> = (0..36)
-        .map(|i| Operating {
+    let passes: Vec<Condition> = (0..36)
+        .map(|i| Condition {
             time_s: 5.0 * f64::from(i),
-            run_time_s: 5.0 * f64::from(i),
-            amplitude_pp_m: if i % 6 == 0 { 0.0 } else { pick(&[0.8e-6, 1.6e-6, 3e-6], draw) },
+            run_time_s: Some(5.0 * f64::from(i)),
+            amplitude: PeakToPeak::from_metres(if i % 6 == 0 {
+                0.0
+            } else {
+                pick(&[0.8e-6, 1.6e-6, 3e-6], draw)
+            }),
             frequency_hz: 30e3,
             speed_m_s: pick(&[0.01, 0.03, 0.09], draw),
-            direction: pick(&[1.0, -1.0], draw),
-            position_m: 0.0,
+            direction: if pick(&[1.0, -1.0], draw) > 0.0 { Direction::Forward } else { Direction::Backward },
             normal_force_n: pick(&[0.15, 0.3, 0.6], draw),
-            ambient_pressure_pa: None,
-            temperature_c: None,
-            relative_humidity_pct: None,
+            ..Condition::paper()
         })
         .collect();
     let theta = [exponent];

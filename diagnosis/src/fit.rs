@@ -1,13 +1,25 @@
-//! Bounded least squares of one hypothesis on a table, in coordinates that are standard normal a priori.
+//! The regression problem: one hypothesis on a table, in coordinates that are standard normal a priori.
 
-use crate::data::Rig;
-use effects::{Active, Baseline, Design, Operating, Parameter, Place, known, library};
+use crate::constants::Constants;
+use crate::data::RigFile;
+use crate::layout::{Layout, NUISANCES};
+use effects::{Active, Baseline, Design, Law, Parameter, Place, known, library};
+use models::condition::Condition;
+use models::rig_file::CertifiedKey;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
-/// Deviation of the logarithm of mu0 a priori where the still passes give it, and where they do not.
-const MU0_LOG_SD: (f64, f64) = (0.3, 0.8);
-/// Number of baseline parameters: logarithms of mu0, normal and lateral stiffness.
-pub const NUISANCES: usize = 3;
+/// Step of a difference in a nuisance's coordinate and in an effect's.
+const STEPS: [f64; 2] = [1e-3, 2e-3];
+/// Farthest coordinate of a nuisance that a fit may take, in deviations of its prior.
+const FARTHEST_NUISANCE: f64 = 40.0;
+/// Half the logarithm of two pi.
+const HALF_LN_2PI: f64 = 0.918_938_533_204_672_8;
+/// Least guess of mu0 where no pass has the plate still.
+const LEAST_MU0: f64 = 0.05;
+/// Certified deviations below this share of a law's own prior are taken as this: closer to exact than any table can tell,
+/// and still a number to divide by.
+const EXACT: f64 = 1e-6;
 
 /// One member of a hypothesis: index of the effect among the known ones, and of its law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -19,9 +31,13 @@ pub struct Member {
 }
 
 impl Member {
+    /// The law.
+    pub fn form(&self) -> &'static Law {
+        &known()[self.effect].laws()[self.law]
+    }
     /// The law's parameters.
     pub fn parameters(&self) -> &'static [Parameter] {
-        known()[self.effect].laws()[self.law].parameters
+        self.form().parameters
     }
     /// The effect's name.
     pub fn name(&self) -> &'static str {
@@ -41,7 +57,7 @@ impl Member {
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// Conditions.
-    pub passes: Vec<Operating>,
+    pub passes: Vec<Condition>,
     /// Measured lateral forces, N.
     pub lateral: Vec<f64>,
     /// Variances of the lateral forces, N^2.
@@ -54,11 +70,24 @@ pub struct Problem {
     pub prior_sd: [f64; NUISANCES],
     /// Certified deviations of effect sizes, by effect and law, in units of the law's own prior.
     pub certified: Vec<(Member, f64)>,
+    /// Tunable constants of the diagnosis.
+    pub constants: Arc<Constants>,
+}
+
+/// Instrument errors that no table of passes tells from another baseline, with the logarithmic change of the baseline's
+/// parameters that each is. What a certificate leaves open of them is part of the recalibration; without a certificate the
+/// instrument is taken at its word, and a pull of the stiffnesses is the only sign.
+fn gains_within_the_baseline() -> impl Iterator<Item = (CertifiedKey, [f64; NUISANCES])> {
+    library()
+        .iter()
+        .filter(|e| e.needs().iter().any(|n| n.is_standard()))
+        .flat_map(|e| e.laws())
+        .filter_map(|law| Some((law.certified_by?, law.acts_as?)))
 }
 
 impl Problem {
     /// The problem of a whole table.
-    pub fn new(table: &crate::data::Table, rig: &Rig) -> Self {
+    pub fn new(table: &crate::data::Table, rig: &RigFile, constants: &Arc<Constants>) -> Self {
         let mu0 = table.still_coefficient();
         // Without still passes the largest friction seen is the best first word on mu0.
         let guess = mu0.unwrap_or_else(|| {
@@ -66,18 +95,25 @@ impl Problem {
                 .passes
                 .iter()
                 .zip(&table.lateral)
-                .map(|(p, l)| p.direction * l / p.normal_force_n)
-                .fold(0.05, f64::max)
+                .map(|(p, l)| p.direction.sign() * l / p.normal_force_n)
+                .fold(LEAST_MU0, f64::max)
         });
-        let sd = rig.finger.stiffness_relative_sd.max(1e-3);
+        let sd = rig.finger.stiffness_relative_sd.max(constants.stiffness_sd_floor);
         let mut certified = Vec::new();
         for (index, effect) in library().iter().enumerate() {
             for (law, form) in effect.laws().iter().enumerate() {
                 if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) =
-                    (rig.certified_sd(effect.name(), law), form.parameters[0].prior)
+                    (form.certified_by.and_then(|key| rig.calibration.sd(key)), form.parameters[0].prior)
                 {
-                    certified.push((Member { effect: index, law }, (sd / wide).min(1.0)));
+                    certified.push((Member { effect: index, law }, (sd / wide).clamp(EXACT, 1.0)));
                 }
+            }
+        }
+        let mut prior_sd = [constants.mu0_log_sd[usize::from(mu0.is_none())], sd, sd];
+        for (key, e_folds) in gains_within_the_baseline() {
+            let open = rig.calibration.sd(key).unwrap_or(0.0);
+            for (own, e_fold) in prior_sd.iter_mut().zip(e_folds) {
+                *own = own.hypot(e_fold * open);
             }
         }
         Problem {
@@ -90,8 +126,9 @@ impl Problem {
                 normal_stiffness_n_per_m: rig.finger.normal_stiffness_n_per_m,
                 lateral_stiffness_n_per_m: rig.finger.lateral_stiffness_n_per_m,
             },
-            prior_sd: [if mu0.is_some() { MU0_LOG_SD.0 } else { MU0_LOG_SD.1 }, sd, sd],
+            prior_sd,
             certified,
+            constants: constants.clone(),
         }
     }
 
@@ -112,13 +149,9 @@ impl Problem {
             lateral: rows.iter().map(|&i| self.lateral[i]).collect(),
             variance: rows.iter().map(|&i| self.variance[i]).collect(),
             certified: self.certified.clone(),
+            constants: self.constants.clone(),
             ..*self
         }
-    }
-
-    /// The same problem with other forces (of a fit, or simulated).
-    pub fn with_lateral(&self, lateral: Vec<f64>) -> Self {
-        Problem { lateral, ..self.clone() }
     }
 
     /// The baseline at coordinates.
@@ -131,14 +164,9 @@ impl Problem {
         }
     }
 
-    /// Number of coordinates of a hypothesis.
-    pub fn dimension(members: &[Member]) -> usize {
-        NUISANCES + members.iter().map(|m| m.parameters().len()).sum::<usize>()
-    }
-
     /// Bounds of the coordinates.
     pub fn bounds(&self, members: &[Member]) -> Vec<(f64, f64)> {
-        let mut bounds = vec![(-40.0, 40.0); NUISANCES];
+        let mut bounds = vec![(-FARTHEST_NUISANCE, FARTHEST_NUISANCE); NUISANCES];
         for m in members {
             bounds.extend(m.parameters().iter().map(Parameter::coordinate_bounds));
         }
@@ -166,14 +194,11 @@ impl Problem {
 
     /// Log prior density at coordinates.
     pub fn log_prior(&self, members: &[Member], u: &[f64]) -> f64 {
-        let half_log_2pi = 0.918_938_533_204_672_8;
-        let mut sum: f64 = u[..NUISANCES].iter().map(|x| -0.5 * x * x - half_log_2pi).sum();
-        let mut at = NUISANCES;
-        for m in members {
-            for (i, p) in m.parameters().iter().enumerate() {
+        let mut sum: f64 = u[..NUISANCES].iter().map(|x| -0.5 * x * x - HALF_LN_2PI).sum();
+        for (m, places) in members.iter().zip(Layout::of(members).members()) {
+            for (i, (p, u)) in m.parameters().iter().zip(&u[places]).enumerate() {
                 let sd = if i == 0 { self.certificate(m) } else { 1.0 };
-                sum += p.log_prior(u[at] / sd) - sd.ln();
-                at += 1;
+                sum += p.log_prior(u / sd) - sd.ln();
             }
         }
         sum
@@ -181,19 +206,10 @@ impl Problem {
 
     /// Parameters in the laws' own units.
     pub fn thetas(members: &[Member], u: &[f64]) -> Vec<Vec<f64>> {
-        let mut at = NUISANCES;
-        members
-            .iter()
-            .map(|m| {
-                m.parameters()
-                    .iter()
-                    .map(|p| {
-                        at += 1;
-                        p.value(u[at - 1])
-                    })
-                    .collect()
-            })
-            .collect()
+        let own = |(m, places): (&Member, std::ops::Range<usize>)| {
+            m.parameters().iter().zip(&u[places]).map(|(p, u)| p.value(*u)).collect()
+        };
+        members.iter().zip(Layout::of(members).members()).map(own).collect()
     }
 
     /// Predicted lateral forces, N.
@@ -202,7 +218,7 @@ impl Problem {
     }
 
     /// Predicted lateral forces at other conditions, N.
-    pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Operating]) -> DVector<f64> {
+    pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Condition]) -> DVector<f64> {
         let baseline = self.baseline(u);
         let thetas = Self::thetas(members, u);
         // Effects act in the library's order, whatever the order of the hypothesis.
@@ -224,7 +240,7 @@ impl Problem {
         let mut jacobian = DMatrix::zeros(self.len(), u.len());
         let mut moved = u.to_vec();
         for k in 0..u.len() {
-            let size = if k < NUISANCES { 1e-3 } else { 2e-3 };
+            let size = STEPS[usize::from(k >= NUISANCES)];
             let step = if u[k] + size > bounds[k].1 { -size } else { size };
             moved[k] = u[k] + step;
             let there = self.predict(members, &moved);
@@ -235,128 +251,28 @@ impl Problem {
     }
 }
 
-/// Where a fit ended.
-#[derive(Debug, Clone)]
-pub struct Fit {
-    /// Coordinates.
-    pub u: Vec<f64>,
-    /// Prediction there, N.
-    pub prediction: DVector<f64>,
-    /// Weighted sum of squares plus the prior's.
-    pub cost: f64,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::{Deviates, rig, table};
+    use models::rig_file::RigFile;
 
-/// Levenberg-Marquardt with projection onto the bounds; weights are the inverse variances.
-pub fn minimise(
-    problem: &Problem,
-    members: &[Member],
-    start: &[f64],
-    variance: &[f64],
-    rounds: usize,
-) -> Fit {
-    let bounds = problem.bounds(members);
-    let precision = problem.prior_precision(members);
-    let n = problem.len();
-    let cost_of = |u: &[f64], m: &DVector<f64>| -> f64 {
-        let misfit: f64 = (0..n).map(|i| (problem.lateral[i] - m[i]).powi(2) / variance[i]).sum();
-        misfit + u.iter().zip(&precision).map(|(x, p)| p * x * x).sum::<f64>()
-    };
-    let mut u: Vec<f64> = start.iter().zip(&bounds).map(|(x, b)| x.clamp(b.0, b.1)).collect();
-    let mut m = problem.predict(members, &u);
-    let mut cost = cost_of(&u, &m);
-    let mut damping = 1e-2;
-    for _ in 0..rounds {
-        let jacobian = problem.jacobian(members, &u, &m);
-        let (hessian, gradient) = normal_equations(problem, &jacobian, &m, variance, &precision, &u);
-        let mut improved = false;
-        for _ in 0..6 {
-            let Some(next) = bounded_step(&hessian, &gradient, damping, &u, &bounds) else { break };
-            let there = problem.predict(members, &next);
-            let value = cost_of(&next, &there);
-            if value < cost {
-                let gain = cost - value;
-                (u, m, cost) = (next, there, value);
-                damping = (damping * 0.2).max(1e-9);
-                improved = gain > 1e-3 * (1.0 + 1e-4 * cost);
-                break;
+    /// Whatever certificate rig.toml may state reaches the prior of the law that it bounds.
+    #[test]
+    fn every_certificate_narrows_the_prior_of_its_law() {
+        let table = table(&mut Deviates(2), 0.0);
+        for key in CertifiedKey::ALL {
+            let text = format!("{}\n[calibration]\n{} = 1e-4\n", rig().to_toml().unwrap(), key.name());
+            let rig = RigFile::parse(&text).unwrap();
+            let problem = Problem::new(&table, &rig, &Arc::default());
+            let narrowed: Vec<_> =
+                problem.certified.iter().filter(|(m, _)| m.form().certified_by == Some(key)).collect();
+            // A cross-talk certificate stands for the other direction too.
+            assert!(!narrowed.is_empty(), "{} bounds no law", key.name());
+            for (member, sd) in narrowed {
+                let precision = problem.prior_precision(&[*member])[Layout::of(&[*member]).size(0)];
+                assert!(*sd < 0.2 && (precision * sd * sd - 1.0).abs() < 1e-9, "{}: {sd}", key.name());
             }
-            damping *= 6.0;
-        }
-        if !improved {
-            break;
         }
     }
-    Fit { u, prediction: m, cost }
-}
-
-fn normal_equations(
-    problem: &Problem,
-    jacobian: &DMatrix<f64>,
-    m: &DVector<f64>,
-    variance: &[f64],
-    precision: &[f64],
-    u: &[f64],
-) -> (DMatrix<f64>, DVector<f64>) {
-    let d = u.len();
-    let n = problem.len();
-    let mut hessian = DMatrix::zeros(d, d);
-    let mut gradient = DVector::zeros(d);
-    for a in 0..d {
-        let column = jacobian.column(a);
-        gradient[a] = -(0..n).map(|i| column[i] * (problem.lateral[i] - m[i]) / variance[i]).sum::<f64>()
-            + precision[a] * u[a];
-        for b in 0..=a {
-            let other = jacobian.column(b);
-            let v: f64 = (0..n).map(|i| column[i] * other[i] / variance[i]).sum();
-            hessian[(a, b)] = v;
-            hessian[(b, a)] = v;
-        }
-        hessian[(a, a)] += precision[a];
-    }
-    (hessian, gradient)
-}
-
-/// A damped Gauss-Newton step that stays within the bounds; coordinates pushed against a bound are held.
-pub fn bounded_step(
-    hessian: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    damping: f64,
-    u: &[f64],
-    bounds: &[(f64, f64)],
-) -> Option<Vec<f64>> {
-    let d = u.len();
-    let mut free: Vec<usize> = (0..d)
-        .filter(|&k| {
-            !((u[k] <= bounds[k].0 && gradient[k] > 0.0) || (u[k] >= bounds[k].1 && gradient[k] < 0.0))
-        })
-        .collect();
-    for _ in 0..d {
-        if free.is_empty() {
-            return None;
-        }
-        let f = free.len();
-        let mut h = DMatrix::from_fn(f, f, |i, j| hessian[(free[i], free[j])]);
-        for i in 0..f {
-            h[(i, i)] += damping * h[(i, i)].max(1e-6) + 1e-10;
-        }
-        let g = DVector::from_fn(f, |i, _| -gradient[free[i]]);
-        let step = h.cholesky()?.solve(&g);
-        let mut next = u.to_vec();
-        let mut blocked = None;
-        for (i, &k) in free.iter().enumerate() {
-            let target = u[k] + step[i].clamp(-3.0, 3.0);
-            if target < bounds[k].0 || target > bounds[k].1 {
-                blocked.get_or_insert(i);
-            }
-            next[k] = target.clamp(bounds[k].0, bounds[k].1);
-        }
-        match blocked {
-            // A coordinate already at its bound is held and the others take a step of their own.
-            Some(i) if u[free[i]] <= bounds[free[i]].0 || u[free[i]] >= bounds[free[i]].1 => {
-                free.remove(i);
-            }
-            _ => return Some(next),
-        }
-    }
-    None
 }

@@ -1,43 +1,27 @@
 //! The hypotheses: no gap, each effect, pairs, and the open set; fitted, with their probabilities.
 
-use crate::data::{Rig, Table};
-use crate::evidence::{Explained, over_forms};
-use crate::explore::{held_nuisances, tempered};
-use crate::fit::{Problem, minimise};
-use crate::linear::log_sum_exp;
+use crate::constants::Constants;
+use crate::data::{RigFile, Table};
+use crate::discrepancy::Discrepancy;
+use crate::evidence::{Posterior, averaged_over_form};
+use crate::fit::Problem;
+use crate::gaussian::log_sum_exp;
+use crate::kernel::{Coordinates, Kernel, Lengths};
+use crate::layout::NUISANCES;
+use crate::least_squares::minimise;
 use crate::noise::{PureError, settle};
 use crate::pairs::pairs;
-use crate::singles::{OUTLIVED, Search, outlived, singles, sort, strangers};
-use crate::smooth::{Coordinates, Kernel, Lengths};
-use crate::wildcard::Wildcard;
-use effects::{known, library};
+use crate::singles::{Search, lapsed, singles, sort, unlisted};
+use crate::starts::{nuisances_of, tempered};
+use effects::{Effect, known, library};
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
-/// Prior probabilities of no gap, of one effect, of two, and of none in the library.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Priors {
-    /// No gap.
-    pub none: f64,
-    /// One effect of the library.
-    pub single: f64,
-    /// Two effects of the library.
-    pub pair: f64,
-    /// Something else.
-    pub unknown: f64,
-}
-
-impl Default for Priors {
-    /// A gap is as likely as none.
-    fn default() -> Self {
-        Priors { none: 0.5, single: 0.36, pair: 0.07, unknown: 0.07 }
-    }
-}
-
-/// What a diagnosis may be told.
+/// Choices of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Prior probabilities.
-    pub priors: Priors,
+    /// Tunable constants; a study changes them.
+    pub constants: Arc<Constants>,
     /// Whether pairs are tried.
     pub pairs: bool,
     /// Effects that are left out of the library (for leave-one-effect-out tests).
@@ -46,7 +30,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Options { priors: Priors::default(), pairs: true, without: Vec::new() }
+        Options { constants: Arc::default(), pairs: true, without: Vec::new() }
     }
 }
 
@@ -58,9 +42,9 @@ pub struct Candidate {
     /// Log evidence averaged over laws and shares.
     pub log_evidence: f64,
     /// The best law and share.
-    pub best: Explained,
+    pub best: Posterior,
     /// Each law's own log evidence and solution.
-    pub laws: Vec<(f64, Explained)>,
+    pub laws: Vec<(f64, Posterior)>,
     /// Probability given the data.
     pub probability: f64,
     /// Its logarithm: it orders hypotheses whose probabilities are too small for a number.
@@ -72,8 +56,8 @@ impl Candidate {
     pub(crate) fn new(
         effects: Vec<usize>,
         log_evidence: f64,
-        best: Explained,
-        laws: Vec<(f64, Explained)>,
+        best: Posterior,
+        laws: Vec<(f64, Posterior)>,
     ) -> Self {
         Candidate { effects, log_evidence, best, laws, probability: 0.0, log_probability: f64::NEG_INFINITY }
     }
@@ -91,13 +75,13 @@ pub struct Fitted {
     /// What the replicates said.
     pub pure: PureError,
     /// Recalibrated baseline.
-    pub none: Explained,
+    pub none: Posterior,
     /// Probability of no gap.
     pub none_probability: f64,
     /// The open set's smooth departure of any kind.
-    pub wildcard: Wildcard,
+    pub discrepancy: Discrepancy,
     /// Causes of known form that the library does not name, best first: part of the open set.
-    pub strangers: Vec<Candidate>,
+    pub unlisted: Vec<Candidate>,
     /// Probability of the open set.
     pub unknown_probability: f64,
     /// Single effects and pairs, most probable first.
@@ -110,40 +94,35 @@ pub struct Fitted {
     pub kernel: Kernel,
     /// Its values at the table's passes.
     pub basis: DMatrix<f64>,
-    /// The priors that were used.
-    pub priors: Priors,
-    /// Number of single effects that were tried.
-    pub singles_tried: usize,
 }
 
-/// Lengths of the form uncertainty in standard deviations of each covariate.
-pub const FORM_LENGTHS: Lengths = Lengths { condition: 1.5, time: 1.5, position: f64::INFINITY };
-const FORM_RANK: usize = 40;
-/// Share of the smooth gap below which starts do not look.
-const START_SHARE: f64 = 0.15;
-/// Share of the open set's weight for causes of known form.
-const KNOWN: f64 = 0.1;
-/// Deviations of chi2 above its expectation from which the best single is taken to leave something.
-const ENOUGH: f64 = 2.5;
+/// Lengths of the form uncertainty in standard deviations of each covariate; a form does not depend on the place.
+pub fn form_lengths(k: &Constants) -> Lengths {
+    Lengths { condition: k.form_length, time: k.form_length, position: f64::INFINITY, climate: f64::INFINITY }
+}
+
+/// Rounds of the baseline's fit, and of its fit to what the gap looks like at large.
+const ROUNDS: [usize; 2] = [15, 10];
 
 /// Fits every hypothesis to a table.
-pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
-    let mut problem = Problem::new(table, rig);
-    let (wildcard, pure) = settle(table, rig, &mut problem);
+pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
+    let k = &*options.constants;
+    let mut problem = Problem::new(table, rig, &options.constants);
+    let (discrepancy, pure) = settle(table, rig, &mut problem);
     let coordinates = Coordinates::of(table);
     let places: Vec<_> = problem
         .passes
         .iter()
-        .map(|p| coordinates.place(p, problem.design.largest_amplitude_m, &FORM_LENGTHS))
+        .map(|p| coordinates.place(p, problem.design.largest_amplitude_m, &form_lengths(k)))
         .collect();
-    let kernel = Kernel::new(&places, FORM_RANK, 0.02);
+    let kernel = Kernel::new(&places, k.form_rank, k.kernel_rest);
     let basis = kernel.matrix(&places);
 
-    let baseline = minimise(&problem, &[], &[0.0; 3], &problem.variance, 15);
-    let (none_evidence, none) = over_forms(&problem, &baseline, &[], &basis);
-    let gap = &wildcard.smooth - &none.prediction;
-    let loose = tempered(&problem, &gap, START_SHARE);
-    let held = held_nuisances(&minimise(&problem, &[], &none.u, &loose, 10));
+    let baseline = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, ROUNDS[0]);
+    let (none_evidence, none) = averaged_over_form(&problem, &baseline, &[], &basis);
+    let gap = &discrepancy.smooth - &none.prediction;
+    let loose = tempered(&problem, &gap, k.start_share);
+    let nuisances = nuisances_of(&minimise(&problem, &[], &none.u, &loose, ROUNDS[1]));
 
     let mut not_testable = Vec::new();
     let mut tried = Vec::new();
@@ -152,25 +131,25 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
             continue;
         }
         match table.lacks(effect.needs()) {
-            Some(because) => not_testable.push((effect.name(), because)),
+            Some(because) => not_testable.push((effect.name(), certified(*effect, rig).unwrap_or(because))),
             None => tried.push(index),
         }
     }
 
-    let search = Search { held: &held, loose: &loose, basis: &basis };
+    let search = Search { nuisances: &nuisances, loose: &loose, basis: &basis };
     let mut candidates = singles(&problem, table, &tried, &search);
-    let outlived = outlived(&mut problem, table, &mut candidates, &search);
+    let lapsed = lapsed(&mut problem, table, &mut candidates, &search);
     sort(&mut candidates);
-    let strangers = strangers(&problem, table, &search);
+    let unlisted = unlisted(&problem, table, &search);
 
-    if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + 3.0) {
-        let companions = second_causes(&problem, &candidates, &outlived, &search);
+    if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + k.pairs_from_nats)
+    {
+        let companions = second_causes(&problem, &candidates, &lapsed, &search);
         candidates.extend(companions);
     }
 
-    let evidence = [none_evidence, open_evidence(&wildcard, &strangers)];
-    let [none_probability, unknown_probability] =
-        weigh(&mut candidates, evidence, tried.len(), &options.priors);
+    let evidence = [none_evidence, open_evidence(k, &discrepancy, &unlisted)];
+    let [none_probability, unknown_probability] = weigh(&mut candidates, evidence, tried.len(), k);
     candidates
         .sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability).then(a.effects.cmp(&b.effects)));
     Fitted {
@@ -178,17 +157,26 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
         pure,
         none,
         none_probability,
-        wildcard,
-        strangers,
+        discrepancy,
+        unlisted,
         unknown_probability,
         candidates,
         not_testable,
         coordinates,
         kernel,
         basis,
-        priors: options.priors,
-        singles_tried: tried.len(),
     }
+}
+
+/// Why an effect is not sought that only an outside standard shows, where rig.toml states that calibration.
+fn certified(effect: &dyn Effect, rig: &RigFile) -> Option<String> {
+    let standard = effect.needs().iter().any(|n| n.is_standard());
+    let key = effect.laws().iter().filter(|_| standard).find_map(|law| law.certified_by)?;
+    let sd = rig.calibration.sd(key)?;
+    Some(format!(
+        "an outside calibration leaves {sd:.1e} of the {} open, and that is part of the recalibrated baseline",
+        key.words()
+    ))
 }
 
 /// Pairs, where the best single leaves something: one that leaves nothing needs no second cause, unless it is the
@@ -196,7 +184,7 @@ pub fn fit_all(table: &Table, rig: &Rig, options: &Options) -> Fitted {
 fn second_causes(
     problem: &Problem,
     singles: &[Candidate],
-    outlived: &[usize],
+    lapsed: &[usize],
     search: &Search<'_>,
 ) -> Vec<Candidate> {
     let best = &singles[0].best;
@@ -205,14 +193,14 @@ fn second_causes(
         .sum::<f64>()
         + best.pull();
     let n = problem.len() as f64;
-    if misfit <= n + ENOUGH * (2.0 * n).sqrt() {
+    if misfit <= n + problem.constants.misfit_sd * (2.0 * n).sqrt() {
         return Vec::new();
     }
     let mut grown = pairs(problem, singles, search.loose, search.basis);
     for pair in &mut grown {
         // A pair pays for the certificates that it frees as its members do alone.
-        let freed = pair.effects.iter().filter(|e| outlived.contains(e)).count();
-        pair.log_evidence += freed as f64 * OUTLIVED.ln();
+        let freed = pair.effects.iter().filter(|e| lapsed.contains(e)).count();
+        pair.log_evidence += freed as f64 * problem.constants.lapse_probability.ln();
     }
     grown
 }
@@ -222,25 +210,25 @@ fn weigh(
     candidates: &mut [Candidate],
     [none, open]: [f64; 2],
     singles_tried: usize,
-    priors: &Priors,
+    k: &Constants,
 ) -> [f64; 2] {
     let count = singles_tried.max(1) as f64;
     let pair_count = (count * (count - 1.0) / 2.0).max(1.0);
     let prior_of = |c: &Candidate| {
-        if c.effects.len() == 1 { priors.single / count } else { priors.pair / pair_count }
+        if c.effects.len() == 1 { k.prior_single / count } else { k.prior_pair / pair_count }
     };
     let mut all: Vec<f64> = candidates.iter().map(|c| c.log_evidence + prior_of(c).ln()).collect();
-    let (no_gap, unknown) = (none + priors.none.ln(), open + priors.unknown.ln());
+    let (no_gap, unknown) = (none + k.prior_null.ln(), open + k.prior_open.ln());
     all.extend([no_gap, unknown]);
     let total = log_sum_exp(&all);
-    // The rest of each hypothesis' weight is no gap's: see `told`.
+    // The rest of each hypothesis' weight is no gap's: see `log_shown_share`.
     let mut rest = 1.0;
     for (c, v) in candidates.iter_mut().zip(&all) {
-        c.log_probability = v - total + told(c.log_evidence, none);
+        c.log_probability = v - total + log_shown_share(c.log_evidence, none);
         c.probability = c.log_probability.exp();
         rest -= c.probability;
     }
-    let unknown = (unknown - total + told(open, none)).exp();
+    let unknown = (unknown - total + log_shown_share(open, none)).exp();
     // Where hypotheses take all but rounding, no gap's own weight is the better number.
     [(rest - unknown).max((no_gap - total).exp()), unknown]
 }
@@ -250,31 +238,31 @@ fn weigh(
 /// Causes have sizes from nothing upwards. Those too small to tell fit as well as no gap does, and give a cause at most the
 /// evidence of no gap; that part of its weight says that there is nothing to be seen, and counts for no gap. Without, tables
 /// without a gap were given 0.75 to 0.93 for none where that was right in 99 of 100.
-fn told(evidence: f64, none: f64) -> f64 {
+fn log_shown_share(evidence: f64, none: f64) -> f64 {
     let behind = none - evidence;
     // The logarithm of one and an exponential, which must not overflow.
     -(behind.max(0.0) + (-behind.abs()).exp().ln_1p())
 }
 
 /// Evidence of the open set: a smooth departure of any kind, or a cause of known form that the library does not name.
-fn open_evidence(wildcard: &Wildcard, strangers: &[Candidate]) -> f64 {
-    let each = (KNOWN / strangers.len().max(1) as f64).ln();
-    let mut parts = vec![wildcard.log_evidence + (1.0 - KNOWN).ln()];
-    parts.extend(strangers.iter().map(|c| c.log_evidence + each));
+fn open_evidence(k: &Constants, discrepancy: &Discrepancy, unlisted: &[Candidate]) -> f64 {
+    let each = (k.unlisted_share / unlisted.len().max(1) as f64).ln();
+    let mut parts = vec![discrepancy.log_evidence + (1.0 - k.unlisted_share).ln()];
+    parts.extend(unlisted.iter().map(|c| c.log_evidence + each));
     log_sum_exp(&parts)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::told;
+    use super::log_shown_share;
 
     /// `E / (E + E0)` in logarithms, at ratios where that fits a number and where it does not.
     #[test]
     fn what_is_too_small_to_tell_is_no_gap() {
-        assert!((told(0.0, 0.0) - 0.5_f64.ln()).abs() < 1e-15);
-        assert!((told(3.0_f64.ln(), 0.0) - 0.75_f64.ln()).abs() < 1e-15);
-        assert!((told(-7.0, -7.0 + 9.0_f64.ln()) - 0.1_f64.ln()).abs() < 1e-14);
-        assert_eq!(told(2e4, -2e4), 0.0);
-        assert_eq!(told(-2e4, 2e4), -4e4);
+        assert!((log_shown_share(0.0, 0.0) - 0.5_f64.ln()).abs() < 1e-15);
+        assert!((log_shown_share(3.0_f64.ln(), 0.0) - 0.75_f64.ln()).abs() < 1e-15);
+        assert!((log_shown_share(-7.0, -7.0 + 9.0_f64.ln()) - 0.1_f64.ln()).abs() < 1e-14);
+        assert_eq!(log_shown_share(2e4, -2e4), 0.0);
+        assert_eq!(log_shown_share(-2e4, 2e4), -4e4);
     }
 }

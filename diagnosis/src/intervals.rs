@@ -1,8 +1,10 @@
 //! Parameter intervals by profile likelihood, with their shape.
 
-use crate::evidence::Explained;
-use crate::fit::{NUISANCES, Problem, bounded_step};
-use crate::linear::Covariance;
+use crate::evidence::Posterior;
+use crate::fit::Problem;
+use crate::gaussian::Covariance;
+use crate::layout::{Layout, NUISANCES};
+use crate::least_squares::bounded_step;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
@@ -33,11 +35,13 @@ pub struct Estimate {
     pub shape: Shape,
 }
 
-/// Fall of twice the log posterior that bounds a 95 % interval.
+/// Fall of twice the log posterior that bounds a 95 % interval: that quantile of chi2 with one degree of freedom.
 const FALL: f64 = 3.841;
+/// Deviations of a normal that bound 95 %.
+const NORMAL_95: f64 = 1.96;
 
 /// Profiles every parameter of the hypothesis.
-pub fn estimates(problem: &Problem, best: &Explained, basis: &DMatrix<f64>) -> Vec<Vec<Estimate>> {
+pub fn estimates(problem: &Problem, best: &Posterior, basis: &DMatrix<f64>) -> Vec<Vec<Estimate>> {
     let mut phi = basis.clone();
     for mut column in phi.column_iter_mut() {
         column.component_mul_assign(&best.change);
@@ -45,20 +49,18 @@ pub fn estimates(problem: &Problem, best: &Explained, basis: &DMatrix<f64>) -> V
     }
     let covariance = Covariance::new(&problem.variance, &phi);
     let floor = cost(problem, best, &covariance, &best.u, &best.prediction);
-    let mut at = NUISANCES;
     best.members
         .iter()
-        .map(|member| {
+        .zip(Layout::of(&best.members).members())
+        .map(|(member, places)| {
             member
                 .parameters()
                 .iter()
-                .map(|p| {
-                    let k = at;
-                    at += 1;
+                .zip(places)
+                .map(|(p, k)| {
                     let bounds = p.coordinate_bounds();
-                    let sd = best.covariance[(k, k)].max(1e-16).sqrt();
                     let ends =
-                        [-1.0, 1.0].map(|side| end(problem, best, &covariance, floor, k, side, sd, bounds));
+                        [-1.0, 1.0].map(|side| end(problem, best, &covariance, floor, k, side, bounds));
                     let value = p.value(best.u[k]);
                     let [low, high] = ends.map(|e| e.unwrap_or(f64::NAN));
                     let shape = match (ends[0], ends[1]) {
@@ -75,24 +77,43 @@ pub fn estimates(problem: &Problem, best: &Explained, basis: &DMatrix<f64>) -> V
         .collect()
 }
 
-fn cost(problem: &Problem, best: &Explained, c: &Covariance, u: &[f64], m: &DVector<f64>) -> f64 {
+/// Intervals from the curvature at the mode, for hypotheses that do not lead.
+pub fn curvature(e: &Posterior) -> Vec<Estimate> {
+    let parameters = e.members.iter().flat_map(|m| m.parameters());
+    parameters
+        .zip(NUISANCES..)
+        .map(|(p, at)| {
+            let u = e.u[at];
+            let reach = NORMAL_95 * e.covariance[(at, at)].max(0.0).sqrt();
+            let (low, high) = p.coordinate_bounds();
+            Estimate {
+                name: p.name,
+                value: p.value(u),
+                ci95: [p.value((u - reach).max(low)), p.value((u + reach).min(high))],
+                unit: p.unit,
+                shape: if u - reach < low || u + reach > high { Shape::OneSided } else { Shape::Bounded },
+            }
+        })
+        .collect()
+}
+
+fn cost(problem: &Problem, best: &Posterior, c: &Covariance, u: &[f64], m: &DVector<f64>) -> f64 {
     let precision = problem.prior_precision(&best.members);
     let y = DVector::from_column_slice(&problem.lateral);
     c.quadratic(&(y - m)) + u.iter().zip(&precision).map(|(x, p)| p * x * x).sum::<f64>()
 }
 
 /// The coordinate at which the profile has fallen by [`FALL`]; `None` where it never does within the bounds.
-#[allow(clippy::too_many_arguments)]
 fn end(
     problem: &Problem,
-    best: &Explained,
+    best: &Posterior,
     covariance: &Covariance,
     floor: f64,
     k: usize,
     side: f64,
-    sd: f64,
     bounds: (f64, f64),
 ) -> Option<f64> {
+    let sd = best.covariance[(k, k)].max(1e-16).sqrt();
     let limit = if side < 0.0 { best.u[k] - bounds.0 } else { bounds.1 - best.u[k] };
     if limit <= 0.0 {
         return None;
@@ -103,7 +124,7 @@ fn end(
         start = u;
         value - floor
     };
-    let (mut near, mut far) = (0.0, (1.96 * sd).min(limit));
+    let (mut near, mut far) = (0.0, (NORMAL_95 * sd).min(limit));
     let mut value = fall(far);
     while value < FALL {
         if far >= limit {
@@ -133,20 +154,20 @@ fn end(
     Some(best.u[k] + side * x)
 }
 
-/// Best cost with one coordinate held, by Gauss-Newton in the others.
+/// Best cost with one coordinate fixed, by Gauss-Newton in the others.
 fn profile(
     problem: &Problem,
-    best: &Explained,
+    best: &Posterior,
     covariance: &Covariance,
     start: &[f64],
     k: usize,
-    held: f64,
+    value_at: f64,
 ) -> (Vec<f64>, f64) {
     let precision = problem.prior_precision(&best.members);
     let mut bounds = problem.bounds(&best.members);
-    bounds[k] = (held, held);
+    bounds[k] = (value_at, value_at);
     let mut u = start.to_vec();
-    u[k] = held;
+    u[k] = value_at;
     let y = DVector::from_column_slice(&problem.lateral);
     let mut m = problem.predict(&best.members, &u);
     let mut value = cost(problem, best, covariance, &u, &m);
@@ -163,7 +184,7 @@ fn profile(
         }
         let gradient = DVector::from_fn(d, |i, _| -all[(i, d)] + precision[i] * u[i]);
         let Some(mut next) = bounded_step(&hessian, &gradient, 1e-6, &u, &bounds) else { break };
-        next[k] = held;
+        next[k] = value_at;
         let there = problem.predict(&best.members, &next);
         let v = cost(problem, best, covariance, &next, &there);
         if v >= value - 1e-3 {

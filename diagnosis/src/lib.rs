@@ -1,20 +1,58 @@
-//! Where simulation and reality part, and why.
+//! Where simulation and reality part, and why: a table of friction passes in, a verdict out.
 //!
-//! [`data`] takes the table, [`noise`] settles the variance of each pass, [`hypotheses`] weighs every candidate cause
-//! ([`singles`], [`pairs`]) and the open set ([`wildcard`]), [`shrink`] asks how each does on passes it has not seen,
-//! [`attribute`] decides, [`verdict`] says it, [`saved`] gives the rig its corrected model.
+//! | room | purpose |
+//! |---|---|
+//! | [`data`] | the table: passes in the order of measurement, and what its design can show |
+//! | [`noise`] | the variance of each pass, from rig.toml and replicates |
+//! | [`constants`] | every tunable constant with its meaning and source |
+//! | [`fit`], [`layout`], [`least_squares`] | the regression problem of a hypothesis, its vector of parameters, its fit |
+//! | [`gaussian`], [`kernel`] | Gaussian algebra of low rank; smooth functions over the operating space |
+//! | [`evidence`] | marginal likelihood by Laplace's method, with a Gaussian-process departure from the law's form |
+//! | [`discrepancy`] | the open set: a Gaussian-process discrepancy of the baseline |
+//! | [`starts`], [`singles`], [`pairs`], [`hypotheses`] | global starts; one cause, two causes, all with their probabilities |
+//! | [`left_out`] | extrapolation to left-out regions of the operating space |
+//! | [`decision`] | the verdict rule |
+//! | [`intervals`], [`pulls`] | profile intervals; how far the stiffnesses went from their calibration |
+//! | [`locate`] | which part of the operating space, and of the rig, carries the gap |
+//! | [`shrinkage`], [`predict`] | how far the gap shrinks on held-out passes; the predictive distribution |
+//! | [`next`] | the experiment that would part the leading hypotheses |
+//! | [`verdict`], [`saved`] | the report; the corrected model for a run |
+//!
+//! docs/diagnosis/model.md states the whole model once. A small table in, a verdict out:
+//!
+//! ```
+//! use models::record::read_passes;
+//! use muprime_diagnosis::{Verdict, data::{RigFile, Table}, hypotheses::Options, verdict::diagnose};
+//!
+//! // Twelve passes of a plate that stands still: friction of 0.5 N/N in both directions, repeatable to half a per cent.
+//! let mut csv = String::from("point,time_s,amplitude_pp_m,frequency_hz,speed_m_s,direction,position_m,normal_force_n,lateral_force_n\n");
+//! for i in 0..12 {
+//!     let (direction, load) = (if i % 2 == 0 { 1.0 } else { -1.0 }, 0.2 + 0.05 * (i % 4) as f64);
+//!     let force = 0.5 * load * direction * (1.0 + 0.005 * [1.0, -1.0, -1.0, 1.0, 0.0][i % 5]);
+//!     csv += &format!("{i},{},0,27500,0.02,{direction},0.01,{load},{force}\n", 5 * i);
+//! }
+//! let rig = RigFile { finger: models::finger::Finger::paper(), noise: Default::default(), calibration: Default::default() };
+//! let table = Table::measured(&read_passes(csv.as_bytes())?)?;
+//! let diagnosis = diagnose(&table, &rig, &Options::default(), String::new());
+//! assert_eq!(diagnosis.report.verdict, Verdict::NoGap);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
-pub mod attribute;
+pub mod constants;
 pub mod data;
+pub mod decision;
+pub mod discrepancy;
 pub mod evidence;
 #[cfg(test)]
 mod example;
-pub mod explore;
 pub mod fit;
-pub mod held_out;
+pub mod gaussian;
 pub mod hypotheses;
 pub mod intervals;
-pub mod linear;
+pub mod kernel;
+pub mod layout;
+pub mod least_squares;
+pub mod left_out;
 pub mod locate;
 pub mod next;
 pub mod noise;
@@ -22,8 +60,9 @@ pub mod pairs;
 pub mod predict;
 pub mod pulls;
 pub mod saved;
-pub mod shrink;
+pub mod shrinkage;
 pub mod singles;
-pub mod smooth;
+pub mod starts;
 pub mod verdict;
-pub mod wildcard;
+
+pub use decision::Verdict;

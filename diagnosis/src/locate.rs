@@ -1,11 +1,17 @@
 //! Where: the parts of the operating space that carry the gap, and the part of the rig.
 
-use crate::data::Rig;
-use crate::evidence::Explained;
+mod partition;
+
+use crate::data::RigFile;
+use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::hypotheses::Fitted;
 use crate::predict::{Forecast, Model, forecast};
-use effects::{Operating, Place, library};
+use effects::{Place, library};
+use models::condition::Condition;
+use models::covariate;
+use models::quantity::PeakToPeak;
+use partition::{cuts, named_parts, parts};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
@@ -25,18 +31,11 @@ pub struct Region {
 
 /// Probability by place; `unknown` is the open set's.
 pub fn ledger(fitted: &Fitted, probabilities: &[f64], unknown: f64) -> BTreeMap<&'static str, f64> {
-    let mut map: BTreeMap<&'static str, f64> =
-        ["contact", "finger", "plate", "instrument"].into_iter().map(|k| (k, 0.0)).collect();
+    let mut map: BTreeMap<&'static str, f64> = Place::ALL.iter().map(|place| (place.name(), 0.0)).collect();
     map.insert("unknown", unknown);
     for (c, p) in fitted.candidates.iter().zip(probabilities) {
         for &e in &c.effects {
-            let place = match library()[e].place() {
-                Place::Contact => "contact",
-                Place::Finger => "finger",
-                Place::Plate => "plate",
-                Place::Instrument => "instrument",
-            };
-            *map.get_mut(place).expect("every place is in the map") += p / c.effects.len() as f64;
+            *map.entry(library()[e].place().name()).or_insert(0.0) += p / c.effects.len() as f64;
         }
     }
     let total: f64 = map.values().sum();
@@ -46,46 +45,10 @@ pub fn ledger(fitted: &Fitted, probabilities: &[f64], unknown: f64) -> BTreeMap<
     map
 }
 
-type Covariate = (&'static str, fn(&Operating) -> f64);
-
-fn covariates() -> [Covariate; 9] {
-    [
-        ("amplitude_pp_m", |p| p.amplitude_pp_m),
-        ("speed_m_s", |p| p.speed_m_s),
-        ("normal_force_n", |p| p.normal_force_n),
-        ("frequency_hz", |p| p.frequency_hz),
-        ("direction", |p| p.direction),
-        ("position_m", |p| p.position_m),
-        ("time_s", |p| p.time_s),
-        ("ambient_pressure_pa", |p| p.ambient_pressure_pa.unwrap_or(f64::NAN)),
-        ("temperature_c", |p| p.temperature_c.unwrap_or(f64::NAN)),
-    ]
-}
-
-/// A covariate in words, with the scale and unit in which it is told.
-fn words_for(name: &str) -> (&str, f64, &str) {
-    match name {
-        "amplitude_pp_m" => ("amplitude", 1e6, "um pp"),
-        "speed_m_s" => ("speed", 1e3, "mm/s"),
-        "normal_force_n" => ("normal force", 1.0, "N"),
-        "frequency_hz" => ("frequency", 1e-3, "kHz"),
-        "position_m" => ("position", 1e3, "mm"),
-        "time_s" => ("time", 1.0, "s"),
-        "ambient_pressure_pa" => ("pressure", 1e-3, "kPa"),
-        "temperature_c" => ("temperature", 1.0, "degrees C"),
-        other => (other, 1.0, ""),
-    }
-}
-
-/// Deviations of a pass by which the gap must stand out at a condition to count.
-const STANDS_OUT: f64 = 2.0;
-/// Largest number of parts that the operating space is cut into, and the least number of places in one.
-const PARTS: usize = 128;
-const LEAST: usize = 16;
-/// Levels at which a covariate may be cut.
-const LEVELS: usize = 24;
 /// Conditions at which the verdict's model is asked for its gap.
 const ASKED: usize = 10_000;
+/// Expected number of passes that stand out from which there is a region.
+const LEAST_PASSES: f64 = 3.0;
 
 /// Boxes that together hold the conditions at which the verdict's model says that the gap stands out of the noise.
 ///
@@ -93,14 +56,14 @@ const ASKED: usize = 10_000;
 /// passes alone would end where the next pass happens to be. A condition counts by its probability of standing out. The
 /// space is cut into parts, each time where that probability differs most; those parts are named that together have
 /// the largest expected F1.
-pub fn regions(fitted: &Fitted, rig: &Rig, model: &(Model, Problem, Explained)) -> Vec<Region> {
+pub fn regions(fitted: &Fitted, rig: &RigFile, model: &(Model, Problem, Posterior)) -> Vec<Region> {
     let problem = &fitted.problem;
     let n = problem.len();
     let mut places = problem.passes.clone();
     places.extend(conditions_between(&problem.passes, ASKED));
     let forecasts = forecast(fitted, rig, model, &places);
-    let chance: Vec<f64> = forecasts.iter().map(stands_out).collect();
-    if chance[..n].iter().sum::<f64>() < 3.0 {
+    let chance: Vec<f64> = forecasts.iter().map(|f| stands_out(f, problem.constants.stands_out_sd)).collect();
+    if chance[..n].iter().sum::<f64>() < LEAST_PASSES {
         return Vec::new();
     }
     let mu0 = problem.nominal.mu0;
@@ -133,157 +96,35 @@ pub fn regions(fitted: &Fitted, rig: &Rig, model: &(Model, Problem, Explained)) 
     found
 }
 
-/// Probability that the gap at a condition exceeds [`STANDS_OUT`] deviations of a pass.
-fn stands_out(f: &Forecast) -> f64 {
+/// Probability that the gap at a condition exceeds so many deviations of a pass.
+fn stands_out(f: &Forecast, deviations: f64) -> f64 {
     let spread = (f.corrected_sd.powi(2) - f.scatter_sd.powi(2)).max(0.0).sqrt();
-    let above = (f.corrected - f.recalibrated).abs() - STANDS_OUT * f.scatter_sd;
+    let above = (f.corrected - f.recalibrated).abs() - deviations * f.scatter_sd;
     0.5 * statrs::function::erf::erfc(-above / (spread.max(1e-12) * std::f64::consts::SQRT_2))
-}
-
-/// A covariate, the values at which it may be cut, and for each place asked how many of them it lies above.
-struct Cut {
-    covariate: usize,
-    at: Vec<f64>,
-    above: Vec<u8>,
-}
-
-fn cuts(places: &[Operating]) -> Vec<Cut> {
-    let one = |covariate: usize| {
-        let values: Vec<f64> = places.iter().map(covariates()[covariate].1).collect();
-        if values.iter().any(|v| v.is_nan()) {
-            return None;
-        }
-        let mut sorted = values.clone();
-        sorted.sort_by(f64::total_cmp);
-        // Between quantiles, so that a cut never falls on a level.
-        let at: Vec<f64> = (1..LEVELS)
-            .filter_map(|k| {
-                let i = k * (sorted.len() - 1) / LEVELS;
-                let next = sorted[i..].iter().find(|v| **v > sorted[i])?;
-                Some(0.5 * (sorted[i] + next))
-            })
-            .collect();
-        let mut at = at;
-        at.dedup();
-        let above = values.iter().map(|v| at.partition_point(|a| a < v) as u8).collect();
-        (!at.is_empty()).then_some(Cut { covariate, at, above })
-    };
-    (0..covariates().len()).filter_map(one).collect()
-}
-
-/// A part of the operating space.
-#[derive(Clone)]
-struct Part {
-    bounds: BTreeMap<usize, [f64; 2]>,
-    members: Vec<usize>,
-    /// The part that it was cut from.
-    parent: Option<usize>,
-    /// Whether it has been cut itself.
-    cut: bool,
-}
-
-/// Cuts the space where the chances of standing out differ most, until there are [`PARTS`] parts.
-fn parts(cuts: &[Cut], chance: &[f64]) -> Vec<Part> {
-    let whole =
-        Part { bounds: BTreeMap::new(), members: (0..chance.len()).collect(), parent: None, cut: false };
-    let mut best: Vec<Option<(f64, usize, usize)>> = vec![best_cut(cuts, chance, &whole.members)];
-    let mut list = vec![whole];
-    for _ in 1..PARTS {
-        let open = (0..list.len()).filter(|&k| !list[k].cut).filter_map(|k| best[k].map(|b| (k, b)));
-        let Some((k, (_, cut, level))) = open.max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(b.0.cmp(&a.0)))
-        else {
-            break;
-        };
-        list[k].cut = true;
-        for upper in [false, true] {
-            let mut part = list[k].clone();
-            part.members.retain(|&i| (usize::from(cuts[cut].above[i]) > level) == upper);
-            let bound = part.bounds.entry(cuts[cut].covariate).or_insert([f64::NEG_INFINITY, f64::INFINITY]);
-            bound[usize::from(!upper)] = cuts[cut].at[level];
-            (part.parent, part.cut) = (Some(k), false);
-            best.push(best_cut(cuts, chance, &part.members));
-            list.push(part);
-        }
-    }
-    list
-}
-
-/// Gain in the sum of squares of the best cut of some places, and its covariate and level.
-fn best_cut(cuts: &[Cut], chance: &[f64], members: &[usize]) -> Option<(f64, usize, usize)> {
-    let all: f64 = members.iter().map(|&i| chance[i]).sum();
-    let square = |sum: f64, count: usize| sum * sum / count.max(1) as f64;
-    let mut best: Option<(f64, usize, usize)> = None;
-    for (k, cut) in cuts.iter().enumerate() {
-        let mut bins = [(0.0, 0); LEVELS];
-        for &i in members {
-            let bin = &mut bins[usize::from(cut.above[i])];
-            *bin = (bin.0 + chance[i], bin.1 + 1);
-        }
-        let (mut sum, mut count) = (0.0, 0);
-        for level in 0..cut.at.len() {
-            (sum, count) = (sum + bins[level].0, count + bins[level].1);
-            let rest = members.len() - count;
-            if count < LEAST || rest < LEAST {
-                continue;
-            }
-            let gain = square(sum, count) + square(all - sum, rest) - square(all, members.len());
-            if gain > best.map_or(0.5, |b| b.0) {
-                best = Some((gain, k, level));
-            }
-        }
-    }
-    best
-}
-
-/// The parts with the largest expected F1 together; where both halves of a part are named, the part itself.
-fn named_parts<'a>(list: &'a [Part], chance: &[f64]) -> Vec<&'a Part> {
-    let hits = |p: &Part| p.members.iter().map(|&i| chance[i]).sum::<f64>();
-    let mean = |p: &Part| hits(p) / p.members.len() as f64;
-    let sum: f64 = chance.iter().sum();
-    let mut leaves: Vec<usize> = (0..list.len()).filter(|&k| !list[k].cut).collect();
-    leaves.sort_by(|&a, &b| mean(&list[b]).total_cmp(&mean(&list[a])).then(a.cmp(&b)));
-    let (mut hit, mut count, mut best) = (0.0, 0.0, (0.0, 0));
-    for (taken, &k) in leaves.iter().enumerate() {
-        hit += hits(&list[k]);
-        count += list[k].members.len() as f64;
-        let expected = 2.0 * hit / (count + sum);
-        if expected > best.0 {
-            best = (expected, taken + 1);
-        }
-    }
-    let mut named = vec![false; list.len()];
-    leaves[..best.1].iter().for_each(|&k| named[k] = true);
-    // The two halves of a part follow each other in the list, after it.
-    for k in (2..list.len()).rev().step_by(2) {
-        if let (true, true, Some(parent)) = (named[k], named[k - 1], list[k].parent) {
-            (named[k], named[k - 1], named[parent]) = (false, false, true);
-        }
-    }
-    (0..list.len()).filter(|&k| named[k]).map(|k| &list[k]).collect()
 }
 
 fn region(
     bounds: &BTreeMap<usize, [f64; 2]>,
-    passes: &[Operating],
+    passes: &[Condition],
     share: f64,
     p_value: Option<f64>,
 ) -> Region {
     let mut named = BTreeMap::new();
     let mut words = Vec::new();
     for (k, b) in bounds {
-        let (name, value) = covariates()[*k];
+        let covariate = covariate::TOLD[*k];
         // An open side ends where the table does.
         let (low, high) = passes
             .iter()
-            .map(value)
+            .filter_map(|p| covariate.of(p))
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, c), v| (a.min(v), c.max(v)));
         let slack = 0.02 * (high - low);
         let low = if low >= 0.0 { (low - slack).max(0.0) } else { low - slack };
         let high = high + slack;
         let low = if b[0].is_finite() { b[0] } else { low };
         let high = if b[1].is_finite() { b[1] } else { high };
-        named.insert(name, [low, high]);
-        let (word, scale, unit) = words_for(name);
+        named.insert(covariate.name, [low, high]);
+        let (word, (scale, unit)) = (covariate.words, covariate.shown);
         let (low, high) = (low * scale, high * scale);
         words.push(match (b[0].is_finite(), b[1].is_finite()) {
             (true, true) => format!("{word} {low:.3} to {high:.3} {unit}"),
@@ -308,17 +149,17 @@ fn region(
 
 /// Conditions of the same design: what can be set is drawn independently, from the table's levels or from between
 /// two neighbouring ones; what comes together (time and temperature) stays together.
-fn conditions_between(passes: &[Operating], count: usize) -> Vec<Operating> {
+fn conditions_between(passes: &[Condition], count: usize) -> Vec<Condition> {
     let mut state = 0x5DEE_CE66_D2B7_4F1D_u64;
-    let mut uniform = || (crate::held_out::split_mix(&mut state) >> 11) as f64 / (1u64 << 53) as f64;
-    let levels = |value: fn(&Operating) -> f64| {
+    let mut uniform = || (crate::shrinkage::split_mix(&mut state) >> 11) as f64 / (1u64 << 53) as f64;
+    let levels = |value: fn(&Condition) -> f64| {
         let mut list: Vec<f64> = passes.iter().map(value).filter(|v| *v > 0.0).collect();
         list.sort_by(f64::total_cmp);
         list.dedup_by(|a, b| *a <= *b * 1.02);
         list
     };
     let (amplitudes, speeds, loads) =
-        (levels(|p| p.amplitude_pp_m), levels(|p| p.speed_m_s), levels(|p| p.normal_force_n));
+        (levels(|p| p.amplitude.metres()), levels(|p| p.speed_m_s), levels(|p| p.normal_force_n));
     let between = |value: f64, levels: &[f64], u: (f64, f64)| {
         let k = levels.partition_point(|v| *v < value * 0.99);
         match (u.0 < 0.5, levels.get(k + 1)) {
@@ -328,8 +169,12 @@ fn conditions_between(passes: &[Operating], count: usize) -> Vec<Operating> {
     };
     let pick = |u: f64| passes[((u * passes.len() as f64) as usize).min(passes.len() - 1)];
     (0..count)
-        .map(|_| Operating {
-            amplitude_pp_m: between(pick(uniform()).amplitude_pp_m, &amplitudes, (uniform(), uniform())),
+        .map(|_| Condition {
+            amplitude: PeakToPeak::from_metres(between(
+                pick(uniform()).amplitude.metres(),
+                &amplitudes,
+                (uniform(), uniform()),
+            )),
             speed_m_s: between(pick(uniform()).speed_m_s, &speeds, (uniform(), uniform())),
             normal_force_n: between(pick(uniform()).normal_force_n, &loads, (uniform(), uniform())),
             frequency_hz: pick(uniform()).frequency_hz,

@@ -3,60 +3,28 @@
 //! | room | purpose |
 //! |---|---|
 //! | [`grid`] | conditions that a plan can choose, within what the table has shown |
-//! | [`belief`] | what each hypothesis expects there, with how surely it knows it |
+//! | [`predictive`] | what each hypothesis expects there, with how surely it knows it |
 //! | [`design`] | which of them, in which order |
 
-pub mod belief;
 pub mod design;
 pub mod grid;
+pub mod predictive;
 
-use crate::attribute::{Decision, Verdict};
-use crate::data::{Rig, Table};
+use crate::data::{RigFile, Table};
+use crate::decision::{Decision, Verdict};
 use crate::fit::Problem;
-use crate::hypotheses::{Candidate, Fitted};
-use belief::beliefs;
-use effects::Operating;
-use serde::Serialize;
-
-/// A condition of a plan.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Condition {
-    /// Amplitude, peak to peak, m.
-    pub amplitude_pp_m: f64,
-    /// Frequency, Hz.
-    pub frequency_hz: f64,
-    /// Speed, m/s.
-    pub speed_m_s: f64,
-    /// Direction.
-    pub direction: f64,
-    /// Normal force, N.
-    pub normal_force_n: f64,
-    /// Middle of the pass along the plate, m.
-    pub position_m: f64,
-    /// Ambient pressure, Pa, where it was varied.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ambient_pressure_pa: Option<f64>,
-}
-
-impl Condition {
-    /// The settings of a pass, without its time and environment.
-    pub fn of(p: &Operating) -> Self {
-        Condition {
-            amplitude_pp_m: p.amplitude_pp_m,
-            frequency_hz: p.frequency_hz,
-            speed_m_s: p.speed_m_s,
-            direction: p.direction,
-            normal_force_n: p.normal_force_n,
-            position_m: p.position_m,
-            ambient_pressure_pa: p.ambient_pressure_pa,
-        }
-    }
-}
+use crate::hypotheses::Fitted;
+use models::condition::Condition;
+use models::covariate;
+use predictive::predictives;
+use serde::{Serialize, Serializer};
+use std::collections::BTreeMap;
 
 /// A next experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiment {
     /// Conditions to run, those that tell most first; empty for an action on an instrument.
+    #[serde(serialize_with = "settings")]
     pub conditions: Vec<Condition>,
     /// The two hypotheses that it parts: the leader and its strongest rival.
     pub separates: [String; 2],
@@ -66,32 +34,36 @@ pub struct Experiment {
     pub text: String,
 }
 
+/// Conditions by what a plan can set of them, under the names of the point table.
+fn settings<S: Serializer>(conditions: &[Condition], serializer: S) -> Result<S::Ok, S::Error> {
+    let of = |c: &Condition| -> BTreeMap<&str, f64> {
+        covariate::planned().filter_map(|k| k.of(c).map(|v| (k.name, v))).collect()
+    };
+    serializer.collect_seq(conditions.iter().map(of))
+}
+
 /// Passes of a designed experiment.
 pub const PASSES: usize = 12;
-/// Nats below which an experiment is not worth asking for.
-const LEAST_NATS: f64 = 0.05;
-/// Probability of no gap from which there is nothing to part.
-const SETTLED: f64 = 0.99;
-
 /// Designs experiments for what a decision left open.
-pub fn experiments(fitted: &Fitted, table: &Table, rig: &Rig, decision: &Decision) -> Vec<Experiment> {
-    if decision.verdict == Verdict::NoGap && decision.none >= SETTLED {
+pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Decision) -> Vec<Experiment> {
+    let k = &fitted.problem.constants;
+    if decision.verdict == Verdict::NoGap && decision.none >= k.settled_probability {
         return Vec::new();
     }
     let mut list = Vec::new();
     let grid = grid::conditions(table);
-    let held = beliefs(fitted, rig, decision, &grid);
+    let hypotheses = predictives(fitted, rig, decision, &grid);
     // Where the evidence is for an effect and the left-out regions are against it, passes that part hypotheses come back to
     // a few conditions and leave the regions as empty as they are. Every second one then goes where nothing is known.
     let empty = decision.unknown > 0.5 && fitted.unknown_probability < 0.5;
-    let open = held.len() - 1;
-    let chosen = design::greedy(&held, PASSES, empty.then_some(open));
-    if let Some(rival) = design::rival(&held, &chosen) {
-        let nats = design::expected_nats(&held[0], &held[rival], &chosen);
-        let names = [held[0].name.clone(), held[rival].name.clone()];
-        if nats > LEAST_NATS {
+    let open = hypotheses.len() - 1;
+    let chosen = design::greedy(&hypotheses, PASSES, empty.then_some(open), k.design_pass_nats);
+    if let Some(rival) = design::rival(&hypotheses, &chosen) {
+        let nats = design::expected_nats(&hypotheses[0], &hypotheses[rival], &chosen);
+        let names = [hypotheses[0].name.clone(), hypotheses[rival].name.clone()];
+        if nats > k.design_least_nats {
             list.push(Experiment {
-                conditions: chosen.iter().map(|&i| Condition::of(&grid[i])).collect(),
+                conditions: chosen.iter().map(|&i| grid[i]).collect(),
                 text: format!(
                     "{PASSES} passes that best part {} from {} and the other hypotheses; {nats:.1} nats expected",
                     names[0], names[1]
@@ -110,61 +82,28 @@ pub fn experiments(fitted: &Fitted, table: &Table, rig: &Rig, decision: &Decisio
 
 /// Actions on instruments that part the leader from the next candidate.
 fn actions(fitted: &Fitted, decision: &Decision) -> Vec<Experiment> {
-    let leader = decision.class[0];
+    let Some(leader) = decision.leader() else { return Vec::new() };
     let second = decision.class.get(1).copied().or_else(|| {
         (0..fitted.candidates.len()).find(|&i| i != leader && fitted.candidates[i].effects.len() == 1)
     });
     let Some(second) = second else { return Vec::new() };
     let (a, b) = (&fitted.candidates[leader], &fitted.candidates[second]);
     let mut list = Vec::new();
-    for (effect, other) in [(a, b), (b, a)] {
-        let own: Vec<&'static str> = effect.names();
-        for (name, text, sd) in ACTIONS {
-            if own.contains(name) && !other.names().contains(name) {
-                let nats = 0.5 * (size_of(effect, name) / sd).powi(2);
-                list.push(Experiment {
-                    conditions: Vec::new(),
-                    separates: [a.names().join("+"), b.names().join("+")],
-                    expected_nats: nats.min(500.0),
-                    text: (*text).to_string(),
-                });
-            }
+    for (one, other) in [(a, b), (b, a)] {
+        let thetas = Problem::thetas(&one.best.members, &one.best.u);
+        for (member, theta) in one.best.members.iter().zip(thetas) {
+            let Some(check) = member.form().seen_by.filter(|_| !other.effects.contains(&member.effect))
+            else {
+                continue;
+            };
+            list.push(Experiment {
+                conditions: Vec::new(),
+                separates: [a.names().join("+"), b.names().join("+")],
+                expected_nats: (0.5 * (theta[0] / check.sd).powi(2))
+                    .min(fitted.problem.constants.check_most_nats),
+                text: check.action.to_string(),
+            });
         }
     }
     list
-}
-
-/// Actions that see one effect without going through friction, with the deviation of what they measure in the
-/// units of the effect's size.
-const ACTIONS: &[(&str, &str, f64)] = &[
-    ("amplitude_miscalibration", "Measure the plate with a vibrometer at three drives.", 0.02),
-    ("amplitude_saturation", "Measure the plate with a vibrometer at the largest drives.", 2e4),
-    ("amplitude_droop", "Measure the plate with a vibrometer while the finger is pressed on it.", 0.05),
-    ("resonance_detuning", "Retune the drive (sweep its frequency) at the start and the end of a run.", 0.05),
-    ("mode_shape", "Scan the plate with a vibrometer along the stroke.", 0.03),
-    ("lateral_gain", "Hang a dead weight on the lateral axis of the force sensor.", 0.005),
-    ("normal_offset", "Lift the finger and read the normal force; put a dead weight on it.", 0.001),
-    ("speed_error", "Time the stage over its stroke, or read its encoder.", 0.003),
-    (
-        "force_crosstalk",
-        "Press on the sensor with a dead weight and no motion, plate levelled; read the lateral axis.",
-        0.001,
-    ),
-    (
-        "plate_tilt",
-        "Put a spirit level (or the sensor, unloaded and turned by 180 degrees) on the plate.",
-        0.002,
-    ),
-    ("lateral_offset_drift", "Lift the finger every few passes and read the lateral force.", 0.0005),
-    ("squeeze_film", "Repeat the largest amplitudes at 0.2 atm.", 5e4),
-];
-
-fn size_of(c: &Candidate, name: &str) -> f64 {
-    let thetas = Problem::thetas(&c.best.members, &c.best.u);
-    c.best
-        .members
-        .iter()
-        .zip(thetas)
-        .find(|(m, _)| m.name() == name)
-        .map_or(0.0, |(_, t)| t.first().copied().unwrap_or(0.0))
 }

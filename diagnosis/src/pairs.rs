@@ -1,140 +1,215 @@
 //! Two causes at once: pairs grown from the best singles, and sought again in every law where they look best.
 
-use crate::evidence::{Explained, FORMS, explain, middle_share, over_forms};
-use crate::explore::{glance, nuisance_starts, polish, survey};
-use crate::fit::{Fit, Member, NUISANCES, Problem};
+use crate::evidence::{Posterior, averaged_over_form, laplace, middle_form_share};
+use crate::fit::{Member, Problem};
 use crate::hypotheses::Candidate;
-use crate::singles::PRUNE;
-use effects::library;
+use crate::layout::{Layout, NUISANCES};
+use crate::least_squares::Fit;
+use crate::starts::{coarse_scan, full_scan, nuisance_starts, refine_from};
+use effects::{library, one_cause};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 
-/// Single effects from which pairs are grown.
-const PAIR_SEEDS: usize = 6;
-/// Near aliases: a pair of them is one cause with the freedom of two.
-const SAME: [[&str; 2]; 1] = [["force_crosstalk", "plate_tilt"]];
-/// Laws whose changes are the same for the same parameter: for any pair with one of them there is the same pair with the
-/// other. Cross-talk and tilt (which also turns the normal axis, a little); a factor on normal stiffness and on amplitude;
-/// a factor on lateral stiffness and on speed.
-const TWINS: [[(&str, usize); 2]; 3] = [
-    [("force_crosstalk", 0), ("plate_tilt", 0)],
-    [("stiffness_error", 1), ("amplitude_miscalibration", 0)],
-    [("stiffness_error", 0), ("speed_error", 0)],
-];
-/// Cosine between two changes above which they are one.
-const ONE_CHANGE: f64 = 0.98;
-/// Pairs that are fitted in full.
-const PAIRS_FITTED: usize = 20;
-/// Of those, pairs that are sought again in each two laws, and how many of these are followed.
-const PAIRS_SEARCHED: usize = 4;
-const LAWS_POLISHED: usize = 16;
+/// Laws of one pair that are fitted: the scan is coarse.
+const LAWS_OF_A_PAIR: usize = 2;
+/// Rounds of the search for a pair's mode, and of its twin's from there.
+const ROUNDS: [usize; 2] = [5, 3];
+
+/// Two members with a place of their coordinates, and what it costs on the scale of the starts.
+#[derive(Clone)]
+struct Start {
+    cost: f64,
+    members: Vec<Member>,
+    u: Vec<f64>,
+}
+
+impl Start {
+    fn effects(&self) -> Vec<usize> {
+        effects_of(&self.members)
+    }
+
+    /// Best first; equal costs in the order of the library.
+    fn sort(list: &mut [Start]) {
+        list.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.members.cmp(&b.members)));
+    }
+}
+
+/// A pair with its posterior, and the effects that it joins.
+struct Pair {
+    effects: Vec<usize>,
+    posterior: Posterior,
+}
+
+impl Pair {
+    fn of(posterior: Posterior) -> Self {
+        Pair { effects: effects_of(&posterior.members), posterior }
+    }
+}
+
+fn effects_of(members: &[Member]) -> Vec<usize> {
+    let mut effects: Vec<usize> = members.iter().map(|m| m.effect).collect();
+    effects.sort_unstable();
+    effects
+}
 
 /// Whether two hypotheses change the forces alike: by name, or by the angle between their changes in deviations of a
 /// pass.
-fn one_change(problem: &Problem, a: &Explained, b: &Explained) -> bool {
-    let names = [a.members[0].name(), b.members[0].name()];
-    if SAME.iter().any(|same| names.iter().all(|n| same.contains(n))) {
+fn one_change(problem: &Problem, a: &Posterior, b: &Posterior) -> bool {
+    if one_cause(a.members[0].name(), b.members[0].name()) {
         return true;
     }
-    let product = |x: &Explained, y: &Explained| -> f64 {
+    let product = |x: &Posterior, y: &Posterior| -> f64 {
         x.change.iter().zip(y.change.iter()).zip(&problem.variance).map(|((p, q), v)| p * q / v).sum()
     };
-    product(a, b) > ONE_CHANGE * (product(a, a) * product(b, b)).sqrt().max(1e-300)
+    product(a, b) > problem.constants.one_change_cosine * (product(a, a) * product(b, b)).sqrt().max(1e-300)
 }
 
 /// The best pairs once more, in every law of both members: which law a cause follows, and where, shows in its pair and
-/// not alone, and a pair in a local minimum loses to strangers.
-fn searched_again(
+/// not alone, and a pair in a local minimum loses to the open set.
+fn with_every_law(
     problem: &Problem,
-    mut pairs: Vec<(Vec<usize>, Explained)>,
+    mut pairs: Vec<Pair>,
     singles: &[Candidate],
     loose: &[f64],
     basis: &DMatrix<f64>,
-) -> Vec<(Vec<usize>, Explained)> {
-    pairs.sort_by(|a, b| b.1.log_evidence.total_cmp(&a.1.log_evidence).then(a.0.cmp(&b.0)));
-    let mut best: Vec<&Vec<usize>> = pairs.iter().map(|(e, _)| e).collect();
-    let mut seen = std::collections::BTreeSet::new();
-    best.retain(|e| seen.insert((*e).clone()));
-    best.truncate(PAIRS_SEARCHED);
-    let again: Vec<Explained> = best
+) -> Vec<Pair> {
+    let evidence = |p: &Pair| p.posterior.log_evidence;
+    pairs.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)).then(a.effects.cmp(&b.effects)));
+    let mut best: Vec<&Vec<usize>> = pairs.iter().map(|p| &p.effects).collect();
+    let mut seen = BTreeSet::new();
+    best.retain(|effects| seen.insert((*effects).clone()));
+    best.truncate(problem.constants.pairs_searched);
+    let again: Vec<Posterior> = best
         .par_iter()
         .flat_map(|effects| {
-            // Singles come best first: the stronger one holds still while the other is sought.
-            let mut both = singles.iter().filter(|c| effects.contains(&c.effects[0]));
-            let (Some(strong), Some(weak)) = (both.next(), both.next()) else { return Vec::new() };
-            let alone = strong.laws.iter().map(|(_, a)| (a.members[0], a.u.clone()));
-            // And each member where the pair has it, beside the other.
-            let paired = pairs.iter().filter(|(e, _)| e == *effects).flat_map(|(_, x)| {
-                let middle = NUISANCES + x.members[0].parameters().len();
-                let second = [&x.u[..NUISANCES], &x.u[middle..]].concat();
-                [(x.members[0], x.u[..middle].to_vec()), (x.members[1], second)]
-            });
-            let jobs: Vec<(Member, Vec<f64>, Member)> = alone
-                .chain(paired)
-                .flat_map(|(first, held)| {
-                    let other = if first.effect == strong.effects[0] { weak } else { strong };
-                    other.laws.iter().map(move |(_, b)| (first, held.clone(), b.members[0]))
-                })
-                .collect();
-            let mut surveys: Vec<(f64, Vec<Member>, Vec<f64>)> = jobs
-                .par_iter()
-                .flat_map_iter(|(first, held, second)| {
-                    let members = vec![*first, *second];
-                    nuisance_starts(held).into_iter().filter_map(move |held| {
-                        survey(problem, &members, &held, loose).map(|(cost, u)| (cost, members.clone(), u))
-                    })
-                })
-                .collect();
-            surveys.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            // Each two laws once: on the scale of the starts the better ones do not stand out.
-            let mut seen = std::collections::BTreeSet::new();
-            surveys.retain(|(_, members, _)| {
-                let mut laws = members.clone();
-                laws.sort_unstable();
-                seen.insert(laws)
-            });
-            surveys.truncate(LAWS_POLISHED);
-            surveys
+            law_starts(problem, effects, &pairs, singles, loose)
                 .into_par_iter()
-                .filter_map(|(_, members, u)| {
-                    let fit = polish(problem, &members, u, loose)?;
-                    Some(explain(problem, &members, &fit.u, basis, middle_share(&members), 5))
-                })
-                .collect()
+                .filter_map(|start| refined(problem, start, loose, basis))
+                .collect::<Vec<_>>()
         })
         .collect();
-    for found in again {
-        let mut effects: Vec<usize> = found.members.iter().map(|m| m.effect).collect();
-        effects.sort_unstable();
-        let better =
-            |(e, x): &&mut (Vec<usize>, Explained)| *e == effects && found.log_evidence > x.log_evidence;
-        if let Some((_, own)) = pairs.iter_mut().find(better) {
+    for found in again.into_iter().map(Pair::of) {
+        let better = |own: &&mut Pair| own.effects == found.effects && evidence(&found) > evidence(own);
+        if let Some(own) = pairs.iter_mut().find(better) {
             *own = found;
         }
     }
     pairs
 }
 
+/// The best places of a pair in each two laws of its members, by the whole scan of one beside the other.
+fn law_starts(
+    problem: &Problem,
+    effects: &[usize],
+    pairs: &[Pair],
+    singles: &[Candidate],
+    loose: &[f64],
+) -> Vec<Start> {
+    let k = &problem.constants;
+    // Singles come best first: the stronger one stays while the other is sought.
+    let mut both = singles.iter().filter(|c| effects.contains(&c.effects[0]));
+    let (Some(strong), Some(weak)) = (both.next(), both.next()) else { return Vec::new() };
+    let alone = strong.laws.iter().map(|(_, a)| (a.members[0], a.u.clone()));
+    // And each member where the pair has it, beside the other.
+    let paired = pairs.iter().filter(|p| p.effects == effects).flat_map(|p| {
+        let x = &p.posterior;
+        let layout = Layout::of(&x.members);
+        [0, 1].map(|i| (x.members[i], [&x.u[..NUISANCES], &x.u[layout.member(i)]].concat()))
+    });
+    let jobs: Vec<(Member, Vec<f64>, Member)> = alone
+        .chain(paired)
+        .flat_map(|(first, fixed)| {
+            let other = if first.effect == strong.effects[0] { weak } else { strong };
+            other.laws.iter().map(move |(_, b)| (first, fixed.clone(), b.members[0]))
+        })
+        .collect();
+    let mut scans: Vec<Start> = jobs
+        .par_iter()
+        .flat_map_iter(|(first, fixed, second)| {
+            let members = vec![*first, *second];
+            nuisance_starts(fixed, k.driven_sd).into_iter().filter_map(move |fixed| {
+                let (cost, u) = full_scan(problem, &members, &fixed, loose)?;
+                Some(Start { cost, members: members.clone(), u })
+            })
+        })
+        .collect();
+    Start::sort(&mut scans);
+    // Each two laws once: on the scale of the starts the better ones do not stand out.
+    let mut seen = BTreeSet::new();
+    scans.retain(|scan| {
+        let mut laws = scan.members.clone();
+        laws.sort_unstable();
+        seen.insert(laws)
+    });
+    scans.truncate(k.laws_refined);
+    scans
+}
+
+/// The mode of a pair from one start.
+fn refined(problem: &Problem, start: Start, loose: &[f64], basis: &DMatrix<f64>) -> Option<Posterior> {
+    let members = &start.members;
+    let fit = refine_from(problem, members, start.u, loose)?;
+    let share = middle_form_share(&problem.constants, members);
+    Some(laplace(problem, members, &fit.u, basis, share, ROUNDS[0]))
+}
+
 /// The same pair with the exact alias of one of its members in its place.
-fn twins(pair: &Explained) -> Vec<(Vec<Member>, Vec<f64>)> {
-    let member = |(name, law): (&str, usize)| {
-        library().iter().position(|e| e.name() == name).map(|effect| Member { effect, law })
-    };
-    let ordered = TWINS.iter().flat_map(|[a, b]| [(*a, *b), (*b, *a)]);
-    let both = ordered.filter_map(|(a, b)| Some((member(a)?, member(b)?)));
+fn twins(pair: &Posterior) -> Vec<(Vec<Member>, Vec<f64>)> {
+    let member = |(effect, law): (usize, usize)| Member { effect, law };
+    let both = effects::twins().into_iter().flat_map(|[a, b]| [(a, b), (b, a)]);
+    let both = both.map(|(one, other)| (member(one), member(other)));
     both.filter_map(|(one, other)| {
         let place = pair.members.iter().position(|m| *m == one)?;
         if pair.members.iter().any(|m| m.effect == other.effect) {
             return None;
         }
         let (mut members, mut u) = (pair.members.clone(), pair.u.clone());
-        let before: usize = members[..place].iter().map(|m| m.parameters().len()).sum();
-        let value = one.parameters()[0].value(u[NUISANCES + before]);
+        let size = Layout::of(&members).size(place);
+        let value = one.parameters()[0].value(u[size]);
         members[place] = other;
-        u[NUISANCES + before] = other.parameters()[0].coordinate(value);
+        u[size] = other.parameters()[0].coordinate(value);
         Some((members, u))
     })
     .collect()
+}
+
+/// Places of pairs by a coarse scan: each of the best singles with every other effect in each of its laws, best first.
+fn coarse_starts(problem: &Problem, singles: &[Candidate], loose: &[f64]) -> Vec<Start> {
+    let k = &problem.constants;
+    let seeds = &singles[..singles.len().min(k.pair_seeds)];
+    let jobs: Vec<(usize, &Posterior)> = (0..seeds.len())
+        .flat_map(|s| singles.iter().flat_map(|c| &c.laws).map(move |(_, e)| (s, e)))
+        .filter(|(s, e)| e.members[0].effect != seeds[*s].effects[0])
+        // Two names for one change are not two causes.
+        .filter(|(s, e)| !one_change(problem, &seeds[*s].best, e))
+        .collect();
+    let mut scans: Vec<Start> = jobs
+        .par_iter()
+        .filter_map(|(s, e)| {
+            let seed = &seeds[*s].best;
+            let members = vec![seed.members[0], e.members[0]];
+            let alone = &e.u[NUISANCES..];
+            // A cause that acts as a gain of the stiffness, the amplitude or the speed hides in the stiffnesses that the
+            // single drove to imitate it.
+            nuisance_starts(&seed.u, k.driven_sd)
+                .iter()
+                .filter_map(|fixed| coarse_scan(problem, &members, fixed, loose, alone))
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+                .map(|(cost, u)| Start { cost, members, u })
+        })
+        .collect();
+    Start::sort(&mut scans);
+    let mut chosen: Vec<Start> = Vec::new();
+    for scan in scans {
+        if chosen.iter().filter(|c| c.effects() == scan.effects()).count() < LAWS_OF_A_PAIR {
+            chosen.push(scan);
+        }
+        if chosen.len() == k.pairs_fitted {
+            break;
+        }
+    }
+    chosen
 }
 
 /// Pairs grown from the best singles, each with every other effect in each of its laws.
@@ -144,78 +219,48 @@ pub fn pairs(
     loose: &[f64],
     basis: &DMatrix<f64>,
 ) -> Vec<Candidate> {
-    let seeds = &singles[..singles.len().min(PAIR_SEEDS)];
-    let jobs: Vec<(usize, &Explained)> = (0..seeds.len())
-        .flat_map(|s| singles.iter().flat_map(|c| &c.laws).map(move |(_, e)| (s, e)))
-        .filter(|(s, e)| e.members[0].effect != seeds[*s].effects[0])
-        // Two names for one change are not two causes.
-        .filter(|(s, e)| !one_change(problem, &seeds[*s].best, e))
-        .collect();
-    let mut glances: Vec<(f64, Vec<Member>, Vec<f64>)> = jobs
-        .par_iter()
-        .filter_map(|(s, e)| {
-            let seed = &seeds[*s].best;
-            let pair = vec![seed.members[0], e.members[0]];
-            let alone = &e.u[NUISANCES..];
-            // A cause that acts as a gain of the stiffness, the amplitude or the speed hides in the stiffnesses that the
-            // single drove to imitate it.
-            nuisance_starts(&seed.u)
-                .iter()
-                .filter_map(|held| glance(problem, &pair, held, loose, alone))
-                .min_by(|a, b| a.0.total_cmp(&b.0))
-                .map(|(cost, u)| (cost, pair, u))
-        })
-        .collect();
-    glances.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut chosen: Vec<(Vec<usize>, Vec<Member>, Vec<f64>)> = Vec::new();
-    for (_, pair, u) in glances {
-        let mut effects: Vec<usize> = pair.iter().map(|m| m.effect).collect();
-        effects.sort_unstable();
-        // Two laws of a pair may be looked at: the scan is coarse.
-        if chosen.iter().filter(|(e, ..)| *e == effects).count() < 2 {
-            chosen.push((effects, pair, u));
-        }
-        if chosen.len() == PAIRS_FITTED {
-            break;
-        }
-    }
-    let first: Vec<(Vec<usize>, Explained)> = chosen
+    let k = &problem.constants;
+    let first: Vec<Pair> = coarse_starts(problem, singles, loose)
         .into_par_iter()
-        .filter_map(|(effects, pair, u)| {
-            let best = nuisance_starts(&u)
+        .filter_map(|start| {
+            nuisance_starts(&start.u, k.driven_sd)
                 .into_iter()
-                .filter_map(|u| polish(problem, &pair, u, loose))
-                .map(|fit| explain(problem, &pair, &fit.u, basis, middle_share(&pair), 5))
-                .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-            Some((effects, best))
+                .filter_map(|u| refined(problem, Start { u, ..start.clone() }, loose, basis))
+                .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+                .map(Pair::of)
         })
         .collect();
-    let mut first = searched_again(problem, first, singles, loose, basis);
-    let twins: Vec<(Vec<usize>, Explained)> = first
+    let mut found = with_every_law(problem, first, singles, loose, basis);
+    let twins: Vec<Pair> = found
         .par_iter()
-        .flat_map_iter(|(_, e)| twins(e))
+        .flat_map_iter(|pair| twins(&pair.posterior))
         .map(|(members, u)| {
-            let mut effects: Vec<usize> = members.iter().map(|m| m.effect).collect();
-            effects.sort_unstable();
-            (effects, explain(problem, &members, &u, basis, middle_share(&members), 3))
+            let share = middle_form_share(k, &members);
+            Pair::of(laplace(problem, &members, &u, basis, share, ROUNDS[1]))
         })
         .collect();
-    first.extend(twins);
-    let top = first.iter().map(|(_, e)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-    let full: Vec<(Vec<usize>, f64, Explained)> = first
+    found.extend(twins);
+    weighed(problem, found, basis)
+}
+
+/// Each pair with its evidence over the shares of form uncertainty, in its best two laws.
+fn weighed(problem: &Problem, pairs: Vec<Pair>, basis: &DMatrix<f64>) -> Vec<Candidate> {
+    let k = &problem.constants;
+    let top = pairs.iter().map(|p| p.posterior.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    let weighed: Vec<(Vec<usize>, f64, Posterior)> = pairs
         .into_par_iter()
-        .map(|(effects, e)| {
-            if e.log_evidence > top - PRUNE {
+        .map(|Pair { effects, posterior: e }| {
+            if e.log_evidence > top - k.prune_nats {
                 let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
-                let (evidence, best) = over_forms(problem, &fit, &e.members, basis);
+                let (evidence, best) = averaged_over_form(problem, &fit, &e.members, basis);
                 (effects, evidence, best)
             } else {
-                (effects, e.log_evidence + FORMS[1].1.ln(), e)
+                (effects, e.log_evidence + k.form_weights[1].ln(), e)
             }
         })
         .collect();
     let mut list: Vec<Candidate> = Vec::new();
-    for (effects, evidence, best) in full {
+    for (effects, evidence, best) in weighed {
         let laws: f64 = best.members.iter().map(|m| library()[m.effect].laws().len() as f64).product();
         // Only the best pair of laws was fitted: the others are taken to add nothing.
         let log_evidence = evidence - laws.ln();

@@ -1,12 +1,14 @@
 //! The verdict's model at any condition: what `--predict` writes and what held-out passes are judged by.
 
-use crate::attribute::Verdict;
-use crate::data::{Rig, Table};
-use crate::evidence::{Explained, explain, recalibration};
-use crate::fit::{NUISANCES, Problem, minimise};
-use crate::hypotheses::{FORM_LENGTHS, Fitted};
-use crate::wildcard::{LENGTHS, Wildcard};
-use effects::Operating;
+use crate::data::{RigFile, Table};
+use crate::decision::Verdict;
+use crate::discrepancy::{Discrepancy, lengths};
+use crate::evidence::{Posterior, laplace, recalibration};
+use crate::fit::Problem;
+use crate::hypotheses::{Fitted, form_lengths};
+use crate::layout::NUISANCES;
+use crate::least_squares::minimise;
+use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -30,11 +32,11 @@ pub struct Forecast {
 /// The model behind a verdict, fitted to some rows of a table.
 pub enum Model {
     /// The recalibrated baseline.
-    Baseline(Explained),
+    Baseline(Posterior),
     /// Effects with their smooth departure from form.
-    Effects(Explained),
+    Effects(Posterior),
     /// The open set.
-    Open(Box<Wildcard>),
+    Open(Box<Discrepancy>),
 }
 
 /// The model of a verdict on some rows (all of them for predictions), starting from the fit to the whole.
@@ -42,9 +44,9 @@ pub fn model(
     fitted: &Fitted,
     table: &Table,
     verdict: Verdict,
-    leader: usize,
+    leader: Option<usize>,
     rows: Option<&[usize]>,
-) -> (Model, Problem, Explained) {
+) -> (Model, Problem, Posterior) {
     let all: Vec<usize> = (0..fitted.problem.len()).collect();
     let rows = rows.unwrap_or(&all);
     let whole = rows.len() == fitted.problem.len();
@@ -53,36 +55,39 @@ pub fn model(
     let baseline = if whole {
         fitted.none.clone()
     } else {
-        let fit = minimise(&problem, &[], &fitted.none.u, &problem.variance, 6);
-        explain(&problem, &[], &fit.u, &basis, 0.0, 1)
+        let fit = minimise(&problem, &[], &fitted.none.u, &problem.variance, ROUNDS[0]);
+        laplace(&problem, &[], &fit.u, &basis, 0.0, ROUNDS[1])
     };
-    let model = match verdict {
-        Verdict::NoGap => Model::Baseline(baseline.clone()),
-        Verdict::Named | Verdict::Ambiguous => {
+    let model = match (verdict, leader) {
+        (Verdict::NoGap, _) => Model::Baseline(baseline.clone()),
+        (Verdict::Named | Verdict::Ambiguous, Some(leader)) => {
             let best = &fitted.candidates[leader].best;
             Model::Effects(if whole {
                 best.clone()
             } else {
-                explain(&problem, &best.members, &best.u, &basis, best.share, 3)
+                laplace(&problem, &best.members, &best.u, &basis, best.share, ROUNDS[2])
             })
         }
-        Verdict::Unknown => {
+        (Verdict::Unknown, _) | (_, None) => {
             let part = table.select(rows);
-            Model::Open(Box::new(Wildcard::fit(&part, &problem, &baseline.u, &LENGTHS)))
+            let lengths = lengths(&problem.constants, &part);
+            Model::Open(Box::new(Discrepancy::fit(&part, &problem, &baseline.u, &lengths)))
         }
     };
     (model, problem, baseline)
 }
 
+/// Rounds of a refit to some rows: of the baseline by least squares, of its mode, and of the effects' mode.
+const ROUNDS: [usize; 3] = [6, 1, 3];
 /// Conditions that are predicted at a time.
 const PART: usize = 256;
 
 /// Predicts conditions.
 pub fn forecast(
     fitted: &Fitted,
-    rig: &Rig,
-    model: &(Model, Problem, Explained),
-    passes: &[Operating],
+    rig: &RigFile,
+    model: &(Model, Problem, Posterior),
+    passes: &[Condition],
 ) -> Vec<Forecast> {
     let (model, problem, baseline) = model;
     let ready = match model {
@@ -102,23 +107,23 @@ pub fn forecast(
 
 /// A model with what is the same for all conditions.
 enum Ready<'a> {
-    Baseline(&'a Explained),
+    Baseline(&'a Posterior),
     /// With the recalibration that imitates the effect best, and the covariance of the departure's weights.
     Effects {
-        best: &'a Explained,
+        best: &'a Posterior,
         shift: DVector<f64>,
         departure: DMatrix<f64>,
     },
-    Open(&'a Wildcard),
+    Open(&'a Discrepancy),
 }
 
 fn forecast_part(
     fitted: &Fitted,
-    rig: &Rig,
+    rig: &RigFile,
     model: &Ready<'_>,
     problem: &Problem,
-    baseline: &Explained,
-    passes: &[Operating],
+    baseline: &Posterior,
+    passes: &[Condition],
 ) -> Vec<Forecast> {
     let n = passes.len();
     let out = Problem {
@@ -138,7 +143,13 @@ fn forecast_part(
             let plain = out.predict(&e.members, &e.u);
             let places: Vec<_> = passes
                 .iter()
-                .map(|p| fitted.coordinates.place(p, out.design.largest_amplitude_m, &FORM_LENGTHS))
+                .map(|p| {
+                    fitted.coordinates.place(
+                        p,
+                        out.design.largest_amplitude_m,
+                        &form_lengths(&problem.constants),
+                    )
+                })
                 .collect();
             let basis = fitted.kernel.matrix(&places);
             let under = out.predict(&[], &e.u[..NUISANCES]);
@@ -172,19 +183,21 @@ fn forecast_part(
         .collect()
 }
 
-fn parameter_variance(out: &Problem, e: &Explained, at: &DVector<f64>) -> Vec<f64> {
+fn parameter_variance(out: &Problem, e: &Posterior, at: &DVector<f64>) -> Vec<f64> {
     let jacobian = out.jacobian(&e.members, &e.u, at);
     let spread = &jacobian * &e.covariance;
     (0..out.len()).map(|i| spread.row(i).dot(&jacobian.row(i)).max(0.0)).collect()
 }
 
 /// Posterior covariance of the departure's weights.
-fn departure_covariance(fitted: &Fitted, problem: &Problem, e: &Explained) -> DMatrix<f64> {
+fn departure_covariance(fitted: &Fitted, problem: &Problem, e: &Posterior) -> DMatrix<f64> {
     let r = fitted.kernel.rank();
     let places: Vec<_> = problem
         .passes
         .iter()
-        .map(|p| fitted.coordinates.place(p, problem.design.largest_amplitude_m, &FORM_LENGTHS))
+        .map(|p| {
+            fitted.coordinates.place(p, problem.design.largest_amplitude_m, &form_lengths(&problem.constants))
+        })
         .collect();
     let mut phi = fitted.kernel.matrix(&places);
     for (i, v) in problem.variance.iter().enumerate() {

@@ -6,9 +6,9 @@
 //! where its own calibration does not want it. The pull says how far: the shift in units of the deviation that such a
 //! shift has when prior and table agree (prior variance less posterior variance).
 
-use crate::evidence::Explained;
-use crate::fit::Problem;
-use effects::library;
+use crate::evidence::Posterior;
+use crate::fit::{Member, Problem};
+use effects::{Law, Place, library};
 use serde::Serialize;
 
 /// Pull of one stiffness from its prior.
@@ -25,7 +25,7 @@ pub struct Pull {
     /// Shift in deviations of a shift when prior and table agree; none where the table says too little of the quantity.
     pub pull_sd: Option<f64>,
     /// Instrument errors that imitate the shift exactly: only an outside calibration tells them from it.
-    pub imitated_by: &'static [&'static str],
+    pub imitated_by: Vec<&'static str>,
 }
 
 impl Pull {
@@ -65,19 +65,24 @@ impl Pull {
 
 /// Pull from which the remark is made: one table in 185 passes it by chance, two stiffnesses counted.
 pub const REMARKABLE: f64 = 3.0;
-/// Least share of the prior variance that the table must take away before a pull is stated.
-const TOLD: f64 = 0.05;
 
-/// Exact aliases of each stiffness, from the two groups.
-const ALIASES: [(&str, &[&str]); 2] = [
-    ("normal_stiffness", &["amplitude_miscalibration", "normal_gain"]),
-    ("lateral_stiffness", &["lateral_gain", "speed_error"]),
-];
+/// The stiffnesses, in the order of the baseline's parameters after mu0.
+const STIFFNESSES: [&str; 2] = ["normal_stiffness", "lateral_stiffness"];
+
+/// Errors of plate and instruments that do as a change of this parameter of the baseline does, by name.
+fn imitators(parameter: usize) -> Vec<&'static str> {
+    let acts = |law: &&Law| law.acts_as.is_some_and(|e_folds| e_folds[parameter] != 0.0);
+    let outside_finger = library().iter().filter(|e| e.place() != Place::Finger);
+    let mut names: Vec<&str> =
+        outside_finger.filter(|e| e.laws().iter().any(|l| acts(&l))).map(|e| e.name()).collect();
+    names.sort_unstable();
+    names
+}
 
 /// Pulls of both stiffnesses in a model. Where `model` explains the table by an error of a stiffness, that error is what
 /// was pulled: how far is then asked of the recalibrated baseline, `none`, and the fitted value is the model's whole one.
-pub fn pulls(problem: &Problem, none: &Explained, model: &Explained) -> Vec<Pull> {
-    let named = model.members.iter().any(|m| m.name() == "stiffness_error");
+pub fn pulls(problem: &Problem, none: &Posterior, model: &Posterior) -> Vec<Pull> {
+    let named = model.members.iter().any(errs_in_the_finger);
     let judged = if named { none } else { model };
     let fitted = problem.baseline(&model.u);
     let nominal = &problem.nominal;
@@ -86,34 +91,39 @@ pub fn pulls(problem: &Problem, none: &Explained, model: &Explained) -> Vec<Pull
         (nominal.normal_stiffness_n_per_m, on_normal * fitted.normal_stiffness_n_per_m),
         (nominal.lateral_stiffness_n_per_m, on_lateral * fitted.lateral_stiffness_n_per_m),
     ];
-    ALIASES
+    STIFFNESSES
         .iter()
         .zip(values)
         .enumerate()
-        .map(|(i, (&(quantity, imitated_by), (stated_n_per_m, fitted_n_per_m)))| {
+        .map(|(i, (&quantity, (stated_n_per_m, fitted_n_per_m)))| {
             // Coordinates are standard normal a priori: mu0 first, then the stiffnesses.
             let at = i + 1;
-            let told = 1.0 - judged.covariance[(at, at)];
+            let contraction = 1.0 - judged.covariance[(at, at)];
             Pull {
                 quantity,
                 stated_n_per_m,
                 fitted_n_per_m,
                 stated_relative_sd: problem.prior_sd[at],
-                pull_sd: (told > TOLD).then(|| judged.u[at] / told.sqrt()),
-                imitated_by,
+                pull_sd: (contraction > problem.constants.least_contraction)
+                    .then(|| judged.u[at] / contraction.sqrt()),
+                imitated_by: imitators(at),
             }
         })
         .collect()
 }
 
+/// Whether a member is an error of the finger's calibration: a change of the baseline itself.
+fn errs_in_the_finger(member: &Member) -> bool {
+    member.place() == Place::Finger && member.form().acts_as.is_some()
+}
+
 /// Factors on normal and lateral stiffness that a named error of a stiffness adds to the baseline's.
-fn stiffness_factors(model: &Explained) -> [f64; 2] {
+fn stiffness_factors(model: &Posterior) -> [f64; 2] {
     let thetas = Problem::thetas(&model.members, &model.u);
     let mut factors = [1.0; 2];
-    for (member, theta) in model.members.iter().zip(thetas).filter(|(m, _)| m.name() == "stiffness_error") {
-        let law = library()[member.effect].laws()[member.law].name;
-        let acts = [law != "lateral stiffness", law != "normal stiffness"];
-        (0..2).filter(|k| acts[*k]).for_each(|k| factors[k] *= theta[0].exp());
+    for (member, theta) in model.members.iter().zip(thetas).filter(|(m, _)| errs_in_the_finger(m)) {
+        let e_folds = member.form().acts_as.unwrap_or_default();
+        (0..2).for_each(|k| factors[k] *= (e_folds[k + 1] * theta[0]).exp());
     }
     factors
 }

@@ -1,25 +1,24 @@
 //! One effect at a time: every law sought from global starts, and the laws of an effect put together.
 
 use crate::data::Table;
-use crate::evidence::{Explained, FORMS, explain, middle_share, over_forms};
-use crate::explore::{nuisance_starts, optima};
-use crate::fit::{Fit, Member, Problem};
+use crate::evidence::{Posterior, averaged_over_form, laplace, middle_form_share};
+use crate::fit::{Member, Problem};
+use crate::gaussian::log_sum_exp;
 use crate::hypotheses::Candidate;
-use crate::linear::log_sum_exp;
+use crate::least_squares::Fit;
+use crate::starts::{nuisance_starts, optima};
 use effects::{known, library};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Laws this many nats behind the best single keep the middle share only.
-pub(crate) const PRUNE: f64 = 15.0;
-/// A law whose tempered cost is beyond this factor of the best, plus this, is not refined.
-const HOPELESS: (f64, f64) = (1.5, 60.0);
-/// Share of certificates that no longer hold when a table is taken: the instrument was knocked, or changed.
-pub(crate) const OUTLIVED: f64 = 0.02;
+/// Rounds of the search for a mode at the middle share of form uncertainty.
+const ROUNDS: usize = 6;
+/// Factor on the best tempered cost of a law, and offset, within which its other optima are looked at.
+const NEAR_OPTIMA: (f64, f64) = (1.2, 10.0);
 
 /// What the searches share: where the nuisances start, tempered variances, and the form's basis.
 pub(crate) struct Search<'a> {
-    pub held: &'a [f64],
+    pub nuisances: &'a [f64],
     pub loose: &'a [f64],
     pub basis: &'a DMatrix<f64>,
 }
@@ -32,19 +31,21 @@ pub(crate) fn singles(
     search: &Search<'_>,
 ) -> Vec<Candidate> {
     let usable = |&effect: &usize| {
-        let laws = (0..known()[effect].laws().len()).filter(move |&law| usable(effect, law, table));
-        laws.map(move |law| Member { effect, law })
+        // Laws whose covariate this table lacks are not tried.
+        let laws = known()[effect].laws().iter().enumerate();
+        let shown = laws.filter(|(_, form)| table.lacks(form.needs).is_none());
+        shown.map(move |(law, _)| Member { effect, law })
     };
     let members: Vec<Member> = effects.iter().flat_map(usable).collect();
     let laws = each_law(problem, &members, search);
-    let of_effect = |effect: usize| -> Vec<(f64, Explained)> {
+    let of_effect = |effect: usize| -> Vec<(f64, Posterior)> {
         members.iter().zip(&laws).filter(|(m, _)| m.effect == effect).filter_map(|(_, l)| l.clone()).collect()
     };
     effects.iter().filter_map(|&effect| candidate(vec![effect], of_effect(effect))).collect()
 }
 
 /// Causes of known form that the library does not name, best first.
-pub(crate) fn strangers(problem: &Problem, table: &Table, search: &Search<'_>) -> Vec<Candidate> {
+pub(crate) fn unlisted(problem: &Problem, table: &Table, search: &Search<'_>) -> Vec<Candidate> {
     let testable = |&e: &usize| table.lacks(known()[e].needs()).is_none();
     let effects: Vec<usize> = (library().len()..known().len()).filter(testable).collect();
     let mut list = singles(problem, table, &effects, search);
@@ -56,7 +57,7 @@ pub(crate) fn strangers(problem: &Problem, table: &Table, search: &Search<'_>) -
 ///
 /// What a certificate says holds unless the table speaks against it by more than such an accident is rare: then the
 /// effect has its own prior again, here and in all that follows.
-pub(crate) fn outlived(
+pub(crate) fn lapsed(
     problem: &mut Problem,
     table: &Table,
     candidates: &mut [Candidate],
@@ -70,7 +71,7 @@ pub(crate) fn outlived(
     let free = Problem { certified: Vec::new(), ..problem.clone() };
     let mut list = Vec::new();
     for mut other in singles(&free, table, &bounded, search) {
-        other.log_evidence += OUTLIVED.ln();
+        other.log_evidence += problem.constants.lapse_probability.ln();
         let effect = other.effects[0];
         let own = candidates.iter_mut().find(|c| c.effects[0] == effect);
         if let Some(own) = own.filter(|own| other.log_evidence > own.log_evidence) {
@@ -83,34 +84,37 @@ pub(crate) fn outlived(
 }
 
 /// Every law alone: its log evidence over the shares of form uncertainty, and its best solution.
-fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<Option<(f64, Explained)>> {
+fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<Option<(f64, Posterior)>> {
     // Middle share first, for every law; the other shares where they could matter. Laws cost from one millisecond to two
     // hundred: each is a task of its own.
+    let k = &*problem.constants;
     let starts: Vec<Vec<Fit>> = members
         .par_iter()
         .with_max_len(1)
         .map(|member| {
-            let mut fits: Vec<Fit> = nuisance_starts(search.held)
+            let mut fits: Vec<Fit> = nuisance_starts(search.nuisances, problem.constants.driven_sd)
                 .iter()
-                .flat_map(|held| optima(problem, &[*member], held, search.loose))
+                .flat_map(|fixed| optima(problem, &[*member], fixed, search.loose))
                 .collect();
             fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
             fits
         })
         .collect();
     let cheapest = starts.iter().flatten().map(|f| f.cost).fold(f64::INFINITY, f64::min);
-    let middle: Vec<Option<Explained>> = members
+    let middle: Vec<Option<Posterior>> = members
         .par_iter()
         .zip(&starts)
         .with_max_len(1)
         .map(|(member, fits)| {
             let own = fits.first()?.cost;
             // What lies far behind even on the tempered scale gets one look, not a search.
-            let rounds = if own > HOPELESS.0 * cheapest + HOPELESS.1 { 0 } else { 6 };
+            let rounds = if own > k.hopeless[0] * cheapest + k.hopeless[1] { 0 } else { ROUNDS };
             fits.iter()
                 .filter(|f| rounds > 0 || f.cost == own)
-                .filter(|f| f.cost < 1.2 * own + 10.0)
-                .map(|f| explain(problem, &[*member], &f.u, search.basis, middle_share(&[*member]), rounds))
+                .filter(|f| f.cost < NEAR_OPTIMA.0 * own + NEAR_OPTIMA.1)
+                .map(|f| {
+                    laplace(problem, &[*member], &f.u, search.basis, middle_form_share(k, &[*member]), rounds)
+                })
                 .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
         })
         .collect();
@@ -120,37 +124,18 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
         .with_max_len(1)
         .map(|found| {
             found.map(|e| {
-                if e.log_evidence > top - PRUNE {
+                if e.log_evidence > top - k.prune_nats {
                     let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
-                    over_forms(problem, &fit, &e.members, search.basis)
+                    averaged_over_form(problem, &fit, &e.members, search.basis)
                 } else {
-                    (e.log_evidence + FORMS[1].1.ln(), e)
+                    (e.log_evidence + k.form_weights[1].ln(), e)
                 }
             })
         })
         .collect()
 }
 
-/// Laws whose covariate this table lacks are not tried.
-fn usable(effect: usize, law: usize, table: &Table) -> bool {
-    let form = &known()[effect].laws()[law];
-    let temperatures: Vec<f64> = table.passes.iter().filter_map(|p| p.temperature_c).collect();
-    let span = temperatures.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-        - temperatures.iter().copied().fold(f64::INFINITY, f64::min);
-    match form.name {
-        "warming (temperature)" | "warming about a tuning point" | "offset with temperature" => {
-            temperatures.len() == table.len() && span > 0.3
-        }
-        "fixed resonance" | "standing wave, shorter at higher frequency" => {
-            let first = table.passes[0].frequency_hz;
-            table.passes.iter().any(|p| (p.frequency_hz / first - 1.0).abs() > 1e-3)
-        }
-        "exponential approach in each run" => table.run_count > 1,
-        _ => true,
-    }
-}
-
-fn candidate(effects: Vec<usize>, laws: Vec<(f64, Explained)>) -> Option<Candidate> {
+fn candidate(effects: Vec<usize>, laws: Vec<(f64, Posterior)>) -> Option<Candidate> {
     let best = laws.iter().max_by(|a, b| a.0.total_cmp(&b.0))?.1.clone();
     let evidences: Vec<f64> = laws.iter().map(|l| l.0).collect();
     let log_evidence = log_sum_exp(&evidences) - (laws.len() as f64).ln();

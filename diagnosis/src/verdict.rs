@@ -1,18 +1,16 @@
-//! The verdict: everything the diagnosis says about one table, in the shape of the contract.
+//! The verdict: everything the diagnosis says about one table, in the shape of docs/contract.md.
 
-use crate::attribute::{Decision, Verdict, decide, imitated};
-use crate::data::{Rig, Table};
-use crate::evidence::Explained;
-use crate::fit::NUISANCES;
-use crate::held_out::{Gap, gap};
+use crate::data::{RigFile, Table};
+use crate::decision::{Decision, Verdict, decide};
 use crate::hypotheses::{Fitted, Options, fit_all};
-use crate::intervals::{Estimate, Shape, estimates};
+use crate::intervals::{Estimate, curvature, estimates};
 use crate::locate::{Region, ledger, regions};
 use crate::next::{Experiment, experiments};
 use crate::noise::PureError;
 use crate::predict::{Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
-use effects::library;
+use crate::shrinkage::{Gap, gap};
+use effects::imitated;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -114,15 +112,18 @@ pub struct Diagnosis {
     /// What was decided.
     pub decision: Decision,
     table: Table,
-    rig: Rig,
+    rig: RigFile,
 }
 
+/// Probability from which a pair is listed.
+const LISTED: f64 = 1e-6;
+
 /// Diagnoses a table.
-pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> Diagnosis {
+pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String) -> Diagnosis {
     let fitted = fit_all(table, rig, options);
     let decision = decide(&fitted);
-    let leader = decision.class[0];
-    let best = &fitted.candidates[leader].best;
+    let leader = decision.leader();
+    let best = leader.map(|l| &fitted.candidates[l].best);
     let gap = gap(&fitted, table, rig, decision.verdict, leader);
     let location = Where {
         place: ledger(&fitted, &decision.probabilities, decision.unknown),
@@ -132,14 +133,17 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
             regions(&fitted, rig, &model(&fitted, table, decision.verdict, leader, None))
         },
     };
-    let parameters = if decision.verdict == Verdict::NoGap {
-        None
-    } else {
-        Some(estimates(&fitted.problem, best, &fitted.basis))
-    };
+    let asked = best.filter(|_| decision.verdict != Verdict::NoGap);
+    let parameters = asked.map(|best| estimates(&fitted.problem, best, &fitted.basis));
     let hypotheses = hypotheses(&fitted, &decision, parameters.as_ref());
     let next_experiment = experiments(&fitted, table, rig, &decision);
     let mut remarks = Vec::new();
+    if leader.is_none() {
+        remarks.push(
+            "No effect of the library could be tried on this table: `not_testable` says what is missing."
+                .into(),
+        );
+    }
     if table.still_coefficient().is_none() {
         remarks.push("No pass has the plate still: mu0 is unknown and was fitted; add w = 0 passes.".into());
     }
@@ -151,7 +155,9 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
     }
     let stiffness_pulls = match decision.verdict {
         Verdict::NoGap => pulls(&fitted.problem, &fitted.none, &fitted.none),
-        Verdict::Named | Verdict::Ambiguous => pulls(&fitted.problem, &fitted.none, best),
+        Verdict::Named | Verdict::Ambiguous => {
+            best.map_or_else(Vec::new, |best| pulls(&fitted.problem, &fitted.none, best))
+        }
         Verdict::Unknown => Vec::new(),
     };
     remarks.extend(stiffness_pulls.iter().filter_map(Pull::remark));
@@ -179,7 +185,7 @@ pub fn diagnose(table: &Table, rig: &Rig, options: &Options, sha256: String) -> 
         remarks,
         data: DataNote { points: table.len(), sha256 },
     };
-    Diagnosis { report, fitted, decision, table: table.clone(), rig: *rig }
+    Diagnosis { report, fitted, decision, table: table.clone(), rig: rig.clone() }
 }
 
 fn label(fitted: &Fitted, candidate: usize) -> String {
@@ -187,11 +193,11 @@ fn label(fitted: &Fitted, candidate: usize) -> String {
 }
 
 fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
-    let leader = decision.class[0];
     let closed = gap.shrinkage.map_or_else(
         || "held-out passes leave no gap to shrink".to_string(),
         |s| format!("the gap shrinks by {:.0} % on held-out passes", 100.0 * s),
     );
+    let leader = decision.leader().unwrap_or_default();
     match decision.verdict {
         Verdict::NoGap => "The recalibrated baseline explains the table: no gap.".to_string(),
         Verdict::Named => format!(
@@ -201,10 +207,10 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
         ),
         Verdict::Ambiguous if decision.class.len() == 1 => {
             let name = label(fitted, leader);
-            if imitated(&fitted.candidates[leader].names()) {
+            if let Some(cause) = imitated(&fitted.candidates[leader].names()) {
                 format!(
-                    "{name} together, or friction that heats up with load times speed, which is not in the library: \
-                     this table cannot tell; {closed}."
+                    "{name} together, or {}, which is not in the library: this table cannot tell; {closed}.",
+                    cause.words()
                 )
             } else {
                 let probability = decision.probabilities[leader];
@@ -218,9 +224,9 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
             format!("This table cannot tell {} apart; {closed}.", names.join(", "))
         }
         Verdict::Unknown => {
-            let known = fitted.strangers.first().filter(|s| {
-                let leading = &fitted.candidates[leader];
-                s.log_evidence > fitted.wildcard.log_evidence.max(leading.log_evidence)
+            let known = fitted.unlisted.first().filter(|s| {
+                let leading = fitted.candidates.get(leader).map_or(f64::NEG_INFINITY, |c| c.log_evidence);
+                s.log_evidence > fitted.discrepancy.log_evidence.max(leading)
             });
             let hint = known.map_or_else(String::new, |s| {
                 format!(" What comes nearest is not in the library: {}.", s.names().join("+"))
@@ -237,12 +243,11 @@ fn hypotheses(
     decision: &Decision,
     parameters: Option<&Vec<Vec<Estimate>>>,
 ) -> Vec<Hypothesis> {
-    let leader = decision.class[0];
     let mut list: Vec<Hypothesis> = fitted
         .candidates
         .iter()
         .enumerate()
-        .filter(|(i, c)| decision.probabilities[*i] > 1e-6 || c.effects.len() == 1)
+        .filter(|(i, c)| decision.probabilities[*i] > LISTED || c.effects.len() == 1)
         .map(|(i, c)| {
             let own = if decision.class.contains(&i) {
                 let mut class = vec![label(fitted, i)];
@@ -251,21 +256,16 @@ fn hypotheses(
             } else {
                 vec![label(fitted, i)]
             };
-            let parameters = if i == leader && parameters.is_some() {
+            let parameters = if Some(i) == decision.leader() && parameters.is_some() {
                 parameters.map(|p| p.concat()).unwrap_or_default()
             } else {
-                laplace(&c.best)
+                curvature(&c.best)
             };
             Hypothesis {
                 effects: c.names().iter().map(|n| (*n).to_string()).collect(),
                 probability: decision.probabilities[i],
                 alias_class: own,
-                laws: c
-                    .best
-                    .members
-                    .iter()
-                    .map(|m| library()[m.effect].laws()[m.law].name.to_string())
-                    .collect(),
+                laws: c.best.members.iter().map(|m| m.form().name.to_string()).collect(),
                 parameters,
             }
         })
@@ -289,32 +289,10 @@ fn hypotheses(
     list
 }
 
-/// Intervals from the curvature at the optimum, for hypotheses that do not lead.
-fn laplace(e: &Explained) -> Vec<Estimate> {
-    let mut at = NUISANCES;
-    e.members
-        .iter()
-        .flat_map(|m| m.parameters())
-        .map(|p| {
-            let u = e.u[at];
-            let reach = 1.96 * e.covariance[(at, at)].max(0.0).sqrt();
-            at += 1;
-            let (low, high) = p.coordinate_bounds();
-            Estimate {
-                name: p.name,
-                value: p.value(u),
-                ci95: [p.value((u - reach).max(low)), p.value((u + reach).min(high))],
-                unit: p.unit,
-                shape: if u - reach < low || u + reach > high { Shape::OneSided } else { Shape::Bounded },
-            }
-        })
-        .collect()
-}
-
 impl Diagnosis {
     /// Predicts conditions with the verdict's model.
     pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {
-        let leader = self.decision.class[0];
+        let leader = self.decision.leader();
         let whole = model(&self.fitted, &self.table, self.decision.verdict, leader, None);
         forecast(&self.fitted, &self.rig, &whole, &conditions.passes)
     }

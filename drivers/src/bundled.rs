@@ -9,6 +9,7 @@ const PROFILES: &[(&str, &str)] = &[
     ("me-gsv4-can", include_str!("../profiles/me-gsv4-can.toml")),
     ("muprime-amplifier", include_str!("../profiles/muprime-amplifier.toml")),
     ("muprime-force2", include_str!("../profiles/muprime-force2.toml")),
+    ("muprime-relay", include_str!("../profiles/muprime-relay.toml")),
     ("muprime-stage", include_str!("../profiles/muprime-stage.toml")),
     ("piezodrive-pdus210", include_str!("../profiles/piezodrive-pdus210.toml")),
     ("polytec-ofv5000", include_str!("../profiles/polytec-ofv5000.toml")),

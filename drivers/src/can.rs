@@ -4,6 +4,7 @@
 //! them: a new request throws away what an earlier one left, and after a time without an answer the
 //! bus is listened to in silence before the next, so that a late half is never joined to a new one.
 
+use super::off::Closed;
 use super::session::{Ended, LONGEST_SLEEP, Periodic, Session};
 use super::setup::InstrumentSetup;
 use super::slcan::Slcan;
@@ -32,7 +33,7 @@ pub fn open(address: &str, bitrate: u32) -> Result<Box<dyn CanPort>, Ended> {
 ///
 /// # Errors
 /// Where no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<()>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
     let base = instrument.base.or(link.base).unwrap_or(0);

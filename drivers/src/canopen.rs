@@ -6,13 +6,14 @@
 
 use super::can;
 use super::endpoint::{BadFrame, Due};
+use super::off::{self, Closed, OFF_ANSWER_MS, OffWay};
 use super::session::{Ended, LONGEST_SLEEP, Periodic, Session};
 use super::setup::InstrumentSetup;
-use instruments::FrameId;
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;
 use instruments::codec::canopen::{self, DriveState, Nmt, SdoAnswer};
 use instruments::profile::FrameKind;
+use instruments::{FrameId, SetId, SignalId};
 use std::convert::Infallible;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -26,7 +27,7 @@ const NOT_ENABLED: u16 = 0x07;
 ///
 /// # Errors
 /// Where no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<()>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
     let node = instrument.base.and_then(|base| u8::try_from(base).ok()).or(link.node).unwrap_or(1);
@@ -34,18 +35,54 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         let port = can::open(&address, link.bitrate.unwrap_or(1_000_000))?;
         let health = session.endpoint.health();
         health.count(&health.connections);
+        let map = Map::of(session, node)?;
+        let block = vec![0; map.length];
         let limit_ms = link.response_timeout_ms;
-        let mut master = Master { port, node, limit_ms, block: Vec::new() };
+        let mut master = Master { port, node, limit_ms, map, block, tries: 0 };
+        off::at_the_beginning(session, &mut master)?;
         master.set_up(session)?;
         master.go_on(session, Duration::from_millis(u64::from(link.heartbeat_ms.unwrap_or(300))))
     })
+}
+
+/// Where a drive's process data are.
+struct Map {
+    /// The frame that the drive sends, and its identifier.
+    data: FrameId,
+    cob: u32,
+    status: SignalId,
+    /// The identifier of the frame that it takes, its length in bytes and how often it is sent.
+    out: u32,
+    length: usize,
+    rate_hz: f64,
+}
+
+impl Map {
+    fn of(session: &Session, node: u8) -> Result<Self, Ended> {
+        let profile = session.endpoint.profile();
+        let broken = |what: &str| Ended::Io(format!("the profile has no {what}"));
+        let mut frames = profile.frames().iter().enumerate();
+        let found = frames.find_map(|(i, frame)| match &frame.kind {
+            FrameKind::Messages(_, parts) => Some((FrameId(i), parts.first()?.0 + u32::from(node))),
+            _ => None,
+        });
+        let (data, cob) = found.ok_or_else(|| broken("process data to read"))?;
+        let status = profile.signal("statusword").ok_or_else(|| broken("signal `statusword`"))?;
+        let block = profile.description.write.first().ok_or_else(|| broken("process data to write"))?;
+        let out = block.cob.ok_or_else(|| broken("`cob` of its block"))? + u32::from(node);
+        let length = 2 * usize::from(block.count);
+        Ok(Self { data, cob, status, out, length, rate_hz: block.rate_hz.unwrap_or(100.0) })
+    }
 }
 
 struct Master {
     port: Box<dyn CanPort>,
     node: u8,
     limit_ms: u32,
+    map: Map,
     block: Vec<u8>,
+    /// Times that 'off' was sent since the drive last showed it.
+    tries: u32,
 }
 
 impl Master {
@@ -101,7 +138,7 @@ impl Master {
         }
         let status = self.read(0x6041, 0)?;
         let faulted = u16::try_from(status & 0xFFFF).ok().and_then(DriveState::of) == Some(DriveState::Fault);
-        if faulted && session.ready.is_some() {
+        if faulted && session.is_first() {
             // A person has just opened the rig: this is the one place where a fault is reset.
             self.write(0x6040, 0, 2, 0)?;
             self.write(0x6040, 0, 2, 0x80)?;
@@ -119,60 +156,36 @@ impl Master {
     }
 
     fn go_on(&mut self, session: &mut Session, heartbeat: Duration) -> Result<Infallible, Ended> {
-        let profile = session.endpoint.profile();
-        let broken = |what: &str| Ended::Io(format!("the profile has no {what}"));
-        let frames = profile.frames().iter().enumerate();
-        let (data, cob) = frames
-            .filter_map(|(i, frame)| match &frame.kind {
-                FrameKind::Messages(_, parts) => Some((FrameId(i), parts.first()?.0 + u32::from(self.node))),
-                _ => None,
-            })
-            .next()
-            .ok_or_else(|| broken("process data to read"))?;
-        let status = profile.signal("statusword").ok_or_else(|| broken("signal `statusword`"))?;
-        let block =
-            profile.description.write.first().cloned().ok_or_else(|| broken("process data to write"))?;
-        let out = block.cob.ok_or_else(|| broken("`cob` of its block"))? + u32::from(self.node);
-        self.block = vec![0; 2 * usize::from(block.count)];
-        let mut write = Periodic::new(block.rate_hz.unwrap_or(100.0), session.now());
+        let mut write = Periodic::new(self.map.rate_hz, session.now());
         let mut alive = Instant::now();
         loop {
             if session.stopping() {
-                self.halt(session, out)?;
-                return Err(Ended::Stopped);
+                return Err(off::at_the_end(session, self));
             }
             if alive.elapsed() > heartbeat {
                 return Err(Ended::Io(format!("node {} gives no sign of life", self.node)));
             }
             let now = session.now();
             if write.is_due(now) {
-                let due = session.endpoint.due(now);
-                // Only the loop's own commands enable; the safe set-points do not.
-                let safe = matches!(due, Due::Safe(_));
-                if let Due::SetPoints(set_points) | Due::Safe(set_points) = due {
-                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 16 bits
-                    let state = DriveState::of(session.endpoint.value(status) as u16);
-                    let control = if safe {
-                        NOT_ENABLED
-                    } else {
-                        state.and_then(DriveState::towards_enabled).unwrap_or(0)
-                    };
-                    for (set, value) in &set_points {
-                        let _ = session.endpoint.profile().encode_set(*set, *value, &mut self.block);
+                match session.endpoint.due(now) {
+                    Due::Nothing => {}
+                    Due::SetPoints(set_points) => {
+                        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 16 bits
+                        let state = DriveState::of(session.endpoint.value(self.map.status) as u16);
+                        let control = state.and_then(DriveState::towards_enabled).unwrap_or(0);
+                        self.process_data(session, control, &set_points)?;
                     }
-                    self.block[..2].copy_from_slice(&control.to_le_bytes());
-                    if let Some(frame) = CanFrame::new(out, &self.block) {
-                        self.send(&frame)?;
-                    }
+                    // Only the loop's own commands enable; the safe set-points do not.
+                    Due::Safe(_) => self.send_off(session)?,
                 }
                 write.advance(session.now());
             }
             let pause = Duration::from_nanos(write.due.since(session.now()).0).min(LONGEST_SLEEP);
             match self.port.receive(Instant::now() + pause)? {
-                Some(CanEvent::Frame(frame, _)) if frame.id == cob => {
+                Some(CanEvent::Frame(frame, _)) if frame.id == self.map.cob => {
                     alive = Instant::now();
                     let arrived = session.now();
-                    session.endpoint.frame(data, frame.data(), arrived)?;
+                    session.endpoint.frame(self.map.data, frame.data(), arrived)?;
                     session.tell(Ok(()));
                 }
                 Some(CanEvent::Frame(frame, _)) if frame.id == 0x700 + u32::from(self.node) => {
@@ -200,13 +213,59 @@ impl Master {
         }
     }
 
-    fn halt(&mut self, session: &Session, out: u32) -> Result<(), Ended> {
-        for (set, value) in session.endpoint.safe_set_points() {
-            let _ = session.endpoint.profile().encode_set(set, value, &mut self.block);
+    fn process_data(
+        &mut self,
+        session: &Session,
+        control: u16,
+        set_points: &[(SetId, f64)],
+    ) -> Result<(), Ended> {
+        for (set, value) in set_points {
+            let _ = session.endpoint.profile().encode_set(*set, *value, &mut self.block);
         }
-        self.block[..2].copy_from_slice(&NOT_ENABLED.to_le_bytes());
-        if let Some(frame) = CanFrame::new(out, &self.block) {
-            self.send(&frame)?;
+        self.block[..2].copy_from_slice(&control.to_le_bytes());
+        CanFrame::new(self.map.out, &self.block).map_or(Ok(()), |frame| self.send(&frame))
+    }
+}
+
+impl OffWay for Master {
+    fn send_off(&mut self, session: &mut Session) -> Result<(), Ended> {
+        let safe = session.endpoint.hand_out_off(session.now());
+        let sent = self.process_data(session, NOT_ENABLED, &safe);
+        self.tries += 1;
+        // A drive that is not operational takes no process data, but service data: the second way, where the first has
+        // not shown itself or where nobody knows the drive's state.
+        let served = if self.tries > 1 || sent.is_err() {
+            self.write(0x6040, 0, 2, i64::from(NOT_ENABLED))
+        } else {
+            Ok(())
+        };
+        match (sent, served) {
+            (Ok(()), Ok(()) | Err(Ended::Refused(_) | Ended::Timeout(_))) | (Err(_), Ok(())) => Ok(()),
+            (Err(ended), _) | (Ok(()), Err(ended)) => Err(ended),
+        }
+    }
+
+    fn be_patient(&mut self, _session: &Session) {
+        self.limit_ms = self.limit_ms.max(OFF_ANSWER_MS);
+    }
+
+    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
+        let deadline = Instant::now() + Duration::from_millis(u64::from(self.limit_ms));
+        while let Some(event) = self.port.receive(deadline)? {
+            if let CanEvent::Frame(frame, _) = event
+                && frame.id == self.map.cob
+            {
+                let arrived = session.now();
+                session.endpoint.frame(self.map.data, frame.data(), arrived)?;
+                if session.endpoint.reads_off() {
+                    self.tries = 0;
+                    return Ok(());
+                }
+                // The drive slows down: what it shows next may be rest.
+                if Instant::now() >= deadline {
+                    break;
+                }
+            }
         }
         Ok(())
     }

@@ -3,24 +3,37 @@
 //! A transport hands over each frame with the time of its arrival, and asks what is due to be sent.
 //! Everything that decides whether a number may become a force stands here, once for all transports.
 
+mod orders;
 mod view;
 
 use super::health::Health;
-use super::ports::{self, AmplifierLink, AmplifierPort, ForcePort, StageLink, StagePort};
+use super::ports::{
+    self, AmplifierLink, AmplifierPort, ContactsPort, ForcePort, StageLink, StagePort, SupplyLink, SupplyPort,
+};
 use super::setup::{AxisSetup, InstrumentSetup};
 use super::timebase::{Counter, DeviceClock, Step};
 use instruments::schema::{Severity, Stamp};
 use instruments::{FrameId, Profile, SetId, SignalId, Values};
 use models::quantity::PeakToPeak;
-use realtime::ports::{AmplifierState, Forces, Nanos, NoData, Reading, StageState};
+pub use orders::Due;
+use orders::Orders;
+use realtime::ports::{
+    AmplifierState, Contact, Contacts, Forces, Nanos, NoData, Reading, StageState, SupplyState,
+};
 use ringbuf::HeapProd;
-use ringbuf::traits::{Consumer, Producer};
+use ringbuf::traits::Producer;
 use std::sync::Arc;
 use view::View;
 
 /// An alarm that came unasked shows as a fault for this long after the last: instruments repeat theirs
 /// some ten times a second.
 const ALARM_HOLDS: Nanos = Nanos(1_500_000_000);
+
+/// A plate that is seen to vibrate by more than this, peak-to-peak in m, is not off, whatever its amplifier says of its
+/// output: ten times what the plate sensors of the bundled profiles are uncertain by, and a tenth of what reduces friction.
+const OFF_AMPLITUDE_PP_M: f64 = 0.1e-6;
+/// A stage that is seen to move slower than this, in m/s, stands: the slowest sweep slides ten times faster.
+const AT_REST_M_S: f64 = 0.5e-3;
 
 /// A frame that must not become a sample.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -31,17 +44,6 @@ pub enum BadFrame {
     /// The instrument is another than the profile says.
     #[error("{0}")]
     WrongInstrument(String),
-}
-
-/// What a transport is to send now.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Due {
-    /// Nothing new.
-    Nothing,
-    /// These set-points, in their units.
-    SetPoints(Vec<(SetId, f64)>),
-    /// The safe set-points, since no command is valid any more.
-    Safe(Vec<(SetId, f64)>),
 }
 
 /// One axis of force out of one signal.
@@ -76,6 +78,50 @@ enum Part {
     Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: HeapProd<Forces> },
     Amplifier { signals: AmplifierSignals, link: AmplifierLink },
     Stage { signals: StageSignals, link: StageLink, dead_weight_n: Option<f64> },
+    Supply { closed: SignalId, link: SupplyLink },
+    Contacts(ContactsLink),
+}
+
+/// Safety contacts by their signals: emergency stop, interlock, dead-man.
+struct ContactsLink {
+    signals: [Option<SignalId>; 3],
+    last: Contacts,
+    ring: HeapProd<Contacts>,
+}
+
+impl ContactsLink {
+    /// The contacts that a profile has, and their port; `None` where it has none.
+    fn of(profile: &Profile) -> Option<(Self, ContactsPort)> {
+        let signals = ["emergency_stop", "interlock", "dead_man"].map(|name| profile.signal(name));
+        let (ring, port) = ports::contacts();
+        let link = Self { signals, last: Contacts::missing(NoData::NotFitted), ring };
+        signals.iter().any(Option::is_some).then_some((link, port))
+    }
+
+    /// Takes what a frame says of them. `None` where it says nothing; else whether the loop's ring was full.
+    fn take(&mut self, view: &View<'_>) -> Option<bool> {
+        let kept = [&mut self.last.emergency_stop, &mut self.last.interlock, &mut self.last.dead_man];
+        let mut touched = false;
+        for (signal, kept) in self.signals.iter().zip(kept) {
+            if let Some(signal) = signal.filter(|signal| view.profile.frame_of(*signal) == view.frame) {
+                *kept = view.channel(signal).map(|reading| Contact {
+                    closed: reading.value != 0.0,
+                    taken_at: reading.taken_at,
+                    sequence: reading.sequence,
+                });
+                touched = true;
+            }
+        }
+        touched.then(|| self.ring.try_push(self.last).is_err())
+    }
+
+    fn lost(&mut self, reason: NoData) {
+        let kept = [&mut self.last.emergency_stop, &mut self.last.interlock, &mut self.last.dead_man];
+        for (signal, kept) in self.signals.iter().zip(kept) {
+            *kept = Err(if signal.is_some() { reason } else { NoData::NotFitted });
+        }
+        let _ = self.ring.try_push(self.last);
+    }
 }
 
 /// The clock and the counter of one frame.
@@ -93,14 +139,6 @@ struct SampleMark {
     sequence: u32,
 }
 
-/// What was wanted last, until it expires.
-#[derive(Debug, Clone, PartialEq)]
-struct Wanted {
-    set_points: Vec<(SetId, f64)>,
-    expires_at: Nanos,
-    sent: bool,
-}
-
 /// One instrument, seen from its wire.
 pub struct Endpoint {
     profile: Profile,
@@ -108,8 +146,7 @@ pub struct Endpoint {
     seen: Vec<bool>,
     times: Vec<FrameTime>,
     part: Part,
-    wanted: Option<Wanted>,
-    safe_sent: bool,
+    orders: Orders,
     alarm_until: Nanos,
     arrived: Nanos,
     health: Arc<Health>,
@@ -206,6 +243,33 @@ impl Endpoint {
         Ok((Self::new(profile, Part::Stage { signals, link, dead_weight_n }), port))
     }
 
+    /// A switch in the amplifier's supply, and its port.
+    ///
+    /// # Errors
+    /// Where the profile lacks the signal that reads the switch back, the set-point, or its safe value.
+    pub fn supply(profile: Profile) -> Result<(Self, SupplyPort), String> {
+        let closed = need(&profile, "closed")?;
+        need_set(&profile, "closed")?;
+        let (link, port) = ports::supply();
+        let endpoint = Self::new(profile, Part::Supply { closed, link });
+        if endpoint.safe_set_points().is_empty() {
+            return Err(
+                "its set-point `closed` has no `safe` value: it could not be opened at the end".into()
+            );
+        }
+        Ok((endpoint, port))
+    }
+
+    /// An instrument that reads safety contacts, and its port.
+    ///
+    /// # Errors
+    /// Where the profile has none of their signals.
+    pub fn contacts(profile: Profile) -> Result<(Self, ContactsPort), String> {
+        let (link, port) = ContactsLink::of(&profile)
+            .ok_or("the profile has none of the signals `emergency_stop`, `interlock`, `dead_man`")?;
+        Ok((Self::new(profile, Part::Contacts(link)), port))
+    }
+
     fn new(profile: Profile, part: Part) -> Self {
         let stamped = profile.description.time.stamp == Stamp::Device;
         let times = profile.frames().iter().map(|frame| FrameTime {
@@ -225,8 +289,7 @@ impl Endpoint {
             seen,
             times,
             part,
-            wanted: None,
-            safe_sent: true,
+            orders: Orders::default(),
             alarm_until: Nanos(0),
             arrived: Nanos(0),
             health: Arc::default(),
@@ -352,6 +415,8 @@ impl Endpoint {
                     taken_at: mark.taken_at,
                     sequence: mark.sequence,
                 };
+                let vibrates = state.amplitude.is_ok_and(|read| read.value > OFF_AMPLITUDE_PP_M);
+                self.orders.read_back(state.output_on || vibrates, mark.arrived);
                 link.states.try_push(Ok(state)).is_err()
             }
             Part::Stage { signals, link, .. } if view.profile.frame_of(signals.position) == frame => {
@@ -365,9 +430,22 @@ impl Endpoint {
                     taken_at: mark.taken_at,
                     sequence: mark.sequence,
                 };
+                // A velocity that is no number is none at rest.
+                let rests = state.velocity_m_s.abs() <= AT_REST_M_S;
+                self.orders.read_back(!rests, mark.arrived);
                 link.states.try_push(Ok(state)).is_err()
             }
-            Part::Amplifier { .. } | Part::Stage { .. } => return,
+            Part::Supply { closed, link } if view.profile.frame_of(*closed) == frame => {
+                let closed = view.values.get(*closed) != 0.0;
+                self.orders.read_back(closed, mark.arrived);
+                let state = SupplyState { cut: !closed, taken_at: mark.taken_at, sequence: mark.sequence };
+                link.states.try_push(Ok(state)).is_err()
+            }
+            Part::Contacts(contacts) => match contacts.take(&view) {
+                Some(full) => full,
+                None => return,
+            },
+            Part::Amplifier { .. } | Part::Stage { .. } | Part::Supply { .. } => return,
         };
         self.health.count(if full { &self.health.ring_full } else { &self.health.samples });
     }
@@ -377,134 +455,6 @@ impl Endpoint {
         self.health.count(&self.health.alarms);
         self.health.problem(format!("the instrument says {text}"));
         self.alarm_until = self.arrived.plus(ALARM_HOLDS);
-    }
-
-    /// Tells the loop at once that nothing will come, and why. Commands that wait are dropped: what
-    /// was wanted before the link went down must not be sent when it comes back.
-    pub fn link_down(&mut self, reason: NoData) {
-        self.seen.fill(false);
-        self.discard_commands();
-        let _ = match &mut self.part {
-            Part::Force { lateral, normal, last, ring } => {
-                for (axis, kept) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
-                    *kept = Err(if axis.is_some() { reason } else { NoData::NotFitted });
-                }
-                ring.try_push(*last).is_ok()
-            }
-            Part::Amplifier { link, .. } => link.states.try_push(Err(reason)).is_ok(),
-            Part::Stage { link, .. } => link.states.try_push(Err(reason)).is_ok(),
-        };
-    }
-
-    /// Drops all commands that wait.
-    pub fn discard_commands(&mut self) {
-        match &mut self.part {
-            Part::Force { .. } => {}
-            Part::Amplifier { link, .. } => while link.commands.try_pop().is_some() {},
-            Part::Stage { link, .. } => while link.commands.try_pop().is_some() {},
-        }
-        self.wanted = None;
-    }
-
-    /// What is due to be sent at `now`: the newest command, if its time has not passed; the safe
-    /// set-points once, where commands were sent and none is valid any more.
-    pub fn due(&mut self, now: Nanos) -> Due {
-        if let Some(newest) = self.newest_command() {
-            self.wanted = Some(newest);
-        }
-        match &mut self.wanted {
-            Some(wanted) if now <= wanted.expires_at => {
-                if wanted.sent {
-                    return Due::Nothing;
-                }
-                if let Some(refused) =
-                    wanted.set_points.iter().find_map(|(set, value)| self.profile.allows(*set, *value).err())
-                {
-                    self.health.count(&self.health.commands_refused);
-                    self.health.problem(refused.to_string());
-                    self.wanted = None;
-                    return self.safe_once();
-                }
-                wanted.sent = true;
-                self.safe_sent = false;
-                self.health.count(&self.health.commands_sent);
-                Due::SetPoints(wanted.set_points.clone())
-            }
-            Some(wanted) => {
-                if !wanted.sent {
-                    self.health.count(&self.health.commands_expired);
-                }
-                self.wanted = None;
-                self.safe_once()
-            }
-            None => Due::Nothing,
-        }
-    }
-
-    /// The set-points that make the rig safe; they may be sent at any time.
-    #[must_use]
-    pub fn safe_set_points(&self) -> Vec<(SetId, f64)> {
-        safe_set_points(&self.profile)
-    }
-
-    fn safe_once(&mut self) -> Due {
-        if self.safe_sent {
-            return Due::Nothing;
-        }
-        self.safe_sent = true;
-        self.health.count(&self.health.safe_sent);
-        Due::Safe(self.safe_set_points())
-    }
-
-    fn newest_command(&mut self) -> Option<Wanted> {
-        let profile = &self.profile;
-        let set = |name: &str, si: f64| {
-            profile.set(name).map(|set| (set, si / profile.description.set[set.0].si.factor))
-        };
-        let heartbeat = |sequence: u32| {
-            profile.set("heartbeat").map(|set| (set, f64::from(sequence) % profile.heartbeat_turns(set)))
-        };
-        match &mut self.part {
-            Part::Force { .. } => None,
-            Part::Amplifier { link, .. } => {
-                let command = std::iter::from_fn(|| link.commands.try_pop()).last()?;
-                let mut set_points = if command.enable {
-                    let wanted = [
-                        set("amplitude", command.amplitude_pp_m),
-                        set("frequency", command.frequency_hz),
-                        set("enable", 1.0),
-                    ];
-                    wanted.into_iter().flatten().collect()
-                } else {
-                    // Off leaves the frequency as it is: there may be no valid one.
-                    safe_set_points(profile)
-                };
-                set_points.extend(heartbeat(command.sequence));
-                Some(Wanted { set_points, expires_at: command.expires_at, sent: false })
-            }
-            Part::Stage { link, dead_weight_n, .. } => {
-                let command = std::iter::from_fn(|| link.commands.try_pop()).last()?;
-                let wanted = command.normal_force_n;
-                if let Some(weight) =
-                    dead_weight_n.filter(|weight| wanted != 0.0 && (wanted - weight).abs() > 1e-6)
-                {
-                    let text = format!("the load stands on a weight of {weight} N: {wanted} N cannot be had");
-                    self.health.count(&self.health.commands_refused);
-                    self.health.problem(text);
-                    return None;
-                }
-                let wanted = [
-                    set("velocity", command.velocity_m_s),
-                    set("load", command.normal_force_n),
-                    heartbeat(command.sequence),
-                ];
-                Some(Wanted {
-                    set_points: wanted.into_iter().flatten().collect(),
-                    expires_at: command.expires_at,
-                    sent: false,
-                })
-            }
-        }
     }
 }
 
@@ -517,11 +467,6 @@ fn need(profile: &Profile, name: &str) -> Result<SignalId, String> {
 
 fn need_set(profile: &Profile, name: &str) -> Result<SetId, String> {
     profile.set(name).ok_or_else(|| format!("the profile has no set-point `{name}`"))
-}
-
-fn safe_set_points(profile: &Profile) -> Vec<(SetId, f64)> {
-    let sets = profile.description.set.iter().enumerate();
-    sets.filter_map(|(i, set)| set.safe.map(|safe| (SetId(i), safe))).collect()
 }
 
 #[cfg(test)]

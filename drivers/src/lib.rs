@@ -36,13 +36,16 @@
 //!
 //! | room | purpose |
 //! |---|---|
-//! | [`setup`] | the `[[force]]`, `[amplifier]` and `[stage]` sections of a setup |
+//! | [`setup`] | the instruments' sections of a setup |
 //! | [`ports`] | the loop's side: port objects over rings |
 //! | [`endpoint`] | the wire's side, whatever the wire: frames to samples, commands to set-points |
 //! | [`timebase`] | an instrument's clock and counter, mapped to the loop's |
 //! | [`health`] | what a link counts |
+//! | [`identity`] | which instrument an address means, however it is spelt |
 //! | [`bundled`] | the profiles that come with the program |
+//! | [`mailbox`] | the newest command on its way from the loop to a link |
 //! | [`session`] | the life of a link: connect, converse, back off |
+//! | [`off`] | how an instrument is switched off and read back, whatever the wire |
 //! | [`modbus`] | the conversation with registers, over [`modbus_tcp`] or [`modbus_rtu`] |
 //! | [`can`] | the conversation in CAN messages, over [`slcan`] or [`socketcan`] |
 //! | [`text`] | the conversation in lines, over a serial line or SCPI over TCP |
@@ -50,15 +53,22 @@
 //! | [`serial`] | serial lines |
 //! | [`vibrometer`] | the settings of a vibrometer's controller, read back for a calibration |
 //! | [`probe`] | each instrument asked by itself, for `muprime doctor` |
+#![allow(
+    clippy::disallowed_methods,
+    reason = "a link's thread lives in wall-clock time: it waits for its wire and stamps what comes"
+)]
 
 pub mod bundled;
 pub mod can;
 pub mod canopen;
 pub mod endpoint;
 pub mod health;
+pub mod identity;
+pub mod mailbox;
 pub mod modbus;
 pub mod modbus_rtu;
 pub mod modbus_tcp;
+pub mod off;
 pub mod ports;
 pub mod probe;
 pub mod serial;
@@ -71,12 +81,13 @@ pub mod timebase;
 pub mod vibrometer;
 
 pub use health::{Health, HealthReport};
+pub use off::Closed;
 pub use setup::{AxisSetup, InstrumentSetup, InstrumentsSetup};
 
 use endpoint::Endpoint;
 use instruments::Profile;
 use instruments::schema::LinkKind;
-use realtime::ports::{Amplifier, ForceSensor, Stage};
+use realtime::ports::{Absent, Amplifier, ForceSensor, SafetyInputs, Stage, SupplySwitch};
 use session::Session;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -91,6 +102,10 @@ pub struct Rig {
     pub amplifier: Box<dyn Amplifier>,
     /// The stage.
     pub stage: Box<dyn Stage>,
+    /// The switch in the amplifier's supply; [`Absent`] where the setup has none.
+    pub supply: Box<dyn SupplySwitch>,
+    /// The safety contacts; [`Absent`] where the setup has none.
+    pub contacts: Box<dyn SafetyInputs>,
     /// The threads beside the loop.
     pub links: Links,
 }
@@ -136,7 +151,42 @@ pub enum OpenError {
     },
 }
 
-/// The threads that talk to the instruments. Dropping it sends safe set-points and ends them.
+/// What an instrument is to the rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// It measures forces.
+    Force,
+    /// It drives the plate.
+    Amplifier,
+    /// It moves and loads the finger.
+    Stage,
+    /// It switches the amplifier's supply.
+    Supply,
+    /// It reads the safety contacts.
+    Contacts,
+}
+
+impl Role {
+    /// Whether it takes no set-points.
+    #[must_use]
+    pub const fn only_measures(self) -> bool {
+        matches!(self, Self::Force | Self::Contacts)
+    }
+}
+
+/// How the link of one instrument was closed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LinkEnd {
+    /// Id of the instrument's profile.
+    pub name: String,
+    /// What it is to the rig.
+    pub role: Role,
+    /// Whether it was read back off.
+    pub closed: Closed,
+}
+
+/// The threads that talk to the instruments. Closing or dropping it switches off what can be switched off, reads it back, and
+/// ends the threads; that takes at most [`off::OFF_WITHIN`] and the time limits of one connection and one answer more.
 pub struct Links {
     stop: Arc<AtomicBool>,
     links: Vec<Link>,
@@ -144,25 +194,44 @@ pub struct Links {
 
 struct Link {
     name: String,
+    role: Role,
     health: Arc<Health>,
-    thread: Option<JoinHandle<()>>,
+    thread: Option<JoinHandle<Closed>>,
 }
 
 impl Links {
+    fn none() -> Self {
+        Self { stop: Arc::new(AtomicBool::new(false)), links: Vec::new() }
+    }
+
     /// Each instrument's name and counters.
     pub fn health(&self) -> impl Iterator<Item = (&str, HealthReport)> {
         self.links.iter().map(|link| (link.name.as_str(), link.health.report()))
+    }
+
+    /// Switches off, ends the threads and says of each instrument how its link was closed, in the order of the setup.
+    #[must_use]
+    pub fn close(mut self) -> Vec<LinkEnd> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Vec<LinkEnd> {
+        self.stop.store(true, Ordering::Release);
+        let ended = |mut link: Link| {
+            let joined = link.thread.take().map(JoinHandle::join);
+            let closed = match joined {
+                Some(Ok(closed)) => closed,
+                _ => Closed::NotReadBack("its thread is gone".into()),
+            };
+            LinkEnd { name: link.name, role: link.role, closed }
+        };
+        self.links.drain(..).map(ended).collect()
     }
 }
 
 impl Drop for Links {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        for link in &mut self.links {
-            if let Some(thread) = link.thread.take() {
-                let _ = thread.join();
-            }
-        }
+        self.end();
     }
 }
 
@@ -173,7 +242,7 @@ impl Drop for Links {
 /// The first instrument that is unknown, does not fit the setup, does not answer, or is another
 /// than the profile says. Nothing was commanded then.
 pub fn open(setup: &InstrumentsSetup, epoch: Instant) -> Result<Rig, OpenError> {
-    let mut links = Links { stop: Arc::new(AtomicBool::new(false)), links: Vec::new() };
+    let mut links = Links::none();
     let mut force = Vec::new();
     for instrument in &setup.force {
         let profile = profile(&instrument.profile)?;
@@ -191,7 +260,31 @@ pub fn open(setup: &InstrumentsSetup, epoch: Instant) -> Result<Rig, OpenError> 
     let (endpoint, stage) = Endpoint::stage(profile(&setup.stage.profile)?, &setup.stage)
         .map_err(|problem| mismatch(&setup.stage, problem))?;
     start(&mut links, &setup.stage, endpoint, epoch)?;
-    Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), links })
+    let (supply, contacts) = open_safety(setup, &mut links, epoch)?;
+    Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), supply, contacts, links })
+}
+
+/// The second switch-off channel and the safety contacts.
+fn open_safety(
+    setup: &InstrumentsSetup,
+    links: &mut Links,
+    epoch: Instant,
+) -> Result<(Box<dyn SupplySwitch>, Box<dyn SafetyInputs>), OpenError> {
+    let mut supply: Box<dyn SupplySwitch> = Box::new(Absent);
+    let mut contacts: Box<dyn SafetyInputs> = Box::new(Absent);
+    if let Some(instrument) = &setup.supply_relay {
+        let (endpoint, port) = Endpoint::supply(profile(&instrument.profile)?)
+            .map_err(|problem| mismatch(instrument, problem))?;
+        start(links, instrument, endpoint, epoch)?;
+        supply = Box::new(port);
+    }
+    if let Some(instrument) = &setup.safety_inputs {
+        let (endpoint, port) = Endpoint::contacts(profile(&instrument.profile)?)
+            .map_err(|problem| mismatch(instrument, problem))?;
+        start(links, instrument, endpoint, epoch)?;
+        contacts = Box::new(port);
+    }
+    Ok((supply, contacts))
 }
 
 /// The bundled profile of that name, its golden vectors run.
@@ -221,7 +314,7 @@ pub fn open_one(
     endpoint: Endpoint,
     epoch: Instant,
 ) -> Result<Links, OpenError> {
-    let mut links = Links { stop: Arc::new(AtomicBool::new(false)), links: Vec::new() };
+    let mut links = Links::none();
     start(&mut links, instrument, endpoint, epoch)?;
     Ok(links)
 }
@@ -233,9 +326,9 @@ fn start(
     endpoint: Endpoint,
     epoch: Instant,
 ) -> Result<(), OpenError> {
-    let health = endpoint.health();
+    let (health, role) = (endpoint.health(), endpoint.role());
     let (ready, opened) = std::sync::mpsc::sync_channel(1);
-    let session = Session { endpoint, epoch, stop: Arc::clone(&links.stop), ready: Some(ready) };
+    let session = Session::new(endpoint, epoch, Arc::clone(&links.stop), ready);
     let failed = |problem: String| OpenError::Link {
         id: instrument.profile.clone(),
         address: instrument.address.clone(),
@@ -247,12 +340,15 @@ fn start(
             modbus_tcp::spawn(instrument, session)
         }
         LinkKind::ModbusTcp | LinkKind::ModbusRtu => modbus_rtu::spawn(instrument, session),
+        LinkKind::Can if !session.endpoint.role().only_measures() => {
+            Err("set-points do not go by plain CAN messages; only sensors can be reached so".into())
+        }
         LinkKind::Can => can::spawn(instrument, session),
         LinkKind::Canopen => canopen::spawn(instrument, session),
         LinkKind::Serial | LinkKind::Scpi => text::spawn(instrument, session),
     }
     .map_err(failed)?;
-    links.links.push(Link { name: instrument.profile.clone(), health, thread: Some(thread) });
+    links.links.push(Link { name: instrument.profile.clone(), role, health, thread: Some(thread) });
     match opened.recv() {
         Ok(Ok(())) => Ok(()),
         Ok(Err(problem)) => Err(failed(problem)),

@@ -1,9 +1,10 @@
 //! The conversation with an instrument of registers, whatever carries it.
 
 use super::endpoint::Due;
+use super::off::{self, OFF_ANSWER_MS, OffWay};
 use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
 use instruments::profile::FrameKind;
-use instruments::schema::{Poll, Table};
+use instruments::schema::{Poll, Table, Write};
 use instruments::{FrameId, SetId};
 use std::convert::Infallible;
 
@@ -27,11 +28,20 @@ pub trait Registers {
     fn read(&mut self, session: &Session, table: Table, address: u16, count: u16)
     -> Result<Vec<u8>, Trouble>;
 
-    /// Writes neighbouring holding registers.
+    /// Writes neighbouring registers of a table that can be written.
     ///
     /// # Errors
     /// See [`Trouble`].
-    fn write(&mut self, session: &Session, address: u16, registers: &[u16]) -> Result<(), Trouble>;
+    fn write(
+        &mut self,
+        session: &Session,
+        table: Table,
+        address: u16,
+        registers: &[u16],
+    ) -> Result<(), Trouble>;
+
+    /// From now on an answer may take so long.
+    fn wait_up_to(&mut self, answer_ms: u32);
 }
 
 /// A conversation's state: blocks as last sent, and bad answers in a row.
@@ -54,6 +64,7 @@ impl Conversation {
             .first()
             .map_or(0, |block| 2 * usize::from(block.count));
         let mut conversation = Self { block: vec![0; block], bad: 0 };
+        off::at_the_beginning(session, &mut Way { conversation: &mut conversation, wire })?;
         for (frame, poll) in polls(session) {
             conversation.read(session, wire, frame, &poll)?;
         }
@@ -82,18 +93,16 @@ impl Conversation {
         let mut write = block.as_ref().map(|block| Periodic::new(block.rate_hz.unwrap_or(100.0), now));
         loop {
             if session.stopping() {
-                let safe = session.endpoint.safe_set_points();
-                if let (false, Some(block)) = (safe.is_empty(), &block) {
-                    self.write(session, wire, block.address, &safe)?;
-                }
-                return Err(Ended::Stopped);
+                return Err(off::at_the_end(session, &mut Way { conversation: &mut self, wire }));
             }
             let now = session.now();
             if let (Some(periodic), Some(block)) =
                 (write.as_mut().filter(|periodic| periodic.is_due(now)), &block)
             {
-                if let Due::SetPoints(set_points) | Due::Safe(set_points) = session.endpoint.due(now) {
-                    self.write(session, wire, block.address, &set_points)?;
+                match session.endpoint.due(now) {
+                    Due::Nothing => {}
+                    Due::SetPoints(set_points) => self.command(session, wire, block, &set_points)?,
+                    Due::Safe(_) => Way { conversation: &mut self, wire }.send_off(session)?,
                 }
                 periodic.advance(session.now());
             }
@@ -125,22 +134,52 @@ impl Conversation {
         Ok(())
     }
 
+    /// Sends the loop's command in one piece. One that is not taken is followed by an 'off' at once.
+    fn command(
+        &mut self,
+        session: &mut Session,
+        wire: &mut dyn Registers,
+        block: &Write,
+        set_points: &[(SetId, f64)],
+    ) -> Result<(), Ended> {
+        let answer = self.write(session, wire, block, set_points);
+        if self.judge(session, answer)?.is_none() {
+            session.endpoint.refused();
+            Way { conversation: self, wire }.send_off(session)?;
+        }
+        Ok(())
+    }
+
     fn write(
         &mut self,
         session: &Session,
         wire: &mut dyn Registers,
-        address: u16,
+        block: &Write,
         set_points: &[(SetId, f64)],
-    ) -> Result<(), Ended> {
+    ) -> Result<(), Trouble> {
         for (set, value) in set_points {
             // Ranges were checked when the command was taken.
             let _ = session.endpoint.profile().encode_set(*set, *value, &mut self.block);
         }
-        let words: Vec<u16> =
-            self.block.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
-        let answer = wire.write(session, address, &words);
-        self.judge(session, answer)?;
-        Ok(())
+        wire.write(session, block.table, block.address, &words(&self.block))
+    }
+
+    /// One set-point by itself, in its own registers.
+    fn write_one(
+        &mut self,
+        session: &Session,
+        wire: &mut dyn Registers,
+        block: &Write,
+        (set, value): (SetId, f64),
+    ) -> Result<(), Trouble> {
+        let profile = session.endpoint.profile();
+        let _ = profile.encode_set(set, value, &mut self.block);
+        let described = &profile.description.set[set.0];
+        let first = usize::from(described.register);
+        let registers = described.number.map_or(1, |number| number.bytes().div_ceil(2));
+        let words = words(&self.block);
+        let own = words.get(first..first + registers).unwrap_or(&words);
+        wire.write(session, block.table, block.address + described.register, own)
     }
 
     /// Tells 'the instrument refused' from 'we could not talk'. A few bad answers are borne.
@@ -164,8 +203,64 @@ impl Conversation {
         health.problem(ended.to_string());
         self.bad += 1;
         // Before the first sample there is nothing to bear with a refusal: the map is wrong.
-        let hopeless = session.ready.is_some() && matches!(ended, Ended::Refused(_));
+        let hopeless = session.is_first() && matches!(ended, Ended::Refused(_));
         if self.bad >= BAD_IN_A_ROW || hopeless { Err(ended) } else { Ok(None) }
+    }
+}
+
+fn words(block: &[u8]) -> Vec<u16> {
+    block.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect()
+}
+
+/// A conversation and its wire, as the way to an 'off'.
+struct Way<'a> {
+    conversation: &'a mut Conversation,
+    wire: &'a mut dyn Registers,
+}
+
+impl OffWay for Way<'_> {
+    fn send_off(&mut self, session: &mut Session) -> Result<(), Ended> {
+        let Some(block) = session.endpoint.profile().description.write.first().cloned() else {
+            return Ok(());
+        };
+        let safe = session.endpoint.hand_out_off(session.now());
+        let health = session.endpoint.health();
+        let mut not_taken = |trouble: Trouble| match trouble {
+            Trouble::Ended(ended) => Err(ended),
+            Trouble::Refused(said) | Trouble::Corrupt(said) => {
+                health.count(&health.exceptions);
+                health.problem(format!("'off' was not taken: {said}"));
+                Ok(false)
+            }
+        };
+        let whole = self.conversation.write(session, self.wire, &block, &safe);
+        if whole.map_or_else(&mut not_taken, |()| Ok(true))? {
+            return Ok(());
+        }
+        // Some instruments refuse a block for the sake of one value in it: each by itself then, whatever becomes of the others.
+        let mut all = true;
+        for one in safe {
+            let taken = self.conversation.write_one(session, self.wire, &block, one);
+            all &= taken.map_or_else(&mut not_taken, |()| Ok(true))?;
+        }
+        if !all {
+            session.endpoint.refused();
+        }
+        Ok(())
+    }
+
+    fn be_patient(&mut self, session: &Session) {
+        let limit = session.endpoint.profile().description.link.response_timeout_ms;
+        self.wire.wait_up_to(limit.max(OFF_ANSWER_MS));
+    }
+
+    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
+        for (frame, poll) in polls(session) {
+            if poll.rate_hz.is_some() {
+                self.conversation.read(session, self.wire, frame, &poll)?;
+            }
+        }
+        Ok(())
     }
 }
 

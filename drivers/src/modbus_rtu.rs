@@ -5,6 +5,7 @@
 //! the instrument's longest answer takes, and only then is the next request made.
 
 use super::modbus::{Conversation, Registers, Trouble};
+use super::off::Closed;
 use super::serial::Line;
 use super::session::{BAD_IN_A_ROW, Ended, LONGEST_SLEEP, Session};
 use super::setup::InstrumentSetup;
@@ -23,7 +24,7 @@ const STOP_TRIES: u32 = 10;
 ///
 /// # Errors
 /// Where no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<()>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
     let link = session.endpoint.profile().description.link.clone();
     let path = instrument.address.strip_prefix("rtu:").unwrap_or(&instrument.address).to_string();
     let rate_hz = instrument.rate_hz;
@@ -35,12 +36,17 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
     }
     session.spawn(move |session| {
         let line = Line::open(&path, baud, &format)?;
-        let mut wire = Rtu { line, unit, answer_ms: link.response_timeout_ms, silence: rtu::silence_s(baud) };
+        let (answer_ms, silence) = (link.response_timeout_ms, rtu::silence_s(baud));
+        let mut wire = Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence };
         let health = session.endpoint.health();
         health.count(&health.connections);
         let stream = session.endpoint.profile().description.stream.clone();
         if let Some(stream) = stream.as_ref().filter(|stream| stream.stop_before_open) {
             wire.stop_stream(stream)?;
+        }
+        if !session.is_first() && session.endpoint.owes_off() {
+            // Sent before the line is listened to: nobody knows how long it will be heard.
+            wire.send_unanswered_off(session)?;
         }
         // Whatever an earlier connection was still owed comes now or never.
         let longest = Duration::from_millis(u64::from(link.response_timeout_ms));
@@ -54,14 +60,36 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
     })
 }
 
+fn write_request(unit: u8, table: Table, address: u16, registers: &[u16]) -> Request {
+    if table.is_bits() {
+        rtu::write_coils(unit, address, registers)
+    } else {
+        rtu::write(unit, address, registers)
+    }
+}
+
 struct Rtu {
     line: Line,
     unit: u8,
     answer_ms: u32,
+    quiet_ms: u32,
     silence: f64,
 }
 
 impl Rtu {
+    /// Writes the safe set-points and waits for no answer. The 'off' that is answered and read back follows.
+    fn send_unanswered_off(&mut self, session: &Session) -> Result<(), Ended> {
+        let profile = session.endpoint.profile();
+        let Some(block) = profile.description.write.first() else { return Ok(()) };
+        let mut bytes = vec![0; 2 * usize::from(block.count)];
+        for (set, value) in session.endpoint.safe_set_points() {
+            let _ = profile.encode_set(set, value, &mut bytes);
+        }
+        let words: Vec<u16> = bytes.chunks_exact(2).map(|p| u16::from_be_bytes([p[0], p[1]])).collect();
+        std::thread::sleep(Duration::from_secs_f64(self.silence));
+        self.line.write(&write_request(self.unit, block.table, block.address, &words).bytes)
+    }
+
     /// One request and its answer.
     fn ask(&mut self, request: &Request) -> Result<Vec<u8>, Trouble> {
         let ended = Trouble::Ended;
@@ -89,7 +117,7 @@ impl Rtu {
         judged.map_err(|error| match error {
             RtuError::Exception(code) => Trouble::Refused(format!("exception {code}")),
             other => {
-                let quiet = Duration::from_millis(u64::from(self.answer_ms));
+                let quiet = Duration::from_millis(u64::from(self.quiet_ms));
                 match self.line.drain(quiet, 10 * quiet) {
                     Ok(_) => Trouble::Corrupt(other.to_string()),
                     Err(ended) => Trouble::Ended(ended),
@@ -120,7 +148,7 @@ impl Rtu {
                     self.read(session, Table::Holding, from, count).and_then(|bytes| {
                         let pairs = bytes.chunks_exact(2);
                         let words: Vec<u16> = pairs.map(|p| u16::from_be_bytes([p[0], p[1]])).collect();
-                        self.write(session, to, &words)
+                        self.write(session, Table::Holding, to, &words)
                     })
                 }
                 (None, None) => Ok(()),
@@ -196,7 +224,7 @@ impl Rtu {
         let mut last = Ended::Io("the profile says no way to start the stream".into());
         for _ in 0..BAD_IN_A_ROW {
             let started = if let Some((address, value)) = stream.start_register {
-                self.write(session, address, &[value])
+                self.write(session, Table::Holding, address, &[value])
             } else if let Some((function, data)) = stream.start_function {
                 self.own_function(function, data)
             } else {
@@ -225,11 +253,21 @@ impl Registers for Rtu {
         self.judged(rtu::registers(&request, &answer))
     }
 
-    fn write(&mut self, _session: &Session, address: u16, registers: &[u16]) -> Result<(), Trouble> {
-        let request = rtu::write(self.unit, address, registers);
+    fn write(
+        &mut self,
+        _session: &Session,
+        table: Table,
+        address: u16,
+        registers: &[u16],
+    ) -> Result<(), Trouble> {
+        let request = write_request(self.unit, table, address, registers);
         let answer = self.ask(&request)?;
         let length = rtu::answer_length(&request, &answer).unwrap_or(answer.len()).min(answer.len());
         // A stream that this write starts may follow its answer at once.
         self.judged(rtu::written(&request, &answer[..length]))
+    }
+
+    fn wait_up_to(&mut self, answer_ms: u32) {
+        self.answer_ms = answer_ms;
     }
 }

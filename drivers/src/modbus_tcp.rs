@@ -6,6 +6,7 @@
 //! and made anew. An answer that comes late then finds no socket: it can never become a force.
 
 use super::modbus::{Conversation, Registers, Trouble};
+use super::off::Closed;
 use super::session::{Ended, Session};
 use super::setup::InstrumentSetup;
 use instruments::schema::Table;
@@ -21,7 +22,7 @@ use tokio_modbus::prelude::Slave;
 ///
 /// # Errors
 /// Where the address makes no sense or no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<()>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
     let link = &session.endpoint.profile().description.link;
     let address = resolve(&instrument.address, link.port)?;
     let unit = instrument.unit.or(link.unit).unwrap_or(255);
@@ -99,10 +100,17 @@ impl<'a> Tcp<'a> {
     /// See [`Trouble`].
     pub fn read_registers(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
         let (runtime, limit) = (self.runtime, self.answer_ms);
-        let registers = part(match table {
-            Table::Holding => within(runtime, limit, self.context.read_holding_registers(address, count)),
-            Table::Input => within(runtime, limit, self.context.read_input_registers(address, count)),
-        })?;
+        let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
+        let registers: Vec<u16> = match table {
+            Table::Holding => {
+                part(within(runtime, limit, self.context.read_holding_registers(address, count)))?
+            }
+            Table::Input => part(within(runtime, limit, self.context.read_input_registers(address, count)))?,
+            Table::Coil => bits(part(within(runtime, limit, self.context.read_coils(address, count)))?),
+            Table::Discrete => {
+                bits(part(within(runtime, limit, self.context.read_discrete_inputs(address, count)))?)
+            }
+        };
         Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect())
     }
 }
@@ -128,7 +136,22 @@ impl Registers for Tcp<'_> {
         self.read_registers(table, address, count)
     }
 
-    fn write(&mut self, _session: &Session, address: u16, registers: &[u16]) -> Result<(), Trouble> {
-        part(within(self.runtime, self.answer_ms, self.context.write_multiple_registers(address, registers)))
+    fn write(
+        &mut self,
+        _session: &Session,
+        table: Table,
+        address: u16,
+        registers: &[u16],
+    ) -> Result<(), Trouble> {
+        let (runtime, limit) = (self.runtime, self.answer_ms);
+        if table.is_bits() {
+            let coils: Vec<bool> = registers.iter().map(|register| *register != 0).collect();
+            return part(within(runtime, limit, self.context.write_multiple_coils(address, &coils)));
+        }
+        part(within(runtime, limit, self.context.write_multiple_registers(address, registers)))
+    }
+
+    fn wait_up_to(&mut self, answer_ms: u32) {
+        self.answer_ms = answer_ms;
     }
 }

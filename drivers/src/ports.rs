@@ -1,16 +1,19 @@
-//! The loop's side of the drivers: port objects over single-producer, single-consumer rings.
+//! The loop's side of the drivers: port objects over single-producer, single-consumer rings of samples and a mailbox of
+//! commands.
 //!
 //! Nothing here blocks, locks or allocates after it was made.
 
-use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Stage, StageState};
+use crate::mailbox::Mailbox;
+use realtime::ports::{
+    Amplifier, AmplifierState, Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs, Stage, StageState,
+    SupplyCommand, SupplyState, SupplySwitch,
+};
 use realtime::safety::{DriveCommand, StageCommand};
-use ringbuf::traits::{Consumer, Producer, Split};
+use ringbuf::traits::{Consumer, Split};
 use ringbuf::{HeapCons, HeapProd, HeapRb};
 
 /// Samples that wait for the loop at most: a quarter of a second at 1 kHz.
 const SAMPLES: usize = 256;
-/// Commands that wait for the link at most; older ones expire there anyway.
-const COMMANDS: usize = 64;
 
 /// What the loop wants of the amplifier, as the link's thread takes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,6 +53,14 @@ pub struct StageSetPoint {
     pub sequence: u32,
     /// It must not leave after this.
     pub expires_at: Nanos,
+}
+
+impl StageSetPoint {
+    /// Whether it neither moves nor loads.
+    #[must_use]
+    pub fn rests(&self) -> bool {
+        self.velocity_m_s == 0.0 && self.normal_force_n == 0.0
+    }
 }
 
 impl From<StageCommand> for StageSetPoint {
@@ -126,32 +137,31 @@ pub fn compose(mut ports: Vec<(ForcePort, (bool, bool))>) -> Result<Box<dyn Forc
 /// The amplifier.
 pub struct AmplifierPort {
     states: HeapCons<Result<AmplifierState, NoData>>,
-    commands: HeapProd<DriveSetPoint>,
+    commands: Mailbox<DriveSetPoint>,
     last: Result<AmplifierState, NoData>,
 }
 
-/// The ends of an amplifier's rings that the link holds.
+/// The ends that an amplifier's link holds.
 pub struct AmplifierLink {
     /// Into the loop.
     pub states: HeapProd<Result<AmplifierState, NoData>>,
     /// Out of the loop.
-    pub commands: HeapCons<DriveSetPoint>,
+    pub commands: Mailbox<DriveSetPoint>,
 }
 
 /// An amplifier port, and the ends that the link holds.
 #[must_use]
 pub fn amplifier() -> (AmplifierLink, AmplifierPort) {
     let (into_loop, states) = HeapRb::new(SAMPLES).split();
-    let (commands, from_loop) = HeapRb::new(COMMANDS).split();
-    let port = AmplifierPort { states, commands, last: Err(NoData::NeverRead) };
-    (AmplifierLink { states: into_loop, commands: from_loop }, port)
+    let commands = Mailbox::default();
+    let port = AmplifierPort { states, commands: commands.clone(), last: Err(NoData::NeverRead) };
+    (AmplifierLink { states: into_loop, commands }, port)
 }
 
 impl AmplifierPort {
-    /// Hands a set-point to the link. A full ring means that the link takes nothing: what waits there
-    /// expires, and so would this.
+    /// Hands a set-point to the link.
     pub(crate) fn push(&mut self, set_point: DriveSetPoint) {
-        let _ = self.commands.try_push(set_point);
+        self.commands.put(set_point, !set_point.enable);
     }
 }
 
@@ -169,35 +179,103 @@ impl Amplifier for AmplifierPort {
 /// The stage.
 pub struct StagePort {
     states: HeapCons<Result<StageState, NoData>>,
-    commands: HeapProd<StageSetPoint>,
+    commands: Mailbox<StageSetPoint>,
     last: Result<StageState, NoData>,
 }
 
-/// The ends of a stage's rings that the link holds.
+/// The ends that a stage's link holds.
 pub struct StageLink {
     /// Into the loop.
     pub states: HeapProd<Result<StageState, NoData>>,
     /// Out of the loop.
-    pub commands: HeapCons<StageSetPoint>,
+    pub commands: Mailbox<StageSetPoint>,
 }
 
 /// A stage port, and the ends that the link holds.
 #[must_use]
 pub fn stage() -> (StageLink, StagePort) {
     let (into_loop, states) = HeapRb::new(SAMPLES).split();
-    let (commands, from_loop) = HeapRb::new(COMMANDS).split();
-    let port = StagePort { states, commands, last: Err(NoData::NeverRead) };
-    (StageLink { states: into_loop, commands: from_loop }, port)
+    let commands = Mailbox::default();
+    let port = StagePort { states, commands: commands.clone(), last: Err(NoData::NeverRead) };
+    (StageLink { states: into_loop, commands }, port)
 }
 
 impl Stage for StagePort {
     fn command(&mut self, command: StageCommand, _now: Nanos) {
-        // As for the amplifier: what finds no room would have expired.
-        let _ = self.commands.try_push(command.into());
+        let set_point = StageSetPoint::from(command);
+        self.commands.put(set_point, set_point.rests());
     }
 
     fn state(&mut self, _now: Nanos) -> Result<StageState, NoData> {
         latest(&mut self.states, &mut self.last);
+        self.last
+    }
+}
+
+/// The supply opens where the loop has said nothing for so long: a loop that is dead closes no supply.
+const SUPPLY_EXPIRES: Nanos = Nanos(250_000_000);
+
+/// What the loop wants of the supply, as the link's thread takes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SupplySetPoint {
+    /// Closed; else open.
+    pub closed: bool,
+    /// It must not leave after this.
+    pub expires_at: Nanos,
+}
+
+/// The switch in the amplifier's supply.
+pub struct SupplyPort {
+    states: HeapCons<Result<SupplyState, NoData>>,
+    commands: Mailbox<SupplySetPoint>,
+    last: Result<SupplyState, NoData>,
+}
+
+/// The ends that a supply's link holds.
+pub struct SupplyLink {
+    /// Into the loop.
+    pub states: HeapProd<Result<SupplyState, NoData>>,
+    /// Out of the loop.
+    pub commands: Mailbox<SupplySetPoint>,
+}
+
+/// A supply's port, and the ends that the link holds.
+#[must_use]
+pub fn supply() -> (SupplyLink, SupplyPort) {
+    let (into_loop, states) = HeapRb::new(SAMPLES).split();
+    let commands = Mailbox::default();
+    let port = SupplyPort { states, commands: commands.clone(), last: Err(NoData::NeverRead) };
+    (SupplyLink { states: into_loop, commands }, port)
+}
+
+impl SupplySwitch for SupplyPort {
+    fn command(&mut self, command: SupplyCommand, now: Nanos) {
+        let closed = command == SupplyCommand::Restore;
+        self.commands.put(SupplySetPoint { closed, expires_at: now.plus(SUPPLY_EXPIRES) }, !closed);
+    }
+
+    fn state(&mut self, _now: Nanos) -> Result<SupplyState, NoData> {
+        latest(&mut self.states, &mut self.last);
+        self.last
+    }
+}
+
+/// The safety contacts.
+pub struct ContactsPort {
+    ring: HeapCons<Contacts>,
+    last: Contacts,
+}
+
+/// A port of safety contacts, and the end into which the link pushes.
+#[must_use]
+pub fn contacts() -> (HeapProd<Contacts>, ContactsPort) {
+    let (producer, ring) = HeapRb::new(SAMPLES).split();
+    (producer, ContactsPort { ring, last: Contacts::missing(NoData::NeverRead) })
+}
+
+impl SafetyInputs for ContactsPort {
+    fn read(&mut self, _now: Nanos) -> Contacts {
+        latest(&mut self.ring, &mut self.last);
         self.last
     }
 }

@@ -1,8 +1,10 @@
 //! The life of a link: connect, converse until something is wrong, tell the loop, back off, connect anew.
 
 use super::endpoint::{BadFrame, Endpoint};
+use super::off::{Closed, OFF_WITHIN};
 use realtime::ports::{Nanos, NoData};
 use std::convert::Infallible;
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
@@ -36,6 +38,12 @@ pub enum Ended {
     /// A frame that must not become a sample.
     #[error(transparent)]
     Frame(#[from] BadFrame),
+    /// 'Off' was sent again and again, and the instrument still shows 'on', or shows nothing.
+    #[error("told to switch off for {} s, the instrument did not show it", OFF_WITHIN.as_secs())]
+    StillOn,
+    /// The driver panicked: a fault of this program.
+    #[error("the driver panicked: {0}")]
+    Panicked(String),
 }
 
 impl From<std::io::Error> for Ended {
@@ -82,9 +90,33 @@ pub struct Session {
     pub stop: Arc<AtomicBool>,
     /// Takes the outcome of the first connection, once.
     pub ready: Option<SyncSender<Result<(), String>>>,
+    /// When the thread is to be done with switching off; known from the moment that it sees `stop`.
+    off_by: Option<Instant>,
 }
 
 impl Session {
+    /// A session whose thread is not started yet. `ready` takes the outcome of the first connection, once.
+    #[must_use]
+    pub fn new(
+        endpoint: Endpoint,
+        epoch: Instant,
+        stop: Arc<AtomicBool>,
+        ready: SyncSender<Result<(), String>>,
+    ) -> Self {
+        Self { endpoint, epoch, stop, ready: Some(ready), off_by: None }
+    }
+
+    /// Whether no connection has given a sample yet: nothing was commanded then, and nothing may be.
+    #[must_use]
+    pub fn is_first(&self) -> bool {
+        self.ready.is_some()
+    }
+
+    /// Whether the time for switching off is over. It runs from the first time that this is asked.
+    pub fn off_time_over(&mut self) -> bool {
+        Instant::now() >= *self.off_by.get_or_insert_with(|| Instant::now() + OFF_WITHIN)
+    }
+
     /// Nanoseconds since the epoch.
     #[must_use]
     pub fn now(&self) -> Nanos {
@@ -111,53 +143,89 @@ impl Session {
         std::thread::sleep(pause.min(LONGEST_SLEEP));
     }
 
-    /// Starts the thread, which converses again and again until it is told to stop.
+    /// Starts the thread, which converses again and again until it is told to stop and the instrument is off.
     ///
     /// # Errors
     /// Where no thread can be had.
     pub fn spawn(
         mut self,
         mut converse: impl FnMut(&mut Session) -> Result<Infallible, Ended> + Send + 'static,
-    ) -> Result<JoinHandle<()>, String> {
+    ) -> Result<JoinHandle<Closed>, String> {
         let name: String = self.endpoint.profile().id().chars().take(15).collect();
         let run = move || self.keep_up(&mut converse);
         std::thread::Builder::new().name(name).spawn(run).map_err(|error| error.to_string())
     }
 
-    fn keep_up(&mut self, converse: &mut dyn FnMut(&mut Session) -> Result<Infallible, Ended>) {
+    fn keep_up(&mut self, converse: &mut dyn FnMut(&mut Session) -> Result<Infallible, Ended>) -> Closed {
         let link = &self.endpoint.profile().description.link;
         let first = Duration::from_millis(u64::from(link.backoff_first_ms));
         let longest = Duration::from_millis(u64::from(link.backoff_longest_ms));
         let health = self.endpoint.health();
         let mut pause = first;
-        while !self.stopping() {
+        let mut last_words = String::from("the link was down");
+        while !self.stopping() || (self.endpoint.owes_off() && !self.off_time_over()) {
             let samples_before = health.report().samples;
-            let ended = match converse(self) {
-                Ok(never) => match never {},
-                Err(ended) => ended,
-            };
+            let ended = self.guarded(converse);
+            let stopped = matches!(ended, Ended::Stopped);
+            let off = self.endpoint.reads_off();
             self.endpoint.link_down(NoData::Disconnected);
-            if matches!(ended, Ended::Stopped) {
-                break;
+            if stopped {
+                return if self.endpoint.is_actuator() && off {
+                    Closed::ReadBackOff
+                } else {
+                    self.closed("stopped before a state came".into())
+                };
             }
             if matches!(ended, Ended::Timeout(_)) {
                 health.count(&health.timeouts);
             }
-            health.problem(ended.to_string());
+            last_words = ended.to_string();
+            health.problem(last_words.clone());
             tracing::warn!(instrument = self.endpoint.profile().id(), %ended, "the link went down");
-            if self.tell(Err(ended.to_string())) {
-                return; // whoever opened the rig wants to know, not to wait
+            if self.tell(Err(last_words.clone())) {
+                return self.closed(last_words); // whoever opened the rig wants to know, not to wait
             }
             // A connection that gave samples was a good one: begin with the short pause again.
-            pause = if health.report().samples > samples_before { first } else { (2 * pause).min(longest) };
-            self.back_off(pause);
+            let was_good = health.report().samples > samples_before;
+            pause = if was_good { first } else { (2 * pause).min(longest) };
+            // Where 'off' is owed the first try is made at once, and the end of the program waits for no long pause.
+            let owed = self.endpoint.owes_off();
+            if !(owed && was_good) {
+                self.back_off(if owed && self.stopping() { pause.min(LONGEST_SLEEP) } else { pause });
+            }
+        }
+        self.closed(last_words)
+    }
+
+    /// How the link was closed where no last 'off' was read back in an orderly end.
+    fn closed(&self, why: String) -> Closed {
+        if !self.endpoint.is_actuator() {
+            Closed::NothingToSwitch
+        } else if self.endpoint.reads_off() {
+            Closed::ReadBackOff
+        } else {
+            Closed::NotReadBack(why)
+        }
+    }
+
+    /// One conversation. A panic in it is the end of it, and of nothing else: the next one switches off.
+    fn guarded(&mut self, converse: &mut dyn FnMut(&mut Session) -> Result<Infallible, Ended>) -> Ended {
+        match std::panic::catch_unwind(AssertUnwindSafe(|| converse(self))) {
+            Ok(Ok(never)) => match never {},
+            Ok(Err(ended)) => ended,
+            Err(cause) => {
+                let said = cause.downcast_ref::<&str>().map(ToString::to_string);
+                let said = said.or_else(|| cause.downcast_ref::<String>().cloned());
+                Ended::Panicked(said.unwrap_or_else(|| "no words".into()))
+            }
         }
     }
 
     /// Sleeps, but not through a stop; commands that come meanwhile are dropped, not kept.
     fn back_off(&mut self, pause: Duration) {
         let until = self.now().plus(Nanos(u64::try_from(pause.as_nanos()).unwrap_or(u64::MAX)));
-        while self.now() < until && !self.stopping() {
+        let stopping = self.stopping();
+        while self.now() < until && self.stopping() == stopping {
             self.sleep_until(Some(until));
             self.endpoint.discard_commands();
         }

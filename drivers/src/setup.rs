@@ -12,6 +12,39 @@ pub struct InstrumentsSetup {
     pub amplifier: InstrumentSetup,
     /// The stage.
     pub stage: InstrumentSetup,
+    /// The switch in the amplifier's supply, with readback: the second way to switch off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supply_relay: Option<InstrumentSetup>,
+    /// Emergency stop, interlock and dead-man device, as digital inputs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub safety_inputs: Option<InstrumentSetup>,
+}
+
+impl InstrumentsSetup {
+    /// A rig without a second switch-off channel and without safety contacts.
+    #[must_use]
+    pub const fn new(
+        force: Vec<InstrumentSetup>,
+        amplifier: InstrumentSetup,
+        stage: InstrumentSetup,
+    ) -> Self {
+        Self { force, amplifier, stage, supply_relay: None, safety_inputs: None }
+    }
+
+    /// Every instrument.
+    pub fn all(&self) -> impl Iterator<Item = &InstrumentSetup> {
+        self.force
+            .iter()
+            .chain([&self.amplifier, &self.stage])
+            .chain(&self.supply_relay)
+            .chain(&self.safety_inputs)
+    }
+
+    /// Every instrument, to be changed.
+    pub fn all_mut(&mut self) -> impl Iterator<Item = &mut InstrumentSetup> {
+        let Self { force, amplifier, stage, supply_relay, safety_inputs } = self;
+        force.iter_mut().chain([amplifier, stage]).chain(supply_relay).chain(safety_inputs)
+    }
 }
 
 /// One instrument: its profile, and where it is.

@@ -7,6 +7,7 @@
 
 use super::endpoint::Due;
 use super::modbus_tcp::resolve;
+use super::off::{self, Closed, OFF_ANSWER_MS, OffWay};
 use super::serial::Line;
 use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
 use super::setup::InstrumentSetup;
@@ -34,7 +35,7 @@ const COMMAND_RATE_HZ: f64 = 500.0;
 ///
 /// # Errors
 /// Where the address makes no sense or no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<()>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
     let tcp = if link.kind == LinkKind::Scpi { Some(resolve(&address, link.port)?) } else { None };
@@ -55,6 +56,12 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         let health = session.endpoint.health();
         health.count(&health.connections);
         let mut talk = Talk::new(way, link.clone());
+        if !session.is_first() && session.endpoint.owes_off() {
+            // Sent before anything is listened to: nobody knows how long the line will carry.
+            talk.send_unanswered_off(session)?;
+            talk.settle()?;
+        }
+        off::at_the_beginning(session, &mut talk)?;
         talk.begin(session)?;
         talk.go_on(session, rate_hz)
     })
@@ -114,15 +121,25 @@ struct Talk {
     asked_at: Instant,
     sent: HashMap<SetId, (String, Instant)>,
     bad: u32,
+    patience_ms: u32,
 }
 
 impl Talk {
     fn new(way: Way, link: Link) -> Self {
-        Self { way, link, came: Vec::new(), asked_at: Instant::now(), sent: HashMap::new(), bad: 0 }
+        let patience_ms = link.response_timeout_ms;
+        Self {
+            way,
+            link,
+            came: Vec::new(),
+            asked_at: Instant::now(),
+            sent: HashMap::new(),
+            bad: 0,
+            patience_ms,
+        }
     }
 
     fn limit(&self) -> Duration {
-        Duration::from_millis(u64::from(self.link.response_timeout_ms))
+        Duration::from_millis(u64::from(self.patience_ms))
     }
 
     /// Takes in what comes; `false` where nothing did until the deadline.
@@ -176,7 +193,7 @@ impl Talk {
                 return Err(Ended::Corrupt("a line without an end".into()));
             }
             if !self.take(deadline)? && Instant::now() >= deadline {
-                return Err(Ended::Timeout(self.link.response_timeout_ms));
+                return Err(Ended::Timeout(self.patience_ms));
             }
         }
     }
@@ -189,7 +206,7 @@ impl Talk {
             self.unasked(session);
             if self.came.len() < length {
                 if !self.take(deadline)? && Instant::now() >= deadline {
-                    return Err(Ended::Timeout(self.link.response_timeout_ms));
+                    return Err(Ended::Timeout(self.patience_ms));
                 }
             } else if !self.take(Instant::now() + AFTER_A_BLOCK)? {
                 let block = std::mem::take(&mut self.came);
@@ -198,12 +215,28 @@ impl Talk {
         }
     }
 
-    fn begin(&mut self, session: &mut Session) -> Result<(), Ended> {
-        // Ends whatever an earlier connection left half said, and lets the answers to it pass.
+    /// Ends whatever an earlier connection left half said, and lets the answers to it pass.
+    fn settle(&mut self) -> Result<(), Ended> {
         let quiet = Instant::now() + self.limit();
         self.send("")?;
         while self.take(quiet)? && Instant::now() < quiet {}
         self.came.clear();
+        Ok(())
+    }
+
+    /// Writes the safe set-points and waits for no answer. The 'off' that is answered and read back follows.
+    fn send_unanswered_off(&mut self, session: &Session) -> Result<(), Ended> {
+        self.send("")?;
+        for (set, value) in session.endpoint.safe_set_points() {
+            if let Some((line, _)) = session.endpoint.profile().line(set, value) {
+                self.send(&line)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn begin(&mut self, session: &mut Session) -> Result<(), Ended> {
+        self.settle()?;
         for init in session.endpoint.profile().description.init.clone() {
             let Some(send) = &init.send else { continue };
             self.clear(session)?;
@@ -230,15 +263,14 @@ impl Talk {
         let mut commands = Periodic::new(COMMAND_RATE_HZ, now);
         loop {
             if session.stopping() {
-                let safe = session.endpoint.safe_set_points();
-                self.sent.clear();
-                self.command(session, &safe)?;
-                return Err(Ended::Stopped);
+                return Err(off::at_the_end(session, &mut self));
             }
             let now = session.now();
             if commands.is_due(now) {
-                if let Due::SetPoints(set_points) | Due::Safe(set_points) = session.endpoint.due(now) {
-                    self.command(session, &set_points)?;
+                match session.endpoint.due(now) {
+                    Due::Nothing => {}
+                    Due::SetPoints(set_points) => self.command(session, &set_points)?,
+                    Due::Safe(_) => self.send_off(session)?,
                 }
                 commands.advance(session.now());
             }
@@ -284,41 +316,100 @@ impl Talk {
 
     /// Bears a few bad answers.
     fn bear(&mut self, session: &Session, said: String) -> Result<(), Ended> {
-        let health = session.endpoint.health();
-        health.count(&health.corrupt_frames);
-        health.problem(said.clone());
-        self.bad += 1;
+        self.note(session, said.clone());
         if self.bad >= BAD_IN_A_ROW { Err(Ended::Corrupt(said)) } else { Ok(()) }
     }
 
+    fn note(&mut self, session: &Session, said: String) {
+        let health = session.endpoint.health();
+        health.count(&health.corrupt_frames);
+        health.problem(said);
+        self.bad += 1;
+    }
+
+    /// Sends the loop's command. One that drives or moves ends with the first set-point that is not taken, that comes too
+    /// late or that an 'off' has overtaken, and is followed by an 'off'. One that does not goes on to its last set-point.
     fn command(&mut self, session: &mut Session, set_points: &[(SetId, f64)]) -> Result<(), Ended> {
-        for (set, value) in set_points {
-            let profile = session.endpoint.profile();
-            let Some((line, answer)) = profile.line(*set, *value) else { continue };
-            let answer = answer.map(|start| start.replace("{}", ""));
-            if self.sent.get(set).is_some_and(|(last, at)| *last == line && at.elapsed() < REPEAT) {
-                continue;
+        let on = session.endpoint.wants_on();
+        let mut all = true;
+        for one in set_points {
+            if on && !session.endpoint.still_wanted(session.now()) {
+                return self.send_off(session);
             }
-            self.clear(session)?;
-            self.send(&line)?;
-            if let Some(start) = answer {
-                let said = self.line(session)?;
-                if !said.starts_with(&start) || (start.is_empty() && number(&said).is_none()) {
-                    self.sent.remove(set);
-                    return self.bear(session, format!("`{line}` was answered by `{said}`"));
-                }
+            all &= self.set(session, *one)?;
+            if on && !all {
+                session.endpoint.refused();
+                return self.send_off(session);
             }
-            if let Some(query) = self.link.error_query.clone() {
-                self.send(&query.send)?;
-                let said = self.line(session)?;
-                if !query.ok.iter().any(|ok| said.starts_with(ok.as_str())) {
-                    self.sent.remove(set);
-                    return self.bear(session, format!("`{line}` gave the error `{said}`"));
-                }
-            }
-            self.sent.insert(*set, (line, Instant::now()));
+        }
+        if !all {
+            session.endpoint.refused();
+        }
+        if self.bad >= BAD_IN_A_ROW {
+            return Err(Ended::Corrupt("set-points are not taken".into()));
         }
         Ok(())
+    }
+
+    /// Sends one set-point. Whether the instrument took it.
+    fn set(&mut self, session: &mut Session, (set, value): (SetId, f64)) -> Result<bool, Ended> {
+        let profile = session.endpoint.profile();
+        let Some((line, answer)) = profile.line(set, value) else { return Ok(true) };
+        let answer = answer.map(|start| start.replace("{}", ""));
+        if self.sent.get(&set).is_some_and(|(last, at)| *last == line && at.elapsed() < REPEAT) {
+            return Ok(true);
+        }
+        self.sent.remove(&set);
+        self.clear(session)?;
+        self.send(&line)?;
+        if let Some(start) = answer {
+            let said = self.line(session)?;
+            if !said.starts_with(&start) || (start.is_empty() && number(&said).is_none()) {
+                self.note(session, format!("`{line}` was answered by `{said}`"));
+                return Ok(false);
+            }
+        }
+        if let Some(query) = self.link.error_query.clone() {
+            self.send(&query.send)?;
+            let said = self.line(session)?;
+            if !query.ok.iter().any(|ok| said.starts_with(ok.as_str())) {
+                self.note(session, format!("`{line}` gave the error `{said}`"));
+                return Ok(false);
+            }
+        }
+        self.sent.insert(set, (line, Instant::now()));
+        Ok(true)
+    }
+}
+
+impl OffWay for Talk {
+    fn send_off(&mut self, session: &mut Session) -> Result<(), Ended> {
+        let safe = session.endpoint.hand_out_off(session.now());
+        let patience_ms = self.patience_ms;
+        self.be_patient(session);
+        self.sent.clear();
+        let mut all = true;
+        for one in safe {
+            // An answer that stays away is not waited for twice, and keeps nothing from being sent.
+            all &= match self.set(session, one) {
+                Ok(taken) => taken,
+                Err(Ended::Timeout(_) | Ended::Corrupt(_)) => false,
+                Err(ended) => return Err(ended),
+            };
+        }
+        if !all {
+            session.endpoint.refused();
+        }
+        self.patience_ms = patience_ms;
+        Ok(())
+    }
+
+    fn be_patient(&mut self, _session: &Session) {
+        self.patience_ms = self.link.response_timeout_ms.max(OFF_ANSWER_MS);
+    }
+
+    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
+        queries(session).into_iter().try_for_each(|(frame, query)| self.ask(session, frame, &query))
     }
 }
 

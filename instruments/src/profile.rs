@@ -497,5 +497,7 @@ pub const fn read_function(table: crate::schema::Table) -> u8 {
     match table {
         crate::schema::Table::Holding => 3,
         crate::schema::Table::Input => 4,
+        crate::schema::Table::Coil => 1,
+        crate::schema::Table::Discrete => 2,
     }
 }

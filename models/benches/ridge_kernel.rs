@@ -2,6 +2,7 @@
 //!
 //! `cargo bench -p muprime-models --bench ridge_kernel`. Items are element updates (kernel), elements of the three
 //! vectors (triad) or multiply-adds (fma). Compare within one run: the machine may be shared.
+#![allow(clippy::disallowed_methods, reason = "it measures time")]
 
 use muprime_models::ridge::{Body, FrictionRule, Material, Plate, RidgeGeometry, Strain, stability};
 use pulp::{Simd, WithSimd};

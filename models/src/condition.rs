@@ -3,7 +3,8 @@
 use crate::quantity::{Direction, PeakToPeak};
 use serde::{Deserialize, Serialize};
 
-/// The conditions of one pass: what a prediction needs to know besides the fingertip.
+/// The conditions of one pass: what a prediction needs to know besides the fingertip. Each is a covariate of the table
+/// in [`crate::covariate`]; what was not measured is `None`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
     /// Peak-to-peak vibration amplitude `w`.
@@ -16,14 +17,38 @@ pub struct Condition {
     pub direction: Direction,
     /// Normal force `F_n` in N, positive in compression.
     pub normal_force_n: f64,
-    /// Coulomb friction coefficient without vibration, `mu_0`.
+    /// Coulomb friction coefficient without vibration, `mu_0`, as it is known where the condition is asked about.
     pub mu0: f64,
     /// Mean position along the stroke in m.
     pub position_m: f64,
-    /// Time since the start of the run in s.
+    /// Time since the start of the table or record in s.
     pub time_s: f64,
-    /// Ambient pressure in Pa, where it was measured.
+    /// Time since the first pass of the run in s, in tables of several runs; `None`: `time_s` counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub run_time_s: Option<f64>,
+    /// Ambient pressure in Pa.
     pub ambient_pressure_pa: Option<f64>,
+    /// Temperature in degrees Celsius.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
+    /// Relative humidity in per cent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_humidity_pct: Option<f64>,
+}
+
+/// What is known of the air about the rig, where no channel reads it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Ambient {
+    /// Ambient pressure in Pa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ambient_pressure_pa: Option<f64>,
+    /// Temperature in degrees Celsius.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
+    /// Relative humidity in per cent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_humidity_pct: Option<f64>,
 }
 
 impl Condition {
@@ -38,8 +63,26 @@ impl Condition {
             mu0: 0.5,
             position_m: 0.0,
             time_s: 0.0,
+            run_time_s: None,
             ambient_pressure_pa: None,
+            temperature_c: None,
+            relative_humidity_pct: None,
         }
+    }
+
+    /// The same, with what the condition does not say of the air taken from `ambient`.
+    pub fn within(self, ambient: &Ambient) -> Self {
+        Condition {
+            ambient_pressure_pa: self.ambient_pressure_pa.or(ambient.ambient_pressure_pa),
+            temperature_c: self.temperature_c.or(ambient.temperature_c),
+            relative_humidity_pct: self.relative_humidity_pct.or(ambient.relative_humidity_pct),
+            ..self
+        }
+    }
+
+    /// Time since the first pass of the run in s; since the start of the table where runs are not told apart.
+    pub fn time_in_run_s(&self) -> f64 {
+        self.run_time_s.unwrap_or(self.time_s)
     }
 
     /// The first value that no model can work with, by name, or `Ok`.
@@ -61,6 +104,17 @@ impl Condition {
             }
         }
         Ok(())
+    }
+}
+
+impl Ambient {
+    /// What a condition says of the air.
+    pub fn of(condition: &Condition) -> Self {
+        Ambient {
+            ambient_pressure_pa: condition.ambient_pressure_pa,
+            temperature_c: condition.temperature_c,
+            relative_humidity_pct: condition.relative_humidity_pct,
+        }
     }
 }
 

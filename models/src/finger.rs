@@ -1,10 +1,11 @@
 //! The fingertip as the laws see it (Tables 1 and 2 of the paper; section 4.1 for the springs).
 
 use crate::condition::OutOfDomain;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Elastic properties of a fingertip in ultrasonic contact.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Finger {
     /// Normal stiffness `k_n` at ultrasonic frequencies in N/m.

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`quantity`] | `PeakToPeak` and its one conversion |
 //! | [`condition`], [`finger`] | one operating point; the fingertip |
+//! | [`covariate`] | what tells one condition from another: name, unit, words, range, getter |
 //! | [`spring_slider`] | Eqs. 6-15 and section 5.3 |
 //! | [`psi`] | Eqs. 16-20 |
 //! | [`psi_fit`] | its constant Psi* fitted, with an interval |
@@ -14,6 +15,7 @@
 //! | [`surrogate`], [`inverse`] | a table of the ridge that is quick to read; the amplitude for a wanted friction |
 //! | [`prediction`] | what every friction law answers |
 //! | [`record`] | the data vocabulary: passes, the point table |
+//! | [`rig_file`] | `rig.toml`: finger, repeatability, what certificates leave open |
 //! | [`root`] | roots in a bracket |
 //!
 //! ```
@@ -33,6 +35,7 @@
 //! ```
 
 pub mod condition;
+pub mod covariate;
 pub mod finger;
 pub mod inverse;
 pub mod prediction;
@@ -41,6 +44,7 @@ pub mod psi_fit;
 pub mod quantity;
 pub mod record;
 pub mod ridge;
+pub mod rig_file;
 pub mod root;
 pub mod spring_slider;
 pub mod surrogate;

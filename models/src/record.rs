@@ -2,6 +2,7 @@
 
 mod table;
 
+use crate::condition::Condition;
 use crate::quantity::{Direction, PeakToPeak};
 use serde::{Deserialize, Serialize};
 pub use table::{TableError, read_passes, write_passes};
@@ -45,11 +46,14 @@ pub struct Pass {
     pub replicate: Option<u64>,
     /// Name of the run, in tables of several.
     pub run: Option<String>,
+    /// Number of the session of its run, from 1: a run that is stopped and taken up again has several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub session: Option<u64>,
 }
 
 impl Pass {
     /// A pass at a condition, with nothing optional.
-    pub fn at(point: u64, condition: &crate::condition::Condition, lateral_force_n: Option<f64>) -> Self {
+    pub fn at(point: u64, condition: &Condition, lateral_force_n: Option<f64>) -> Self {
         Pass {
             point,
             time_s: condition.time_s,
@@ -64,17 +68,18 @@ impl Pass {
             lateral_force_sd_n: None,
             samples: None,
             ambient_pressure_pa: condition.ambient_pressure_pa,
-            temperature_c: None,
-            relative_humidity_pct: None,
+            temperature_c: condition.temperature_c,
+            relative_humidity_pct: condition.relative_humidity_pct,
             phase_shift_deg: None,
             replicate: None,
             run: None,
+            session: None,
         }
     }
 
     /// The condition of the pass, given the friction coefficient without vibration.
-    pub fn condition(&self, mu0: f64) -> crate::condition::Condition {
-        crate::condition::Condition {
+    pub fn condition(&self, mu0: f64) -> Condition {
+        Condition {
             amplitude: self.amplitude,
             frequency_hz: self.frequency_hz,
             speed_m_s: self.speed_m_s,
@@ -83,7 +88,10 @@ impl Pass {
             mu0,
             position_m: self.position_m,
             time_s: self.time_s,
+            run_time_s: None,
             ambient_pressure_pa: self.ambient_pressure_pa,
+            temperature_c: self.temperature_c,
+            relative_humidity_pct: self.relative_humidity_pct,
         }
     }
 

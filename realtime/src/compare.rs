@@ -7,23 +7,18 @@
 //! and noise are what they claim to be, and only then.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod agreement;
 mod sequential;
 
 use crate::estimate::Mu0;
+use agreement::Power;
+pub use agreement::{Agreement, ENOUGH_PASSES, Lack, VISIBLE_DEPARTURE};
 use models::condition::{Condition, OutOfDomain};
 use models::prediction::{FrictionModel, Validity};
+use models::rig_file::PassNoise;
 pub use sequential::{ALARM_LEVEL, Sequential};
+use sequential::{BETS, CAP};
 use serde::{Deserialize, Serialize};
-
-/// What is known of the noise of a pass's mean forces (rig.toml, section `noise`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PassNoise {
-    /// Repeatability of the lateral force from pass to pass, one relative standard deviation.
-    pub pass_relative_sd: f64,
-    /// Standard deviation of a pass's mean force, each axis, in N.
-    pub force_sd_n: f64,
-}
 
 /// A pass held against the model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,6 +39,15 @@ pub struct PassComparison {
     pub departed: bool,
     /// Inside the law's range or not.
     pub validity: Validity,
+    /// Passes with vibration that were judged so far, this one included.
+    #[serde(default)]
+    pub judged: u32,
+    /// Root mean square of their residuals in standard deviations; none before the first.
+    #[serde(default)]
+    pub rms_z: Option<f64>,
+    /// Departure of `mu'`, the same in all of them, that would have been seen by now with a probability of 90 %.
+    #[serde(default)]
+    pub visible_departure: Option<f64>,
 }
 
 /// Carries what passes have in common from one to the next.
@@ -54,6 +58,7 @@ pub struct Comparator {
     covariance: [[f64; 3]; 3],
     noise: PassNoise,
     test: Sequential,
+    power: Power,
     passes: u32,
 }
 
@@ -68,7 +73,14 @@ impl Comparator {
         covariance[0][0] = (mu0 * MU0_PRIOR_RELATIVE_SD).powi(2);
         covariance[1][1] = first * first;
         covariance[2][2] = second * second;
-        Comparator { estimate: [mu0, 0.0, 0.0], covariance, noise, test: Sequential::new(), passes: 0 }
+        Comparator {
+            estimate: [mu0, 0.0, 0.0],
+            covariance,
+            noise,
+            test: Sequential::new(),
+            power: Power::default(),
+            passes: 0,
+        }
     }
 
     /// `mu_0` as known now; `None` until a pass has told of it.
@@ -134,8 +146,14 @@ impl Comparator {
         if known.is_some() {
             self.test.push(z, c);
         }
+        let vibrating = c.amplitude.metres() > 0.0;
+        let unit = if vibrating { coulomb } else { 0.0 };
+        self.power.push(unit, &slope, &gain, variance, (known.is_some() && vibrating).then_some(z));
+        // What lies beyond the cap is no news of the shared parameters: a filter that followed it would take up in one
+        // pass what it is there to judge. The first word on mu_0 is taken whole.
+        let taken = if known.is_some() { z.clamp(-CAP, CAP) * variance.sqrt() } else { innovation };
         for (estimate, gain) in self.estimate.iter_mut().zip(&gain) {
-            *estimate += gain / variance * innovation;
+            *estimate += gain / variance * taken;
         }
         for (row, left) in self.covariance.iter_mut().zip(&gain) {
             for (cell, right) in row.iter_mut().zip(&gain) {
@@ -160,6 +178,9 @@ impl Comparator {
             log_evidence: self.test.log_evidence(),
             departed: self.test.alarmed(),
             validity: prediction.validity,
+            judged: self.power.judged(),
+            rms_z: self.power.rms_z(),
+            visible_departure: self.power.visible(BETS),
         })
     }
 }
@@ -171,3 +192,6 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 fn product(m: &[[f64; 3]; 3], v: &[f64; 3]) -> [f64; 3] {
     [dot(&m[0], v), dot(&m[1], v), dot(&m[2], v)]
 }
+
+#[cfg(test)]
+mod tests;

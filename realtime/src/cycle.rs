@@ -1,16 +1,17 @@
 //! One cycle of the loop: a pure function of configuration, state, inputs and the time passed in.
 //!
-//! Order: commands, safety, estimate, comparison. Everything that a cycle can reach is `Copy` (checked below), so it
+//! Order: commands and safety ([`decide`]), then estimate and comparison ([`judge`]): what is decided can leave before a model
+//! is asked. Everything that a cycle can reach is `Copy` (checked below), so it
 //! holds no lock, no heap and no handle; the model is reached through `&`, and models hold plain tables.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
-use crate::ports::Nanos;
+use crate::ports::{Nanos, SupplyCommand};
 use crate::safety::{
     Cause, Controls, Decision, DriveCommand, Limits, Observation, Remark, Request, Safety, StageCommand,
     State, Trip,
 };
-use models::condition::Condition;
+use models::condition::{Ambient, Condition};
 use models::prediction::FrictionModel;
 use models::quantity::{Direction, PeakToPeak};
 use serde::{Deserialize, Serialize};
@@ -51,11 +52,17 @@ pub enum Command {
     Reset,
     /// Stop and latch.
     Stop,
-    /// The dead-man input changed.
+    /// The dead-man key of a trial: held, to be said again before [`KEY_AGE`] is over, or released.
     DeadMan(bool),
     /// `mu_0` as known now.
     Mu0(Mu0),
+    /// What is known of the air from now on, where no channel reads it.
+    Ambient(Ambient),
 }
+
+/// Time after which a dead-man key that was not said to be held again counts as released: a terminal repeats a held key after
+/// half a second at the latest.
+pub const KEY_AGE: Nanos = Nanos(700_000_000);
 
 /// Commands taken in one cycle at most; the rest wait for the next.
 pub const COMMANDS_PER_CYCLE: usize = 4;
@@ -76,8 +83,9 @@ pub struct CycleState {
     window: Window,
     request: Request,
     marker: Marker,
-    dead_man: bool,
+    key_held_at: Option<Nanos>,
     mu0: Option<Mu0>,
+    ambient: Ambient,
 }
 
 impl CycleState {
@@ -114,14 +122,16 @@ pub struct Outputs {
     pub drive: DriveCommand,
     /// For the stage.
     pub stage: StageCommand,
-    /// Whether the second switch-off channel is to be opened.
-    pub cut_supply: bool,
+    /// For the second switch-off channel.
+    pub supply: SupplyCommand,
     /// A trip latched in this cycle.
     pub tripped: Option<Trip>,
     /// The first rule that is broken now, latched or not.
     pub blocking: Option<Cause>,
     /// Whether the rig is armed after this cycle.
     pub armed: bool,
+    /// Whether the second switch-off channel is being proved.
+    pub proving: bool,
     /// Which pass the cycle belongs to.
     pub marker: Marker,
     /// Running `mu'`, or why there is none.
@@ -150,9 +160,26 @@ pub fn step(
     inputs: &Inputs,
     now: Nanos,
 ) -> Outputs {
-    let controls = take_commands(state, inputs);
+    let decision = decide(config, state, inputs, now);
+    judge(config, model, state, inputs, &decision, now)
+}
+
+/// The first half of a cycle: commands and safety. What it decides is ready to leave.
+pub fn decide(config: &Config, state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Decision {
+    let controls = take_commands(state, inputs, now);
+    state.safety.step(&config.limits, &inputs.seen, &state.request, controls, now)
+}
+
+/// The second half: estimate and comparison. Nothing that is commanded depends on it.
+pub fn judge(
+    config: &Config,
+    model: &dyn FrictionModel,
+    state: &mut CycleState,
+    inputs: &Inputs,
+    decision: &Decision,
+    now: Nanos,
+) -> Outputs {
     let seen = &inputs.seen;
-    let decision = state.safety.step(&config.limits, seen, &state.request, controls, now);
 
     let usable = decision.lateral_usable && decision.normal_usable;
     if let (true, Ok(lateral), Ok(normal)) = (usable, &seen.forces.lateral, &seen.forces.normal) {
@@ -174,14 +201,15 @@ pub fn step(
     };
     let online = mu_relative.ok().and_then(|mu| compare(config, model, state, seen, &mu, now));
 
-    let Decision { drive, stage, cut_supply, tripped, blocking, remark, .. } = decision;
+    let Decision { drive, stage, supply, tripped, blocking, remark, .. } = *decision;
     Outputs {
         drive,
         stage,
-        cut_supply,
+        supply,
         tripped,
         blocking,
         armed: state.safety.is_armed(),
+        proving: state.safety.is_proving(),
         marker: state.marker,
         mu_relative,
         online,
@@ -190,7 +218,7 @@ pub fn step(
     }
 }
 
-fn take_commands(state: &mut CycleState, inputs: &Inputs) -> Controls {
+fn take_commands(state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Controls {
     let mut controls = Controls::default();
     for command in inputs.commands.iter().flatten() {
         match command {
@@ -199,14 +227,16 @@ fn take_commands(state: &mut CycleState, inputs: &Inputs) -> Controls {
                     state.window.clear();
                 }
                 (state.request, state.marker) = (*request, *marker);
+                controls.new_request = true;
             }
             Command::Reset => controls.reset = true,
             Command::Stop => controls.stop = true,
-            Command::DeadMan(held) => state.dead_man = *held,
+            Command::DeadMan(held) => state.key_held_at = held.then_some(now),
             Command::Mu0(mu0) => state.mu0 = Some(*mu0),
+            Command::Ambient(ambient) => state.ambient = *ambient,
         }
     }
-    controls.dead_man = state.dead_man;
+    controls.dead_man = state.key_held_at.is_some_and(|at| now.since(at) <= KEY_AGE);
     controls
 }
 
@@ -241,8 +271,11 @@ fn compare(
         mu0: mu0.value,
         position_m: stage.position_m,
         time_s: now.seconds(),
-        ambient_pressure_pa: None,
-    };
+        // The table of a run holds this channel's temperature: what a model was diagnosed on.
+        temperature_c: amplifier.temperature_c.ok().map(|r| r.value).filter(|t| t.is_finite()),
+        ..Condition::paper()
+    }
+    .within(&state.ambient);
     let prediction = model.predict(&condition).ok()?;
     let sd = mu.sd.hypot(prediction.mu_relative_sd);
     // A model that has diverged has no opinion; nothing that is commanded depends on it.

@@ -2,13 +2,14 @@
 //!
 //! | room | purpose |
 //! |---|---|
-//! | [`ports`] | the seams `ForceSensor`, `Amplifier`, `Stage`; `Reading`, and `NoData` with its reason |
+//! | [`ports`] | the seams `ForceSensor`, `Amplifier`, `Stage`, `SupplySwitch`, `SafetyInputs`; `Reading`, and `NoData` with its reason |
 //! | [`cycle`] | pure `step`: commands, safety, estimate, comparison |
 //! | [`safety`] | limits, the state machine, the only maker of a [`safety::DriveCommand`] |
 //! | [`estimate`] | `mu`, `mu'` with uncertainty and age; means over a pass |
 //! | [`compare`] | residuals against the model; the test that says when it has left the measurement |
 //! | [`turn`] | one turn of the loop over real ports; the row that it leaves behind |
 //! | [`pacing`] | the thread: absolute deadlines, priority, memory lock, lateness histogram |
+//! | [`queue`] | commands to the loop; a stop waits behind nothing |
 //! | [`wrap`] | ports around ports: faults |
 //! | [`witness`] | notes when the machine kept ordinary threads from running |
 //! | [`replay`] | recorded cycles through the same code again |
@@ -34,6 +35,7 @@ pub mod estimate;
 mod number;
 pub mod pacing;
 pub mod ports;
+pub mod queue;
 pub mod recorder;
 pub mod replay;
 pub mod safety;

@@ -1,13 +1,15 @@
 //! The thread of the loop: absolute deadlines, priority, locked memory, lateness histogram.
 //!
-//! Overrun policy: a cycle that ends past the next deadline skips the deadlines it has missed (they are counted), so
-//! the loop never runs two cycles back to back to catch up.
+//! Overrun policy: a cycle that ends past the next deadline skips the deadlines it has missed, so the loop never runs two
+//! cycles back to back to catch up. Skipped deadlines are counted, and the lateness of the next cycle is that against the
+//! first deadline that was due: safety sees it, and the histogram holds every deadline, run or skipped. Whatever ends the
+//! loop, 'off' is the last that the ports are told.
 
-use crate::cycle::{Command, Config, CycleState};
-use crate::ports::Nanos;
+use crate::cycle::{Config, CycleState};
+use crate::ports::{Nanos, SupplyCommand};
+use crate::queue::CommandQueue;
 use crate::safety::{DriveCommand, StageCommand};
 use crate::turn::{Ports, Row, Tick, turn};
-use crossbeam_queue::ArrayQueue;
 use hdrhistogram::Histogram;
 use models::prediction::FrictionModel;
 use ringbuf::HeapProd;
@@ -30,6 +32,34 @@ pub struct Grants {
     pub memory_locked: bool,
     /// Why memory could not be locked.
     pub lock_refused: Option<String>,
+    /// CPUs that the thread may run on, as read back; empty where it was not pinned.
+    #[serde(default)]
+    pub pinned_to: Vec<usize>,
+    /// Why it could not be pinned, or the CPUs kept awake.
+    #[serde(default)]
+    pub pace_refused: Option<String>,
+    /// Whether deep sleep of the CPUs is held off.
+    #[serde(default)]
+    pub cpus_kept_awake: bool,
+}
+
+/// What the loop's thread is to ask of the machine. All of it is optional; each has its price.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Pacing {
+    /// FIFO priority to ask for, with locked memory; `None` leaves scheduling and memory alone.
+    pub priority: Option<i32>,
+    /// CPU to run on and no other. Worth it on a CPU that is kept free of other work; on a shared one it is worse.
+    pub cpu: Option<usize>,
+    /// Keeps CPUs out of deep sleep (`/dev/cpu_dma_latency`): a shorter wake-up for some watts.
+    pub keep_cpus_awake: bool,
+    /// The last so many ns before a deadline are spun, not slept: of a CPU this costs that share of the period.
+    pub spin_ns: u64,
+}
+
+impl From<Option<i32>> for Pacing {
+    fn from(priority: Option<i32>) -> Self {
+        Pacing { priority, ..Pacing::default() }
+    }
 }
 
 /// What a loop has to tell when it ends. Stored in every run.
@@ -41,7 +71,7 @@ pub struct LoopReport {
     pub period_ns: u64,
     /// Cycles run.
     pub cycles: u64,
-    /// Deadlines skipped because a cycle ended too late.
+    /// Deadlines missed: skipped because a cycle ended too late, or past by a period when the thread woke.
     pub overruns: u64,
     /// Rows lost because the record's ring was full.
     pub ring_drops: u64,
@@ -51,12 +81,12 @@ pub struct LoopReport {
     pub minor_faults: i64,
     /// Major page faults of the thread after its first cycle.
     pub major_faults: i64,
-    /// Lateness quantiles in ns: 0.5, 0.9, 0.99, 0.999, maximum.
+    /// Lateness quantiles in ns over all deadlines, skipped ones included: 0.5, 0.9, 0.99, 0.999, maximum.
     pub lateness_ns: [u64; 5],
     /// What a port said when it panicked, which ended the loop with the drive off; `None` otherwise.
     #[serde(default)]
     pub panicked: Option<String>,
-    /// Lateness counts: upper bound of a bucket in ns, cycles in it.
+    /// Lateness counts: upper bound of a bucket in ns, deadlines in it.
     pub histogram: Vec<(u64, u64)>,
 }
 
@@ -78,7 +108,7 @@ pub struct LoopParts {
     /// The rig.
     pub ports: Ports,
     /// Commands in.
-    pub commands: Arc<ArrayQueue<Command>>,
+    pub commands: Arc<CommandQueue>,
     /// Rows out, to the record.
     pub rows: HeapProd<Row>,
     /// The same rows, to the sweep: so that a slow disk cannot hold the sweep up.
@@ -180,30 +210,104 @@ fn thread_faults() -> (i64, i64) {
     (usage.ru_minflt, usage.ru_majflt)
 }
 
+/// Binds the calling thread to a CPU; the CPUs that it may run on then.
+fn pin_to(cpu: usize) -> std::io::Result<Vec<usize>> {
+    if cpu >= libc::CPU_SETSIZE as usize {
+        return Err(std::io::Error::from_raw_os_error(libc::EINVAL));
+    }
+    // SAFETY: `set` is plain data, valid when zeroed; CPU_SET stays inside it by the check above; both calls concern the
+    // calling thread (pid 0) and a set of the size given.
+    unsafe {
+        let mut set: libc::cpu_set_t = std::mem::zeroed();
+        libc::CPU_SET(cpu, &mut set);
+        let size = size_of::<libc::cpu_set_t>();
+        if libc::sched_setaffinity(0, size, &set) != 0 || libc::sched_getaffinity(0, size, &mut set) != 0 {
+            return Err(std::io::Error::last_os_error());
+        }
+        Ok((0..libc::CPU_SETSIZE as usize).filter(|cpu| libc::CPU_ISSET(*cpu, &set)).collect())
+    }
+}
+
+/// Holds the CPUs out of deep sleep for as long as the file is open.
+fn keep_cpus_awake() -> std::io::Result<std::fs::File> {
+    use std::io::Write;
+    let mut file = std::fs::File::options().write(true).open("/dev/cpu_dma_latency")?;
+    file.write_all(&0i32.to_ne_bytes())?;
+    Ok(file)
+}
+
+/// Sleeps until `spin_ns` before a time, then spins.
+fn wait_until(absolute_ns: u64, spin_ns: u64) {
+    sleep_until(absolute_ns - spin_ns.min(absolute_ns));
+    while spin_ns > 0 && monotonic_ns() < absolute_ns {
+        std::hint::spin_loop();
+    }
+}
+
+/// The grid of deadlines.
+#[derive(Clone, Copy, Debug)]
+struct Grid {
+    period: u64,
+    /// The deadline that is due next.
+    due: u64,
+}
+
+impl Grid {
+    /// The first deadline of the grid that is not past: where the next cycle begins.
+    const fn next(&self, now: u64) -> u64 {
+        let past = now.saturating_sub(self.due);
+        self.due + past.div_ceil(self.period) * self.period
+    }
+
+    /// A cycle begins: how late it is against the deadline that was due, and how many deadlines it has missed.
+    const fn begin(&mut self, begun: u64) -> (u64, u64) {
+        let late = begun.saturating_sub(self.due);
+        let missed = late / self.period;
+        self.due += (missed + 1) * self.period;
+        (late, missed)
+    }
+}
+
 /// Runs the loop on the calling thread until its lifeline says to end. Call it on a thread of its own.
 ///
-/// `real_time` is the FIFO priority to ask for; `None` leaves scheduling and memory alone.
-pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
+/// `pacing` is what to ask of the machine; a bare FIFO priority, or `None`, will do.
+pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
+    let pacing = pacing.into();
     let LoopParts { config, model, mut ports, commands, mut rows, mut watch, life, origin_ns } = parts;
     let period = config.limits.timing.cycle.0;
     // 1 us to 10 s at two digits: some 40 kB, allocated here and never again.
     let mut lateness_histogram =
-        Histogram::<u64>::new_with_bounds(1_000, 10_000_000_000, 2).expect("the bounds are constants");
-    let grants = match real_time {
+        Histogram::<u64>::new_with_bounds(1_000, LONGEST_NS, 2).expect("the bounds are constants");
+    let mut grants = match pacing.priority {
         Some(priority) => ask_for_real_time(priority),
         None => Grants { policy: "unchanged".into(), ..Grants::default() },
     };
+    if let Some(cpu) = pacing.cpu {
+        match pin_to(cpu) {
+            Ok(cpus) => grants.pinned_to = cpus,
+            Err(why) => grants.pace_refused = Some(format!("cpu {cpu}: {why}")),
+        }
+    }
+    let awake = pacing.keep_cpus_awake.then(keep_cpus_awake);
+    grants.cpus_kept_awake = matches!(awake, Some(Ok(_)));
+    if let Some(Err(why)) = &awake {
+        grants.pace_refused = Some(format!("/dev/cpu_dma_latency: {why}"));
+    }
     let mut state = CycleState::default();
-    let mut take = || commands.pop();
+    let mut take = &*commands;
     let (mut cycles, mut overruns, mut ring_drops, mut watch_drops) = (0u64, 0u64, 0u64, 0u64);
     let mut faults_at_start = (0, 0);
     let mut panicked = None;
-    let mut deadline = monotonic_ns() + period;
+    let mut grid = Grid { period, due: monotonic_ns() + period };
     loop {
-        sleep_until(deadline);
+        wait_until(grid.next(monotonic_ns()), pacing.spin_ns);
         let begun = monotonic_ns();
-        let late = begun.saturating_sub(deadline);
-        lateness_histogram.saturating_record(late);
+        let (late, missed) = grid.begin(begun);
+        // The deadlines between were late as well, each by one period less: without them a stall would count once.
+        for k in 0..=missed.min(LONGEST_NS / period) {
+            lateness_histogram.saturating_record(late - k * period);
+        }
+        overruns += missed;
         cycles += 1;
         let now = Nanos(begun.saturating_sub(origin_ns));
         let tick = Tick { number: cycles, lateness: Nanos(late), now };
@@ -214,13 +318,6 @@ pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
         let row = match turned {
             Ok(row) => row,
             Err(cause) => {
-                let expires_at = now.plus(Nanos(1_000_000_000));
-                let off = AssertUnwindSafe(|| {
-                    ports.amplifier.command(DriveCommand::off(u32::MAX, expires_at), now);
-                    ports.stage.command(StageCommand::stop(u32::MAX, expires_at), now);
-                });
-                // The amplifier's port may be the one that panics: then its own watchdog is left.
-                let _ = std::panic::catch_unwind(off);
                 panicked = Some(words_of(&*cause));
                 break;
             }
@@ -235,17 +332,12 @@ pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
         if life.end.load(Ordering::Relaxed) {
             break;
         }
-        deadline += period;
-        let ended = monotonic_ns();
-        if ended > deadline {
-            let missed = (ended - deadline) / period + 1;
-            overruns += missed;
-            deadline += missed * period;
-        }
         if cycles == 1 {
             faults_at_start = thread_faults();
         }
     }
+    switch_off(&mut ports, Nanos(monotonic_ns().saturating_sub(origin_ns)));
+    drop(awake);
     let faults = thread_faults();
     let quantile = |q| lateness_histogram.value_at_quantile(q);
     LoopReport {
@@ -272,6 +364,23 @@ pub fn run(parts: LoopParts, real_time: Option<i32>) -> LoopReport {
     }
 }
 
+/// Longest lateness that is told from longer ones, in ns.
+const LONGEST_NS: u64 = 10_000_000_000;
+
+/// Tells every port that can still be told: off, at rest. A port that panics keeps no other from being told; then the
+/// instrument's own watchdog is left, and the second channel.
+fn switch_off(ports: &mut Ports, now: Nanos) {
+    let expires_at = now.plus(Nanos(1_000_000_000));
+    let off = DriveCommand::off(u32::MAX, expires_at);
+    let told = std::panic::catch_unwind(AssertUnwindSafe(|| ports.amplifier.command(off, now))).is_ok();
+    let stop = StageCommand::stop(u32::MAX, expires_at);
+    let _ = std::panic::catch_unwind(AssertUnwindSafe(|| ports.stage.command(stop, now)));
+    if !told {
+        let cut = AssertUnwindSafe(|| ports.supply.command(SupplyCommand::Cut, now));
+        let _ = std::panic::catch_unwind(cut);
+    }
+}
+
 /// What a panic said.
 fn words_of(cause: &(dyn std::any::Any + Send)) -> String {
     let text = cause.downcast_ref::<&str>().map(ToString::to_string);
@@ -295,3 +404,6 @@ pub fn lateness_of_sleep(during: std::time::Duration, period: std::time::Duratio
     }
     late
 }
+
+#[cfg(test)]
+mod tests;

@@ -150,13 +150,6 @@ pub trait Amplifier: Send {
     /// # Errors
     /// Why there is none.
     fn state(&mut self, now: Nanos) -> Result<AmplifierState, NoData>;
-
-    /// Opens the second, independent switch-off channel (supply relay or enable line), if one is fitted.
-    /// Returns whether it is.
-    fn cut_supply(&mut self, now: Nanos) -> bool {
-        let _ = now;
-        false
-    }
 }
 
 /// What the stage says of itself.
@@ -188,4 +181,103 @@ pub trait Stage: Send {
     /// # Errors
     /// Why there is none.
     fn state(&mut self, now: Nanos) -> Result<StageState, NoData>;
+}
+
+/// What the second switch-off channel is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SupplyCommand {
+    /// Open the amplifier's supply: its output is dead whatever its electronics want.
+    #[default]
+    Cut,
+    /// Close it again.
+    Restore,
+}
+
+/// What the second switch-off channel says of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SupplyState {
+    /// Whether the supply is cut, as read back from the switch (a mirror contact or its output), never as commanded.
+    pub cut: bool,
+    /// When this was read.
+    pub taken_at: Nanos,
+    /// Count of readings.
+    pub sequence: u32,
+}
+
+/// The second, independent way to switch off: a relay in the amplifier's supply, or an enable line of its own.
+///
+/// The loop hands over the absolute command every cycle; a port sends it when it is new, and again from time to time.
+/// A switch that loses its own supply or its link must fall open by itself where its hardware can.
+pub trait SupplySwitch: Send {
+    /// Hands over what the switch is to do.
+    fn command(&mut self, command: SupplyCommand, now: Nanos);
+
+    /// The latest state, read back.
+    ///
+    /// # Errors
+    /// Why there is none; [`NoData::NotFitted`] where the rig has no second channel.
+    fn state(&mut self, now: Nanos) -> Result<SupplyState, NoData>;
+}
+
+/// One safety contact. Closed is the safe state of each, so that a broken wire is the unsafe one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Contact {
+    /// Whether the contact is closed.
+    pub closed: bool,
+    /// When this was read.
+    pub taken_at: Nanos,
+    /// Count of readings.
+    pub sequence: u32,
+}
+
+/// The safety contacts of a rig; each is [`NoData::NotFitted`] where the rig has none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Contacts {
+    /// Emergency stop: closed while it is not pressed.
+    pub emergency_stop: Result<Contact, NoData>,
+    /// Guard or cover: closed while it is shut.
+    pub interlock: Result<Contact, NoData>,
+    /// Dead-man (enabling) device: closed while it is held.
+    pub dead_man: Result<Contact, NoData>,
+}
+
+impl Contacts {
+    /// A rig without any.
+    pub const ABSENT: Contacts = Contacts::missing(NoData::NotFitted);
+
+    /// All missing for the same reason.
+    pub const fn missing(reason: NoData) -> Self {
+        Contacts { emergency_stop: Err(reason), interlock: Err(reason), dead_man: Err(reason) }
+    }
+}
+
+impl Default for Contacts {
+    fn default() -> Self {
+        Self::ABSENT
+    }
+}
+
+/// Reads the safety contacts.
+pub trait SafetyInputs: Send {
+    /// The latest reading of each contact. Old ones come back with their old `taken_at`; judging age is the loop's.
+    fn read(&mut self, now: Nanos) -> Contacts;
+}
+
+/// What stands in a port's place where a rig has none: every reading is [`NoData::NotFitted`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Absent;
+
+impl SupplySwitch for Absent {
+    fn command(&mut self, _: SupplyCommand, _: Nanos) {}
+
+    fn state(&mut self, _: Nanos) -> Result<SupplyState, NoData> {
+        Err(NoData::NotFitted)
+    }
+}
+
+impl SafetyInputs for Absent {
+    fn read(&mut self, _: Nanos) -> Contacts {
+        Contacts::ABSENT
+    }
 }

@@ -4,24 +4,30 @@
 //! is. Chunks are closed at every [`Recorder::flush`]; a kill loses at most what came after the last one.
 //! Time stamps are the wall clock at the start plus loop time, which is monotonic.
 //!
+//! Every byte is under a checksum: a chunk's messages under the chunk's, an attachment under its own, a metadata record under
+//! one that stands among its facts ([`CHECKSUM`]), and all of the data and all of the index under those that the format puts at
+//! the end. Messages are numbered, and the last words say how many there were: so a reader knows what is missing.
+//!
 //! Memory stays the same however long a run lasts. Every chunk is made by a writer of its own and tells its own channels;
 //! what a reader needs to find its way is put together when the file ends, from the file.
 
+mod integrity;
 mod read;
 mod recover;
+mod sink;
 mod summary;
 
 use crate::ports::Nanos;
 use crate::turn::Row;
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
+use mcap::McapError;
 use serde::Serialize;
-use std::borrow::Cow;
+use sink::Sink;
 use std::collections::BTreeMap;
-use std::io::{Cursor, Read, Seek, Write};
+use std::io::{Read, Seek, Write};
 
+pub use integrity::{Gap, Integrity, Place};
 pub use read::{Entry, Reader};
-pub use recover::{Contents, Recovery, read, recover};
+pub use recover::{Contents, Recovery, inspect, read, recover};
 
 /// Topic of the rows, one a cycle.
 pub const CYCLES: &str = "/cycle";
@@ -33,6 +39,10 @@ pub const EVENTS: &str = "/event";
 pub const HEADER: &str = "muprime.run";
 /// Name of the metadata record that comes last.
 pub const TRAILER: &str = "muprime.end";
+/// Name of the metadata record that 'recover' adds: what it had found.
+pub const RECOVERED: &str = "muprime.recovered";
+/// Name of the fact, in every metadata record, that holds the CRC-32 of the others in hexadecimal digits.
+pub const CHECKSUM: &str = "crc32";
 
 /// What goes into a record before anything else.
 #[derive(Clone, Debug, Default)]
@@ -47,6 +57,8 @@ pub struct Preamble {
 
 /// The topics; the number of a topic's schema and channel is its place here, from 1.
 const TOPICS: [&str; 3] = [CYCLES, PASSES, EVENTS];
+/// Facts of the last words: how many messages of each topic were written.
+const WRITTEN: [&str; 3] = ["cycles_written", "passes_written", "events_written"];
 /// How the schemas are written.
 const ENCODING: &str = "jsonschema";
 /// All of them: any object.
@@ -58,35 +70,11 @@ fn schema_name(topic: &str) -> String {
     format!("muprime{}", topic.replace('/', "."))
 }
 
-/// Writes into memory, from which whole pieces go to the file.
-type Piece = Writer<Cursor<Vec<u8>>>;
-
-/// A new piece; `head` bytes of it, magic and header, belong only at the beginning of a file.
-fn piece() -> Result<Piece, McapError> {
-    let options = WriteOptions::new()
-        .compression(Some(Compression::Lz4))
-        .chunk_size(None)
-        .calculate_data_section_crc(false)
-        .profile("")
-        .library("muprime");
-    options.create(Cursor::new(Vec::new()))
-}
-
-/// What a piece holds. Its chunk, if it has one, must be finished: a `flush` or a metadata record does that.
-fn bytes_of(piece: Piece) -> Vec<u8> {
-    piece.into_inner().into_inner()
-}
-
 /// Writes a record.
 pub struct Recorder<W> {
-    to: W,
+    sink: Sink<W>,
     preamble: Preamble,
-    /// Length of what every piece begins with.
-    head: usize,
-    chunk: Option<Piece>,
-    /// Bytes of the messages in the present chunk.
-    filled: usize,
-    sequence: [u32; 3],
+    written: [u32; 3],
     text: Vec<u8>,
 }
 
@@ -95,60 +83,21 @@ impl<W: Write> Recorder<W> {
     ///
     /// # Errors
     /// Whatever the file says.
-    pub fn begin(mut to: W, preamble: Preamble) -> Result<Self, McapError> {
-        let head = bytes_of(piece()?).len();
-        let mut first = piece()?;
-        first.write_metadata(&Metadata { name: HEADER.into(), metadata: preamble.facts.clone() })?;
+    pub fn begin(to: W, preamble: Preamble) -> Result<Self, McapError> {
+        let mut sink = Sink::begin(to)?;
+        sink.facts(HEADER, preamble.facts.clone())?;
         for (name, text) in &preamble.files {
-            first.attach(&Attachment {
-                log_time: preamble.start_unix_ns,
-                create_time: preamble.start_unix_ns,
-                name: name.clone(),
-                media_type: "text/plain".into(),
-                data: Cow::Borrowed(text.as_bytes()),
-            })?;
+            sink.attach(preamble.start_unix_ns, name, text.as_bytes())?;
         }
-        to.write_all(&bytes_of(first))?;
-        to.flush()?;
-        let text = Vec::with_capacity(4096);
-        Ok(Recorder { to, preamble, head, chunk: None, filled: 0, sequence: [0; 3], text })
-    }
-
-    fn open_chunk() -> Result<Piece, McapError> {
-        let mut chunk = piece()?;
-        for topic in TOPICS {
-            let schema = chunk.add_schema(&schema_name(topic), ENCODING, SCHEMA)?;
-            chunk.add_channel(schema, topic, "json", &BTreeMap::new())?;
-        }
-        Ok(chunk)
+        sink.flush()?;
+        Ok(Recorder { sink, preamble, written: [0; 3], text: Vec::with_capacity(4096) })
     }
 
     fn message(&mut self, kind: usize, at: Nanos, body: &impl Serialize) -> Result<(), McapError> {
         self.text.clear();
         serde_json::to_writer(&mut self.text, body).map_err(std::io::Error::from)?;
-        self.sequence[kind] = self.sequence[kind].wrapping_add(1);
-        let log_time = self.preamble.start_unix_ns + at.0;
-        let header = MessageHeader {
-            channel_id: kind as u16 + 1,
-            sequence: self.sequence[kind],
-            log_time,
-            publish_time: log_time,
-        };
-        if self.chunk.is_none() {
-            self.chunk = Some(Self::open_chunk()?);
-        }
-        let Some(chunk) = &mut self.chunk else { unreachable!("opened above") };
-        chunk.write_to_known_channel(&header, &self.text)?;
-        self.filled += self.text.len();
-        if self.filled > CHUNK { self.close_chunk() } else { Ok(()) }
-    }
-
-    /// Puts the present chunk into the file, whole.
-    fn close_chunk(&mut self) -> Result<(), McapError> {
-        self.filled = 0;
-        let Some(mut chunk) = self.chunk.take() else { return Ok(()) };
-        chunk.flush()?;
-        Ok(self.to.write_all(&bytes_of(chunk)[self.head..])?)
+        self.written[kind] = self.written[kind].wrapping_add(1);
+        self.sink.message(kind, self.written[kind], self.preamble.start_unix_ns + at.0, &self.text)
     }
 
     /// Writes a row.
@@ -180,23 +129,21 @@ impl<W: Write> Recorder<W> {
     /// # Errors
     /// Whatever the file says.
     pub fn flush(&mut self) -> Result<(), McapError> {
-        self.close_chunk()?;
-        Ok(self.to.flush()?)
+        self.sink.flush()
     }
 }
 
 impl<W: Read + Write + Seek> Recorder<W> {
-    /// Repeats the preamble's facts with `last` words, and ends the file so that any reader opens it.
+    /// Repeats the preamble's facts with `last` words and the counts of messages, and ends the file so that any reader opens
+    /// it.
     ///
     /// # Errors
     /// Whatever the file says.
     pub fn end(mut self, last: BTreeMap<String, String>) -> Result<(), McapError> {
-        self.close_chunk()?;
         let mut facts = self.preamble.facts.clone();
         facts.extend(last);
-        let mut trailer = piece()?;
-        trailer.write_metadata(&Metadata { name: TRAILER.into(), metadata: facts })?;
-        self.to.write_all(&bytes_of(trailer)[self.head..])?;
-        summary::end(&mut self.to)
+        facts.extend(WRITTEN.iter().zip(self.written).map(|(name, n)| (name.to_string(), n.to_string())));
+        self.sink.facts(TRAILER, facts)?;
+        self.sink.end()
     }
 }

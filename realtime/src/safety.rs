@@ -2,28 +2,31 @@
 //!
 //! Duties: decide each cycle, before anything else, whether the rig may drive and move; latch what went wrong with
 //! its cause, value, bound and cycle; hand out commands that the limits allow.
-//! Owners: `limits.rs` the numbers, `watch.rs` what must be remembered of each channel, `rules.rs` the rules with
-//! their requirement identifiers. This file: states, requests, and commands.
+//! Owners: `limits.rs` the numbers, `watch.rs` and `exposure.rs` what must be remembered, `rules.rs` the rules with their
+//! requirement identifiers, `arming.rs` the way to armed. This file: states, requests, and commands.
 //!
 //! ```text
-//!                 reset edge, every cause clear
-//!   Faulted(trip) ------------------------------> Armed
-//!      ^   ^                                        |
-//!      |   +---- any rule broken, or a stop --------+
-//!      +-- start-up
+//!                 reset edge, causes clear             second channel opened and
+//!   Faulted(trip) --------------------------> Proving ---- closed, causes clear ----> Armed
+//!      ^   ^                                     |                                      |
+//!      |   +------- any rule broken, a stop, or a proof that failed --------------------+
+//!      +-- start-up                (without a second channel: straight to Armed)
 //! ```
-//! Faulted commands output off, stage at rest, finger lifted. Armed passes requests on, clamped to nothing: a
-//! request beyond a limit is a trip, not a smaller request.
+//! Faulted and Proving command output off, stage at rest, finger lifted. Armed passes on requests that came since it was
+//! armed, clamped to nothing: a request beyond a limit is a trip, not a smaller request.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod arming;
+mod exposure;
 mod limits;
 mod rules;
 mod watch;
 
-use crate::ports::{AmplifierState, Forces, Nanos, NoData, StageState};
+use crate::ports::{AmplifierState, Contacts, Forces, Nanos, NoData, StageState, SupplyCommand, SupplyState};
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 
+pub use arming::Proof;
 pub use limits::{ChannelTiming, HARD, HardLimits, LimitError, Limits, Timing};
 pub use rules::{Cause, RULES, Rule};
 use watch::Watch;
@@ -138,6 +141,13 @@ pub struct Trip {
 pub enum State {
     /// Off, at rest, lifted; waiting for an explicit reset with every cause clear.
     Faulted(Trip),
+    /// Off, at rest, lifted; the second switch-off channel is being proved.
+    Proving {
+        /// What is proved.
+        proof: Proof,
+        /// Since when.
+        since: Nanos,
+    },
     /// Requests within the limits are passed on.
     Armed {
         /// When it was armed.
@@ -165,8 +175,10 @@ pub struct Controls {
     pub reset: bool,
     /// Stops the rig and latches.
     pub stop: bool,
-    /// The dead-man input of human-contact mode: true while held.
+    /// The dead-man key of a trial, where the limits allow one: true while held, and no longer than its age.
     pub dead_man: bool,
+    /// A request came in this cycle.
+    pub new_request: bool,
 }
 
 /// Everything that safety looks at in a cycle.
@@ -178,8 +190,26 @@ pub struct Observation {
     pub amplifier: Result<AmplifierState, NoData>,
     /// The stage.
     pub stage: Result<StageState, NoData>,
-    /// How late this cycle began.
+    /// Time from the deadline that was due to the begin of this cycle: deadlines that were missed before it are in it.
     pub lateness: Nanos,
+    /// The second switch-off channel.
+    #[serde(default = "not_fitted")]
+    pub supply: Result<SupplyState, NoData>,
+    /// Emergency stop, interlock, dead-man.
+    #[serde(default)]
+    pub contacts: Contacts,
+}
+
+/// Records from before there was a second channel hold none.
+const fn not_fitted() -> Result<SupplyState, NoData> {
+    Err(NoData::NotFitted)
+}
+
+impl Observation {
+    /// Deadlines that were missed before this cycle began.
+    pub fn missed(&self, cycle: Nanos) -> u32 {
+        u32::try_from(self.lateness.0 / cycle.0.max(1)).unwrap_or(u32::MAX)
+    }
 }
 
 /// What safety decided in a cycle.
@@ -189,8 +219,8 @@ pub struct Decision {
     pub drive: DriveCommand,
     /// For the stage.
     pub stage: StageCommand,
-    /// Whether the second switch-off channel is to be opened.
-    pub cut_supply: bool,
+    /// For the second switch-off channel.
+    pub supply: SupplyCommand,
     /// A trip that was latched in this cycle.
     pub tripped: Option<Trip>,
     /// Whether the rig was armed in this cycle.
@@ -225,6 +255,10 @@ pub struct Safety {
     cycle: u64,
     sequence: u32,
     reset_before: bool,
+    /// A request came since the rig was armed.
+    asked: bool,
+    /// The second channel was cut for cause, and has not been proved since.
+    supply_cut: bool,
 }
 
 impl Default for Safety {
@@ -243,12 +277,19 @@ impl Safety {
             cycle: 0,
             sequence: 0,
             reset_before: false,
+            asked: false,
+            supply_cut: false,
         }
     }
 
     /// The present state.
     pub const fn state(&self) -> State {
         self.state
+    }
+
+    /// Whether the second switch-off channel is being proved.
+    pub const fn is_proving(&self) -> bool {
+        matches!(self.state, State::Proving { .. })
     }
 
     /// Whether requests are passed on.
@@ -270,43 +311,50 @@ impl Safety {
         let reset_edge = controls.reset && !self.reset_before;
         self.reset_before = controls.reset;
 
-        self.watch.look(limits, seen, now);
+        self.watch.look(limits, seen, controls, now);
         let armed_since = match self.state {
             State::Armed { since } => Some(since),
-            State::Faulted(_) => None,
+            State::Faulted(_) | State::Proving { .. } => None,
         };
-        let context =
-            rules::Context { limits, seen, request, controls, watch: &self.watch, armed_since, now };
+        // A request counts from the cycle after arming on: what was asked for before a reset is not asked for after it.
+        self.asked = armed_since.is_some() && (self.asked || controls.new_request);
+        let request = if self.asked { *request } else { Request::default() };
+        let context = rules::Context {
+            limits,
+            seen,
+            request: &request,
+            controls,
+            watch: &self.watch,
+            armed_since,
+            now,
+        };
         let broken = rules::first_broken(&context);
-        let remark = rules::remark(&context);
-
-        let mut tripped = None;
-        let mut armed_now = false;
-        match (self.state, broken) {
-            (State::Armed { .. }, Some(breach)) => {
-                let trip = Trip {
-                    cause: breach.cause,
-                    value: breach.value,
-                    bound: breach.bound,
-                    cycle: self.cycle,
-                    at: now,
-                };
-                self.state = State::Faulted(trip);
-                tripped = Some(trip);
-            }
-            (State::Faulted(_), None) if reset_edge => {
-                self.state = State::Armed { since: now };
-                armed_now = true;
-                self.watch.lateral.forget_losses();
-                self.watch.normal.forget_losses();
-            }
-            _ => {}
-        }
+        let mut said = Decision {
+            drive: DriveCommand::off(self.sequence, now),
+            stage: StageCommand::stop(self.sequence, now),
+            supply: SupplyCommand::Cut,
+            tripped: None,
+            armed_now: false,
+            blocking: broken.map(|b| b.cause),
+            lateral_usable: self.watch.lateral.usable,
+            normal_usable: self.watch.normal.usable,
+            remark: rules::remark(&context),
+        };
+        let step = arming::Step {
+            besides_the_cut: rules::first_broken_but(&context, self.excused(seen.supply)),
+            broken,
+            cuts_the_supply: rules::cuts_the_supply(&context),
+            supply: seen.supply,
+            reset_edge,
+            cycle: self.cycle,
+            now,
+        };
+        self.advance(&step, &mut said);
 
         let expires_at = now.plus(limits.timing.command_expiry);
-        let (drive, stage) = match self.state {
+        (said.drive, said.stage) = match self.state {
             State::Armed { .. } => (
-                DriveCommand::within(limits, request, self.sequence, expires_at),
+                DriveCommand::within(limits, &request, self.sequence, expires_at),
                 StageCommand {
                     velocity_m_s: request.velocity_m_s,
                     normal_force_n: request.normal_force_n,
@@ -314,22 +362,13 @@ impl Safety {
                     expires_at,
                 },
             ),
-            State::Faulted(_) => {
+            State::Faulted(_) | State::Proving { .. } => {
                 (DriveCommand::off(self.sequence, expires_at), StageCommand::stop(self.sequence, expires_at))
             }
         };
-        self.watch.commanded(&drive, &stage, now);
-        Decision {
-            drive,
-            stage,
-            cut_supply: self.watch.refuses_off(limits, now),
-            tripped,
-            armed_now,
-            blocking: broken.map(|b| b.cause),
-            lateral_usable: self.watch.lateral.usable,
-            normal_usable: self.watch.normal.usable,
-            remark,
-        }
+        said.supply = self.supply();
+        self.watch.commanded(&said, now);
+        said
     }
 }
 

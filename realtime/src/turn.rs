@@ -3,7 +3,7 @@
 
 use crate::cycle::{self, COMMANDS_PER_CYCLE, Config, CycleState, Inputs, Marker, Online, Outputs};
 use crate::estimate::{MuRelative, NoMu};
-use crate::ports::{Amplifier, ForceSensor, Nanos, Stage};
+use crate::ports::{Absent, Amplifier, ForceSensor, Nanos, SafetyInputs, Stage, SupplyCommand, SupplySwitch};
 use crate::safety::{Cause, Observation, Remark, Trip};
 use models::prediction::FrictionModel;
 use serde::{Deserialize, Serialize};
@@ -16,6 +16,29 @@ pub struct Ports {
     pub amplifier: Box<dyn Amplifier>,
     /// Moves and loads the finger.
     pub stage: Box<dyn Stage>,
+    /// The second switch-off channel; [`Absent`] where the rig has none.
+    pub supply: Box<dyn SupplySwitch>,
+    /// Emergency stop, interlock and dead-man; [`Absent`] where the rig has none.
+    pub contacts: Box<dyn SafetyInputs>,
+}
+
+impl Ports {
+    /// A rig without a second switch-off channel and without safety contacts.
+    pub fn new(force: Box<dyn ForceSensor>, amplifier: Box<dyn Amplifier>, stage: Box<dyn Stage>) -> Self {
+        Ports { force, amplifier, stage, supply: Box::new(Absent), contacts: Box::new(Absent) }
+    }
+
+    /// The same rig with a second switch-off channel.
+    #[must_use]
+    pub fn with_supply(self, supply: Box<dyn SupplySwitch>) -> Self {
+        Ports { supply, ..self }
+    }
+
+    /// The same rig with safety contacts.
+    #[must_use]
+    pub fn with_contacts(self, contacts: Box<dyn SafetyInputs>) -> Self {
+        Ports { contacts, ..self }
+    }
 }
 
 /// One cycle for the record: what came in, what was decided. Plain data, `Copy`.
@@ -39,6 +62,12 @@ pub struct Row {
     pub marker: Marker,
     /// Whether the rig is armed.
     pub armed: bool,
+    /// Whether the second switch-off channel was being proved.
+    #[serde(default)]
+    pub proving: bool,
+    /// Whether the supply was told to be cut.
+    #[serde(default)]
+    pub supply_cut: bool,
     /// A trip latched in this cycle.
     pub tripped: Option<Trip>,
     /// The first rule that is broken now, latched or not.
@@ -67,6 +96,8 @@ impl Row {
             load_n: out.stage.normal_force_n(),
             marker: out.marker,
             armed: out.armed,
+            proving: out.proving,
+            supply_cut: out.supply == SupplyCommand::Cut,
             tripped: out.tripped,
             blocking: out.blocking,
             mu_relative: out.mu_relative,
@@ -100,7 +131,7 @@ pub struct Tick {
     pub now: Nanos,
 }
 
-/// One turn: read the ports, step, command the ports.
+/// One turn: read the ports, decide, command the ports, and only then estimate and compare: a slow model delays no 'off'.
 pub fn turn(
     config: &Config,
     model: &dyn FrictionModel,
@@ -122,13 +153,14 @@ pub fn turn(
         amplifier: ports.amplifier.state(now),
         stage: ports.stage.state(now),
         lateness,
+        supply: ports.supply.state(now),
+        contacts: ports.contacts.read(now),
     };
     let inputs = Inputs { commands: taken, seen };
-    let out = cycle::step(config, model, state, &inputs, now);
-    ports.amplifier.command(out.drive, now);
-    ports.stage.command(out.stage, now);
-    if out.cut_supply {
-        ports.amplifier.cut_supply(now);
-    }
+    let decision = cycle::decide(config, state, &inputs, now);
+    ports.amplifier.command(decision.drive, now);
+    ports.supply.command(decision.supply, now);
+    ports.stage.command(decision.stage, now);
+    let out = cycle::judge(config, model, state, &inputs, &decision, now);
     Row::of(number, now, &inputs, &out)
 }

@@ -4,6 +4,7 @@
 //! a CPU away for milliseconds, and drivers (or an embedded virtual rig) on it fall silent. A witness tells which. It
 //! sleeps to absolute deadlines as the loop does, but as an ordinary thread, bound to its CPU: what delays it delays
 //! the drivers there too.
+#![allow(clippy::disallowed_methods, reason = "a witness measures how late ordinary threads wake")]
 
 use crate::pacing::{monotonic_ns, sleep_until};
 use crate::ports::Nanos;

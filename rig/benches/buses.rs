@@ -3,6 +3,7 @@
 //!
 //! `cargo bench -p muprime-rig --bench buses` prints the table that BENCHMARKS.md quotes. The bare client does what the bus
 //! demands (the silence between RTU frames, one answer before the next question) and nothing else: it decodes nothing.
+#![allow(clippy::disallowed_methods, reason = "it measures time")]
 
 use drivers::InstrumentSetup;
 use drivers::endpoint::Endpoint;

@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p muprime-rig --bench diagnosis`
 
-use diagnosis::data::{Rig, Table};
+use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use models::condition::Condition;
@@ -15,7 +15,7 @@ fn main() {
 }
 
 /// A sealed set whose sweep was gone through again until it had 500 passes.
-fn table(stratum: Stratum) -> (Table, Rig) {
+fn table(stratum: Stratum) -> (Table, RigFile) {
     let (set, mut sealed) = generate_with_rig(4242, stratum, Ask::Gain);
     let mut passes = set.passes.clone();
     let again: Vec<Condition> = set
@@ -36,7 +36,7 @@ fn table(stratum: Stratum) -> (Table, Rig) {
         .collect();
     passes.extend(sealed.measure(&again));
     passes.truncate(PASSES);
-    let rig = toml::from_str(&set.rig_toml).expect("rig.toml of a sealed set");
+    let rig = RigFile::parse(&set.rig_toml).expect("rig.toml of a sealed set");
     (Table::measured(&passes).expect("table of a sealed set"), rig)
 }
 

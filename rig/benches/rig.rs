@@ -1,4 +1,5 @@
 //! Speeds of the loop and of the virtual rig: `cargo bench -p muprime-rig --bench rig`.
+#![allow(clippy::disallowed_methods, reason = "it measures time")]
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
@@ -10,7 +11,7 @@ use muprime_rig::session::rehearse;
 use muprime_rig::setup::Setup;
 use realtime::cycle::{self, Command, CycleState, Inputs, Marker, Phase};
 use realtime::estimate::Mu0;
-use realtime::ports::{AmplifierState, Forces, Nanos, Quality, Reading, StageState};
+use realtime::ports::{AmplifierState, Contacts, Forces, Nanos, NoData, Quality, Reading, StageState};
 use realtime::safety::{Observation, Request};
 use sim::wire::SharedPlant;
 use sim::wire::modbus_tcp::ModbusTcpServer;
@@ -95,6 +96,8 @@ fn step(bencher: Bencher<'_, '_>) {
             amplifier: Ok(amplifier),
             stage: Ok(stage),
             lateness: Nanos(0),
+            supply: Err(NoData::NotFitted),
+            contacts: Contacts::default(),
         };
         let out = cycle::step(&setup.config, &model, &mut state, &Inputs { commands, seen }, now);
         assert!(n < 100 || out.online.is_some());

@@ -5,11 +5,13 @@
 
 pub mod further;
 pub mod same_form;
+pub mod sensitivity;
 
-use diagnosis::attribute::Verdict;
-use diagnosis::data::{Rig, Table};
+use diagnosis::Verdict;
+use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
+use models::covariate;
 use rayon::prelude::*;
 use serde::Serialize;
 use sim::sealed::{Ask, DETECTABLE, PAIR_LEAVES, Set, Stratum, generate};
@@ -61,8 +63,8 @@ pub struct Scored {
 /// # Errors
 /// A set that the diagnosis refuses.
 pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
-    let rig: Rig =
-        toml::from_str(&set.rig_toml).map_err(|e| miette::miette!("rig.toml of a sealed set: {e}"))?;
+    let rig: RigFile =
+        RigFile::parse(&set.rig_toml).map_err(|e| miette::miette!("rig.toml of a sealed set: {e}"))?;
     let table = Table::measured(&set.passes).map_err(|e| miette::miette!("table of a sealed set: {e}"))?;
     let conditions = Table::conditions(&set.conditions, &table.origin(&set.passes))
         .map_err(|e| miette::miette!("conditions of a sealed set: {e}"))?;
@@ -118,17 +120,7 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
         .map(|p| {
             report.location.regions.iter().any(|r| {
                 r.bounds.iter().all(|(name, b)| {
-                    let v = match *name {
-                        "amplitude_pp_m" => p.amplitude_pp_m,
-                        "speed_m_s" => p.speed_m_s,
-                        "normal_force_n" => p.normal_force_n,
-                        "frequency_hz" => p.frequency_hz,
-                        "direction" => p.direction,
-                        "position_m" => p.position_m,
-                        "time_s" => p.time_s,
-                        "ambient_pressure_pa" => p.ambient_pressure_pa.unwrap_or(f64::NAN),
-                        _ => p.temperature_c.unwrap_or(f64::NAN),
-                    };
+                    let v = covariate::by_name(name).and_then(|c| c.of(p)).unwrap_or(f64::NAN);
                     v >= b[0] && v <= b[1]
                 })
             })

@@ -1,5 +1,6 @@
 //! The catalogue of runs: SQLite in WAL mode beside the runs.
 
+use crate::files::{self, Placed};
 use miette::{IntoDiagnostic, WrapErr};
 use rusqlite::{Connection, OptionalExtension, params};
 use serde::Serialize;
@@ -29,7 +30,12 @@ pub struct RunEntry {
 /// The catalogue.
 pub struct Catalogue {
     db: Connection,
+    /// The file that was opened: it must still be the one at its place.
+    file: Placed,
 }
+
+/// Name of the catalogue in a folder of runs.
+const FILE: &str = "catalogue.sqlite";
 
 impl Catalogue {
     /// Opens the catalogue of a folder of runs, making it where there is none.
@@ -37,8 +43,8 @@ impl Catalogue {
     /// # Errors
     /// Whatever SQLite says.
     pub fn open(runs: &Path) -> miette::Result<Self> {
-        std::fs::create_dir_all(runs).into_diagnostic()?;
-        let path = runs.join("catalogue.sqlite");
+        files::make_folder(runs)?;
+        let path = runs.join(FILE);
         let db = Connection::open(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
         db.pragma_update(None, "journal_mode", "WAL").into_diagnostic()?;
         // FULL keeps the last commit through a power cut, which NORMAL may roll back.
@@ -51,8 +57,26 @@ impl Catalogue {
                 passes INTEGER NOT NULL DEFAULT 0, planned INTEGER NOT NULL,
                 departed INTEGER NOT NULL DEFAULT 0) STRICT;",
         )
-        .into_diagnostic()?;
-        Ok(Catalogue { db })
+        .into_diagnostic()
+        .wrap_err_with(|| path.display().to_string())?;
+        files::sync_folder_of(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        let file = Placed::open(&path, std::fs::OpenOptions::new().read(true))?;
+        Ok(Catalogue { db, file })
+    }
+
+    /// Opens the catalogue of a folder of runs, to look at it.
+    ///
+    /// # Errors
+    /// There is none: none is made then. Whatever SQLite says.
+    pub fn existing(runs: &Path) -> miette::Result<Self> {
+        if !runs.join(FILE).exists() {
+            miette::bail!(
+                help = "give --folder, or make a run first",
+                "{} holds no catalogue",
+                runs.display()
+            );
+        }
+        Self::open(runs)
     }
 
     /// Enters a run, or re-enters one that is taken up again.
@@ -82,12 +106,19 @@ impl Catalogue {
     /// # Errors
     /// Whatever SQLite says.
     pub fn progress(&self, folder: &str, passes: i64, departed: bool) -> miette::Result<()> {
-        self.db
-            .execute(
-                "UPDATE run SET passes = ?2, departed = ?3 WHERE folder = ?1",
-                params![folder, passes, departed],
-            )
-            .into_diagnostic()?;
+        self.update(
+            "UPDATE run SET passes = ?2, departed = ?3 WHERE folder = ?1",
+            params![folder, passes, departed],
+        )
+    }
+
+    /// Changes the line of one run, and looks whether the catalogue is still where it belongs.
+    fn update(&self, sql: &str, values: impl rusqlite::Params) -> miette::Result<()> {
+        let lines = self.db.execute(sql, values).into_diagnostic().wrap_err("the catalogue")?;
+        self.file.still_there()?;
+        if lines != 1 {
+            miette::bail!("the catalogue has lost the run");
+        }
         Ok(())
     }
 
@@ -96,10 +127,7 @@ impl Catalogue {
     /// # Errors
     /// Whatever SQLite says.
     pub fn end(&self, folder: &str, outcome: &str) -> miette::Result<()> {
-        self.db
-            .execute("UPDATE run SET outcome = ?2 WHERE folder = ?1", params![folder, outcome])
-            .into_diagnostic()?;
-        Ok(())
+        self.update("UPDATE run SET outcome = ?2 WHERE folder = ?1", params![folder, outcome])
     }
 
     /// All runs, newest first.
@@ -111,7 +139,7 @@ impl Catalogue {
             .db
             .prepare(
                 "SELECT folder, plan, setup, started_unix_s, outcome, passes, planned, departed FROM run
-                 ORDER BY started_unix_s DESC",
+                 ORDER BY started_unix_s DESC, rowid DESC",
             )
             .into_diagnostic()?;
         let rows = query

@@ -13,11 +13,10 @@ use calibration::amplitude::apply::AmplitudeCalibration;
 use calibration::certificate::{Certificate, Circumstances, Kind, Verified};
 use calibration::force::apply::ForceCalibration;
 use calibration::force::zero::Zero;
-use calibration::prior::CalibrationPriors;
 use models::quantity::PeakToPeak;
+use models::rig_file::Calibration;
 use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Quality, Reading};
 use realtime::safety::DriveCommand;
-use std::collections::BTreeMap;
 use std::path::Path;
 use temperature::TemperatureRange;
 
@@ -36,10 +35,8 @@ pub struct Certificates {
     pub amplitude_m_per_unit: Option<f64>,
     /// Ranges of temperature that the amplifier's own channel is held against while the rig runs.
     pub temperature_ranges: Vec<TemperatureRange>,
-    /// What remains uncertain, for rig.toml.
-    pub priors: CalibrationPriors,
-    /// File name of each certificate, by its kind.
-    pub names: BTreeMap<String, String>,
+    /// What remains uncertain, and which file says so, for rig.toml.
+    pub calibration: Calibration,
     /// The files, for the record.
     pub files: Vec<(String, String)>,
 }
@@ -52,6 +49,7 @@ impl Certificates {
     /// scaled twice.
     pub fn load(file: &SetupFile, folder: &Path, now_unix_s: i64) -> Result<Self, String> {
         let mut all = Certificates::default();
+        all.calibration.speed_gain_sd = file.speed_gain_sd;
         let mut seen: Vec<Kind> = Vec::new();
         for path in &file.certificates {
             let path = folder.join(path);
@@ -73,7 +71,7 @@ impl Certificates {
                      bench"
                 )));
             }
-            all.priors.take(verified).map_err(|e| fail(e.to_string()))?;
+            calibration::prior::take(&mut all.calibration, verified).map_err(|e| fail(e.to_string()))?;
             if kind == Kind::Force {
                 let axes = file.force.iter().flat_map(|i| [&i.lateral, &i.normal]).flatten();
                 if axes.into_iter().any(|a| a.gain != 1.0 || a.offset_n != 0.0) {
@@ -85,6 +83,10 @@ impl Certificates {
                 let calibration = ForceCalibration::compile(verified, file.temperature_c)
                     .map_err(|e| fail(e.to_string()))?;
                 all.force = Some((calibration, zero(file, &certificate)));
+                if file.zero_counts.is_some() {
+                    // The certificate speaks for its own zero, not for the one that the setup states.
+                    (all.calibration.lateral_offset_sd_n, all.calibration.normal_offset_sd_n) = (None, None);
+                }
             }
             if kind == Kind::Amplitude {
                 all.take_amplitude(file, verified).map_err(&fail)?;
@@ -95,7 +97,7 @@ impl Certificates {
                 let certificate = format!("{kind} certificate ({kept})");
                 all.temperature_ranges.push(TemperatureRange { certificate, range_c });
             }
-            all.names.insert(kind.to_string(), kept.clone());
+            all.calibration.certificates.insert(kind, kept.clone());
             all.files.push((format!("certificates/{kept}"), text));
         }
         Ok(all)
@@ -171,14 +173,9 @@ fn serial(file: &SetupFile, kind: Kind) -> Result<Option<String>, String> {
 /// The setup's stated zero, or the one that was found with the certificate. Neither is silent: the first
 /// stands in the setup, the second in the certificate.
 fn zero(file: &SetupFile, certificate: &Certificate) -> Zero {
-    let found =
-        |name: &str| certificate.parameter(name).map_or([0.0, 0.0], |p| [p.value, p.standard_uncertainty]);
-    let [lateral, normal] = [found("lateral.offset"), found("normal.offset")];
-    Zero {
-        counts: file.zero_counts.unwrap_or([lateral[0], normal[0]]),
-        standard_uncertainty: [lateral[1], normal[1]],
-        time_s: 0.0,
-    }
+    let none = Zero { counts: [0.0; 2], standard_uncertainty: [0.0; 2], time_s: 0.0 };
+    let found = Zero::of_certificate(certificate).unwrap_or(none);
+    Zero { counts: file.zero_counts.unwrap_or(found.counts), ..found }
 }
 
 /// A force port around a force port: counts in, calibrated newtons out. No allocation, no lock.
@@ -235,9 +232,5 @@ impl Amplifier for CalibratedAmplifier {
             echoed_amplitude: plate(state.echoed_amplitude.metres()),
             ..state
         })
-    }
-
-    fn cut_supply(&mut self, now: Nanos) -> bool {
-        self.inner.cut_supply(now)
     }
 }

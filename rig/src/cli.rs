@@ -1,4 +1,5 @@
 //! One file a subcommand. Add one: a file here, a line in this list, a variant and a line in `main.rs`.
+#![allow(clippy::disallowed_methods, reason = "people wait in wall-clock time")]
 
 pub mod blind;
 pub mod calibrate;
@@ -18,6 +19,8 @@ pub mod virtual_rig;
 pub mod watch;
 
 use std::process::ExitCode;
+use std::sync::OnceLock;
+use std::sync::mpsc::{Sender, channel};
 
 /// Done, also when the model has left the measurement or the verdict is unknown.
 pub const DONE: u8 = 0;
@@ -32,9 +35,35 @@ pub const INTERNAL: u8 = 3;
 pub fn status_of(error: &miette::Report) -> u8 {
     use crate::session::Unfinished;
     match error.downcast_ref::<Unfinished>() {
-        Some(Unfinished::NotKept) => FAILED,
+        Some(Unfinished::NotKept | Unfinished::Interrupted | Unfinished::NotOff) => FAILED,
         Some(Unfinished::Internal) => INTERNAL,
         None => REFUSED,
+    }
+}
+
+/// Where the main thread waits for the end.
+static END: OnceLock<Sender<ExitCode>> = OnceLock::new();
+
+/// Runs a subcommand on a thread of its own and waits for its end, or for somebody who asks to leave at once: a subcommand
+/// that hangs keeps nobody from leaving. Called once, by the main thread, whose return ends the process.
+pub fn until_the_end(subcommand: impl FnOnce() -> ExitCode + Send + 'static) -> ExitCode {
+    let (end, ended) = channel();
+    let _ = END.set(end.clone());
+    let run = move || {
+        let _ = end.send(subcommand());
+    };
+    // As large as a main thread's stack commonly is.
+    let thread = std::thread::Builder::new().name("subcommand".into()).stack_size(8 << 20).spawn(run);
+    match thread {
+        Ok(_) => ended.recv().unwrap_or(ExitCode::from(INTERNAL)),
+        Err(_) => ExitCode::from(INTERNAL),
+    }
+}
+
+/// Asks the main thread to end the process with that status, whatever the subcommand does.
+pub fn leave_now(status: u8) {
+    if let Some(end) = END.get() {
+        let _ = end.send(ExitCode::from(status));
     }
 }
 
@@ -54,6 +83,8 @@ mod tests {
         assert_eq!(status_of(&full()), REFUSED);
         assert_eq!(status_of(&full().wrap_err(Unfinished::NotKept)), FAILED);
         assert_eq!(status_of(&full().wrap_err(Unfinished::Internal)), INTERNAL);
+        assert_eq!(status_of(&full().wrap_err(Unfinished::NotOff)), FAILED);
+        assert_eq!(status_of(&Unfinished::Interrupted.into()), FAILED);
         assert_eq!(status_of(&full().wrap_err(Unfinished::NotKept).wrap_err("and more")), FAILED);
     }
 }

@@ -57,8 +57,7 @@ pub fn embed(
     if let Some(weight) = setup.stage.dead_weight_n {
         plant.now().0.command(&[(Command::NormalForce, weight)]);
     }
-    let InstrumentsSetup { force, amplifier, stage } = setup;
-    let mut all: Vec<&mut InstrumentSetup> = force.iter_mut().chain([amplifier, stage]).collect();
+    let mut all: Vec<&mut InstrumentSetup> = setup.all_mut().collect();
     for instrument in &mut all {
         let mut profile = drivers::profile(&instrument.profile).map_err(|error| error.to_string())?;
         if let Some(rate) = instrument.rate_hz {
@@ -73,7 +72,9 @@ pub fn embed(
             LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
                 let unit = instrument.unit.or(link.unit).unwrap_or(1);
                 let units = registers.entry(instrument.address.clone()).or_default();
-                if units.insert(unit, device).is_some() {
+                // A board that is relay and inputs at once is named twice and served once.
+                let other = |served: &Device| served.profile().id() != instrument.profile;
+                if units.insert(unit, device).is_some_and(|served| other(&served)) {
                     return Err(format!(
                         "two instruments of the virtual rig have Modbus unit {unit}; give one another `unit`"
                     ));
@@ -175,14 +176,15 @@ fn port(address: &mut String) -> Result<Box<dyn SerialPort>, String> {
 /// A profile that is not bundled or names what the world does not have, or two instruments of one unit.
 pub fn emulators(setup: &InstrumentsSetup) -> miette::Result<BTreeMap<u8, Device>> {
     let mut devices = BTreeMap::new();
-    for instrument in setup.force.iter().chain([&setup.amplifier, &setup.stage]) {
+    for instrument in setup.all() {
         let profile = drivers::profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
         if !matches!(profile.description.link.kind, LinkKind::ModbusTcp | LinkKind::ModbusRtu) {
             continue;
         }
         let unit = instrument.unit.or(profile.description.link.unit).unwrap_or(1);
         let device = Device::new(profile).map_err(|e| miette::miette!("{}: {e}", instrument.profile))?;
-        if devices.insert(unit, device).is_some() {
+        let other = |served: &Device| served.profile().id() != instrument.profile;
+        if devices.insert(unit, device).is_some_and(|served| other(&served)) {
             miette::bail!(
                 help = "give one of them another `unit`",
                 "two instruments of the virtual rig have Modbus unit {unit}"

@@ -32,8 +32,6 @@ mod parquet {
 
 use crate::report::RunData;
 use clap::ValueEnum;
-use miette::IntoDiagnostic;
-use std::io::Write;
 use std::path::Path;
 
 pub use parquet::as_csv as parquet_as_csv;
@@ -79,9 +77,5 @@ pub fn export(run: &RunData, format: Format, to: &Path) -> miette::Result<()> {
         Format::Parquet => parquet::bytes(&table)?,
         Format::Arrow => arrow::bytes(&table)?,
     };
-    let beside = to.with_extension("part");
-    let mut file = std::fs::File::create(&beside).into_diagnostic()?;
-    file.write_all(&bytes).into_diagnostic()?;
-    file.sync_all().into_diagnostic()?;
-    std::fs::rename(&beside, to).into_diagnostic()
+    crate::files::write_whole(to, &bytes)
 }

@@ -8,6 +8,6 @@ pub mod rows;
 pub mod search;
 mod tamper;
 
-pub use bench::{Found, Scene, Strike, run};
-pub use rows::{Expect, FaultRow, Moment, ROWS};
+pub use bench::{Core, Found, Scene, Strike, run, run_with};
+pub use rows::{ELSEWHERE, Expect, FaultRow, Moment, Pace, ROWS};
 pub use search::{Search, Tally, search};

@@ -6,8 +6,12 @@
 //! | [`certificates`] | a setup's certificates, verified and applied once |
 //! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 //! | [`sequence`] | the order of a sweep, a pure state machine over rows |
+//! | [`supervisor`] | the one way to lead a loop: it stops first, switches off, reads back |
+//! | [`claim`] | one controller a rig |
 //! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
 //! | [`run_dir`], [`catalogue`] | a run's folder and the catalogue of runs |
+//! | [`figures`] | the paper's figures recomputed |
+//! | [`files`], [`print`] | how files are written, and how the program speaks: each in one place |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
 //! | [`model_file`] | a corrected model from its file to the loop |
 //! | [`faults`], [`blind`] | what validates: the fault list in virtual time, the diagnosis scored on sealed sets |
@@ -26,19 +30,26 @@
 //! # Ok::<(), miette::Report>(())
 //! ```
 
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 pub mod blind;
 pub mod catalogue;
 pub mod certificates;
+pub mod claim;
 pub mod cli;
 pub mod embed;
 pub mod export;
 pub mod faults;
+pub mod figures;
+pub mod files;
 pub mod fingertip;
 pub mod input;
 pub mod model_file;
 pub mod plan;
+pub mod print;
 pub mod report;
 pub mod run_dir;
 pub mod sequence;
 pub mod session;
 pub mod setup;
+pub mod supervisor;

@@ -1,7 +1,12 @@
 //! The `muprime` command: parses its arguments and hands over to one file per subcommand in `cli/`.
 
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 use clap::{CommandFactory, Parser, Subcommand};
 use muprime_rig::cli;
+use muprime_rig::print::Remarks;
+use muprime_rig::say;
+use std::io::IsTerminal;
 use std::process::ExitCode;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::layer::SubscriberExt;
@@ -55,6 +60,13 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    // Places are named in records, catalogues and JSON, all of which are text.
+    let unreadable =
+        std::env::args_os().chain(std::env::var_os("MUPRIME_RUNS")).find(|a| a.to_str().is_none());
+    if let Some(argument) = unreadable {
+        say!("{} is not text in UTF-8: give the file or folder another name", argument.display());
+        return ExitCode::from(cli::REFUSED);
+    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -66,17 +78,22 @@ fn main() -> ExitCode {
     let filter: Targets = match wanted.parse() {
         Ok(filter) => filter,
         Err(error) => {
-            eprintln!("MUPRIME_LOG={wanted}: {error}; a level, or as in 'warn,muprime_drivers=debug'");
+            say!("MUPRIME_LOG={wanted}: {error}; a level, or as in 'warn,muprime_drivers=debug'");
             return ExitCode::from(cli::REFUSED);
         }
     };
+    let colours = std::io::stderr().is_terminal();
     tracing_subscriber::registry()
-        .with(tracing_subscriber::fmt::layer().with_writer(std::io::stderr))
+        .with(tracing_subscriber::fmt::layer().with_ansi(colours).with_writer(|| Remarks))
         .with(filter)
         .init();
     let json = cli.json;
+    cli::until_the_end(move || run(cli.verb, json))
+}
+
+fn run(verb: Verb, json: bool) -> ExitCode {
     // A panic is a fault of this program: status 3, after the threads have put the rig in its safe state.
-    let outcome = std::panic::catch_unwind(|| match cli.verb {
+    let outcome = std::panic::catch_unwind(|| match verb {
         Verb::Run(args) => cli::run::run(args, json),
         Verb::VirtualRig(args) => cli::virtual_rig::run(args, json),
         Verb::Calibrate(args) => cli::calibrate::run(args, json),
@@ -97,7 +114,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(Ok(code)) => code,
         Ok(Err(report)) => {
-            eprintln!("{report:?}");
+            say!("{report:?}");
             ExitCode::from(cli::status_of(&report))
         }
         Err(_) => ExitCode::from(cli::INTERNAL),

@@ -5,6 +5,8 @@ mod points;
 mod visible;
 
 use crate::input::{self, BadInput};
+use models::condition::Condition;
+use models::covariate::{self, Covariate};
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -49,6 +51,31 @@ pub struct PlanFile {
     /// Preparation and environment, as section 2.2 of the paper records them: copied into the record.
     #[serde(default)]
     pub protocol: BTreeMap<String, toml::Value>,
+}
+
+/// Passes that one plan may ask for: a pass takes half a second, so this is half a day, and what a run keeps of its passes
+/// fits into memory.
+pub const MAX_PASSES: u64 = 100_000;
+
+impl PlanFile {
+    /// Passes that the plan asks for, references left out, counted without making them.
+    fn passes(&self) -> u64 {
+        let of_series = |s: &Series| {
+            let lists = [
+                s.amplitude_pp_m.len(),
+                s.frequency_hz.len(),
+                s.speed_m_s.len(),
+                s.normal_force_n.len(),
+                s.position_m.len(),
+                s.ambient_pressure_pa.len(),
+            ];
+            let directions = if s.directions.is_empty() { &self.directions } else { &s.directions };
+            let conditions = lists.iter().fold(1u64, |all, n| all.saturating_mul((*n).max(1) as u64));
+            conditions.saturating_mul(directions.len() as u64)
+        };
+        let conditions = self.series.iter().map(of_series).fold(0, u64::saturating_add);
+        conditions.saturating_mul(u64::from(self.replicates))
+    }
 }
 
 /// Times of a pass.
@@ -106,6 +133,35 @@ pub struct Series {
     pub ambient_pressure_pa: Vec<f64>,
     /// Directions of this series alone, 1 and -1; empty for the plan's.
     pub directions: Vec<i8>,
+}
+
+impl Base {
+    /// The base as a condition; what it does not say is the paper's.
+    pub(crate) fn condition(&self) -> Condition {
+        Condition {
+            amplitude: PeakToPeak::from_metres(self.amplitude_pp_m),
+            frequency_hz: self.frequency_hz,
+            speed_m_s: self.speed_m_s,
+            normal_force_n: self.normal_force_n,
+            position_m: self.position_m,
+            mu0: 1.0,
+            ..Condition::paper()
+        }
+    }
+}
+
+impl Series {
+    /// What the series varies, slowest first; an empty list stands for the base's value.
+    pub(crate) fn lists(&self) -> [(&'static Covariate, &[f64]); 6] {
+        [
+            (&covariate::AMBIENT_PRESSURE, &self.ambient_pressure_pa),
+            (&covariate::FREQUENCY, &self.frequency_hz),
+            (&covariate::SPEED, &self.speed_m_s),
+            (&covariate::NORMAL_FORCE, &self.normal_force_n),
+            (&covariate::POSITION, &self.position_m),
+            (&covariate::AMPLITUDE, &self.amplitude_pp_m),
+        ]
+    }
 }
 
 const fn yes() -> bool {
@@ -170,6 +226,15 @@ impl Plan {
         }
         if !(1..=1000).contains(&file.replicates) {
             return Err(bad(&["replicates"], "replicates are 1 to 1000").into());
+        }
+        let passes = file.passes();
+        if passes > MAX_PASSES {
+            let problem =
+                format!("the plan asks for {passes} passes; at most {MAX_PASSES} are made in one run");
+            let remedy = "shorten the lists, or make several plans of it".to_string();
+            return Err(
+                BadInput::new(origin, text, input::place_of(text, &["series"]), problem, remedy).into()
+            );
         }
         let times = [
             ("settle_s", file.pass.settle_s),

@@ -4,7 +4,7 @@ pub mod diagnosis;
 mod page;
 pub mod plots;
 
-use crate::run_dir::{passes_in, records_in};
+use crate::run_dir::{differences, missing_records, of_file, passes_in, records_in};
 use crate::sequence::MeasuredPass;
 use crate::session::Summary;
 use miette::{IntoDiagnostic, WrapErr};
@@ -29,11 +29,8 @@ pub struct RunData {
     pub summary: Option<Summary>,
     /// The finger of rig.toml.
     pub finger: Finger,
-}
-
-#[derive(serde::Deserialize)]
-struct RigToml {
-    finger: Finger,
+    /// What is damaged or missing in the run's folder.
+    pub damage: Vec<String>,
 }
 
 /// Reads a run's folder.
@@ -44,11 +41,13 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
     let passes = passes_in(folder).wrap_err_with(|| format!("{} holds no run", folder.display()))?;
     let mut facts = BTreeMap::new();
     let mut events = Vec::new();
+    let mut damage = missing_records(folder)?;
     for path in records_in(folder)? {
         let file = File::open(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
         let mut start = 0u64;
         // Entry by entry: the rows of hours would not fit into memory.
-        for entry in Reader::new(BufReader::new(file)).only(recorder::EVENTS) {
+        let mut reader = Reader::new(BufReader::new(file)).only(recorder::EVENTS);
+        for entry in &mut reader {
             match entry {
                 Entry::Facts { name, facts: found } if name == recorder::HEADER => {
                     start = found.get("start_unix_ns").and_then(|s| s.parse().ok()).unwrap_or(0);
@@ -62,12 +61,13 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
                 Entry::Facts { .. } | Entry::File { .. } => {}
             }
         }
+        damage.extend(reader.integrity().sentences().iter().map(|s| of_file(&path, s)));
     }
+    damage.extend(differences(folder, &passes)?);
     let summary =
         std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
-    let rig = std::fs::read_to_string(folder.join("rig.toml")).into_diagnostic().wrap_err("rig.toml")?;
-    let rig: RigToml = toml::from_str(&rig).into_diagnostic().wrap_err("rig.toml")?;
-    Ok(RunData { facts, passes, events, summary, finger: rig.finger })
+    let rig = crate::input::rig_file(&folder.join("rig.toml"))?;
+    Ok(RunData { facts, passes, events, summary, finger: rig.finger, damage })
 }
 
 /// The report of a run as HTML.
@@ -75,5 +75,14 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
 /// # Errors
 /// A folder that holds no run.
 pub fn html(folder: &Path) -> miette::Result<String> {
-    page::page(&read(folder)?)
+    Ok(html_and_damage(folder)?.0)
+}
+
+/// The same, and what is damaged or missing in the folder.
+///
+/// # Errors
+/// A folder that holds no run.
+pub fn html_and_damage(folder: &Path) -> miette::Result<(String, Vec<String>)> {
+    let run = read(folder)?;
+    Ok((page::page(&run)?, run.damage))
 }

@@ -2,13 +2,21 @@
 //!
 //! A pass is acknowledged (on stdout, in the catalogue) only after its line is in `points.csv` and synced.
 
+mod damage;
+mod lines;
+mod lock;
+
+use crate::files::{self, Placed, write_whole};
 use crate::plan::Point;
 use crate::sequence::MeasuredPass;
+pub use damage::{damage_in, differences, missing_records, of_file};
+use lines::{whole_passes, whole_table};
+pub use lock::{claim, is_held};
 use miette::{Context, IntoDiagnostic};
 use models::record::{self, Pass};
 use serde::{Deserialize, Serialize};
-use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
+use std::fs::{self, File, OpenOptions};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// What a run is of: written when it begins, compared when it is taken up again.
@@ -25,30 +33,69 @@ pub struct Identity {
     pub model: String,
 }
 
+/// One session of a run: from its start until its end, a stop or a crash. A run that is taken up again has several.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Session {
+    /// Number, from 1. The session's record is `run-NUMBER.mcap`.
+    pub session: u64,
+    /// Wall clock at its start, in ns since 1970.
+    pub start_unix_ns: u64,
+    /// Time of the run at its start in s: 0 for the first. `time_s` of its passes goes on from there.
+    pub start_s: f64,
+}
+
 /// A run's folder, held by this process alone.
 pub struct RunDir {
     path: PathBuf,
-    points: File,
-    journal: File,
+    points: Placed,
+    journal: Placed,
     /// Held, and so locked, for as long as this lives: the system frees it with the process, whatever ends that.
     _lock: File,
     /// Passes that an earlier session has made.
     pub made: Vec<Pass>,
+    sessions: Vec<Session>,
+    planned: Option<Session>,
+    /// A pass could not be kept: half a line may stand at the end, and nothing may follow it.
+    failed: bool,
+    new: New,
+}
+
+/// What this process has put into the file system, and takes back where nothing comes of it.
+#[derive(Default)]
+struct New {
+    paths: Vec<PathBuf>,
+    begun: bool,
+}
+
+impl Drop for New {
+    fn drop(&mut self) {
+        if self.begun {
+            return;
+        }
+        for path in self.paths.iter().rev() {
+            // Only an empty folder goes: another process may have put something there.
+            let _ = if path.is_dir() { fs::remove_dir(path) } else { fs::remove_file(path) };
+        }
+    }
 }
 
 const IDENTITY: &str = "run.toml";
-const LOCK: &str = ".lock";
+const POINTS: &str = "points.csv";
+const JOURNAL: &str = "passes.jsonl";
+const SESSIONS: &str = "sessions.jsonl";
 
 impl RunDir {
     /// Makes a new folder, or takes up one that an earlier session of the same plan, setup, seed and model left.
     ///
     /// # Errors
-    /// A folder of another run, or one that a living process holds. Nothing is written then.
+    /// A folder of another run, or one that a living process holds. Nothing is left behind then, nor where this is dropped
+    /// before [`RunDir::begin`].
     pub fn open(path: &Path, identity: &Identity) -> miette::Result<Self> {
         let shown = path.display();
         let file = path.join(IDENTITY);
         if file.exists() {
-            let text = fs::read_to_string(&file).into_diagnostic()?;
+            let text = crate::input::text_of(&file)?;
             let before: Identity =
                 toml::from_str(&text).map_err(|e| miette::miette!("{shown}/{IDENTITY}: {e}"))?;
             if before != *identity {
@@ -71,40 +118,81 @@ impl RunDir {
                 "{shown} is not empty and holds no run"
             );
         }
-        fs::create_dir_all(path).into_diagnostic().wrap_err_with(|| format!("cannot make {shown}"))?;
-        let lock = claim(&path.join(LOCK))?;
-        Self::open_locked(path, identity, lock)
+        let mut new = New { paths: files::make_folder(path)?, begun: false };
+        let lock_file = path.join(lock::NAME);
+        if !lock_file.exists() {
+            new.paths.push(lock_file.clone());
+        }
+        let lock = claim(&lock_file)?;
+        Self::open_locked(path, identity, lock, new)
     }
 
-    fn open_locked(path: &Path, identity: &Identity, lock: File) -> miette::Result<Self> {
-        let identity_file = path.join(IDENTITY);
-        if !identity_file.exists() {
-            write_whole(&identity_file, toml::to_string(identity).into_diagnostic()?.as_bytes())?;
+    fn open_locked(path: &Path, identity: &Identity, lock: File, mut new: New) -> miette::Result<Self> {
+        let mut header = Vec::new();
+        record::write_passes(&[], &mut header).into_diagnostic()?;
+        let identity = toml::to_string(identity).into_diagnostic()?;
+        // The journal before the table: where there is a table, there is a journal.
+        for (name, bytes) in [(IDENTITY, identity.as_bytes()), (JOURNAL, b""), (POINTS, &header)] {
+            let file = path.join(name);
+            if !file.exists() {
+                new.paths.push(file.clone());
+                write_whole(&file, bytes)?;
+            }
         }
-        let points_file = path.join("points.csv");
-        if !points_file.exists() {
-            let mut header = Vec::new();
-            record::write_passes(&[], &mut header).into_diagnostic()?;
-            write_whole(&points_file, &header)?;
+        let sessions = sessions_in(path)?;
+        let open = |name: &str| {
+            let file = Placed::open(&path.join(name), OpenOptions::new().read(true).append(true))?;
+            let bytes = fs::read(path.join(name)).into_diagnostic().wrap_err_with(|| name.to_string())?;
+            Ok::<_, miette::Report>((file, bytes))
+        };
+        let (mut points, table) = open(POINTS)?;
+        if !table.starts_with(&header) {
+            miette::bail!(
+                help = "give another --out: this table can be read, but not gone on with",
+                "{}: the columns of {POINTS} are those of another version",
+                path.display()
+            );
         }
-        let mut points = OpenOptions::new()
-            .read(true)
-            .append(true)
-            .open(&points_file)
-            .into_diagnostic()
-            .wrap_err("points.csv")?;
-        drop_torn_line(&mut points)?;
-        points.seek(SeekFrom::Start(0)).into_diagnostic()?;
-        let made =
-            record::read_passes(&points).into_diagnostic().wrap_err("points.csv of an earlier session")?;
-        let mut journal = OpenOptions::new()
-            .create(true)
-            .read(true)
-            .append(true)
-            .open(path.join("passes.jsonl"))
-            .into_diagnostic()?;
-        drop_torn_line(&mut journal)?;
-        Ok(RunDir { path: path.to_path_buf(), points, journal, _lock: lock, made })
+        let (made, whole) = whole_table(&table).wrap_err("points.csv of an earlier session")?;
+        cut_torn(&mut points, whole, table.len(), POINTS)?;
+        let (mut journal, lines) = open(JOURNAL)?;
+        let (_, whole) = whole_passes(&lines).wrap_err(JOURNAL)?;
+        cut_torn(&mut journal, whole, lines.len(), JOURNAL)?;
+        let path = path.to_path_buf();
+        Ok(RunDir { path, points, journal, _lock: lock, made, sessions, planned: None, failed: false, new })
+    }
+
+    /// Keeps the folder, whatever comes.
+    pub fn stay(&mut self) {
+        self.new.begun = true;
+    }
+
+    /// Plans the session that comes now. In wall-clock time the run's time has gone on since its first session began; in virtual
+    /// time (`fast`) it goes on where the last pass that was kept had ended, `pass_s` after its `time_s`.
+    pub fn plan_session(&mut self, now_unix_ns: u64, pass_s: f64, fast: bool) -> Session {
+        let session = 1 + self.sessions.iter().map(|s| s.session).max().unwrap_or(0);
+        // A clock that was set back meanwhile does not put a pass before one that was made.
+        let measured = self.made.iter().map(|p| p.time_s + pass_s).fold(0.0, f64::max);
+        let passed = self.sessions.first().map_or(0, |first| now_unix_ns.saturating_sub(first.start_unix_ns));
+        let start_s = if fast { measured } else { measured.max(passed as f64 * 1e-9) };
+        let session = Session { session, start_unix_ns: now_unix_ns, start_s };
+        self.planned = Some(session);
+        session
+    }
+
+    /// Begins the session that was planned: from here on the folder stays, whatever comes.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn begin(&mut self) -> miette::Result<()> {
+        self.sessions.extend(self.planned.take());
+        let mut text = Vec::new();
+        for session in &self.sessions {
+            serde_json::to_writer(&mut text, session).into_diagnostic()?;
+            text.push(b'\n');
+        }
+        self.stay();
+        write_whole(&self.path.join(SESSIONS), &text)
     }
 
     /// The folder.
@@ -118,20 +206,14 @@ impl RunDir {
         points.into_iter().filter(|p| !made(p)).collect()
     }
 
-    /// A new record file: `run-1.mcap`, then one for every time the run is taken up again.
+    /// The record file of the session that has begun.
     ///
     /// # Errors
     /// Whatever the file system says.
-    pub fn new_record(&self) -> miette::Result<File> {
-        let number = self.records()?.len() + 1;
+    pub fn new_record(&self) -> miette::Result<Placed> {
+        let number = self.sessions.last().map_or(1, |s| s.session);
         let path = self.path.join(format!("run-{number}.mcap"));
-        OpenOptions::new()
-            .create_new(true)
-            .read(true)
-            .write(true)
-            .open(&path)
-            .into_diagnostic()
-            .wrap_err_with(|| path.display().to_string())
+        Placed::open(&path, OpenOptions::new().create_new(true).read(true).write(true))
     }
 
     /// The record files, oldest first.
@@ -145,18 +227,27 @@ impl RunDir {
     /// Puts a pass into the point table and the journal, synced: after this it is never lost.
     ///
     /// # Errors
-    /// Whatever the file system says; the sweep must stop then.
+    /// Whatever the file system says, or a file that was removed meanwhile; the sweep must stop then.
     pub fn keep(&mut self, measured: &MeasuredPass) -> miette::Result<()> {
+        if self.failed {
+            miette::bail!("point {} is not kept: an earlier pass could not be", measured.pass.point);
+        }
+        let kept = self.append(measured);
+        self.failed = kept.is_err();
+        kept
+    }
+
+    fn append(&mut self, measured: &MeasuredPass) -> miette::Result<()> {
         let mut table = Vec::new();
         record::write_passes(std::slice::from_ref(&measured.pass), &mut table).into_diagnostic()?;
         let header = table.iter().position(|b| *b == b'\n').map_or(0, |i| i + 1);
         let mut line = serde_json::to_vec(measured).into_diagnostic()?;
         line.push(b'\n');
         // The journal first: a pass that is in the table is in the journal too.
-        self.journal.write_all(&line).into_diagnostic().wrap_err("passes.jsonl")?;
-        self.journal.sync_data().into_diagnostic().wrap_err("passes.jsonl")?;
-        self.points.write_all(&table[header..]).into_diagnostic().wrap_err("points.csv")?;
-        self.points.sync_data().into_diagnostic().wrap_err("points.csv")
+        self.journal.write_all(&line).into_diagnostic().wrap_err(JOURNAL)?;
+        self.journal.sync()?;
+        self.points.write_all(&table[header..]).into_diagnostic().wrap_err(POINTS)?;
+        self.points.sync()
     }
 
     /// Writes a file of the run whole or not at all.
@@ -183,100 +274,72 @@ pub fn records_in(path: &Path) -> miette::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
+/// The sessions of a run's folder, oldest first; none where the first has not begun.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn sessions_in(path: &Path) -> miette::Result<Vec<Session>> {
+    let file = path.join(SESSIONS);
+    if !file.exists() {
+        return Ok(Vec::new());
+    }
+    let read = |(i, line): (usize, &str)| {
+        serde_json::from_str(line).map_err(|e| miette::miette!("{}: line {}: {e}", file.display(), i + 1))
+    };
+    crate::input::text_of(&file)?.lines().enumerate().map(read).collect()
+}
+
 /// The passes of a run with their comparisons, each point once: a pass whose table line was lost with a power cut is
 /// not counted, one that was journalled twice counts once.
 ///
 /// # Errors
-/// A folder that holds no run, or a journal that cannot be read.
+/// A folder that holds no run, or a table or journal that is damaged.
 pub fn passes_in(path: &Path) -> miette::Result<Vec<MeasuredPass>> {
-    let table = path.join("points.csv");
-    let file = File::open(&table).into_diagnostic().wrap_err_with(|| table.display().to_string())?;
-    let kept = record::read_passes(file).into_diagnostic().wrap_err_with(|| table.display().to_string())?;
-    let journal = path.join("passes.jsonl");
-    let file = File::open(&journal).into_diagnostic().wrap_err_with(|| journal.display().to_string())?;
+    let read = |name: &str| {
+        let file = path.join(name);
+        fs::read(&file).into_diagnostic().wrap_err_with(|| file.display().to_string())
+    };
+    let (kept, _) = whole_table(&read(POINTS)?).wrap_err_with(|| path.join(POINTS).display().to_string())?;
+    let (journal, _) =
+        whole_passes(&read(JOURNAL)?).wrap_err_with(|| path.join(JOURNAL).display().to_string())?;
     let mut passes: Vec<MeasuredPass> = Vec::new();
-    for (i, line) in BufReader::new(file).lines().enumerate() {
-        let line = line.into_diagnostic()?;
-        let pass: MeasuredPass = serde_json::from_str(&line)
-            .map_err(|e| miette::miette!("{}: line {}: {e}", journal.display(), i + 1))?;
+    for pass in journal {
         let in_table = kept.iter().any(|k| k.point == pass.pass.point);
         passes.retain(|p| p.pass.point != pass.pass.point);
         if in_table {
             passes.push(pass);
         }
     }
-    Ok(passes)
-}
-
-/// Writes a file beside its place, syncs it and moves it there.
-fn write_whole(path: &Path, bytes: &[u8]) -> miette::Result<()> {
-    let shown = || path.display().to_string();
-    let beside = path.with_extension("part");
-    let mut file = File::create(&beside).into_diagnostic().wrap_err_with(shown)?;
-    file.write_all(bytes).into_diagnostic().wrap_err_with(shown)?;
-    file.sync_all().into_diagnostic().wrap_err_with(shown)?;
-    fs::rename(&beside, path).into_diagnostic().wrap_err_with(shown)
-}
-
-/// A power cut may leave half a line at the end: it was never acknowledged and is dropped.
-fn drop_torn_line(file: &mut File) -> miette::Result<()> {
-    file.seek(SeekFrom::Start(0)).into_diagnostic()?;
-    let mut whole = 0u64;
-    let mut reader = BufReader::new(&*file);
-    let mut line = Vec::new();
-    loop {
-        line.clear();
-        let n = reader.read_until(b'\n', &mut line).into_diagnostic()?;
-        if n == 0 {
-            return Ok(());
-        }
-        if line.last() != Some(&b'\n') {
-            break;
-        }
-        whole += n as u64;
-    }
-    file.set_len(whole).into_diagnostic()
-}
-
-/// Takes a lock: the file stays, named after its present holder, and is locked as long as the answer lives.
-///
-/// # Errors
-/// A living process holds it, or the file system refuses.
-pub fn claim(lock: &Path) -> miette::Result<File> {
-    let shown = lock.display();
-    let wrong = |e: std::io::Error| miette::miette!("{shown}: {e}");
-    let mut file =
-        OpenOptions::new().create(true).read(true).write(true).truncate(false).open(lock).map_err(wrong)?;
-    match file.try_lock() {
-        Ok(()) => {
-            file.set_len(0).map_err(wrong)?;
-            write!(file, "{}", std::process::id()).map_err(wrong)?;
-            Ok(file)
-        }
-        Err(TryLockError::WouldBlock) => {
-            let holder = fs::read_to_string(lock).unwrap_or_default();
-            Err(miette::miette!(
-                help = "wait until it ends, or end it",
-                "another muprime (process {}) holds {shown}",
-                holder.trim()
-            ))
-        }
-        Err(TryLockError::Error(e)) => Err(wrong(e)),
+    let lost = kept.iter().find(|k| passes.iter().all(|p| p.pass.point != k.point));
+    match lost {
+        None => Ok(passes),
+        Some(k) => miette::bail!(
+            "{}: point {} is in {POINTS} and not in {JOURNAL}: one of them is damaged",
+            path.display(),
+            k.point
+        ),
     }
 }
 
-/// Whether a process holds the lock of a run's folder.
-pub fn is_held(run: &Path) -> bool {
-    let Ok(file) = File::open(run.join(LOCK)) else { return false };
-    matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
+/// A power cut may leave part of a line at the end: it was never acknowledged and is cut off.
+fn cut_torn(file: &mut Placed, whole: usize, length: usize, name: &str) -> miette::Result<()> {
+    if whole == length {
+        return Ok(());
+    }
+    tracing::warn!("{name}: the last line is torn and is left out; its pass was not acknowledged");
+    let file = file.file();
+    file.set_len(whole as u64)
+        .and_then(|()| file.sync_all())
+        .into_diagnostic()
+        .wrap_err_with(|| name.to_string())
 }
 
 /// Whether a folder holds more than what a session leaves that died before it wrote its identity.
 fn holds_something(path: &Path) -> miette::Result<bool> {
-    let part = Path::new(IDENTITY).with_extension("part");
+    let part = files::beside(Path::new(IDENTITY));
     for entry in fs::read_dir(path).into_diagnostic()? {
         let name = entry.into_diagnostic()?.file_name();
-        if name != LOCK && name != part.as_os_str() {
+        if name != lock::NAME && name != part.as_os_str() {
             return Ok(true);
         }
     }

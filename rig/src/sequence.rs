@@ -8,16 +8,17 @@
 
 use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
 use crate::plan::{PassTimes, Point};
-use models::condition::Condition;
+use models::condition::{Ambient, Condition};
 use models::prediction::{FrictionModel, Regime};
 use models::psi::PsiEq17;
 use models::quantity::PeakToPeak;
 use models::record::Pass;
-use realtime::compare::{Comparator, PassComparison, PassNoise};
+use models::rig_file::PassNoise;
+use realtime::compare::{Agreement, Comparator, PassComparison};
 use realtime::cycle::{Command, Marker, Phase};
 use realtime::estimate::Moments;
 use realtime::ports::{Nanos, NoData};
-use realtime::safety::{Cause, Request, Trip};
+use realtime::safety::{Cause, Limits, Request, Trip};
 use realtime::turn::Row;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -46,6 +47,11 @@ pub struct MeasuredPass {
 pub enum Event {
     /// The rig was armed.
     Armed,
+    /// It was armed without a second switch-off channel: what the amplifier refuses, nothing else switches off.
+    NoSecondChannel,
+    /// It was armed with an amplifier that has no watchdog of its own: if this program dies, the second channel is what
+    /// switches off.
+    NoWatchdog,
     /// Force zeros, lifted off, in N: mean of each axis. They are recorded, never taken off silently.
     Zeros {
         /// Lateral.
@@ -128,7 +134,7 @@ pub struct Reaction {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
-    Arm { since: Option<Nanos>, asked: Option<Nanos> },
+    Arm { since: Option<Nanos>, clear_since: Option<Nanos>, asked: Option<Nanos>, asks: u32 },
     Zero { since: Option<Nanos>, after: bool },
     Approach { since: Nanos },
     Settle { since: Nanos },
@@ -138,8 +144,12 @@ enum Stage {
 
 /// Time to wait for the rig to arm.
 const ARM_WITHIN: Nanos = Nanos(10_000_000_000);
-/// Time between two reset edges.
-const ASK_EVERY: Nanos = Nanos(50_000_000);
+/// Nothing may have stood in the way for this long before a reset is asked for.
+const CLEAR_FOR: Nanos = Nanos(50_000_000);
+/// A reset that found something in its way is asked for again, so often in all. Each waits until nothing stands in the way.
+const ASKS: u32 = 3;
+/// Time that the loop has to answer a reset.
+const ANSWER_WITHIN: Nanos = Nanos(200_000_000);
 /// Length of a zero reading.
 const ZERO_FOR: Nanos = Nanos(200_000_000);
 /// Time that a plate may ring on after the zero began: left out of the zero.
@@ -174,10 +184,18 @@ pub struct Sequence {
     comparator: Comparator,
     stopping: bool,
     departed: bool,
+    /// Of the last pass that could be compared, of earlier sessions too.
+    last_comparison: Option<PassComparison>,
     started: bool,
     poisson_ratio: f64,
     temperature_ranges: Vec<TemperatureRange>,
     temperature_flags: Vec<TemperatureFlag>,
+    /// What the setup states of the air, and what the loop was last told of it.
+    ambient: Ambient,
+    ambient_sent: Ambient,
+    has_watchdog: bool,
+    session: Option<u64>,
+    start_s: f64,
 }
 
 impl Sequence {
@@ -194,18 +212,34 @@ impl Sequence {
             points,
             next: 0,
             times,
-            stage: Stage::Arm { since: None, asked: None },
+            stage: Stage::Arm { since: None, clear_since: None, asked: None, asks: 0 },
             sums: Sums::default(),
             tries: 0,
             model,
             comparator,
             stopping: false,
             departed: false,
+            last_comparison: None,
             started: false,
             poisson_ratio: tip.finger.poisson_ratio,
             temperature_ranges: Vec::new(),
             temperature_flags: Vec::new(),
+            ambient: Ambient::default(),
+            ambient_sent: Ambient::default(),
+            has_watchdog: true,
+            session: None,
+            start_s: 0.0,
         }
+    }
+
+    /// The same in air of which the setup states this; what a plan or a channel says of it goes first.
+    pub fn in_air(self, ambient: Ambient) -> Self {
+        Sequence { ambient, ..self }
+    }
+
+    /// The same, as a session of a run that had begun `start_s` before the loop's time zero, in s: passes tell the run's time.
+    pub fn in_session(self, session: u64, start_s: f64) -> Self {
+        Sequence { session: Some(session), start_s, ..self }
     }
 
     /// The same, with certificates that are held against the amplifier's temperature at the start of each pass.
@@ -213,12 +247,19 @@ impl Sequence {
         Sequence { temperature_ranges: temperature_ranges.to_vec(), ..self }
     }
 
+    /// The same, with the limits of the rig that is armed: what guards are missing is told then.
+    pub fn guarded_by(self, limits: &Limits) -> Self {
+        Sequence { has_watchdog: limits.amplifier_watchdog, ..self }
+    }
+
     /// Takes in a pass of an earlier session of the same run: `mu_0` and the evidence go on from there.
     pub fn remember(&mut self, pass: &Pass) {
         if let Some(friction) = pass.friction_force_n() {
-            let condition = pass.condition(1.0);
+            let condition = pass.condition(1.0).within(&self.ambient);
             // A condition outside the model's domain has no comparison, now as then.
-            let _ = self.comparator.pass(&*self.model, &condition, friction);
+            if let Ok(comparison) = self.comparator.pass(&*self.model, &condition, friction) {
+                self.last_comparison = Some(comparison);
+            }
             self.departed = self.comparator.departed();
         }
     }
@@ -244,6 +285,11 @@ impl Sequence {
         self.departed
     }
 
+    /// What the comparison says, for a sweep that came to its end or did not.
+    pub fn agreement(&self, complete: bool) -> Agreement {
+        Agreement::of(self.last_comparison.as_ref(), complete)
+    }
+
     /// Takes a row.
     pub fn on_row(&mut self, row: &Row) -> Reaction {
         let mut out = Reaction::default();
@@ -266,7 +312,7 @@ impl Sequence {
             return out;
         }
         match self.stage {
-            Stage::Arm { since, asked } => self.arm(row, since, asked, &mut out),
+            Stage::Arm { .. } => self.arm(row, &mut out),
             Stage::Zero { since, after } => self.zero(row, since, after, &mut out),
             Stage::Approach { since } => self.approach(row, since, &mut out),
             Stage::Settle { since } => self.settle(row, since, &mut out),
@@ -281,31 +327,45 @@ impl Sequence {
         out.outcome = Some(outcome);
     }
 
-    fn arm(&mut self, row: &Row, since: Option<Nanos>, asked: Option<Nanos>, out: &mut Reaction) {
+    /// Arming is one act: a reset once nothing stands in the way, and the proof of the second channel after it.
+    fn arm(&mut self, row: &Row, out: &mut Reaction) {
+        let Stage::Arm { since, clear_since, asked, asks } = self.stage else { return };
         let since = since.unwrap_or(row.now);
         if row.armed {
-            out.events.push(Event::Armed);
-            if row.inputs.seen.amplifier.is_ok_and(|a| a.temperature_c == Err(NoData::NotFitted)) {
-                let certificates = self.temperature_ranges.iter().map(|range| range.certificate.clone());
-                out.events
-                    .extend(certificates.map(|certificate| Event::TemperatureUnwatched { certificate }));
-            }
-            out.commands.push(Command::Set(Request::default(), self.marker(Phase::Zero)));
-            self.stage = Stage::Zero { since: None, after: false };
+            self.armed(row, out);
             return;
         }
         if row.now.since(since) > ARM_WITHIN {
             self.finish(out, Outcome::WouldNotArm { blocking: row.blocking });
             return;
         }
-        let ask = asked.is_none_or(|at| row.now.since(at) >= ASK_EVERY);
-        // A few cycles first, so that every channel has spoken.
-        if ask && row.now.since(since) >= ASK_EVERY {
+        let clear_since = if row.blocking.is_none() { clear_since.or(Some(row.now)) } else { None };
+        let clear = clear_since.is_some_and(|at| row.now.since(at) >= CLEAR_FOR);
+        let unanswered = asked.is_none_or(|at| row.now.since(at) > ANSWER_WITHIN) && !row.proving;
+        let ask = clear && unanswered && asks < ASKS;
+        if ask {
             out.commands.push(Command::Reset);
-            self.stage = Stage::Arm { since: Some(since), asked: Some(row.now) };
-        } else {
-            self.stage = Stage::Arm { since: Some(since), asked };
         }
+        let asked = if ask { Some(row.now) } else { asked };
+        self.stage = Stage::Arm { since: Some(since), clear_since, asked, asks: asks + u32::from(ask) };
+    }
+
+    /// Armed: says what guards are missing, and reads the zeros.
+    fn armed(&mut self, row: &Row, out: &mut Reaction) {
+        let seen = &row.inputs.seen;
+        out.events.push(Event::Armed);
+        if seen.supply == Err(NoData::NotFitted) {
+            out.events.push(Event::NoSecondChannel);
+        }
+        if !self.has_watchdog {
+            out.events.push(Event::NoWatchdog);
+        }
+        if seen.amplifier.is_ok_and(|a| a.temperature_c == Err(NoData::NotFitted)) {
+            let certificates = self.temperature_ranges.iter().map(|range| range.certificate.clone());
+            out.events.extend(certificates.map(|certificate| Event::TemperatureUnwatched { certificate }));
+        }
+        out.commands.push(Command::Set(Request::default(), self.marker(Phase::Zero)));
+        self.stage = Stage::Zero { since: None, after: false };
     }
 
     fn zero(&mut self, row: &Row, since: Option<Nanos>, after: bool, out: &mut Reaction) {
@@ -347,6 +407,11 @@ impl Sequence {
             return;
         }
         self.sums = Sums::default();
+        let ambient = Ambient::of(&self.points[self.next].condition.within(&self.ambient));
+        if ambient != self.ambient_sent {
+            self.ambient_sent = ambient;
+            out.commands.push(Command::Ambient(ambient));
+        }
         self.stage = Stage::Approach { since: row.now };
         self.approach(row, row.now, out);
     }
@@ -492,23 +557,27 @@ impl Sequence {
             speed_m_s: sums.speed.mean().unwrap_or(point.condition.speed_m_s),
             position_m: sums.position.mean().unwrap_or(point.condition.position_m),
             normal_force_n: normal,
-            time_s: since.seconds(),
-            ..point.condition
+            time_s: self.start_s + since.seconds(),
+            ..point.condition.within(&self.ambient)
         };
         Pass {
             normal_force_sd_n: sums.normal.sd(),
             lateral_force_sd_n: sums.lateral.sd(),
             samples: Some(sums.lateral.count()),
+            // The channel's, or none: two thermometers in one column would look like a change.
             temperature_c: sums.temperature.mean(),
             replicate: Some(u64::from(point.replicate)),
+            session: self.session,
             ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
         }
     }
 
     fn compare(&mut self, pass: Pass, reference: bool) -> MeasuredPass {
-        let condition = pass.condition(self.comparator.mu0().map_or(1.0, |m| m.value));
+        let mu0 = self.comparator.mu0().map_or(1.0, |m| m.value);
+        let condition = pass.condition(mu0).within(&self.ambient);
         let comparison =
             pass.friction_force_n().and_then(|f| self.comparator.pass(&*self.model, &condition, f).ok());
+        self.last_comparison = comparison.or(self.last_comparison);
         let regime = self.model.predict(&condition).ok().map(|p| p.regime);
         let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
         let psi_eq17 =

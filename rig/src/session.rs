@@ -7,24 +7,25 @@ mod fast;
 mod keeper;
 mod live;
 
-pub use live::RigClaim;
-
 pub use fast::{Rehearsal, rehearse};
-pub use keeper::{REPLAYABLE, Replayable};
+pub use keeper::{REPLAYABLE, Replayable, unix_ns};
 
 use crate::plan::{Plan, Point, Resolution};
 use crate::run_dir::{Identity, RunDir};
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use crate::setup::Setup;
+use crate::supervisor::OffReport;
+use calibration::certificate::sha256_hex;
+use keeper::Keeper;
 use models::prediction::FrictionModel;
+use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
 use realtime::witness::StallReport;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::AtomicUsize;
 
 /// What is to be run.
 pub struct Job {
@@ -70,6 +71,9 @@ pub struct Summary {
     pub planned: usize,
     /// Whether the model has left the measurement.
     pub model_departed: bool,
+    /// What the comparison of all passes says.
+    #[serde(default = "nothing_said")]
+    pub agreement: Agreement,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
     /// When the machine kept ordinary threads from running; `None` in virtual time.
@@ -79,11 +83,22 @@ pub struct Summary {
     pub record_lost: u64,
     /// What the links counted, by instrument.
     pub links: BTreeMap<String, serde_json::Value>,
+    /// Whether the rig was read back off in the end.
+    #[serde(default)]
+    pub off: OffReport,
+    /// Every pass had been made before: nothing was driven.
+    #[serde(default)]
+    pub finished_before: bool,
+}
+
+/// The finding of a summary that was written before it had one.
+fn nothing_said() -> Agreement {
+    Agreement::of(None, false)
 }
 
 /// Why a run that had begun did not come to an orderly end. Anything else that goes wrong is a refusal: it comes before
 /// the rig or the folder of the run is touched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error, miette::Diagnostic)]
 pub enum Unfinished {
     /// The sweep ran, and its record could not be kept.
     #[error("the sweep had begun, and what came of it could not be kept")]
@@ -91,30 +106,31 @@ pub enum Unfinished {
     /// A thread hangs or has panicked: a fault of this program.
     #[error("the sweep had begun; the instruments' own watchdogs switch off; what was measured is kept")]
     Internal,
+    /// A signal ended it.
+    #[error("stopped by a signal")]
+    Interrupted,
+    /// The drive was not read back off.
+    #[error("the output may still be on: switch the supply off")]
+    NotOff,
 }
 
-/// Signals that a run looks at: how often a stop was asked for, and whether to leave at once.
+/// Signals that a run looks at: how often a stop was asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Signals {
     /// SIGINT, SIGTERM or SIGHUP so far.
     pub stops: Arc<AtomicUsize>,
-    /// For tests: pretend the process dies.
-    pub abandon: Arc<AtomicBool>,
-}
-
-/// Hex SHA-256 of a text.
-pub fn sha256(text: &str) -> String {
-    Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect()
 }
 
 impl Job {
     /// What the run is of.
     pub fn identity(&self) -> Identity {
-        let model =
-            self.model_file.as_ref().map_or_else(|| self.model.name().to_string(), |(_, text)| sha256(text));
+        let model = self
+            .model_file
+            .as_ref()
+            .map_or_else(|| self.model.name().to_string(), |(_, text)| sha256_hex(text.as_bytes()));
         Identity {
-            setup_sha256: sha256(&self.setup.text),
-            plan_sha256: sha256(&self.plan.text),
+            setup_sha256: sha256_hex(self.setup.text.as_bytes()),
+            plan_sha256: sha256_hex(self.plan.text.as_bytes()),
             seed: self.seed,
             model,
         }
@@ -155,8 +171,9 @@ impl Job {
     pub fn run(self, signals: &Signals, news: &mut dyn FnMut(News<'_>)) -> miette::Result<Summary> {
         let points = self.points()?;
         let planned = points.len();
-        let dir = RunDir::open(&self.out, &self.identity())?;
+        let mut dir = RunDir::open(&self.out, &self.identity())?;
         let left = dir.left_of(points);
+        let session = dir.plan_session(keeper::unix_ns(), self.plan.file.pass.measure_s, self.fast);
         let mut sequence = Sequence::new(
             left,
             self.plan.file.pass,
@@ -164,12 +181,19 @@ impl Job {
             &self.setup.tip,
             self.setup.file.noise,
         )
-        .watching(&self.setup.certificates.temperature_ranges);
+        .watching(&self.setup.certificates.temperature_ranges)
+        .in_air(self.setup.ambient())
+        .guarded_by(&self.setup.config.limits)
+        // In virtual time the loop's own time goes on from session to session.
+        .in_session(session.session, if self.fast { 0.0 } else { session.start_s });
         for pass in &dir.made {
             sequence.remember(pass);
         }
+        if sequence.progress().1 == 0 {
+            return Keeper::finish(&self, dir, planned, sequence.agreement(true));
+        }
         if self.fast {
-            fast::run(self, dir, sequence, planned, signals, news)
+            fast::run(self, dir, session.start_s, sequence, planned, signals, news)
         } else {
             live::run(self, dir, sequence, planned, signals, news)
         }
@@ -192,6 +216,11 @@ impl Job {
         config.finger.normal_stiffness_n_per_m = finger.normal_stiffness_n_per_m;
         config.finger.lateral_stiffness_n_per_m = finger.lateral_stiffness_n_per_m;
         config.finger.stiffness_relative_sd = 0.0;
-        sim::world::World::new(&config, self.seed).map_err(wrong)
+        let mut world = sim::world::World::new(&config, self.seed).map_err(wrong)?;
+        if virtual_rig.hand_holds {
+            let holds_dead_man_from = Some(realtime::ports::Nanos(200_000_000));
+            world.set_operator(sim::world::Operator { holds_dead_man_from, ..world.operator() });
+        }
+        Ok(world)
     }
 }

@@ -1,6 +1,7 @@
 //! A setup: which instruments make up the rig, its limits, its fingertip, its noise.
 
 mod bundled;
+mod limits;
 
 use crate::certificates::Certificates;
 use crate::fingertip::{Fingertip, FingertipSetup};
@@ -8,17 +9,18 @@ use crate::input::{self, BadInput};
 use crate::plan::LateralChannel;
 use drivers::vibrometer::{Settings, VibrometerSetup};
 use drivers::{InstrumentSetup, InstrumentsSetup};
-use miette::IntoDiagnostic;
-use models::quantity::PeakToPeak;
-use realtime::compare::PassNoise;
+use models::condition::Ambient;
+use models::covariate;
+use models::rig_file::{PassNoise, RigFile, RigFileError};
 use realtime::cycle::Config;
 use realtime::estimate::EstimateConfig;
+use realtime::pacing::Pacing;
 use realtime::ports::Nanos;
-use realtime::safety::{ChannelTiming, LimitError, Limits};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 pub use bundled::{BUNDLED, text as bundled_text};
+pub use limits::LimitsFile;
 
 /// A setup file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -35,6 +37,13 @@ pub struct SetupFile {
     pub amplifier: InstrumentSetup,
     /// The stage.
     pub stage: InstrumentSetup,
+    /// The second switch-off channel: an output that cuts the amplifier's supply, with readback. It is proved before every
+    /// arming. A human finger, and an amplifier without a watchdog of its own, need one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supply_relay: Option<InstrumentSetup>,
+    /// Emergency stop, interlock and dead-man device, as digital inputs. A human finger needs the first and the last.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub safety_inputs: Option<InstrumentSetup>,
     /// The vibrometer's controller, whose settings calibrations read back; it takes no part in a run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vibrometer: Option<VibrometerSetup>,
@@ -55,12 +64,32 @@ pub struct SetupFile {
     /// temperatures asks for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
+    /// Ambient pressure in Pa, where a plan does not set it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ambient_pressure_pa: Option<f64>,
+    /// Relative humidity in per cent, as read at the bench.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_humidity_pct: Option<f64>,
+    /// Standard uncertainty of the stage's speed, relative, where an encoder or a timed stroke gives it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed_gain_sd: Option<f64>,
     /// Zero of the force channels in counts, lateral and normal, where it is not the force certificate's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero_counts: Option<[f64; 2]>,
     /// Present: this is a virtual rig, served on its instruments' loopback addresses by `muprime run` itself.
     #[serde(default, rename = "virtual")]
     pub virtual_rig: Option<VirtualRig>,
+}
+
+impl SetupFile {
+    /// What the setup states of the air.
+    fn ambient(&self) -> Ambient {
+        Ambient {
+            ambient_pressure_pa: self.ambient_pressure_pa,
+            temperature_c: self.temperature_c,
+            relative_humidity_pct: self.relative_humidity_pct,
+        }
+    }
 }
 
 /// Pace of the loop.
@@ -71,11 +100,30 @@ pub struct Pace {
     pub rate_hz: f64,
     /// SCHED_FIFO priority to ask for, 1 to 98; 0 asks for none.
     pub priority: i32,
+    /// CPU to run on and no other: for one that is kept free of other work.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cpu: Option<usize>,
+    /// Keeps CPUs out of deep sleep while the loop runs, for some watts.
+    pub keep_cpus_awake: bool,
+    /// us before each deadline that are spun, not slept; at 1 kHz 100 us cost a tenth of a CPU.
+    pub spin_us: f64,
 }
 
 impl Default for Pace {
     fn default() -> Self {
-        Pace { rate_hz: 1000.0, priority: 80 }
+        Pace { rate_hz: 1000.0, priority: 80, cpu: None, keep_cpus_awake: false, spin_us: 0.0 }
+    }
+}
+
+impl Pace {
+    /// What the loop's thread is to ask of the machine.
+    pub fn pacing(&self) -> Pacing {
+        Pacing {
+            priority: (self.priority > 0).then_some(self.priority),
+            cpu: self.cpu,
+            keep_cpus_awake: self.keep_cpus_awake,
+            spin_ns: (self.spin_us * 1e3) as u64,
+        }
     }
 }
 
@@ -87,52 +135,9 @@ pub struct VirtualRig {
     pub ideal: bool,
     /// Seed of the finger's true stiffnesses about those that the setup states.
     pub finger_seed: u64,
-}
-
-/// Soft limits as a setup states them.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LimitsFile {
-    /// N.
-    pub normal_force_max_n: Option<f64>,
-    /// N.
-    pub lateral_force_max_n: Option<f64>,
-    /// N between two samples.
-    pub force_step_max_n: Option<f64>,
-    /// N/s.
-    pub force_rate_max_n_s: Option<f64>,
-    /// m, peak-to-peak.
-    pub amplitude_max_pp_m: Option<f64>,
-    /// m/s.
-    pub amplitude_rate_max_m_s: Option<f64>,
-    /// Hz.
-    pub frequency_min_hz: Option<f64>,
-    /// Hz.
-    pub frequency_max_hz: Option<f64>,
-    /// m/s.
-    pub speed_max_m_s: Option<f64>,
-    /// m.
-    pub travel_min_m: Option<f64>,
-    /// m.
-    pub travel_max_m: Option<f64>,
-    /// Degrees Celsius.
-    pub temperature_max_c: Option<f64>,
-    /// Whether a temperature is read.
-    pub temperature_fitted: Option<bool>,
-    /// Equal raw samples in a row.
-    pub frozen_after: Option<u32>,
-    /// A human finger is in the rig.
-    pub human_contact: Option<bool>,
-    /// s.
-    pub exposure_max_s: Option<f64>,
-    /// s that a link's thread may be held up before its channel counts as stale, beyond three of its periods.
-    pub link_stall_s: Option<f64>,
-    /// Late cycles among a thousand.
-    pub late_cycles_max: Option<u32>,
-    /// Late cycles in a row that are one too many.
-    pub late_in_a_row_max: Option<u32>,
-    /// s, `Q / (pi f)` of the plate.
-    pub plate_ring_time_s: Option<f64>,
+    /// A hand grips the virtual dead-man device a fifth of a second after the start, and holds it: for trials with a human
+    /// finger that is none.
+    pub hand_holds: bool,
 }
 
 const fn default_estimate() -> EstimateConfig {
@@ -191,6 +196,11 @@ impl Setup {
         if !(0..=98).contains(&file.pace.priority) {
             return Err(bad(&["loop", "priority"], "a priority is 0 (none) to 98".into()).into());
         }
+        let half_period_us = 0.5e6 / file.pace.rate_hz;
+        if !(0.0..=half_period_us).contains(&file.pace.spin_us) {
+            let problem = format!("spin_us = {}: 0 to {half_period_us} (half a period)", file.pace.spin_us);
+            return Err(bad(&["loop", "spin_us"], problem).into());
+        }
         if !(1..=realtime::estimate::WINDOW_MAX).contains(&file.estimate.window) {
             let most = realtime::estimate::WINDOW_MAX;
             return Err(bad(&["estimate", "window"], format!("a window has 1 to {most} samples")).into());
@@ -206,21 +216,52 @@ impl Setup {
                 .into());
             }
         }
+        let air = models::condition::Condition::paper().within(&file.ambient());
+        for c in covariate::OPTIONAL {
+            if let Some(value) = c.of(&air).filter(|v| !c.admits(*v)) {
+                return Err(bad(&[c.name], format!("{} = {value}: {} is needed", c.name, c.needed)).into());
+            }
+        }
         let tip = Fingertip::resolve(&file.finger, folder).map_err(|p| bad(&["finger"], p))?;
         let cycle = Nanos((1e9 / file.pace.rate_hz).round() as u64);
-        let limits = limits(&file, cycle).map_err(|error| {
-            let name = match error {
-                LimitError::AboveHard { name, .. } | LimitError::Unusable { name, .. } => name,
-            };
-            bad(&["limits", name], error.to_string())
+        let limits = limits::of(&file, cycle).map_err(|error| {
+            // The rate of a channel stands with its instrument, every other limit under [limits].
+            match error.name() {
+                table @ ("amplifier" | "stage" | "supply_relay" | "safety_inputs") => {
+                    bad(&[table, "rate_hz"], error.to_string())
+                }
+                "force" => bad(&["force"], error.to_string()),
+                name => bad(&["limits", name], error.to_string()),
+            }
         })?;
+        limits::guarded(&file).map_err(|problem| bad(&["limits", "human_contact"], problem))?;
         let config = Config { limits, estimate: file.estimate };
+        #[allow(clippy::disallowed_methods, reason = "a certificate is good until a date")]
         let now_unix_s = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
             .map_or(0, |since| since.as_secs() as i64);
         let certificates =
             Certificates::load(&file, folder, now_unix_s).map_err(|p| bad(&["certificates"], p))?;
-        Ok(Setup { file, text: text.to_string(), origin: origin.to_string(), tip, config, certificates })
+        let setup =
+            Setup { file, text: text.to_string(), origin: origin.to_string(), tip, config, certificates };
+        // What goes beside the point table in the end is known now.
+        if let Err(error) = setup.rig_file().check() {
+            let path: &[&str] = match &error {
+                RigFileError::Value { section: "noise", key, .. } => &["noise", key],
+                RigFileError::Value { section: "calibration", key: "speed_gain_sd", .. } => {
+                    &["speed_gain_sd"]
+                }
+                RigFileError::Value { section: "calibration", .. } => &["certificates"],
+                _ => &["finger"],
+            };
+            return Err(bad(path, error.to_string()).into());
+        }
+        Ok(setup)
+    }
+
+    /// What the setup states of the air.
+    pub fn ambient(&self) -> Ambient {
+        self.file.ambient()
     }
 
     /// The instruments' part, for the drivers.
@@ -229,7 +270,14 @@ impl Setup {
         // A certificate of the drive's current is what the setup would otherwise have to state.
         amplifier.amplitude_m_per_unit =
             self.certificates.amplitude_m_per_unit.or(amplifier.amplitude_m_per_unit);
-        InstrumentsSetup { force: self.file.force.clone(), amplifier, stage: self.file.stage.clone() }
+        let SetupFile { force, stage, supply_relay, safety_inputs, .. } = &self.file;
+        InstrumentsSetup {
+            force: force.clone(),
+            amplifier,
+            stage: stage.clone(),
+            supply_relay: supply_relay.clone(),
+            safety_inputs: safety_inputs.clone(),
+        }
     }
 
     /// The settings of the vibrometer's controller, read back now; they must cover the drive's frequency.
@@ -278,83 +326,12 @@ impl Setup {
         Ok(None)
     }
 
-    /// The `rig.toml` that goes beside a point table (contract).
-    ///
-    /// # Errors
-    /// Only if TOML cannot express a number.
-    pub fn rig_toml(&self) -> miette::Result<String> {
-        #[derive(Serialize)]
-        struct Rig<'a> {
-            finger: &'a models::finger::Finger,
-            noise: &'a PassNoise,
-            calibration: Calibration<'a>,
+    /// What is known of this rig, for the `rig.toml` beside a point table (contract).
+    pub fn rig_file(&self) -> RigFile {
+        RigFile {
+            finger: models::finger::Finger { lateral_recovery_m_per_s: None, ..self.tip.finger },
+            noise: self.file.noise,
+            calibration: self.certificates.calibration.clone(),
         }
-        #[derive(Serialize)]
-        struct Calibration<'a> {
-            #[serde(flatten)]
-            priors: &'a calibration::prior::CalibrationPriors,
-            /// Which certificate says so, by its kind.
-            #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty")]
-            certificates: &'a std::collections::BTreeMap<String, String>,
-        }
-        let calibration =
-            Calibration { priors: &self.certificates.priors, certificates: &self.certificates.names };
-        let finger = models::finger::Finger { lateral_recovery_m_per_s: None, ..self.tip.finger };
-        toml::to_string(&Rig { finger: &finger, noise: &self.file.noise, calibration }).into_diagnostic()
     }
-}
-
-/// How long a link's thread may be held up on a machine that does nothing else, and the longest that a setup may allow.
-const LINK_STALL_S: f64 = 0.02;
-const LINK_STALL_MAX_S: f64 = 0.05;
-
-/// Soft limits over the paper's, timing from the instruments' profiles.
-fn limits(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
-    let l = &file.limits;
-    let mut limits = Limits::paper(cycle);
-    let set = |slot: &mut f64, value: Option<f64>| *slot = value.unwrap_or(*slot);
-    set(&mut limits.normal_force_max_n, l.normal_force_max_n);
-    set(&mut limits.lateral_force_max_n, l.lateral_force_max_n);
-    set(&mut limits.force_step_max_n, l.force_step_max_n);
-    set(&mut limits.force_rate_max_n_s, l.force_rate_max_n_s);
-    set(&mut limits.amplitude_rate_max_m_s, l.amplitude_rate_max_m_s);
-    set(&mut limits.frequency_hz.0, l.frequency_min_hz);
-    set(&mut limits.frequency_hz.1, l.frequency_max_hz);
-    set(&mut limits.speed_max_m_s, l.speed_max_m_s);
-    set(&mut limits.travel_m.0, l.travel_min_m);
-    set(&mut limits.travel_m.1, l.travel_max_m);
-    set(&mut limits.temperature_max_c, l.temperature_max_c);
-    set(&mut limits.exposure_max_s, l.exposure_max_s);
-    limits.amplitude_max = l.amplitude_max_pp_m.map_or(limits.amplitude_max, PeakToPeak::from_metres);
-    limits.temperature_fitted = l.temperature_fitted.unwrap_or(limits.temperature_fitted);
-    limits.frozen_after = l.frozen_after.unwrap_or(limits.frozen_after);
-    limits.late_cycles_max = l.late_cycles_max.unwrap_or(limits.late_cycles_max);
-    limits.late_in_a_row_max = l.late_in_a_row_max.unwrap_or(limits.late_in_a_row_max);
-    limits.human_contact = l.human_contact.unwrap_or(limits.human_contact);
-    limits.timing.ring_time = l.plate_ring_time_s.map_or(limits.timing.ring_time, Nanos::from_seconds);
-    limits.timing.command_expiry = Nanos((2 * cycle.0).max(20_000_000));
-
-    // A channel is stale after a number of its own periods, never of the loop's cycles. On a general-purpose kernel a
-    // link thread may be held up for some milliseconds: the latency allows for that and is stated.
-    let stall = l.link_stall_s.unwrap_or(LINK_STALL_S);
-    if !(0.0..=LINK_STALL_MAX_S).contains(&stall) {
-        let needed = "from 0 to 0.05: an amplifier's own watchdog waits no longer";
-        return Err(LimitError::Unusable { name: "link_stall_s", value: stall, needed });
-    }
-    let stall = Nanos::from_seconds(stall);
-    let timing = |instrument: &InstrumentSetup| -> ChannelTiming {
-        let rate =
-            instrument.rate_hz.or_else(|| drivers::nominal_rate_hz(&instrument.profile)).unwrap_or(100.0);
-        let period = Nanos((1e9 / rate) as u64).0.max(cycle.0);
-        ChannelTiming { period: Nanos(period), latency: stall, periods: 3 }
-    };
-    if let (Some(first), Some(last)) = (file.force.first(), file.force.last()) {
-        let normal_first = file.force.len() == 2 && first.normal.is_some() && first.lateral.is_none();
-        let (lateral, normal) = if normal_first { (last, first) } else { (first, last) };
-        limits.timing.lateral = timing(lateral);
-        limits.timing.normal = timing(normal);
-    }
-    limits.timing.amplifier = timing(&file.amplifier);
-    limits.timing.stage = timing(&file.stage);
-    limits.checked()
 }

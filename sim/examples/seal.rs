@@ -2,6 +2,7 @@
 //!
 //! `FOLDER/open/SEED/` holds what a diagnoser may read, `FOLDER/sealed/SEED/` what only the scorer may. The stratum is
 //! drawn from the seed unless one is named: none, single, pair, alias, outside.
+#![allow(clippy::disallowed_methods, reason = "it says how long it took")]
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -34,6 +34,8 @@ pub struct AmplifierConfig {
     pub warming_ratio: f64,
     /// Fault: the enable input is ignored once the output is on; only the supply relay stops it.
     pub refuses_off: bool,
+    /// Fault: the contact of the supply relay is welded; it does not open.
+    pub relay_welded: bool,
 }
 
 impl Default for AmplifierConfig {
@@ -50,6 +52,7 @@ impl Default for AmplifierConfig {
             temperature_max_c: 70.0,
             warming_ratio: 1.5,
             refuses_off: false,
+            relay_welded: false,
         }
     }
 }
@@ -161,8 +164,20 @@ impl Amplifier {
 
     /// Opens the supply relay: the output is dead whatever the electronics want.
     pub fn cut_supply(&mut self) {
-        self.supply_closed = false;
-        self.output_on = false;
+        if !self.config.relay_welded {
+            self.supply_closed = false;
+            self.output_on = false;
+        }
+    }
+
+    /// Closes the supply relay: the output stays off until it is commanded on anew.
+    pub fn close_supply(&mut self) {
+        self.supply_closed = true;
+    }
+
+    /// Whether the supply relay is closed, by its mirror contact.
+    pub const fn supply_closed(&self) -> bool {
+        self.supply_closed
     }
 
     /// Closes the supply relay again and clears a fault, by hand at the bench.

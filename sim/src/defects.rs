@@ -111,6 +111,9 @@ pub struct Kind {
     pub in_library: bool,
     /// Whether a table of steady passes can show it.
     pub in_tables: bool,
+    /// Whether another cause of the library does the same by construction (gains of stiffness, speed, amplitude; tilt
+    /// and cross-talk).
+    pub imitated: bool,
     /// What it is, and its source.
     pub summary: &'static str,
     /// Its parameters, the size first; at most four.

@@ -49,10 +49,6 @@ pub enum Stratum {
     Outside,
 }
 
-/// Causes that others imitate by construction (gains of k_l, k_n, speed, amplitude; tilt and cross-talk).
-pub const ALIASES: [&str; 5] =
-    ["stiffness_error", "speed_error", "amplitude_miscalibration", "plate_tilt", "force_crosstalk"];
-
 impl Stratum {
     /// The stratum of a seed: 20 % none, 35 % single, 10 % pairs, 15 % aliases, 20 % outside the library.
     pub fn draw(seed: u64) -> Self {
@@ -72,9 +68,9 @@ impl Stratum {
             .filter(|kind| kind.in_tables)
             .filter(|kind| match self {
                 Stratum::None => false,
-                Stratum::Single => kind.in_library && !ALIASES.contains(&kind.name),
+                Stratum::Single => kind.in_library && !kind.imitated,
                 Stratum::Pair => kind.in_library,
-                Stratum::Alias => ALIASES.contains(&kind.name),
+                Stratum::Alias => kind.imitated,
                 Stratum::Outside => !kind.in_library,
             })
             .collect();
@@ -285,7 +281,7 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
     };
     let set = Set {
         conditions: rig.bench.conditions(&at_hidden, &hidden),
-        rig_toml: rig.bench.rig_toml(),
+        rig_toml: rig.bench.rig_file().to_toml().expect("a sealed set's rig is within every range"),
         recalibrated_n: rig.bench.ideal(&at_hidden, &base.finger),
         sd_n: at_hidden.sd_n,
         passes,

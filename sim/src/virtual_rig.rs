@@ -7,8 +7,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use realtime::ports::{
-    Amplifier, AmplifierState, Channel, ForceSensor, Forces, Nanos, NoData, Quality, Reading, Stage,
-    StageState,
+    Amplifier, AmplifierState, Channel, Contact, Contacts, ForceSensor, Forces, Nanos, NoData, Quality,
+    Reading, SafetyInputs, Stage, StageState, SupplyCommand, SupplyState, SupplySwitch,
 };
 use realtime::safety::{DriveCommand, StageCommand};
 
@@ -109,11 +109,34 @@ impl Amplifier for VirtualRig {
             sequence: status.sequence,
         })
     }
+}
 
-    fn cut_supply(&mut self, now: Nanos) -> bool {
+impl SupplySwitch for VirtualRig {
+    fn command(&mut self, command: SupplyCommand, now: Nanos) {
         self.world.advance_to(now);
-        self.world.cut_supply();
-        true
+        match command {
+            SupplyCommand::Cut => self.world.cut_supply(),
+            SupplyCommand::Restore => self.world.close_supply(),
+        }
+    }
+
+    fn state(&mut self, now: Nanos) -> Result<SupplyState, NoData> {
+        self.world.advance_to(now);
+        let taken_at = self.world.now();
+        Ok(SupplyState { cut: !self.world.supply_closed(), taken_at, sequence: taken_at.0 as u32 })
+    }
+}
+
+impl SafetyInputs for VirtualRig {
+    fn read(&mut self, now: Nanos) -> Contacts {
+        self.world.advance_to(now);
+        let (operator, taken_at) = (self.world.operator(), self.world.now());
+        let contact = |closed| Ok(Contact { closed, taken_at, sequence: taken_at.0 as u32 });
+        Contacts {
+            emergency_stop: contact(!operator.presses_emergency_stop),
+            interlock: contact(!operator.opens_guard),
+            dead_man: contact(operator.holds_dead_man_from.is_some_and(|from| taken_at >= from)),
+        }
     }
 }
 
@@ -157,7 +180,7 @@ impl SharedRig {
 
 impl ForceSensor for SharedRig {
     fn read(&mut self, now: Nanos) -> Forces {
-        self.rig().read(now)
+        ForceSensor::read(&mut *self.rig(), now)
     }
 }
 
@@ -169,9 +192,21 @@ impl Amplifier for SharedRig {
     fn state(&mut self, now: Nanos) -> Result<AmplifierState, NoData> {
         Amplifier::state(&mut *self.rig(), now)
     }
+}
 
-    fn cut_supply(&mut self, now: Nanos) -> bool {
-        self.rig().cut_supply(now)
+impl SupplySwitch for SharedRig {
+    fn command(&mut self, command: SupplyCommand, now: Nanos) {
+        SupplySwitch::command(&mut *self.rig(), command, now);
+    }
+
+    fn state(&mut self, now: Nanos) -> Result<SupplyState, NoData> {
+        SupplySwitch::state(&mut *self.rig(), now)
+    }
+}
+
+impl SafetyInputs for SharedRig {
+    fn read(&mut self, now: Nanos) -> Contacts {
+        SafetyInputs::read(&mut *self.rig(), now)
     }
 }
 

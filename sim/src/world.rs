@@ -48,6 +48,24 @@ pub struct Truth {
     pub contact_fraction: f64,
 }
 
+/// The hands of whoever stands at the virtual rig: what its safety contacts show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Operator {
+    /// The emergency stop is pressed.
+    pub presses_emergency_stop: bool,
+    /// The guard is open.
+    pub opens_guard: bool,
+    /// The dead-man device is held, from this time on; `None`: never.
+    pub holds_dead_man_from: Option<Nanos>,
+}
+
+impl Default for Operator {
+    /// Nothing pressed, the guard shut, the dead-man device released.
+    fn default() -> Self {
+        Operator { presses_emergency_stop: false, opens_guard: false, holds_dead_man_from: None }
+    }
+}
+
 /// Speeds below this are standing still (m/s).
 const STILL_M_S: f64 = 1e-7;
 /// Steps a period when every cycle is marched.
@@ -67,6 +85,7 @@ pub struct World {
     amplifier: Amplifier,
     sensor: Sensor,
     stage: Stage,
+    operator: Operator,
     averager: Averager,
     march: Option<March>,
     noise: Noise,
@@ -109,6 +128,7 @@ impl World {
             amplifier: Amplifier::new(config.amplifier, config.room.temperature_c),
             sensor: Sensor::new(config.sensor, tick_s, seed),
             stage: Stage::new(config.stage, seed),
+            operator: Operator::default(),
             averager: Averager::default(),
             march: None,
             noise: Noise::new(seed, "world"),
@@ -292,9 +312,29 @@ impl World {
         self.amplifier.cut_supply();
     }
 
+    /// Closes the supply relay, by its own wire: nothing is driven until it is commanded anew.
+    pub fn close_supply(&mut self) {
+        self.amplifier.close_supply();
+    }
+
+    /// Whether the supply relay is closed, by its mirror contact.
+    pub fn supply_closed(&self) -> bool {
+        self.amplifier.supply_closed()
+    }
+
     /// Closes the supply relay again and clears the amplifier's fault, by hand at the bench.
     pub fn restore_supply(&mut self) {
         self.amplifier.restore_supply();
+    }
+
+    /// The hands at the safety contacts.
+    pub fn operator(&self) -> Operator {
+        self.operator
+    }
+
+    /// What the hands at the safety contacts do from now on.
+    pub fn set_operator(&mut self, operator: Operator) {
+        self.operator = operator;
     }
 
     /// Hangs dead weights on the force sensor, as an operator does at the bench: true forces from the next tick on (N).

@@ -350,7 +350,7 @@ fn a_withheld_amplitude_scale_is_found_over_modbus() {
     config.plate.resonance_hz = frequency_hz;
     let scale = 1.0 + VIBROMETER_SD * draw.normal();
     let Bench { hands, rig, setup, epoch, _embedded, .. } = Bench::new("virtual-ideal", &config);
-    let mut ports = Ports { force: rig.force, amplifier: rig.amplifier, stage: rig.stage };
+    let mut ports = Ports::new(rig.force, rig.amplifier, rig.stage);
     let model: Box<dyn FrictionModel> = Box::new(SpringSlider::new(setup.tip.finger).unwrap());
     let mut state = CycleState::default();
     let mut number = 0;

@@ -14,11 +14,11 @@ use std::time::{Duration, Instant};
 /// A setup whose instruments all stand at one address.
 fn setup(address: SocketAddr) -> InstrumentsSetup {
     let address = address.to_string();
-    InstrumentsSetup {
-        force: vec![InstrumentSetup::new("muprime-force2", &address)],
-        amplifier: InstrumentSetup::new("muprime-amplifier", &address),
-        stage: InstrumentSetup::new("muprime-stage", &address),
-    }
+    InstrumentsSetup::new(
+        vec![InstrumentSetup::new("muprime-force2", &address)],
+        InstrumentSetup::new("muprime-amplifier", &address),
+        InstrumentSetup::new("muprime-stage", &address),
+    )
 }
 
 #[test]
@@ -354,4 +354,65 @@ fn more_clients_than_allowed_are_turned_away_and_a_place_is_freed() {
     assert!(!ask(&mut connect()), "one too many was served");
     clients.clear();
     eventually("a free place", || ask(&mut connect()).then_some(()));
+}
+
+#[test]
+fn idle_clients_make_room_and_the_world_is_kept_up() {
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let server = bench::serve_all(&bench, epoch);
+    let connect = || std::net::TcpStream::connect(server.address()).unwrap();
+    let ask = |stream: &mut std::net::TcpStream| {
+        let mut byte = [0; 9];
+        stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        stream.write_all(&[0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 12]).is_ok()
+            && stream.read_exact(&mut byte).is_ok()
+    };
+    let mut at_work = connect();
+    let _idle: Vec<_> = (1..sim::wire::modbus_tcp::MOST_CLIENTS).map(|_| connect()).collect();
+    let begun = Instant::now();
+    while begun.elapsed() < sim::wire::modbus_tcp::IDLE + Duration::from_millis(200) {
+        assert!(ask(&mut at_work));
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    assert!(ask(&mut connect()), "an idle client makes room");
+    assert!(ask(&mut at_work), "one at work keeps its place");
+}
+
+#[test]
+fn a_relay_and_safety_contacts_behind_coils_and_discrete_inputs() {
+    use realtime::ports::{SafetyInputs, SupplyCommand, SupplySwitch};
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let units = [(1, "muprime-force2"), (2, "muprime-amplifier"), (3, "muprime-stage"), (4, "muprime-relay")];
+    let server = bench::serve(&bench, &units, epoch);
+    let mut setup = setup(server.address());
+    let relay = InstrumentSetup::new("muprime-relay", &server.address().to_string());
+    (setup.supply_relay, setup.safety_inputs) = (Some(relay.clone()), Some(relay));
+    bench.set(Quantity::EmergencyStop, 1.0);
+    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let (supply, contacts): (&mut dyn SupplySwitch, &mut dyn SafetyInputs) =
+        (&mut *rig.supply, &mut *rig.contacts);
+    eventually("the relay is open", || supply.state(now(epoch)).ok().filter(|state| state.cut));
+    let seen = eventually("the contacts", || {
+        let seen = contacts.read(now(epoch));
+        seen.emergency_stop.is_ok().then_some(seen)
+    });
+    let closed = [seen.emergency_stop, seen.interlock, seen.dead_man].map(|contact| contact.unwrap().closed);
+    assert_eq!(closed, [true, false, false]);
+    eventually("closed and read back", || {
+        supply.command(SupplyCommand::Restore, now(epoch));
+        supply.state(now(epoch)).ok().filter(|state| !state.cut)
+    });
+    eventually("cut and read back", || {
+        supply.command(SupplyCommand::Cut, now(epoch));
+        supply.state(now(epoch)).ok().filter(|state| state.cut)
+    });
+    eventually("closed again", || {
+        supply.command(SupplyCommand::Restore, now(epoch));
+        supply.state(now(epoch)).ok().filter(|state| !state.cut)
+    });
+    // A loop that says nothing more closes no supply.
+    eventually("open by itself", || supply.state(now(epoch)).ok().filter(|state| state.cut));
+    let ends = rig.links.close();
+    assert!(ends.iter().all(|end| !matches!(end.closed, drivers::Closed::NotReadBack(_))), "{ends:?}");
+    assert_eq!(bench.commanded(Command::CloseSupply), Some(0.0));
 }

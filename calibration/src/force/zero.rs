@@ -2,6 +2,7 @@
 
 use super::noise::mean_with_uncertainty;
 use super::{AXES, Axis};
+use crate::certificate::Certificate;
 
 /// A zero reading of both channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +55,17 @@ pub enum ZeroError {
 }
 
 impl Zero {
+    /// The zero that a force certificate states, counted from its own time; `None` where it states none.
+    pub fn of_certificate(certificate: &Certificate) -> Option<Self> {
+        let lateral = certificate.parameter("lateral.offset")?;
+        let normal = certificate.parameter("normal.offset")?;
+        Some(Zero {
+            counts: [lateral.value, normal.value],
+            standard_uncertainty: [lateral.standard_uncertainty, normal.standard_uncertainty],
+            time_s: 0.0,
+        })
+    }
+
     /// From samples with the finger lifted (counts of both channels, evenly spaced around `time_s`).
     /// The zeros of real sensors wander: `allowed_counts` is how far the second half of the reading may lie
     /// from the first, beyond five standard uncertainties of that difference.

@@ -1,4 +1,4 @@
-//! The phase table (`PHASES.csv` of docs/contract.md): what `calibrate phase` writes and `calibrate finger` reads.
+//! The phase table of docs/contract.md (`PHASES.csv`): what `calibrate phase` writes and `calibrate finger` reads.
 
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};

@@ -158,19 +158,3 @@ fn polish(
     }
     Ok(Fit { estimates: b, covariance, residuals, residual_sum_of_squares, degrees_of_freedom })
 }
-
-/// Derivatives of `f` by central differences, for models whose derivatives are not written out.
-/// The error is of the order of `1e-10` of the model's variation over one parameter magnitude.
-pub fn differentiate(f: impl Fn(&[f64]) -> f64, at: &[f64], gradient: &mut [f64]) -> f64 {
-    let mut moved = at.to_vec();
-    for k in 0..at.len() {
-        let h = 6e-6 * if at[k] == 0.0 { 1.0 } else { at[k].abs() };
-        moved[k] = at[k] + h;
-        let up = f(&moved);
-        moved[k] = at[k] - h;
-        let down = f(&moved);
-        gradient[k] = (up - down) / (2.0 * h);
-        moved[k] = at[k];
-    }
-    f(at)
-}

@@ -6,22 +6,19 @@
 //! minimises the sum over all pairs: a pair that is parted stops drawing passes, a condition that a hypothesis has
 //! learnt stops telling.
 
-use super::belief::Belief;
+use super::predictive::Predictive;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-
-/// Nats that one pass may count for: beyond them an outlier is the likelier explanation.
-const PASS_NATS: f64 = 4.0;
 
 /// Chooses `count` passes; a condition may come again. Rows of the grid, in the order of their worth.
 ///
 /// Where the open set is given by its place among the hypotheses, every second pass goes where it is most in doubt.
-pub fn greedy(held: &[Belief], count: usize, open: Option<usize>) -> Vec<usize> {
-    let n = held.first().map_or(0, |b| b.mean.len());
-    let k = held.len();
-    let mut known: Vec<DMatrix<f64>> = held.iter().map(|b| b.covariance.clone()).collect();
+pub fn greedy(hypotheses: &[Predictive], count: usize, open: Option<usize>, most: f64) -> Vec<usize> {
+    let n = hypotheses.first().map_or(0, |b| b.mean.len());
+    let k = hypotheses.len();
+    let mut known: Vec<DMatrix<f64>> = hypotheses.iter().map(|b| b.covariance.clone()).collect();
     // What `j` expects once it has seen what `i` expects, at j + k i.
-    let mut seen: Vec<DVector<f64>> = (0..k * k).map(|ij| held[ij % k].mean.clone()).collect();
+    let mut seen: Vec<DVector<f64>> = (0..k * k).map(|ij| hypotheses[ij % k].mean.clone()).collect();
     let mut nats = vec![0.0; k * k];
     let mut chosen = Vec::new();
     for step in 0..count {
@@ -29,28 +26,28 @@ pub fn greedy(held: &[Belief], count: usize, open: Option<usize>) -> Vec<usize> 
             let mut sum = 0.0;
             for i in 0..k {
                 for j in 0..i {
-                    let told = both(held, &known, &seen, (i, j), c).min(PASS_NATS);
-                    let weight = (held[i].probability * held[j].probability).sqrt();
-                    sum += weight * (-(nats[j + k * i] + told) / 4.0).exp();
+                    let gain = both(hypotheses, &known, &seen, (i, j), c).min(most);
+                    let weight = (hypotheses[i].probability * hypotheses[j].probability).sqrt();
+                    sum += weight * (-(nats[j + k * i] + gain) / 4.0).exp();
                 }
             }
             sum
         };
         let left: Vec<f64> = match open.filter(|_| step % 2 == 1) {
-            Some(h) => (0..n).map(|c| -known[h][(c, c)] / held[h].scatter[c]).collect(),
+            Some(h) => (0..n).map(|c| -known[h][(c, c)] / hypotheses[h].scatter[c]).collect(),
             None => (0..n).into_par_iter().map(confused).collect(),
         };
         let best = (0..n).min_by(|&a, &b| left[a].total_cmp(&left[b]).then(a.cmp(&b)));
         let Some(c) = best else { break };
         for i in 0..k {
             for j in 0..i {
-                nats[j + k * i] += both(held, &known, &seen, (i, j), c).min(PASS_NATS);
+                nats[j + k * i] += both(hypotheses, &known, &seen, (i, j), c).min(most);
             }
         }
         for j in 0..k {
-            let column = known[j].column(c) / (known[j][(c, c)] + held[j].scatter[c]);
+            let column = known[j].column(c) / (known[j][(c, c)] + hypotheses[j].scatter[c]);
             for i in 0..k {
-                let surprise = held[i].mean[c] - seen[j + k * i][c];
+                let surprise = hypotheses[i].mean[c] - seen[j + k * i][c];
                 seen[j + k * i].axpy(surprise, &column, 1.0);
             }
             let row = known[j].row(c).clone_owned();
@@ -63,34 +60,35 @@ pub fn greedy(held: &[Belief], count: usize, open: Option<usize>) -> Vec<usize> 
 
 /// Mean of both divergences that a further pass at `c` adds.
 fn both(
-    held: &[Belief],
+    hypotheses: &[Predictive],
     known: &[DMatrix<f64>],
     seen: &[DVector<f64>],
     (i, j): (usize, usize),
     c: usize,
 ) -> f64 {
-    let k = held.len();
-    let variance = |h: usize| known[h][(c, c)].max(0.0) + held[h].scatter[c];
+    let k = hypotheses.len();
+    let variance = |h: usize| known[h][(c, c)].max(0.0) + hypotheses[h].scatter[c];
     let one = |i: usize, j: usize| {
         let (vi, vj) = (variance(i), variance(j));
-        let apart = held[i].mean[c] - seen[j + k * i][c];
+        let apart = hypotheses[i].mean[c] - seen[j + k * i][c];
         0.5 * ((vi + apart * apart) / vj - 1.0 + (vj / vi).ln())
     };
     0.5 * (one(i, j) + one(j, i))
 }
 
 /// The hypothesis that the leader (the first) is most to be parted from.
-pub fn rival(held: &[Belief], chosen: &[usize]) -> Option<usize> {
+pub fn rival(hypotheses: &[Predictive], chosen: &[usize]) -> Option<usize> {
     if chosen.is_empty() {
         return None;
     }
-    (1..held.len()).max_by(|&a, &b| held[a].probability.total_cmp(&held[b].probability).then(b.cmp(&a)))
+    (1..hypotheses.len())
+        .max_by(|&a, &b| hypotheses[a].probability.total_cmp(&hypotheses[b].probability).then(b.cmp(&a)))
 }
 
 /// Expected gain of the log evidence of `a` over `b`'s by passes at those conditions, were `a` true: the
 /// Kullback-Leibler divergence of what both expect of them together.
-pub fn expected_nats(a: &Belief, b: &Belief, chosen: &[usize]) -> f64 {
-    let joint = |h: &Belief| {
+pub fn expected_nats(a: &Predictive, b: &Predictive, chosen: &[usize]) -> f64 {
+    let joint = |h: &Predictive| {
         let mut m = DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| h.covariance[(chosen[i], chosen[j])]);
         for (i, &c) in chosen.iter().enumerate() {
             m[(i, i)] += h.scatter[c];
@@ -108,16 +106,17 @@ pub fn expected_nats(a: &Belief, b: &Belief, chosen: &[usize]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attribute::decide;
-    use crate::evidence::{Explained, explain};
+    const MOST: f64 = 4.0;
+    use crate::decision::decide;
+    use crate::evidence::{Posterior, laplace};
     use crate::example::{Deviates, rig, table};
     use crate::fit::Problem;
-    use crate::hypotheses::{FORM_LENGTHS, Fitted, Options, fit_all};
-    use crate::next::{PASSES, belief::beliefs, grid};
-    use effects::Operating;
+    use crate::hypotheses::{Fitted, Options, fit_all, form_lengths};
+    use crate::next::{PASSES, grid, predictive::predictives};
+    use models::condition::Condition;
 
     /// Log evidence of a hypothesis with further passes, or without.
-    fn evidence(fitted: &Fitted, e: &Explained, further: &[(Operating, f64, f64)]) -> f64 {
+    fn evidence(fitted: &Fitted, e: &Posterior, further: &[(Condition, f64, f64)]) -> f64 {
         let mut problem = fitted.problem.clone();
         for (p, force, variance) in further {
             problem.passes.push(*p);
@@ -125,10 +124,13 @@ mod tests {
             problem.variance.push(*variance);
         }
         let largest = problem.design.largest_amplitude_m;
-        let places: Vec<_> =
-            problem.passes.iter().map(|p| fitted.coordinates.place(p, largest, &FORM_LENGTHS)).collect();
+        let places: Vec<_> = problem
+            .passes
+            .iter()
+            .map(|p| fitted.coordinates.place(p, largest, &form_lengths(&problem.constants)))
+            .collect();
         let problem: Problem = problem;
-        explain(&problem, &e.members, &e.u, &fitted.kernel.matrix(&places), e.share, 8).log_evidence
+        laplace(&problem, &e.members, &e.u, &fitted.kernel.matrix(&places), e.share, 8).log_evidence
     }
 
     /// The stated nats are what evidence gains on average when the passes are made and the leader is true.
@@ -139,18 +141,19 @@ mod tests {
         let fitted = fit_all(&table, &rig(), &Options { pairs: false, ..Options::default() });
         let decision = decide(&fitted);
         let grid = grid::conditions(&table);
-        let held = beliefs(&fitted, &rig(), &decision, &grid);
-        let chosen = greedy(&held, PASSES, Some(held.len() - 1));
+        let hypotheses = predictives(&fitted, &rig(), &decision, &grid);
+        let chosen = greedy(&hypotheses, PASSES, Some(hypotheses.len() - 1), MOST);
         assert_eq!(chosen.len(), PASSES);
         let of = |name: &str| {
             &fitted.candidates.iter().find(|c| c.names().join("+") == name).expect("a candidate").best
         };
-        let (a, b) = (of(&held[0].name), of(&held[1].name));
+        let (a, b) = (of(&hypotheses[0].name), of(&hypotheses[1].name));
         let before = evidence(&fitted, a, &[]) - evidence(&fitted, b, &[]);
-        let stated = expected_nats(&held[0], &held[1], &chosen);
+        let stated = expected_nats(&hypotheses[0], &hypotheses[1], &chosen);
         let k = chosen.len();
         let root = DMatrix::from_fn(k, k, |i, j| {
-            held[0].covariance[(chosen[i], chosen[j])] + if i == j { held[0].scatter[chosen[i]] } else { 0.0 }
+            hypotheses[0].covariance[(chosen[i], chosen[j])]
+                + if i == j { hypotheses[0].scatter[chosen[i]] } else { 0.0 }
         })
         .cholesky()
         .expect("a covariance with scatter is positive definite")
@@ -160,16 +163,16 @@ mod tests {
             .map(|_| {
                 let deviates = DVector::from_fn(k, |_, _| draw.normal());
                 let off = &root * deviates;
-                let further: Vec<(Operating, f64, f64)> = chosen
+                let further: Vec<(Condition, f64, f64)> = chosen
                     .iter()
                     .enumerate()
-                    .map(|(i, &c)| (grid[c], held[0].mean[c] + off[i], held[0].scatter[c]))
+                    .map(|(i, &c)| (grid[c], hypotheses[0].mean[c] + off[i], hypotheses[0].scatter[c]))
                     .collect();
                 evidence(&fitted, a, &further) - evidence(&fitted, b, &further) - before
             })
             .collect();
         let mean = gains.iter().sum::<f64>() / f64::from(draws);
-        let names = (&held[0].name, &held[1].name);
+        let names = (&hypotheses[0].name, &hypotheses[1].name);
         assert!(stated > 0.5, "{names:?}: {stated:.2} nats");
         // A third for what linear predictions leave out, and the scatter of the mean.
         let sd =
@@ -180,8 +183,8 @@ mod tests {
         );
     }
 
-    fn belief(probability: f64, mean: [f64; 2], own: f64) -> Belief {
-        Belief {
+    fn belief(probability: f64, mean: [f64; 2], own: f64) -> Predictive {
+        Predictive {
             name: String::new(),
             probability,
             mean: DVector::from_column_slice(&mean),
@@ -202,9 +205,9 @@ mod tests {
     #[test]
     fn a_condition_that_is_learnt_stops_drawing_passes() {
         let sure = [belief(0.5, [0.0, 0.0], 0.0), belief(0.5, [3.0, 2.5], 0.0)];
-        assert_eq!(greedy(&sure, 2, None), [0, 0]);
+        assert_eq!(greedy(&sure, 2, None, MOST), [0, 0]);
         let unsure = [belief(0.5, [0.0, 0.0], 9.0), belief(0.5, [3.0, 2.5], 9.0)];
-        assert_eq!(greedy(&unsure, 2, None), [0, 1]);
+        assert_eq!(greedy(&unsure, 2, None, MOST), [0, 1]);
     }
 
     /// With the open set given, every second pass goes where that is most in doubt, and moves on once it has learnt.
@@ -212,16 +215,16 @@ mod tests {
     fn every_second_pass_goes_where_nothing_is_known() {
         let mut open = belief(0.001, [0.0, 0.0], 0.0);
         open.covariance = DMatrix::from_diagonal(&DVector::from_column_slice(&[1.0, 9.0]));
-        let held = [belief(0.5, [0.0, 0.0], 0.0), belief(0.5, [3.0, 0.0], 0.0), open];
-        assert_eq!(greedy(&held, 4, None), [0, 0, 0, 0]);
-        assert_eq!(greedy(&held, 4, Some(2)), [0, 1, 0, 1]);
+        let hypotheses = [belief(0.5, [0.0, 0.0], 0.0), belief(0.5, [3.0, 0.0], 0.0), open];
+        assert_eq!(greedy(&hypotheses, 4, None, MOST), [0, 0, 0, 0]);
+        assert_eq!(greedy(&hypotheses, 4, Some(2), MOST), [0, 1, 0, 1]);
     }
 
     /// Passes go where the likely rival is parted, not where the unlikely one is.
     #[test]
     fn passes_go_to_the_likely_rival() {
-        let held =
+        let hypotheses =
             [belief(0.6, [0.0, 0.0], 0.0), belief(0.38, [0.0, 1.0], 0.0), belief(0.02, [1.5, 0.0], 0.0)];
-        assert_eq!(greedy(&held, 1, None), [1]);
+        assert_eq!(greedy(&hypotheses, 1, None, MOST), [1]);
     }
 }

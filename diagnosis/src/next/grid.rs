@@ -1,7 +1,8 @@
 //! Conditions that a next experiment may choose: every setting of a plan, within what the table has shown to be safe.
 
 use crate::data::Table;
-use effects::Operating;
+use models::condition::Condition;
+use models::quantity::{Direction, PeakToPeak};
 
 /// Conditions that a design looks at: the product of the levels, evenly thinned to so many.
 const MOST: usize = 240;
@@ -18,10 +19,10 @@ const ONE_PLACE_M: f64 = 1e-3;
 const INTO_RUN: f64 = 6.0;
 
 /// The conditions. Time is that of a further run, the environment that of the last pass.
-pub fn conditions(table: &Table) -> Vec<Operating> {
+pub fn conditions(table: &Table) -> Vec<Condition> {
     let passes = &table.passes;
-    let of = |f: &dyn Fn(&Operating) -> f64| -> Vec<f64> { passes.iter().map(f).collect() };
-    let vibrating: Vec<f64> = passes.iter().map(|p| p.amplitude_pp_m).filter(|w| *w > 0.0).collect();
+    let of = |f: &dyn Fn(&Condition) -> f64| -> Vec<f64> { passes.iter().map(f).collect() };
+    let vibrating: Vec<f64> = passes.iter().map(|p| p.amplitude.metres()).filter(|w| *w > 0.0).collect();
     let mut amplitudes = vec![0.0];
     if !vibrating.is_empty() {
         amplitudes.extend(in_ratio(vibrating, AMPLITUDES));
@@ -36,15 +37,15 @@ pub fn conditions(table: &Table) -> Vec<Operating> {
     let positions = places(of(&|p| p.position_m));
     let template = further(table);
     let mut list = Vec::new();
-    for &amplitude_pp_m in &amplitudes {
+    for &amplitude in &amplitudes {
         for &frequency_hz in &spread(&frequencies, FREQUENCIES) {
             for &speed_m_s in &in_ratio(of(&|p| p.speed_m_s), SPEEDS) {
                 for &normal_force_n in &in_ratio(of(&|p| p.normal_force_n), LOADS) {
                     for &position_m in &positions {
                         for &ambient_pressure_pa in &pressures {
                             for direction in directions(table) {
-                                list.push(Operating {
-                                    amplitude_pp_m,
+                                list.push(Condition {
+                                    amplitude: PeakToPeak::from_metres(amplitude),
                                     frequency_hz,
                                     speed_m_s,
                                     normal_force_n,
@@ -61,7 +62,7 @@ pub fn conditions(table: &Table) -> Vec<Operating> {
         }
     }
     let (low, high) = (positions[0], positions[positions.len() - 1]);
-    let shown = |p: &Operating| {
+    let shown = |p: &Condition| {
         let as_fast = || passes.iter().filter(|q| q.speed_m_s > 0.95 * p.speed_m_s);
         // A fast pass takes a long stroke: at the ends only as fast as passes were made there.
         (p.position_m > low || as_fast().any(|q| q.position_m <= low))
@@ -74,8 +75,9 @@ pub fn conditions(table: &Table) -> Vec<Operating> {
 }
 
 /// Directions of the table.
-fn directions(table: &Table) -> Vec<f64> {
-    [1.0, -1.0].into_iter().filter(|d| table.passes.iter().any(|p| p.direction == *d)).collect()
+fn directions(table: &Table) -> Vec<Direction> {
+    let seen = |d: &Direction| table.passes.iter().any(|p| p.direction == *d);
+    [Direction::Forward, Direction::Backward].into_iter().filter(seen).collect()
 }
 
 /// Evenly in the logarithm from the smallest to the largest.
@@ -108,7 +110,7 @@ fn spread<T: Copy>(sorted: &[T], most: usize) -> Vec<T> {
 }
 
 /// Steps through the product by a share that is far from every fraction, so that every pair of levels stays in.
-fn thinned(list: &[Operating]) -> Vec<Operating> {
+fn thinned(list: &[Condition]) -> Vec<Condition> {
     if list.len() <= MOST {
         return list.to_vec();
     }
@@ -122,12 +124,12 @@ fn thinned(list: &[Operating]) -> Vec<Operating> {
 
 /// A pass some way into a further run. Where the runs of a table follow each other in time the run comes last, else
 /// each run counts its own time.
-fn further(table: &Table) -> Operating {
+fn further(table: &Table) -> Condition {
     let passes = &table.passes;
     let last = *passes.last().expect("a table has passes");
-    let pace = passes.iter().map(|p| p.run_time_s).fold(0.0, f64::max) * table.run_count as f64
+    let pace = passes.iter().map(Condition::time_in_run_s).fold(0.0, f64::max) * table.run_count as f64
         / passes.len() as f64;
     let follow = table.run_count > 1 && table.runs.windows(2).all(|w| w[1] >= w[0]);
     let into = INTO_RUN * pace;
-    Operating { run_time_s: into, time_s: if follow { last.time_s + into } else { into }, ..last }
+    Condition { run_time_s: Some(into), time_s: if follow { last.time_s + into } else { into }, ..last }
 }

@@ -96,3 +96,93 @@ fn off_leaves_the_frequency_alone() {
     assert_eq!((sent(&endpoint, &due, "enable"), sent(&endpoint, &due, "frequency")), (Some(0.0), None));
     assert_eq!(sent(&endpoint, &due, "heartbeat"), Some(5.0), "off feeds the watchdog as well");
 }
+
+/// A state of the amplifier: counter, time and whether the output is on.
+fn state(counter: u16, output_on: bool) -> Vec<u8> {
+    let mut registers = [0_u16; 20];
+    (registers[0], registers[1]) = (0x6D75, 0x3241);
+    (registers[3], registers[5]) = (counter, counter);
+    registers[15] = u16::from(output_on);
+    registers.iter().flat_map(|register| register.to_be_bytes()).collect()
+}
+
+fn show(endpoint: &mut Endpoint, counter: u16, output_on: bool, arrived: u64) {
+    let frame = endpoint.profile().frame("state").unwrap();
+    endpoint.frame(frame, &state(counter, output_on), Nanos(arrived)).unwrap();
+}
+
+/// Old behaviour: a full ring dropped the newest command, the 'off' among them.
+#[test]
+fn an_off_is_never_dropped_however_many_commands_wait() {
+    for before in [0, 1, 64, 1000] {
+        for after in [0, 1, 64, 1000] {
+            let (mut endpoint, mut port) = amplifier();
+            port.push(on(1, 1_000_000));
+            endpoint.due(Nanos(1));
+            (0..before).for_each(|i| port.push(on(i, 1_000_000)));
+            port.push(DriveSetPoint { enable: false, ..on(7, 1_000_000) });
+            (0..after).for_each(|i| port.push(on(i, 1_000_000)));
+            let due = endpoint.due(Nanos(2));
+            assert_eq!(sent(&endpoint, &due, "enable"), Some(0.0), "{before} before, {after} after");
+        }
+    }
+}
+
+#[test]
+fn off_is_repeated_until_a_later_state_shows_it() {
+    let (mut endpoint, mut port) = amplifier();
+    port.push(on(1, 100));
+    endpoint.due(Nanos(10));
+    assert!(endpoint.owes_off());
+    let due = endpoint.due(Nanos(101));
+    assert!(matches!(due, Due::Safe(_)), "expired: {due:?}");
+    show(&mut endpoint, 1, true, 110);
+    assert!(matches!(endpoint.due(Nanos(111)), Due::Safe(_)), "a later state still says on");
+    assert_eq!(endpoint.due(Nanos(112)), Due::Nothing, "until the next state");
+    endpoint.refused();
+    assert!(matches!(endpoint.due(Nanos(113)), Due::Safe(_)), "refused: once more");
+    endpoint.refused();
+    show(&mut endpoint, 2, false, 112);
+    assert!(!endpoint.reads_off(), "a state from before the last 'off' shows nothing of it");
+    show(&mut endpoint, 3, false, 120);
+    assert!(endpoint.reads_off() && !endpoint.owes_off());
+    assert_eq!(endpoint.due(Nanos(121)), Due::Nothing);
+}
+
+/// Several set-points that leave one by one take their time: none drives after the command's time or after an 'off'.
+#[test]
+fn a_command_that_has_begun_to_leave_ends_with_its_time_and_with_an_off() {
+    let (mut endpoint, mut port) = amplifier();
+    port.push(on(1, 100));
+    endpoint.due(Nanos(10));
+    assert!(endpoint.still_wanted(Nanos(100)) && !endpoint.still_wanted(Nanos(101)));
+    port.push(on(2, 200));
+    assert!(endpoint.still_wanted(Nanos(150)), "a newer command keeps it alive");
+    port.push(DriveSetPoint { enable: false, ..on(3, 300) });
+    port.push(on(4, 300));
+    assert!(!endpoint.still_wanted(Nanos(160)));
+    let due = endpoint.due(Nanos(161));
+    assert_eq!(sent(&endpoint, &due, "enable"), Some(0.0));
+}
+
+#[test]
+fn what_switches_off_leaves_first() {
+    for id in ["muprime-amplifier", "piezodrive-pdus210", "keysight-33500b", "muprime-stage", "muprime-relay"]
+    {
+        let profile = profile(id).unwrap();
+        let names = |endpoint: &Endpoint| {
+            let safe = endpoint.safe_set_points();
+            let name = |(set, _): &(instruments::SetId, f64)| {
+                endpoint.profile().description.set[set.0].name.as_ref().clone()
+            };
+            safe.iter().map(name).collect::<Vec<_>>()
+        };
+        let endpoint = match id {
+            "muprime-stage" => Endpoint::stage(profile, &InstrumentSetup::new(id, "")).unwrap().0,
+            "muprime-relay" => Endpoint::supply(profile).unwrap().0,
+            _ => Endpoint::amplifier(profile, &InstrumentSetup::new(id, "")).unwrap().0,
+        };
+        let first = ["enable", "velocity", "closed"];
+        assert!(first.contains(&names(&endpoint)[0].as_str()), "{id}: {:?}", names(&endpoint));
+    }
+}

@@ -58,13 +58,42 @@ fn closed(mut body: Vec<u8>) -> Vec<u8> {
     body
 }
 
-/// Asks for registers by function 3 or 4.
+/// Asks for registers by function 3 or 4, or for bits by function 1 or 2.
 #[must_use]
 pub fn read(unit: u8, function: u8, address: u16, count: u16) -> Request {
     let mut body = vec![unit, function];
     body.extend(address.to_be_bytes());
     body.extend(count.to_be_bytes());
-    Request { bytes: closed(body), answer_length: 5 + 2 * usize::from(count) }
+    let count = usize::from(count);
+    let data = if function <= 2 { count.div_ceil(8) } else { 2 * count };
+    Request { bytes: closed(body), answer_length: 5 + data }
+}
+
+/// Writes neighbouring coils by function 15: those whose register is not zero are closed.
+#[must_use]
+pub fn write_coils(unit: u8, address: u16, registers: &[u16]) -> Request {
+    let count = u16::try_from(registers.len()).unwrap_or(u16::MAX);
+    let mut body = vec![unit, 15];
+    body.extend(address.to_be_bytes());
+    body.extend(count.to_be_bytes());
+    body.push(u8::try_from(registers.len().div_ceil(8)).unwrap_or(u8::MAX));
+    body.extend(to_bits(registers));
+    Request { bytes: closed(body), answer_length: 8 }
+}
+
+/// Registers of 0 and not 0 as bits, the first in the lowest bit of the first byte.
+#[must_use]
+pub fn to_bits(registers: &[u16]) -> Vec<u8> {
+    let byte =
+        |eight: &[u16]| eight.iter().rev().fold(0, |byte, register| byte << 1 | u8::from(*register != 0));
+    registers.chunks(8).map(byte).collect()
+}
+
+/// Bits as registers of 0 and 1; as many as `count` of them.
+#[must_use]
+pub fn from_bits(bits: &[u8], count: usize) -> Vec<u16> {
+    let each = bits.iter().flat_map(|byte| (0..8).map(move |bit| u16::from(byte >> bit & 1)));
+    each.take(count).collect()
 }
 
 /// Writes neighbouring registers by function 16.
@@ -122,7 +151,7 @@ pub fn payload<'a>(request: &Request, answer: &'a [u8]) -> Result<&'a [u8], RtuE
     Ok(&body[2..])
 }
 
-/// The registers of an answer to [`read()`], as bytes.
+/// The registers of an answer to [`read()`], as bytes; bits come as registers of 0 and 1.
 ///
 /// # Errors
 /// Whatever does not fit the request.
@@ -130,6 +159,11 @@ pub fn registers(request: &Request, answer: &[u8]) -> Result<Vec<u8>, RtuError> 
     let payload = payload(request, answer)?;
     if usize::from(payload[0]) != payload.len() - 1 {
         return Err(RtuError::Mismatch);
+    }
+    if request.bytes[1] <= 2 {
+        let count = u16::from_be_bytes([request.bytes[4], request.bytes[5]]);
+        let registers = from_bits(&payload[1..], usize::from(count));
+        return Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect());
     }
     Ok(payload[1..].to_vec())
 }
@@ -189,8 +223,8 @@ pub enum Heard {
 pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
     let Some(&function) = bytes.get(1) else { return Heard::Incomplete };
     let length = match function {
-        3 | 4 | 6 => 8,
-        16 => match bytes.get(6) {
+        1..=4 | 6 => 8,
+        15 | 16 => match bytes.get(6) {
             None => return Heard::Incomplete,
             Some(&count) => 9 + usize::from(count),
         },
@@ -204,8 +238,15 @@ pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
     }
     let word = |at: usize| u16::from_be_bytes([body[at], body[at + 1]]);
     let asked = match function {
-        3 | 4 => Asked::Read { function, address: word(2), count: word(4) },
+        1..=4 => Asked::Read { function, address: word(2), count: word(4) },
         6 => Asked::Write { function, address: word(2), registers: vec![word(4)] },
+        15 => {
+            let count = usize::from(word(4));
+            if body[7..].len() != count.div_ceil(8) {
+                return Heard::Noise;
+            }
+            Asked::Write { function, address: word(2), registers: from_bits(&body[7..], count) }
+        }
         16 => {
             let data = &body[7..];
             if data.len() != 2 * usize::from(word(4)) {
@@ -219,9 +260,14 @@ pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
     Heard::Request(body[0], asked, length)
 }
 
-/// The answer that gives registers.
+/// The answer that gives registers, as bits where the function is one of bits.
 #[must_use]
 pub fn give(unit: u8, function: u8, registers: &[u16]) -> Vec<u8> {
+    if function <= 2 {
+        let bits = to_bits(registers);
+        let head = [unit, function, u8::try_from(bits.len()).unwrap_or(u8::MAX)];
+        return closed([&head, bits.as_slice()].concat());
+    }
     let mut body = vec![unit, function, u8::try_from(2 * registers.len()).unwrap_or(u8::MAX)];
     body.extend(registers.iter().flat_map(|register| register.to_be_bytes()));
     closed(body)
@@ -258,6 +304,25 @@ pub fn silence_s(baud: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The examples of the Modbus application protocol 1.1b3, 6.1 and 6.11: coils 20-38 read, coils 20-29 written.
+    #[test]
+    fn coils_as_the_standard_packs_them() {
+        let read = read(1, 1, 19, 19);
+        assert_eq!(&read.bytes[..6], &[1, 1, 0, 19, 0, 19]);
+        let answer = closed(vec![1, 1, 3, 0xCD, 0x6B, 0x05]);
+        let bytes = registers(&read, &answer).unwrap();
+        let bits: Vec<u8> = bytes.chunks(2).map(|pair| pair[1]).collect();
+        assert_eq!(bits, [1, 0, 1, 1, 0, 0, 1, 1, 1, 1, 0, 1, 0, 1, 1, 0, 1, 0, 1]);
+        let coils = from_bits(&[0xCD, 0x01], 10);
+        let write = write_coils(1, 19, &coils);
+        assert_eq!(&write.bytes[..9], &[1, 15, 0, 19, 0, 10, 2, 0xCD, 0x01]);
+        let heard = hear(&write.bytes, &[]);
+        let asked = Asked::Write { function: 15, address: 19, registers: coils.clone() };
+        assert_eq!(heard, Heard::Request(1, asked, write.bytes.len()));
+        assert!(written(&write, &confirm(1, 15, 19, 10)).is_ok());
+        assert_eq!(give(1, 1, &coils)[2..5], [2, 0xCD, 0x01]);
+    }
 
     /// ATI's manual prints this request for its diagnostics registers.
     #[test]

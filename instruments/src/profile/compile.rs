@@ -9,7 +9,7 @@ use crate::codec::eds::{self, Objects};
 use crate::error::ProfileError;
 use crate::expression::Expression;
 use crate::field::{ByteOrder, Field, NumberType};
-use crate::schema::{Description, LinkKind, Message};
+use crate::schema::{Description, LinkKind, Message, Table};
 
 /// Gives the text of another file by its name.
 type Files<'a> = &'a dyn Fn(&str) -> Option<String>;
@@ -45,6 +45,13 @@ impl Compiler<'_> {
                     "block `{}` has {} registers; one write takes 1 to 123",
                     block.name.as_ref(),
                     block.count
+                );
+                return Err(self.at(block.name.span(), message));
+            }
+            if !matches!(block.table, Table::Holding | Table::Coil) {
+                let message = format!(
+                    "block `{}`: only holding registers and coils can be written",
+                    block.name.as_ref()
                 );
                 return Err(self.at(block.name.span(), message));
             }

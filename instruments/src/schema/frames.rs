@@ -6,7 +6,7 @@ use toml::Spanned;
 
 use crate::codec::checksum::Check;
 
-/// Tables of Modbus registers.
+/// Tables of Modbus registers. A coil or a discrete input counts as a register whose value is 0 or 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Table {
@@ -15,6 +15,18 @@ pub enum Table {
     Holding,
     /// Function code 4.
     Input,
+    /// Coils: function codes 1 and 15.
+    Coil,
+    /// Discrete inputs: function code 2.
+    Discrete,
+}
+
+impl Table {
+    /// Whether its registers are single bits on the wire.
+    #[must_use]
+    pub const fn is_bits(self) -> bool {
+        matches!(self, Self::Coil | Self::Discrete)
+    }
 }
 
 /// `[[poll]]`: one read of neighbouring registers, which yields one sample.
@@ -161,6 +173,9 @@ pub struct Write {
     /// Name, for set-points to refer to.
     #[schemars(with = "String")]
     pub name: Spanned<String>,
+    /// Table: holding registers, or coils.
+    #[serde(default)]
+    pub table: Table,
     /// First register.
     #[serde(default)]
     pub address: u16,

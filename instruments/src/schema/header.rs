@@ -47,6 +47,12 @@ pub enum Role {
     /// Loading of the contact.
     #[serde(rename = "motion.load")]
     MotionLoad,
+    /// A switch in the amplifier's supply: the second way to switch off.
+    #[serde(rename = "safety.supply")]
+    SafetySupply,
+    /// Safety contacts: emergency stop, interlock, dead-man.
+    #[serde(rename = "safety.contacts")]
+    SafetyContacts,
     /// A vibrometer's controller, whose settings are read back for a calibration; it takes no part in a run.
     #[serde(rename = "measure.vibration")]
     MeasureVibration,

@@ -5,7 +5,11 @@
 //! force is the largest that grows no faster than the drag of the spring and never passes the friction limit
 //! (a Skorokhod reflection), `L(x) = min over y <= x of [limit(y) + k_l U (x - y)]`. For a limit proportional
 //! to the normal force that minimum, and its mean over the cycle, are closed forms but for one root
-//! ([`mean_friction`]); laws that change the limit within the cycle take the sweep of [`crate::sweep`].
+//! ([`mean_friction`]); laws that change the limit within the cycle take the sweep of [`sweep`].
+
+pub mod asperities;
+pub mod impact;
+pub mod sweep;
 
 use std::f64::consts::PI;
 
@@ -56,14 +60,14 @@ pub struct Contact {
     /// Scale of the heights of the asperities, m. 0 in the baseline (one height).
     pub asperity_height: f64,
     /// Distribution of the heights.
-    pub asperity_heights: crate::asperities::Heights,
+    pub asperity_heights: asperities::Heights,
     /// Retardation time of the normal spring, s. 0 in the baseline.
     pub normal_retardation_time: f64,
     /// Mass of the ridges that follow the plate, kg. 0 in the baseline.
     pub mass: f64,
     /// Damping ratio of the ridges where there is mass.
     pub ridge_damping_ratio: f64,
-    /// Index into [`crate::impact::LANDINGS`] where there is mass.
+    /// Index into [`impact::LANDINGS`] where there is mass.
     pub landing: usize,
 }
 
@@ -137,14 +141,14 @@ pub fn mean_friction(c: &Contact) -> f64 {
     let base = if c.amplitude_pp < STILL_PLATE_M {
         still_friction(c)
     } else if c.asperity_height > 0.0 {
-        crate::asperities::mean_friction(c)
+        asperities::mean_friction(c)
     } else if c.needs_sweep() {
-        crate::sweep::mean_friction(c)
+        sweep::mean_friction(c)
     } else {
         closed_form(c)
     };
     let inertia =
-        if c.mass > 0.0 && c.amplitude_pp >= STILL_PLATE_M { crate::impact::friction_ratio(c) } else { 1.0 };
+        if c.mass > 0.0 && c.amplitude_pp >= STILL_PLATE_M { impact::friction_ratio(c) } else { 1.0 };
     base * c.friction_factor * inertia
 }
 

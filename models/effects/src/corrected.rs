@@ -2,12 +2,13 @@
 //!
 //! It is evaluated directly, without allocation: the contact is a closed form or one short sweep, so no table
 //! and no interpolation error stands between the verdict and the loop. The one exception is ridge inertia,
-//! whose table's error is stated in [`crate::impact::STATED_ERROR`].
+//! whose table's error is stated in [`crate::contact::impact::STATED_ERROR`].
 
 use crate::effect::{Effect, Place};
-use crate::operating::{Baseline, Design, Operating};
+use crate::operating::{Baseline, Design};
 use crate::predict::{Active, lateral_force};
-use models::condition::{Condition, OutOfDomain};
+use models::condition::{Ambient, Condition, OutOfDomain};
+use models::covariate::Covariate;
 use models::prediction::{FrictionModel, Prediction, Regime, Validity};
 use serde::{Deserialize, Serialize};
 
@@ -115,6 +116,18 @@ pub enum ModelError {
     NotPositive(&'static str),
 }
 
+/// A law that would do nothing for want of a covariate.
+#[derive(Debug, Clone, Copy, thiserror::Error)]
+#[error("law '{law}' of {effect} needs the {}", covariate.words)]
+pub struct Lack {
+    /// The effect.
+    pub effect: &'static str,
+    /// Its law.
+    pub law: &'static str,
+    /// What it needs.
+    pub covariate: &'static Covariate,
+}
+
 #[derive(Clone, Copy)]
 struct Compiled {
     effect: &'static dyn Effect,
@@ -203,6 +216,17 @@ impl Corrected {
         })
     }
 
+    /// The first law that needs what neither a channel of every rig nor `ambient` gives.
+    pub fn lacks(&self, ambient: &Ambient) -> Option<Lack> {
+        let known = Condition::paper().within(ambient);
+        self.effects.iter().find_map(|c| {
+            let law = &c.effect.laws()[c.law];
+            let needs = c.effect.needs().iter().chain(law.needs);
+            let covariate = needs.filter_map(|n| n.covariate()).find(|k| k.of(&known).is_none())?;
+            Some(Lack { effect: c.effect.name(), law: law.name, covariate })
+        })
+    }
+
     /// Stated error of mu' by interpolation.
     pub fn interpolation_error(&self) -> f64 {
         self.interpolation_error
@@ -214,35 +238,18 @@ impl Corrected {
     }
 
     /// Signed mean lateral force that the sensor will read at a pass, N. Allocates nothing.
-    pub fn lateral_force(&self, pass: &Operating) -> f64 {
+    pub fn lateral_force(&self, pass: &Condition) -> f64 {
         self.lateral_force_from(&self.baseline, pass)
     }
 
-    fn lateral_force_from(&self, baseline: &Baseline, pass: &Operating) -> f64 {
+    fn lateral_force_from(&self, baseline: &Baseline, pass: &Condition) -> f64 {
         let zero: [f64; 0] = [];
-        let idle = Active { effect: &crate::sensor_lag::SensorLag, law: 0, theta: &zero };
+        let idle = Active { effect: &crate::library::sensor_lag::SensorLag, law: 0, theta: &zero };
         let mut active = [idle; MOST_EFFECTS];
         for (slot, c) in active.iter_mut().zip(&self.effects) {
             *slot = Active { effect: c.effect, law: c.law, theta: &c.theta[..c.count] };
         }
         lateral_force(baseline, &active[..self.effects.len()], pass, &self.design)
-    }
-
-    /// The pass that a condition of the loop stands for.
-    pub fn operating(&self, c: &Condition) -> Operating {
-        Operating {
-            time_s: c.time_s,
-            run_time_s: c.time_s,
-            amplitude_pp_m: c.amplitude.metres(),
-            frequency_hz: c.frequency_hz,
-            speed_m_s: c.speed_m_s,
-            direction: c.direction.sign(),
-            position_m: c.position_m,
-            normal_force_n: c.normal_force_n,
-            ambient_pressure_pa: c.ambient_pressure_pa,
-            temperature_c: None,
-            relative_humidity_pct: None,
-        }
     }
 }
 
@@ -259,13 +266,13 @@ impl FrictionModel for Corrected {
     /// the relative friction is that force over `mu_0 F_n` with the loop's own `mu_0`.
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
         condition.check()?;
-        let pass = self.operating(condition);
         // The finger of today may rub more or less than that of the diagnosis: the loop's mu_0 counts.
         let baseline = Baseline { mu0: condition.mu0, ..self.baseline };
-        let along = pass.direction * self.lateral_force_from(&baseline, &pass);
+        let sign = condition.direction.sign();
+        let along = sign * self.lateral_force_from(&baseline, condition);
         let full = condition.mu0 * condition.normal_force_n;
-        let change = along - pass.direction * lateral_force(&baseline, &[], &pass, &self.design);
-        let contact = self.baseline.contact(&pass, &self.design);
+        let change = along - sign * lateral_force(&baseline, &[], condition, &self.design);
+        let contact = self.baseline.contact(condition, &self.design);
         let regime = if contact.amplitude_pp < crate::contact::STILL_PLATE_M || contact.load_ratio() >= 1.0 {
             Regime::FullContact
         } else if contact.drag() >= 1.0 {

@@ -1,7 +1,10 @@
 //! What a candidate effect is.
 
 use crate::contact::Contact;
-use crate::operating::{Design, Operating, Reading};
+use crate::operating::{Design, Reading};
+use models::condition::Condition;
+use models::covariate::{self, Covariate};
+use models::rig_file::CertifiedKey;
 use serde::Serialize;
 
 /// Where an effect sits.
@@ -16,6 +19,21 @@ pub enum Place {
     Plate,
     /// In a sensor, the stage, or the timing.
     Instrument,
+}
+
+impl Place {
+    /// Every place.
+    pub const ALL: [Place; 4] = [Place::Contact, Place::Finger, Place::Plate, Place::Instrument];
+
+    /// Its name in a verdict.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Place::Contact => "contact",
+            Place::Finger => "finger",
+            Place::Plate => "plate",
+            Place::Instrument => "instrument",
+        }
+    }
 }
 
 /// What the prior says about a parameter. The fit works in a coordinate `u` that is standard normal under it.
@@ -119,6 +137,19 @@ impl Parameter {
     }
 }
 
+/// How a law acts as a change of the baseline, exactly and on every pass: by e-folds of mu0, normal and lateral
+/// stiffness for one e-fold of the law's size.
+pub type Rescaling = [f64; 3];
+
+/// A check that sees a law's size without going through friction.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Check {
+    /// What to do, as an instruction.
+    pub action: &'static str,
+    /// Standard deviation of what it measures, in the unit of the law's size.
+    pub sd: f64,
+}
+
 /// One functional form of an effect. A cause may follow more than one; all are forms of ONE effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Law {
@@ -126,6 +157,48 @@ pub struct Law {
     pub name: &'static str,
     /// Its parameters, the size first.
     pub parameters: &'static [Parameter],
+    /// What a table must hold for this form beyond what its effect needs.
+    #[serde(skip_serializing_if = "<[Need]>::is_empty")]
+    pub needs: &'static [Need],
+    /// The certificate that bounds its size, in the size's own unit; none where no calibration measures it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certified_by: Option<CertifiedKey>,
+    /// The change of the baseline that does exactly the same, for laws that no table of passes tells from one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acts_as: Option<Rescaling>,
+    /// Effect and law that do the same for the same size but for a small rest: stated on one of the two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub same_as: Option<(&'static str, &'static str)>,
+    /// The check that sees it; none where only friction shows it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seen_by: Option<Check>,
+}
+
+impl Law {
+    /// A form with these parameters, the size first.
+    pub const fn new(name: &'static str, parameters: &'static [Parameter]) -> Self {
+        Self { name, parameters, needs: &[], certified_by: None, acts_as: None, same_as: None, seen_by: None }
+    }
+    /// A table must hold this too.
+    pub const fn needs(self, needs: &'static [Need]) -> Self {
+        Self { needs, ..self }
+    }
+    /// A certificate bounds the size.
+    pub const fn certified_by(self, key: CertifiedKey) -> Self {
+        Self { certified_by: Some(key), ..self }
+    }
+    /// For an e-fold of the size, a change of the baseline by these e-folds does the same.
+    pub const fn acts_as(self, rescaling: Rescaling) -> Self {
+        Self { acts_as: Some(rescaling), ..self }
+    }
+    /// A law of another effect does nearly the same.
+    pub const fn same_as(self, effect: &'static str, law: &'static str) -> Self {
+        Self { same_as: Some((effect, law)), ..self }
+    }
+    /// A check sees the size with this standard deviation.
+    pub const fn seen_by(self, action: &'static str, sd: f64) -> Self {
+        Self { seen_by: Some(Check { action, sd }), ..self }
+    }
 }
 
 /// What a table must hold before an effect can be seen on it.
@@ -146,15 +219,61 @@ pub enum Need {
     Positions,
     /// Passes spread over time.
     Time,
+    /// More than one frequency.
+    Frequencies,
+    /// More than one run.
+    Runs,
+    /// A temperature at every pass, and one that changes.
+    Temperatures,
     /// Signals within a pass: a run's record.
     Record,
-    /// A calibration against an outside standard (dead weight).
+    /// A calibration of the lateral axis against an outside standard (dead weight).
     OutsideStandard,
+    /// A calibration of the normal axis against an outside standard (dead weight).
+    NormalStandard,
+}
+
+impl Need {
+    /// Whether a calibration against an outside standard alone shows it: no table of passes does.
+    pub fn is_standard(self) -> bool {
+        matches!(self, Need::OutsideStandard | Need::NormalStandard)
+    }
+
+    /// What every condition must say for it, beyond what every table says.
+    pub fn covariate(self) -> Option<&'static Covariate> {
+        match self {
+            Need::Temperatures => Some(&covariate::TEMPERATURE),
+            _ => None,
+        }
+    }
+
+    /// What is missing from a table that does not meet it.
+    pub const fn missing(self) -> &'static str {
+        match self {
+            Need::Vibration => "no pass has the plate vibrating",
+            Need::Amplitudes => "a second amplitude is missing",
+            Need::Loads => "normal forces differ by less than a quarter: a second load is missing",
+            Need::Speeds => "speeds differ by less than a third: a second speed is missing",
+            Need::Directions => "only one direction was measured: passes in reverse are missing",
+            Need::Positions => "all passes lie at one position_m: a second place is missing",
+            Need::Time => "all passes carry one time_s",
+            Need::Frequencies => "all passes have one frequency: a second one is missing",
+            Need::Runs => "all passes are of one run: a second one is missing",
+            Need::Temperatures => "temperature_c is missing, or does not change",
+            Need::Record => "means over passes do not show it; a time-resolved run record is missing",
+            Need::OutsideStandard => {
+                "an exact alias of mu0 and lateral stiffness; a dead-weight certificate of the lateral axis is missing"
+            }
+            Need::NormalStandard => {
+                "an exact alias of mu0 and normal stiffness; a dead-weight certificate of the normal axis is missing"
+            }
+        }
+    }
 }
 
 /// A candidate cause of the gap. It nests the baseline: at the zero of its size nothing changes, bit for bit.
 pub trait Effect: Sync {
-    /// Name as the contract has it.
+    /// Name as docs/contract.md has it.
     fn name(&self) -> &'static str;
     /// Where it sits.
     fn place(&self) -> Place;
@@ -172,6 +291,22 @@ pub trait Effect: Sync {
     }
     /// What a table must hold before it can be seen.
     fn needs(&self) -> &'static [Need];
+    /// Effects that nearly do the same, and stand in for it where it is missing: stated on one of each two.
+    fn near(&self) -> &'static [&'static str] {
+        &[]
+    }
+    /// Effects of the library that together nearly do what this one does: as a pair they are not named.
+    fn imitated_by(&self) -> &'static [&'static str] {
+        &[]
+    }
+    /// The cause in words, as it stands in a sentence; its name where it is a name of the library.
+    fn words(&self) -> &'static str {
+        self.name()
+    }
+    /// Error of mu' by interpolation, root mean square; zero for what is evaluated directly.
+    fn interpolation_error(&self) -> f64 {
+        0.0
+    }
     /// Makes what [`Effect::change`] with these parameters will look up, so that a control loop makes nothing.
     fn prepare(&self, _law: usize, _theta: &[f64]) {}
     /// Changes what the contact is given. `theta` holds the parameters of the law in its order.
@@ -179,12 +314,12 @@ pub trait Effect: Sync {
         &self,
         _law: usize,
         _theta: &[f64],
-        _pass: &Operating,
+        _pass: &Condition,
         _design: &Design,
         _contact: &mut Contact,
     ) {
     }
     /// Changes what the instruments make of the friction force.
-    fn read(&self, _law: usize, _theta: &[f64], _pass: &Operating, _design: &Design, _reading: &mut Reading) {
+    fn read(&self, _law: usize, _theta: &[f64], _pass: &Condition, _design: &Design, _reading: &mut Reading) {
     }
 }

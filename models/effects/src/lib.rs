@@ -1,103 +1,51 @@
-//! Candidate effects: what may part reality from the baseline model, one file each.
+//! Candidate effects: what may part reality from the baseline model.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`library`] | the candidate causes, one file each, with the facts that others need of them |
+//! | [`effect`] | what a cause is: place, laws, parameters with their priors, needs, aliases, checks |
+//! | [`contact`] | the one contact that every cause acts on, and its solvers |
+//! | [`operating`] | one pass as the table has it; the baseline and the reading |
+//! | [`predict`] | the lateral force of a pass under the baseline and any effects |
+//! | [`corrected`] | the corrected model that a run loads |
+//! | [`listing`] | the library as data |
 //!
 //! An effect changes what the contact is given ([`contact::Contact`]) or what the instruments make of the
 //! force ([`operating::Reading`]); the contact itself is solved in one place. Effects therefore combine, and
-//! each nests the baseline exactly. To add one: a file, and one line in [`library`]'s list.
+//! each nests the baseline exactly. To add one: a file in `library/`, and its line in [`library`]'s list.
+//!
+//! ```
+//! use models::condition::Condition;
+//! use muprime_effects::{Active, Baseline, Design, by_name, lateral_force};
+//!
+//! let baseline = Baseline { mu0: 0.5, normal_stiffness_n_per_m: 3.9e6, lateral_stiffness_n_per_m: 1.5e6 };
+//! let design = Design {
+//!     duration_s: 60.0,
+//!     reference_load_n: 0.25,
+//!     reference_speed_m_s: 0.02,
+//!     reference_frequency_hz: 27_500.0,
+//!     reference_temperature_c: 20.0,
+//!     stroke_m: 0.0,
+//!     largest_amplitude_m: 2e-6,
+//! };
+//! let pass = Condition::paper();
+//! let effect = by_name("amplitude_miscalibration").ok_or("no effect of that name")?;
+//! // The plate moves by half of what was asked: friction falls less.
+//! let half = [Active { effect, law: 0, theta: &[0.5_f64.ln()] }];
+//! let expected = lateral_force(&baseline, &[], &pass, &design);
+//! assert!(lateral_force(&baseline, &half, &pass, &design) > expected);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
-pub mod asperities;
 pub mod contact;
 pub mod corrected;
 pub mod effect;
-pub mod impact;
+pub mod library;
 pub mod listing;
 pub mod operating;
 pub mod predict;
-pub mod sweep;
 
-pub mod adhesion;
-pub mod amplitude_droop;
-pub mod amplitude_miscalibration;
-pub mod amplitude_saturation;
-pub mod contact_ageing;
-pub mod force_crosstalk;
-pub mod frictional_heating;
-pub mod lateral_gain;
-pub mod lateral_offset_drift;
-pub mod lateral_recovery;
-pub mod load_dependent_friction;
-pub mod mode_shape;
-pub mod moisture_drift;
-pub mod multi_asperity;
-pub mod normal_damping;
-pub mod normal_offset;
-pub mod plate_tilt;
-pub mod rate_dependent_friction;
-pub mod resonance_detuning;
-pub mod ridge_inertia;
-pub mod sensor_lag;
-pub mod speed_error;
-pub mod speed_ripple;
-pub mod squeeze_film;
-pub mod stiffness_error;
-pub mod subsurface_relaxation;
-pub mod time_misalignment;
-
-pub use effect::{Effect, Law, Need, Parameter, Place, Prior};
-pub use operating::{Baseline, Design, Operating, Reading};
+pub use effect::{Check, Effect, Law, Need, Parameter, Place, Prior};
+pub use library::{by_name, imitated, known, library, near, one_cause, twins};
+pub use operating::{Baseline, Design, Reading};
 pub use predict::{Active, lateral_force};
-
-/// What every effect's file needs.
-mod prelude {
-    pub use crate::contact::Contact;
-    pub use crate::effect::{Effect, Law, Need, Parameter, Place};
-    pub use crate::operating::{Design, Operating, Reading, atmospheres};
-}
-
-/// Every effect of the library, in the order in which a signal passes them: instruments that falsify the
-/// condition first, then plate, finger and contact.
-pub fn library() -> &'static [&'static dyn Effect] {
-    &KNOWN[..LIBRARY]
-}
-
-/// Number of effects in the library.
-const LIBRARY: usize = 26;
-
-/// The library, and after it causes of known form that it does not name: a diagnosis' open set takes them in.
-pub fn known() -> &'static [&'static dyn Effect] {
-    &KNOWN
-}
-
-static KNOWN: [&dyn Effect; LIBRARY + 1] = [
-    &normal_offset::NormalOffset,
-    &speed_error::SpeedError,
-    &speed_ripple::SpeedRipple,
-    &amplitude_miscalibration::AmplitudeMiscalibration,
-    &amplitude_saturation::AmplitudeSaturation,
-    &resonance_detuning::ResonanceDetuning,
-    &mode_shape::ModeShape,
-    &amplitude_droop::AmplitudeDroop,
-    &stiffness_error::StiffnessError,
-    &subsurface_relaxation::SubsurfaceRelaxation,
-    &moisture_drift::MoistureDrift,
-    &rate_dependent_friction::RateDependentFriction,
-    &load_dependent_friction::LoadDependentFriction,
-    &adhesion::Adhesion,
-    &multi_asperity::MultiAsperity,
-    &normal_damping::NormalDamping,
-    &lateral_recovery::LateralRecovery,
-    &contact_ageing::ContactAgeing,
-    &ridge_inertia::RidgeInertia,
-    &squeeze_film::SqueezeFilm,
-    &plate_tilt::PlateTilt,
-    &force_crosstalk::ForceCrosstalk,
-    &lateral_gain::LateralGain,
-    &lateral_offset_drift::LateralOffsetDrift,
-    &sensor_lag::SensorLag,
-    &time_misalignment::TimeMisalignment,
-    &frictional_heating::FrictionalHeating,
-];
-
-/// The effect of that name.
-pub fn by_name(name: &str) -> Option<&'static dyn Effect> {
-    library().iter().copied().find(|effect| effect.name() == name)
-}

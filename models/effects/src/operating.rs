@@ -1,33 +1,7 @@
-//! One pass as the table has it, and what the whole design says about scales.
+//! The baseline's parameters, what the whole design says about scales, and what a reading is.
 
 use crate::contact::Contact;
-
-/// The condition of one pass as measured. SI units; a covariate that was not measured is `None`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Operating {
-    /// Start of the pass from the start of the table, s.
-    pub time_s: f64,
-    /// Start of the pass from the first pass of its run, s (equal to `time_s` where runs are not told apart).
-    pub run_time_s: f64,
-    /// Commanded amplitude, peak to peak, m.
-    pub amplitude_pp_m: f64,
-    /// Vibration frequency, Hz.
-    pub frequency_hz: f64,
-    /// Commanded speed (magnitude), m/s.
-    pub speed_m_s: f64,
-    /// Direction of travel, 1 or -1.
-    pub direction: f64,
-    /// Mean position along the plate, m.
-    pub position_m: f64,
-    /// Measured mean normal force, N.
-    pub normal_force_n: f64,
-    /// Ambient pressure, Pa.
-    pub ambient_pressure_pa: Option<f64>,
-    /// Temperature of the plate, degrees Celsius.
-    pub temperature_c: Option<f64>,
-    /// Relative humidity, per cent.
-    pub relative_humidity_pct: Option<f64>,
-}
+use models::condition::Condition;
 
 /// Reference scales of a whole table: effects that need a zero of time, load or temperature take it from here.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -72,12 +46,12 @@ pub struct Reading {
 
 impl Baseline {
     /// The contact that this baseline gives a pass before any effect.
-    pub fn contact(&self, pass: &Operating, design: &Design) -> Contact {
+    pub fn contact(&self, pass: &Condition, design: &Design) -> Contact {
         Contact {
             mu0: self.mu0,
             normal_stiffness: self.normal_stiffness_n_per_m,
             lateral_stiffness: self.lateral_stiffness_n_per_m,
-            amplitude_pp: pass.amplitude_pp_m,
+            amplitude_pp: pass.amplitude.metres(),
             frequency: pass.frequency_hz,
             speed: pass.speed_m_s,
             normal_force: pass.normal_force_n,
@@ -95,7 +69,7 @@ impl Baseline {
             bonding_time: 0.0,
             bonding_exponent: 1.0,
             asperity_height: 0.0,
-            asperity_heights: crate::asperities::Heights::Gaussian,
+            asperity_heights: crate::contact::asperities::Heights::Gaussian,
             normal_retardation_time: 0.0,
             mass: 0.0,
             ridge_damping_ratio: 1.0,
@@ -104,12 +78,12 @@ impl Baseline {
     }
 
     /// Signed mean lateral force of the baseline, N.
-    pub fn lateral_force(&self, pass: &Operating, design: &Design) -> f64 {
-        pass.direction * crate::contact::mean_friction(&self.contact(pass, design))
+    pub fn lateral_force(&self, pass: &Condition, design: &Design) -> f64 {
+        pass.direction.sign() * crate::contact::mean_friction(&self.contact(pass, design))
     }
 }
 
 /// Pressure in units of one standard atmosphere; one where it was not measured.
-pub fn atmospheres(pass: &Operating) -> f64 {
+pub fn atmospheres(pass: &Condition) -> f64 {
     pass.ambient_pressure_pa.map_or(1.0, |p| p / 101_325.0)
 }

@@ -2,7 +2,8 @@
 
 use crate::contact::mean_friction;
 use crate::effect::Effect;
-use crate::operating::{Baseline, Design, Operating, Reading};
+use crate::operating::{Baseline, Design, Reading};
+use models::condition::Condition;
 
 /// An effect with the law and parameters at which it acts.
 #[derive(Clone, Copy)]
@@ -15,15 +16,16 @@ pub struct Active<'a> {
     pub theta: &'a [f64],
 }
 
-/// Signed mean lateral force that the sensor reads, N. Effects act in the library's order; allocates nothing.
-pub fn lateral_force(baseline: &Baseline, effects: &[Active<'_>], pass: &Operating, design: &Design) -> f64 {
+/// Signed mean lateral force that the sensor reads, N. Effects act in the library's order; allocates nothing. The
+/// friction coefficient is the baseline's, not the condition's.
+pub fn lateral_force(baseline: &Baseline, effects: &[Active<'_>], pass: &Condition, design: &Design) -> f64 {
     let mut contact = baseline.contact(pass, design);
     let mut reading = Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 };
     for active in effects {
         active.effect.change(active.law, active.theta, pass, design, &mut contact);
         active.effect.read(active.law, active.theta, pass, design, &mut reading);
     }
-    let friction = pass.direction * mean_friction(&contact);
+    let friction = pass.direction.sign() * mean_friction(&contact);
     if reading == (Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 }) {
         return friction;
     }

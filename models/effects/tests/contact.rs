@@ -1,8 +1,10 @@
 //! The contact solver against figures that an independent time-domain simulation printed.
-use muprime_effects::asperities::Heights;
+use models::condition::Condition;
+use models::quantity::PeakToPeak;
+use muprime_effects::contact::asperities::Heights;
+use muprime_effects::contact::impact::{Bouncing, LANDINGS, STATED_ERROR};
 use muprime_effects::contact::{Attraction, Contact, mean_friction};
-use muprime_effects::impact::{Bouncing, LANDINGS, STATED_ERROR};
-use muprime_effects::{Baseline, Design, Operating};
+use muprime_effects::{Baseline, Design};
 use std::f64::consts::PI;
 
 const DESIGN: Design = Design {
@@ -15,19 +17,12 @@ const DESIGN: Design = Design {
     largest_amplitude_m: 5e-6,
 };
 
-fn pass(amplitude_pp_m: f64, speed_m_s: f64, normal_force_n: f64) -> Operating {
-    Operating {
-        time_s: 0.0,
-        run_time_s: 0.0,
-        amplitude_pp_m,
-        frequency_hz: 27_500.0,
+fn pass(amplitude_pp_m: f64, speed_m_s: f64, normal_force_n: f64) -> Condition {
+    Condition {
+        amplitude: PeakToPeak::from_metres(amplitude_pp_m),
         speed_m_s,
-        direction: 1.0,
-        position_m: 0.0,
         normal_force_n,
-        ambient_pressure_pa: None,
-        temperature_c: None,
-        relative_humidity_pct: None,
+        ..Condition::paper()
     }
 }
 

@@ -1,16 +1,18 @@
 //! Every effect nests the baseline: at the zero of its size the prediction is the baseline's, bit for bit.
-use muprime_effects::{Active, Baseline, Design, Operating, known, library};
+use models::condition::Condition;
+use models::quantity::{Direction, PeakToPeak};
+use muprime_effects::{Active, Baseline, Design, known, library};
 
-fn passes() -> Vec<Operating> {
+fn passes() -> Vec<Condition> {
     let mut list = Vec::new();
     for (i, w) in [0.0, 0.1e-6, 0.8e-6, 2e-6, 5e-6].into_iter().enumerate() {
         for (j, u) in [2e-3, 0.02, 0.2].into_iter().enumerate() {
             for f in [0.15, 0.8] {
-                for direction in [1.0, -1.0] {
-                    list.push(Operating {
+                for direction in [Direction::Forward, Direction::Backward] {
+                    list.push(Condition {
                         time_s: 37.0 * i as f64,
-                        run_time_s: 11.0 * j as f64,
-                        amplitude_pp_m: w,
+                        run_time_s: Some(11.0 * j as f64),
+                        amplitude: PeakToPeak::from_metres(w),
                         frequency_hz: if j == 1 { 25_000.0 } else { 41_000.0 },
                         speed_m_s: u,
                         direction,
@@ -18,6 +20,7 @@ fn passes() -> Vec<Operating> {
                         normal_force_n: f,
                         ambient_pressure_pa: Some(50_000.0),
                         temperature_c: Some(20.0 + i as f64),
+                        mu0: 0.6,
                         relative_humidity_pct: None,
                     });
                 }
@@ -100,13 +103,15 @@ fn small_sizes_are_continuous_and_all_predictions_finite() {
 }
 
 #[test]
-fn every_name_of_the_contract_is_there_once() {
+fn every_name_of_the_contract_and_each_added_one_is_there_once() {
     let contract = "squeeze_film lateral_recovery ridge_inertia normal_damping load_dependent_friction \
         contact_ageing rate_dependent_friction adhesion moisture_drift multi_asperity subsurface_relaxation \
         stiffness_error amplitude_miscalibration amplitude_droop amplitude_saturation resonance_detuning \
         mode_shape force_crosstalk lateral_offset_drift lateral_gain normal_offset plate_tilt sensor_lag \
         time_misalignment speed_error speed_ripple";
-    let mut wanted: Vec<&str> = contract.split_whitespace().collect();
+    // The contract lets further effects be added.
+    let added = ["normal_gain"];
+    let mut wanted: Vec<&str> = contract.split_whitespace().chain(added).collect();
     let mut names: Vec<&str> = library().iter().map(|e| e.name()).collect();
     wanted.sort_unstable();
     names.sort_unstable();

@@ -1,7 +1,8 @@
 //! The point table as CSV: read with the place of every fault, written with all digits.
 
 use super::Pass;
-use crate::quantity::{Direction, PeakToPeak};
+use crate::condition::Condition;
+use crate::covariate::{self, Covariate};
 use std::io::{Read, Write};
 
 /// What is wrong with a table, and where.
@@ -38,53 +39,38 @@ pub enum TableError {
     Malformed(#[from] csv::Error),
 }
 
-const REQUIRED: [&str; 8] = [
-    "point",
-    "time_s",
-    "amplitude_pp_m",
-    "frequency_hz",
-    "speed_m_s",
-    "direction",
-    "position_m",
-    "normal_force_n",
-];
-const OPTIONAL: [&str; 10] = [
-    "lateral_force_n",
-    "normal_force_sd_n",
-    "lateral_force_sd_n",
-    "samples",
-    "ambient_pressure_pa",
-    "temperature_c",
-    "relative_humidity_pct",
-    "phase_shift_deg",
-    "replicate",
-    "run",
+/// Columns of numbers that are no covariates, with the range of each and what is needed.
+const NUMBERS: [(&str, [f64; 2], &str); 4] = [
+    ("lateral_force_n", [-500.0, 500.0], "a number of newtons, -500 to 500"),
+    ("normal_force_sd_n", [0.0, 500.0], "a number of newtons, zero to 500"),
+    ("lateral_force_sd_n", [0.0, 500.0], "a number of newtons, zero to 500"),
+    ("phase_shift_deg", [-3600.0, 3600.0], "an angle in degrees, at most ten turns"),
 ];
 
-/// Where each known column stands in a file.
-struct Columns {
-    required: [usize; REQUIRED.len()],
-    optional: [Option<usize>; OPTIONAL.len()],
-}
+/// A header, and where each of its columns stands.
+struct Columns(csv::StringRecord);
 
 impl Columns {
-    fn of(header: &csv::StringRecord) -> Result<Self, TableError> {
-        let find = |name: &str| -> Result<Option<usize>, TableError> {
-            let mut at = header.iter().enumerate().filter(|(_, h)| h.trim() == name).map(|(i, _)| i);
-            match (at.next(), at.next()) {
-                (Some(_), Some(_)) => Err(TableError::DoubleColumn(name.to_string())),
-                (first, _) => Ok(first),
+    /// Takes a header in which every column that a table must have stands, and none twice.
+    fn of(header: csv::StringRecord) -> Result<Self, TableError> {
+        let columns = Columns(header);
+        let required = covariate::REQUIRED.iter().map(|c| c.name);
+        for name in std::iter::once("point").chain(required) {
+            columns.place(name).ok_or(TableError::MissingColumn(name))?;
+        }
+        let optional = covariate::OPTIONAL.iter().map(|c| c.name);
+        let known =
+            ["point", "samples", "replicate", "run", "session"].into_iter().chain(NUMBERS.map(|n| n.0));
+        for name in known.chain(covariate::REQUIRED.iter().map(|c| c.name)).chain(optional) {
+            if columns.0.iter().filter(|h| h.trim() == name).count() > 1 {
+                return Err(TableError::DoubleColumn(name.to_string()));
             }
-        };
-        let mut required = [0; REQUIRED.len()];
-        for (slot, name) in required.iter_mut().zip(REQUIRED) {
-            *slot = find(name)?.ok_or(TableError::MissingColumn(name))?;
         }
-        let mut optional = [None; OPTIONAL.len()];
-        for (slot, name) in optional.iter_mut().zip(OPTIONAL) {
-            *slot = find(name)?;
-        }
-        Ok(Columns { required, optional })
+        Ok(columns)
+    }
+
+    fn place(&self, name: &str) -> Option<usize> {
+        self.0.iter().position(|h| h.trim() == name)
     }
 }
 
@@ -100,87 +86,66 @@ impl Row<'_> {
         TableError::BadCell { line: self.line, column, text: text.to_string(), needed }
     }
 
-    fn required(&self, i: usize) -> Result<&str, TableError> {
-        match self.cells.get(self.columns.required[i]).map(str::trim) {
-            Some(text) if !text.is_empty() => Ok(text),
-            _ => Err(TableError::EmptyCell { line: self.line, column: REQUIRED[i] }),
-        }
-    }
-
-    fn optional(&self, i: usize) -> Option<&str> {
-        let cell = self.columns.optional[i].and_then(|at| self.cells.get(at))?;
+    fn cell(&self, column: &str) -> Option<&str> {
+        let cell = self.cells.get(self.columns.place(column)?)?;
         Some(cell.trim()).filter(|text| !text.is_empty())
     }
 
-    fn number(&self, i: usize, ok: fn(f64) -> bool, needed: &'static str) -> Result<f64, TableError> {
-        let text = self.required(i)?;
+    fn required(&self, column: &'static str) -> Result<&str, TableError> {
+        self.cell(column).ok_or(TableError::EmptyCell { line: self.line, column })
+    }
+
+    fn parsed(
+        &self,
+        text: &str,
+        column: &'static str,
+        ok: impl Fn(f64) -> bool,
+        needed: &'static str,
+    ) -> Result<f64, TableError> {
         match text.parse::<f64>() {
             Ok(v) if v.is_finite() && ok(v) => Ok(v),
-            _ => Err(self.bad(REQUIRED[i], text, needed)),
+            _ => Err(self.bad(column, text, needed)),
         }
     }
 
-    fn maybe_number(
-        &self,
-        i: usize,
-        ok: fn(f64) -> bool,
-        needed: &'static str,
-    ) -> Result<Option<f64>, TableError> {
-        self.optional(i)
-            .map(|text| match text.parse::<f64>() {
-                Ok(v) if v.is_finite() && ok(v) => Ok(v),
-                _ => Err(self.bad(OPTIONAL[i], text, needed)),
-            })
-            .transpose()
+    fn covariate(&self, c: &'static Covariate, text: &str) -> Result<f64, TableError> {
+        let unit = |v: f64| c.name != covariate::DIRECTION.name || v.abs() == 1.0;
+        self.parsed(text, c.name, |v| c.admits(v) && unit(v), c.needed)
     }
 
-    fn maybe_count(&self, i: usize) -> Result<Option<u64>, TableError> {
-        let parse = |text: &str| text.parse().map_err(|_| self.bad(OPTIONAL[i], text, "a whole number"));
-        self.optional(i).map(parse).transpose()
+    fn number(&self, column: &str) -> Result<Option<f64>, TableError> {
+        let (name, [low, high], needed) =
+            *NUMBERS.iter().find(|n| n.0 == column).expect("a column of numbers");
+        let within = |v: f64| v >= low && v <= high;
+        self.cell(name).map(|text| self.parsed(text, name, within, needed)).transpose()
     }
 
-    fn direction(&self) -> Result<Direction, TableError> {
-        let text = self.required(5)?;
-        let number = text.parse::<f64>().ok();
-        match number {
-            Some(1.0) => Ok(Direction::Forward),
-            Some(-1.0) => Ok(Direction::Backward),
-            _ => Err(self.bad("direction", text, "1 or -1")),
-        }
+    fn count(&self, column: &'static str) -> Result<Option<u64>, TableError> {
+        let parse = |text: &str| text.parse().map_err(|_| self.bad(column, text, "a whole number"));
+        self.cell(column).map(parse).transpose()
     }
 
     fn pass(&self) -> Result<Pass, TableError> {
-        const ANY: fn(f64) -> bool = |_| true;
-        const NOT_NEGATIVE: fn(f64) -> bool = |v| v >= 0.0;
-        const POSITIVE: fn(f64) -> bool = |v| v > 0.0;
-        let point = self.required(0)?;
+        let point = self.required("point")?;
+        let point = point.parse().map_err(|_| self.bad("point", point, "a whole number"))?;
+        let mut condition = Condition::paper();
+        for c in covariate::REQUIRED {
+            c.put(&mut condition, self.covariate(c, self.required(c.name)?)?);
+        }
+        for c in covariate::OPTIONAL {
+            if let Some(text) = self.cell(c.name) {
+                c.put(&mut condition, self.covariate(c, text)?);
+            }
+        }
         Ok(Pass {
-            point: point.parse().map_err(|_| self.bad("point", point, "a whole number"))?,
-            time_s: self.number(1, ANY, "a number")?,
-            amplitude: PeakToPeak::from_metres(self.number(
-                2,
-                NOT_NEGATIVE,
-                "a number of metres, zero or more",
-            )?),
-            frequency_hz: self.number(3, POSITIVE, "a number of hertz above zero")?,
-            speed_m_s: self.number(
-                4,
-                NOT_NEGATIVE,
-                "a speed in m/s, zero or more (the sign is 'direction')",
-            )?,
-            direction: self.direction()?,
-            position_m: self.number(6, ANY, "a number of metres")?,
-            normal_force_n: self.number(7, ANY, "a number of newtons")?,
-            lateral_force_n: self.maybe_number(0, ANY, "a number of newtons")?,
-            normal_force_sd_n: self.maybe_number(1, NOT_NEGATIVE, "a number of newtons, zero or more")?,
-            lateral_force_sd_n: self.maybe_number(2, NOT_NEGATIVE, "a number of newtons, zero or more")?,
-            samples: self.maybe_count(3)?,
-            ambient_pressure_pa: self.maybe_number(4, NOT_NEGATIVE, "a pressure in Pa, zero or more")?,
-            temperature_c: self.maybe_number(5, ANY, "a temperature in degrees Celsius")?,
-            relative_humidity_pct: self.maybe_number(6, NOT_NEGATIVE, "a percentage")?,
-            phase_shift_deg: self.maybe_number(7, ANY, "an angle in degrees")?,
-            replicate: self.maybe_count(8)?,
-            run: self.optional(9).map(str::to_string),
+            normal_force_sd_n: self.number("normal_force_sd_n")?,
+            lateral_force_sd_n: self.number("lateral_force_sd_n")?,
+            samples: self.count("samples")?,
+            phase_shift_deg: self.number("phase_shift_deg")?,
+            replicate: self.count("replicate")?,
+            run: self.cell("run").map(str::to_string),
+            session: self.count("session")?,
+            ..Pass::at(point, &condition, self.number("lateral_force_n")?)
         })
     }
 }
@@ -199,7 +164,7 @@ pub fn read_passes(from: impl Read) -> Result<Vec<Pass>, TableError> {
         names[0] = first.to_string();
         header = csv::StringRecord::from(names);
     }
-    let columns = Columns::of(&header)?;
+    let columns = Columns::of(header)?;
     let mut passes = Vec::new();
     for record in reader.records() {
         let cells = record?;
@@ -216,7 +181,11 @@ pub fn read_passes(from: impl Read) -> Result<Vec<Pass>, TableError> {
 /// Whatever the writer says.
 pub fn write_passes(passes: &[Pass], to: impl Write) -> Result<(), TableError> {
     let mut writer = csv::Writer::from_writer(to);
-    writer.write_record(REQUIRED.iter().chain(&OPTIONAL))?;
+    let before = ["lateral_force_n", "normal_force_sd_n", "lateral_force_sd_n", "samples"];
+    let after = ["phase_shift_deg", "replicate", "run"];
+    let required = std::iter::once("point").chain(covariate::REQUIRED.iter().map(|c| c.name));
+    let optional = covariate::OPTIONAL.iter().map(|c| c.name);
+    writer.write_record(required.chain(before).chain(optional).chain(after))?;
     for pass in passes {
         writer.write_record(cells(pass))?;
     }
@@ -224,39 +193,35 @@ pub fn write_passes(passes: &[Pass], to: impl Write) -> Result<(), TableError> {
     Ok(())
 }
 
-/// The cells of a row, in the order of [`header`].
-fn cells(p: &Pass) -> [String; REQUIRED.len() + OPTIONAL.len()] {
-    fn number(v: Option<f64>) -> String {
-        v.map(|v| v.to_string()).unwrap_or_default()
+/// The cells of a row, in the order of the header.
+fn cells(p: &Pass) -> Vec<String> {
+    fn text<T: ToString>(value: Option<T>) -> String {
+        value.map(|v| v.to_string()).unwrap_or_default()
     }
-    fn count(v: Option<u64>) -> String {
-        v.map(|v| v.to_string()).unwrap_or_default()
-    }
-    [
-        p.point.to_string(),
-        p.time_s.to_string(),
-        format!("{:e}", p.amplitude.metres()),
-        p.frequency_hz.to_string(),
-        p.speed_m_s.to_string(),
-        i8::from(p.direction).to_string(),
-        p.position_m.to_string(),
-        p.normal_force_n.to_string(),
-        number(p.lateral_force_n),
-        number(p.normal_force_sd_n),
-        number(p.lateral_force_sd_n),
-        count(p.samples),
-        number(p.ambient_pressure_pa),
-        number(p.temperature_c),
-        number(p.relative_humidity_pct),
-        number(p.phase_shift_deg),
-        count(p.replicate),
+    let condition = p.condition(1.0);
+    let covariate = |c: &&Covariate| match c.of(&condition) {
+        // Micrometres in metres are mostly zeros.
+        Some(v) if c.name == covariate::AMPLITUDE.name => format!("{v:e}"),
+        value => text(value),
+    };
+    let mut cells = vec![p.point.to_string()];
+    cells.extend(covariate::REQUIRED.iter().map(covariate));
+    cells.extend([p.lateral_force_n, p.normal_force_sd_n, p.lateral_force_sd_n].map(text));
+    cells.push(text(p.samples));
+    cells.extend(covariate::OPTIONAL.iter().map(covariate));
+    cells.extend([
+        text(p.phase_shift_deg),
+        text(p.replicate),
         p.run.clone().unwrap_or_default(),
-    ]
+        text(p.session),
+    ]);
+    cells
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::quantity::Direction;
 
     const HEAD: &str = "point,time_s,amplitude_pp_m,frequency_hz,speed_m_s,direction,position_m,normal_force_n,lateral_force_n";
 
@@ -265,6 +230,7 @@ mod tests {
         let mut pass = Pass::at(7, &crate::condition::Condition::paper(), Some(-0.123_456_789_012_345_6));
         pass.replicate = Some(3);
         pass.run = Some("a, \"b\"".into());
+        pass.session = Some(2);
         let mut bytes = Vec::new();
         write_passes(std::slice::from_ref(&pass), &mut bytes).unwrap();
         assert_eq!(read_passes(&bytes[..]).unwrap(), [pass]);

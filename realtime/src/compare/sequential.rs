@@ -15,11 +15,15 @@ pub const ALARM_LEVEL: f64 = 0.005;
 const SHIFT_SD: f64 = 1.0;
 /// Scatters, in sd of a pass, that scatter bets are placed on.
 const SCATTERS: [f64; 3] = [1.5, 2.0, 4.0];
-const CAP: f64 = 4.0;
+/// Residuals beyond so many standard deviations count as so many.
+pub(super) const CAP: f64 = 4.0;
 
 /// Directions in which a departure may pull: the same way always, with the sliding direction, with the
 /// amplitude, with the speed.
 const PULLS: usize = 4;
+
+/// Number of bets that are averaged.
+pub(super) const BETS: usize = PULLS + SCATTERS.len();
 
 /// The running evidence.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +72,7 @@ impl Sequential {
             let spread = 1.0 + v * self.information[i];
             0.5 * (v * self.score[i] * self.score[i] / spread - spread.ln())
         };
-        let mut bets = [0.0; PULLS + SCATTERS.len()];
+        let mut bets = [0.0; BETS];
         for (i, bet) in bets.iter_mut().enumerate() {
             *bet = if i < PULLS { shift(i) } else { self.log_scatter[i - PULLS] };
         }

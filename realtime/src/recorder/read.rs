@@ -1,9 +1,15 @@
 //! Reading a record from its beginning, entry by entry, in memory that does not depend on its length.
 
-use mcap::records::{Record, op};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use std::collections::BTreeMap;
-use std::io::{Cursor, Read};
+use super::integrity::Integrity;
+use super::{RECOVERED, TOPICS, TRAILER, WRITTEN};
+use chunk::Message;
+use mcap::records::op;
+use sound::{Sound, known, may_begin, sound};
+use std::collections::{BTreeMap, VecDeque};
+use std::io::{Read, Seek, SeekFrom};
+
+mod chunk;
+mod sound;
 
 /// Something that a record holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -12,20 +18,24 @@ pub enum Entry {
     Facts {
         /// Its name.
         name: String,
-        /// What it says.
+        /// What it says, without its checksum.
         facts: BTreeMap<String, String>,
     },
     /// An attached file.
     File {
         /// Its name.
         name: String,
+        /// When it was attached, in ns since 1970.
+        time_ns: u64,
         /// Its contents.
         bytes: Vec<u8>,
     },
     /// A message.
     Message {
         /// Its topic.
-        topic: String,
+        topic: &'static str,
+        /// Its number within its topic, from 1.
+        number: u32,
         /// Log time in ns since 1970.
         log_time: u64,
         /// JSON text.
@@ -33,269 +43,348 @@ pub enum Entry {
     },
 }
 
-/// Reads whatever a record still holds, in the order it was written. Never panics, never invents: a chunk whose checksum
-/// fails ends the reading.
+/// Longest record of the format that is read, in bytes.
+const LONGEST: u64 = 64 << 20;
+/// Length of an opcode and the length that follows it.
+const HEAD: usize = 9;
+/// Bytes that are looked through at once for the next good record.
+const WINDOW: usize = 64 * 1024;
+
+/// Reads whatever a record still holds, in the order it was written. Never panics, never invents: what a checksum does not
+/// vouch for is left out and noted in [`Reader::integrity`], and reading goes on behind it.
 pub struct Reader<R> {
     from: R,
-    linear: LinearReader,
-    /// The chunk that is being read.
-    chunk: Option<Box<Chunk>>,
-    channels: BTreeMap<u16, String>,
-    only: Option<&'static str>,
-    ended: bool,
-    /// Nothing more comes.
-    over: bool,
-    cut: Option<String>,
-    damaged: u64,
+    /// Where the next record of the format begins.
+    at: u64,
+    part: Part,
+    body: Vec<u8>,
+    messages: VecDeque<Message>,
+    wanted: Wanted,
+    /// Number of the last message of every topic.
+    last: [u32; TOPICS.len()],
+    /// Of the data so far, then of the index; `None` once something was left out.
+    checksum: Option<crc32fast::Hasher>,
+    found: Integrity,
 }
 
-impl<R: Read> Reader<R> {
+/// Which part of the file comes next.
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    Magic,
+    Data,
+    Index,
+    Over,
+}
+
+/// Topics whose messages are given out.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Wanted {
+    All,
+    Only(&'static str),
+    None,
+}
+
+/// Why a record of the format could not be read.
+enum Trouble {
+    /// The file ends within it.
+    Short,
+    Bad(String),
+}
+
+impl<R: Read + Seek> Reader<R> {
     /// A reader at the beginning of a record.
     pub fn new(from: R) -> Self {
-        let options = LinearReaderOptions::default().with_emit_chunks(true).with_record_length_limit(LONGEST);
         Reader {
             from,
-            linear: LinearReader::new_with_options(options),
-            chunk: None,
-            channels: BTreeMap::new(),
-            only: None,
-            ended: false,
-            over: false,
-            cut: None,
-            damaged: 0,
+            at: 0,
+            part: Part::Magic,
+            body: Vec::new(),
+            messages: VecDeque::new(),
+            wanted: Wanted::All,
+            last: [0; TOPICS.len()],
+            checksum: Some(crc32fast::Hasher::new()),
+            found: Integrity::default(),
         }
     }
 
-    /// Passes over messages of other topics than `topic`, unseen.
+    /// Passes over messages of other topics than `topic`: they are checked, not given out.
     #[must_use]
     pub fn only(mut self, topic: &'static str) -> Self {
-        self.only = Some(topic);
+        self.wanted = Wanted::Only(topic);
         self
     }
 
-    /// Why reading ended before a proper end, if it did; known once there are no more entries.
-    pub fn cut(&self) -> Option<&str> {
-        self.cut.as_deref()
+    /// Checks the messages and gives none out.
+    #[must_use]
+    pub(super) fn no_messages(mut self) -> Self {
+        self.wanted = Wanted::None;
+        self
     }
 
-    /// Messages so far that are no longer what was written (their JSON does not parse): dropped and counted.
-    pub fn damaged(&self) -> u64 {
-        self.damaged
+    /// What was found to be other than it was written; known once there are no more entries.
+    pub fn integrity(&self) -> &Integrity {
+        &self.found
+    }
+
+    /// Reads up to `wanted` bytes into the body; whether there were as many.
+    fn fill(&mut self, wanted: u64) -> std::io::Result<bool> {
+        self.body.clear();
+        Ok((&mut self.from).take(wanted).read_to_end(&mut self.body)? as u64 == wanted)
+    }
+
+    /// Reads the head of a record of the format: opcode, length, and the bytes themselves. `None` at the end of the file.
+    fn head(&mut self) -> std::io::Result<Result<Option<(u8, u64, [u8; HEAD])>, Trouble>> {
+        if !self.fill(HEAD as u64)? {
+            return Ok(if self.body.is_empty() { Ok(None) } else { Err(Trouble::Short) });
+        }
+        let head: [u8; HEAD] = self.body[..].try_into().expect("as many bytes as were asked for");
+        let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
+        Ok(Ok(Some((head[0], length, head))))
+    }
+
+    /// Reads the record of the format that begins here; `None` at the end of the file.
+    fn record(&mut self) -> Result<Option<(Sound, [u8; HEAD])>, Trouble> {
+        let bad = |e: std::io::Error| Trouble::Bad(e.to_string());
+        let Some((opcode, length, head)) = self.head().map_err(bad)?? else { return Ok(None) };
+        if !known(opcode) {
+            return Err(Trouble::Bad(format!("no record is of the kind {opcode:#04x}")));
+        }
+        if length > LONGEST {
+            return Err(Trouble::Bad(format!("a record of {length} bytes is longer than any")));
+        }
+        if !self.fill(length).map_err(bad)? {
+            return Err(Trouble::Short);
+        }
+        sound(opcode, &self.body, self.wanted).map(|sound| Some((sound, head))).map_err(Trouble::Bad)
+    }
+
+    fn seek(&mut self, to: u64) -> Result<(), Trouble> {
+        self.from.seek(SeekFrom::Start(to)).map(|_| ()).map_err(|e| Trouble::Bad(e.to_string()))
+    }
+
+    /// The next place from `from` on where a sound record begins, by its checksum or by its form alone where it is the mark of the
+    /// data's end.
+    fn next_sound(&mut self, from: u64) -> Option<u64> {
+        let mut window = Vec::with_capacity(WINDOW);
+        let mut base = from;
+        loop {
+            self.seek(base).ok()?;
+            window.clear();
+            (&mut self.from).take(WINDOW as u64).read_to_end(&mut window).ok()?;
+            let starts = window.len().checked_sub(HEAD)?;
+            for i in (0..=starts).filter(|i| may_begin(&window[*i..])) {
+                let at = base + i as u64;
+                self.seek(at).ok()?;
+                if matches!(self.record(), Ok(Some(_))) {
+                    return Some(at);
+                }
+            }
+            base += starts as u64 + 1;
+        }
+    }
+
+    fn size(&mut self) -> u64 {
+        self.from.seek(SeekFrom::End(0)).unwrap_or(self.at)
+    }
+
+    /// Leaves out what cannot be read from here on, up to the next good record; without one the record is cut here.
+    fn leave_out(&mut self, trouble: Trouble) {
+        self.checksum = None;
+        let from = self.at;
+        let next = self.next_sound(from + 1);
+        let why = match trouble {
+            Trouble::Short => "a record is longer than what follows it".into(),
+            Trouble::Bad(why) => why,
+        };
+        match next {
+            Some(next) if self.seek(next).is_ok() => {
+                self.found.place(from, next, why);
+                self.at = next;
+            }
+            _ => {
+                let size = self.size();
+                self.part = Part::Over;
+                self.found.cut = Some(format!("nothing can be read behind byte {from} of {size} ({why})"));
+            }
+        }
+    }
+
+    fn magic(&mut self) {
+        let magic = mcap::MAGIC;
+        self.part = Part::Data;
+        let whole = self.fill(magic.len() as u64).unwrap_or(false);
+        if self.body.is_empty() {
+            (self.part, self.found.cut) = (Part::Over, Some("the file is empty".into()));
+        } else if !whole || self.body != magic {
+            self.at = 0;
+            self.leave_out(Trouble::Bad("it does not begin as an MCAP file does".into()));
+        } else {
+            self.at = magic.len() as u64;
+            self.hash(magic);
+        }
+    }
+
+    fn hash(&mut self, bytes: &[u8]) {
+        if let Some(checksum) = &mut self.checksum {
+            checksum.update(bytes);
+        }
+    }
+
+    /// Reads on in the data.
+    fn data(&mut self) -> Option<Entry> {
+        let (sound, head) = match self.record() {
+            Ok(Some(read)) => read,
+            Ok(None) => {
+                self.part = Part::Over;
+                self.found.cut = Some("the file ends before its footer".into());
+                return None;
+            }
+            Err(trouble) => {
+                self.leave_out(trouble);
+                return None;
+            }
+        };
+        self.at += (HEAD + self.body.len()) as u64;
+        if !matches!(sound, Sound::DataEnd(_))
+            && let Some(checksum) = &mut self.checksum
+        {
+            checksum.update(&head);
+            checksum.update(&self.body);
+        }
+        match sound {
+            Sound::Nothing => None,
+            Sound::Chunk(messages) => {
+                self.messages = messages;
+                None
+            }
+            Sound::Entry(entry) => {
+                self.heard(&entry);
+                Some(entry)
+            }
+            Sound::DataEnd(stated) => {
+                let found = self.checksum.replace(crc32fast::Hasher::new()).map(|c| c.finalize());
+                if found.is_some_and(|found| found != stated) {
+                    // Every chunk, attachment and fact has been checked by its own checksum: what is damaged lies between.
+                    let why = "the checksum of the data does not agree; every chunk, file and fact is as it was \
+                               written, so it is in the heads or indexes between them";
+                    self.found.somewhere = Some(why.into());
+                }
+                self.part = Part::Index;
+                None
+            }
+        }
+    }
+
+    /// What the last words say of the messages, held against those that came.
+    fn heard(&mut self, entry: &Entry) {
+        let Entry::Facts { name, facts } = entry else { return };
+        if name == RECOVERED {
+            self.found.recovered = facts.get("found").cloned();
+        }
+        if name != TRAILER {
+            return;
+        }
+        for (kind, fact) in WRITTEN.iter().enumerate() {
+            if let Some(written) = facts.get(*fact).and_then(|n| n.parse::<u32>().ok()) {
+                self.came(kind, written.wrapping_add(1));
+                self.last[kind] = written;
+            }
+        }
+    }
+
+    /// Notes that message `number` of a topic came, or would have come: what is missing before it.
+    fn came(&mut self, kind: usize, number: u32) {
+        let after = self.last[kind];
+        let missing = number.wrapping_sub(after).wrapping_sub(1);
+        // A number before the last one is no gap: no writer goes back.
+        if missing > 0 && missing < u32::MAX / 2 {
+            self.found.gap(TOPICS[kind], u64::from(after), u64::from(missing));
+        }
+    }
+
+    /// Reads the index through: nothing of it is given out, all of it is checked.
+    fn index(&mut self) {
+        let read = self.index_record();
+        let start = self.at;
+        match read {
+            Ok(Some(0)) => self.part = Part::Over,
+            Ok(Some(length)) => self.at += length,
+            Ok(None) | Err(Trouble::Short) => {
+                self.part = Part::Over;
+                self.found.cut = Some("the file ends within its index; all of its data is there".into());
+            }
+            Err(Trouble::Bad(why)) => {
+                self.part = Part::Over;
+                let size = self.size();
+                self.found.place(start, size, format!("the index: {why}; all of the data is there"));
+            }
+        }
+    }
+
+    /// Reads a record of the index and returns its length, 0 for the footer and what follows it.
+    fn index_record(&mut self) -> Result<Option<u64>, Trouble> {
+        let bad = |e: std::io::Error| Trouble::Bad(e.to_string());
+        let Some((opcode, length, head)) = self.head().map_err(bad)?? else { return Ok(None) };
+        if length > LONGEST {
+            return Err(Trouble::Bad(format!("a record of {length} bytes is longer than any")));
+        }
+        if !self.fill(length).map_err(bad)? {
+            return Err(Trouble::Short);
+        }
+        let body = std::mem::take(&mut self.body);
+        self.hash(&head);
+        if opcode != op::FOOTER {
+            self.hash(&body);
+            self.body = body;
+            return Ok(Some(HEAD as u64 + length));
+        }
+        let Some((covered, stated)) = body.split_last_chunk::<4>() else {
+            return Err(Trouble::Bad("the footer is too short".into()));
+        };
+        self.hash(covered);
+        let found = self.checksum.take().map(|c| c.finalize());
+        if found != Some(u32::from_le_bytes(*stated)) {
+            return Err(Trouble::Bad("its checksum does not agree".into()));
+        }
+        let magic = mcap::MAGIC;
+        if !self.fill(magic.len() as u64).map_err(bad)? {
+            return Err(Trouble::Short);
+        }
+        if self.body != magic {
+            return Err(Trouble::Bad("the file does not end as an MCAP file does".into()));
+        }
+        if self.fill(1).map_err(bad)? {
+            return Err(Trouble::Bad("something follows its end".into()));
+        }
+        Ok(Some(0))
     }
 }
 
-impl<R: Read> Iterator for Reader<R> {
+impl<R: Read + Seek> Iterator for Reader<R> {
     type Item = Entry;
 
     fn next(&mut self) -> Option<Entry> {
-        while !self.over {
-            let inside = self.chunk.is_some();
-            let (linear, from): (_, &mut dyn Read) = match &mut self.chunk {
-                Some(chunk) => (&mut chunk.linear, &mut chunk.bytes),
-                None => (&mut self.linear, &mut self.from),
-            };
-            let step = match linear.next_event() {
-                None => Step::End,
-                Some(Ok(LinearReadEvent::ReadRequest(wanted))) => match some(from, linear.insert(wanted)) {
-                    Ok(n) => {
-                        linear.notify_read(n);
-                        Step::On
-                    }
-                    Err(error) => Step::Wrong(error.to_string()),
-                },
-                Some(Ok(LinearReadEvent::Record { opcode: op::ATTACHMENT, data })) if !ends(data) => {
-                    Step::Wrong("an attachment is shorter than its own head".into())
+        loop {
+            while let Some(Message { kind, number, log_time, text }) = self.messages.pop_front() {
+                self.came(kind, number);
+                self.last[kind] = number;
+                if let Some(text) = text {
+                    return Some(Entry::Message { topic: TOPICS[kind], number, log_time, text });
                 }
-                Some(Ok(LinearReadEvent::Record { opcode, data })) => {
-                    match mcap::parse_record(opcode, data) {
-                        // A chunk within a chunk is nothing that is written.
-                        Ok(Record::Chunk { header, data: records }) if !inside => {
-                            if header.compression.is_empty() && !fits(&records) {
-                                Step::Wrong("the records of a chunk do not fit into it".into())
-                            } else {
-                                Step::Chunk(Box::new(Chunk::of(opcode, data)))
-                            }
-                        }
-                        Ok(Record::Footer(_)) if !inside => Step::Footer,
-                        Ok(record) => taken(&mut self.channels, self.only, &mut self.damaged, record)
-                            .map_or(Step::On, Step::Found),
-                        Err(error) => Step::Wrong(error.to_string()),
+            }
+            match self.part {
+                Part::Magic => self.magic(),
+                Part::Data => {
+                    if let Some(entry) = self.data() {
+                        return Some(entry);
                     }
                 }
-                Some(Err(error)) => Step::Wrong(error.to_string()),
-            };
-            match step {
-                Step::On => {}
-                Step::Found(entry) => return Some(entry),
-                Step::Chunk(chunk) => self.chunk = Some(chunk),
-                Step::Footer => self.ended = true,
-                Step::End if inside => self.chunk = None,
-                Step::End => {
-                    self.over = true;
-                    if !self.ended {
-                        self.cut = Some("the file ends before its footer".into());
-                    }
-                }
-                Step::Wrong(why) => (self.over, self.cut) = (true, Some(why)),
+                Part::Index => self.index(),
+                Part::Over => return None,
             }
         }
-        None
     }
-}
-
-/// What reading on led to.
-enum Step {
-    On,
-    Found(Entry),
-    Chunk(Box<Chunk>),
-    Footer,
-    End,
-    Wrong(String),
-}
-
-/// Reads what there is, whatever signals come.
-fn some(from: &mut dyn Read, into: &mut [u8]) -> std::io::Result<usize> {
-    loop {
-        match from.read(into) {
-            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-            other => return other,
-        }
-    }
-}
-
-/// Longest record that is read, in bytes.
-const LONGEST: usize = 64 << 20;
-
-/// A chunk, read as a file of one record.
-struct Chunk {
-    linear: LinearReader,
-    bytes: Cursor<Vec<u8>>,
-}
-
-impl Chunk {
-    fn of(opcode: u8, body: &[u8]) -> Self {
-        let mut bytes = vec![opcode];
-        bytes.extend((body.len() as u64).to_le_bytes());
-        bytes.extend(body);
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_skip_end_magic(true)
-            .with_validate_chunk_crcs(true)
-            .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(LONGEST);
-        Chunk { linear: LinearReader::new_with_options(options), bytes: Cursor::new(bytes) }
-    }
-}
-
-/// Whether the lengths of uncompressed records fill their chunk. The MCAP library (0.26) takes them as they are, and counts
-/// below zero where one is too long.
-fn fits(mut records: &[u8]) -> bool {
-    while let Some((head, rest)) = records.split_first_chunk::<9>() {
-        let length =
-            u64::from_le_bytes([head[1], head[2], head[3], head[4], head[5], head[6], head[7], head[8]]);
-        let Some(rest) = usize::try_from(length).ok().and_then(|n| rest.get(n..)) else { return false };
-        records = rest;
-    }
-    records.is_empty()
-}
-
-fn taken(
-    channels: &mut BTreeMap<u16, String>,
-    only: Option<&str>,
-    damaged: &mut u64,
-    record: Record<'_>,
-) -> Option<Entry> {
-    match record {
-        Record::Channel(channel) => {
-            channels.insert(channel.id, channel.topic);
-        }
-        Record::Message { header, data } => {
-            let topic = channels.get(&header.channel_id);
-            if only.is_some_and(|only| topic.is_some_and(|t| t != only)) {
-                return None;
-            }
-            match topic {
-                Some(topic) if serde_json::from_slice::<serde::de::IgnoredAny>(&data).is_ok() => {
-                    let (topic, log_time) = (topic.clone(), header.log_time);
-                    return Some(Entry::Message { topic, log_time, text: data.into_owned() });
-                }
-                _ => *damaged += 1,
-            }
-        }
-        Record::Metadata(metadata) => {
-            return Some(Entry::Facts { name: metadata.name, facts: metadata.metadata });
-        }
-        Record::Attachment { header, data, .. } => {
-            return Some(Entry::File { name: header.name, bytes: data.into_owned() });
-        }
-        _ => {}
-    }
-    None
-}
-
-/// Whether an attachment has room for its length and its checksum behind its times, its name and its kind. The MCAP library
-/// (0.26) takes that for granted.
-fn ends(attachment: &[u8]) -> bool {
-    let after_text = |at: usize| {
-        let length = attachment.get(at..)?.first_chunk::<4>()?;
-        (at + 4).checked_add(u32::from_le_bytes(*length) as usize)
-    };
-    let head = after_text(16).and_then(after_text);
-    head.and_then(|head| head.checked_add(8 + 4)).is_some_and(|least| least <= attachment.len())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use mcap::{WriteOptions, records::MessageHeader};
-
-    /// An uncompressed chunk, with its checksum or without, and where its message's length stands.
-    fn uncompressed(checksum: bool) -> (Vec<u8>, usize) {
-        let options = WriteOptions::new().compression(None).calculate_chunk_crcs(checksum);
-        let mut writer = options.create(Cursor::new(Vec::new())).unwrap();
-        let channel = writer.add_channel(0, "/cycle", "json", &BTreeMap::new()).unwrap();
-        let header = MessageHeader { channel_id: channel, sequence: 1, log_time: 2, publish_time: 2 };
-        writer.write_to_known_channel(&header, b"{\"a\":1}").unwrap();
-        writer.finish().unwrap();
-        let bytes = writer.into_inner().into_inner();
-        let body = bytes.windows(7).position(|w| w == b"{\"a\":1}").unwrap();
-        // Opcode and length, then 22 bytes of header.
-        (bytes, body - 30)
-    }
-
-    fn read(bytes: &[u8]) -> (usize, Option<String>) {
-        let mut reader = Reader::new(bytes);
-        let messages = reader.by_ref().filter(|e| matches!(e, Entry::Message { .. })).count();
-        (messages, reader.cut().map(str::to_string))
-    }
-
-    /// Found by coverage-guided fuzzing.
-    #[test]
-    fn a_record_that_is_longer_than_its_chunk_ends_the_reading() {
-        for checksum in [true, false] {
-            let (mut bytes, length) = uncompressed(checksum);
-            assert_eq!(read(&bytes), (1, None));
-            bytes[length] += 1;
-            let (messages, cut) = read(&bytes);
-            assert_eq!((messages, cut.unwrap().contains("do not fit")), (0, true));
-        }
-    }
-
-    /// Found by coverage-guided fuzzing.
-    #[test]
-    fn an_attachment_that_is_shorter_than_its_head_ends_the_reading() {
-        let attachment = |length: usize| {
-            // Times, an empty name, an empty kind, no data, no checksum.
-            let head = [&[op::ATTACHMENT][..], &(length as u64).to_le_bytes()].concat();
-            [mcap::MAGIC, &head, &vec![0; length]].concat()
-        };
-        let empty = Entry::File { name: String::new(), bytes: Vec::new() };
-        assert_eq!(Reader::new(&attachment(36)[..]).next(), Some(empty));
-        for length in 0..36 {
-            let bytes = attachment(length);
-            let mut reader = Reader::new(&bytes[..]);
-            assert_eq!(reader.next(), None, "{length}");
-            assert!(reader.cut().is_some_and(|why| why.contains("shorter than its own head")), "{length}");
-        }
-    }
-}
+mod tests;

@@ -1,12 +1,12 @@
-//! Reading a record that may have been cut anywhere, and making it whole.
+//! Reading a record that may be cut or damaged anywhere, and making it whole.
 
-use super::{CYCLES, ENCODING, EVENTS, Entry, PASSES, Reader, SCHEMA, schema_name};
+use super::integrity::Integrity;
+use super::sink::Sink;
+use super::{CYCLES, EVENTS, Entry, PASSES, RECOVERED, Reader, TOPICS};
 use crate::turn::Row;
-use mcap::records::MessageHeader;
-use mcap::{Attachment, Compression, McapError, WriteOptions};
-use std::borrow::Cow;
+use mcap::McapError;
 use std::collections::BTreeMap;
-use std::io::{Cursor, Seek, Write};
+use std::io::{Cursor, Read, Seek, Write};
 
 /// What could be read of a record.
 #[derive(Clone, Debug, Default)]
@@ -16,11 +16,9 @@ pub struct Contents {
     /// Attached files: name and bytes.
     pub files: Vec<(String, Vec<u8>)>,
     /// Messages in order: topic, log time in ns since 1970, JSON text.
-    pub messages: Vec<(String, u64, Vec<u8>)>,
-    /// Why reading ended before a proper end, if it did.
-    pub cut: Option<String>,
-    /// Messages that are no longer what was written (their JSON does not parse): dropped and counted.
-    pub damaged: u64,
+    pub messages: Vec<(&'static str, u64, Vec<u8>)>,
+    /// What was found to be other than it was written.
+    pub integrity: Integrity,
 }
 
 impl Contents {
@@ -52,48 +50,52 @@ impl Contents {
 /// Reads whatever a record still holds into memory, in the order it was written: see [`Reader`].
 pub fn read(bytes: &[u8]) -> Contents {
     let mut contents = Contents::default();
-    let mut reader = Reader::new(bytes);
+    let mut reader = Reader::new(Cursor::new(bytes));
     for entry in &mut reader {
         match entry {
             Entry::Facts { name, facts } => contents.metadata.push((name, facts)),
-            Entry::File { name, bytes } => contents.files.push((name, bytes)),
-            Entry::Message { topic, log_time, text } => contents.messages.push((topic, log_time, text)),
+            Entry::File { name, bytes, .. } => contents.files.push((name, bytes)),
+            Entry::Message { topic, log_time, text, .. } => contents.messages.push((topic, log_time, text)),
         }
     }
-    contents.cut = reader.cut().map(str::to_string);
-    contents.damaged = reader.damaged();
+    contents.integrity = reader.integrity().clone();
     contents
+}
+
+/// Checks a record from its first byte to its last.
+pub fn inspect(from: impl Read + Seek) -> Integrity {
+    let mut reader = Reader::new(from).no_messages();
+    reader.by_ref().for_each(drop);
+    reader.integrity().clone()
 }
 
 /// What a recovery found.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Recovery {
-    /// The record was whole: nothing was written.
-    Whole,
+    /// The file is as it was written, and nothing was written. It may have been recovered before.
+    Whole(Integrity),
     /// It was cut or damaged; a whole record of what it still held was written.
     Rewritten {
         /// Messages saved.
         messages: usize,
-        /// Messages that were no longer what was written.
-        damaged: u64,
-        /// Why reading ended.
-        because: String,
+        /// What was damaged, and what is missing.
+        found: Integrity,
     },
     /// Nothing of a record could be read.
     Nothing {
-        /// Why.
-        because: String,
+        /// What was found instead.
+        found: Integrity,
     },
 }
 
-/// Reads a record and, unless it is whole, writes a whole one of what it still holds. It is read twice: what it holds is never
-/// in memory at once.
+/// Reads a record and, unless it is whole, writes a whole one of what it still holds: every chunk, file and fact whose checksum
+/// agrees, also behind a damaged stretch. It is read twice: what it holds is never in memory at once.
 ///
 /// # Errors
 /// Whatever the writer says.
-pub fn recover(bytes: &[u8], to: impl Write + Seek) -> Result<Recovery, McapError> {
+pub fn recover(mut from: impl Read + Seek, to: impl Read + Write + Seek) -> Result<Recovery, McapError> {
     let (mut messages, mut facts) = (0, 0);
-    let mut reader = Reader::new(bytes);
+    let mut reader = Reader::new(&mut from);
     for entry in &mut reader {
         match entry {
             Entry::Message { .. } => messages += 1,
@@ -101,68 +103,40 @@ pub fn recover(bytes: &[u8], to: impl Write + Seek) -> Result<Recovery, McapErro
             Entry::File { .. } => {}
         }
     }
-    let Some(because) = reader.cut().map(str::to_string) else {
-        return Ok(Recovery::Whole);
-    };
-    if messages + facts == 0 {
-        return Ok(Recovery::Nothing { because });
+    let found = reader.integrity().clone();
+    if found.intact() {
+        return Ok(Recovery::Whole(found));
     }
-    rewrite(Reader::new(bytes), to)?;
-    Ok(Recovery::Rewritten { messages, damaged: reader.damaged(), because })
+    if messages + facts == 0 {
+        return Ok(Recovery::Nothing { found });
+    }
+    from.rewind()?;
+    rewrite(Reader::new(from), &found, to)?;
+    Ok(Recovery::Rewritten { messages, found })
 }
 
-fn rewrite(entries: impl Iterator<Item = Entry>, to: impl Write + Seek) -> Result<(), McapError> {
-    let options =
-        WriteOptions::new().compression(Some(Compression::Lz4)).profile("").library("muprime recover");
-    let mut writer = options.create(to)?;
-    let mut channels: BTreeMap<String, (u16, u32)> = BTreeMap::new();
+fn rewrite(
+    entries: impl Iterator<Item = Entry>,
+    found: &Integrity,
+    to: impl Read + Write + Seek,
+) -> Result<(), McapError> {
+    let mut sink = Sink::begin(to)?;
+    let mut told = found.sentences().join("; ");
     for entry in entries {
         match entry {
-            Entry::Facts { name, facts: metadata } => {
-                writer.write_metadata(&mcap::records::Metadata { name, metadata })?;
+            // One record of what was found: that of an earlier recovery goes into it.
+            Entry::Facts { name, facts } if name == RECOVERED => {
+                told.extend(facts.get("found").map(|before| format!("; before that: {before}")));
             }
-            Entry::File { name, bytes } => writer.attach(&Attachment {
-                log_time: 0,
-                create_time: 0,
-                name,
-                media_type: "text/plain".into(),
-                data: Cow::Owned(bytes),
-            })?,
-            Entry::Message { topic, log_time, text } => {
-                if !channels.contains_key(&topic) {
-                    let schema = writer.add_schema(&schema_name(&topic), ENCODING, SCHEMA)?;
-                    let channel = writer.add_channel(schema, &topic, "json", &BTreeMap::new())?;
-                    channels.insert(topic.clone(), (channel, 0));
-                }
-                let (channel_id, sequence) = channels.get_mut(&topic).expect("inserted above");
-                *sequence += 1;
-                let header = MessageHeader {
-                    channel_id: *channel_id,
-                    sequence: *sequence,
-                    log_time,
-                    publish_time: log_time,
-                };
-                writer.write_to_known_channel(&header, &text)?;
+            Entry::Facts { name, facts } => sink.facts(&name, facts)?,
+            Entry::File { name, time_ns, bytes } => sink.attach(time_ns, &name, &bytes)?,
+            // The numbers stay what they were: gaps in them go on telling what is missing.
+            Entry::Message { topic, number, log_time, text } => {
+                let kind = TOPICS.iter().position(|t| *t == topic).expect("the reader gives out no other");
+                sink.message(kind, number, log_time, &text)?;
             }
         }
     }
-    writer.finish()?;
-    Ok(())
-}
-
-/// A record in memory, for tests and conversions.
-impl Contents {
-    /// These contents as a whole record.
-    ///
-    /// # Errors
-    /// Whatever the MCAP writer says.
-    pub fn to_bytes(&self) -> Result<Vec<u8>, McapError> {
-        let facts = self.metadata.iter().cloned().map(|(name, facts)| Entry::Facts { name, facts });
-        let files = self.files.iter().cloned().map(|(name, bytes)| Entry::File { name, bytes });
-        let messages = self.messages.iter().cloned();
-        let messages = messages.map(|(topic, log_time, text)| Entry::Message { topic, log_time, text });
-        let mut bytes = Cursor::new(Vec::new());
-        rewrite(facts.chain(files).chain(messages), &mut bytes)?;
-        Ok(bytes.into_inner())
-    }
+    sink.facts(RECOVERED, BTreeMap::from([("found".to_string(), told)]))?;
+    sink.end()
 }

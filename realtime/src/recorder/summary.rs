@@ -241,12 +241,11 @@ impl<F: Read + Write + Seek> Summary<'_, F> {
     }
 }
 
-/// Ends a file whose data is complete: mark of its end, summary, footer.
-pub(super) fn end(file: &mut (impl Read + Write + Seek)) -> Result<(), McapError> {
+/// Ends a file whose data, of that checksum, is complete: mark of its end, summary, footer.
+pub(super) fn end(file: &mut (impl Read + Write + Seek), data_crc: u32) -> Result<(), McapError> {
     let end = file.seek(SeekFrom::End(0))?;
     let mut mark = Vec::new();
-    // No checksum of the whole data: every chunk and every attachment has its own.
-    Bytes::default().u32(0).record(op::DATA_END, &mut mark);
+    Bytes::default().u32(data_crc).record(op::DATA_END, &mut mark);
     file.write_all(&mark)?;
     let start = end + mark.len() as u64;
     let checksum = crc32fast::Hasher::new();

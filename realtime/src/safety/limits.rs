@@ -22,9 +22,9 @@ pub struct HardLimits {
     pub temperature_max_c: f64,
     /// s of vibration on a human finger in one go.
     pub exposure_max_s: f64,
-    /// Late cycles among the last thousand: beyond one in ten there is no control.
+    /// Missed deadlines among the last thousand: beyond one in ten there is no control.
     pub late_cycles_max: u32,
-    /// Late cycles in a row.
+    /// Missed deadlines in a row: from fifty on the loop counts as suspended.
     pub late_in_a_row_max: u32,
 }
 
@@ -38,8 +38,66 @@ pub const HARD: HardLimits = HardLimits {
     temperature_max_c: 48.0,
     exposure_max_s: 600.0,
     late_cycles_max: 100,
-    late_in_a_row_max: 20,
+    late_in_a_row_max: 50,
 };
+
+/// A value that must lie between two others, both permitted.
+struct Range {
+    low: f64,
+    high: f64,
+    /// Why not less, why not more.
+    why: &'static str,
+}
+
+/// Ranges of what a setup states besides: beyond them a rule would be switched off, or could never be met.
+mod range {
+    use super::{HARD, Range};
+
+    pub const FORCE_STEP_N: Range = Range {
+        low: 0.01,
+        high: HARD.normal_force_max_n,
+        why: "a larger step is an overforce, a smaller one is noise",
+    };
+    pub const FORCE_RATE_N_S: Range =
+        Range { low: 1.0, high: 500.0, why: "500 N/s reach the hard limit of 5 N in 10 ms" };
+    pub const AMPLITUDE_RATE_M_S: Range =
+        Range { low: 1e-6, high: 0.1, why: "0.1 m/s reach the hard limit of 10 um in 0.1 ms" };
+    pub const TRAVEL_M: Range = Range { low: -0.5, high: 0.5, why: "a bench-top stage" };
+    pub const STROKE_M: Range =
+        Range { low: 1e-3, high: 1.0, why: "a shorter travel has no room for a pass" };
+    pub const FROZEN: Range = Range {
+        low: 20.0,
+        high: 1000.0,
+        why: "fewer repeats come by chance, more are a second of a dead sensor at 1 kHz",
+    };
+    pub const REST_S: Range = Range { low: 10.0, high: 3600.0, why: "a shorter pause is no rest" };
+    pub const DUTY: Range =
+        Range { low: 1e-3, high: 0.5, why: "share of an hour: a finger rests half the time" };
+    pub const DOSE_M2_S: Range = Range {
+        low: 1e-3,
+        high: 100.0,
+        why: "100 m2/s are a quarter of an hour at 5 um peak-to-peak and 30 kHz",
+    };
+    pub const CYCLE_S: Range = Range { low: 2.5e-4, high: 0.1, why: "the loop runs at 10 to 4000 Hz" };
+    pub const FORCE_PERIOD_S: Range = Range {
+        low: 1e-5,
+        high: 0.05,
+        why: "a force sensor slower than 20 samples a second shows an overforce too late",
+    };
+    pub const STATE_PERIOD_S: Range = Range {
+        low: 1e-5,
+        high: 0.1,
+        why: "a state slower than 10 a second shows a refused set-point too late",
+    };
+    pub const LATENCY_S: Range =
+        Range { low: 0.0, high: 0.05, why: "an amplifier's own watchdog waits no longer than 0.05 s" };
+    pub const PERIODS: Range = Range { low: 1.0, high: 5.0, why: "periods that a channel may be silent" };
+    pub const RING_S: Range = Range {
+        low: 1e-5,
+        high: 0.05,
+        why: "Q / (pi f): a quality factor of 1500 at 10 kHz rings for 0.05 s, and a plate no longer",
+    };
+}
 
 /// When a channel counts as stale: a number of its own sample periods plus its stated latency.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -53,6 +111,16 @@ pub struct ChannelTiming {
 }
 
 impl ChannelTiming {
+    /// 50 readings a second with 20 ms of latency: what a relay's or a contact's channel has where nothing else is said.
+    pub const SLOW: ChannelTiming =
+        ChannelTiming { period: Nanos(20_000_000), latency: Nanos(20_000_000), periods: 3 };
+
+    /// Whether a stamp is neither older than the age limit nor as far ahead of the loop's time.
+    pub const fn is_fresh(&self, taken_at: Nanos, now: Nanos) -> bool {
+        let limit = self.age_limit().0;
+        now.since(taken_at).0 <= limit && taken_at.since(now).0 <= limit
+    }
+
     /// The greatest age that is not stale.
     pub const fn age_limit(&self) -> Nanos {
         Nanos(self.period.0 * self.periods as u64 + self.latency.0)
@@ -72,10 +140,36 @@ pub struct Timing {
     pub amplifier: ChannelTiming,
     /// Stage state.
     pub stage: ChannelTiming,
+    /// The second switch-off channel's state.
+    #[serde(default = "slow")]
+    pub supply: ChannelTiming,
+    /// The safety contacts.
+    #[serde(default = "slow")]
+    pub contacts: ChannelTiming,
     /// How long a command may wait on its way before it must not be sent.
     pub command_expiry: Nanos,
     /// Time constant of the plate's ring-up and ring-down, `Q / (pi f)`.
     pub ring_time: Nanos,
+}
+
+const fn slow() -> ChannelTiming {
+    ChannelTiming::SLOW
+}
+
+const fn rest_by_default() -> f64 {
+    60.0
+}
+
+const fn duty_by_default() -> f64 {
+    0.25
+}
+
+const fn dose_by_default() -> f64 {
+    25.0
+}
+
+const fn yes() -> bool {
+    true
 }
 
 /// The limits of a setup. Made only by [`Limits::checked`] (reading them back included), so they never exceed [`HARD`].
@@ -107,13 +201,38 @@ pub struct Limits {
     pub temperature_fitted: bool,
     /// Equal raw samples in a row that count as frozen, 20 to 1000 (from the noise: `ceil(ln 1e-9 / ln p_equal)`).
     pub frozen_after: u32,
-    /// A human finger is in the rig: dead-man input and exposure limit apply.
+    /// Equal raw amplitudes in a row, while driven, that count as frozen; `None` where the readback has no noise to be
+    /// frozen against: then only a new set-point shows it (SR-08, SR-22).
+    #[serde(default)]
+    pub amplitude_frozen_after: Option<u32>,
+    /// A human finger is in the rig: second channel, emergency stop, dead-man device and exposure limits apply.
     pub human_contact: bool,
+    /// A key held at the terminal may stand for a dead-man device that is not fitted: for trials.
+    #[serde(default)]
+    pub dead_man_key: bool,
     /// Longest vibration on a human finger in one go, in s.
     pub exposure_max_s: f64,
-    /// Cycles among the last thousand that may begin more than a period late.
+    /// Rest in s that ends a go.
+    #[serde(default = "rest_by_default")]
+    pub exposure_rest_s: f64,
+    /// Largest share of the last hour that may be vibrated on a human finger.
+    #[serde(default = "duty_by_default")]
+    pub exposure_duty_max: f64,
+    /// Largest integral of the squared rms velocity of the plate over the last hour on a human finger, in m2/s.
+    #[serde(default = "dose_by_default")]
+    pub exposure_dose_max_m2_s: f64,
+    /// Whether the amplifier switches off by itself when its heartbeat stands still.
+    #[serde(default = "yes")]
+    pub amplifier_watchdog: bool,
+    /// Whether the setup declares a second channel: then it is missed where the rig shows none.
+    #[serde(default)]
+    pub supply_required: bool,
+    /// Whether the stage applies the load that it is told; not where weights load the finger.
+    #[serde(default = "yes")]
+    pub load_commanded: bool,
+    /// Deadlines among the last thousand that may be missed.
     pub late_cycles_max: u32,
-    /// Late cycles in a row that are one too many.
+    /// Missed deadlines in a row that are one too many.
     pub late_in_a_row_max: u32,
     /// Timing of the channels.
     pub timing: Timing,
@@ -142,6 +261,42 @@ pub enum LimitError {
         /// What would be accepted.
         needed: &'static str,
     },
+    /// Outside its hard range.
+    #[error("{name} = {value}: {low} to {high} is permitted ({why}), and no setup can widen that")]
+    OutOfRange {
+        /// Name of the limit, with its unit.
+        name: &'static str,
+        /// What the setup says.
+        value: f64,
+        /// Smallest value permitted.
+        low: f64,
+        /// Largest value permitted.
+        high: f64,
+        /// The reason for the range.
+        why: &'static str,
+    },
+}
+
+impl LimitError {
+    /// Name of the limit, as a setup calls it.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::AboveHard { name, .. } | Self::Unusable { name, .. } | Self::OutOfRange { name, .. } => {
+                name
+            }
+        }
+    }
+}
+
+impl Range {
+    fn check(&self, name: &'static str, value: f64) -> Result<(), LimitError> {
+        let Range { low, high, why } = *self;
+        if value >= low && value <= high {
+            Ok(())
+        } else {
+            Err(LimitError::OutOfRange { name, value, low, high, why })
+        }
+    }
 }
 
 impl Serialize for Limits {
@@ -173,8 +328,16 @@ impl Limits {
             temperature_max_c: 45.0,
             temperature_fitted: true,
             frozen_after: 50,
+            amplitude_frozen_after: Some(200),
             human_contact: false,
+            dead_man_key: false,
             exposure_max_s: 60.0,
+            exposure_rest_s: rest_by_default(),
+            exposure_duty_max: duty_by_default(),
+            exposure_dose_max_m2_s: dose_by_default(),
+            amplifier_watchdog: true,
+            supply_required: false,
+            load_commanded: true,
             late_cycles_max: 10,
             late_in_a_row_max: 3,
             timing: Timing {
@@ -183,6 +346,8 @@ impl Limits {
                 normal: fast,
                 amplifier: ChannelTiming { period: cycle, latency: Nanos(4_000_000), periods: 5 },
                 stage: ChannelTiming { period: cycle, latency: Nanos(4_000_000), periods: 5 },
+                supply: ChannelTiming::SLOW,
+                contacts: ChannelTiming::SLOW,
                 command_expiry: Nanos(2 * cycle.0),
                 ring_time: Nanos(2_500_000),
             },
@@ -211,25 +376,68 @@ impl Limits {
                 return Err(LimitError::AboveHard { name, value, hard });
             }
         }
-        positive("force_step_max_n", self.force_step_max_n)?;
-        positive("force_rate_max_n_s", self.force_rate_max_n_s)?;
-        positive("amplitude_rate_max_m_s", self.amplitude_rate_max_m_s)?;
-        let refuse = |name, value, needed| Err(LimitError::Unusable { name, value, needed });
+        range::FORCE_STEP_N.check("force_step_max_n", self.force_step_max_n)?;
+        range::FORCE_RATE_N_S.check("force_rate_max_n_s", self.force_rate_max_n_s)?;
+        range::AMPLITUDE_RATE_M_S.check("amplitude_rate_max_m_s", self.amplitude_rate_max_m_s)?;
         let (low, high) = self.frequency_hz;
         if !(low >= HARD.frequency_hz.0 && low < high) {
-            return refuse("frequency_min_hz", low, "at least the hard limit and less than frequency_max_hz");
+            let needed = "at least the hard limit and less than frequency_max_hz";
+            return Err(LimitError::Unusable { name: "frequency_min_hz", value: low, needed });
         }
         let (left, right) = self.travel_m;
-        if !(left.is_finite() && right.is_finite() && left < right) {
-            return refuse("travel_min_m", left, "a number below travel_max_m");
+        range::TRAVEL_M.check("travel_min_m", left)?;
+        range::TRAVEL_M.check("travel_max_m", right)?;
+        range::STROKE_M.check("travel_max_m", right - left)?;
+        range::FROZEN.check("frozen_after", f64::from(self.frozen_after))?;
+        if let Some(after) = self.amplitude_frozen_after {
+            range::FROZEN.check("amplitude_frozen_after", f64::from(after))?;
         }
-        if !(20..=1000).contains(&self.frozen_after) {
-            return refuse("frozen_after", f64::from(self.frozen_after), "a count from 20 to 1000");
-        }
-        if self.timing.cycle.0 == 0 {
-            return refuse("cycle", 0.0, "a loop period above zero");
-        }
+        range::REST_S.check("exposure_rest_s", self.exposure_rest_s)?;
+        range::DUTY.check("exposure_duty_max", self.exposure_duty_max)?;
+        range::DOSE_M2_S.check("exposure_dose_max_m2_s", self.exposure_dose_max_m2_s)?;
+        self.timing.check()?;
         Ok(self)
+    }
+}
+
+impl Timing {
+    /// The longest that a command may wait: two cycles, and 20 ms where a cycle is short. A link's thread on a general-purpose
+    /// kernel is held up for milliseconds: with two cycles of 1 ms healthy rigs would drop their drive. An amplifier's own
+    /// watchdog waits 50 ms, and a newer 'off' replaces an older 'on' at once, so 20 ms never outlive either.
+    pub fn longest_expiry(cycle: Nanos) -> Nanos {
+        Nanos((2 * cycle.0).max(20_000_000))
+    }
+
+    /// A ring time as a setup states it, in s.
+    ///
+    /// # Errors
+    /// One that is outside its hard range.
+    pub fn ring_time_of(seconds: f64) -> Result<Nanos, LimitError> {
+        range::RING_S.check("plate_ring_time_s", seconds)?;
+        Ok(Nanos::from_seconds(seconds))
+    }
+
+    fn check(&self) -> Result<(), LimitError> {
+        range::CYCLE_S.check("cycle", self.cycle.seconds())?;
+        let channels = [
+            ("lateral", &self.lateral, range::FORCE_PERIOD_S),
+            ("normal", &self.normal, range::FORCE_PERIOD_S),
+            ("amplifier", &self.amplifier, range::STATE_PERIOD_S),
+            ("stage", &self.stage, range::STATE_PERIOD_S),
+            ("supply", &self.supply, range::STATE_PERIOD_S),
+            ("contacts", &self.contacts, range::STATE_PERIOD_S),
+        ];
+        for (name, timing, period) in channels {
+            // A loop slower than the channel sees it once a cycle.
+            let high = period.high.max(self.cycle.seconds());
+            Range { high, ..period }.check(name, timing.period.seconds())?;
+            range::LATENCY_S.check(name, timing.latency.seconds())?;
+            range::PERIODS.check(name, f64::from(timing.periods))?;
+        }
+        let (low, high) = (self.cycle.seconds(), Self::longest_expiry(self.cycle).seconds());
+        let why = "a command lives for one cycle at least, and for two or 20 ms at most";
+        Range { low, high, why }.check("command_expiry", self.command_expiry.seconds())?;
+        range::RING_S.check("plate_ring_time_s", self.ring_time.seconds())
     }
 }
 

@@ -1,8 +1,9 @@
 //! The rules, each with its requirement identifier. Add a rule: one variant, one line in [`RULES`], one function.
 
-use super::watch::{STAGE_RESPONSE, Watch};
+use super::arming::SUPPLY_ACTS;
+use super::watch::{ForceWatch, STAGE_RESPONSE, Watch};
 use super::{Controls, HARD, Limits, Observation, Remark, Request};
-use crate::ports::{AmplifierState, Channel, Nanos, NoData, Quality};
+use crate::ports::{AmplifierState, Channel, Contact, Nanos, NoData, SupplyCommand};
 use serde::{Deserialize, Serialize};
 
 /// Why the rig is, or would be, faulted.
@@ -79,6 +80,25 @@ pub enum Cause {
     LateralLossy,
     /// Most normal samples are lost.
     NormalLossy,
+    /// The emergency stop is pressed, or nothing is known of it.
+    EmergencyStop,
+    /// The guard is open, or nothing is known of it.
+    Interlock,
+    /// The second switch-off channel does not do what it is told, or nothing is known of it.
+    SupplySwitch,
+    /// What must be there to switch off is not fitted: 1 a second channel beside an amplifier without watchdog; with a
+    /// human finger 2 a second channel, 3 an emergency stop, 4 a dead-man device.
+    Unguarded,
+    /// With a human finger: too large a share of the last hour was vibrated.
+    ExposureDuty,
+    /// With a human finger: the vibration of the last hour was too strong for its length.
+    ExposureDose,
+    /// The amplitude's channel is at the end of its range.
+    AmplitudeSaturated,
+    /// The amplitude's channel repeats itself while the plate is driven.
+    AmplitudeFrozen,
+    /// The normal force is not that of the load that the stage was told to apply, or to lift off.
+    LoadImplausible,
 }
 
 /// A rule and what it is for.
@@ -120,9 +140,19 @@ pub(super) struct Breach {
 
 /// The first broken rule in the order of [`RULES`].
 pub(super) fn first_broken(context: &Context<'_>) -> Option<Breach> {
-    RULES.iter().find_map(|rule| {
+    first_broken_but(context, &[])
+}
+
+/// The first broken rule whose cause is not excused.
+pub(super) fn first_broken_but(context: &Context<'_>, excused: &[Cause]) -> Option<Breach> {
+    RULES.iter().filter(|rule| !excused.contains(&rule.cause)).find_map(|rule| {
         (rule.check)(context).map(|(value, bound)| Breach { cause: rule.cause, value, bound })
     })
+}
+
+/// Whether the second channel must act: the amplifier stays on, or somebody has pressed the emergency stop.
+pub(super) fn cuts_the_supply(c: &Context<'_>) -> bool {
+    c.watch.refuses_off(c.limits, c.now) || contact_open(c, &c.seen.contacts.emergency_stop).is_some()
 }
 
 macro_rules! rules {
@@ -133,9 +163,11 @@ macro_rules! rules {
 }
 
 rules! {
+    "SR-35" EmergencyStop "A pressed, silent or broken emergency stop switches off and cuts the supply." => |c| contact_open(c, &c.seen.contacts.emergency_stop);
     "SR-01" Stopped "A stop switches off and latches." => |c| broken(c.controls.stop, 1.0, 0.0);
-    "SR-02" DeadMan "With a human finger, releasing the dead-man input switches off." => |c| broken(c.limits.human_contact && !c.controls.dead_man, 0.0, 1.0);
-    "SR-03" Exposure "With a human finger, vibration lasts no longer than the exposure limit." => exposure;
+    "SR-36" Interlock "An open, silent or broken interlock switches off." => |c| contact_open(c, &c.seen.contacts.interlock);
+    "SR-02" DeadMan "With a human finger, releasing the dead-man input switches off; it must be seen released, then held, before arming." => dead_man;
+    "SR-03" Exposure "With a human finger, vibration in one go lasts no longer than its limit; only a rest of full length ends a go." => exposure;
     "SR-04" NormalOverforce "Normal force stays below its limit." => |c| overforce(c, Axis::Normal);
     "SR-05" LateralOverforce "Lateral force stays below its limit, either sign." => |c| overforce(c, Axis::Lateral);
     "SR-06" ForceRate "Normal force does not change faster than its limit over two samples in a row." => |c| broken(c.watch.normal.fast_in_a_row >= 2, c.watch.normal.rate_n_s.abs(), c.limits.force_rate_max_n_s);
@@ -144,8 +176,8 @@ rules! {
     "SR-09" AmplitudeRate "Measured amplitude does not rise faster than its limit over two samples in a row." => |c| broken(c.watch.amplitude_fast_in_a_row >= 2, c.watch.amplitude_rate_m_s, c.limits.amplitude_rate_max_m_s);
     "SR-10" LateralInvalid "Three cycles without a valid lateral sample switch off." => |c| broken(c.watch.lateral.invalid_in_a_row >= 3, f64::from(c.watch.lateral.invalid_in_a_row), 3.0);
     "SR-11" NormalInvalid "Three cycles without a valid normal sample switch off." => |c| broken(c.watch.normal.invalid_in_a_row >= 3, f64::from(c.watch.normal.invalid_in_a_row), 3.0);
-    "SR-12" LateralSaturated "A lateral channel at the end of its range for two cycles switches off." => |c| broken(c.watch.lateral.saturated_in_a_row >= 2, f64::from(c.watch.lateral.saturated_in_a_row), 2.0);
-    "SR-13" NormalSaturated "A normal channel at the end of its range for two cycles switches off." => |c| broken(c.watch.normal.saturated_in_a_row >= 2, f64::from(c.watch.normal.saturated_in_a_row), 2.0);
+    "SR-12" LateralSaturated "A lateral channel at the end of its range for two cycles, or for five in fifty, switches off." => |c| saturated(&c.watch.lateral);
+    "SR-13" NormalSaturated "A normal channel at the end of its range for two cycles, or for five in fifty, switches off." => |c| saturated(&c.watch.normal);
     "SR-14" LateralStale "A lateral sample is no older than its own periods and latency allow." => |c| stale(&c.seen.forces.lateral, c.limits.timing.lateral.age_limit(), c.now);
     "SR-15" NormalStale "A normal sample is no older than its own periods and latency allow." => |c| stale(&c.seen.forces.normal, c.limits.timing.normal.age_limit(), c.now);
     "SR-16" LateralFrozen "A lateral channel does not repeat its raw value more often than its noise allows." => |c| frozen(c, c.watch.lateral.equal_in_a_row);
@@ -161,12 +193,19 @@ rules! {
     "SR-26" StageStale "The stage's state is no older than its own periods and latency allow." => |c| state_stale(c.seen.stage.map(|s| s.taken_at), c.limits.timing.stage.age_limit(), c.now);
     "SR-27" StageFault "A stage that reports a fault, or numbers that are none, is stopped." => |c| broken(c.seen.stage.is_ok_and(|s| s.fault || !(s.position_m.is_finite() && s.velocity_m_s.is_finite())), 1.0, 0.0);
     "SR-28" OverTravel "The stage stays within its travel." => travel;
-    "SR-29" Overrun "The loop misses fewer deadlines in a row than its limit (three by default), and of a thousand no more than another (ten by default)." => overrun;
+    "SR-31" Suspended "A cycle that begins fifty periods after the deadline that was due switches off: the rig was alone for that time." => |c| above(Some(c.seen.lateness.seconds()), SUSPENDED_CYCLES * c.limits.timing.cycle.seconds());
+    "SR-29" Overrun "The loop misses fewer deadlines in a row than its limit (three by default), and of a thousand no more than another (ten by default); a skipped deadline is a missed one." => overrun;
     "SR-30" RequestRefused "A request beyond any limit, or not finite, switches off." => request;
-    "SR-31" Suspended "A cycle that begins fifty periods late switches off: the rig was alone for that time." => |c| above(Some(c.seen.lateness.seconds()), SUSPENDED_CYCLES * c.limits.timing.cycle.seconds());
     "SR-32" StageNotFollowing "The stage moves as it is told: at least a fifth of its speed after its response time, and not half as fast again." => following;
     "SR-33" LateralLossy "At least a quarter of the lateral samples that are due in a window come." => |c| lossy(c, c.watch.lateral.share_came);
     "SR-34" NormalLossy "At least a quarter of the normal samples that are due in a window come." => |c| lossy(c, c.watch.normal.share_came);
+    "SR-37" SupplySwitch "A second switch-off channel that is fitted reads back what it was told." => supply_switch;
+    "SR-38" Unguarded "A human finger needs a second channel, an emergency stop and a dead-man device; an amplifier without watchdog needs a second channel." => unguarded;
+    "SR-39" ExposureDuty "With a human finger, no larger share of the last hour is vibrated than its limit." => exposure_duty;
+    "SR-40" ExposureDose "With a human finger, the squared velocity summed over the last hour stays below its limit." => exposure_dose;
+    "SR-41" AmplitudeSaturated "An amplitude at the end of its range in two states in a row switches off." => |c| broken(c.watch.amplitude_saturated_in_a_row >= 2, f64::from(c.watch.amplitude_saturated_in_a_row), 2.0);
+    "SR-42" AmplitudeFrozen "While the plate is driven, a measured amplitude that has noise does not repeat its raw value more often than that allows." => amplitude_frozen;
+    "SR-43" LoadImplausible "Normal force stays near the load that the stage was told to apply, and near zero when it was told to lift off." => load_plausible;
 }
 
 fn broken(is: bool, value: f64, bound: f64) -> Option<(f64, f64)> {
@@ -223,21 +262,111 @@ enum Axis {
 }
 
 fn overforce(c: &Context<'_>, axis: Axis) -> Option<(f64, f64)> {
-    let (watch, limit) = match axis {
-        Axis::Lateral => (&c.watch.lateral, c.limits.lateral_force_max_n),
-        Axis::Normal => (&c.watch.normal, c.limits.normal_force_max_n),
+    let (watch, limit, timing) = match axis {
+        Axis::Lateral => (&c.watch.lateral, c.limits.lateral_force_max_n, &c.limits.timing.lateral),
+        Axis::Normal => (&c.watch.normal, c.limits.normal_force_max_n, &c.limits.timing.normal),
     };
-    above(watch.believed.map(|r| r.value.abs()), limit)
+    // What is shown above the limit for two sample periods is no spike, whatever its counter says.
+    let shown = watch
+        .over_since
+        .filter(|since| c.now.since(*since).0 >= 2 * timing.period.0.max(c.limits.timing.cycle.0))
+        .map(|_| (watch.over_value, limit));
+    above(watch.believed.map(|r| r.value.abs()), limit).or(shown)
+}
+
+fn saturated(watch: &ForceWatch) -> Option<(f64, f64)> {
+    let (row, window) = (watch.saturated_in_a_row, watch.saturated_in_window());
+    broken(row >= 2, f64::from(row), 2.0).or_else(|| broken(window >= 5, f64::from(window), 5.0))
+}
+
+/// A contact that is fitted and not known to be closed; its age, or 0, against the age limit.
+fn contact_open(c: &Context<'_>, contact: &Result<Contact, NoData>) -> Option<(f64, f64)> {
+    let timing = &c.limits.timing.contacts;
+    match contact {
+        Err(NoData::NotFitted) => None,
+        Err(_) => Some((f64::INFINITY, timing.age_limit().seconds())),
+        Ok(contact) if !contact.closed => Some((0.0, 1.0)),
+        Ok(contact) => broken(
+            !timing.is_fresh(contact.taken_at, c.now),
+            c.now.since(contact.taken_at).seconds(),
+            timing.age_limit().seconds(),
+        ),
+    }
+}
+
+fn dead_man(c: &Context<'_>) -> Option<(f64, f64)> {
+    let confirmed = c.armed_since.is_some() || c.watch.hand_let_go;
+    broken(c.limits.human_contact && !(c.watch.hand_holds && confirmed), 0.0, 1.0)
 }
 
 fn exposure(c: &Context<'_>) -> Option<(f64, f64)> {
-    let since = c.watch.exposed_since.filter(|_| c.limits.human_contact)?;
-    above(Some(c.now.since(since).seconds()), c.limits.exposure_max_s)
+    let in_one_go = c.watch.exposure.in_one_go.seconds();
+    broken(c.limits.human_contact && in_one_go > c.limits.exposure_max_s, in_one_go, c.limits.exposure_max_s)
 }
 
+fn exposure_duty(c: &Context<'_>) -> Option<(f64, f64)> {
+    let (driven, bound) =
+        (c.watch.exposure.in_the_last_hour().0.seconds(), 3600.0 * c.limits.exposure_duty_max);
+    broken(c.limits.human_contact && driven > bound, driven, bound)
+}
+
+fn exposure_dose(c: &Context<'_>) -> Option<(f64, f64)> {
+    let (dose, bound) = (c.watch.exposure.in_the_last_hour().1, c.limits.exposure_dose_max_m2_s);
+    broken(c.limits.human_contact && dose > bound, dose, bound)
+}
+
+fn supply_switch(c: &Context<'_>) -> Option<(f64, f64)> {
+    let timing = &c.limits.timing.supply;
+    let limit = timing.age_limit().seconds();
+    match c.seen.supply {
+        Err(NoData::NotFitted) if !c.limits.supply_required => None,
+        Err(_) => Some((f64::INFINITY, limit)),
+        Ok(state) if !timing.is_fresh(state.taken_at, c.now) => {
+            Some((c.now.since(state.taken_at).seconds(), limit))
+        }
+        Ok(state) => {
+            let told = c.watch.supply_told == SupplyCommand::Cut;
+            let waited = c.now.since(c.watch.supply_since);
+            broken(state.cut != told && waited > SUPPLY_ACTS, waited.seconds(), SUPPLY_ACTS.seconds())
+        }
+    }
+}
+
+fn unguarded(c: &Context<'_>) -> Option<(f64, f64)> {
+    let absent = Err(NoData::NotFitted);
+    let (supply, contacts) = (c.seen.supply.is_err_and(|e| e == NoData::NotFitted), &c.seen.contacts);
+    let human = c.limits.human_contact;
+    let missing = [
+        (1.0, !c.limits.amplifier_watchdog && supply),
+        (2.0, human && supply),
+        (3.0, human && contacts.emergency_stop == absent),
+        (4.0, human && contacts.dead_man == absent && !c.limits.dead_man_key),
+    ];
+    missing.into_iter().find(|(_, is)| *is).map(|(which, _)| (which, 0.0))
+}
+
+fn amplitude_frozen(c: &Context<'_>) -> Option<(f64, f64)> {
+    let most = c.limits.amplitude_frozen_after?;
+    let equal = c.watch.amplitude_equal_in_a_row;
+    broken(c.watch.enabled && equal >= most, f64::from(equal), f64::from(most))
+}
+
+/// Time within which a loading axis has applied its load or lifted off.
+const LOAD_SETTLES: Nanos = Nanos(2_000_000_000);
+/// Force in N that may stand on a sensor without a load: its zero, and the weight of what is mounted on it.
+const LOAD_ZERO_N: f64 = 0.3;
+/// What a loading axis may overshoot for ever, beside that.
+const LOAD_FACTOR: f64 = 1.5;
+
+fn load_plausible(c: &Context<'_>) -> Option<(f64, f64)> {
+    let settled = c.limits.load_commanded && c.now.since(c.watch.load_since) > LOAD_SETTLES;
+    let force = c.watch.normal.believed.map(|r| r.value.abs()).filter(|_| settled && c.watch.normal.usable);
+    above(force, LOAD_FACTOR * c.watch.load_n + LOAD_ZERO_N)
+}
+
+/// A reading at the end of its range is a lower bound of the truth: what it breaks is broken.
 fn amplitude_pp_m(c: &Context<'_>) -> Option<f64> {
-    let state = c.seen.amplifier.ok()?;
-    state.amplitude.ok().filter(|r| r.quality != Quality::Saturated).map(|r| r.value)
+    c.seen.amplifier.ok()?.amplitude.ok().map(|r| r.value)
 }
 
 /// An amplitude is not negative; the noise of a sensor at rest may make it a little so.
@@ -335,7 +464,7 @@ fn overrun(c: &Context<'_>) -> Option<(f64, f64)> {
     if row.0 >= row.1 {
         return Some((f64::from(row.0), f64::from(row.1)));
     }
-    // Among the last thousand cycles, the first second after arming included.
+    // In the last thousand cycles, the first second after arming included.
     let (late, most) = (c.watch.late_in_window(), c.limits.late_cycles_max);
     broken(late > most && c.armed_since.is_some(), f64::from(late), f64::from(most))
 }

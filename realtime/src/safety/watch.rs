@@ -1,7 +1,8 @@
 //! What must be remembered of each channel to judge it: spikes, repeats, gaps, rates.
 
-use super::{ChannelTiming, DriveCommand, Limits, Observation, StageCommand};
-use crate::ports::{Channel, Nanos, Quality, Reading};
+use super::exposure::Exposure;
+use super::{ChannelTiming, Controls, Decision, Limits, Observation};
+use crate::ports::{Channel, Nanos, NoData, Quality, Reading, SupplyCommand};
 
 /// Memory of one force channel.
 #[derive(Clone, Copy, Debug)]
@@ -18,6 +19,12 @@ pub(super) struct ForceWatch {
     pub invalid_in_a_row: u32,
     /// Cycles in a row at the end of the range.
     pub saturated_in_a_row: u32,
+    /// One bit a cycle, newest lowest: was it at the end of the range?
+    saturated: u64,
+    /// Since when every value shown is above the limit, believed or not, and the last of them: a counter that stands
+    /// still, or a sample at the end of its range, hides no overforce.
+    pub over_since: Option<Nanos>,
+    pub over_value: f64,
     /// One bit a cycle, newest lowest: was it a spike?
     spikes: u64,
     /// N/s over the last two believed samples, and how often in a row it was above the limit.
@@ -36,8 +43,12 @@ pub(super) struct ForceWatch {
 /// Samples due in a window of the rule for lost samples.
 const LOSS_WINDOW: f64 = 100.0;
 
-/// Cycles that the rule for repeated spikes looks back on.
+/// Cycles that the rules for repeated spikes and saturation look back on.
 const SPIKE_WINDOW: u32 = 50;
+
+const fn bits_in_window(bits: u64) -> u32 {
+    (bits & ((1 << SPIKE_WINDOW) - 1)).count_ones()
+}
 
 impl ForceWatch {
     /// Counts the samples that are due: no cycle can see more than one.
@@ -62,6 +73,9 @@ impl ForceWatch {
             equal_in_a_row: 0,
             invalid_in_a_row: 0,
             saturated_in_a_row: 0,
+            saturated: 0,
+            over_since: None,
+            over_value: 0.0,
             spikes: 0,
             rate_n_s: 0.0,
             fast_in_a_row: 0,
@@ -75,12 +89,23 @@ impl ForceWatch {
     }
 
     pub(super) const fn spikes_in_window(&self) -> u32 {
-        (self.spikes & ((1 << SPIKE_WINDOW) - 1)).count_ones()
+        bits_in_window(self.spikes)
     }
 
-    fn look(&mut self, channel: &Channel, limits: &Limits, timing: &ChannelTiming, now: Nanos) {
+    pub(super) const fn saturated_in_window(&self) -> u32 {
+        bits_in_window(self.saturated)
+    }
+
+    fn look(&mut self, channel: &Channel, limits: &Limits, axis: &Axis<'_>, now: Nanos) {
+        let timing = axis.timing;
         let age_limit = timing.age_limit();
         self.spikes <<= 1;
+        self.saturated <<= 1;
+        if let Ok(reading) = channel {
+            let over = reading.value.abs() > axis.force_max_n;
+            self.over_since = if over { self.over_since.or(Some(now)) } else { None };
+            self.over_value = reading.value.abs();
+        }
         self.usable = false;
         self.expect(limits.timing.cycle, timing.period);
         let reading = match channel {
@@ -100,6 +125,7 @@ impl ForceWatch {
         if reading.quality == Quality::Saturated {
             self.invalid_in_a_row = 0;
             self.saturated_in_a_row = self.saturated_in_a_row.saturating_add(1);
+            self.saturated |= 1;
             return;
         }
         self.saturated_in_a_row = 0;
@@ -149,6 +175,12 @@ impl ForceWatch {
     }
 }
 
+/// What sets one force axis apart from the other.
+struct Axis<'a> {
+    timing: &'a ChannelTiming,
+    force_max_n: f64,
+}
+
 /// Cycles of overrun bookkeeping: a thousand cycles in buckets of a hundred.
 const BUCKETS: usize = 10;
 const BUCKET_CYCLES: u32 = 100;
@@ -158,7 +190,7 @@ const BUCKET_CYCLES: u32 = 100;
 pub(super) struct Watch {
     pub lateral: ForceWatch,
     pub normal: ForceWatch,
-    /// Cycles in a row that began more than a period late.
+    /// Deadlines missed in a row.
     pub late_in_a_row: u32,
     late: [u32; BUCKETS],
     filled: u32,
@@ -170,9 +202,12 @@ pub(super) struct Watch {
     pub enabled: bool,
     /// When the output was commanded off; `None` while it is commanded on.
     pub off_since: Option<Nanos>,
-    /// When vibration on the finger began; `None` while there is none.
-    pub exposed_since: Option<Nanos>,
+    /// How long and how strongly the plate was driven.
+    pub exposure: Exposure,
     amplitude: Option<Reading>,
+    /// States in a row whose amplitude was at the end of its range, and whose raw amplitude was that before.
+    pub amplitude_saturated_in_a_row: u32,
+    pub amplitude_equal_in_a_row: u32,
     /// m/s over the last two amplitude samples.
     pub amplitude_rate_m_s: f64,
     pub amplitude_fast_in_a_row: u32,
@@ -189,6 +224,16 @@ pub(super) struct Watch {
     /// States in a row in which the stage was faster than it was told.
     pub fast_stage_in_a_row: u32,
     stage_sequence: u32,
+    /// Normal load as last commanded in N, and since when.
+    pub load_n: f64,
+    pub load_since: Nanos,
+    /// What the second channel was last told, and since when.
+    pub supply_told: SupplyCommand,
+    pub supply_since: Nanos,
+    /// Whether the dead-man device is held, and whether it was seen released since the last trip: a hand that lets go and
+    /// grips again is a person who confirms.
+    pub hand_holds: bool,
+    pub hand_let_go: bool,
 }
 
 /// Time within which a stage follows a new velocity: the slowest one for a reversal at full speed, and the age of its
@@ -211,8 +256,10 @@ impl Watch {
             commanded_since: Nanos(0),
             enabled: false,
             off_since: Some(Nanos(0)),
-            exposed_since: None,
+            exposure: Exposure::new(),
             amplitude: None,
+            amplitude_saturated_in_a_row: 0,
+            amplitude_equal_in_a_row: 0,
             amplitude_rate_m_s: 0.0,
             amplitude_fast_in_a_row: 0,
             amplifier_on: false,
@@ -223,28 +270,42 @@ impl Watch {
             fastest_m_s: 0.0,
             fast_stage_in_a_row: 0,
             stage_sequence: 0,
+            load_n: 0.0,
+            load_since: Nanos(0),
+            supply_told: SupplyCommand::Restore,
+            supply_since: Nanos(0),
+            hand_holds: false,
+            hand_let_go: false,
         }
     }
 
-    /// Late cycles among the last thousand or so.
+    /// Deadlines missed in the last thousand cycles or so.
     pub(super) fn late_in_window(&self) -> u32 {
         self.late.iter().sum()
     }
 
-    pub(super) fn look(&mut self, limits: &Limits, seen: &Observation, now: Nanos) {
+    pub(super) fn look(&mut self, limits: &Limits, seen: &Observation, controls: Controls, now: Nanos) {
         let timing = &limits.timing;
-        self.lateral.look(&seen.forces.lateral, limits, &timing.lateral, now);
-        self.normal.look(&seen.forces.normal, limits, &timing.normal, now);
+        let lateral = Axis { timing: &timing.lateral, force_max_n: limits.lateral_force_max_n };
+        self.lateral.look(&seen.forces.lateral, limits, &lateral, now);
+        let normal = Axis { timing: &timing.normal, force_max_n: limits.normal_force_max_n };
+        self.normal.look(&seen.forces.normal, limits, &normal, now);
+        self.hand_holds = match seen.contacts.dead_man {
+            Ok(contact) => contact.closed && timing.contacts.is_fresh(contact.taken_at, now),
+            Err(NoData::NotFitted) => limits.dead_man_key && controls.dead_man,
+            Err(_) => false,
+        };
+        self.hand_let_go |= !self.hand_holds;
 
-        let late = seen.lateness > timing.cycle;
-        self.late_in_a_row = if late { self.late_in_a_row.saturating_add(1) } else { 0 };
+        let missed = if seen.lateness > timing.cycle { seen.missed(timing.cycle) } else { 0 };
+        self.late_in_a_row = if missed > 0 { self.late_in_a_row.saturating_add(missed) } else { 0 };
         if self.filled == BUCKET_CYCLES {
             self.bucket = (self.bucket + 1) % BUCKETS;
             self.late[self.bucket] = 0;
             self.filled = 0;
         }
         self.filled += 1;
-        self.late[self.bucket] += u32::from(late);
+        self.late[self.bucket] = self.late[self.bucket].saturating_add(missed);
 
         let amplitude = match seen.amplifier {
             Ok(state) => state.amplitude,
@@ -257,13 +318,26 @@ impl Watch {
             if let Some(before) = self.amplitude
                 && reading.sequence != before.sequence
             {
+                let equal =
+                    reading.raw == before.raw && self.enabled && before.taken_at >= self.commanded_since;
+                self.amplitude_equal_in_a_row =
+                    if equal { self.amplitude_equal_in_a_row.saturating_add(1) } else { 0 };
                 let dt = reading.taken_at.since(before.taken_at).seconds();
                 self.amplitude_rate_m_s = if dt > 0.0 { (reading.value - before.value) / dt } else { 0.0 };
                 let fast = self.amplitude_rate_m_s > limits.amplitude_rate_max_m_s;
                 self.amplitude_fast_in_a_row = if fast { self.amplitude_fast_in_a_row + 1 } else { 0 };
             }
+            let saturated = reading.quality == Quality::Saturated;
+            if self.amplitude.is_none_or(|before| before.sequence != reading.sequence) {
+                self.amplitude_saturated_in_a_row =
+                    if saturated { self.amplitude_saturated_in_a_row.saturating_add(1) } else { 0 };
+            }
             self.amplitude = Some(reading);
         }
+        let w = self.amplitude.map_or(0.0, |r| r.value).max(self.commanded_pp_m);
+        let velocity_rms_m_s = std::f64::consts::FRAC_1_SQRT_2 * std::f64::consts::PI * w * self.commanded_hz;
+        let rest = Nanos::from_seconds(limits.exposure_rest_s);
+        self.exposure.add(self.enabled || self.amplifier_on, velocity_rms_m_s, rest, now);
         let fade = (-timing.cycle.seconds() / STAGE_RESPONSE.seconds()).exp();
         self.fastest_m_s = (self.fastest_m_s * fade).max(self.velocity_m_s.abs());
         if let Ok(stage) = seen.stage
@@ -282,7 +356,24 @@ impl Watch {
         }
     }
 
-    pub(super) fn commanded(&mut self, drive: &DriveCommand, stage: &StageCommand, now: Nanos) {
+    /// The hand at the dead-man device must let go and grip again before anything is armed.
+    pub(super) fn forget_the_hand(&mut self) {
+        self.hand_let_go = false;
+    }
+
+    /// The supply is read back cut: whatever the amplifier said before, its output is off.
+    pub(super) fn supply_is_cut(&mut self) {
+        self.amplifier_on = false;
+    }
+
+    pub(super) fn commanded(&mut self, said: &Decision, now: Nanos) {
+        let (drive, stage) = (&said.drive, &said.stage);
+        if said.supply != self.supply_told {
+            (self.supply_told, self.supply_since) = (said.supply, now);
+        }
+        if stage.normal_force_n() != self.load_n {
+            (self.load_n, self.load_since) = (stage.normal_force_n(), now);
+        }
         let velocity = stage.velocity_m_s();
         let same = velocity * self.velocity_m_s > 0.0 && velocity.abs() >= CREEP_M_S;
         if !same {
@@ -300,7 +391,6 @@ impl Watch {
         self.ringing_pp_m = self.ringing_pp_m.max(amplitude);
         self.enabled = drive.enable();
         self.off_since = if drive.enable() { None } else { self.off_since.or(Some(now)) };
-        self.exposed_since = if drive.enable() { self.exposed_since.or(Some(now)) } else { None };
     }
 
     /// Velocity as last commanded, in m/s.

@@ -492,10 +492,6 @@ impl<P: Amplifier> Amplifier for FaultyAmplifier<P> {
         let came = self.inner.state(now);
         self.states.pass(came, now)
     }
-
-    fn cut_supply(&mut self, now: Nanos) -> bool {
-        self.inner.cut_supply(now)
-    }
 }
 
 /// A stage with faults of its states.

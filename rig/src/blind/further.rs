@@ -5,12 +5,12 @@
 //! the truth has a probability of 0.9 or the passes run out. Both sides meet the same stream of noise.
 
 use super::{Figure, median, share, statistic};
-use diagnosis::data::{Rig, Table};
+use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::next;
 use diagnosis::verdict::diagnose;
 use models::condition::Condition;
-use models::quantity::{Direction, PeakToPeak};
+use models::covariate;
 use models::record::Pass;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -87,7 +87,7 @@ fn one(seed: u64) -> miette::Result<Option<Race>> {
         return Ok(None);
     }
     let truth = set.label.causes[0].name.clone();
-    let rig: Rig = toml::from_str(&set.rig_toml).map_err(|e| miette::miette!("rig.toml: {e}"))?;
+    let rig: RigFile = RigFile::parse(&set.rig_toml).map_err(|e| miette::miette!("rig.toml: {e}"))?;
     let Some((kept, start, first)) = thin(&set.passes, &rig, &truth)? else { return Ok(None) };
     let grid = grid(&start)?;
     let race = |designed: bool| -> miette::Result<Vec<Step>> {
@@ -158,7 +158,7 @@ pub fn figures(races: &[Race]) -> Vec<Figure> {
 }
 
 /// The largest thinned set that does not tell its cause, with what the diagnosis says of it.
-fn thin(passes: &[Pass], rig: &Rig, truth: &str) -> miette::Result<Option<(usize, Vec<Pass>, Said)>> {
+fn thin(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Option<(usize, Vec<Pass>, Said)>> {
     for kept in KEPT {
         let start = thinned(passes, kept);
         let said = says(&start, rig, truth)?;
@@ -193,14 +193,14 @@ struct Said {
     asked: Vec<Condition>,
 }
 
-fn says(passes: &[Pass], rig: &Rig, truth: &str) -> miette::Result<Said> {
+fn says(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Said> {
     let options = Options { pairs: false, ..Options::default() };
     let report = diagnose(&table(passes)?, rig, &options, String::new()).report;
     let of = |name: &str| -> f64 {
         report.hypotheses.iter().filter(|h| h.effects == [name]).map(|h| h.probability).sum()
     };
     let asked = report.next_experiment.iter().find(|e| !e.conditions.is_empty());
-    let asked = asked.map_or_else(Vec::new, |e| e.conditions.iter().take(BATCH).map(condition).collect());
+    let asked = asked.map_or_else(Vec::new, |e| e.conditions.iter().take(BATCH).map(settings).collect());
     let found = of(truth);
     let step = Step {
         passes: 0,
@@ -218,19 +218,16 @@ fn table(passes: &[Pass]) -> miette::Result<Table> {
 
 /// The conditions that a design of these passes may choose from.
 fn grid(passes: &[Pass]) -> miette::Result<Vec<Condition>> {
-    Ok(next::grid::conditions(&table(passes)?).iter().map(|p| condition(&next::Condition::of(p))).collect())
+    Ok(next::grid::conditions(&table(passes)?).iter().map(settings).collect())
 }
 
-fn condition(c: &next::Condition) -> Condition {
-    Condition {
-        amplitude: PeakToPeak::from_metres(c.amplitude_pp_m),
-        frequency_hz: c.frequency_hz,
-        speed_m_s: c.speed_m_s,
-        direction: if c.direction < 0.0 { Direction::Backward } else { Direction::Forward },
-        normal_force_n: c.normal_force_n,
-        mu0: 0.5,
-        position_m: c.position_m,
-        time_s: 0.0,
-        ambient_pressure_pa: c.ambient_pressure_pa,
+/// What a plan sets of a condition, and nothing of its time and climate.
+fn settings(c: &Condition) -> Condition {
+    let mut set = Condition::paper();
+    for covariate in covariate::planned() {
+        if let Some(value) = covariate.of(c) {
+            covariate.put(&mut set, value);
+        }
     }
+    set
 }

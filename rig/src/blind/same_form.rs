@@ -3,8 +3,8 @@
 //! The inverse crime on purpose: an interval is one of the library's form, so only data of that form can say whether it
 //! covers. These sets say nothing about naming, and no figure of naming is taken from them.
 
-use diagnosis::attribute::Verdict;
-use diagnosis::data::{Rig, Table};
+use diagnosis::Verdict;
+use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use effects::{Active, Baseline, Need, Prior, library};
@@ -38,7 +38,7 @@ pub fn run(seed: u64, count: usize) -> miette::Result<Vec<Covered>> {
 
 fn one(seed: u64) -> miette::Result<Covered> {
     let set = generate(seed, Stratum::None, Ask::Gain);
-    let rig: Rig = toml::from_str(&set.rig_toml).map_err(|e| miette::miette!("rig.toml: {e}"))?;
+    let rig: RigFile = RigFile::parse(&set.rig_toml).map_err(|e| miette::miette!("rig.toml: {e}"))?;
     let clean = Table::measured(&set.passes).map_err(|e| miette::miette!("table: {e}"))?;
     let mut noise = Noise::new(seed, "same form");
     let seen: Vec<usize> = (0..library().len())

@@ -1,10 +1,13 @@
 //! `muprime blind`: the diagnosis scored on sealed sets.
 
 use crate::blind::{confusion, figures, run as score_all};
+use crate::{out, say};
+use diagnosis::constants::{Constants, Row, Stage};
 use diagnosis::hypotheses::Options;
 use miette::IntoDiagnostic;
 use sim::sealed::Stratum;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 /// Score the diagnosis on sealed sets of the independent simulation.
 #[derive(Debug, clap::Args)]
@@ -33,6 +36,16 @@ pub struct Args {
     /// Instead: designed next experiments against random ones.
     #[arg(long, conflicts_with_all = ["write", "stratum"])]
     pub further: bool,
+    /// Set a constant of the diagnosis for this study (may be repeated); docs/diagnosis/constants.md lists them.
+    #[arg(long, value_name = "NAME=VALUE", hide = true)]
+    pub constant: Vec<String>,
+    /// Instead: the verdicts with each constant halved and doubled. `fit`, `decision` or a name restricts it.
+    #[arg(long, value_name = "WHICH", num_args = 0..=1, default_missing_value = "all", hide = true,
+          conflicts_with_all = ["further", "write", "same_form"])]
+    pub sensitivity: Option<String>,
+    /// Instead: the table of constants, as docs/diagnosis/constants.md has it.
+    #[arg(long, hide = true)]
+    pub constants: bool,
     /// Print one line a set on stderr.
     #[arg(long)]
     pub verbose: bool,
@@ -60,16 +73,31 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         return Ok(ExitCode::SUCCESS);
     }
+    if args.constants {
+        out!("{}", diagnosis::constants::markdown().trim_end());
+        return Ok(ExitCode::SUCCESS);
+    }
     if args.same_form {
         return same_form(&args, json);
     }
     if args.further {
         return further(&args, json);
     }
-    let options = Options { pairs: !args.no_pairs, without: args.without.clone(), ..Options::default() };
+    let mut constants = Constants::default();
+    for setting in &args.constant {
+        let (name, value) = setting
+            .split_once('=')
+            .ok_or_else(|| miette::miette!("--constant {setting}: NAME=VALUE is needed"))?;
+        constants.set(name.trim(), value).map_err(|e| miette::miette!("--constant {setting}: {e}"))?;
+    }
+    let options =
+        Options { constants: Arc::new(constants), pairs: !args.no_pairs, without: args.without.clone() };
+    if let Some(asked) = args.sensitivity.as_deref() {
+        return sensitivity(&args, asked, stratum, &options, json);
+    }
     let scored = score_all(args.seed, args.sets, stratum, &options, |s| {
         if args.verbose {
-            eprintln!("{}", serde_json::to_string(s).unwrap_or_default());
+            say!("{}", serde_json::to_string(s).unwrap_or_default());
         }
     })?;
     let figures = figures(&scored);
@@ -79,19 +107,61 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             "schema": "muprime.blind/1", "seed": args.seed, "sets": args.sets,
             "figures": figures, "confusion": confusion, "scored": scored,
         });
-        println!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
     } else {
-        println!("{:52} {:>8}  {:>17}  {:>5}  target", "figure", "value", "95 % interval", "n");
+        out!("{:52} {:>8}  {:>17}  {:>5}  target", "figure", "value", "95 % interval", "n");
         for f in &figures {
             let value = f.value.map_or_else(|| "-".to_string(), |v| format!("{v:.3}"));
             let ci = f.ci95.map_or_else(|| "-".to_string(), |c| format!("[{:.3}, {:.3}]", c[0], c[1]));
-            println!("{:52} {value:>8}  {ci:>17}  {:>5}  {}", f.name, f.n, f.target);
+            out!("{:52} {value:>8}  {ci:>17}  {:>5}  {}", f.name, f.n, f.target);
         }
-        println!("\ntruth -> answers");
+        out!("\ntruth -> answers");
         for (truth, answers) in &confusion {
             let list: Vec<String> = answers.iter().map(|(a, n)| format!("{a} {n}")).collect();
-            println!("  {truth:40} {}", list.join("; "));
+            out!("  {truth:40} {}", list.join("; "));
         }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Verdicts with each constant halved and doubled.
+fn sensitivity(
+    args: &Args,
+    asked: &str,
+    stratum: Option<Stratum>,
+    options: &Options,
+    json: bool,
+) -> miette::Result<ExitCode> {
+    let picked = |row: &Row| match asked {
+        "all" => true,
+        "fit" => row.stage == Stage::Fit,
+        "decision" => row.stage == Stage::Decision,
+        name => row.name == name,
+    };
+    if !options.constants.rows().iter().any(picked) {
+        miette::bail!("--sensitivity {asked}: fit, decision, the name of a constant, or nothing is needed");
+    }
+    let rows = crate::blind::sensitivity::run(args.seed, args.sets, stratum, options, &picked)?;
+    if json {
+        let document = serde_json::json!({
+            "schema": "muprime.blind.sensitivity/1", "seed": args.seed, "sets": args.sets, "rows": rows,
+        });
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    out!("| constant | factor | right | misnamed | changed | probability on the truth | n |");
+    out!("|---|---|---|---|---|---|---|");
+    for r in rows {
+        out!(
+            "| `{}` | {} | {} | {} | {} | {:.3} | {} |",
+            r.constant,
+            r.factor,
+            r.right,
+            r.misnamed,
+            r.changed,
+            r.probability,
+            r.sets
+        );
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -105,10 +175,10 @@ fn same_form(args: &Args, json: bool) -> miette::Result<ExitCode> {
     if json {
         let document =
             serde_json::json!({ "schema": "muprime.blind.same_form/1", "figure": figure, "sets": sets });
-        println!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
     } else {
         let ci = figure.ci95.unwrap_or([f64::NAN; 2]);
-        println!(
+        out!(
             "{}: {:.3} [{:.3}, {:.3}], n {} of {} sets (the others were not named in their own form)",
             figure.name,
             figure.value.unwrap_or(f64::NAN),
@@ -128,9 +198,12 @@ fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
         let passes = |n: Option<usize>| n.map_or(format!("> {LIMIT}"), |n| n.to_string());
         let (designed, random) = (passes(r.designed), passes(r.random));
         if args.verbose {
-            eprintln!(
+            say!(
                 "{} {:26} kept {} before {:.3} designed {designed} random {random}",
-                r.seed, r.truth, r.kept, r.before
+                r.seed,
+                r.truth,
+                r.kept,
+                r.before
             );
         }
     };
@@ -140,22 +213,22 @@ fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
         let document = serde_json::json!({
             "schema": "muprime.blind.further/2", "limit": LIMIT, "figures": figures, "races": races,
         });
-        println!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
         return Ok(ExitCode::SUCCESS);
     }
-    println!(
+    out!(
         "further passes to a probability of 0.9 on the truth, {} sets whose cause is open at first:",
         races.len()
     );
     for f in figures {
         let ci = f.ci95.unwrap_or([f64::NAN; 2]);
         let value = f.value.unwrap_or(f64::NAN);
-        println!("  {:46} {value:7.3} [{:.3}, {:.3}]  n {}  {}", f.name, ci[0], ci[1], f.n, f.target);
+        out!("  {:46} {value:7.3} [{:.3}, {:.3}]  n {}  {}", f.name, ci[0], ci[1], f.n, f.target);
     }
     let count = |of: &dyn Fn(usize, usize) -> bool| {
         let passes = |n: Option<usize>| n.unwrap_or(usize::MAX);
         races.iter().filter(|r| of(passes(r.designed), passes(r.random))).count()
     };
-    println!("  designed sooner in {}, later in {}", count(&|d, r| d < r), count(&|d, r| d > r));
+    out!("  designed sooner in {}, later in {}", count(&|d, r| d < r), count(&|d, r| d > r));
     Ok(ExitCode::SUCCESS)
 }

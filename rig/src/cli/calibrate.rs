@@ -14,6 +14,7 @@ mod noise;
 mod phase;
 mod tables;
 
+use crate::out;
 use calibration::certificate::{Certificate, Instrument, Kind, Occasion, Outcome, RawData, date};
 use miette::IntoDiagnostic;
 use std::path::{Path, PathBuf};
@@ -139,18 +140,19 @@ fn now_unix_s() -> miette::Result<i64> {
 }
 
 fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
-    let mut priors = calibration::prior::CalibrationPriors::default();
+    let mut priors = models::rig_file::Calibration::default();
     for path in &args.certificates {
         let name = path.display().to_string();
         let certificate = Certificate::from_toml(&crate::input::text_of(path)?)
             .map_err(|e| miette::miette!("{name}: {e}"))?;
         let verified = verify(&name, &certificate, certificate.kind, &certificate.instrument.serial)?;
-        priors.take(verified).map_err(|refusal| miette::miette!("{name}: {refusal}"))?;
+        calibration::prior::take(&mut priors, verified)
+            .map_err(|refusal| miette::miette!("{name}: {refusal}"))?;
     }
     if json {
-        println!("{}", serde_json::json!({ "calibration": priors }));
+        out!("{}", serde_json::json!({ "calibration": priors }));
     } else {
-        println!("[calibration]\n{}", toml::to_string(&priors).into_diagnostic()?.trim_end());
+        out!("[calibration]\n{}", toml::to_string(&priors).into_diagnostic()?.trim_end());
     }
     super::exit(super::DONE)
 }
@@ -201,7 +203,7 @@ impl Common {
         if out.exists() && !self.overwrite {
             miette::bail!("{} exists: give another --out, or --overwrite", out.display());
         }
-        write_whole(&out, &certificate.to_toml())?;
+        crate::files::write_whole(&out, certificate.to_toml())?;
         if json {
             let parameters: Vec<serde_json::Value> = certificate
                 .parameters
@@ -219,7 +221,7 @@ impl Common {
                     "parameters": parameters, "remarks": certificate.remarks,
             });
             more.into_iter().for_each(|(key, value)| document[key] = value);
-            println!("{document}");
+            out!("{document}");
         } else {
             show(&certificate, &out);
         }
@@ -227,26 +229,23 @@ impl Common {
     }
 }
 
-/// Writes beside and renames: a certificate is whole or not there.
-fn write_whole(path: &Path, text: &str) -> miette::Result<()> {
-    let beside = path.with_extension("toml.part");
-    let shown = path.display();
-    std::fs::write(&beside, text).map_err(|e| miette::miette!("{shown}: {e}"))?;
-    std::fs::rename(&beside, path).map_err(|e| miette::miette!("{shown}: {e}"))
-}
-
 fn show(certificate: &Certificate, out: &Path) {
-    println!("{} certificate for {}: {}", certificate.kind, certificate.instrument.serial, out.display());
+    out!("{} certificate for {}: {}", certificate.kind, certificate.instrument.serial, out.display());
     for p in &certificate.parameters {
-        println!(
+        out!(
             "  {:<34} {:>14.6e} +- {:.1e} {}  95 %: {:.6e} to {:.6e}",
-            p.name, p.value, p.standard_uncertainty, p.unit, p.ci95[0], p.ci95[1]
+            p.name,
+            p.value,
+            p.standard_uncertainty,
+            p.unit,
+            p.ci95[0],
+            p.ci95[1]
         );
     }
     let r = &certificate.residuals;
-    println!("  residuals: {} of sd {:.3e}, largest {:.3e} {}", r.count, r.sd, r.largest, r.unit);
+    out!("  residuals: {} of sd {:.3e}, largest {:.3e} {}", r.count, r.sd, r.largest, r.unit);
     for remark in &certificate.remarks {
-        println!("  note: {remark}");
+        out!("  note: {remark}");
     }
-    println!("  valid until {}", certificate.validity.until);
+    out!("  valid until {}", certificate.validity.until);
 }

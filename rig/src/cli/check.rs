@@ -2,6 +2,7 @@
 
 use crate::plan::Plan;
 use crate::setup::Setup;
+use crate::{out, say};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -26,11 +27,11 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 Ok(kind) => serde_json::json!({ "file": file, "ok": true, "kind": kind }),
                 Err(e) => serde_json::json!({ "file": file, "ok": false, "problem": format!("{e}") }),
             };
-            println!("{said}");
+            out!("{said}");
         } else {
             match &verdict {
-                Ok(kind) => eprintln!("{}: a good {kind}", file.display()),
-                Err(e) => eprintln!("{}:\n{e:?}", file.display()),
+                Ok(kind) => say!("{}: a good {kind}", file.display()),
+                Err(e) => say!("{}:\n{e:?}", file.display()),
             }
         }
         if verdict.is_err() {
@@ -50,7 +51,7 @@ fn check(path: &Path) -> miette::Result<&'static str> {
         // Files that a profile names (DBC) stand beside it, or come with the program.
         let beside = |file: &str| {
             let path = path.parent().unwrap_or(Path::new(".")).join(file);
-            let text = std::fs::read_to_string(path).ok();
+            let text = crate::input::text_of(&path).ok();
             text.or_else(|| drivers::bundled::file(file).map(String::from))
         };
         let wrong = |e: instruments::ProfileError| miette::miette!("{e}");

@@ -1,5 +1,6 @@
 //! `muprime completions SHELL`.
 
+use crate::out;
 use clap_complete::Shell;
 use std::process::ExitCode;
 
@@ -15,6 +16,8 @@ pub struct Args {
 /// # Errors
 /// None.
 pub fn run(args: &Args, command: &mut clap::Command) -> miette::Result<ExitCode> {
-    clap_complete::generate(args.shell, command, "muprime", &mut std::io::stdout());
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, command, "muprime", &mut script);
+    out!("{}", String::from_utf8_lossy(&script).trim_end());
     super::exit(super::DONE)
 }

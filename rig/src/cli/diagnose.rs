@@ -2,14 +2,17 @@
 
 mod certificates;
 
+use crate::input::{MAX_TABLE_BYTES, bytes_of};
+use crate::{out, say};
+use calibration::certificate::sha256_hex;
 use clap::Args as ClapArgs;
-use diagnosis::data::{Rig, Table};
+use diagnosis::data::Table;
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::{Diagnosis, diagnose};
 use miette::{Context, IntoDiagnostic};
+use models::condition::Condition;
+use models::covariate::{self, Covariate};
 use models::record::{Pass, read_passes};
-use sha2::{Digest, Sha256};
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -59,9 +62,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         (args.data.clone(), folder.join("rig.toml"))
     };
     let rig_path = args.rig.as_deref().unwrap_or(&beside);
-    let rig = read_rig(rig_path)?;
-    let bytes = fs::read(&table_path)
-        .into_diagnostic()
+    let rig = crate::input::rig_file(rig_path)
+        .wrap_err_with(|| format!("the rig's calibration {} (name it with --rig)", rig_path.display()))?;
+    let damage = if args.data.is_dir() { crate::run_dir::damage_in(&args.data)? } else { Vec::new() };
+    let bytes = bytes_of(&table_path, MAX_TABLE_BYTES)
         .wrap_err_with(|| format!("cannot read the table {}", table_path.display()))?;
     let passes = parse_passes(&table_path, &bytes)?;
     let table =
@@ -84,69 +88,53 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         None => None,
     };
     let options = Options { pairs: !args.no_pairs, without: args.without.clone(), ..Options::default() };
-    let result = diagnose(&table, &rig, &options, hex(&Sha256::digest(&bytes)));
+    let result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
     if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
         write_text(out, &predictions(&result, conditions))?;
     }
     if let Some(out) = &args.save_model {
         match result.saved_model() {
             Some(model) => write_text(out, &toml::to_string(&model).into_diagnostic()?)?,
-            None => eprintln!(
-                "no model written to {}: no effect of the library causes most of the gap",
-                out.display()
-            ),
+            None => {
+                say!("no model written to {}: no effect of the library causes most of the gap", out.display())
+            }
         }
     }
     if let Some(out) = &args.save_plan {
         match result.report.next_experiment.iter().find(|e| !e.conditions.is_empty()) {
             Some(experiment) => write_text(out, &plan(experiment))?,
-            None => eprintln!("no plan written to {}: no conditions would tell more", out.display()),
+            None => say!("no plan written to {}: no conditions would tell more", out.display()),
         }
     }
     if let Some(out) = &args.report {
         write_text(out, &crate::report::diagnosis::page(&result, &table)?)?;
     }
     let mut report = serde_json::to_value(&result.report).into_diagnostic()?;
-    let faults = certificates::at_fault(&rig, rig_path, &report);
-    let doubts = certificates::in_doubt(rig_path, &result.report.stiffness_pulls);
+    let faults = certificates::at_fault(&result, &rig);
+    let doubts = certificates::in_doubt(&rig, &result.report.stiffness_pulls);
     if json {
+        if !damage.is_empty() {
+            report["damage"] = serde_json::to_value(&damage).into_diagnostic()?;
+        }
         if !faults.is_empty() {
             report["certificates_at_fault"] = serde_json::to_value(&faults).into_diagnostic()?;
         }
         if !doubts.is_empty() {
             report["certificates_in_doubt"] = serde_json::to_value(&doubts).into_diagnostic()?;
         }
-        println!("{}", serde_json::to_string(&report).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&report).into_diagnostic()?);
     } else {
-        print!("{}", terminal(&result));
-        faults.iter().for_each(|fault| println!("{}", fault.text()));
-        doubts.iter().for_each(|doubt| println!("{}", doubt.text()));
+        damage.iter().for_each(|d| say!("damaged: {d}"));
+        out!("{}", terminal(&result).trim_end());
+        faults.iter().for_each(|fault| out!("{}", fault.text()));
+        doubts.iter().for_each(|doubt| out!("{}", doubt.text()));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn read_rig(path: &Path) -> miette::Result<Rig> {
-    let text = fs::read_to_string(path).into_diagnostic().wrap_err_with(|| {
-        format!("cannot read the rig's calibration {} (name it with --rig)", path.display())
-    })?;
-    let rig: Rig = toml::from_str(&text).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-    rig.finger.check().into_diagnostic().wrap_err_with(|| format!("{}: [finger]", path.display()))?;
-    let noise = rig.noise;
-    if !(noise.pass_relative_sd >= 0.0
-        && noise.force_sd_n >= 0.0
-        && noise.pass_relative_sd + noise.force_sd_n > 0.0)
-    {
-        miette::bail!(
-            "{}: [noise] needs pass_relative_sd and force_sd_n of zero or more, not both zero",
-            path.display()
-        );
-    }
-    Ok(rig)
-}
-
 fn read_table(path: &Path) -> miette::Result<Vec<Pass>> {
     let bytes =
-        fs::read(path).into_diagnostic().wrap_err_with(|| format!("cannot read {}", path.display()))?;
+        bytes_of(path, MAX_TABLE_BYTES).wrap_err_with(|| format!("cannot read {}", path.display()))?;
     parse_passes(path, &bytes)
 }
 
@@ -172,43 +160,33 @@ fn predictions(result: &Diagnosis, conditions: &Table) -> String {
 /// a chamber is changed once.
 fn plan(experiment: &diagnosis::next::Experiment) -> String {
     let mut conditions = experiment.conditions.clone();
-    let pressure = |c: &diagnosis::next::Condition| c.ambient_pressure_pa.unwrap_or(0.0);
+    let pressure = |c: &Condition| c.ambient_pressure_pa.unwrap_or(0.0);
     conditions.sort_by(|a, b| pressure(b).total_cmp(&pressure(a)));
     let Some(base) = conditions.first() else { return String::new() };
     let about = toml::Value::String(experiment.text.clone());
+    // Every plan has the settings that every table has, but the direction; a series names what the base cannot.
+    let based = |c: &&Covariate| covariate::REQUIRED.iter().any(|r| r.name == c.name);
+    let of = |c: &Condition, k: &Covariate| k.of(c).map(|v| (k.name, v));
+    let listed = |k: &&Covariate| k.name != covariate::DIRECTION.name;
     let mut text = format!(
         "name = \"next-experiment\"\nabout = {about}\nrandomise = false\n\n[base]\n{}",
-        settings(base, |name, value| format!("{name} = {value:e}\n"))
+        covariate::planned()
+            .filter(|k| listed(k) && based(k))
+            .filter_map(|k| of(base, k))
+            .map(|(name, value)| format!("{name} = {value:e}\n"))
+            .collect::<String>()
     );
     for c in &conditions {
-        text.push_str(&format!("\n[[series]]\ndirections = [{}]\n", c.direction as i8));
-        text.push_str(&settings(c, |name, value| format!("{name} = [{value:e}]\n")));
-        if let Some(p) = c.ambient_pressure_pa {
-            text.push_str(&format!("ambient_pressure_pa = [{p:e}]\n"));
+        text.push_str(&format!("\n[[series]]\ndirections = [{}]\n", i8::from(c.direction)));
+        for (name, value) in covariate::planned().filter(listed).filter_map(|k| of(c, k)) {
+            text.push_str(&format!("{name} = [{value:e}]\n"));
         }
     }
     text
 }
 
-fn settings(c: &diagnosis::next::Condition, line: impl Fn(&str, f64) -> String) -> String {
-    [
-        ("amplitude_pp_m", c.amplitude_pp_m),
-        ("frequency_hz", c.frequency_hz),
-        ("speed_m_s", c.speed_m_s),
-        ("normal_force_n", c.normal_force_n),
-        ("position_m", c.position_m),
-    ]
-    .into_iter()
-    .map(|(name, value)| line(name, value))
-    .collect()
-}
-
 fn write_text(path: &Path, text: &str) -> miette::Result<()> {
-    fs::write(path, text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
+    crate::files::write_whole(path, text)
 }
 
 /// What a terminal shows.
@@ -282,22 +260,23 @@ pub fn terminal(result: &Diagnosis) -> String {
 mod tests {
     use super::plan;
     use crate::plan::{Plan, Resolution};
-    use diagnosis::next::{Condition, Experiment};
+    use diagnosis::next::Experiment;
+    use models::condition::Condition;
+    use models::quantity::{Direction, PeakToPeak};
     use realtime::ports::Nanos;
     use realtime::safety::Limits;
 
     #[test]
     fn a_saved_plan_asks_for_the_designed_passes() {
         let one = Condition {
-            amplitude_pp_m: 3e-6,
-            frequency_hz: 27_500.0,
-            speed_m_s: 0.02,
-            direction: -1.0,
+            amplitude: PeakToPeak::from_metres(3e-6),
+            direction: Direction::Backward,
             normal_force_n: 0.4,
             position_m: 0.001,
             ambient_pressure_pa: Some(101_325.0),
+            ..Condition::paper()
         };
-        let thin = Condition { ambient_pressure_pa: Some(20_000.0), direction: 1.0, ..one };
+        let thin = Condition { ambient_pressure_pa: Some(20_000.0), direction: Direction::Forward, ..one };
         let conditions = vec![thin, one, Condition { speed_m_s: 0.01, ..thin }, one];
         let experiment = Experiment {
             conditions: conditions.clone(),
@@ -319,7 +298,7 @@ mod tests {
             .collect();
         let mut wanted: Vec<[f64; 4]> = conditions
             .iter()
-            .map(|c| [c.speed_m_s, c.direction, c.position_m, c.ambient_pressure_pa.unwrap_or(0.0)])
+            .map(|c| [c.speed_m_s, c.direction.sign(), c.position_m, c.ambient_pressure_pa.unwrap_or(0.0)])
             .collect();
         let order = |a: &[f64; 4], b: &[f64; 4]| a.partial_cmp(b).expect("finite settings");
         asked.sort_by(order);

@@ -1,5 +1,6 @@
 //! `muprime doctor`: judges this machine truthfully, and talks to the instruments of a setup.
 
+use crate::out;
 use crate::setup::Setup;
 use drivers::OpenError;
 use drivers::probe::Probed;
@@ -57,18 +58,18 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let good = findings.iter().chain(&instruments).all(|f| f.good);
     let judgement = Judgement { findings, lateness_us, instruments };
     if json {
-        println!("{}", serde_json::json!({ "good": good, "judgement": judgement }));
+        out!("{}", serde_json::json!({ "good": good, "judgement": judgement }));
     } else {
         for f in judgement.findings.iter().chain(&judgement.instruments) {
             let mark = if f.good { "good" } else { "POOR" };
-            println!("{mark}  {}: {}", f.subject, f.found);
+            out!("{mark}  {}: {}", f.subject, f.found);
             if !f.good {
-                println!("      {}", f.advice);
+                out!("      {}", f.advice);
             }
         }
         if let Some(late) = &judgement.lateness_us {
             for (when, [p50, p99, p999, max]) in [("idle", late.idle), ("loaded", late.loaded)] {
-                println!(
+                out!(
                     "      lateness {when}: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us"
                 );
             }
@@ -217,6 +218,18 @@ fn talk(setup: &Setup) -> Vec<Finding> {
             advice: String::new(),
         }];
     }
+    // Every driver ends with an 'off': that must not reach a rig that another program drives.
+    let _claim = match crate::claim::RigClaim::take(setup) {
+        Ok(claim) => claim,
+        Err(why) => {
+            return vec![Finding {
+                subject: "instruments".into(),
+                good: false,
+                found: format!("{why}: {}", why.root_cause()),
+                advice: "wait until it ends, or end it".into(),
+            }];
+        }
+    };
     let probed = drivers::probe::probe(&setup.instruments(), Duration::from_secs(1));
     let vibrometer = setup.file.vibrometer.as_ref().map(|v| {
         let settings = drivers::vibrometer::settings(v);

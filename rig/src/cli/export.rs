@@ -1,6 +1,7 @@
 //! `muprime export RUN --to csv|parquet|arrow`.
 
 use crate::export::{Format, export};
+use crate::{out, say};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -26,9 +27,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let out = args.out.unwrap_or_else(|| args.run.join(format!("passes.{}", args.to.ending())));
     export(&run, args.to, &out)?;
     if json {
-        println!("{}", serde_json::json!({ "file": out, "passes": run.passes.len() }));
+        out!("{}", serde_json::json!({ "file": out, "passes": run.passes.len(), "damage": run.damage }));
     } else {
-        eprintln!("{} passes: {}", run.passes.len(), out.display());
+        say!("{} passes: {}", run.passes.len(), out.display());
+        run.damage.iter().for_each(|d| say!("{d}"));
     }
     super::exit(super::DONE)
 }

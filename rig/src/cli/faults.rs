@@ -1,7 +1,9 @@
 //! `muprime faults`: the fault list in virtual time, from seeds.
 
+use crate::faults::Pace;
 use crate::faults::bench::{Scene, run as run_scene};
 use crate::faults::search::{Search, Tally, search};
+use crate::out;
 use miette::IntoDiagnostic;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,6 +23,9 @@ pub struct Args {
     /// Every seed twice: equal hashes, and its rows replayed to equal decisions
     #[arg(long)]
     twice: bool,
+    /// At the limits that a setup has by default (links held up for 20 ms), not at those of fast links
+    #[arg(long)]
+    default_limits: bool,
     /// Run one scene again, as a failure printed it
     #[arg(long, value_name = "SCENE.json")]
     scene: Option<PathBuf>,
@@ -38,31 +43,32 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             miette::bail!("{}: a strike's row is beyond the list", path.display());
         }
         let found = run_scene(&scene, true);
-        println!("{}", serde_json::to_string(&found).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&found).into_diagnostic()?);
         return super::exit(if found.wrong.is_empty() { super::DONE } else { super::FAILED });
     }
-    let Args { seeds, first, pairs, twice, .. } = args;
+    let Args { seeds, first, pairs, twice, default_limits, .. } = args;
+    let pace = if default_limits { Pace::Default } else { Pace::Fast };
     let (begun, cpu_ns) = (std::time::Instant::now(), realtime::pacing::process_cpu_ns());
-    let tally = search(Search { first, seeds, pairs, twice });
+    let tally = search(Search { first, seeds, pairs, twice, pace });
     let cpu_s = (realtime::pacing::process_cpu_ns() - cpu_ns) as f64 * 1e-9;
     let simulated_s = tally.cycles as f64 * crate::faults::bench::T.seconds();
     let speed = simulated_s / cpu_s.max(1e-9);
     if json {
-        println!("{}", document(&tally, speed)?);
+        out!("{}", document(&tally, speed)?);
     } else {
         table(&tally);
-        println!(
+        out!(
             "{} runs in {:.0} s, {} over a bound or otherwise wrong",
             tally.scenes,
             begun.elapsed().as_secs_f64(),
             tally.failed
         );
-        println!(
+        out!(
             "{simulated_s:.0} s simulated in {cpu_s:.0} s of processor time: {speed:.0} times real time per core"
         );
         for failure in &tally.failures {
-            println!("seed {}: {}", failure.seed, failure.wrong.join("; "));
-            println!("  again: muprime faults --scene FILE, with {}", json_of(&failure.smallest)?);
+            out!("seed {}: {}", failure.seed, failure.wrong.join("; "));
+            out!("  again: muprime faults --scene FILE, with {}", json_of(&failure.smallest)?);
         }
     }
     super::exit(if tally.failed == 0 { super::DONE } else { super::FAILED })
@@ -87,9 +93,7 @@ fn document(tally: &Tally, speed: f64) -> miette::Result<String> {
 
 /// Worst reactions beside their bounds, in cycles of 1 ms.
 pub fn table(tally: &Tally) {
-    println!(
-        "  # fault                          phase    runs  command off / bound  measured off / bound (ms)"
-    );
+    out!("  # fault                          phase    runs  command off / bound  measured off / bound (ms)");
     for ((number, name, moment), r) in &tally.reactions {
         let moment = format!("{moment:?}").to_lowercase();
         let cells = match r.command_bound {
@@ -104,6 +108,6 @@ pub fn table(tally: &Tally) {
                 )
             }
         };
-        println!("{number:>3} {name:<30} {moment:<7} {:>6}  {cells}", r.runs);
+        out!("{number:>3} {name:<30} {moment:<7} {:>6}  {cells}", r.runs);
     }
 }

@@ -3,14 +3,12 @@
 mod amplitude_for;
 mod conditions;
 mod effects;
-mod figures;
-mod plot;
 mod point;
 mod reproduce;
 mod ridge;
-mod store;
 mod table;
 
+use crate::say;
 use clap::{Args, Subcommand};
 use std::process::ExitCode;
 
@@ -54,6 +52,6 @@ pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
 
 /// Bad input: says why and gives its exit status (docs/contract.md).
 fn refused(why: impl std::fmt::Display) -> miette::Result<ExitCode> {
-    eprintln!("refused: {why}");
+    say!("refused: {why}");
     Ok(ExitCode::from(2))
 }

@@ -1,9 +1,12 @@
-//! `muprime recover FILE`: makes a cut record whole in place, and keeps the original beside it.
+//! `muprime recover FILE`: makes a cut or damaged record whole in place, and keeps the original beside it.
 
+use crate::files::{self, Placed};
+use crate::{out, say};
 use miette::{IntoDiagnostic, WrapErr};
-use realtime::recorder::{self, Recovery};
-use std::io::{BufWriter, Write};
-use std::path::PathBuf;
+use realtime::recorder::{self, Integrity, Recovery};
+use std::fs::{self, File, OpenOptions};
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments.
@@ -16,64 +19,79 @@ pub struct Args {
 /// Recovers.
 ///
 /// # Errors
-/// A file that is not there, or that holds nothing of a record.
+/// A file that is not there, or that holds nothing of a record; nothing is written then.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let file = &args.file;
     let shown = || file.display().to_string();
-    let bytes = std::fs::read(file).into_diagnostic().wrap_err_with(shown)?;
-    let beside = file.with_extension("mcap.part");
-    let part = std::fs::File::create(&beside).into_diagnostic().wrap_err_with(shown)?;
-    let mut writer = BufWriter::new(part);
-    let found = recorder::recover(&bytes, &mut writer).into_diagnostic()?;
-    writer.flush().into_diagnostic()?;
-    writer.get_ref().sync_all().into_diagnostic()?;
-    drop(writer);
-    let answer = match &found {
-        Recovery::Whole | Recovery::Nothing { .. } => {
-            std::fs::remove_file(&beside).into_diagnostic()?;
-            None
-        }
-        Recovery::Rewritten { .. } => {
-            let mut original = file.with_extension("mcap.original");
-            let mut n = 1;
-            while original.exists() {
-                n += 1;
-                original = file.with_extension(format!("mcap.original-{n}"));
-            }
-            // The original keeps a name at every instant: link it beside, then move the whole one over it.
-            std::fs::hard_link(file, &original)
-                .or_else(|_| std::fs::copy(file, &original).map(|_| ()))
-                .into_diagnostic()?;
-            std::fs::rename(&beside, file).into_diagnostic()?;
-            Some(original)
-        }
-    };
+    if !fs::metadata(file).into_diagnostic().wrap_err_with(shown)?.is_file() {
+        miette::bail!(help = "give a record, run-1.mcap and the like", "{} is no ordinary file", shown());
+    }
+    let damaged = BufReader::new(File::open(file).into_diagnostic().wrap_err_with(shown)?);
+    let part = files::beside(file);
+    let whole = Placed::open(&part, OpenOptions::new().create(true).truncate(true).read(true).write(true))?;
+    let disk = whole.handle()?;
+    let found = recorder::recover(damaged, whole);
+    let found = found.into_diagnostic().and_then(|found| disk.sync().map(|()| found));
     match found {
-        Recovery::Whole => {
+        Ok(Recovery::Rewritten { messages, found }) => {
+            let original = put_in_place(file, &part)?;
             if json {
-                println!("{}", serde_json::json!({ "recovered": false, "whole": true }));
+                let said = serde_json::json!({ "recovered": true, "messages": messages, "original": original,
+                    "damaged": found.damaged_places, "because": found.sentences().join("; "), "integrity": found });
+                out!("{said}");
             } else {
-                eprintln!("{}: whole, nothing to do", file.display());
+                say!("{}: {messages} messages saved; the original is {}", shown(), original.display());
+                tell(&found);
             }
             super::exit(super::DONE)
         }
-        Recovery::Rewritten { messages, damaged, because } => {
-            let original = answer.unwrap_or_default();
-            if json {
-                let said = serde_json::json!({ "recovered": true, "messages": messages, "damaged": damaged,
-                    "because": because, "original": original });
-                println!("{said}");
-            } else {
-                eprintln!(
-                    "{}: {messages} messages saved ({damaged} damaged); the original is {}\nit was cut: {because}",
-                    file.display(),
-                    original.display()
-                );
+        other => {
+            fs::remove_file(&part).into_diagnostic()?;
+            match other? {
+                Recovery::Nothing { found } => {
+                    miette::bail!(
+                        "{}: nothing of a record can be read: {}",
+                        shown(),
+                        found.sentences().join("; ")
+                    )
+                }
+                Recovery::Whole(found) | Recovery::Rewritten { found, .. } => {
+                    if json {
+                        out!(
+                            "{}",
+                            serde_json::json!({ "recovered": false, "whole": true, "integrity": found })
+                        );
+                    } else {
+                        say!("{}: whole, nothing to do", shown());
+                        tell(&found);
+                    }
+                    super::exit(super::DONE)
+                }
             }
-            super::exit(super::DONE)
-        }
-        Recovery::Nothing { because } => {
-            miette::bail!("{}: nothing of a record can be read: {because}", file.display())
         }
     }
+}
+
+fn tell(found: &Integrity) {
+    for sentence in found.sentences() {
+        say!("  {sentence}");
+    }
+}
+
+/// Moves the whole record to its place. The original keeps a name at every instant: it is linked beside first.
+fn put_in_place(file: &Path, part: &Path) -> miette::Result<PathBuf> {
+    let mut original = file.with_extension("mcap.original");
+    let mut n = 1;
+    while original.exists() {
+        n += 1;
+        original = file.with_extension(format!("mcap.original-{n}"));
+    }
+    fs::hard_link(file, &original)
+        .or_else(|_| fs::copy(file, &original).and_then(|_| File::open(&original)?.sync_all()))
+        .and_then(|()| files::sync_folder_of(file))
+        .and_then(|()| fs::rename(part, file))
+        .and_then(|()| files::sync_folder_of(file))
+        .into_diagnostic()
+        .wrap_err_with(|| file.display().to_string())?;
+    Ok(original)
 }

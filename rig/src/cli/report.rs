@@ -1,6 +1,6 @@
 //! `muprime report RUN`.
 
-use miette::{IntoDiagnostic, WrapErr};
+use crate::{out, say};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -19,13 +19,14 @@ pub struct Args {
 /// # Errors
 /// A folder that holds no run, or a place that cannot be written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    let html = crate::report::html(&args.run)?;
+    let (html, damage) = crate::report::html_and_damage(&args.run)?;
     let out = args.out.unwrap_or_else(|| args.run.join("report.html"));
-    std::fs::write(&out, html).into_diagnostic().wrap_err_with(|| out.display().to_string())?;
+    crate::files::write_whole(&out, html)?;
     if json {
-        println!("{}", serde_json::json!({ "report": out }));
+        out!("{}", serde_json::json!({ "report": out, "damage": damage }));
     } else {
-        eprintln!("report: {}", out.display());
+        say!("report: {}", out.display());
+        damage.iter().for_each(|d| say!("{d}"));
     }
     super::exit(super::DONE)
 }

@@ -2,14 +2,17 @@
 
 use crate::catalogue::runs_folder;
 use crate::plan::Plan;
+use crate::print::clean;
 use crate::sequence::{Event, Outcome};
-use crate::session::{Job, News, Signals, Summary};
+use crate::session::{Job, News, Signals, Summary, unix_ns};
 use crate::setup::Setup;
+use crate::supervisor::MAY_BE_ON;
+use crate::{out, say};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
 use models::prediction::{FrictionModel, SpringSlider};
 use realtime::ports::Nanos;
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -52,7 +55,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let bar = progress_bar(json);
     let planned = job.points()?.len();
     bar.set_length(planned as u64);
-    let say = |text: String| if bar.is_hidden() { eprintln!("{text}") } else { bar.println(text) };
+    let say = |text: String| if bar.is_hidden() { say!("{text}") } else { bar.println(clean(&text)) };
     if !json {
         let clock = if job.fast { "virtual time" } else { "wall-clock time" };
         say(format!(
@@ -65,12 +68,12 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let summary = job.run(&signals, &mut |news| match news {
         News::Pass(pass) => {
             if json {
-                print_line(&serde_json::json!({ "pass": pass }));
+                out!("{}", serde_json::json!({ "pass": pass }));
             }
         }
         News::Event(event) => {
             if json {
-                print_line(&serde_json::json!({ "event": event }));
+                out!("{}", serde_json::json!({ "event": event }));
             } else {
                 say(describe(event));
             }
@@ -84,7 +87,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     bar.finish_and_clear();
     tell(&summary, json);
     super::exit(match summary.outcome {
-        Outcome::Complete | Outcome::Stopped => super::DONE,
+        Outcome::Complete if summary.off.read_back => super::DONE,
         _ => super::FAILED,
     })
 }
@@ -111,7 +114,7 @@ fn job(args: Args) -> miette::Result<Job> {
         None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
         Some((_, text)) => {
             let path = args.model.as_ref().map_or_else(String::new, |p| p.display().to_string());
-            crate::model_file::load(&path, text)?
+            crate::model_file::load_for(&setup, &path, text)?
         }
     };
     let seed = args.seed.unwrap_or(plan.file.seed);
@@ -121,20 +124,8 @@ fn job(args: Args) -> miette::Result<Job> {
 
 /// Name of a new run: UTC date and time, and the plan.
 fn new_name(plan: &str) -> String {
-    let unix = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    let (days, second) = ((unix / 86_400) as i64, unix % 86_400);
-    // Civil date from days since 1970 (Howard Hinnant, 'chrono-compatible low-level date algorithms').
-    let z = days + 719_468;
-    let era = z.div_euclid(146_097);
-    let day_of_era = z.rem_euclid(146_097);
-    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let month_shifted = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month_shifted + 2) / 5 + 1;
-    let month = if month_shifted < 10 { month_shifted + 3 } else { month_shifted - 9 };
-    let year = year_of_era + era * 400 + i64::from(month <= 2);
-    let (h, m, s) = (second / 3600, second / 60 % 60, second % 60);
-    format!("{year:04}{month:02}{day:02}-{h:02}{m:02}{s:02}-{plan}")
+    let now = calibration::certificate::date::format((unix_ns() / 1_000_000_000) as i64);
+    format!("{}-{plan}", now.replace(['-', ':', 'Z'], "").replace('T', "-"))
 }
 
 /// SIGINT, SIGTERM and SIGHUP ask for a stop; a second one leaves within two seconds whatever happens.
@@ -148,9 +139,10 @@ fn watch_signals(signals: &Signals) -> miette::Result<()> {
             for (i, _) in caught.forever().enumerate() {
                 stops.fetch_add(1, Ordering::Relaxed);
                 if i > 0 {
-                    // The first one has sent the stop; the amplifier's watchdog covers the rest.
+                    // The first one has sent the stop; nobody can wait here for what was read back.
                     std::thread::sleep(std::time::Duration::from_millis(1500));
-                    std::process::exit(i32::from(super::FAILED));
+                    say!("leaving at once: {MAY_BE_ON}");
+                    super::leave_now(super::FAILED);
                 }
             }
         })
@@ -168,16 +160,14 @@ fn progress_bar(json: bool) -> ProgressBar {
     bar
 }
 
-fn print_line(value: &serde_json::Value) {
-    let mut out = std::io::stdout().lock();
-    // A reader that has gone away is no reason to stop a sweep.
-    let _ = writeln!(out, "{value}");
-    let _ = out.flush();
-}
-
 fn describe(event: &Event) -> String {
     match event {
         Event::Armed => "armed".into(),
+        Event::NoSecondChannel => {
+            "no second switch-off channel: what the amplifier refuses, only a hand at its supply switches off"
+                .into()
+        }
+        Event::NoWatchdog => "the amplifier has no watchdog: the second channel stands for it".into(),
         Event::Zeros { lateral_n, normal_n, after } => {
             let mn = |v: &Option<f64>| v.map_or("none".into(), |v| format!("{:+.2} mN", v * 1e3));
             let when = if *after { "after" } else { "before" };
@@ -211,39 +201,39 @@ fn describe(event: &Event) -> String {
 
 fn tell(summary: &Summary, json: bool) {
     if json {
-        print_line(&serde_json::json!({ "summary": summary }));
+        out!("{}", serde_json::json!({ "summary": summary }));
         return;
     }
-    let mut err = std::io::stderr().lock();
-    let _ = writeln!(err, "{} of {} passes", summary.passes, summary.planned);
+    if !summary.off.read_back {
+        say!("{}", summary.off.words());
+    }
+    if summary.finished_before {
+        say!("every pass of this run was made before: nothing was driven, nothing was recorded");
+    }
+    say!("{} of {} passes", summary.passes, summary.planned);
     if let Some(report) = &summary.loop_report {
         let [p50, _, p99, _, max] = report.lateness_ns.map(|ns| ns as f64 / 1e3);
-        let _ = writeln!(
-            err,
+        say!(
             "loop: {} cycles, lateness median {p50:.0} us, 99 % {p99:.0} us, worst {max:.0} us; {} overruns, {} rows lost",
-            report.cycles, report.overruns, summary.record_lost
+            report.cycles,
+            report.overruns,
+            summary.record_lost
         );
     }
     if let (Outcome::Tripped(trip), Some(stalls)) = (&summary.outcome, &summary.stalls)
         && let Some(stall) = stalls.within(Nanos(trip.at.0.saturating_sub(100_000_000)), trip.at)
     {
-        let _ = writeln!(
-            err,
+        say!(
             "just before the trip this machine kept its programs from running for {:.0} ms: see 'muprime doctor'",
             stall.lasted.seconds() * 1e3
         );
     }
     if summary.passes < summary.planned {
-        let _ = writeln!(err, "the same command with --out {} goes on", summary.folder.display());
+        say!("the same command with --out {} goes on", summary.folder.display());
     }
-    let finding = if summary.model_departed {
-        format!(
-            "the model has left the measurement: 'muprime diagnose {}' says where and why",
-            summary.folder.display()
-        )
-    } else {
-        "the measurement agrees with the model".into()
-    };
-    let _ = writeln!(err, "{finding}");
-    let _ = writeln!(err, "report: {}", summary.folder.join("report.html").display());
+    say!("{}", summary.agreement);
+    if summary.model_departed {
+        say!("'muprime diagnose {}' says where and why", summary.folder.display());
+    }
+    say!("report: {}", summary.folder.join("report.html").display());
 }

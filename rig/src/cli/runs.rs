@@ -1,6 +1,7 @@
 //! `muprime runs`: the catalogue.
 
 use crate::catalogue::{Catalogue, runs_folder};
+use crate::out;
 use miette::IntoDiagnostic;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -25,20 +26,17 @@ pub struct Args {
 /// A catalogue that cannot be read.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let folder = args.folder.unwrap_or_else(runs_folder);
-    if !folder.join("catalogue.sqlite").exists() {
-        miette::bail!(help = "give --folder, or make a run first", "{} holds no catalogue", folder.display());
-    }
-    let mut runs = Catalogue::open(&folder)?.all()?;
+    let mut runs = Catalogue::existing(&folder)?.all()?;
     runs.retain(|r| args.plan.as_ref().is_none_or(|p| r.plan.contains(p.as_str())));
     runs.retain(|r| !args.unfinished || r.outcome != "complete");
     if json {
-        println!("{}", serde_json::to_string(&runs).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&runs).into_diagnostic()?);
         return super::exit(super::DONE);
     }
     for r in runs {
         let outcome = if r.outcome.is_empty() { "no ending" } else { &r.outcome };
         let departed = if r.departed { "  model departed" } else { "" };
-        println!("{:40} {:>5}/{:<5} {outcome:12} {}{departed}", r.folder, r.passes, r.planned, r.setup);
+        out!("{:40} {:>5}/{:<5} {outcome:12} {}{departed}", r.folder, r.passes, r.planned, r.setup);
     }
     super::exit(super::DONE)
 }

@@ -1,6 +1,7 @@
 //! `muprime virtual-rig`: the simulated rig behind real protocols.
 
 use crate::setup::Setup;
+use crate::{out, say};
 use drivers::InstrumentsSetup;
 use instruments::schema::LinkKind;
 use miette::{IntoDiagnostic, WrapErr};
@@ -62,8 +63,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let plant = SharedPlant::new(world, Instant::now());
     let mut instruments = setup.instruments();
     let line = args.modbus_rtu.as_deref().map(|path| rtu(path, &instruments, &plant)).transpose()?;
-    for instrument in instruments.force.iter_mut().chain([&mut instruments.amplifier, &mut instruments.stage])
-    {
+    for instrument in instruments.all_mut() {
         let kind = drivers::profile(&instrument.profile).into_diagnostic()?.description.link.kind;
         let place = match kind {
             LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
@@ -76,7 +76,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         instrument.address = place.unwrap_or_else(|| instrument.address.clone());
     }
     if !args.modbus_tcp.ip().is_loopback() {
-        eprintln!(
+        say!(
             "warning: {} is reachable from other machines, and Modbus knows no password: anyone there can drive \
              this rig. Use it on a trusted network only.",
             args.modbus_tcp
@@ -95,14 +95,14 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     };
     let modbus_tcp = embedded.modbus_tcp().map(|address| address.to_string());
     if json {
-        println!("{}", serde_json::json!({ "modbus_tcp": modbus_tcp, "instruments": embedded.places }));
+        out!("{}", serde_json::json!({ "modbus_tcp": modbus_tcp, "instruments": embedded.places }));
     } else {
         for place in &embedded.places {
-            eprintln!("{place}");
+            say!("{place}");
         }
         let listens =
             modbus_tcp.map(|address| format!("listens on {address} (Modbus TCP)")).unwrap_or("runs".into());
-        eprintln!("the virtual rig {listens}; Ctrl-C ends it");
+        say!("the virtual rig {listens}; Ctrl-C ends it");
     }
     if args.hands {
         let plant = plant.clone();
@@ -146,7 +146,7 @@ fn at_the_bench(hands: &Hands, plant: &SharedPlant) {
             }
             _ => serde_json::json!({ "error": format!("`{line}`: hang LATERAL_N NORMAL_N, or look") }),
         };
-        println!("{answer}");
+        out!("{answer}");
     }
 }
 

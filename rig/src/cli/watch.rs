@@ -1,9 +1,10 @@
 //! `muprime watch RUN`: follows a run by its journal.
 
 use crate::catalogue::{Catalogue, runs_folder};
+use crate::out;
 use crate::sequence::MeasuredPass;
 use miette::{IntoDiagnostic, WrapErr};
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -24,7 +25,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         Some(run) => run,
         None => {
             let folder = runs_folder();
-            let newest = Catalogue::open(&folder)?.all()?.into_iter().next();
+            let newest = Catalogue::existing(&folder)?.all()?.into_iter().next();
             folder.join(newest.ok_or_else(|| miette::miette!("there is no run yet"))?.folder)
         }
     };
@@ -52,16 +53,14 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
 }
 
 fn show(line: &str, json: bool) {
-    let mut out = std::io::stdout().lock();
     if json {
-        let _ = out.write_all(line.as_bytes());
+        out!("{}", line.trim_end());
         return;
     }
     let Ok(p) = serde_json::from_str::<MeasuredPass>(line) else { return };
     let c = p.comparison;
     let number = |v: Option<f64>| v.map_or("  --".to_string(), |v| format!("{v:.3}"));
-    let _ = writeln!(
-        out,
+    out!(
         "point {:4}  w {:6.3} um  f {:6.2} kHz  U {:6.1} mm/s  Fn {:.3} N  mu' {} predicted {} z {}{}",
         p.pass.point,
         p.pass.amplitude.micrometres(),

@@ -1,6 +1,7 @@
 //! The columns of an export: those of the point table, then what the comparison said.
 
 use crate::sequence::MeasuredPass;
+use models::covariate::{self, Covariate};
 
 /// A column: numbers or text, missing values as `None`.
 pub enum Column {
@@ -20,25 +21,21 @@ pub fn of(passes: &[MeasuredPass]) -> Table {
     let numbers = |f: &dyn Fn(&MeasuredPass) -> Option<f64>| Column::Numbers(passes.iter().map(f).collect());
     let counts = |f: &dyn Fn(&MeasuredPass) -> Option<u64>| Column::Counts(passes.iter().map(f).collect());
     let texts = |f: &dyn Fn(&MeasuredPass) -> Option<String>| Column::Texts(passes.iter().map(f).collect());
-    vec![
-        ("point", counts(&|p| Some(p.pass.point))),
-        ("time_s", numbers(&|p| Some(p.pass.time_s))),
-        ("amplitude_pp_m", numbers(&|p| Some(p.pass.amplitude.metres()))),
-        ("frequency_hz", numbers(&|p| Some(p.pass.frequency_hz))),
-        ("speed_m_s", numbers(&|p| Some(p.pass.speed_m_s))),
-        ("direction", numbers(&|p| Some(p.pass.direction.sign()))),
-        ("position_m", numbers(&|p| Some(p.pass.position_m))),
-        ("normal_force_n", numbers(&|p| Some(p.pass.normal_force_n))),
+    let covariate = |c: &&'static Covariate| (c.name, numbers(&|p| c.of(&p.pass.condition(1.0))));
+    let mut table = vec![("point", counts(&|p| Some(p.pass.point)))];
+    table.extend(covariate::REQUIRED.iter().map(covariate));
+    table.extend([
         ("lateral_force_n", numbers(&|p| p.pass.lateral_force_n)),
         ("normal_force_sd_n", numbers(&|p| p.pass.normal_force_sd_n)),
         ("lateral_force_sd_n", numbers(&|p| p.pass.lateral_force_sd_n)),
         ("samples", counts(&|p| p.pass.samples)),
-        ("ambient_pressure_pa", numbers(&|p| p.pass.ambient_pressure_pa)),
-        ("temperature_c", numbers(&|p| p.pass.temperature_c)),
-        ("relative_humidity_pct", numbers(&|p| p.pass.relative_humidity_pct)),
+    ]);
+    table.extend(covariate::OPTIONAL.iter().map(covariate));
+    table.extend([
         ("phase_shift_deg", numbers(&|p| p.pass.phase_shift_deg)),
         ("replicate", counts(&|p| p.pass.replicate)),
         ("run", texts(&|p| p.pass.run.clone())),
+        ("session", counts(&|p| p.pass.session)),
         ("mu_relative", numbers(&|p| p.comparison.and_then(|c| c.mu_relative))),
         ("mu_relative_sd", numbers(&|p| p.comparison.and_then(|c| c.mu_relative_sd))),
         ("mu_relative_predicted", numbers(&|p| p.comparison.map(|c| c.predicted))),
@@ -46,7 +43,8 @@ pub fn of(passes: &[MeasuredPass]) -> Table {
         ("residual_z", numbers(&|p| p.comparison.map(|c| c.z))),
         ("log_evidence", numbers(&|p| p.comparison.map(|c| c.log_evidence))),
         ("psi_eq17", numbers(&|p| p.psi_eq17)),
-    ]
+    ]);
+    table
 }
 
 /// Rows of a table.

@@ -1,7 +1,7 @@
 //! Many seeds over all cores, the tally of their reactions, and a failure made small.
 
-use super::bench::{Found, STEADY_AT, Scene, Strike, measured_bound, run};
-use super::rows::{Expect, Moment, ROWS};
+use super::bench::{Found, RING, STEADY_AT, Scene, Strike, T, measured_bound, run};
+use super::rows::{Expect, Moment, Pace, ROWS};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -19,6 +19,8 @@ pub struct Search {
     pub pairs: bool,
     /// Each seed twice, with hashes and a replay of its rows.
     pub twice: bool,
+    /// The limits that the scenes run at.
+    pub pace: Pace,
 }
 
 /// Reactions to one fault in one moment.
@@ -63,7 +65,7 @@ pub struct Tally {
 }
 
 /// The scene of a seed: moment, faults and the cycles in which they strike.
-pub fn scene_of(seed: u64, pairs: bool) -> Scene {
+pub fn scene_of(seed: u64, pairs: bool, pace: Pace) -> Scene {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut strike = || {
         let row = rng.random_range(0..ROWS.len());
@@ -78,7 +80,7 @@ pub fn scene_of(seed: u64, pairs: bool) -> Scene {
     let both = |m: &&Moment| strikes.iter().all(|s| ROWS[s.row].moments.contains(m));
     let moments: Vec<_> = ROWS[one.row].moments.iter().filter(both).collect();
     let moment = *moments[rng.random_range(0..moments.len())];
-    Scene { moment, seed, strikes }
+    Scene { moment, seed, strikes, pace }
 }
 
 /// Two faults can strike together where they share a moment and neither hides the other: what strikes one channel twice,
@@ -108,7 +110,7 @@ pub fn search(what: Search) -> Tally {
         .map(|chunk| {
             let mut tally = Tally::default();
             for seed in chunk {
-                tally.take(&scene_of(*seed, what.pairs), what.twice);
+                tally.take(&scene_of(*seed, what.pairs, what.pace), what.twice);
             }
             tally
         })
@@ -125,7 +127,8 @@ impl Tally {
             let row = &ROWS[strike.row];
             let entry = self.reactions.entry((row.number, row.name, scene.moment)).or_default();
             entry.runs += 1;
-            if let Expect::Off(bound) = row.expect {
+            if let Expect::Off(within) = row.expect {
+                let bound = within.at(&scene.pace.timing(T, RING));
                 entry.command_bound = Some(bound);
                 entry.command_off = entry.command_off.max(found.command_off[i]);
                 entry.measured_off = entry.measured_off.max(found.measured_off);

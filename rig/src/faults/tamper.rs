@@ -1,7 +1,7 @@
 //! What instruments show that must not be: a wrapper around the virtual rig's ports that alters what they say.
 
 use realtime::ports::{
-    Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Reading, Stage, StageState,
+    Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Quality, Reading, Stage, StageState,
 };
 use realtime::safety::{DriveCommand, StageCommand};
 use std::sync::Arc;
@@ -36,6 +36,14 @@ pub enum Tamper {
     StageFast,
     /// Both forces at zero.
     ContactLost,
+    /// The measured amplitude and its raw value stand still; samples go on counting.
+    AmplitudeStuck,
+    /// The measured amplitude is at the end of its range, at a plausible value.
+    AmplitudeRails,
+    /// The normal force is at the end of its range in every other cycle.
+    NormalRailsByTurns,
+    /// The normal force's counter stands still, at so many N.
+    NormalStuckCounter(f64),
 }
 
 /// A port with something to show from a time on; when it did so first is left in `shown` (ns; 0: not yet).
@@ -43,9 +51,16 @@ pub struct Tampered<P> {
     pub inner: P,
     pub tamper: Option<(Tamper, Nanos)>,
     pub shown: Arc<AtomicU64>,
+    /// Cycles tampered with, and what is held since the first.
+    pub cycles: u64,
+    pub held: Option<Reading>,
 }
 
 impl<P> Tampered<P> {
+    pub fn new(inner: P, tamper: Option<(Tamper, Nanos)>, shown: &Arc<AtomicU64>) -> Self {
+        Tampered { inner, tamper, shown: Arc::clone(shown), cycles: 0, held: None }
+    }
+
     fn acting(&self, now: Nanos) -> Option<(Tamper, f64)> {
         self.tamper.filter(|(_, from)| now >= *from).map(|(t, from)| (t, now.since(from).seconds()))
     }
@@ -73,6 +88,18 @@ impl<P: ForceSensor> ForceSensor for Tampered<P> {
                 shift(&mut forces.normal, rate * since);
                 if !forces.normal.is_ok_and(|r| r.value > 1.5) {
                     return forces;
+                }
+            }
+            Tamper::NormalRailsByTurns => {
+                self.cycles += 1;
+                if let (Ok(normal), true) = (&mut forces.normal, self.cycles % 2 == 1) {
+                    normal.quality = Quality::Saturated;
+                }
+            }
+            Tamper::NormalStuckCounter(newtons) => {
+                if let Ok(normal) = &mut forces.normal {
+                    normal.value = newtons;
+                    normal.sequence = self.held.get_or_insert(*normal).sequence;
                 }
             }
             Tamper::NormalFast(rate) => shift(&mut forces.normal, rate * (since + 1e-3)),
@@ -105,6 +132,17 @@ impl<P: Amplifier> Amplifier for Tampered<P> {
                     amplitude.value *= factor;
                 }
             }
+            Tamper::AmplitudeStuck => {
+                if let Ok(amplitude) = &mut state.amplitude {
+                    let held = *self.held.get_or_insert(*amplitude);
+                    (amplitude.value, amplitude.raw) = (held.value, held.raw);
+                }
+            }
+            Tamper::AmplitudeRails => {
+                if let Ok(amplitude) = &mut state.amplitude {
+                    amplitude.quality = Quality::Saturated;
+                }
+            }
             Tamper::AmplitudeLost => state.amplitude = Err(NoData::Invalid),
             Tamper::Hot => {
                 if let Ok(temperature) = &mut state.temperature_c {
@@ -118,10 +156,6 @@ impl<P: Amplifier> Amplifier for Tampered<P> {
         }
         self.show(now);
         Ok(state)
-    }
-
-    fn cut_supply(&mut self, now: Nanos) -> bool {
-        self.inner.cut_supply(now)
     }
 }
 

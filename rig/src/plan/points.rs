@@ -3,6 +3,7 @@
 use super::Plan;
 use crate::input::{self, BadInput};
 use models::condition::Condition;
+use models::covariate::Covariate;
 use models::quantity::{Direction, PeakToPeak};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -51,35 +52,8 @@ fn quantise(wanted: f64, step: f64) -> f64 {
 #[error("{0}")]
 pub struct PlanProblem(String);
 
-/// A condition of a series, before directions and repeats.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Wanted {
-    pub(super) amplitude_pp_m: f64,
-    pub(super) frequency_hz: f64,
-    pub(super) speed_m_s: f64,
-    pub(super) normal_force_n: f64,
-    pub(super) position_m: f64,
-    pub(super) ambient_pressure_pa: Option<f64>,
-    /// The series' own direction; none where the plan's are made in turn.
-    pub(super) direction: Option<i8>,
-}
-
-impl Wanted {
-    /// The condition of a pass in that direction; `time_s` is not known yet.
-    pub(super) fn condition(&self, direction: Direction, mu0: f64) -> Condition {
-        Condition {
-            amplitude: PeakToPeak::from_metres(self.amplitude_pp_m),
-            frequency_hz: self.frequency_hz,
-            speed_m_s: self.speed_m_s,
-            direction,
-            normal_force_n: self.normal_force_n,
-            mu0,
-            position_m: self.position_m,
-            time_s: 0.0,
-            ambient_pressure_pa: self.ambient_pressure_pa,
-        }
-    }
-}
+/// A condition of a series, and the directions in which it is visited in turn.
+pub(super) type Visit<'a> = (Condition, &'a [i8]);
 
 impl Plan {
     /// The passes in the order of measurement.
@@ -93,86 +67,70 @@ impl Plan {
             conditions.extend(self.conditions_of(index, resolution));
         }
         self.check_travel(&conditions, limits)?;
-        Ok(self.order(conditions, seed))
+        Ok(self.order(&conditions, seed))
     }
 
     /// The conditions of one series: the product of its lists, at what the amplifier can set.
-    pub(super) fn conditions_of(&self, index: usize, resolution: &Resolution) -> Vec<Wanted> {
-        let (series, base) = (&self.file.series[index], &self.file.base);
-        let or_base = |list: &Vec<f64>, base: f64| if list.is_empty() { vec![base] } else { list.clone() };
-        let pressures: Vec<Option<f64>> = match &series.ambient_pressure_pa[..] {
-            [] => vec![None],
-            listed => listed.iter().copied().map(Some).collect(),
-        };
-        let directions: Vec<Option<i8>> = match &series.directions[..] {
-            [] => vec![None],
-            listed => listed.iter().copied().map(Some).collect(),
-        };
-        let mut conditions = Vec::new();
-        for &ambient_pressure_pa in &pressures {
-            for &frequency_hz in &or_base(&series.frequency_hz, base.frequency_hz) {
-                for &speed_m_s in &or_base(&series.speed_m_s, base.speed_m_s) {
-                    for &normal_force_n in &or_base(&series.normal_force_n, base.normal_force_n) {
-                        for &position_m in &or_base(&series.position_m, base.position_m) {
-                            for &amplitude_pp_m in &or_base(&series.amplitude_pp_m, base.amplitude_pp_m) {
-                                conditions.extend(directions.iter().map(|&direction| Wanted {
-                                    amplitude_pp_m: resolution.amplitude(amplitude_pp_m),
-                                    frequency_hz: resolution.frequency(frequency_hz),
-                                    speed_m_s,
-                                    normal_force_n,
-                                    position_m,
-                                    ambient_pressure_pa,
-                                    direction,
-                                }));
-                            }
-                        }
-                    }
-                }
+    pub(super) fn conditions_of(&self, index: usize, resolution: &Resolution) -> Vec<Visit<'_>> {
+        let series = &self.file.series[index];
+        let mut conditions = vec![self.file.base.condition()];
+        for (covariate, list) in series.lists() {
+            if !list.is_empty() {
+                let each = |c: &Condition| {
+                    let with = |&value: &f64| {
+                        let mut c = *c;
+                        covariate.put(&mut c, value);
+                        c
+                    };
+                    list.iter().map(with).collect::<Vec<_>>()
+                };
+                conditions = conditions.iter().flat_map(each).collect();
             }
         }
-        conditions
+        let set = |c: Condition| Condition {
+            amplitude: PeakToPeak::from_metres(resolution.amplitude(c.amplitude.metres())),
+            frequency_hz: resolution.frequency(c.frequency_hz),
+            ..c
+        };
+        // A series' own directions are settings like others; the plan's are visited in turn.
+        let visits = |c: Condition| -> Vec<Visit<'_>> {
+            match &series.directions[..] {
+                [] => vec![(c, &self.file.directions[..])],
+                own => own.iter().map(|d| (c, std::slice::from_ref(d))).collect(),
+            }
+        };
+        conditions.into_iter().map(set).flat_map(visits).collect()
     }
 
     /// Repeats, shuffles within each pressure, interleaves references, and turns conditions into passes.
-    fn order(&self, conditions: Vec<Wanted>, seed: u64) -> Vec<Point> {
+    fn order(&self, conditions: &[Visit<'_>], seed: u64) -> Vec<Point> {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
-        let mut pressures: Vec<Option<f64>> = conditions.iter().map(|c| c.ambient_pressure_pa).collect();
+        let mut pressures: Vec<Option<f64>> = conditions.iter().map(|(c, _)| c.ambient_pressure_pa).collect();
         pressures.dedup();
         let mut points = Vec::new();
         for pressure in pressures {
-            let here = conditions.iter().filter(|c| c.ambient_pressure_pa == pressure);
-            let mut visits: Vec<(Wanted, u32)> =
-                here.flat_map(|c| (0..self.file.replicates).map(move |r| (*c, r))).collect();
+            let here = conditions.iter().filter(|(c, _)| c.ambient_pressure_pa == pressure);
+            let mut visits: Vec<(&Visit<'_>, u32)> =
+                here.flat_map(|c| (0..self.file.replicates).map(move |r| (c, r))).collect();
             if self.file.randomise {
                 visits.shuffle(&mut rng);
             }
             let every = self.file.reference_every as usize;
             let mut references = 0;
-            for (i, (wanted, replicate)) in visits.iter().enumerate() {
+            let still = |c: &Condition| Condition { amplitude: PeakToPeak::ZERO, ..*c };
+            for (i, ((condition, directions), replicate)) in visits.iter().enumerate() {
                 if every > 0 && i % every == 0 {
-                    self.visit(&mut points, &Wanted { amplitude_pp_m: 0.0, ..*wanted }, references, true);
+                    visit(&mut points, &still(condition), directions, references, true);
                     references += 1;
                 }
-                self.visit(&mut points, wanted, *replicate, wanted.amplitude_pp_m == 0.0);
+                let reference = condition.amplitude == PeakToPeak::ZERO;
+                visit(&mut points, condition, directions, *replicate, reference);
             }
-            if let (true, Some((last, _))) = (every > 0, visits.last()) {
-                self.visit(&mut points, &Wanted { amplitude_pp_m: 0.0, ..*last }, references, true);
+            if let (true, Some(((last, directions), _))) = (every > 0, visits.last()) {
+                visit(&mut points, &still(last), directions, references, true);
             }
         }
         points
-    }
-
-    fn visit(&self, points: &mut Vec<Point>, wanted: &Wanted, replicate: u32, reference: bool) {
-        let own = wanted.direction.map(|d| [d]);
-        for sign in own.as_ref().map_or(&self.file.directions[..], |d| &d[..]) {
-            let direction = Direction::try_from(*sign).expect("checked when the plan was read");
-            points.push(Point {
-                number: points.len() as u32,
-                condition: wanted.condition(direction, 1.0),
-                replicate,
-                reference,
-            });
-        }
     }
 
     /// Length of stroke that a pass needs in m: settling, averaging, and getting up to speed.
@@ -181,21 +139,13 @@ impl Plan {
     }
 
     fn check_series(&self, index: usize, limits: &Limits) -> Result<(), BadInput> {
-        let (series, base) = (&self.file.series[index], &self.file.base);
-        let (lowest, highest) = limits.frequency_hz;
-        let amplitude_max = limits.amplitude_max.metres().min(HARD.amplitude_max.metres());
-        let tiny = f64::MIN_POSITIVE;
-        let checks: [(&str, &[f64], f64, f64, f64); 6] = [
-            ("amplitude_pp_m", &series.amplitude_pp_m, base.amplitude_pp_m, 0.0, amplitude_max),
-            ("frequency_hz", &series.frequency_hz, base.frequency_hz, lowest, highest),
-            ("speed_m_s", &series.speed_m_s, base.speed_m_s, tiny, limits.speed_max_m_s),
-            ("normal_force_n", &series.normal_force_n, base.normal_force_n, tiny, limits.normal_force_max_n),
-            ("position_m", &series.position_m, base.position_m, limits.travel_m.0, limits.travel_m.1),
-            ("ambient_pressure_pa", &series.ambient_pressure_pa, 101_325.0, 0.0, 200_000.0),
-        ];
-        for (name, list, base, low, high) in checks {
-            let listed = list.iter().map(|v| (true, *v));
-            for (in_series, value) in listed.chain(list.is_empty().then_some((false, base))) {
+        let series = &self.file.series[index];
+        let base = self.file.base.condition();
+        for (covariate, list) in series.lists() {
+            let name = covariate.name;
+            let [low, high] = allowed(covariate, limits);
+            let based = covariate.of(&base).filter(|_| list.is_empty()).map(|v| (false, v));
+            for (in_series, value) in list.iter().map(|v| (true, *v)).chain(based) {
                 if value.is_finite() && value >= low && value <= high {
                     continue;
                 }
@@ -204,7 +154,7 @@ impl Plan {
                 } else {
                     input::place_of(&self.text, &["base", name])
                 };
-                let low = if low == tiny { 0.0 } else { low };
+                let low = if low == f64::MIN_POSITIVE { 0.0 } else { low };
                 let problem =
                     format!("{name} = {value:e} is outside what this rig allows, {low:e} to {high:e}");
                 let remedy =
@@ -215,9 +165,9 @@ impl Plan {
         Ok(())
     }
 
-    fn check_travel(&self, conditions: &[Wanted], limits: &Limits) -> Result<(), BadInput> {
+    fn check_travel(&self, conditions: &[Visit<'_>], limits: &Limits) -> Result<(), BadInput> {
         let (left, right) = limits.travel_m;
-        for c in conditions {
+        for (c, _) in conditions {
             let half = 0.5 * self.stroke_m(c.speed_m_s);
             if c.position_m - half < left || c.position_m + half > right {
                 let (speed, position) = (c.speed_m_s, c.position_m);
@@ -234,6 +184,31 @@ impl Plan {
         Ok(())
     }
 }
+
+/// Makes the passes of one visit, in each of its directions.
+fn visit(points: &mut Vec<Point>, condition: &Condition, directions: &[i8], replicate: u32, reference: bool) {
+    for sign in directions {
+        let direction = Direction::try_from(*sign).expect("checked when the plan was read");
+        let number = points.len() as u32;
+        points.push(Point { number, condition: Condition { direction, ..*condition }, replicate, reference });
+    }
+}
+
+/// What this rig's limits leave of a setting.
+fn allowed(covariate: &Covariate, limits: &Limits) -> [f64; 2] {
+    match covariate.name {
+        "amplitude_pp_m" => [0.0, limits.amplitude_max.metres().min(HARD.amplitude_max.metres())],
+        "frequency_hz" => [limits.frequency_hz.0, limits.frequency_hz.1],
+        "speed_m_s" => [f64::MIN_POSITIVE, limits.speed_max_m_s],
+        "normal_force_n" => [f64::MIN_POSITIVE, limits.normal_force_max_n],
+        "position_m" => [limits.travel_m.0, limits.travel_m.1],
+        "ambient_pressure_pa" => [0.0, CHAMBER_MAX_PA],
+        _ => covariate.range,
+    }
+}
+
+/// Largest pressure that a plan may ask a chamber for, Pa.
+const CHAMBER_MAX_PA: f64 = 200_000.0;
 
 pub(super) fn series_place(text: &str, index: usize, name: &str) -> Option<std::ops::Range<usize>> {
     let table = toml::de::DeTable::parse(text).ok()?;

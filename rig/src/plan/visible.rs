@@ -1,11 +1,12 @@
 //! Whether the force sensor can see what a sweep is to show. A sweep whose whole expected change of force is a count
 //! or two, or drowns in the sensor's noise, measures the sensor: it is refused before anything moves.
 
-use super::points::{Wanted, series_place};
+use super::points::series_place;
 use super::{Plan, Point, Resolution};
 use crate::input::BadInput;
+use models::condition::Condition;
 use models::prediction::FrictionModel;
-use models::quantity::Direction;
+use models::quantity::PeakToPeak;
 
 /// Counts of the sensor that the largest expected change of a series must span. One count either way is rounding of
 /// the two readings whose difference is taken; four leave a curve of some shape.
@@ -65,16 +66,18 @@ impl Plan {
         let (least_n, because) = channel.least_change_n();
         for (index, series) in self.file.series.iter().enumerate() {
             let conditions = self.conditions_of(index, resolution);
-            let expected = conditions.iter().filter_map(|w| Some((w, expected_change_n(w, model, mu0)?)));
+            let expected =
+                conditions.iter().filter_map(|(c, _)| Some((c, expected_change_n(c, model, mu0)?)));
             let Some((best, change_n)) = expected.max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
             if change_n >= least_n {
                 continue;
             }
             let number = points
                 .iter()
-                .find(|p| p.condition == best.condition(p.condition.direction, p.condition.mu0))
+                .find(|p| p.condition == Condition { direction: p.condition.direction, ..*best })
                 .map_or(String::new(), |p| format!(" (point {})", p.number));
-            let Wanted { amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, .. } = best;
+            let Condition { frequency_hz, speed_m_s, normal_force_n, .. } = best;
+            let amplitude_pp_m = best.amplitude.metres();
             let problem = format!(
                 "series '{}': the largest change of lateral force that {} expects is {} mN, at w = {amplitude_pp_m:e} m, \
                  f = {frequency_hz} Hz, U = {speed_m_s} m/s, Fn = {normal_force_n} N{number}; {} sees no less than {} mN: {because}",
@@ -98,12 +101,12 @@ impl Plan {
     }
 }
 
-fn expected_change_n(wanted: &Wanted, model: &dyn FrictionModel, mu0: f64) -> Option<f64> {
+fn expected_change_n(wanted: &Condition, model: &dyn FrictionModel, mu0: f64) -> Option<f64> {
     let coulomb_n = mu0 * wanted.normal_force_n;
-    if wanted.amplitude_pp_m == 0.0 {
+    if wanted.amplitude == PeakToPeak::ZERO {
         return Some(coulomb_n);
     }
-    let prediction = model.predict(&wanted.condition(Direction::Forward, mu0)).ok()?;
+    let prediction = model.predict(&Condition { mu0, ..*wanted }).ok()?;
     Some((1.0 - prediction.mu_relative).abs() * coulomb_n)
 }
 

@@ -4,6 +4,7 @@ use super::page::{escape, shell};
 use super::plots;
 use diagnosis::data::Table;
 use diagnosis::verdict::Diagnosis;
+use models::covariate::{self, Scale};
 
 /// Parts of the operating space that are told in words, the largest first.
 const TOLD: usize = 12;
@@ -90,27 +91,23 @@ fn gap(result: &Diagnosis) -> String {
 fn maps(result: &Diagnosis, table: &Table) -> miette::Result<String> {
     let problem = &result.fitted.problem;
     let forecasts = result.predict(table);
-    let covariates: [(&str, fn(&effects::Operating) -> f64, bool); 6] = [
-        ("amplitude, um peak-to-peak", |p| p.amplitude_pp_m * 1e6, false),
-        ("speed, mm/s", |p| p.speed_m_s * 1e3, true),
-        ("normal force, N", |p| p.normal_force_n, false),
-        ("frequency, kHz", |p| p.frequency_hz * 1e-3, false),
-        ("time, s", |p| p.time_s, false),
-        ("position, mm", |p| p.position_m * 1e3, false),
-    ];
     let z: Vec<(f64, f64)> = forecasts
         .iter()
         .enumerate()
         .map(|(i, f)| {
             let sd = problem.variance[i].sqrt();
-            let d = table.passes[i].direction;
+            let d = table.passes[i].direction.sign();
             (d * (table.lateral[i] - f.recalibrated) / sd, d * (table.lateral[i] - f.corrected) / sd)
         })
         .collect();
     let limit = z.iter().fold(4.0f64, |a, (b, _)| a.max(b.abs())).min(40.0);
     let mut figures = String::new();
-    for (name, value, logarithmic) in covariates {
-        let x: Vec<f64> = table.passes.iter().map(value).collect();
+    for c in covariate::TOLD {
+        let (factor, unit) = c.shown;
+        let logarithmic = c.scale == Scale::Log;
+        let all: Option<Vec<f64>> = table.passes.iter().map(|p| c.of(p).map(|v| factor * v)).collect();
+        let Some(x) = all else { continue };
+        let name = format!("{}, {unit}", c.words);
         let (low, high) =
             x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         if high - low <= 1e-12 * high.abs().max(1e-12) {
@@ -118,7 +115,7 @@ fn maps(result: &Diagnosis, table: &Table) -> miette::Result<String> {
         }
         let before: Vec<(f64, f64)> = x.iter().zip(&z).map(|(x, z)| (*x, z.0)).collect();
         let after: Vec<(f64, f64)> = x.iter().zip(&z).map(|(x, z)| (*x, z.1)).collect();
-        figures.push_str(&plots::errors_against(name, logarithmic, limit, &before, &after)?);
+        figures.push_str(&plots::errors_against(&name, logarithmic, limit, &before, &after)?);
     }
     Ok(format!(
         "<h2>Residuals</h2><p>Error along the motion in standard deviations of a pass: <span style=\"color:#d55e00\">recalibrated baseline</span>, <span style=\"color:#0072b2\">verdict's model</span>.</p><div class=\"maps\">{figures}</div>"

@@ -96,10 +96,19 @@ fn verdict(w: &mut String, run: &RunData) {
                  Run <code>muprime diagnose</code> on this folder to learn where and why."
         )
     } else {
-        "The measurement agrees with the model.".to_string()
+        let complete = run.summary.as_ref().is_some_and(|s| s.outcome == crate::sequence::Outcome::Complete);
+        let last = run.passes.iter().rev().find_map(|p| p.comparison.as_ref());
+        escape(&format!("Finding: {}.", realtime::compare::Agreement::of(last, complete)))
     };
     let class = if departed { "verdict departed" } else { "verdict" };
     let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}</p>");
+    if !run.damage.is_empty() {
+        let items: String = run.damage.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
+        let _ = writeln!(
+            w,
+            "<div class=\"verdict departed\"><strong>The records of this run are not whole</strong><ul>{items}</ul></div>"
+        );
+    }
     let flagged = run.passes.iter().filter(|p| !p.temperature_flags.is_empty()).count();
     if let Some(flag) = run.passes.iter().find_map(|p| p.temperature_flags.first()) {
         let _ = writeln!(

@@ -1,19 +1,21 @@
 //! A sweep in virtual time: one thread, no clock, the same bytes for the same seed.
 
 use super::keeper::{self, Keeper};
-use super::{Job, News, Signals, Summary, Unfinished};
+use super::{Job, News, Signals, Summary};
+use crate::files::Placed;
 use crate::plan::{Plan, Resolution};
 use crate::run_dir::RunDir;
-use crate::sequence::{MeasuredPass, Outcome, Sequence};
+use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
 use crate::setup::Setup;
+use crate::supervisor::{self, End, OffReport, VirtualLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::FrictionModel;
-use realtime::cycle::{Command, CycleState};
 use realtime::ports::Nanos;
 use realtime::recorder::Recorder;
-use realtime::turn::{Ports, Tick, turn};
+use realtime::turn::{Ports, Row};
 use sim::virtual_rig::VirtualRig;
-use std::collections::{BTreeMap, VecDeque};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -22,10 +24,11 @@ const EPOCH_UNIX_NS: u64 = 946_684_800_000_000_000;
 /// Rows between two flushes of the record: 50 ms at 1 kHz.
 const FLUSH_EVERY: u64 = 50;
 
-/// Runs a job in virtual time.
+/// Runs a job in virtual time, which begins at `start_s` s.
 pub fn run(
     job: Job,
     dir: RunDir,
+    start_s: f64,
     mut sequence: Sequence,
     planned: usize,
     signals: &Signals,
@@ -38,65 +41,97 @@ pub fn run(
             job.setup.file.name
         );
     }
-    let rig = VirtualRig::of(job.world()?);
-    let kept = Keeper::begin(&job, dir, planned, EPOCH_UNIX_NS)?;
-    sweep(job, rig, kept, &mut sequence, signals, news).wrap_err(Unfinished::NotKept)
+    let ports = ports_of(&job, VirtualRig::of(job.world()?));
+    let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
+    let mut kept = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
+    let rig =
+        VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports).from(Nanos::from_seconds(start_s));
+    let record = kept.new_record().and_then(|file| {
+        let disk = file.handle()?;
+        Ok((Recorder::begin(file, preamble).into_diagnostic()?, disk))
+    });
+    let (swept, off) = match record {
+        Ok(record) => sweep(rig, record, &mut kept, &mut sequence, signals, news),
+        // Before the first row nothing has been driven.
+        Err(why) => (Err(why), OffReport::off()),
+    };
+    let outcome = swept.unwrap_or_else(|why| {
+        tracing::error!("the record could not be kept: the sweep was stopped: {why:#}");
+        Outcome::RecordLost
+    });
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, None, 0, BTreeMap::new(), off))
 }
 
-fn sweep(
-    job: Job,
-    rig: VirtualRig,
-    mut kept: Keeper,
-    sequence: &mut Sequence,
-    signals: &Signals,
-    news: &mut dyn FnMut(News<'_>),
-) -> miette::Result<Summary> {
+/// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
+fn ports_of(job: &Job, rig: VirtualRig) -> Ports {
     let [force, amplifier, stage] = rig.split();
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
-    let mut ports = Ports { force, amplifier, stage: Box::new(stage) };
-    let file = kept.new_record()?;
-    let mut recorder = Recorder::begin(file, keeper::preamble(&job, EPOCH_UNIX_NS)?).into_diagnostic()?;
-    let config = job.setup.config;
-    let mut state = CycleState::default();
-    let mut queue: VecDeque<Command> = VecDeque::new();
-    let mut number = 0u64;
-    let outcome = loop {
-        number += 1;
-        let now = Nanos(number * config.limits.timing.cycle.0);
-        let tick = Tick { number, lateness: Nanos(0), now };
-        let row = turn(&config, &*job.model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
-        recorder.row(&row).into_diagnostic()?;
-        if signals.stops.swap(0, Ordering::Relaxed) > 0 {
-            sequence.stop();
+    let mut ports = Ports::new(force, amplifier, Box::new(stage.clone()));
+    if job.setup.file.supply_relay.is_some() {
+        ports = ports.with_supply(Box::new(stage.clone()));
+    }
+    if job.setup.file.safety_inputs.is_some() {
+        ports = ports.with_contacts(Box::new(stage));
+    }
+    ports
+}
+
+/// Sweeps, and ends the record; says what became of the output too.
+fn sweep(
+    mut rig: VirtualLoop,
+    (mut recorder, disk): (Recorder<Placed>, Placed),
+    kept: &mut Keeper,
+    sequence: &mut Sequence,
+    signals: &Signals,
+    news: &mut dyn FnMut(News<'_>),
+) -> (miette::Result<Outcome>, OffReport) {
+    // What cannot be kept ends the sweep.
+    let unkept = RefCell::new(None);
+    let mut knows = false;
+    let mut ask = || {
+        if !knows && unkept.borrow().is_some() {
+            knows = true;
+            return Some(End::NotKept);
         }
-        let reaction = sequence.on_row(&row);
-        keeper::record(&mut recorder, now, &reaction.events, reaction.pass.as_ref())?;
+        (signals.stops.swap(0, Ordering::Relaxed) > 0).then_some(End::Asked)
+    };
+    let mut keep = |row: &Row, sequence: &Sequence, reaction: Reaction| -> miette::Result<()> {
+        recorder.row(row).into_diagnostic()?;
+        keeper::record(&mut recorder, row.now, &reaction.events, reaction.pass.as_ref())?;
         kept.keep(&reaction.events, reaction.pass.as_ref(), news)?;
         if reaction.pass.is_some() {
+            disk.still_there()?;
             let (done, all) = sequence.progress();
             news(News::Progress(done, all, sequence.remaining_s()));
         }
-        queue.extend(reaction.commands);
-        if number.is_multiple_of(FLUSH_EVERY) {
+        if row.cycle.is_multiple_of(FLUSH_EVERY) {
             recorder.flush().into_diagnostic()?;
         }
-        if let Some(outcome) = reaction.outcome {
-            break outcome;
-        }
+        Ok(())
     };
-    // Let the stop reach the rig, so that the record shows the safe state.
-    for _ in 0..20 {
-        number += 1;
-        let now = Nanos(number * config.limits.timing.cycle.0);
-        let tick = Tick { number, lateness: Nanos(0), now };
-        let row = turn(&config, &*job.model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
-        recorder.row(&row).into_diagnostic()?;
-    }
-    let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
-    recorder.end(last).into_diagnostic().wrap_err("the record")?;
-    let departed = sequence.departed();
-    Ok(kept.end(outcome, departed, None, 0, BTreeMap::new()))
+    let outcome = supervisor::sweep(&mut rig, sequence, &mut ask, &mut |row, sequence, reaction| {
+        if unkept.borrow().is_none() {
+            *unkept.borrow_mut() = keep(row, sequence, reaction).err();
+        }
+    });
+    // The stop reaches the rig, so that the record shows the safe state; kept or not, off comes first.
+    let mut recorded = Ok(());
+    let off = rig.end(&mut |row| {
+        if recorded.is_ok() {
+            recorded = recorder.row(row);
+        }
+    });
+    let ended = || {
+        unkept.into_inner().map_or(Ok(()), Err)?;
+        recorded.into_diagnostic()?;
+        let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
+        recorder.end(last).into_diagnostic().wrap_err("the record")?;
+        disk.sync()?;
+        Ok(outcome)
+    };
+    (ended(), off)
 }
 
 /// What a sweep in memory comes to.
@@ -126,27 +161,17 @@ pub fn rehearse(
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
     let points = plan.points(seed, &setup.config.limits, &resolution)?;
     let mut sequence =
-        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise);
+        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
+            .in_air(setup.ambient());
     let [force, amplifier, stage] =
         VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
-    let mut ports = Ports { force: Box::new(force), amplifier: Box::new(amplifier), stage: Box::new(stage) };
-    let config = setup.config;
-    let mut state = CycleState::default();
-    let mut queue: VecDeque<Command> = VecDeque::new();
+    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
+    let mut rig = VirtualLoop::new(setup.config, model, ports);
     let mut passes = Vec::new();
-    for number in 1.. {
-        let now = Nanos(number * config.limits.timing.cycle.0);
-        let tick = Tick { number, lateness: Nanos(0), now };
-        let row = turn(&config, &*model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
-        let reaction = sequence.on_row(&row);
+    let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut || None, &mut |_, _, reaction| {
         passes.extend(reaction.pass);
-        queue.extend(reaction.commands);
-        if let Some(outcome) = reaction.outcome {
-            let departed = sequence.departed();
-            return Ok(Rehearsal { passes, outcome, departed, cycles: number });
-        }
-    }
-    unreachable!("the sequence ends every sweep")
+    });
+    Ok(Rehearsal { passes, outcome, departed: sequence.departed(), cycles: rig.cycles() })
 }
 
 /// An outcome as JSON, for the record's last words.

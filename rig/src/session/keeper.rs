@@ -1,11 +1,15 @@
 //! Keeps what a sweep yields: record, point table, catalogue. It runs beside the loop and may touch files.
+#![allow(clippy::disallowed_methods, reason = "a run says when it began")]
 
-use super::{Job, News, Summary};
+use super::{Job, News, Summary, Unfinished};
 use crate::catalogue::{Catalogue, RunEntry};
+use crate::files::Placed;
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome};
+use crate::supervisor::OffReport;
 use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
+use realtime::compare::Agreement;
 use realtime::cycle::Config;
 use realtime::pacing::LoopReport;
 use realtime::ports::Nanos;
@@ -15,6 +19,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+/// Name of the file that says how a run ended.
+const SUMMARY: &str = "summary.json";
 /// Name of the file in a record that a replay needs.
 pub const REPLAYABLE: &str = "loop.json";
 
@@ -36,6 +42,8 @@ pub struct Keeper {
     passes: usize,
     planned: usize,
     departed: bool,
+    /// The catalogue could not be written: it is left alone until the end.
+    unnoted: bool,
 }
 
 /// The wall clock, in ns since 1970.
@@ -63,7 +71,7 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     let mut files = vec![
         ("setup.toml".to_string(), job.setup.text.clone()),
         ("plan.toml".to_string(), job.plan.text.clone()),
-        ("rig.toml".to_string(), job.setup.rig_toml()?),
+        ("rig.toml".to_string(), job.setup.rig_file().to_toml().into_diagnostic()?),
     ];
     let replayed = Replayable { config: job.setup.config, finger: job.setup.tip.finger };
     files.push((REPLAYABLE.to_string(), serde_json::to_string_pretty(&replayed).into_diagnostic()?));
@@ -71,10 +79,8 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     files.extend(job.setup.certificates.files.iter().cloned());
     for (id, text) in job
         .setup
-        .file
-        .force
-        .iter()
-        .chain([&job.setup.file.amplifier, &job.setup.file.stage])
+        .instruments()
+        .all()
         .filter_map(|i| drivers::bundled::text(&i.profile).map(|text| (i.profile.clone(), text)))
     {
         files.push((format!("profiles/{id}.toml"), text.to_string()));
@@ -84,18 +90,58 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
 }
 
 impl Keeper {
-    /// Opens the catalogue and enters the run.
+    /// Opens the catalogue, begins a session of the run and enters it.
+    ///
+    /// # Errors
+    /// Whatever file system and SQLite say: a refusal as long as nothing stays behind.
+    pub fn begin(job: &Job, mut dir: RunDir, planned: usize, start_unix_ns: u64) -> miette::Result<Self> {
+        let catalogue = Self::catalogue(&dir)?;
+        dir.begin().wrap_err(Unfinished::NotKept)?;
+        Self::enter(job, dir, catalogue, planned, start_unix_ns).wrap_err(Unfinished::NotKept)
+    }
+
+    /// The end of a run whose passes were all made in earlier sessions: nothing is driven. What an earlier session wrote at its
+    /// end stays; where none came so far, it is written now.
     ///
     /// # Errors
     /// Whatever file system and SQLite say.
-    pub fn begin(job: &Job, dir: RunDir, planned: usize, start_unix_ns: u64) -> miette::Result<Self> {
-        dir.write("rig.toml", job.setup.rig_toml()?.as_bytes())?;
+    pub fn finish(
+        job: &Job,
+        mut dir: RunDir,
+        planned: usize,
+        agreement: Agreement,
+    ) -> miette::Result<Summary> {
+        dir.stay();
+        let written = std::fs::read(dir.path().join(SUMMARY)).ok();
+        let written: Option<Summary> = written.and_then(|text| serde_json::from_slice(&text).ok());
+        if let Some(summary) = written.filter(|s| s.outcome == Outcome::Complete && s.passes == planned) {
+            return Ok(Summary { folder: dir.path().to_path_buf(), finished_before: true, ..summary });
+        }
+        let catalogue = Self::catalogue(&dir)?;
+        let kept = Self::enter(job, dir, catalogue, planned, unix_ns()).wrap_err(Unfinished::NotKept)?;
+        Ok(Summary {
+            finished_before: true,
+            ..kept.end(Outcome::Complete, agreement, None, 0, BTreeMap::new(), OffReport::off())
+        })
+    }
+
+    fn catalogue(dir: &RunDir) -> miette::Result<Catalogue> {
         let runs = dir
             .path()
             .parent()
             .filter(|p| !p.as_os_str().is_empty())
             .map_or_else(|| std::path::PathBuf::from("."), std::path::Path::to_path_buf);
-        let catalogue = Catalogue::open(&runs)?;
+        Catalogue::open(&runs)
+    }
+
+    fn enter(
+        job: &Job,
+        dir: RunDir,
+        catalogue: Catalogue,
+        planned: usize,
+        start_unix_ns: u64,
+    ) -> miette::Result<Self> {
+        dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())?;
         let folder = dir.path().file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let passes = dir.made.len();
         catalogue.begin(&RunEntry {
@@ -108,13 +154,14 @@ impl Keeper {
             planned: planned as i64,
             departed: false,
         })?;
-        Ok(Keeper { dir, catalogue, folder, passes, planned, departed: false })
+        Ok(Keeper { dir, catalogue, folder, passes, planned, departed: false, unnoted: false })
     }
 
     /// Keeps what a row led to and passes it on. Returns the pass, once it is safe.
     ///
     /// # Errors
-    /// Whatever file system and SQLite say: the sweep must stop then.
+    /// Whatever file system and SQLite say: the sweep must stop then. Passes that come until it has stopped may still be given
+    /// here: they are kept where they can be.
     pub fn keep(
         &mut self,
         events: &[Event],
@@ -128,21 +175,28 @@ impl Keeper {
         if let Some(pass) = pass {
             self.dir.keep(pass)?;
             self.passes += 1;
-            self.catalogue.progress(&self.folder, self.passes as i64, self.departed)?;
+            let noted = if self.unnoted { Ok(()) } else { self.note() };
+            self.unnoted |= noted.is_err();
             news(News::Pass(pass));
+            return noted;
         }
         Ok(())
+    }
+
+    fn note(&self) -> miette::Result<()> {
+        self.catalogue.progress(&self.folder, self.passes as i64, self.departed)
     }
 
     /// Ends the run: catalogue, summary, report. What cannot be written is said, and makes a sweep that went well one whose
     /// record is lost; the summary is returned all the same.
     pub fn end(
-        self,
+        mut self,
         outcome: Outcome,
-        departed: bool,
+        agreement: Agreement,
         machine: Option<(LoopReport, StallReport)>,
         record_lost: u64,
         links: BTreeMap<String, serde_json::Value>,
+        off: OffReport,
     ) -> Summary {
         let (loop_report, stalls) = machine.unzip();
         let mut summary = Summary {
@@ -150,38 +204,51 @@ impl Keeper {
             folder: self.dir.path().to_path_buf(),
             passes: self.passes,
             planned: self.planned,
-            model_departed: departed,
+            model_departed: agreement == Agreement::Departed,
+            agreement,
             loop_report,
             stalls,
             record_lost,
             links,
+            off,
+            finished_before: false,
         };
-        if let Err(why) = self.write_end(&summary) {
+        self.departed |= summary.model_departed;
+        // The catalogue last: what it calls complete has its summary and its report.
+        let written = [self.write_end(&summary), self.note_end(&summary)];
+        let mut kept = true;
+        for why in written.iter().filter_map(|w| w.as_ref().err()) {
+            kept = false;
             tracing::error!("the end of the run could not be kept: {why:#}");
-            if matches!(summary.outcome, Outcome::Complete | Outcome::Stopped) {
-                summary.outcome = Outcome::RecordLost;
-            }
+        }
+        if !kept && matches!(summary.outcome, Outcome::Complete | Outcome::Stopped) {
+            summary.outcome = Outcome::RecordLost;
+            // As far as it goes: one of the two has just failed.
+            let _ = (self.write_end(&summary), self.note_end(&summary));
         }
         summary
     }
 
     fn write_end(&self, summary: &Summary) -> miette::Result<()> {
-        let word = serde_json::to_value(&summary.outcome).into_diagnostic()?;
-        let word = word.get("outcome").and_then(|o| o.as_str()).unwrap_or("?").to_string();
-        self.catalogue.progress(&self.folder, self.passes as i64, summary.model_departed)?;
-        self.catalogue.end(&self.folder, &word)?;
         let text = serde_json::to_vec_pretty(summary).into_diagnostic()?;
-        self.dir.write("summary.json", &text).wrap_err("the summary")?;
+        self.dir.write(SUMMARY, &text).wrap_err("the summary")?;
         let html = crate::report::html(self.dir.path()).wrap_err("the report")?;
         self.dir.write("report.html", html.as_bytes()).wrap_err("the report")
+    }
+
+    fn note_end(&self, summary: &Summary) -> miette::Result<()> {
+        let word = serde_json::to_value(&summary.outcome).into_diagnostic()?;
+        let word = word.get("outcome").and_then(|o| o.as_str()).unwrap_or("?").to_string();
+        self.note()?;
+        self.catalogue.end(&self.folder, &word)
     }
 
     /// A new record file of the run.
     ///
     /// # Errors
     /// Whatever the file system says.
-    pub fn new_record(&self) -> miette::Result<std::fs::File> {
-        self.dir.new_record()
+    pub fn new_record(&self) -> miette::Result<Placed> {
+        self.dir.new_record().wrap_err(Unfinished::NotKept)
     }
 }
 

@@ -1,34 +1,29 @@
 //! A sweep in wall-clock time. Four threads, each with one duty: the loop; the record's writer; the sweep, which answers
 //! the loop's rows within a millisecond or two; and this one, which makes passes safe on the disk and tells the news.
 //! A slow disk so reaches neither the loop nor the stage.
+#![allow(clippy::disallowed_methods, reason = "a sweep in wall-clock time, beside the loop")]
 
-mod claim;
-mod follow;
 mod writer;
 
 use super::fast::words;
 use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary, Unfinished};
+use crate::claim::RigClaim;
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
-pub use claim::RigClaim;
-use crossbeam_queue::ArrayQueue;
+use crate::supervisor::wall::{Ended, Parts};
+use crate::supervisor::{self, End, WallLoop};
 use miette::{IntoDiagnostic, WrapErr};
-use realtime::cycle::Command;
-use realtime::pacing::{self, Lifeline, LoopParts};
+use realtime::pacing;
 use realtime::ports::Nanos;
-use realtime::turn::{Ports, Row};
+use realtime::turn::Ports;
 use realtime::witness::Witnesses;
-use ringbuf::HeapRb;
-use ringbuf::traits::Split;
 use std::collections::BTreeMap;
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::channel;
-use std::time::{Duration, Instant};
-
-/// Rows that a ring holds: eight seconds at 1 kHz.
-const RING: usize = 8192;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Instant;
 
 /// What the sweep has to keep and to tell.
 struct Note {
@@ -64,95 +59,115 @@ pub fn run(
     let file = kept.new_record()?;
     let preamble = keeper::preamble(&job, start_unix_ns)?;
 
-    let (row_in, row_out) = HeapRb::<Row>::new(RING).split();
-    let (watch_in, mut watch) = HeapRb::<Row>::new(RING).split();
-    let commands = Arc::new(ArrayQueue::new(64));
-    let life = Arc::new(Lifeline::default());
     let lost = Arc::new(AtomicBool::new(false));
-    let parts = LoopParts {
+    let witnesses = Witnesses::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
+    let (rig, mut reins, row_out) = WallLoop::start(Parts {
         config: job.setup.config,
         model: Arc::clone(&job.model),
-        ports: Ports {
-            force: job.setup.certificates.calibrated(rig.force),
-            amplifier: job.setup.certificates.calibrated_amplifier(rig.amplifier),
-            stage: rig.stage,
-        },
-        commands: Arc::clone(&commands),
-        rows: row_in,
-        watch: watch_in,
-        life: Arc::clone(&life),
+        ports: Ports::new(
+            job.setup.certificates.calibrated(rig.force),
+            job.setup.certificates.calibrated_amplifier(rig.amplifier),
+            rig.stage,
+        )
+        .with_supply(rig.supply)
+        .with_contacts(rig.contacts),
+        links: rig.links,
+        pacing: job.setup.file.pace.pacing(),
         origin_ns,
-    };
-    let priority = (job.setup.file.pace.priority > 0).then_some(job.setup.file.pace.priority);
-
+    })
+    .wrap_err(Unfinished::Internal)?;
     let (to_writer, notes) = channel();
     let (last_in, last_out) = channel();
     let writing = {
-        let lost = Arc::clone(&lost);
-        let write = move || writer::write(file, preamble, row_out, &notes, &last_out, &lost);
+        let lost = RaisedByPanic(Arc::clone(&lost));
+        let write = move || writer::write(file, preamble, row_out, &notes, &last_out, &lost.0);
         std::thread::Builder::new().name("recorder".into()).spawn(write).into_diagnostic()?
     };
-    let looping = std::thread::Builder::new()
-        .name("loop".into())
-        .spawn(move || pacing::run(parts, priority))
-        .into_diagnostic()?;
-    let witnesses = Witnesses::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
 
     let (note_in, note_out) = channel::<Note>();
-    let strands = follow::Strands { commands: &commands, life: &life, signals, lost: &lost, notes: note_in };
     let mut unkept = None;
-    let outcome = std::thread::scope(|scope| {
-        let following = scope.spawn(|| follow::follow(&mut sequence, &mut watch, strands));
-        for note in note_out {
-            if unkept.is_none() {
-                unkept = kept.keep(&note.events, note.pass.as_ref(), news).err();
-                lost.fetch_or(unkept.is_some(), Ordering::Relaxed);
+    let (outcome, panicked) = std::thread::scope(|scope| {
+        let (following_sequence, lost, stop) = (&mut sequence, &*lost, reins.stopper());
+        let following = scope.spawn(move || {
+            let (mut stops, mut knows) = (0, false);
+            let mut ask = || {
+                let asked = signals.stops.load(Ordering::Relaxed);
+                if asked > stops {
+                    stops = asked;
+                    return Some(End::Asked);
+                }
+                if !knows && lost.load(Ordering::Relaxed) {
+                    knows = true;
+                    return Some(End::NotKept);
+                }
+                None
+            };
+            supervisor::sweep(&mut reins, following_sequence, &mut ask, &mut |row, sequence, reaction| {
+                if !reaction.events.is_empty() || reaction.pass.is_some() {
+                    let (done, all) = sequence.progress();
+                    let progress = (done, all, sequence.remaining_s());
+                    let (events, pass) = (reaction.events, reaction.pass);
+                    // The other end lives as long as this one: it reads until this end is dropped.
+                    let _ = note_in.send(Note { at: row.now, events, pass, progress });
+                }
+            })
+        });
+        let mut keep = |notes: &Receiver<Note>, news: &mut dyn FnMut(News<'_>)| {
+            for note in notes {
+                // Passes that come until the sweep has stopped are kept where they can be.
+                if let Err(why) = kept.keep(&note.events, note.pass.as_ref(), news) {
+                    lost.store(true, Ordering::Relaxed);
+                    unkept.get_or_insert(why);
+                }
+                if note.pass.is_some() {
+                    let (done, all, left_s) = note.progress;
+                    news(News::Progress(done, all, left_s));
+                }
+                let _ = to_writer.send((note.at, note.events, note.pass));
             }
-            if note.pass.is_some() {
-                let (done, all, left_s) = note.progress;
-                news(News::Progress(done, all, left_s));
-            }
-            let _ = to_writer.send((note.at, note.events, note.pass));
+        };
+        // Whoever is told the news is foreign code, and may panic where its terminal is gone: then the rig is stopped before
+        // anything else, what was measured is kept, and the panic goes on when the rig is off.
+        let told = std::panic::catch_unwind(AssertUnwindSafe(|| keep(&note_out, news)));
+        if told.is_err() {
+            stop();
+            lost.store(true, Ordering::Relaxed);
+            keep(&note_out, &mut |_| {});
         }
-        following.join()
+        (following.join(), told.err())
     });
-    // Whatever ended it: the stop goes out, and a few more cycles carry it to the amplifier.
-    let _ = commands.force_push(Command::Stop);
-    let beat = life.heartbeat.load(Ordering::Relaxed);
-    let waited = Instant::now();
-    while life.heartbeat.load(Ordering::Relaxed) < beat + 20 && waited.elapsed() < Duration::from_millis(500)
-    {
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    life.end.store(true, Ordering::Relaxed);
+    // Whatever ended it: off first.
+    let Ended { report, links, off } = rig.end();
     let stalls = witnesses.finish();
     drop(to_writer);
-    // A loop that is stuck inside a driver cannot be joined: its instruments' own watchdogs have dropped the drive.
-    let stuck = Instant::now();
-    while !looping.is_finished() && stuck.elapsed() < Duration::from_secs(2) {
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    if !looping.is_finished() {
-        return Err(fault("the loop's thread is stuck inside a driver"));
-    }
-    let report = looping.join().map_err(|_| fault("the loop's thread panicked"))?;
-    let links: BTreeMap<String, serde_json::Value> = rig
-        .links
-        .health()
-        .map(|(name, health)| (name.to_string(), serde_json::to_value(health).unwrap_or_default()))
-        .collect();
-    drop(rig.links);
-    let outcome = outcome.map_err(|_| fault("the sweep's thread panicked"))?;
+    let outcome = outcome.map_err(|_| fault("the sweep's thread panicked"));
     let mut last = BTreeMap::new();
-    last.insert("outcome".to_string(), words(&outcome)?);
+    if let Ok(outcome) = &outcome {
+        last.insert("outcome".to_string(), words(outcome)?);
+    }
     last.insert("loop".to_string(), serde_json::to_string(&report).into_diagnostic()?);
     last.insert("stalls".to_string(), serde_json::to_string(&stalls).into_diagnostic()?);
     last.insert("links".to_string(), serde_json::to_string(&links).into_diagnostic()?);
+    last.insert("off".to_string(), serde_json::to_string(&off).into_diagnostic()?);
     let _ = last_in.send(last);
-    if let Some(what) = &report.panicked {
-        tracing::error!(what, "a port panicked in the loop: the drive was switched off");
+    // A writer that cannot write waits for the other end of this channel to go.
+    drop(last_in);
+    let written = writing.join().map_err(|_| fault("the recorder's thread panicked"));
+    if let Some(panic) = panicked {
+        tracing::error!("{}", off.words());
+        std::panic::resume_unwind(panic);
     }
-    let written = writing.join().map_err(|_| fault("the recorder's thread panicked"))?;
+    let ended = outcome.and_then(|outcome| Ok((outcome, written?, report)));
+    let (outcome, written, report) = match ended {
+        Ok((outcome, written, Some(report))) => (outcome, written, report),
+        Ok((.., None)) => {
+            return Err(fault("the loop's thread is stuck inside a driver").wrap_err(off.words()));
+        }
+        Err(fault) => return Err(fault.wrap_err(off.words())),
+    };
+    if let Some(what) = &report.panicked {
+        tracing::error!(what, "a port panicked in the loop: the rig was stopped");
+    }
     for why in written.problem.iter().cloned().chain(unkept.map(|e| format!("{e:#}"))) {
         tracing::error!(why, "the record could not be kept: the sweep was stopped");
     }
@@ -160,7 +175,17 @@ pub fn run(
     let unrecorded = written.problem.is_some() && outcome == Outcome::Complete;
     let outcome = if unrecorded { Outcome::RecordLost } else { outcome };
     let record_lost = written.lost_rows + report.ring_drops;
-    Ok(kept.end(outcome, sequence.departed(), Some((report, stalls)), record_lost, links))
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, Some((report, stalls)), record_lost, links, off))
+}
+
+/// Raises a flag where the thread that holds it panics.
+struct RaisedByPanic(Arc<AtomicBool>);
+
+impl Drop for RaisedByPanic {
+    fn drop(&mut self) {
+        self.0.fetch_or(std::thread::panicking(), Ordering::Relaxed);
+    }
 }
 
 /// A fault of this program, after the rig was touched.

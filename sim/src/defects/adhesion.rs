@@ -9,6 +9,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "attraction adds to the load that friction feels",
     parameters: &[Parameter::log("attraction_n", 5e-4, 0.2), Parameter::log("development_n", 0.01, 0.1)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

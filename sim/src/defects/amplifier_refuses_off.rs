@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Plate,
     in_library: false,
     in_tables: false,
+    imitated: false,
     summary: "the amplifier ignores its enable input once its output is on",
     parameters: &[],
     act: Act { setup: Some(act), plate: None, contact: None, forces: None },

@@ -10,6 +10,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Plate,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "the plate's amplitude droops under the finger's load",
     parameters: &[Parameter::log("load_ratio_at_1_n", 0.01, 3.0)],
     act: Act { setup: None, plate: Some(act), contact: None, forces: None },

@@ -7,6 +7,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Plate,
     in_library: true,
     in_tables: true,
+    imitated: true,
     summary: "the true amplitude is not the one stated",
     parameters: &[Parameter::factor("factor", 0.02, 1.0)],
     act: Act { setup: None, plate: Some(act), contact: None, forces: None },

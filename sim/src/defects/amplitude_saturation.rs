@@ -7,6 +7,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Plate,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "the amplitude stops growing with the set-point",
     parameters: &[Parameter::log("inverse_ceiling_per_m", 1.2e5, 1.5e6)],
     act: Act { setup: None, plate: Some(act), contact: None, forces: None },

@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "the friction limit of a fresh contact grows with its age",
     parameters: &[Parameter::log("half_time_s", 1e-8, 3e-5)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

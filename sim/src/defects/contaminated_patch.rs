@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Plate,
     in_library: false,
     in_tables: true,
+    imitated: false,
     summary: "friction differs on a patch of the plate",
     parameters: &[Parameter::signed("relative_change", 0.01, 0.8), Parameter::linear("centre_m", -0.015, 0.015), Parameter::log("width_m", 2e-3, 8e-3)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Instrument,
     in_library: true,
     in_tables: true,
+    imitated: true,
     summary: "a share of each force shows in the other channel",
     parameters: &[Parameter::signed("lateral_per_normal", 0.0015, 0.15), Parameter::linear("normal_per_lateral", 0.0, 0.02)],
     act: Act { setup: None, plate: None, contact: None, forces: Some(act) },

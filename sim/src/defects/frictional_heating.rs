@@ -9,6 +9,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: false,
     in_tables: true,
+    imitated: false,
     summary: "friction falls with the power that it dissipates",
     parameters: &[Parameter::log("inverse_power_per_w", 1.0, 400.0)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

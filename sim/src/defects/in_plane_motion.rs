@@ -9,6 +9,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Plate,
     in_library: false,
     in_tables: true,
+    imitated: false,
     summary: "the plate also vibrates along the sliding direction",
     parameters: &[Parameter::log("share", 0.003, 0.5), Parameter::linear("phase_rad", 0.0, 6.2)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

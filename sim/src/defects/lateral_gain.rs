@@ -7,6 +7,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Instrument,
     in_library: true,
     in_tables: false,
+    imitated: false,
     summary: "the gain of the lateral force is wrong",
     parameters: &[Parameter::factor("factor", 0.03, 0.5)],
     act: Act { setup: None, plate: None, contact: None, forces: Some(act) },

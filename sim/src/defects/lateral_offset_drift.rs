@@ -7,6 +7,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Instrument,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "the zero of the lateral force is off and drifts",
     parameters: &[Parameter::signed("end_n", 4e-4, 0.04), Parameter::linear("start_over_end", -1.0, 1.0), Parameter::log("time_s", 40.0, 600.0)],
     act: Act { setup: None, plate: None, contact: None, forces: Some(act) },

@@ -10,6 +10,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "ridges recover their lateral stretch at a finite speed",
     parameters: &[Parameter::log("slowness_s_per_m", 10.0, 1000.0), Parameter::log("knee_m", 3e-8, 3e-7)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

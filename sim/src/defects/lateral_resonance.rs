@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Finger,
     in_library: false,
     in_tables: true,
+    imitated: false,
     summary: "the lateral stiffness of the ridges depends on frequency as a resonance does",
     parameters: &[Parameter::log("strength", 0.02, 1.0), Parameter::log("resonance_hz", 3e4, 5e4)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

@@ -10,6 +10,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "part of the friction limit grows as the 2/3 power of the force",
     parameters: &[Parameter::log("area_share", 0.01, 0.95)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

@@ -9,6 +9,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Plate,
     in_library: false,
     in_tables: true,
+    imitated: false,
     summary: "the amplitude is modulated at twice the mains frequency",
     parameters: &[Parameter::log("depth", 0.05, 0.95), Parameter::log("corner_m", 6e-6, 3e-5)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

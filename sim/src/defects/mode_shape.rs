@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Plate,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "the amplitude depends on the position along the plate",
     parameters: &[Parameter::log("depth", 0.01, 0.95), Parameter::linear("phase_rad", 0.0, 3.1), Parameter::log("half_wave_at_25_khz_m", 8e-3, 2e-2)],
     act: Act { setup: None, plate: Some(act), contact: None, forces: None },

@@ -9,6 +9,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "friction and softness change with the time in contact",
     parameters: &[Parameter::signed("relative_gain", 0.006, 0.8), Parameter::log("half_time_s", 15.0, 400.0), Parameter::linear("softening", 0.0, 0.15)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

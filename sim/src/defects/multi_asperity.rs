@@ -9,6 +9,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "ridges of unequal height leave the plate one after another",
     parameters: &[Parameter::log("height_sd_m", 5e-9, 1.5e-6)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

@@ -11,6 +11,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "ridges are damped on their normal spring",
     parameters: &[Parameter::log("retardation_s", 3e-8, 1e-5)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

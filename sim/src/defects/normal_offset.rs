@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Instrument,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "the zero of the normal force is off",
     parameters: &[Parameter::signed("offset_n", 1.5e-3, 0.12), Parameter::linear("sinking", 0.0, 0.15)],
     act: Act { setup: None, plate: None, contact: None, forces: Some(act) },

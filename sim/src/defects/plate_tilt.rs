@@ -7,6 +7,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Instrument,
     in_library: true,
     in_tables: true,
+    imitated: true,
     summary: "the plate is tilted against the sensor",
     parameters: &[Parameter::signed("tilt_rad", 0.0015, 0.12), Parameter::linear("bend_rad_per_m", -0.3, 0.3)],
     act: Act { setup: None, plate: None, contact: None, forces: Some(act) },

@@ -9,6 +9,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "the coefficient of friction depends on the sliding speed",
     parameters: &[Parameter::signed("relative_slope", 0.004, 0.3), Parameter::log("knee_m_s", 2e-3, 2e-2)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

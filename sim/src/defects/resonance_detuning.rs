@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Plate,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "the plate is driven off its resonance as it warms",
     parameters: &[
         Parameter::log("relative_shift_per_k", 1e-5, 4e-3),

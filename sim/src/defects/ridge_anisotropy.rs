@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Finger,
     in_library: false,
     in_tables: true,
+    imitated: false,
     summary: "ridges are stiffer in one direction than in the other",
     parameters: &[Parameter::signed("asymmetry", 0.02, 0.8)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

@@ -11,6 +11,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "ridges have mass: they overshoot, fly and land",
     parameters: &[Parameter::log("mass_kg", 1e-7, 8e-6), Parameter::log("damping_ratio", 0.3, 1.0), Parameter::log("skin_loss", 0.15, 0.6)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

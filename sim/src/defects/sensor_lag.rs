@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Instrument,
     in_library: true,
     in_tables: false,
+    imitated: false,
     summary: "the bandwidth of the force sensor is lower than stated",
     parameters: &[Parameter::log("bandwidth_hz", 2.0, 80.0)],
     act: Act { setup: Some(act), plate: None, contact: None, forces: None },

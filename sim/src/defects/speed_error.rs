@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Instrument,
     in_library: true,
     in_tables: true,
+    imitated: true,
     summary: "the true sliding speed is not the one stated",
     parameters: &[Parameter::factor("factor", 0.02, 0.8)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

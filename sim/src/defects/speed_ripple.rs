@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Instrument,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "the speed rises and falls along the stroke",
     parameters: &[Parameter::log("ripple", 0.01, 0.7), Parameter::log("pitch_m", 3e-3, 1.2e-2), Parameter::linear("phase_rad", 0.0, 6.2)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

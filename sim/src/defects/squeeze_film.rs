@@ -13,6 +13,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "air trapped between ridges and plate carries part of the load",
     parameters: &[
         Parameter::log("film_area_m2", 3e-8, 1.5e-5),

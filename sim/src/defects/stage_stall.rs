@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Instrument,
     in_library: false,
     in_tables: false,
+    imitated: false,
     summary: "the stage's slide stands still from a time on",
     parameters: &[Parameter::log("from_s", 0.5, 30.0)],
     act: Act { setup: Some(act), plate: None, contact: None, forces: None },

@@ -10,6 +10,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Finger,
     in_library: true,
     in_tables: true,
+    imitated: true,
     summary: "the true stiffnesses are far from the nominal ones",
     parameters: &[Parameter::factor("factor", 0.04, 1.8), Parameter::linear("angle_rad", -0.46, 2.0)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

@@ -9,6 +9,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: true,
     in_tables: true,
+    imitated: false,
     summary: "the tissue under the ridges creeps with the time in contact",
     parameters: &[Parameter::log("creep", 0.01, 1.0), Parameter::log("time_s", 1.0, 30.0)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Instrument,
     in_library: true,
     in_tables: false,
+    imitated: false,
     summary: "forces arrive later than stated",
     parameters: &[Parameter::log("delay_s", 2e-3, 0.1)],
     act: Act { setup: Some(act), plate: None, contact: None, forces: None },

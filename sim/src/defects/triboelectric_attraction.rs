@@ -8,6 +8,7 @@ pub(super) static KIND: Kind = Kind {
     place: Place::Contact,
     in_library: false,
     in_tables: true,
+    imitated: false,
     summary: "sliding charges the plate, and the charge attracts the finger",
     parameters: &[Parameter::log("attraction_n", 1e-3, 0.15), Parameter::log("speed_m_s", 5e-3, 5e-2)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },

@@ -2,6 +2,7 @@
 
 use models::quantity::PeakToPeak;
 use models::record::Pass;
+use models::rig_file::{Calibration, PassNoise, RigFile};
 use serde::{Deserialize, Serialize};
 
 use super::design::Planned;
@@ -243,21 +244,29 @@ impl Bench {
         rms(sds.map(|(point, sd)| sd / (self.finger.mu0 * point.at.normal_force_n)))
     }
 
-    /// The rig.toml of the set.
-    pub(super) fn rig_toml(&self) -> String {
+    /// What its owner would know of the set's rig.
+    pub(super) fn rig_file(&self) -> RigFile {
         let f = &self.config;
-        format!(
-            "[finger]\nnormal_stiffness_n_per_m = {:?}\nlateral_stiffness_n_per_m = {:?}\n\
-             stiffness_relative_sd = {:?}\npoisson_ratio = {:?}\n\n\
-             [noise]\npass_relative_sd = {:.5}\nforce_sd_n = {:.3e}\n",
-            f.normal_stiffness_n_per_m,
-            f.lateral_stiffness_n_per_m,
-            f.stiffness_relative_sd,
-            f.poisson_ratio,
-            self.scatter.pass_relative_sd * self.stated,
-            self.scatter.force_sd_n.hypot(self.scatter.count_n / 12.0_f64.sqrt()) * self.stated,
-        )
+        let finger = models::finger::Finger {
+            normal_stiffness_n_per_m: f.normal_stiffness_n_per_m,
+            lateral_stiffness_n_per_m: f.lateral_stiffness_n_per_m,
+            stiffness_relative_sd: f.stiffness_relative_sd,
+            poisson_ratio: f.poisson_ratio,
+            young_modulus_pa: None,
+            lateral_recovery_m_per_s: None,
+        };
+        let force_sd_n = self.scatter.force_sd_n.hypot(self.scatter.count_n / 12.0_f64.sqrt()) * self.stated;
+        let noise = PassNoise {
+            pass_relative_sd: stated(format!("{:.5}", self.scatter.pass_relative_sd * self.stated)),
+            force_sd_n: stated(format!("{force_sd_n:.3e}")),
+        };
+        RigFile { finger, noise, calibration: Calibration::default() }
     }
+}
+
+/// The number that a written one is: nobody states his repeatability with all digits.
+fn stated(written: String) -> f64 {
+    written.parse().expect("a number as it was written")
 }
 
 fn rms(values: impl Iterator<Item = f64>) -> f64 {

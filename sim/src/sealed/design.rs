@@ -101,14 +101,13 @@ impl Design {
             speed_m_s: pick(&self.speeds_m_s, noise),
             direction: if noise.chance(0.5) { Direction::Forward } else { Direction::Backward },
             normal_force_n: pick(&self.normal_forces_n, noise),
-            mu0: 0.5,
             position_m: (noise.between(-self.reach_m, self.reach_m) * 1e5).round() * 1e-5,
-            time_s: 0.0,
             ambient_pressure_pa: if self.pressures_pa.is_empty() {
                 None
             } else {
                 Some(pick(&self.pressures_pa, noise))
             },
+            ..Condition::paper()
         }
     }
 

@@ -181,22 +181,29 @@ impl Device {
                 put(start, &bytes);
             }
         }
-        if table == Table::Holding {
-            for (block, bytes) in self.profile.description.write.iter().zip(&self.blocks) {
+        for (block, bytes) in self.profile.description.write.iter().zip(&self.blocks) {
+            if block.table == table {
                 put(block.address, bytes);
             }
         }
         registers.into_iter().collect::<Option<Vec<u16>>>().ok_or(Refused::Address)
     }
 
-    /// Writes neighbouring holding registers; the set-points that they touch take effect together.
+    /// Writes neighbouring registers of a table; the set-points that they touch take effect together.
     ///
     /// # Errors
     /// [`Refused`], and then nothing was changed.
-    pub fn write(&mut self, address: u16, registers: &[u16], plant: &mut dyn Plant) -> Result<(), Refused> {
+    pub fn write(
+        &mut self,
+        table: Table,
+        address: u16,
+        registers: &[u16],
+        plant: &mut dyn Plant,
+    ) -> Result<(), Refused> {
         let writes = &self.profile.description.write;
         let inside = |block: &instruments::schema::Write| {
-            address >= block.address
+            block.table == table
+                && address >= block.address
                 && usize::from(address) + registers.len()
                     <= usize::from(block.address) + usize::from(block.count)
         };

@@ -4,17 +4,26 @@ use super::SharedPlant;
 use super::device::{Device, Refused};
 use instruments::schema::Table;
 use std::collections::BTreeMap;
-use std::future::{Ready, ready};
+use std::future::{Future, Ready, ready};
 use std::io;
 use std::net::{SocketAddr, TcpListener};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll};
+use std::time::{Duration, Instant};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::sync::oneshot;
 use tokio_modbus::prelude::{ExceptionCode, Request, Response, SlaveRequest};
 use tokio_modbus::server::Service;
 use tokio_modbus::server::tcp::Server;
 
 /// More clients than this are turned away, so that no flood exhausts the host.
 pub const MOST_CLIENTS: usize = 32;
+/// Where all places are taken, a client that has asked nothing for so long makes room for a new one: the rule of the Modbus
+/// messaging guide (V1.0b, 4.2.2), which closes the connection that was unused for longest.
+pub const IDLE: Duration = Duration::from_secs(2);
+/// The world is brought up to now at least so often: the first question after a long silence is answered as fast as any.
+const KEEP_UP: Duration = Duration::from_millis(50);
 
 /// A running server; dropping it stops the server.
 pub struct ModbusTcpServer {
@@ -67,24 +76,97 @@ async fn serve(
     stopped: tokio::sync::oneshot::Receiver<()>,
 ) -> io::Result<()> {
     let server = Server::new(tokio::net::TcpListener::from_std(listener)?);
-    let clients = Arc::new(AtomicUsize::new(0));
+    let places = Arc::new(Places::default());
+    let plant = units.plant.clone();
     let on_connected = move |stream: tokio::net::TcpStream, peer: SocketAddr| {
-        let (units, clients) = (Arc::clone(&units), Arc::clone(&clients));
+        let (units, places) = (Arc::clone(&units), Arc::clone(&places));
         async move {
-            if clients.fetch_add(1, Ordering::Relaxed) >= MOST_CLIENTS {
-                clients.fetch_sub(1, Ordering::Relaxed);
+            let Some((place, evicted)) = places.take() else {
                 tracing::warn!(%peer, "turned away: {MOST_CLIENTS} clients are connected");
                 return Ok(None);
-            }
+            };
             stream.set_nodelay(true)?;
-            Ok(Some((Client { units, clients }, stream)))
+            Ok(Some((Client { units, places, place }, Connection { stream, evicted })))
         }
     };
-    let stopped = async {
-        let _ = stopped.await;
+    let stopped = async move {
+        let mut stopped = std::pin::pin!(stopped);
+        while tokio::time::timeout(KEEP_UP, stopped.as_mut()).await.is_err() {
+            drop(plant.now());
+        }
     };
     server.serve_until(&on_connected, |error| tracing::debug!(%error, "a client was lost"), stopped).await?;
     Ok(())
+}
+
+/// The places of the connected clients.
+#[derive(Default)]
+struct Places(Mutex<(u64, Vec<Place>)>);
+
+struct Place {
+    number: u64,
+    used: Instant,
+    /// Dropping it ends the connection.
+    _evicts: oneshot::Sender<()>,
+}
+
+impl Places {
+    /// A place for a new client, and what tells it to leave. `None` where all are taken by clients that are at work.
+    fn take(&self) -> Option<(u64, oneshot::Receiver<()>)> {
+        let mut held = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let (number, places) = &mut *held;
+        if places.len() >= MOST_CLIENTS {
+            let idlest = (0..places.len()).min_by_key(|&i| places[i].used)?;
+            if places[idlest].used.elapsed() < IDLE {
+                return None;
+            }
+            places.swap_remove(idlest);
+        }
+        *number += 1;
+        let (evicts, evicted) = oneshot::channel();
+        places.push(Place { number: *number, used: Instant::now(), _evicts: evicts });
+        Some((*number, evicted))
+    }
+
+    fn with(&self, number: u64, change: impl FnOnce(&mut Vec<Place>, usize)) {
+        let mut held = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(at) = held.1.iter().position(|place| place.number == number) {
+            change(&mut held.1, at);
+        }
+    }
+}
+
+/// A client's connection until its place is given to another.
+struct Connection {
+    stream: tokio::net::TcpStream,
+    evicted: oneshot::Receiver<()>,
+}
+
+impl AsyncRead for Connection {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buf: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        if Pin::new(&mut self.evicted).poll(cx).is_ready() {
+            return Poll::Ready(Err(io::Error::other("idle, and its place was wanted")));
+        }
+        Pin::new(&mut self.stream).poll_read(cx, buf)
+    }
+}
+
+impl AsyncWrite for Connection {
+    fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(cx, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
 }
 
 struct Units {
@@ -95,12 +177,13 @@ struct Units {
 /// One connected client; leaving frees its place.
 struct Client {
     units: Arc<Units>,
-    clients: Arc<AtomicUsize>,
+    places: Arc<Places>,
+    place: u64,
 }
 
 impl Drop for Client {
     fn drop(&mut self) {
-        self.clients.fetch_sub(1, Ordering::Relaxed);
+        self.places.with(self.place, |places, at| drop(places.swap_remove(at)));
     }
 }
 
@@ -111,6 +194,7 @@ impl Service for Client {
     type Future = Ready<Result<Response, ExceptionCode>>;
 
     fn call(&self, request: Self::Request) -> Self::Future {
+        self.places.with(self.place, |places, at| places[at].used = Instant::now());
         ready(self.units.answer(request.slave, request.request))
     }
 }
@@ -136,18 +220,42 @@ impl Units {
                 .read(Table::Input, address, counted(count)?, &mut *plant, now)
                 .map(Response::ReadInputRegisters)
                 .map_err(refused),
+            Request::ReadCoils(address, count) => device
+                .read(Table::Coil, address, counted(count)?, &mut *plant, now)
+                .map(|coils| Response::ReadCoils(bits(&coils)))
+                .map_err(refused),
+            Request::ReadDiscreteInputs(address, count) => device
+                .read(Table::Discrete, address, counted(count)?, &mut *plant, now)
+                .map(|inputs| Response::ReadDiscreteInputs(bits(&inputs)))
+                .map_err(refused),
+            Request::WriteSingleCoil(address, closed) => device
+                .write(Table::Coil, address, &[u16::from(closed)], &mut *plant)
+                .map(|()| Response::WriteSingleCoil(address, closed))
+                .map_err(refused),
+            Request::WriteMultipleCoils(address, coils) => {
+                let count = counted(u16::try_from(coils.len()).unwrap_or(u16::MAX))?;
+                let words: Vec<u16> = coils.iter().map(|closed| u16::from(*closed)).collect();
+                device
+                    .write(Table::Coil, address, &words, &mut *plant)
+                    .map(|()| Response::WriteMultipleCoils(address, count))
+                    .map_err(refused)
+            }
             Request::WriteSingleRegister(address, word) => device
-                .write(address, &[word], &mut *plant)
+                .write(Table::Holding, address, &[word], &mut *plant)
                 .map(|()| Response::WriteSingleRegister(address, word))
                 .map_err(refused),
             Request::WriteMultipleRegisters(address, words) => {
                 let count = counted(u16::try_from(words.len()).unwrap_or(u16::MAX))?;
                 device
-                    .write(address, &words, &mut *plant)
+                    .write(Table::Holding, address, &words, &mut *plant)
                     .map(|()| Response::WriteMultipleRegisters(address, count))
                     .map_err(refused)
             }
             _ => Err(ExceptionCode::IllegalFunction),
         }
     }
+}
+
+fn bits(registers: &[u16]) -> Vec<bool> {
+    registers.iter().map(|register| *register != 0).collect()
 }

@@ -78,6 +78,14 @@ named! {
         StageCount = "stage.count",
         /// When the stage took its state, in s.
         StageTime = "stage.time_s",
+        /// Whether the switch in the amplifier's supply is closed, by its mirror contact.
+        SupplyClosed = "supply.closed",
+        /// Whether the emergency stop's contact is closed: it is not pressed.
+        EmergencyStop = "contact.emergency_stop",
+        /// Whether the interlock's contact is closed: the guard is shut.
+        Interlock = "contact.interlock",
+        /// Whether the dead-man device's contact is closed: it is held.
+        DeadMan = "contact.dead_man",
         /// The emulated instrument's own time, in s.
         DeviceTime = "device.time_s",
         /// How often the emulated instrument was read.
@@ -102,5 +110,7 @@ named! {
         NormalForce = "stage.normal_force_n",
         /// Heartbeat of the stage's watchdog.
         StageHeartbeat = "stage.heartbeat",
+        /// The switch in the amplifier's supply closed (1) or open (0).
+        CloseSupply = "supply.closed",
     }
 }

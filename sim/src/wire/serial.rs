@@ -142,7 +142,12 @@ impl RtuLine {
         let key = device.profile().description.init.iter().find_map(|init| init.function);
         match asked {
             Asked::Read { function, address, count } => {
-                let table = if function == 3 { Table::Holding } else { Table::Input };
+                let table = match function {
+                    1 => Table::Coil,
+                    2 => Table::Discrete,
+                    3 => Table::Holding,
+                    _ => Table::Input,
+                };
                 match device.read(table, address, count.min(125), &mut *plant, now) {
                     Ok(registers) => rtu::give(unit, function, &registers),
                     Err(refused) => rtu::refuse(unit, function, code(refused)),
@@ -161,7 +166,8 @@ impl RtuLine {
                 if key.is_some() && !self.unlocked.contains(&unit) {
                     return rtu::refuse(unit, function, ILLEGAL_FUNCTION);
                 }
-                match device.write(address, &registers, &mut *plant) {
+                let table = if function == 15 { Table::Coil } else { Table::Holding };
+                match device.write(table, address, &registers, &mut *plant) {
                     Ok(()) => rtu::confirm(unit, function, address, second),
                     Err(refused) => rtu::refuse(unit, function, code(refused)),
                 }

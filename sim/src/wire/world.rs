@@ -52,6 +52,35 @@ pub struct WorldPlant {
     hands: Hands,
     drive: AmplifierInput,
     motion: StageInput,
+    guard: StageGuard,
+}
+
+/// Time that the stage moves on without a new heartbeat: twice that of the amplifier's watchdog, so that the plate is quiet before
+/// the finger leaves it.
+pub const STAGE_HEARTBEAT_WITHIN: Nanos = Nanos(100_000_000);
+/// A stage at rest, lifted off.
+const AT_REST: StageInput = StageInput { velocity_m_s: 0.0, normal_force_n: 0.0 };
+
+/// The stage's watchdog: where heartbeats have come and then stand still, the stage stops and lifts off, and takes no set-point
+/// until the heartbeat goes on. A controller whose stage profile has no heartbeat is not watched.
+#[derive(Clone, Copy, Default)]
+struct StageGuard {
+    /// Last heartbeat, and when it was new.
+    last: Option<(f64, Nanos)>,
+    lapsed: bool,
+}
+
+impl StageGuard {
+    fn beat(&mut self, value: f64, now: Nanos) {
+        if self.last.is_none_or(|(before, _)| before != value) {
+            (self.last, self.lapsed) = (Some((value, now)), false);
+        }
+    }
+
+    /// When the heartbeat has stood still for too long, if that is still to come or has not been acted upon.
+    fn due(&self) -> Option<Nanos> {
+        self.last.filter(|_| !self.lapsed).map(|(_, since)| Nanos(since.0 + STAGE_HEARTBEAT_WITHIN.0))
+    }
 }
 
 impl WorldPlant {
@@ -65,8 +94,8 @@ impl WorldPlant {
         let hands = Hands::default();
         let drive =
             AmplifierInput { amplitude: PeakToPeak::ZERO, frequency_hz: 0.0, enable: false, heartbeat: 0 };
-        let motion = StageInput { velocity_m_s: 0.0, normal_force_n: 0.0 };
-        (WorldPlant { world, hands: hands.clone(), drive, motion }, hands)
+        let guard = StageGuard::default();
+        (WorldPlant { world, hands: hands.clone(), drive, motion: AT_REST, guard }, hands)
     }
 }
 
@@ -75,6 +104,12 @@ impl Plant for WorldPlant {
         // Whatever was hung since the last look has been there since then.
         let [lateral_n, normal_n] = self.hands.bench().hung_n;
         self.world.hang(lateral_n, normal_n);
+        if let Some(due) = self.guard.due().filter(|due| *due < now) {
+            self.world.advance_to(due);
+            self.guard.lapsed = true;
+            self.motion = AT_REST;
+            self.world.command_stage(AT_REST);
+        }
         self.world.advance_to(now);
         self.hands.bench().free = Laser {
             amplitude_pp_m: self.world.free_amplitude_pp_m(),
@@ -117,6 +152,13 @@ impl Plant for WorldPlant {
             Quantity::StageFault => truth(stage.is_some_and(|s| s.fault)),
             Quantity::StageCount => of_stage(|s| f64::from(s.sequence)),
             Quantity::StageTime => of_stage(|s| s.taken_at.seconds()),
+            Quantity::SupplyClosed => truth(self.world.supply_closed()),
+            Quantity::EmergencyStop => truth(!self.world.operator().presses_emergency_stop),
+            Quantity::Interlock => truth(!self.world.operator().opens_guard),
+            Quantity::DeadMan => {
+                let now = self.world.now();
+                truth(self.world.operator().holds_dead_man_from.is_some_and(|from| now >= from))
+            }
             Quantity::DeviceTime => self.world.now().seconds(),
             // The emulator counts its own reads; the world knows nothing of them.
             Quantity::DeviceReads => 0.0,
@@ -133,20 +175,85 @@ impl Plant for WorldPlant {
                 Command::DriveHeartbeat => self.drive.heartbeat = value as u32,
                 Command::Velocity => self.motion.velocity_m_s = value,
                 Command::NormalForce => self.motion.normal_force_n = value,
-                Command::StageHeartbeat => {}
+                Command::StageHeartbeat => self.guard.beat(value, self.world.now()),
+                // The switch has a wire of its own: it moves nothing else.
+                Command::CloseSupply if value != 0.0 => self.world.close_supply(),
+                Command::CloseSupply => self.world.cut_supply(),
             }
             let of_drive = matches!(
                 command,
                 Command::Amplitude | Command::Frequency | Command::Enable | Command::DriveHeartbeat
             );
             drives |= of_drive;
-            moves |= !of_drive;
+            moves |= !of_drive && command != Command::CloseSupply;
         }
         if drives {
             self.world.command_amplifier(self.drive);
         }
+        if self.guard.lapsed {
+            self.motion = AT_REST;
+        }
         if moves {
             self.world.command_stage(self.motion);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::WorldConfig;
+
+    fn ms(n: u64) -> Nanos {
+        Nanos(n * 1_000_000)
+    }
+
+    fn slide(plant: &mut WorldPlant, beat: Option<f64>) {
+        plant.command(&[(Command::Velocity, 0.02), (Command::NormalForce, 0.25)]);
+        if let Some(beat) = beat {
+            plant.command(&[(Command::StageHeartbeat, beat)]);
+        }
+    }
+
+    #[test]
+    fn a_stage_whose_heartbeat_stands_still_stops_and_lifts_off() {
+        let mut plant = WorldPlant::new(World::new(&WorldConfig::ideal(), 1).unwrap());
+        for n in 0..300 {
+            plant.advance(ms(n));
+            slide(&mut plant, Some(n as f64));
+        }
+        let moving = |plant: &mut WorldPlant| plant.measure(Quantity::Velocity).abs() > 1e-3;
+        let loaded = |plant: &mut WorldPlant| plant.world.truth().normal_force_n > 0.01;
+        plant.advance(ms(390));
+        assert!(moving(&mut plant) && loaded(&mut plant), "within its time it goes on");
+        // The controller is dead; the same heartbeat over and over is no life.
+        for n in 391..600 {
+            plant.advance(ms(n));
+            slide(&mut plant, Some(299.0));
+        }
+        assert!(!moving(&mut plant) && !loaded(&mut plant));
+        let here = plant.measure(Quantity::Position);
+        plant.advance(ms(2000));
+        assert!((plant.measure(Quantity::Position) - here).abs() < 1e-5);
+        assert_eq!(plant.measure(Quantity::VelocitySetPoint), 0.0);
+        // Nobody needs to look for it to happen in time.
+        let mut unseen = WorldPlant::new(World::new(&WorldConfig::ideal(), 1).unwrap());
+        slide(&mut unseen, Some(1.0));
+        unseen.advance(ms(5000));
+        assert!(!moving(&mut unseen) && unseen.measure(Quantity::Position).abs() < 0.02 * 0.2);
+        // A living controller takes it up again.
+        for n in 5001..5200 {
+            unseen.advance(ms(n));
+            slide(&mut unseen, Some(n as f64));
+        }
+        assert!(moving(&mut unseen) && loaded(&mut unseen));
+    }
+
+    #[test]
+    fn a_stage_that_never_had_a_heartbeat_is_not_watched() {
+        let mut plant = WorldPlant::new(World::new(&WorldConfig::ideal(), 1).unwrap());
+        slide(&mut plant, None);
+        plant.advance(ms(1000));
+        assert!(plant.measure(Quantity::Velocity).abs() > 1e-3);
     }
 }

@@ -1,4 +1,4 @@
-//! What a world is made of, and the `rig.toml` that says so.
+//! What a world is made of.
 
 use serde::{Deserialize, Serialize};
 
@@ -192,30 +192,6 @@ impl WorldConfig {
         let share = 2.0 * r * (1.0 - r * (1.0 - (-1.0 / r).exp()));
         let white = s.white_sd_n[axis] * (s.sample_period_s / seconds).sqrt();
         (s.wander_sd_n[axis] * share.sqrt()).hypot(white)
-    }
-
-    /// The `rig.toml` of this world: what its owner would know of it. Passes of half a second are assumed.
-    pub fn rig_toml(&self) -> String {
-        let f = &self.finger;
-        format!(
-            "# What is known of this rig. Written by the virtual rig.\n\
-             [finger]\n\
-             normal_stiffness_n_per_m = {:?}\n\
-             lateral_stiffness_n_per_m = {:?}\n\
-             stiffness_relative_sd = {:?}\n\
-             poisson_ratio = {:?}\n\
-             young_modulus_pa = {:?}\n\n\
-             [noise]\n\
-             pass_relative_sd = {:?}\n\
-             force_sd_n = {:.1e}\n",
-            f.normal_stiffness_n_per_m,
-            f.lateral_stiffness_n_per_m,
-            f.stiffness_relative_sd,
-            f.poisson_ratio,
-            f.young_modulus_pa,
-            self.pass_relative_sd,
-            self.pass_force_sd_n(0, 0.5).max(self.pass_force_sd_n(1, 0.5)),
-        )
     }
 }
 

@@ -50,12 +50,16 @@ fn the_measured_amplitude_is_held_to_what_was_commanded() {
     assert_eq!((decision.tripped, decision.remark), (None, None));
     // A plate sensor that is not fitted is missed by nobody; one that is fitted is.
     assert_eq!(trips(&mut bench(), 9, |s| amplifier(s).amplitude = Err(NoData::NotFitted)), None);
-    // A saturated one is no measure of anything: neither too high nor too low.
-    let saturated = |s: &mut Observation| {
-        *measured(s) = 1.0;
-        amplifier(s).amplitude.as_mut().unwrap().quality = Quality::Saturated;
+    // A saturated one is a lower bound: what it breaks is broken, and at the end of its range it is no measure.
+    let saturated = |value: f64| {
+        let trip = trips(&mut bench(), 9, |s| {
+            *measured(s) = value;
+            amplifier(s).amplitude.as_mut().unwrap().quality = Quality::Saturated;
+        });
+        trip.map(|t| (t.cause, t.value))
     };
-    assert_eq!(trips(&mut bench(), 9, saturated), None);
+    assert_eq!(saturated(50e-6), Some((Cause::OverAmplitude, 50e-6)));
+    assert_eq!(saturated(2e-6), Some((Cause::AmplitudeSaturated, 2.0)));
 }
 
 /// The echo: 2 % and 5 nm, 1 Hz and 1e-4, either way.
@@ -343,9 +347,7 @@ fn a_refused_limit_is_named() {
     let refused = |change: fn(&mut Limits)| {
         let mut limits = Limits::paper(T);
         change(&mut limits);
-        match limits.checked().unwrap_err() {
-            LimitError::AboveHard { name, .. } | LimitError::Unusable { name, .. } => name,
-        }
+        limits.checked().unwrap_err().name()
     };
     assert_eq!(refused(|l| l.lateral_force_max_n = 10.1), "lateral_force_max_n");
     assert_eq!(refused(|l| l.amplitude_max = PeakToPeak::from_metres(10.1e-6)), "amplitude_max_pp_m");
@@ -356,16 +358,10 @@ fn a_refused_limit_is_named() {
     assert_eq!(refused(|l| l.temperature_max_c = 48.1), "temperature_max_c");
     assert_eq!(refused(|l| l.exposure_max_s = 600.1), "exposure_max_s");
     assert_eq!(refused(|l| l.late_cycles_max = 101), "late_cycles_max");
-    assert_eq!(refused(|l| l.late_in_a_row_max = 21), "late_in_a_row_max");
+    assert_eq!(refused(|l| l.late_in_a_row_max = 51), "late_in_a_row_max");
     assert_eq!(refused(|l| l.late_in_a_row_max = 0), "late_in_a_row_max");
-    assert_eq!(refused(|l| l.travel_m.1 = f64::NAN), "travel_min_m");
+    assert_eq!(refused(|l| l.travel_m.1 = f64::NAN), "travel_max_m");
     assert_eq!(refused(|l| l.timing.cycle = Nanos(0)), "cycle");
-    let ends = |n| {
-        let mut limits = Limits::paper(T);
-        limits.frozen_after = n;
-        limits.checked().is_ok()
-    };
-    assert_eq!([19, 20, 1000, 1001].map(ends), [false, true, true, false]);
     let timing = ChannelTiming { period: Nanos(7), latency: Nanos(0), periods: 2 };
     assert_eq!(timing.age_limit(), Nanos(14));
 }
@@ -398,6 +394,9 @@ fn limits_bind_exactly_where_they_say() {
         for _ in 0..60 {
             bench.cycle(|_| {}, Controls::default());
         }
+        // Fifty late cycles are a row; the rule under test is another.
+        bench.limits.late_in_a_row_max = 60;
+        bench.limits.late_cycles_max = 1000;
         // A jump to the bound is confirmed by its second sample; the rate rule is out of the way.
         bench.limits.force_rate_max_n_s = 1e9;
         for i in 0..5 {
@@ -471,4 +470,166 @@ fn beyond_the_travel_only_the_way_back_is_let_through() {
         assert_eq!(decision.tripped.is_some(), trips, "{position} {velocity}");
         bench.cycle(|s| stage(s).at_limit = true, Controls::default());
     }
+}
+
+/// Every value of a setup has two hard ends: at each it is taken, beyond each it is refused by its name with the range; what is
+/// no number, zero where nothing is, and what is absurd are beyond.
+#[test]
+fn every_range_is_closed_at_both_ends() {
+    type Set = fn(&mut Limits, f64);
+    fn seconds(v: f64) -> Nanos {
+        // To the nanosecond that is meant, not the one below.
+        Nanos((v * 1e9).round() as u64)
+    }
+    let cases: &[(&str, f64, f64, Set)] = &[
+        ("force_step_max_n", 0.01, 5.0, |l, v| l.force_step_max_n = v),
+        ("force_rate_max_n_s", 1.0, 500.0, |l, v| l.force_rate_max_n_s = v),
+        ("amplitude_rate_max_m_s", 1e-6, 0.1, |l, v| l.amplitude_rate_max_m_s = v),
+        ("travel_min_m", -0.5, 0.5, |l, v| l.travel_m = (v, 0.06)),
+        ("travel_max_m", -0.499, 0.5, |l, v| l.travel_m = (-0.5, v)),
+        ("frozen_after", 20.0, 1000.0, |l, v| l.frozen_after = v as u32),
+        ("amplitude_frozen_after", 20.0, 1000.0, |l, v| l.amplitude_frozen_after = Some(v as u32)),
+        ("exposure_rest_s", 10.0, 3600.0, |l, v| l.exposure_rest_s = v),
+        ("exposure_duty_max", 1e-3, 0.5, |l, v| l.exposure_duty_max = v),
+        ("exposure_dose_max_m2_s", 1e-3, 100.0, |l, v| l.exposure_dose_max_m2_s = v),
+        ("lateral", 1e-5, 0.05, |l, v| l.timing.lateral.period = seconds(v)),
+        ("normal", 1e-5, 0.05, |l, v| l.timing.normal.period = seconds(v)),
+        ("amplifier", 1e-5, 0.1, |l, v| l.timing.amplifier.period = seconds(v)),
+        ("stage", 1e-5, 0.1, |l, v| l.timing.stage.period = seconds(v)),
+        ("supply", 1e-5, 0.1, |l, v| l.timing.supply.period = seconds(v)),
+        ("contacts", 1e-5, 0.1, |l, v| l.timing.contacts.period = seconds(v)),
+        ("command_expiry", 1e-3, 0.02, |l, v| l.timing.command_expiry = seconds(v)),
+        ("plate_ring_time_s", 1e-5, 0.05, |l, v| l.timing.ring_time = seconds(v)),
+    ];
+    for (name, low, high, set) in cases {
+        let taken = |value: f64| {
+            let mut limits = Limits::paper(T);
+            set(&mut limits, value);
+            limits.checked()
+        };
+        if *name != "travel_min_m" {
+            assert!(taken(*high).is_ok(), "{name} = {high}: {:?}", taken(*high));
+        }
+        assert!(taken(*low).is_ok(), "{name} = {low}: {:?}", taken(*low));
+        let step = if name.contains("frozen") { 1.0 } else { (high - low) * 1e-3 };
+        for beyond in [low - step, high + step, 1e6 * high] {
+            let error = taken(beyond).expect_err(name);
+            assert!(matches!(error, LimitError::OutOfRange { .. }) && error.name() == *name, "{error}");
+            assert!(error.to_string().contains("permitted"), "{error}");
+        }
+    }
+    type Wide = fn(&mut Limits, f64);
+    let floats: &[(&str, Wide)] = &[
+        ("force_step_max_n", |l, v| l.force_step_max_n = v),
+        ("force_rate_max_n_s", |l, v| l.force_rate_max_n_s = v),
+        ("amplitude_rate_max_m_s", |l, v| l.amplitude_rate_max_m_s = v),
+        ("travel_min_m", |l, v| l.travel_m.0 = v),
+        ("travel_max_m", |l, v| l.travel_m.1 = v),
+        ("exposure_rest_s", |l, v| l.exposure_rest_s = v),
+        ("exposure_duty_max", |l, v| l.exposure_duty_max = v),
+        ("exposure_dose_max_m2_s", |l, v| l.exposure_dose_max_m2_s = v),
+        ("normal_force_max_n", |l, v| l.normal_force_max_n = v),
+        ("exposure_max_s", |l, v| l.exposure_max_s = v),
+    ];
+    for (name, set) in floats {
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e12, 1e12] {
+            let mut limits = Limits::paper(T);
+            set(&mut limits, value);
+            let error = limits.checked().expect_err(name);
+            assert_eq!(error.name(), *name, "{value}");
+        }
+    }
+    // Latencies and periods, of any channel.
+    for (latency, periods, fits) in
+        [(50_000_000, 5, true), (50_000_001, 5, false), (50_000_000, 6, false), (0, 1, true), (0, 0, false)]
+    {
+        let mut limits = Limits::paper(T);
+        (limits.timing.stage.latency, limits.timing.stage.periods) = (Nanos(latency), periods);
+        assert_eq!(limits.checked().is_ok(), fits, "{latency} {periods}");
+    }
+    for (cycle, fits) in [(249_000, false), (250_000, true), (100_000_000, true), (101_000_000, false)] {
+        assert_eq!(Limits::paper(Nanos(cycle)).checked().is_ok(), fits, "{cycle}");
+    }
+}
+
+/// Saturated every other cycle is saturated.
+#[test]
+fn saturation_that_comes_and_goes_trips() {
+    let mut bench = bench();
+    let mut i = 0;
+    let (cause, cycles) = bench.until_off(|s| {
+        i += 1;
+        if i % 2 == 0 {
+            normal(s).quality = Quality::Saturated;
+        }
+    });
+    assert_eq!((cause, cycles), (Cause::NormalSaturated, 10));
+    // Four in fifty cycles, alone each, are let through.
+    let mut bench = super::bounds::bench();
+    for i in 0..400 {
+        let rail = |s: &mut Observation| {
+            if i % 13 == 0 {
+                lateral(s).quality = Quality::Saturated;
+            }
+        };
+        assert_eq!(bench.cycle(rail, Controls::default()).tripped, None, "{i}");
+    }
+}
+
+/// A counter that stands still hides no overforce: what is shown above the limit for two samples' time trips.
+#[test]
+fn an_overforce_trips_whatever_the_counter_says() {
+    let mut stuck = bench();
+    let n0 = stuck.n;
+    let (cause, cycles) = stuck.until_off(|s| {
+        normal(s).sequence = n0;
+        normal(s).value = 40.0;
+    });
+    assert_eq!((cause, cycles), (Cause::NormalOverforce, 3));
+    let mut railed = bench();
+    let (cause, cycles) = railed.until_off(|s| {
+        normal(s).value = 40.0;
+        normal(s).quality = Quality::Saturated;
+    });
+    assert_eq!((cause, cycles), (Cause::NormalSaturated, 2));
+}
+
+/// Near its load, or near zero when lifted off; less than the load is a lost contact, not a fault.
+#[test]
+fn the_normal_force_is_held_to_the_load() {
+    let told = |load_n: f64, shows: f64, commanded: bool| {
+        let mut bench = bench();
+        bench.limits.load_commanded = commanded;
+        bench.request.normal_force_n = load_n;
+        trips(&mut bench, 2100, |s| normal(s).value = shows).map(|t| (t.cause, t.bound))
+    };
+    for (load, shows, fits) in [
+        (0.25, 0.674, true),
+        (0.25, 0.676, false),
+        (0.25, 0.0, true),
+        (0.0, 0.299, true),
+        (0.0, 0.301, false),
+        (0.0, -0.301, false),
+    ] {
+        let bound = (Cause::LoadImplausible, 1.5 * load + 0.3);
+        assert_eq!(told(load, shows, true), (!fits).then_some(bound), "{load} N, {shows} N");
+        assert_eq!(told(load, shows, false), None, "weights load this finger");
+    }
+}
+
+/// Equal amplitudes count while the same set-point is driven, from a state of that set-point on.
+#[test]
+fn an_amplitude_that_repeats_itself_is_frozen() {
+    let frozen = |after: Option<u32>, driven: bool| {
+        let mut bench = bench();
+        bench.limits.amplitude_frozen_after = after;
+        if !driven {
+            bench.request.amplitude = PeakToPeak::ZERO;
+        }
+        trips(&mut bench, 400, |s| amplifier(s).amplitude.as_mut().unwrap().raw = 77)
+            .map(|t| (t.cause, t.bound))
+    };
+    assert_eq!(frozen(Some(200), true), Some((Cause::AmplitudeFrozen, 200.0)));
+    assert_eq!(frozen(Some(200), false), None, "at rest it has nothing to tell");
+    assert_eq!(frozen(None, true), None, "a readback without noise");
 }

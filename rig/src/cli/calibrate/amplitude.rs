@@ -2,6 +2,7 @@
 
 use super::tables::{Sources, columns};
 use super::{Common, live};
+use crate::say;
 use crate::setup::Setup;
 use calibration::amplitude::apply::AmplitudeFit;
 use calibration::amplitude::droop::{Exponent, droop};
@@ -108,7 +109,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         (Some(path), false) => (path.clone(), points_of(&mut sources, path, &args.set_point)?, None),
         (Some(path), true) => {
             let settings = with_vibrometer(args)?.vibrometer_settings(args.frequency_hz)?;
-            eprintln!("vibrometer: {settings}");
+            say!("vibrometer: {settings}");
             let rows = columns(&mut sources, path, [args.set_point.as_str(), "velocity_v"], &[])?;
             let convert = |(row, [at, volts]): (usize, [f64; 2])| {
                 live::displacement(volts, settings.range_m_s_per_v, args.frequency_hz)
@@ -176,8 +177,8 @@ fn live_table(args: &Args) -> miette::Result<(PathBuf, String)> {
     };
     let text = live::table(&setup, &table)?;
     let path = args.common.out.clone().unwrap_or_else(|| "amplitude.toml".into()).with_extension("csv");
-    super::write_whole(&path, &text)?;
-    eprintln!("the table is kept in {}", path.display());
+    crate::files::write_whole(&path, &text)?;
+    say!("the table is kept in {}", path.display());
     let settings = text.lines().next().and_then(|l| l.strip_prefix("# vibrometer: ")).unwrap_or_default();
     Ok((path, settings.to_string()))
 }

@@ -2,6 +2,7 @@
 
 use super::tables::Sources;
 use super::{Common, guided};
+use crate::say;
 use calibration::force::matrix::{Linearity, Options, fit};
 use calibration::force::series::{self, Weighing};
 use std::path::PathBuf;
@@ -79,7 +80,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             };
             let text = guided::series(&way)?;
             let name = path.display().to_string();
-            eprintln!("the series is kept in {name}");
+            say!("the series is kept in {name}");
             sources.add(&name, text.as_bytes());
             (name, text.into_bytes())
         }

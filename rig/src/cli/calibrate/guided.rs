@@ -1,6 +1,7 @@
 //! A dead-weight series at the terminal: the operator loads, the program reads (or the operator types).
 
 use crate::setup::Setup;
+use crate::{ask, say};
 use drivers::Rig;
 use realtime::ports::{Nanos, NoData, Quality};
 use std::fmt::Write as _;
@@ -39,18 +40,21 @@ pub fn series(way: &Way<'_>) -> miette::Result<String> {
         miette::bail!("--reconnect-s {}: between 0 and 86400", way.reconnect_s);
     }
     let epoch = Instant::now();
+    // Closing the links switches off what they reach: that must be nobody else's rig.
+    let mut _claim = None;
     let mut rig = match way.setup {
         None => None,
         Some(name) => {
             let setup = Setup::load(name)?;
+            _claim = Some(crate::claim::RigClaim::take(&setup)?);
             Some(drivers::open(&setup.instruments(), epoch).map_err(|e| miette::miette!("{e}"))?)
         }
     };
-    eprintln!("{HELP}");
+    say!("{HELP}");
     let mut kept = Kept::take_up(way.keep)?;
     let mut lines = std::io::stdin().lock().lines();
     loop {
-        eprint!("reading {}> ", kept.rows.len() + 1);
+        ask!("reading {}> ", kept.rows.len() + 1);
         let Some(line) = lines.next() else {
             miette::bail!(
                 help = "the same command goes on with them; delete that file to begin anew",
@@ -67,7 +71,7 @@ pub fn series(way: &Way<'_>) -> miette::Result<String> {
             ["undo"] => {
                 let row = kept.rows.pop();
                 kept.write()?;
-                eprintln!("{}", row.map_or("nothing to forget".into(), |r| format!("forgotten: {r}")));
+                say!("{}", row.map_or("nothing to forget".into(), |r| format!("forgotten: {r}")));
                 continue;
             }
             ["zero"] => ("zero", String::new(), ""),
@@ -76,7 +80,7 @@ pub fn series(way: &Way<'_>) -> miette::Result<String> {
                 (*axis, (*mass).to_string(), *branch)
             }
             _ => {
-                eprintln!("not understood: `{line}`\n{HELP}");
+                say!("not understood: `{line}`\n{HELP}");
                 continue;
             }
         };
@@ -96,9 +100,9 @@ pub fn series(way: &Way<'_>) -> miette::Result<String> {
                 ));
                 kept.write()?;
                 // Said only once it is kept.
-                eprintln!("  lateral {:.2}, normal {:.2} counts{}", t.counts[0], t.counts[1], t.note);
+                say!("  lateral {:.2}, normal {:.2} counts{}", t.counts[0], t.counts[1], t.note);
             }
-            Err(why) => eprintln!("  no reading: {why}; try again"),
+            Err(why) => say!("  no reading: {why}; try again"),
         }
     }
     kept.finish(way.keep)
@@ -130,7 +134,7 @@ impl Kept {
             miette::bail!(help = "delete it to begin anew", "{shown} is no series of this program");
         };
         let rows: Vec<String> = lines.map(String::from).collect();
-        eprintln!(
+        say!(
             "{} readings of an earlier session are taken up from {shown} (begun {:.0} s ago); delete that file to begin \
              anew",
             rows.len(),
@@ -152,13 +156,13 @@ impl Kept {
     }
 
     fn write(&self) -> miette::Result<()> {
-        super::write_whole(&self.part, &self.text())
+        crate::files::write_whole(&self.part, self.text())
     }
 
     /// Writes the series and returns its text; only then the file so far goes.
     fn finish(self, keep: &Path) -> miette::Result<String> {
         let text = self.text().lines().skip(1).fold(String::new(), |all, line| all + line + "\n");
-        super::write_whole(keep, &text)?;
+        crate::files::write_whole(keep, &text)?;
         std::fs::remove_file(&self.part).or_else(|e| match e.kind() {
             std::io::ErrorKind::NotFound => Ok(()),
             _ => Err(miette::miette!("{}: {e}", self.part.display())),
@@ -183,7 +187,7 @@ fn read(rig: &mut Rig, epoch: Instant, way: &Way<'_>) -> Result<Taken, String> {
         };
         if !down {
             let links = rig.links.health().map(|(name, health)| format!("{name}: {}", health.last_problem));
-            eprintln!(
+            say!(
                 "  {why} ({}): waiting up to {:.0} s for it to come back; nothing that was weighed is lost",
                 links.collect::<Vec<_>>().join(", "),
                 way.reconnect_s
@@ -198,7 +202,7 @@ fn read(rig: &mut Rig, epoch: Instant, way: &Way<'_>) -> Result<Taken, String> {
             let now = Nanos(u64::try_from(epoch.elapsed().as_nanos()).unwrap_or(u64::MAX));
             let forces = rig.force.read(now);
             if forces.lateral.is_ok() && forces.normal.is_ok() {
-                eprintln!("  the link is back: the reading begins anew");
+                say!("  the link is back: the reading begins anew");
                 break;
             }
         }
@@ -262,7 +266,7 @@ fn average(rig: &mut Rig, epoch: Instant, average_s: f64) -> Result<Taken, Missi
 
 /// Counts as the operator reads them off a display.
 fn typed(lines: &mut impl Iterator<Item = std::io::Result<String>>) -> Result<Taken, String> {
-    eprint!("  counts, lateral and normal> ");
+    ask!("  counts, lateral and normal> ");
     let line = lines.next().ok_or("the input ended")?.map_err(|e| e.to_string())?;
     let numbers: Vec<f64> = line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
     match numbers.as_slice() {

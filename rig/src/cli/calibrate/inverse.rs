@@ -2,6 +2,7 @@
 //! over the whole range of moduli as elastic skin, then about what was found with penalty and retardation time
 //! free as well.
 
+use crate::say;
 use calibration::identify::skin::{IdentifiedSkin, identify_skin};
 use calibration::identify::{Identified, Search, identify};
 use calibration::phase::table::PhasePoint;
@@ -85,7 +86,7 @@ fn compute(
     grid: SkinGrid,
 ) -> miette::Result<PhaseCurves> {
     let runs = (amplitudes.len() * grid.len()) as u64;
-    eprintln!("{what}: running the ridge {runs} times ({} amplitudes)", amplitudes.len());
+    say!("{what}: running the ridge {runs} times ({} amplitudes)", amplitudes.len());
     let bar = ProgressBar::with_draw_target(Some(runs), ProgressDrawTarget::stderr());
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} gone, {eta} to go");
     bar.set_style(style.into_diagnostic()?);

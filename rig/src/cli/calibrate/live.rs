@@ -5,32 +5,24 @@
 //! What stands in this file is only the order of the set-points and the questions. The velocity is a voltage that a
 //! digitiser, an oscilloscope or a lock-in shows: its amplitude comes from the standard input, typed or from a program.
 
-use crate::session::RigClaim;
+mod drive;
+
+use crate::claim::RigClaim;
+use crate::session::Unfinished;
 use crate::setup::Setup;
-use crossbeam_queue::ArrayQueue;
-use drivers::Links;
-use miette::IntoDiagnostic;
-use models::prediction::SpringSlider;
+use crate::{ask, say};
+use drive::Drive;
+use drivers::vibrometer::Settings;
 use models::quantity::PeakToPeak;
-use realtime::cycle::{Command, Marker};
-use realtime::pacing::{self, Lifeline, LoopParts};
-use realtime::safety::{Request, Trip};
-use realtime::turn::{Ports, Row};
-use ringbuf::HeapRb;
-use ringbuf::traits::{Consumer, Split};
 use std::fmt::Write as _;
-use std::io::BufRead;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::io::{BufRead, Write as _};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::time::Duration;
 
 /// Largest amplitude of a decoder's output in V: full scale is taken as 20 V peak-to-peak.
 const FULL_SCALE_V: f64 = 10.0;
-/// Time to arm in s.
-const ARM_WITHIN_S: f64 = 10.0;
-/// Time to reach an amplitude in s: the loop limits its rate.
-const REACH_WITHIN_S: f64 = 10.0;
+/// How often a wait for an answer looks whether the operator has ended it otherwise.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// What is to be driven.
 pub struct Table<'a> {
@@ -69,18 +61,38 @@ pub fn displacement(volts: f64, range_m_s_per_v: f64, frequency_hz: f64) -> Resu
 pub fn table(setup: &Setup, table: &Table<'_>) -> miette::Result<String> {
     check(setup, table)?;
     let settings = setup.vibrometer_settings(table.frequency_hz)?;
-    eprintln!("vibrometer: {settings}");
+    say!("vibrometer: {settings}");
     let _claim = RigClaim::take(setup)?;
     let drive = Drive::start(setup)?;
+    let taken = take(table, &drive, &settings);
+    // Whatever became of the table: off first, and what is said of it was read back.
+    let off = drive.end();
+    let _ = writeln!(std::io::stderr(), "{}", off.words());
+    let text = match taken {
+        Ok(_) if !off.read_back => {
+            return Err(miette::miette!("{}", off.words()).wrap_err(Unfinished::NotOff));
+        }
+        Err(why) if !off.read_back => return Err(why.wrap_err(Unfinished::NotOff)),
+        taken => taken?,
+    };
+    let after = setup.vibrometer_settings(table.frequency_hz)?;
+    if after != settings {
+        miette::bail!("the vibrometer was set otherwise while the table was taken ({after} now): no table");
+    }
+    Ok(text)
+}
+
+/// The set-points and the questions.
+fn take(table: &Table<'_>, drive: &Drive, settings: &Settings) -> miette::Result<String> {
     drive.arm()?;
-    eprintln!(
+    say!(
         "The plate will vibrate at {:.1} Hz, up to {:.2} um peak-to-peak. Nothing may touch it. Each question wants the \
          amplitude of the velocity signal in V, zero to peak; an empty line asks again after another settling.",
         table.frequency_hz,
         table.set_points_pp_m.iter().fold(0.0f64, |a, b| a.max(*b)) * 1e6
     );
     let mut text = format!("# vibrometer: {settings}\nset_point_pp_m,velocity_v,amplitude_pp_m\n");
-    let mut lines = std::io::stdin().lock().lines();
+    let lines = lines_of_stdin()?;
     for pass in 0..table.passes {
         let mut order = table.set_points_pp_m.to_vec();
         if pass % 2 == 1 {
@@ -89,42 +101,52 @@ pub fn table(setup: &Setup, table: &Table<'_>) -> miette::Result<String> {
         for set_point in order {
             let amplitude = PeakToPeak::from_metres(set_point);
             let (volts, w) = loop {
-                if let Err(why) = drive.hold(amplitude, table) {
+                if let Err(why) = drive.hold(amplitude, table.frequency_hz, table.settle_s) {
                     // A trip stays until somebody at the rig takes it back.
-                    eprint!("  {why}; an empty line arms the rig again> ");
-                    answer(&mut lines)?;
+                    ask!("  {why}; an empty line arms the rig again> ");
+                    answer(&lines, drive)?;
                     drive.arm()?;
                     continue;
                 }
-                eprint!("set-point {set_point:.3e} m, volts> ");
-                let line = answer(&mut lines)?;
+                ask!("set-point {set_point:.3e} m, volts> ");
+                let line = answer(&lines, drive)?;
                 if !drive.holds(amplitude) {
-                    eprintln!("  no reading: the drive did not stand while it was taken; again");
+                    say!("  no reading: the drive did not stand while it was taken; again");
                     continue;
                 }
                 let volts = line.trim().parse().unwrap_or(f64::NAN);
                 match displacement(volts, settings.range_m_s_per_v, table.frequency_hz) {
                     Ok(w) => break (volts, w),
-                    Err(why) => eprintln!("  no reading: {why}"),
+                    Err(why) => say!("  no reading: {why}"),
                 }
             };
-            eprintln!("  {volts} V are {:.4} um peak-to-peak", w.micrometres());
+            say!("  {volts} V are {:.4} um peak-to-peak", w.micrometres());
             let _ = writeln!(text, "{set_point:e},{volts},{:e}", w.metres());
         }
-    }
-    drop(drive);
-    let after = setup.vibrometer_settings(table.frequency_hz)?;
-    if after != settings {
-        miette::bail!("the vibrometer was set otherwise while the table was taken ({after} now): no table");
     }
     Ok(text)
 }
 
+/// The lines of the standard input, read on a thread of their own: a wait for one can then be ended otherwise.
+fn lines_of_stdin() -> miette::Result<Receiver<std::io::Result<String>>> {
+    let (into, lines) = sync_channel(1);
+    let read = move || std::io::stdin().lock().lines().try_for_each(|line| into.send(line));
+    let spawned = std::thread::Builder::new().name("answers".into()).spawn(read);
+    spawned.map_err(|e| miette::miette!("no thread for the answers: {e}"))?;
+    Ok(lines)
+}
+
 /// What the operator, or the program in his place, says next.
-fn answer(lines: &mut impl Iterator<Item = std::io::Result<String>>) -> miette::Result<String> {
-    match lines.next() {
-        Some(line) => line.map_err(|e| miette::miette!("the terminal: {e}")),
-        None => miette::bail!("the input ended before the last set-point: no table, no certificate"),
+fn answer(lines: &Receiver<std::io::Result<String>>, drive: &Drive) -> miette::Result<String> {
+    loop {
+        drive.go_on()?;
+        match lines.recv_timeout(LOOK_EVERY) {
+            Ok(line) => return line.map_err(|e| miette::miette!("the terminal: {e}")),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => {
+                miette::bail!("the input ended before the last set-point: no table, no certificate")
+            }
+        }
     }
 }
 
@@ -151,162 +173,6 @@ fn check(setup: &Setup, table: &Table<'_>) -> miette::Result<()> {
         miette::bail!("--settle-s is between 0.05 and 60, --passes between 1 and 20");
     }
     Ok(())
-}
-
-/// What the loop said last.
-#[derive(Default)]
-struct Seen {
-    row: Option<Row>,
-    tripped: Option<Trip>,
-}
-
-/// The loop with the rig, driven to one amplitude after another; dropping it stops the drive.
-struct Drive {
-    commands: Arc<ArrayQueue<Command>>,
-    life: Arc<Lifeline>,
-    seen: Arc<Mutex<Seen>>,
-    ended: Arc<AtomicBool>,
-    threads: Vec<JoinHandle<()>>,
-    links: Option<Links>,
-}
-
-impl Drive {
-    fn start(setup: &Setup) -> miette::Result<Drive> {
-        let epoch = Instant::now();
-        let origin_ns = pacing::monotonic_ns();
-        let rig = drivers::open(&setup.instruments(), epoch).map_err(|e| miette::miette!("{e}"))?;
-        let model = SpringSlider::new(setup.tip.finger).map_err(|e| miette::miette!("{e}"))?;
-        let commands = Arc::new(ArrayQueue::new(64));
-        let life = Arc::new(Lifeline::default());
-        // Nobody records here: a ring of one is full at once, and what is lost is not missed.
-        let (rows, _) = HeapRb::<Row>::new(1).split();
-        let (watch, mut watched) = HeapRb::<Row>::new(8192).split();
-        let parts = LoopParts {
-            config: setup.config,
-            model: Arc::new(model),
-            // The raw set-point is what is calibrated: a certificate of the setup is not applied.
-            ports: Ports { force: rig.force, amplifier: rig.amplifier, stage: rig.stage },
-            commands: Arc::clone(&commands),
-            rows,
-            watch,
-            life: Arc::clone(&life),
-            origin_ns,
-        };
-        let priority = (setup.file.pace.priority > 0).then_some(setup.file.pace.priority);
-        let looping = std::thread::Builder::new().name("loop".into()).spawn(move || {
-            pacing::run(parts, priority);
-        });
-        let interrupted = Arc::new(AtomicBool::new(false));
-        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-            signal_hook::flag::register(signal, Arc::clone(&interrupted)).into_diagnostic()?;
-        }
-        let seen = Arc::new(Mutex::new(Seen::default()));
-        let ended = Arc::new(AtomicBool::new(false));
-        let (note, done, queue) = (Arc::clone(&seen), Arc::clone(&ended), Arc::clone(&commands));
-        let watching = std::thread::Builder::new().name("watch".into()).spawn(move || {
-            while !done.load(Ordering::Acquire) {
-                let mut news = false;
-                while let Some(row) = watched.try_pop() {
-                    let mut seen = note.lock().unwrap_or_else(PoisonError::into_inner);
-                    seen.tripped = row.tripped.or(seen.tripped);
-                    seen.row = Some(row);
-                    news = true;
-                }
-                if interrupted.load(Ordering::Relaxed) {
-                    // The main thread waits for a line: the stop goes out from here, and the program ends.
-                    let _ = queue.force_push(Command::Stop);
-                    std::thread::sleep(Duration::from_millis(200));
-                    eprintln!("stopped: the drive is off");
-                    std::process::exit(1);
-                }
-                if !news {
-                    std::thread::sleep(Duration::from_millis(1));
-                }
-            }
-        });
-        let threads = vec![looping.into_diagnostic()?, watching.into_diagnostic()?];
-        Ok(Drive { commands, life, seen, ended, threads, links: Some(rig.links) })
-    }
-
-    fn row(&self) -> Option<Row> {
-        self.seen.lock().unwrap_or_else(PoisonError::into_inner).row
-    }
-
-    fn send(&self, command: Command) {
-        let _ = self.commands.force_push(command);
-    }
-
-    fn until(&self, seconds: f64, so: impl Fn(&Row) -> bool) -> bool {
-        let began = Instant::now();
-        while began.elapsed().as_secs_f64() < seconds {
-            if self.row().is_some_and(|row| so(&row)) {
-                return true;
-            }
-            std::thread::sleep(Duration::from_millis(2));
-        }
-        false
-    }
-
-    /// Arms the rig, with nothing driven: once at the beginning, and after a trip when the operator says so.
-    fn arm(&self) -> miette::Result<()> {
-        let began = Instant::now();
-        while !self.row().is_some_and(|row| row.armed) {
-            if began.elapsed().as_secs_f64() > ARM_WITHIN_S {
-                let blocking = self.row().and_then(|row| row.blocking);
-                miette::bail!("the rig does not arm within {ARM_WITHIN_S} s: {blocking:?}");
-            }
-            self.send(Command::Set(Request::default(), Marker::default()));
-            self.send(Command::Reset);
-            std::thread::sleep(Duration::from_millis(60));
-        }
-        self.seen.lock().unwrap_or_else(PoisonError::into_inner).tripped = None;
-        Ok(())
-    }
-
-    /// Brings the plate to an amplitude and lets it settle.
-    fn hold(&self, amplitude: PeakToPeak, table: &Table<'_>) -> Result<(), String> {
-        let request = Request { amplitude, frequency_hz: table.frequency_hz, ..Request::default() };
-        self.send(Command::Set(request, Marker::default()));
-        let stands =
-            self.until(REACH_WITHIN_S, |row| !row.armed || reached(row, amplitude)) && self.holds(amplitude);
-        if stands {
-            std::thread::sleep(Duration::from_secs_f64(table.settle_s));
-            if self.holds(amplitude) {
-                return Ok(());
-            }
-        }
-        self.send(Command::Set(Request::default(), Marker::default()));
-        let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        let why = seen.tripped.map(|trip| trip.cause).or(seen.row.and_then(|row| row.blocking));
-        Err(match why {
-            Some(cause) => format!("the rig has tripped ({cause:?})"),
-            None => format!("{:.3} um are not reached in {REACH_WITHIN_S} s", amplitude.micrometres()),
-        })
-    }
-
-    /// Whether the drive has stood at an amplitude since it was reached.
-    fn holds(&self, amplitude: PeakToPeak) -> bool {
-        let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        seen.tripped.is_none() && seen.row.is_some_and(|row| row.armed && reached(&row, amplitude))
-    }
-}
-
-fn reached(row: &Row, amplitude: PeakToPeak) -> bool {
-    (row.drive_pp_m - amplitude.metres()).abs() <= 1e-3 * amplitude.metres()
-}
-
-impl Drop for Drive {
-    fn drop(&mut self) {
-        self.send(Command::Stop);
-        // A few cycles carry the stop to the amplifier.
-        std::thread::sleep(Duration::from_millis(100));
-        self.life.end.store(true, Ordering::Relaxed);
-        self.ended.store(true, Ordering::Release);
-        for thread in self.threads.drain(..) {
-            let _ = thread.join();
-        }
-        drop(self.links.take());
-    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::Common;
 use super::tables::{Sources, columns};
+use crate::say;
 use crate::setup::Setup;
 use calibration::amplitude::vibrometer::{Decoder, sine};
 use calibration::phase::{
@@ -65,7 +66,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         None => None,
         Some(name) => {
             let settings = Setup::load(name)?.vibrometer_settings(args.frequency_hz)?;
-            eprintln!("vibrometer: {settings}");
+            say!("vibrometer: {settings}");
             Some(settings)
         }
     };
@@ -124,8 +125,8 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     }
     let mut table = Vec::new();
     write_phases(&mut table, &points).map_err(|e| miette::miette!("{e}"))?;
-    std::fs::write(&args.phases, &table).map_err(|e| miette::miette!("{}: {e}", args.phases.display()))?;
-    eprintln!("{} amplitudes: {}", points.len(), args.phases.display());
+    crate::files::write_whole(&args.phases, &table)?;
+    say!("{} amplitudes: {}", points.len(), args.phases.display());
     let acquisition = Acquisition {
         frequency_hz: args.frequency_hz,
         delay_sd_s: args.delay_sd_s,

@@ -22,7 +22,7 @@ impl Sources {
         if size > MAX_BYTES {
             miette::bail!("{shown}: {size} bytes; a data file has at most {MAX_BYTES}");
         }
-        let bytes = std::fs::read(path).map_err(|e| miette::miette!("{shown}: {e}"))?;
+        let bytes = crate::input::bytes_of(path, crate::input::MAX_TABLE_BYTES)?;
         self.add(&shown.to_string(), &bytes);
         Ok(bytes)
     }

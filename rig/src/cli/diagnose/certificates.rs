@@ -1,14 +1,16 @@
 //! What a verdict says of the certificates that stand beside the table in rig.toml.
 
-use diagnosis::data::Rig;
+use diagnosis::Verdict;
 use diagnosis::pulls::Pull;
+use diagnosis::verdict::Diagnosis;
+use models::rig_file::RigFile;
 use serde::Serialize;
-use std::path::Path;
 
 /// A certificate that speaks for an instrument which is blamed nevertheless.
 #[derive(Debug, Serialize)]
 pub struct AtFault {
-    effect: String,
+    effect: &'static str,
+    quantity: &'static str,
     certificate: String,
     stated_sd: f64,
 }
@@ -17,32 +19,26 @@ impl AtFault {
     /// For a terminal.
     pub fn text(&self) -> String {
         format!(
-            "The {} leaves a standard uncertainty of {:.2e} for {}, and the data want it beyond: it is at fault, or \
-             something changed since. Calibrate again.",
-            self.certificate, self.stated_sd, self.effect
+            "The {} leaves a standard uncertainty of {:.2e} for the {}, and the data want it beyond ({}): it is at \
+             fault, or something changed since. Calibrate again.",
+            self.certificate, self.stated_sd, self.quantity, self.effect
         )
     }
 }
 
-/// The certificates at fault: an effect that leads the verdict although one bounds it.
-pub fn at_fault(rig: &Rig, path: &Path, report: &serde_json::Value) -> Vec<AtFault> {
-    if !matches!(report["verdict"].as_str(), Some("named" | "ambiguous")) {
+/// The certificates at fault: a law that leads the verdict although a certificate bounds it.
+pub fn at_fault(result: &Diagnosis, rig: &RigFile) -> Vec<AtFault> {
+    if !matches!(result.decision.verdict, Verdict::Named | Verdict::Ambiguous) {
         return Vec::new();
     }
-    let effects = report["hypotheses"][0]["effects"].as_array().cloned().unwrap_or_default();
-    effects
-        .iter()
-        .filter_map(|e| e.as_str())
-        .filter_map(|effect| {
-            let stated_sd = rig.certified_sd(effect, 0)?;
-            let kind = if effect == "amplitude_miscalibration" { "amplitude" } else { "force" };
-            let certificate = match file(path, kind) {
-                Some(name) => format!("{kind} certificate ({name})"),
-                None => format!("{kind} certificate"),
-            };
-            Some(AtFault { effect: effect.into(), certificate, stated_sd })
-        })
-        .collect()
+    let leader = &result.fitted.candidates[result.decision.class[0]].best;
+    let blamed = leader.members.iter().filter_map(|member| {
+        let key = member.form().certified_by?;
+        let stated_sd = rig.calibration.sd(key)?;
+        let certificate = rig.calibration.certificate_of(key);
+        Some(AtFault { effect: member.name(), quantity: key.words(), certificate, stated_sd })
+    });
+    blamed.collect()
 }
 
 /// A certificate whose error a stiffness would have taken up, where a stiffness was pulled off its calibration.
@@ -70,27 +66,19 @@ impl InDoubt {
 
 /// The certificates that rig.toml names and that a remarkable pull puts in doubt. They are not blamed: the finger's own
 /// calibration may be the wrong one.
-pub fn in_doubt(path: &Path, pulls: &[Pull]) -> Vec<InDoubt> {
+pub fn in_doubt(rig: &RigFile, pulls: &[Pull]) -> Vec<InDoubt> {
     let mut doubts = Vec::new();
     for pull in pulls.iter().filter(|p| p.remarkable()) {
-        for &imitates in pull.imitated_by {
-            let kind = match imitates {
-                "amplitude_miscalibration" => "amplitude",
-                "normal_gain" | "lateral_gain" => "force",
-                _ => continue,
-            };
-            let (Some(name), Some(pull_sd)) = (file(path, kind), pull.pull_sd) else { continue };
-            let certificate = format!("{kind} certificate ({name})");
-            doubts.push(InDoubt { certificate, quantity: pull.quantity, pull_sd, imitates });
+        for &imitates in &pull.imitated_by {
+            let laws = effects::by_name(imitates).map_or(&[][..], |e| e.laws());
+            let Some(key) = laws.iter().find_map(|l| l.acts_as.and(l.certified_by)) else { continue };
+            // Only a certificate that is there can be in doubt.
+            let named = key.kind().is_some_and(|kind| rig.calibration.certificates.contains_key(&kind));
+            if let (true, Some(pull_sd)) = (named, pull.pull_sd) {
+                let certificate = rig.calibration.certificate_of(key);
+                doubts.push(InDoubt { certificate, quantity: pull.quantity, pull_sd, imitates });
+            }
         }
     }
     doubts
-}
-
-/// File name of the certificate of a kind, as rig.toml states it.
-fn file(path: &Path, kind: &str) -> Option<String> {
-    let text = std::fs::read_to_string(path).ok()?;
-    let stated: toml::Table = toml::from_str(&text).ok()?;
-    let name = stated.get("calibration")?.get("certificates")?.get(kind)?.as_str()?;
-    Some(name.to_string())
 }

@@ -2,6 +2,7 @@
 
 use super::conditions::ConditionArgs;
 use super::refused;
+use crate::{out, say};
 use clap::Args;
 use miette::IntoDiagnostic;
 use models::inverse;
@@ -46,13 +47,13 @@ pub fn run(args: &AmplitudeForArgs, json: bool) -> miette::Result<ExitCode> {
     let answer = match inverse::amplitude_for(&law, &condition, wanted, largest) {
         Ok(answer) => answer,
         Err(why @ inverse::NoAmplitude::OutOfReach { .. }) => {
-            eprintln!("{why}");
+            say!("{why}");
             return Ok(ExitCode::from(1));
         }
         Err(why) => return refused(why),
     };
     if json {
-        println!(
+        out!(
             "{}",
             serde_json::json!({
                 "amplitude_pp_m": answer.amplitude.metres(),
@@ -65,7 +66,7 @@ pub fn run(args: &AmplitudeForArgs, json: bool) -> miette::Result<ExitCode> {
             })
         );
     } else {
-        println!(
+        out!(
             "{} for mu' = {wanted:.4} (lateral force {:.5} N){}; drive power {:.2} times that of 1 um; {}",
             answer.amplitude,
             answer.prediction.lateral_force_n,

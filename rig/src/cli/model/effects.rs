@@ -1,5 +1,6 @@
 //! `muprime model effects`: the library of candidate effects.
 
+use crate::out;
 use clap::Args;
 use miette::IntoDiagnostic;
 use std::process::ExitCode;
@@ -25,23 +26,23 @@ pub fn run(args: &EffectsArgs, json: bool) -> miette::Result<ExitCode> {
         entries.retain(|e| e.name == name);
     }
     if json {
-        println!("{}", serde_json::to_string(&entries).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&entries).into_diagnostic()?);
         return Ok(ExitCode::SUCCESS);
     }
     for entry in entries {
-        println!("{} ({})", entry.name, word(&entry.place)?);
-        println!("  {}", entry.summary);
-        println!("  source: {}", entry.source);
+        out!("{} ({})", entry.name, word(&entry.place)?);
+        out!("  {}", entry.summary);
+        out!("  source: {}", entry.source);
         let needs: Vec<_> = entry.needs.iter().map(word).collect::<miette::Result<_>>()?;
         if !needs.is_empty() {
-            println!("  needs: {}", needs.join(", "));
+            out!("  needs: {}", needs.join(", "));
         }
         for law in entry.laws {
-            println!("  law: {}", law.name);
+            out!("  law: {}", law.name);
             for p in law.parameters {
                 let zero = p.zero.map_or_else(|| "none (a shape)".into(), |z| z.to_string());
                 let (unit, prior) = (p.unit, serde_json::to_string(&p.prior).into_diagnostic()?);
-                println!("    {} [{unit}]: zero {zero}, prior {prior}, {} to {}", p.name, p.lower, p.upper);
+                out!("    {} [{unit}]: zero {zero}, prior {prior}, {} to {}", p.name, p.lower, p.upper);
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use super::conditions::ConditionArgs;
 use super::refused;
+use crate::out;
 use clap::{Args, ValueEnum};
 use miette::IntoDiagnostic;
 use models::finger::Finger;
@@ -125,9 +126,9 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
         answer.touch_down_deg = None;
     }
     if json {
-        println!("{}", serde_json::to_string(&answer).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&answer).into_diagnostic()?);
     } else {
-        println!(
+        out!(
             "{}: mu' = {:.4} +- {:.4}, lateral force {:.5} N, contact {:.1} % of the time, phase shift {:.1} deg",
             answer.model,
             answer.mu_relative,

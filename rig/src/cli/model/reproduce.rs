@@ -1,7 +1,8 @@
 //! `muprime model reproduce`: the paper's figures.
 
-use super::plot::Chart;
-use super::{figures, refused, store};
+use super::refused;
+use crate::figures::{self, store};
+use crate::out;
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, WrapErr};
 use models::ridge::study::{content_key, fig_9};
@@ -52,14 +53,6 @@ pub struct ReproduceArgs {
     elements: usize,
 }
 
-/// What a figure gives: its charts, and how it compares with the paper.
-pub struct Reproduced {
-    /// Charts to write.
-    pub charts: Vec<Chart>,
-    /// Lines of comparison.
-    pub lines: Vec<String>,
-}
-
 /// Recomputes the figure or all of them.
 pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
     if let Err(why) = (RidgeCase { elements: args.elements, ..RidgeCase::paper() }).check() {
@@ -93,15 +86,12 @@ pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
             chart.write(&args.out)?;
         }
         let text = reproduced.lines.join("\n");
-        std::fs::write(args.out.join(format!("{name}.txt")), format!("{text}\n")).into_diagnostic()?;
+        crate::files::write_whole(&args.out.join(format!("{name}.txt")), format!("{text}\n"))?;
         if json {
             let files: Vec<String> = reproduced.charts.iter().map(|c| format!("{}.csv", c.name)).collect();
-            println!(
-                "{}",
-                serde_json::json!({"figure": name, "files": files, "comparison": reproduced.lines})
-            );
+            out!("{}", serde_json::json!({"figure": name, "files": files, "comparison": reproduced.lines}));
         } else {
-            println!("{name}\n  {}", text.replace('\n', "\n  "));
+            out!("{name}\n  {}", text.replace('\n', "\n  "));
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -135,7 +125,7 @@ pub fn write_fig_9_table(file: &Path, base: RidgeCase, results: &store::Results)
     .into_diagnostic()?;
     for point in fig_9(base) {
         let c = &point.case;
-        let key = content_key(c, &super::table::settings());
+        let key = content_key(c, &figures::settings());
         let Some(kept) = results.get(&key) else { continue };
         let psi = c.speed_m_s / (c.amplitude.metres() * c.frequency_hz * c.mu0 * (1.0 + c.poisson_ratio));
         csv.write_record([

@@ -2,6 +2,7 @@
 
 use super::conditions::ConditionArgs;
 use super::refused;
+use crate::{out, say};
 use clap::{Args, ValueEnum};
 use miette::IntoDiagnostic;
 use models::ridge::{
@@ -98,7 +99,7 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
     let run = match ridge::run(&case, &settings) {
         Ok(run) => run,
         Err(why @ RidgeError::Diverged) => {
-            eprintln!("{why}");
+            say!("{why}");
             return Ok(ExitCode::from(1));
         }
         Err(why) => return refused(why),
@@ -108,27 +109,30 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
     let answer =
         Answer { run: &run, wall_seconds, element_updates_per_second: updates / wall_seconds, case: &case };
     if json {
-        println!("{}", serde_json::to_string(&answer).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&answer).into_diagnostic()?);
         return Ok(ExitCode::SUCCESS);
     }
-    println!(
+    out!(
         "mu' = {:.4} +- {:.4}   (exponential with 2.38: {:.4})",
         run.mu_relative,
         run.mu_relative_sd,
         models::psi::relative_friction(models::psi::PsiEq17(run.psi_eq17), models::psi::PSI_STAR)
     );
-    println!(
+    out!(
         "lateral force {:.5} N, mean reaction {:.5} N for {} N applied, greatest {:.4} N",
-        run.lateral_force_n, run.mean_reaction_force_n, case.normal_force_n, run.peak_reaction_force_n
+        run.lateral_force_n,
+        run.mean_reaction_force_n,
+        case.normal_force_n,
+        run.peak_reaction_force_n
     );
-    println!(
+    out!(
         "contact {:.1} % of the time, phase shift {}, {}{}",
         100.0 * run.contact_fraction,
         run.phase_shift_deg.map_or("none".into(), |p| format!("{p:.1} deg")),
         if run.steady { "steady" } else { "NOT steady" },
         if run.period_doubled { ", period doubled" } else { "" }
     );
-    println!(
+    out!(
         "{} elements, {} cycles ({} averaged), {} steps of {:.2e} s, {:.2} s, {:.0} million element updates/s",
         run.elements,
         run.cycles,

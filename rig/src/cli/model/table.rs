@@ -1,11 +1,13 @@
 //! `muprime model table`: the study of Fig. 9, or the surrogate's table.
 
-use super::store::{self, Kept};
 use super::{refused, reproduce};
+use crate::figures::fig_9_results;
+use crate::figures::store::{self, Kept};
+use crate::{out, say};
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr};
 use models::ridge::study::{content_key, fig_9};
-use models::ridge::{RidgeCase, RunSettings, case};
+use models::ridge::{RidgeCase, case};
 use models::surrogate::{Grid, GridPoint, InterpolationError, Surrogate, TableResult};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -50,26 +52,14 @@ pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
     })?;
     let seconds = start.elapsed().as_secs_f64();
     if json {
-        println!(
+        out!(
             "{}",
             serde_json::json!({"file": file, "cases": cases, "failed": failed, "wall_seconds": seconds})
         );
     } else {
-        println!("{}: {cases} cases, {failed} failed, {seconds:.1} s", file.display());
+        out!("{}: {cases} cases, {failed} failed, {seconds:.1} s", file.display());
     }
     Ok(ExitCode::from(u8::from(failed > 0)))
-}
-
-/// Results of the study of Fig. 9, running what is missing in `out`.
-pub fn fig_9_results(out: &Path, elements: usize) -> miette::Result<(store::Results, usize)> {
-    let base = RidgeCase { elements, ..RidgeCase::paper() };
-    let cases = fig_9(base).into_iter().map(|p| p.case);
-    store::complete(&out.join("ridge.jsonl"), cases, &settings())
-}
-
-/// How the figures' cases are run.
-pub fn settings() -> RunSettings {
-    RunSettings { energy: false, ..RunSettings::default() }
 }
 
 fn fig_9_study(out: &Path, elements: usize) -> miette::Result<(PathBuf, usize, usize)> {
@@ -93,12 +83,13 @@ fn surrogate(out: &Path) -> miette::Result<(PathBuf, usize, usize)> {
     let error = Surrogate::from_text(&bare).into_diagnostic()?.measure_error(judged);
     let file = out.join("ridge_table.txt");
     let text = Surrogate::table_text(&grid, result, error).into_diagnostic()?;
-    std::fs::write(&file, text)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot write {}", file.display()))?;
-    eprintln!(
+    crate::files::write_whole(&file, text)?;
+    say!(
         "interpolation error on {} held-out cases: mu' rms {:.4}, worst {:.4}; phase rms {:.1} deg",
-        error.cases, error.mu_rms, error.mu_max, error.phase_rms_deg
+        error.cases,
+        error.mu_rms,
+        error.mu_max,
+        error.phase_rms_deg
     );
     Ok((file, points.len() + held_out.len(), failed))
 }

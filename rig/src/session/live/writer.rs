@@ -1,5 +1,6 @@
 //! The record's thread: drains the ring, writes, flushes, syncs.
 
+use crate::files::Placed;
 use crate::sequence::{Event, MeasuredPass};
 use crate::session::keeper;
 use miette::IntoDiagnostic;
@@ -31,10 +32,10 @@ pub(super) struct Written {
     pub problem: Option<String>,
 }
 
-/// Writes until the last words come. A file that cannot be written raises `lost`, and the rest is counted: the rows go
-/// on being drained, so that the loop never notices.
+/// Writes until the last words come. A file that cannot be written, or that was removed, raises `lost`, and the rest is counted:
+/// the rows go on being drained, so that the loop never notices. It ends with the last words, whatever becomes of the file.
 pub(super) fn write(
-    file: std::fs::File,
+    file: Placed,
     preamble: Preamble,
     mut rows: impl Consumer<Item = Row>,
     entries: &Receiver<Entry>,
@@ -42,15 +43,14 @@ pub(super) fn write(
     lost: &AtomicBool,
 ) -> Written {
     let mut written = Written::default();
-    if let Err(problem) = record(file, preamble, &mut rows, entries, last) {
+    let mut ended = false;
+    if let Err(problem) = record(file, preamble, &mut rows, entries, last, &mut ended) {
         lost.store(true, Ordering::Relaxed);
         written.problem = Some(format!("{problem:#}"));
-        loop {
+        // The last words come once: where they have, none are waited for.
+        while !ended {
             written.lost_rows += rows.pop_iter().count() as u64;
-            match last.recv_timeout(Duration::from_millis(20)) {
-                Err(RecvTimeoutError::Timeout) => {}
-                Ok(_) | Err(RecvTimeoutError::Disconnected) => break,
-            }
+            ended = !matches!(last.recv_timeout(Duration::from_millis(20)), Err(RecvTimeoutError::Timeout));
         }
         written.lost_rows += rows.pop_iter().count() as u64;
     }
@@ -58,13 +58,14 @@ pub(super) fn write(
 }
 
 fn record(
-    file: std::fs::File,
+    file: Placed,
     preamble: Preamble,
     rows: &mut impl Consumer<Item = Row>,
     entries: &Receiver<Entry>,
     last: &Receiver<Last>,
+    ended: &mut bool,
 ) -> miette::Result<()> {
-    let disk = file.try_clone().into_diagnostic()?;
+    let disk = file.handle()?;
     let mut recorder = Recorder::begin(file, preamble).into_diagnostic()?;
     let (mut flushed, mut synced) = (Instant::now(), Instant::now());
     let last = loop {
@@ -82,7 +83,7 @@ fn record(
             flushed = Instant::now();
         }
         if synced.elapsed() >= SYNC_EVERY {
-            disk.sync_data().into_diagnostic()?;
+            disk.sync()?;
             synced = Instant::now();
         }
         if idle {
@@ -93,9 +94,40 @@ fn record(
             }
         }
     };
+    *ended = true;
     while let Some(row) = rows.try_pop() {
         recorder.row(&row).into_diagnostic()?;
     }
     recorder.end(last).into_diagnostic()?;
-    disk.sync_all().into_diagnostic()
+    disk.sync()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ringbuf::traits::Split;
+    use std::sync::mpsc::channel;
+
+    /// A record that takes everything and cannot be ended: its index is made from what is read back, and it cannot be read.
+    #[test]
+    fn a_record_that_cannot_be_ended_is_said_and_nobody_waits_for_ever() {
+        let path = std::env::temp_dir().join(format!("muprime-writer-{}.mcap", std::process::id()));
+        let file =
+            Placed::open(&path, std::fs::OpenOptions::new().create(true).write(true).truncate(true)).unwrap();
+        let (_rows_in, rows) = ringbuf::HeapRb::<Row>::new(8).split();
+        let (_entries_in, entries) = channel::<Entry>();
+        let (last_in, last) = channel::<Last>();
+        let (done_in, done) = channel();
+        std::thread::spawn(move || {
+            let lost = AtomicBool::new(false);
+            let written = write(file, Preamble::default(), rows, &entries, &last, &lost);
+            let _ = done_in.send((written.problem, lost.into_inner()));
+        });
+        // Kept until the writer is done, as the sweep's thread does.
+        last_in.send(Last::new()).unwrap();
+        let (problem, lost) = done.recv_timeout(Duration::from_secs(20)).expect("the writer ends");
+        assert!(lost && problem.is_some());
+        drop(last_in);
+        std::fs::remove_file(path).unwrap();
+    }
 }

@@ -1,0 +1,275 @@
+//! Every tunable constant of the diagnosis: name, value, meaning and source.
+//!
+//! A diagnosis takes its constants from [`Constants`]; the defaults are those of every verdict. A study may set one apart
+//! ([`Constants::set`], `muprime blind --constant NAME=VALUE`) or scale it ([`Constants::scale`], `--sensitivity`). The
+//! table of docs/diagnosis/constants.md is [`markdown`], held equal by a test.
+//!
+//! What a source says: a reference to the literature; `contract` where docs/contract.md defines it; `numerical` where it
+//! is an accuracy or an effort; `development` where it was set on development sets, with what they showed; `judgement`
+//! where it was chosen without a measurement and the sensitivity table is all there is.
+
+mod value;
+
+pub use value::Value;
+
+/// The stage of a diagnosis at which a constant enters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// The fits and evidences of all hypotheses, and all that follows.
+    Fit,
+    /// The verdict rule, from finished fits.
+    Decision,
+    /// What is reported beside the verdict.
+    Report,
+}
+
+/// One constant as the table shows it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Name.
+    pub name: &'static str,
+    /// Stage at which it enters.
+    pub stage: Stage,
+    /// Value or values.
+    pub values: Vec<f64>,
+    /// Meaning, with its unit.
+    pub meaning: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+}
+
+/// A constant that a study asks for and that is none, or a value that it cannot have.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ConstantError {
+    /// No such name.
+    #[error("no constant is named '{0}'; docs/diagnosis/constants.md lists them")]
+    Name(String),
+    /// Not as many numbers as the constant has, or text that is none.
+    #[error("constant '{name}' takes {needed} number(s), separated by commas")]
+    Value {
+        /// Name.
+        name: String,
+        /// How many numbers it has.
+        needed: usize,
+    },
+}
+
+macro_rules! constants {
+    ($($stage:ident { $($name:ident: $kind:ty = $value:expr, $meaning:literal, $source:expr;)* })*) => {
+        /// The constants; [`rows`](Constants::rows) says what each means.
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct Constants {
+            $($(#[doc = $meaning] pub $name: $kind,)*)*
+        }
+
+        impl Default for Constants {
+            fn default() -> Self {
+                Constants { $($($name: $value,)*)* }
+            }
+        }
+
+        impl Constants {
+            /// Every constant with its present value.
+            pub fn rows(&self) -> Vec<Row> {
+                vec![$($(Row {
+                    name: stringify!($name),
+                    stage: Stage::$stage,
+                    values: self.$name.numbers(),
+                    meaning: $meaning,
+                    source: $source,
+                },)*)*]
+            }
+
+            fn replace(&mut self, name: &str, numbers: &mut dyn Iterator<Item = f64>) -> Option<bool> {
+                match name {
+                    $($(stringify!($name) => Some(match Value::from_numbers(numbers) {
+                        Some(value) => {
+                            self.$name = value;
+                            true
+                        }
+                        None => false,
+                    }),)*)*
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+/// A covariate that a kernel does not see.
+const FAR: f64 = f64::INFINITY;
+/// Sources that several constants share.
+const JUDGEMENT: &str = "judgement: chosen without a measurement";
+const NUMERICAL: &str = "numerical: effort of a search";
+const CONTRACT: &str = "contract";
+const MIMICS: &str = "development: 243 single causes of the simulation under other formulae, 101 pairs, 127 causes outside \
+    of the library";
+
+constants! {
+    Fit {
+    prior_null: f64 = 0.5, "Prior probability of no gap.", "a gap is as likely as none (indifference)";
+    prior_single: f64 = 0.36, "Prior probability of one cause of the library, shared evenly by the testable ones.", JUDGEMENT;
+    prior_pair: f64 = 0.07, "Prior probability of two causes, shared evenly by their pairs.", JUDGEMENT;
+    prior_open: f64 = 0.07, "Prior probability of the open set.", JUDGEMENT;
+    unlisted_share: f64 = 0.1, "Share of the open set's weight for causes of known form that the library does not name.", JUDGEMENT;
+    lapse_probability: f64 = 0.02, "Probability that a certificate no longer holds when a table is taken.", "judgement: one certificate in fifty is outdated by a knock or a change";
+    mu0_log_sd: [f64; 2] = [0.3, 0.8], "Prior deviation of ln mu0, with passes at w = 0 and without.", "judgement: wide against the 1 % to which such passes give mu0";
+    stiffness_sd_floor: f64 = 1e-3, "Least prior deviation of ln stiffness, whatever rig.toml states.", "numerical: keeps the prior proper";
+
+    stated_freedom: f64 = 40.0, "Degrees of freedom that the repeatability stated in rig.toml counts for.", "judgement: a statement is worth some forty replicates (scaled inverse chi2 prior, Gelman et al. 2013, sec. 2.6)";
+    variance_factor_bounds: [f64; 2] = [0.8, 3.0], "Bounds of the factor that replicates put on the stated variance.", JUDGEMENT;
+    outlier_sd: f64 = 3.5, "Residual from the smooth surface, in deviations, from which a pass is an outlier.", "Iglewicz & Hoaglin 1993 (modified z-score of 3.5)";
+    outlier_share: f64 = 0.02, "Share of passes above which they are a gap and no outliers.", JUDGEMENT;
+    outlier_reach: f64 = 2.0, "Deviations at which an outlier counts after its variance is raised.", JUDGEMENT;
+
+    form_shares: [f64; 3] = [0.05, 0.15, 0.35], "Standard deviation of a cause's departure from its form, as a share of its net change.", "development: true causes under another formula left 13 to 49 % of their gap";
+    form_weights: [f64; 3] = [0.4, 0.4, 0.2], "Prior weights of those shares.", JUDGEMENT;
+    form_length: f64 = 1.5, "Correlation length of the departure, in standard deviations of each covariate and of time.", JUDGEMENT;
+    form_rank: usize = 40, "Most pivots of the departure's kernel.", "numerical: incomplete Cholesky (Fine & Scheinberg 2001)";
+    kernel_rest: f64 = 0.02, "Share of variance that a kernel's pivots may leave at a pass.", "numerical: incomplete Cholesky";
+
+    discrepancy_lengths: [f64; 6] = [1.2, 1.5, 2.5, 4.0, 2.5, 4.0], "Correlation lengths of the open set over conditions, in standard deviations of each covariate.", JUDGEMENT;
+    discrepancy_time_lengths: [f64; 6] = [0.8, 1.5, 2.5, 4.0, 2.5, 4.0], "The same over time.", JUDGEMENT;
+    discrepancy_position_lengths: [f64; 6] = [0.8, FAR, FAR, 0.3, FAR, FAR], "The same along the plate; infinite leaves the position out.", JUDGEMENT;
+    discrepancy_climate_lengths: [f64; 6] = [FAR, FAR, FAR, FAR, 1.2, 0.7], "The same over temperature and humidity; tried only where these change by themselves.", JUDGEMENT;
+    discrepancy_rank: usize = 56, "Most pivots of the open set's kernel.", "numerical: incomplete Cholesky";
+    discrepancy_even: [f64; 6] = [0.0, 0.015, 0.05, 0.15, 0.45, 1.3], "Scales of the open set's part that turns with the direction, in units of friction.", "judgement: a factor of three from the noise to more than all friction";
+    discrepancy_odd: [f64; 4] = [0.0, 0.012, 0.06, 0.4], "Scales of its part that does not turn with the direction.", "judgement: as above";
+    discrepancy_white: [f64; 4] = [0.0, 0.02, 0.08, 0.3], "Scales of its white excess.", "judgement: as above";
+
+    start_share: f64 = 0.15, "Share of the smooth gap below which starts of a search do not look.", NUMERICAL;
+    driven_sd: f64 = 3.0, "Deviations of its prior beyond which a nuisance is taken to imitate a cause; searches then start at the calibration too.", NUMERICAL;
+    prune_nats: f64 = 15.0, "Nats behind the best law from which a law keeps the middle form share only.", NUMERICAL;
+    hopeless: [f64; 2] = [1.5, 60.0], "Factor on the best tempered cost, and offset in chi2, beyond which a law is not refined.", NUMERICAL;
+    pairs_from_nats: f64 = 3.0, "Nats by which the best single cause must beat no gap before pairs are tried.", NUMERICAL;
+    misfit_sd: f64 = 2.5, "Deviations of chi2 above its mean from which the best single cause is taken to leave something.", NUMERICAL;
+    pair_seeds: usize = 6, "Single causes from which pairs are grown.", NUMERICAL;
+    pairs_fitted: usize = 20, "Pairs that are fitted in full.", NUMERICAL;
+    pairs_searched: usize = 4, "Pairs that are sought again in each two laws.", NUMERICAL;
+    laws_refined: usize = 16, "Laws of those pairs that are followed.", NUMERICAL;
+    one_change_cosine: f64 = 0.98, "Cosine between two changes above which they are one.", JUDGEMENT;
+
+    }
+    Decision {
+    region_cuts: [f64; 2] = [0.28, 0.72], "Quantiles that bound the lower and upper region of a covariate.", "judgement: a little more than a quarter each, so that two levels of four are not parted";
+    region_least: usize = 6, "Fewest passes of a region.", JUDGEMENT;
+    region_most: f64 = 0.6, "Largest share of the passes in the end of a covariate.", JUDGEMENT;
+    region_most_level: f64 = 0.8, "Largest share of the passes at one frequency, or at low pressure.", JUDGEMENT;
+    late_share: f64 = 0.25, "Share of the passes that the late region holds.", JUDGEMENT;
+    low_pressure: f64 = 0.8, "Share of the largest pressure below which a pass is at low pressure.", JUDGEMENT;
+    informed_share: f64 = 0.1, "Share of the gap, and of each cause's own change, that the rest must hold for a region to count in full.", JUDGEMENT;
+    uninformed_weight: f64 = 0.5, "Weight of a region whose rest holds less.", JUDGEMENT;
+    carrying_sd: f64 = 3.0, "Deviations of the floor's scatter from which a region carries gap.", "three standard deviations";
+    region_allowance_sd: f64 = 2.0, "Deviations of its sampling error that a region's rest is granted before it counts as open.", "two standard deviations";
+    pooled_allowance_sd: f64 = 3.0, "The same for the pool of regions, which overlap: each pass counts about four times.", JUDGEMENT;
+    region_closed: f64 = 0.5, "Share of its gap from which a region counts as closed.", CONTRACT;
+    closure_single: [f64; 3] = [0.5, 0.62, 0.67], "Pooled closure at which a cause and a mimic are as likely, by the form share needed: one cause.", MIMICS;
+    closure_pair: [f64; 3] = [0.52, 0.64, 0.7], "The same: two causes.", MIMICS;
+    closure_scale: f64 = 0.02, "Scale on which that odds ratio changes by a factor of e.", JUDGEMENT;
+    half_open_survival: f64 = 0.1, "Largest share of the probability that survives where fewer than half of the regions are closed.", "contract asks for half of the regions; the value is judgement";
+    few_regions: usize = 3, "Number of carrying regions below which their count says nothing.", JUDGEMENT;
+
+    alias_nats: f64 = 5.0, "Nats within which the data do not tell two hypotheses apart (chi2 of 10).", CONTRACT;
+    name_probability: f64 = 0.9, "Probability that a name needs.", CONTRACT;
+    alone_share: [f64; 2] = [0.93, 0.993], "Share of its alias class that a name needs: one cause, two.", "development: one cause was never wrong between 0.93 and 0.98 on 190 sets; pairs were wrong by up to 4.5 nats";
+    same_forces_chi2: f64 = 4.0, "chi2 between the forces of two hypotheses below which they say the same of a table.", JUDGEMENT;
+    prior_nats: f64 = 10.0, "Nats up to which such a hypothesis stays in the leader's class: priors alone make no name.", JUDGEMENT;
+    claim_probability: f64 = 0.1, "Probability of no gap above which no gap is claimed.", CONTRACT;
+    pair_gain_share: f64 = 0.03, "Share of the gap's chi2 by which a second cause must raise twice the log evidence.", "development: single causes under another form gained up to 0.026 by a spurious companion, on two generators";
+    pair_left_share: f64 = 0.05, "Or: share of the gap's chi2 that the better single cause leaves (a quarter of the gap, squared, or nearly so),", "contract: a quarter of the gap";
+    pair_halves: f64 = 0.5, "of which the second cause takes up so much,", JUDGEMENT;
+    pair_nats: f64 = 50.0, "and raises the log evidence by these nats.", "development: spurious companions gained up to 34";
+    pair_pull_chi2: f64 = 50.0, "Or: chi2 by which it frees the nuisances.", "development: true single causes pull them by up to 30, a gain that hides in a stiffness by hundreds";
+
+    }
+    Report {
+    folds: usize = 5, "Parts that are held out in turn.", "Hastie, Tibshirani & Friedman 2009, sec. 7.10: five or ten";
+    resamples: usize = 400, "Resamples of the bootstrap.", "numerical: Efron & Tibshirani 1993";
+    gapless_sd: f64 = 2.0, "Deviations of the mean square's scatter within which held-out passes show no gap to shrink.", "two standard deviations";
+    stands_out_sd: f64 = 2.0, "Deviations of a pass by which the gap at a condition must stand out.", CONTRACT;
+    least_contraction: f64 = 0.05, "Least contraction of the prior variance before a pull of a stiffness is stated.", JUDGEMENT;
+
+    design_least_nats: f64 = 0.05, "Nats below which an experiment is not worth asking for.", JUDGEMENT;
+    settled_probability: f64 = 0.99, "Probability of no gap from which there is nothing to part.", JUDGEMENT;
+    design_candidates: usize = 6, "Candidates that a design takes into account.", NUMERICAL;
+    design_least_probability: f64 = 0.01, "Probability that each hypothesis counts for at least.", JUDGEMENT;
+    design_pass_nats: f64 = 4.0, "Nats that one pass may count for: beyond them an outlier is the likelier explanation.", JUDGEMENT;
+    check_most_nats: f64 = 500.0, "Nats of an instrument's check beyond which more says nothing.", NUMERICAL;
+    }
+}
+
+impl Constants {
+    /// Sets a constant from text: one number, or as many as it has, separated by commas.
+    ///
+    /// # Errors
+    /// A name that is none, or numbers that do not fit.
+    pub fn set(&mut self, name: &str, text: &str) -> Result<(), ConstantError> {
+        let needed = self.numbers(name)?.len();
+        let refused = || ConstantError::Value { name: name.to_string(), needed };
+        let given: Result<Vec<f64>, _> = text.split(',').map(|t| t.trim().parse::<f64>()).collect();
+        let given = given.map_err(|_| refused())?;
+        if given.len() != needed || given.iter().any(|v| v.is_nan()) {
+            return Err(refused());
+        }
+        match self.replace(name, &mut given.into_iter()) {
+            Some(true) => Ok(()),
+            _ => Err(refused()),
+        }
+    }
+
+    /// Multiplies a constant, all of its numbers alike; whole numbers are rounded and stay one at least.
+    ///
+    /// # Errors
+    /// A name that is none.
+    pub fn scale(&mut self, name: &str, factor: f64) -> Result<(), ConstantError> {
+        let scaled: Vec<f64> = self.numbers(name)?.iter().map(|v| v * factor).collect();
+        self.replace(name, &mut scaled.into_iter());
+        Ok(())
+    }
+
+    fn numbers(&self, name: &str) -> Result<Vec<f64>, ConstantError> {
+        let row = self.rows().into_iter().find(|r| r.name == name);
+        row.map(|r| r.values).ok_or_else(|| ConstantError::Name(name.to_string()))
+    }
+}
+
+/// The table of all constants for docs/diagnosis/constants.md.
+pub fn markdown() -> String {
+    let mut text = String::from("| constant | value | meaning | source |\n|---|---|---|---|\n");
+    for row in Constants::default().rows() {
+        let values: Vec<String> = row.values.iter().map(f64::to_string).collect();
+        text += &format!("| `{}` | {} | {} | {} |\n", row.name, values.join(", "), row.meaning, row.source);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A study sets and scales by name; what is none, or does not fit, is refused and changes nothing.
+    #[test]
+    fn constants_are_set_and_scaled_by_name() {
+        let mut c = Constants::default();
+        c.set("form_shares", "0.1, 0.2,0.3").unwrap();
+        assert_eq!(c.form_shares, [0.1, 0.2, 0.3]);
+        c.scale("form_rank", 0.5).unwrap();
+        assert_eq!(c.form_rank, 20);
+        c.scale("pairs_searched", 0.01).unwrap();
+        assert_eq!(c.pairs_searched, 1);
+        let before = c.clone();
+        assert_eq!(c.set("nonsense", "1"), Err(ConstantError::Name("nonsense".into())));
+        let short = ConstantError::Value { name: "form_shares".into(), needed: 3 };
+        assert_eq!(c.set("form_shares", "0.1"), Err(short));
+        assert!(c.set("alias_nats", "five").is_err() && c.set("alias_nats", "NaN").is_err());
+        assert_eq!(c, before);
+    }
+
+    /// The documented table is the table.
+    #[test]
+    fn the_documented_constants_are_those_of_the_code() {
+        let page =
+            std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/diagnosis/constants.md"));
+        assert!(page.unwrap().contains(&markdown()), "docs/diagnosis/constants.md: put in\n{}", markdown());
+    }
+}

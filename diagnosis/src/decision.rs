@@ -1,0 +1,213 @@
+//! Which: from probabilities to a verdict, with what cannot be told apart said so.
+
+use crate::hypotheses::Fitted;
+use crate::left_out::{Gate, Region, gate, left_out_regions};
+use effects::imitated;
+
+/// The four answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The recalibrated baseline explains the table.
+    NoGap,
+    /// One effect, or one pair, causes most of the gap.
+    Named,
+    /// The leading hypotheses cannot be told apart on this table.
+    Ambiguous,
+    /// No effect of the library causes most of the gap.
+    Unknown,
+}
+
+/// The decision and what it rests on.
+pub struct Decision {
+    /// The answer.
+    pub verdict: Verdict,
+    /// Probability of no gap, after the regions have spoken.
+    pub none: f64,
+    /// Probability of the open set, after the regions have spoken.
+    pub unknown: f64,
+    /// Probabilities of the candidates, in their order, after the regions have spoken.
+    pub probabilities: Vec<f64>,
+    /// Indices of the leader's alias class among the candidates, the leader first; empty where no effect could be tried.
+    pub class: Vec<usize>,
+    /// What the left-out regions say about the leader.
+    pub gate: Gate,
+    /// Those regions.
+    pub regions: Vec<Region>,
+}
+
+impl Decision {
+    /// Index of the leading candidate; none where no effect could be tried.
+    pub fn leader(&self) -> Option<usize> {
+        self.class.first().copied()
+    }
+}
+
+/// Probability below which a pair is not looked at.
+const LEAST_PROBABILITY: f64 = 1e-6;
+
+/// Decides.
+pub fn decide(fitted: &Fitted) -> Decision {
+    let k = &*fitted.problem.constants;
+    let candidates = &fitted.candidates;
+    let mut probabilities: Vec<f64> = candidates.iter().map(|c| c.probability).collect();
+    let (none, mut unknown) = (fitted.none_probability, fitted.unknown_probability);
+    fold_pairs(fitted, &mut probabilities);
+    // Candidates come in the order of their own probability, which decides where all are too small for a number.
+    let leading =
+        (0..candidates.len()).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
+    let Some(leader) = leading else {
+        // No effect could be tried: there is a gap of an unknown cause, or none.
+        let verdict = if none < k.claim_probability { Verdict::Unknown } else { Verdict::NoGap };
+        let (class, regions, gate) = (Vec::new(), Vec::new(), gate(k, &[]));
+        return Decision { verdict, none, unknown, probabilities, class, gate, regions };
+    };
+    let regions = left_out_regions(fitted, &candidates[leader].best);
+    let judged = gate(k, &regions);
+    let claimed = none < k.claim_probability;
+    if claimed {
+        // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
+        let survival = judged.survival(k, candidates[leader].effects.len(), candidates[leader].best.share);
+        for p in &mut probabilities {
+            unknown += *p * (1.0 - survival);
+            *p *= survival;
+        }
+    }
+    let class = alias_class(fitted, leader);
+    let alone = k.alone_share[usize::from(candidates[leader].effects.len() > 1)];
+    // Priors alone make no name: a rival whose forces are the same must be told apart by the data.
+    let distinct = imitated(&candidates[leader].names()).is_none()
+        && class[1..].iter().all(|&i| !same_said(fitted, leader, i));
+    let in_class: f64 = class.iter().map(|&i| probabilities[i]).sum();
+    let verdict = if !claimed || none >= in_class.max(unknown) {
+        Verdict::NoGap
+    } else if unknown >= in_class {
+        Verdict::Unknown
+    } else if distinct && in_class >= k.name_probability && probabilities[leader] >= alone * in_class {
+        Verdict::Named
+    } else {
+        Verdict::Ambiguous
+    };
+    Decision { verdict, none, unknown, probabilities, class, gate: judged, regions }
+}
+
+/// The leader and every hypothesis of its size that the data does not tell from it.
+fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
+    let k = &fitted.problem.constants;
+    let candidates = &fitted.candidates;
+    let mut class = vec![leader];
+    let own = &candidates[leader];
+    class.extend((0..candidates.len()).filter(|&i| {
+        let behind = own.log_evidence - candidates[i].log_evidence;
+        i != leader
+            && candidates[i].effects.len() == own.effects.len()
+            && (behind < k.alias_nats || behind < k.prior_nats && same_said(fitted, leader, i))
+    }));
+    class
+}
+
+/// Whether a rival says the same as the leader with no more parameters.
+fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
+    let [a, b] = [leader, rival].map(|i| &fitted.candidates[i].best);
+    let forces = a.prediction.iter().zip(b.prediction.iter());
+    let apart: f64 = forces.zip(&fitted.problem.variance).map(|((p, q), v)| (p - q).powi(2) / v).sum();
+    b.u.len() <= a.u.len() && apart < fitted.problem.constants.same_forces_chi2
+}
+
+/// A pair that says little more than one of its members alone is that single with a form of its own: its weight goes
+/// to such members, and to singles that do better than they, in proportion to their evidence.
+fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
+    let problem = &fitted.problem;
+    let k = &problem.constants;
+    let left = |model: &nalgebra::DVector<f64>| -> f64 {
+        (0..problem.len()).map(|i| (problem.lateral[i] - model[i]).powi(2) / problem.variance[i] - 1.0).sum()
+    };
+    let gap = left(&fitted.none.prediction);
+    let candidates = &fitted.candidates;
+    for pair in 0..candidates.len() {
+        let own = &candidates[pair];
+        if own.effects.len() < 2 || probabilities[pair] < LEAST_PROBABILITY {
+            continue;
+        }
+        let own_left = left(&own.best.prediction);
+        let alone: Vec<usize> = (0..candidates.len())
+            .filter(|&i| {
+                let c = &candidates[i];
+                if c.effects.len() != 1 || !own.effects.contains(&c.effects[0]) {
+                    return false;
+                }
+                let gain = own.log_evidence - c.log_evidence;
+                let c_left = left(&c.best.prediction);
+                let needed = c_left > k.pair_left_share * gap
+                    && own_left < k.pair_halves * c_left
+                    && gain > k.pair_nats;
+                let pulled = c.best.pull() > own.best.pull() + k.pair_pull_chi2;
+                2.0 * gain < k.pair_gain_share * gap && !needed && !pulled
+            })
+            .collect();
+        let Some(best) = alone.iter().map(|&i| candidates[i].log_evidence).reduce(f64::max) else { continue };
+        // Another single that does better than these is the better short word for what the pair says.
+        let mut heirs = alone;
+        heirs.extend((0..candidates.len()).filter(|&i| {
+            let c = &candidates[i];
+            c.effects.len() == 1 && !own.effects.contains(&c.effects[0]) && c.log_evidence > best
+        }));
+        let evidence: Vec<f64> = heirs.iter().map(|&i| candidates[i].log_evidence).collect();
+        let total = crate::gaussian::log_sum_exp(&evidence);
+        let weight = std::mem::take(&mut probabilities[pair]);
+        for (i, e) in heirs.iter().zip(&evidence) {
+            probabilities[*i] += weight * (e - total).exp();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Verdict;
+    use crate::example::{Deviates, rig, table};
+    use crate::hypotheses::Options;
+    use crate::verdict::diagnose;
+    use models::quantity::PeakToPeak;
+
+    fn no_effects() -> Options {
+        let without = effects::library().iter().map(|e| e.name().to_string()).collect();
+        Options { without, ..Options::default() }
+    }
+
+    /// With nothing to try the answer is `no_gap` or `unknown`, with a remark, and no model but the baseline's.
+    #[test]
+    fn a_library_without_effects_gives_an_answer() {
+        for (exponent, wanted) in [(0.0, Verdict::NoGap), (0.6, Verdict::Unknown)] {
+            let table = table(&mut Deviates(5), exponent);
+            let result = diagnose(&table, &rig(), &no_effects(), String::new());
+            assert_eq!(result.report.verdict, wanted, "exponent {exponent}: {}", result.report.text);
+            assert!(result.report.remarks.iter().any(|r| r.contains("could be tried")));
+            let sum: f64 = result.report.hypotheses.iter().map(|h| h.probability).sum();
+            assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+            assert_eq!(result.saved_model().is_some(), wanted == Verdict::NoGap);
+            assert!(result.predict(&table).iter().all(|f| f.corrected.is_finite() && f.corrected_sd > 0.0));
+        }
+    }
+
+    /// Values at the ends of what a table may hold give an answer too.
+    #[test]
+    fn values_at_the_ends_of_their_range_give_an_answer() {
+        type Change = fn(&mut models::condition::Condition, &mut f64);
+        let changes: [(&str, Change); 5] = [
+            ("lateral force", |_, l| *l = 500.0),
+            ("normal force", |p, _| p.normal_force_n = 500.0),
+            ("frequency", |p, _| p.frequency_hz = 1e7),
+            ("amplitude", |p, _| p.amplitude = PeakToPeak::from_metres(1e-3)),
+            ("speed", |p, _| p.speed_m_s = 100.0),
+        ];
+        for (what, change) in changes {
+            let mut table = table(&mut Deviates(5), 0.0);
+            change(&mut table.passes[3], &mut table.lateral[3]);
+            let report =
+                diagnose(&table, &rig(), &Options { pairs: false, ..Options::default() }, String::new())
+                    .report;
+            let sum: f64 = report.hypotheses.iter().map(|h| h.probability).sum();
+            assert!((sum - 1.0).abs() < 1e-9, "{what}: {sum}");
+        }
+    }
+}

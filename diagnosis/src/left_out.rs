@@ -1,0 +1,293 @@
+//! The gap left on parts of the operating space that the fit did not see.
+
+use crate::constants::Constants;
+use crate::evidence::Posterior;
+use crate::fit::{Member, Problem};
+use crate::gaussian::Covariance;
+use crate::hypotheses::Fitted;
+use crate::layout::Layout;
+use crate::least_squares::{Fit, minimise};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Mean squares over a region, in units of what repeatability and an open baseline leave: one where nothing is left.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Errors {
+    /// Number of passes.
+    pub passes: usize,
+    /// Of the recalibrated baseline.
+    pub recalibrated: f64,
+    /// Of the hypothesis.
+    pub after: f64,
+}
+
+impl Errors {
+    /// `1 - sqrt(left / G)`; `None` where there is no gap to close.
+    pub fn closed(&self) -> Option<f64> {
+        let gap = self.recalibrated - 1.0;
+        (gap > 0.0).then(|| 1.0 - ((self.after - 1.0).max(0.0) / gap).sqrt())
+    }
+}
+
+/// A part of the operating space that was left out and predicted from the rest.
+#[derive(Debug, Clone)]
+pub struct Region {
+    /// What it is, in words.
+    pub name: String,
+    /// Rows of the table.
+    pub rows: Vec<usize>,
+    /// Errors there.
+    pub errors: Errors,
+    /// Whether the rest of the table holds enough of the gap, and of each cause's own part, to learn from.
+    pub informed: bool,
+}
+
+/// Ratio of the largest to the smallest value within which a covariate has one level.
+const ONE_LEVEL: f64 = 1.05;
+/// Share of a pass by which a count may miss a bound for rounding.
+const ROUNDING: f64 = 1e-6;
+/// Relative difference within which two frequencies are one.
+const ONE_FREQUENCY: f64 = 1e-3;
+
+/// Parts of the operating space that are worth leaving out: ends of each covariate, each frequency, late passes.
+pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
+    let n = problem.len();
+    let p = &problem.passes;
+    let mut list: Vec<(String, Vec<usize>)> = Vec::new();
+    let k = &problem.constants;
+    let ends =
+        |name: &str, value: &dyn Fn(usize) -> f64, of: &[usize], list: &mut Vec<(String, Vec<usize>)>| {
+            let mut sorted: Vec<f64> = of.iter().map(|&i| value(i)).collect();
+            sorted.sort_by(f64::total_cmp);
+            if sorted.len() < 2 * k.region_least || sorted[sorted.len() - 1] <= sorted[0] * ONE_LEVEL {
+                return;
+            }
+            let cut = |q: f64| sorted[((sorted.len() - 1) as f64 * q.min(1.0)) as usize];
+            let (low, high) = (cut(k.region_cuts[0]), cut(k.region_cuts[1]));
+            let below: Vec<usize> = of.iter().copied().filter(|&i| value(i) <= low).collect();
+            let above: Vec<usize> = of.iter().copied().filter(|&i| value(i) >= high).collect();
+            for (word, rows) in [("low", below), ("high", above)] {
+                if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most * n as f64 + ROUNDING {
+                    list.push((format!("{word} {name}"), rows));
+                }
+            }
+        };
+    let all: Vec<usize> = (0..n).collect();
+    let vibrating: Vec<usize> = (0..n).filter(|&i| p[i].amplitude.metres() > 0.0).collect();
+    ends("amplitude", &|i| p[i].amplitude.metres(), &vibrating, &mut list);
+    ends("speed", &|i| p[i].speed_m_s, &all, &mut list);
+    ends("load", &|i| p[i].normal_force_n, &all, &mut list);
+    let mut frequencies: Vec<f64> = p.iter().map(|q| q.frequency_hz).collect();
+    frequencies.sort_by(f64::total_cmp);
+    frequencies.dedup_by(|a, b| (*a / *b - 1.0).abs() < ONE_FREQUENCY);
+    if (2..=4).contains(&frequencies.len()) {
+        for f in frequencies {
+            let rows: Vec<usize> =
+                (0..n).filter(|&i| (p[i].frequency_hz / f - 1.0).abs() < ONE_FREQUENCY).collect();
+            if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most_level * n as f64 + ROUNDING
+            {
+                list.push((format!("{f:.0} Hz"), rows));
+            }
+        }
+    }
+    let late: Vec<usize> =
+        all.iter().copied().filter(|&i| i as f64 >= (1.0 - k.late_share) * n as f64).collect();
+    list.push(("late".to_string(), late));
+    let pressures: Vec<f64> = p.iter().filter_map(|q| q.ambient_pressure_pa).collect();
+    if pressures.len() == n {
+        let top = pressures.iter().copied().fold(0.0, f64::max);
+        let rows: Vec<usize> = (0..n).filter(|&i| pressures[i] < k.low_pressure * top).collect();
+        if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most_level * n as f64 + ROUNDING {
+            list.push(("low pressure".to_string(), rows));
+        }
+    }
+    // A region needs a rest to be predicted from.
+    list.retain(|(_, rows)| rows.len() < n);
+    list
+}
+
+/// Full friction at each pass, N: the unit of the errors of docs/contract.md.
+pub fn full_friction(problem: &Problem) -> Vec<f64> {
+    problem.passes.iter().map(|p| problem.nominal.mu0 * p.normal_force_n).collect()
+}
+
+/// Measured less expected at rows that a refit to the others did not see, in deviations of a pass; and the refit.
+///
+/// By least squares: a departure from form would take up part of what the rest shows of the cause, and leave the form
+/// to predict less than it can. On sealed sets causes close more that way (a cause whose standing wave is not the
+/// library's 0.83 of the gap instead of 0.62), and pairs that imitate a cause outside the library less.
+fn left_out(rest: &Problem, out: &Problem, members: &[Member], start: &[f64]) -> (DVector<f64>, Fit) {
+    let refit = minimise(rest, members, start, &rest.variance, ROUNDS);
+    let expected = out.predict(members, &refit.u);
+    let one = |i: usize| (out.lateral[i] - expected[i]) / out.variance[i].sqrt();
+    (DVector::from_fn(out.len(), |i, _| one(i)), refit)
+}
+
+/// Covariance of a region's passes in their own deviations: scatter, and what the rest leaves open of the baseline.
+///
+/// Stiffnesses that the rest does not tell carry baseline and hypothesis off together where they begin to matter; that
+/// says nothing of the cause. What the rest leaves open of the hypothesis is not granted: unlisted that a free shape
+/// imitates would close by it.
+fn metric(rest: &Problem, out: &Problem, baseline: &Fit) -> Covariance {
+    let whitened = |p: &Problem| {
+        let mut m = p.jacobian(&[], &baseline.u, &p.predict(&[], &baseline.u));
+        for (i, v) in p.variance.iter().enumerate() {
+            m.row_mut(i).scale_mut(1.0 / v.sqrt());
+        }
+        m
+    };
+    let (seen, asked) = (whitened(rest), whitened(out));
+    let precision = seen.transpose() * &seen + DMatrix::from_diagonal(&rest.prior_precision(&[]).into());
+    let root = precision.cholesky().and_then(|c| c.l().solve_lower_triangular(&asked.transpose()));
+    let open = root.map_or_else(|| DMatrix::zeros(out.len(), 0), |r| r.transpose());
+    Covariance::new(&vec![1.0; out.len()], &open)
+}
+
+/// All other rows.
+fn without(problem: &Problem, rows: &[usize]) -> Vec<usize> {
+    (0..problem.len()).filter(|i| rows.binary_search(i).is_err()).collect()
+}
+
+/// Rounds of a refit without a region.
+const ROUNDS: usize = 6;
+
+/// Squared changes by each of two effects beside the other, in deviations of a pass; of a single effect nothing: what it
+/// does is the gap.
+fn own_changes(problem: &Problem, best: &Posterior) -> Vec<Vec<f64>> {
+    if best.members.len() < 2 {
+        return Vec::new();
+    }
+    let layout = Layout::of(&best.members);
+    (0..best.members.len())
+        .map(|i| {
+            let (mut members, mut u) = (best.members.clone(), best.u.clone());
+            members.remove(i);
+            u.drain(layout.member(i));
+            let beside = problem.predict(&members, &u);
+            let change = best.prediction.iter().zip(beside.iter()).zip(&problem.variance);
+            change.map(|((with, without), v)| (with - without).powi(2) / v).collect()
+        })
+        .collect()
+}
+
+/// Predicts each region from the rest, by the hypothesis' form alone.
+pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
+    let problem = &fitted.problem;
+    let k = &problem.constants;
+    let whole: f64 = (0..problem.len())
+        .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.variance[i] - 1.0)
+        .sum();
+    let own = own_changes(problem, best);
+    regions(problem)
+        .into_par_iter()
+        .map(|(name, rows)| {
+            let others = without(problem, &rows);
+            let shown = own.iter().all(|change| {
+                let seen: f64 = others.iter().map(|&i| change[i]).sum();
+                seen > k.informed_share * change.iter().sum::<f64>()
+            });
+            let (rest, out) = (problem.select(&others), problem.select(&rows));
+            let (hypothesis, _) = left_out(&rest, &out, &best.members, &best.u);
+            let (baseline, refit) = left_out(&rest, &out, &[], &fitted.none.u);
+            let metric = metric(&rest, &out, &refit);
+            let n = out.len();
+            let mean = |r: &DVector<f64>| metric.quadratic(r) / n.max(1) as f64;
+            let errors = Errors { passes: n, recalibrated: mean(&baseline), after: mean(&hypothesis) };
+            let gap: f64 = (0..rest.len())
+                .map(|i| (rest.lateral[i] - refit.prediction[i]).powi(2) / rest.variance[i] - 1.0)
+                .sum();
+            let scatter = (2.0 * rest.len() as f64).sqrt();
+            let informed = shown && gap > k.carrying_sd * scatter && gap > k.informed_share * whole;
+            Region { name, rows, errors, informed }
+        })
+        .collect()
+}
+
+/// What the left-out regions say about a hypothesis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gate {
+    /// Share of the gap closed, pooled over the regions.
+    pub pooled: f64,
+    /// Regions that carry gap.
+    pub carrying: usize,
+    /// Those of them closed by more than half.
+    pub closed: usize,
+}
+
+impl Gate {
+    /// Share of a candidate's probability that survives: one half where it closes just so much as a mimic may, and
+    /// ever less below that. `share` is the form uncertainty that it needed.
+    pub fn survival(&self, k: &Constants, effects: usize, share: f64) -> f64 {
+        let rank = k.form_shares.iter().filter(|s| **s < share * (1.0 - 1e-9)).count();
+        let closures = if effects > 1 { k.closure_pair } else { k.closure_single };
+        let middle = closures[rank.min(closures.len() - 1)];
+        let pooled = 1.0 / (1.0 + (-(self.pooled - middle) / k.closure_scale).exp());
+        let half_open = 2 * self.closed < self.carrying && self.carrying >= k.few_regions;
+        if half_open { pooled.min(k.half_open_survival) } else { pooled }
+    }
+}
+
+/// Judges the regions: those count whose gap stands above the floor's own scatter.
+///
+/// What is left is granted its sampling error, the root of twice the number of passes in units of the floor: a
+/// small gap cannot be shown to stay open by noise alone.
+pub fn gate(k: &Constants, regions: &[Region]) -> Gate {
+    let share = |gap: f64, left: f64| (gap > 0.0).then(|| 1.0 - (left.max(0.0) / gap).sqrt());
+    let (mut gap, mut left, mut passes) = (0.0, 0.0, 0.0);
+    let (mut carrying, mut closed) = (0, 0);
+    for r in regions {
+        let e = &r.errors;
+        let n = e.passes as f64;
+        let scatter = (2.0 * n).sqrt();
+        let own_gap = (e.recalibrated - 1.0) * n;
+        // A region that stays wholly open is open, however far off the refit ran: it must not outweigh all others.
+        let own_left = ((e.after - 1.0) * n).min(own_gap.max(0.0));
+        let weight = if r.informed { 1.0 } else { k.uninformed_weight };
+        gap += weight * own_gap;
+        left += weight * own_left;
+        passes += weight * n;
+        if own_gap > k.carrying_sd * scatter {
+            carrying += 1;
+            if share(own_gap, own_left - k.region_allowance_sd * scatter).is_some_and(|c| c > k.region_closed)
+            {
+                closed += 1;
+            }
+        }
+    }
+    let pooled = share(gap, left - k.pooled_allowance_sd * (2.0 * passes).sqrt()).unwrap_or(1.0);
+    Gate { pooled, carrying, closed }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::{Deviates, rig, table};
+
+    /// One vibrating pass, predicted from passes with the plate still, which tell nothing of the stiffnesses: a miss
+    /// along them counts in deviations of scatter and of the stiffnesses' prior together.
+    #[test]
+    fn a_miss_that_the_rest_leaves_open_counts_for_little() {
+        let table = table(&mut Deviates(3), 0.0);
+        let mut rig = rig();
+        rig.finger.stiffness_relative_sd = 0.3;
+        let mut problem = Problem::new(&table, &rig, &Default::default());
+        crate::noise::settle(&table, &rig, &mut problem);
+        let still: Vec<usize> =
+            (0..problem.len()).filter(|&i| problem.passes[i].amplitude.metres() == 0.0).collect();
+        let nominal = problem.jacobian(&[], &[0.0; 3], &problem.predict(&[], &[0.0; 3]));
+        let telling = nominal.column(1).iamax();
+        let (rest, out) = (problem.select(&still), problem.select(&[telling]));
+        let fit = minimise(&rest, &[], &[0.0; 3], &rest.variance, 6);
+        let slope = |p: &Problem| p.jacobian(&[], &fit.u, &p.predict(&[], &fit.u));
+        let (seen, asked) = (slope(&rest), slope(&out));
+        // Plate still: friction is mu0 times load, whatever the stiffnesses.
+        assert!(seen.column(1).amax() < 1e-9 && seen.column(2).amax() < 1e-9);
+        let mu0: f64 = (0..rest.len()).map(|i| seen[(i, 0)].powi(2) / rest.variance[i]).sum();
+        let open = (asked[(0, 1)].powi(2) + asked[(0, 2)].powi(2) + asked[(0, 0)].powi(2) / (1.0 + mu0))
+            / out.variance[0];
+        assert!(open > 0.5, "{open}");
+        let miss = DVector::from_element(1, 2.5);
+        let counted = metric(&rest, &out, &fit).quadratic(&miss);
+        assert!((counted - 6.25 / (1.0 + open)).abs() < 1e-9 * counted, "{counted} {open}");
+    }
+}

@@ -1,0 +1,145 @@
+//! The operating space cut into parts, as a regression tree is grown (Breiman et al. 1984), by the chance of standing out.
+
+use models::condition::Condition;
+use models::covariate::{self, Role};
+use std::collections::BTreeMap;
+
+/// Largest number of parts that the operating space is cut into, and the least number of places in one.
+const PARTS: usize = 128;
+const LEAST: usize = 16;
+/// Levels at which a covariate may be cut.
+const LEVELS: usize = 24;
+/// Least gain of a cut in the sum of squares.
+const LEAST_GAIN: f64 = 0.5;
+
+/// A covariate, the values at which it may be cut, and for each place asked how many of them it lies above.
+pub(super) struct Cut {
+    covariate: usize,
+    pub at: Vec<f64>,
+    above: Vec<u8>,
+}
+
+/// Standard deviation.
+fn spread(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+pub(super) fn cuts(places: &[Condition]) -> Vec<Cut> {
+    let one = |covariate: usize| {
+        let values: Vec<f64> =
+            places.iter().map(|p| covariate::TOLD[covariate].of(p)).collect::<Option<_>>()?;
+        if covariate::TOLD[covariate].role == Role::Climate
+            && spread(&values) < covariate::TOLD[covariate].least_spread
+        {
+            return None;
+        }
+        let mut sorted = values.clone();
+        sorted.sort_by(f64::total_cmp);
+        // Between quantiles, so that a cut never falls on a level.
+        let at: Vec<f64> = (1..LEVELS)
+            .filter_map(|k| {
+                let i = k * (sorted.len() - 1) / LEVELS;
+                let next = sorted[i..].iter().find(|v| **v > sorted[i])?;
+                Some(0.5 * (sorted[i] + next))
+            })
+            .collect();
+        let mut at = at;
+        at.dedup();
+        let above = values.iter().map(|v| at.partition_point(|a| a < v) as u8).collect();
+        (!at.is_empty()).then_some(Cut { covariate, at, above })
+    };
+    (0..covariate::TOLD.len()).filter_map(one).collect()
+}
+
+/// A part of the operating space.
+#[derive(Clone)]
+pub(super) struct Part {
+    pub bounds: BTreeMap<usize, [f64; 2]>,
+    pub members: Vec<usize>,
+    /// The part that it was cut from.
+    parent: Option<usize>,
+    /// Whether it has been cut itself.
+    cut: bool,
+}
+
+/// Cuts the space where the chances of standing out differ most, until there are [`PARTS`] parts.
+pub(super) fn parts(cuts: &[Cut], chance: &[f64]) -> Vec<Part> {
+    let whole =
+        Part { bounds: BTreeMap::new(), members: (0..chance.len()).collect(), parent: None, cut: false };
+    let mut best: Vec<Option<(f64, usize, usize)>> = vec![best_cut(cuts, chance, &whole.members)];
+    let mut list = vec![whole];
+    for _ in 1..PARTS {
+        let open = (0..list.len()).filter(|&k| !list[k].cut).filter_map(|k| best[k].map(|b| (k, b)));
+        let Some((k, (_, cut, level))) = open.max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(b.0.cmp(&a.0)))
+        else {
+            break;
+        };
+        list[k].cut = true;
+        for upper in [false, true] {
+            let mut part = list[k].clone();
+            part.members.retain(|&i| (usize::from(cuts[cut].above[i]) > level) == upper);
+            let bound = part.bounds.entry(cuts[cut].covariate).or_insert([f64::NEG_INFINITY, f64::INFINITY]);
+            bound[usize::from(!upper)] = cuts[cut].at[level];
+            (part.parent, part.cut) = (Some(k), false);
+            best.push(best_cut(cuts, chance, &part.members));
+            list.push(part);
+        }
+    }
+    list
+}
+
+/// Gain in the sum of squares of the best cut of some places, and its covariate and level.
+fn best_cut(cuts: &[Cut], chance: &[f64], members: &[usize]) -> Option<(f64, usize, usize)> {
+    let all: f64 = members.iter().map(|&i| chance[i]).sum();
+    let square = |sum: f64, count: usize| sum * sum / count.max(1) as f64;
+    let mut best: Option<(f64, usize, usize)> = None;
+    for (k, cut) in cuts.iter().enumerate() {
+        let mut bins = [(0.0, 0); LEVELS];
+        for &i in members {
+            let bin = &mut bins[usize::from(cut.above[i])];
+            *bin = (bin.0 + chance[i], bin.1 + 1);
+        }
+        let (mut sum, mut count) = (0.0, 0);
+        for level in 0..cut.at.len() {
+            (sum, count) = (sum + bins[level].0, count + bins[level].1);
+            let rest = members.len() - count;
+            if count < LEAST || rest < LEAST {
+                continue;
+            }
+            let gain = square(sum, count) + square(all - sum, rest) - square(all, members.len());
+            if gain > best.map_or(LEAST_GAIN, |b| b.0) {
+                best = Some((gain, k, level));
+            }
+        }
+    }
+    best
+}
+
+/// The parts with the largest expected F1 together; where both halves of a part are named, the part itself.
+pub(super) fn named_parts<'a>(list: &'a [Part], chance: &[f64]) -> Vec<&'a Part> {
+    let hits = |p: &Part| p.members.iter().map(|&i| chance[i]).sum::<f64>();
+    let mean = |p: &Part| hits(p) / p.members.len() as f64;
+    let sum: f64 = chance.iter().sum();
+    let mut leaves: Vec<usize> = (0..list.len()).filter(|&k| !list[k].cut).collect();
+    leaves.sort_by(|&a, &b| mean(&list[b]).total_cmp(&mean(&list[a])).then(a.cmp(&b)));
+    let (mut hit, mut count, mut best) = (0.0, 0.0, (0.0, 0));
+    for (taken, &k) in leaves.iter().enumerate() {
+        hit += hits(&list[k]);
+        count += list[k].members.len() as f64;
+        let expected = 2.0 * hit / (count + sum);
+        if expected > best.0 {
+            best = (expected, taken + 1);
+        }
+    }
+    let mut named = vec![false; list.len()];
+    leaves[..best.1].iter().for_each(|&k| named[k] = true);
+    // The two halves of a part follow each other in the list, after it.
+    for k in (2..list.len()).rev().step_by(2) {
+        if let (true, true, Some(parent)) = (named[k], named[k - 1], list[k].parent) {
+            (named[k], named[k - 1], named[parent]) = (false, false, true);
+        }
+    }
+    (0..list.len()).filter(|&k| named[k]).map(|k| &list[k]).collect()
+}

@@ -1,0 +1,137 @@
+//! What a hypothesis expects at conditions that were not measured, and how surely, correlated between conditions.
+//!
+//! A cause is uncertain in its parameters and in its smooth departure from form; the open set in its two smooth parts;
+//! all in the baseline. A second pass at a condition therefore tells less than the first: what the first left open is
+//! noise, while the hypothesis' own doubt about that condition is gone.
+
+use crate::data::RigFile;
+use crate::decision::Decision;
+use crate::evidence::{Posterior, recalibration};
+use crate::fit::Problem;
+use crate::hypotheses::{Fitted, form_lengths};
+use crate::layout::NUISANCES;
+use models::condition::Condition;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// One hypothesis' predictions over a grid of conditions.
+pub struct Predictive {
+    /// Names joined by `+`; `unknown` for the open set, `no gap` for the baseline.
+    pub name: String,
+    /// Probability after the verdict's gates.
+    pub probability: f64,
+    /// Expected lateral forces, N.
+    pub mean: DVector<f64>,
+    /// Covariance of what it does not know, without the scatter of passes, N^2.
+    pub covariance: DMatrix<f64>,
+    /// Variance of a pass about that, N^2.
+    pub scatter: Vec<f64>,
+}
+
+/// The hypotheses that a decision leaves: the likeliest candidates, no gap and the open set. The leader comes first.
+pub fn predictives(
+    fitted: &Fitted,
+    rig: &RigFile,
+    decision: &Decision,
+    grid: &[Condition],
+) -> Vec<Predictive> {
+    let k = &fitted.problem.constants;
+    let problem = Problem {
+        passes: grid.to_vec(),
+        lateral: vec![0.0; grid.len()],
+        variance: vec![1.0; grid.len()],
+        ..fitted.problem.select(&[])
+    };
+    let places: Vec<_> = grid
+        .iter()
+        .map(|p| fitted.coordinates.place(p, problem.design.largest_amplitude_m, &form_lengths(k)))
+        .collect();
+    let basis = fitted.kernel.matrix(&places);
+    let mut order: Vec<usize> = (0..fitted.candidates.len()).collect();
+    order.sort_by(|&a, &b| decision.probabilities[b].total_cmp(&decision.probabilities[a]).then(a.cmp(&b)));
+    if let Some(leader) = decision.leader() {
+        order.retain(|&i| i != leader);
+        order.insert(0, leader);
+    }
+    order.truncate(k.design_candidates);
+    let mut list: Vec<Predictive> = order
+        .into_par_iter()
+        .map(|i| {
+            let c = &fitted.candidates[i];
+            let (mean, covariance) = expected(fitted, &problem, &basis, &c.best);
+            let probability = decision.probabilities[i].max(k.design_least_probability);
+            Predictive { name: c.names().join("+"), probability, mean, covariance, scatter: Vec::new() }
+        })
+        .collect();
+    let (mean, covariance) = expected(fitted, &problem, &basis, &fitted.none);
+    let name = "no gap".to_string();
+    list.push(Predictive {
+        name,
+        probability: decision.none.max(k.design_least_probability),
+        mean,
+        covariance,
+        scatter: Vec::new(),
+    });
+
+    let level: Vec<f64> = list[0].mean.iter().copied().collect();
+    let scatter = crate::noise::variance(&problem, rig, &fitted.none.u, &level, fitted.pure.used);
+    for belief in &mut list {
+        belief.scatter.clone_from(&scatter);
+    }
+    let (mean, covariance, white) = fitted.discrepancy.belief(&fitted.problem, grid);
+    let scatter = scatter.iter().zip(&white).map(|(s, w)| s + w).collect();
+    let name = "unknown".to_string();
+    list.push(Predictive {
+        name,
+        probability: decision.unknown.max(k.design_least_probability),
+        mean,
+        covariance,
+        scatter,
+    });
+    list
+}
+
+/// Mean and covariance of a fitted hypothesis at a grid: parameters and departure from form, jointly.
+fn expected(
+    fitted: &Fitted,
+    grid: &Problem,
+    basis: &DMatrix<f64>,
+    e: &Posterior,
+) -> (DVector<f64>, DMatrix<f64>) {
+    let problem = &fitted.problem;
+    let plain = grid.predict(&e.members, &e.u);
+    let here = grid.jacobian(&e.members, &e.u, &plain);
+    let there = problem.jacobian(&e.members, &e.u, &e.prediction);
+    let d = e.u.len();
+    let r = if e.departure.is_empty() { 0 } else { basis.ncols() };
+    let (mut seen, mut asked) = (there.insert_columns(d, r, 0.0), here.insert_columns(d, r, 0.0));
+    let mut mean = plain.clone();
+    if r > 0 {
+        let (_, _, shift) = recalibration(problem, &e.u, &e.prediction);
+        let under = grid.predict(&[], &e.u[..NUISANCES]);
+        let change = &plain - &under - grid.jacobian(&[], &e.u[..NUISANCES], &under) * shift;
+        mean += change.component_mul(&(basis * &e.departure)) * e.share;
+        for k in 0..r {
+            seen.set_column(d + k, &(fitted.basis.column(k).component_mul(&e.change) * e.share));
+            asked.set_column(d + k, &(basis.column(k).component_mul(&change) * e.share));
+        }
+    }
+    let mut whitened = seen;
+    for (i, v) in problem.variance.iter().enumerate() {
+        whitened.row_mut(i).scale_mut(1.0 / v.sqrt());
+    }
+    let mut precision = whitened.transpose() * &whitened;
+    for (k, p) in problem.prior_precision(&e.members).iter().enumerate() {
+        // A uniform prior is as wide as its bounds; a little keeps what the table does not touch finite.
+        precision[(k, k)] += p.max(1e-2);
+    }
+    for k in d..d + r {
+        precision[(k, k)] += 1.0;
+    }
+    let factor = precision.cholesky().expect("a prior makes the precision positive definite");
+    let root = factor
+        .l()
+        .solve_lower_triangular(&asked.transpose())
+        .expect("a Cholesky factor has no zero on its diagonal");
+    (mean, root.transpose() * root)
+}

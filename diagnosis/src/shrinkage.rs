@@ -1,0 +1,162 @@
+//! How far the gap shrinks on passes held out by group.
+
+use crate::data::{RigFile, Table};
+use crate::decision::Verdict;
+use crate::hypotheses::Fitted;
+use crate::left_out::full_friction;
+use crate::predict::{forecast, model};
+use models::covariate;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Blocks of neighbouring conditions: passes in one, and the most of them.
+const BLOCK: usize = 6;
+const MOST_BLOCKS: usize = 40;
+/// Fewest passes that a fold may leave to the fit.
+const LEAST_KEPT: usize = 10;
+/// Fewest resamples with a gap for an interval.
+const LEAST_DRAWS: usize = 20;
+/// Quantiles of a 95 % interval.
+const CI95: [f64; 2] = [0.025, 0.975];
+
+/// The gap in units of full friction, on held-out passes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gap {
+    /// Unit of the errors.
+    pub unit: &'static str,
+    /// Of the nominal baseline.
+    pub before_rmse: f64,
+    /// Of the recalibrated baseline.
+    pub recalibrated_rmse: f64,
+    /// Of the verdict's model.
+    pub after_rmse: f64,
+    /// Of the named effects in the library's own form, without the smooth departure from it.
+    pub form_alone_rmse: f64,
+    /// What repeatability leaves.
+    pub noise_floor_rmse: f64,
+    /// Share of the removable gap that is closed; none where there is no gap to shrink.
+    pub shrinkage: Option<f64>,
+    /// Its interval over groups of passes (bootstrap, 95 per cent).
+    pub shrinkage_ci95: Option<[f64; 2]>,
+    /// Share of the removable gap's square that is left.
+    pub unexplained_share: Option<f64>,
+}
+
+/// Groups that are held out together: runs where there are at least three, else blocks of like conditions.
+pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
+    if table.run_count >= 3 {
+        return table.runs.clone();
+    }
+    // Conditions with all their replicates, in an order that keeps neighbours together, cut into blocks.
+    let mut keyed: Vec<([Option<i64>; 5], usize)> = table
+        .passes
+        .iter()
+        .enumerate()
+        .map(|(i, p)| {
+            let key = covariate::NEIGHBOURS.map(|c| Some(c.neighbourhood?(c.of(p)?)));
+            (key, i)
+        })
+        .collect();
+    keyed.sort();
+    let blocks = (table.len() / BLOCK).clamp(folds * 2, MOST_BLOCKS.max(folds * 2));
+    let mut group = vec![0; table.len()];
+    let mut block = 0;
+    let mut filled = 0;
+    for (k, (key, i)) in keyed.iter().enumerate() {
+        let fresh = k > 0 && keyed[k - 1].0 != *key;
+        if fresh && filled * blocks >= table.len() {
+            block += 1;
+            filled = 0;
+        }
+        group[*i] = block;
+        filled += 1;
+    }
+    group
+}
+
+/// Errors on held-out passes under the verdict's model.
+pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, leader: Option<usize>) -> Gap {
+    let k = &fitted.problem.constants;
+    let groups = groups(table, k.folds);
+    let full = full_friction(&fitted.problem);
+    let folds = k.folds.min(groups.iter().copied().max().unwrap_or(0) + 1).max(2);
+    let per_fold: Vec<Vec<(usize, [f64; 5])>> = (0..folds)
+        .into_par_iter()
+        .map(|fold| {
+            let (out, kept): (Vec<usize>, Vec<usize>) =
+                (0..table.len()).partition(|&i| groups[i] % folds == fold);
+            if out.is_empty() || kept.len() < LEAST_KEPT {
+                return Vec::new();
+            }
+            let fit = model(fitted, table, verdict, leader, Some(&kept));
+            let passes: Vec<_> = out.iter().map(|&i| table.passes[i]).collect();
+            forecast(fitted, rig, &fit, &passes)
+                .iter()
+                .zip(&out)
+                .map(|(f, &i)| {
+                    let e = |m: f64| ((table.lateral[i] - m) / full[i]).powi(2);
+                    let floor = fitted.problem.variance[i] / (full[i] * full[i]);
+                    (groups[i], [e(f.baseline), e(f.recalibrated), e(f.corrected), e(f.form), floor])
+                })
+                .collect()
+        })
+        .collect();
+    let mut sums: std::collections::BTreeMap<usize, ([f64; 5], f64)> = std::collections::BTreeMap::new();
+    for (group, e) in per_fold.into_iter().flatten() {
+        let entry = sums.entry(group).or_default();
+        for k in 0..5 {
+            entry.0[k] += e[k];
+        }
+        entry.1 += 1.0;
+    }
+    let list: Vec<([f64; 5], f64)> = sums.into_values().collect();
+    let mean = |list: &[([f64; 5], f64)]| {
+        let n: f64 = list.iter().map(|g| g.1).sum::<f64>().max(1.0);
+        let mut m = [0.0; 5];
+        for g in list {
+            for k in 0..5 {
+                m[k] += g.0[k] / n;
+            }
+        }
+        m
+    };
+    let all = mean(&list);
+    let shrink = |m: &[f64; 5]| {
+        let removable = m[1] - m[4];
+        (removable > 0.0).then(|| 1.0 - ((m[2] - m[4]).max(0.0) / removable).sqrt())
+    };
+    let passes = table.len() as f64;
+    // The mean square of n scatters about the floor has a relative deviation of sqrt(2/n).
+    let gapless = all[1] <= all[4] * (1.0 + k.gapless_sd * (2.0 / passes).sqrt());
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    let mut draws: Vec<f64> = (0..k.resamples)
+        .filter_map(|_| {
+            let sample: Vec<_> =
+                (0..list.len()).map(|_| list[(split_mix(&mut state) % list.len() as u64) as usize]).collect();
+            shrink(&mean(&sample))
+        })
+        .collect();
+    draws.sort_by(f64::total_cmp);
+    let quantile = |q: f64| draws[((draws.len() - 1) as f64 * q).round() as usize];
+    let removable = all[1] - all[4];
+    Gap {
+        unit: "mu_relative",
+        before_rmse: all[0].sqrt(),
+        recalibrated_rmse: all[1].sqrt(),
+        after_rmse: all[2].sqrt(),
+        form_alone_rmse: all[3].sqrt(),
+        noise_floor_rmse: all[4].sqrt(),
+        shrinkage: if gapless { None } else { shrink(&all) },
+        shrinkage_ci95: (!gapless && draws.len() > LEAST_DRAWS).then(|| CI95.map(quantile)),
+        unexplained_share: (!gapless).then(|| (all[2] - all[4]).max(0.0) / removable),
+    }
+}
+
+/// SplitMix64: a fixed stream, so that the same data gives the same interval.
+pub(crate) fn split_mix(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}

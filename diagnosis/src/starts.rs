@@ -1,0 +1,260 @@
+//! Global starts: a coarse scan of each law over its sizes and shapes, then local fits of the best few.
+
+use crate::fit::{Member, Problem};
+use crate::gaussian::Covariance;
+use crate::layout::NUISANCES;
+use crate::least_squares::{Fit, minimise};
+use effects::{Parameter, Prior};
+use nalgebra::{DMatrix, DVector};
+
+/// Rows that the scan looks at.
+const SCAN_ROWS: usize = 128;
+/// Starts that are fitted on the scan's rows, and those of them refined on all.
+const STARTS: (usize, usize) = (4, 2);
+/// Rounds of a local fit on the scan's rows before the starts are compared, and after, and on all rows: the search under
+/// form uncertainty goes on from there.
+const ROUNDS: (usize, usize, usize) = (4, 8, 4);
+
+/// Rounds of a fit without members.
+const BASELINE_ROUNDS: usize = 20;
+/// Factor on the best cost and offset beyond which a start is given up, after the first rounds and after the next.
+const BEHIND: (f64, f64) = (2.0, 30.0);
+const FAR_BEHIND: (f64, f64) = (1.3, 10.0);
+/// Starts differ by so much in the coordinate of the size, or of a shape.
+const OTHER: (f64, f64) = (0.8, 0.5);
+/// Longest linear step of a fixed coordinate while the scan walks.
+const LONGEST_STEP: f64 = 2.0;
+/// Half periods over a stroke by which two wavelengths differ.
+const WAVE_STEP: f64 = 0.4;
+
+/// Sizes and shapes at which a law is tried.
+fn grid(parameters: &[Parameter], stroke: f64) -> Vec<Vec<f64>> {
+    let mut list: Vec<Vec<f64>> = vec![Vec::new()];
+    let fine = parameters.iter().any(is_wavelength);
+    for (index, p) in parameters.iter().enumerate() {
+        let (low, high) = p.coordinate_bounds();
+        let values: Vec<f64> = match p.prior {
+            Prior::HalfNormal(_) if fine => vec![0.4, 1.5],
+            Prior::HalfNormal(_) => vec![0.04, 0.12, 0.35, 0.9, 2.0, 4.5],
+            // Further signed parameters enter smoothly: the local fit finds them from zero.
+            Prior::Normal(_) if index > 0 => vec![0.0],
+            Prior::Normal(_) => vec![-3.0, -1.2, -0.4, -0.1, 0.1, 0.4, 1.2, 3.0],
+            // A third parameter bends the curve: the local fit finds it from either side.
+            Prior::LogNormal(..) if index > 1 => vec![-1.0, 1.0],
+            Prior::LogNormal(..) => vec![-2.0, -1.0, 0.0, 1.0, 2.0],
+            Prior::Uniform(a, b) if is_wavelength(p) => {
+                // Two wavelengths differ on a stroke if they differ by half a period over it.
+                let step = WAVE_STEP / stroke.max(1e-4);
+                let count = (((1.0 / a - 1.0 / b) / step).ceil() as usize).clamp(4, 240);
+                (0..=count)
+                    .map(|i| p.coordinate(1.0 / (1.0 / b + (1.0 / a - 1.0 / b) * i as f64 / count as f64)))
+                    .collect()
+            }
+            // A phase is cyclic over the unit interval inside its bounds.
+            Prior::Uniform(..) if fine => [0.0, 0.2, 0.4, 0.6, 0.8].map(|x| p.coordinate(x)).to_vec(),
+            Prior::Uniform(..) => vec![-2.4, -1.2, 0.0, 1.2, 2.4],
+        };
+        let values: Vec<f64> = values.into_iter().filter(|v| *v >= low && *v <= high).collect();
+        list = list
+            .iter()
+            .flat_map(|head| {
+                values.iter().map(|v| {
+                    let mut row = head.clone();
+                    row.push(*v);
+                    row
+                })
+            })
+            .collect();
+    }
+    list
+}
+
+fn is_wavelength(p: &Parameter) -> bool {
+    p.unit == "m" && matches!(p.prior, Prior::Uniform(..))
+}
+
+/// Local optima of the last member's parameters beside the given coordinates of the others, best first.
+///
+/// `fixed` are the coordinates of nuisances and of all members but the last; `variance` may be tempered.
+pub fn optima(problem: &Problem, members: &[Member], fixed: &[f64], variance: &[f64]) -> Vec<Fit> {
+    if members.is_empty() {
+        return vec![minimise(problem, members, fixed, variance, BASELINE_ROUNDS)];
+    }
+    let (rows, scored) = scanned(problem, members, fixed, variance);
+    refine(problem, members, fixed.len(), variance, &rows, &scored, STARTS)
+}
+
+/// The whole grid of the last member, on the rows that show it: those rows, and every place with its cost, best first.
+fn scanned(
+    problem: &Problem,
+    members: &[Member],
+    fixed: &[f64],
+    variance: &[f64],
+) -> (Vec<usize>, Vec<(f64, Vec<f64>)>) {
+    let parameters = members.last().map_or(&[][..], Member::parameters);
+    let fine = parameters.iter().any(is_wavelength);
+    let rows = rows(problem.len(), if fine { problem.len() } else { SCAN_ROWS });
+    let scored = scan(problem, members, fixed, variance, &rows, grid(parameters, problem.design.stroke_m));
+    (rows, scored)
+}
+
+/// Best cost of a coarse scan of the last member about coordinates that it had alone, with the place it was found.
+pub fn coarse_scan(
+    problem: &Problem,
+    members: &[Member],
+    fixed: &[f64],
+    variance: &[f64],
+    alone: &[f64],
+) -> Option<(f64, Vec<f64>)> {
+    let last = members.last()?;
+    let (low, high) = last.parameters()[0].coordinate_bounds();
+    let mut list = vec![alone.to_vec()];
+    let reach = if alone[0].abs() > 0.05 { alone[0] } else { 0.3 };
+    let own = [0.15, 0.4, 1.0, 2.0, -0.4, -1.0].map(|factor| reach * factor);
+    // What it did alone says little of a large size beside another cause.
+    for size in own.into_iter().chain([-3.0, -1.2, 1.2, 3.0]) {
+        let mut tail = alone.to_vec();
+        tail[0] = size.clamp(low, high);
+        list.push(tail);
+    }
+    let rows = rows(problem.len(), SCAN_ROWS);
+    scan(problem, members, fixed, variance, &rows, list).into_iter().next()
+}
+
+/// Best cost of the whole scan of the last member beside the given coordinates of the others, with the place.
+pub fn full_scan(
+    problem: &Problem,
+    members: &[Member],
+    fixed: &[f64],
+    variance: &[f64],
+) -> Option<(f64, Vec<f64>)> {
+    scanned(problem, members, fixed, variance).1.into_iter().next()
+}
+
+/// Local fit of a pair from one start.
+pub fn refine_from(problem: &Problem, members: &[Member], start: Vec<f64>, variance: &[f64]) -> Option<Fit> {
+    let rows = rows(problem.len(), SCAN_ROWS);
+    let fixed = start.len() - members.last()?.parameters().len();
+    refine(problem, members, fixed, variance, &rows, &[(0.0, start)], (1, 1)).into_iter().next()
+}
+
+fn rows(n: usize, limit: usize) -> Vec<usize> {
+    (0..n).step_by(n.div_ceil(limit).max(1)).collect()
+}
+
+fn scan(
+    problem: &Problem,
+    members: &[Member],
+    fixed: &[f64],
+    variance: &[f64],
+    rows: &[usize],
+    grid: Vec<Vec<f64>>,
+) -> Vec<(f64, Vec<f64>)> {
+    let part = problem.select(rows);
+    let part_variance: Vec<f64> = rows.iter().map(|&i| variance[i]).collect();
+    // Nuisances (and the other members) follow linearly while the scan walks.
+    let others = &members[..members.len() - 1];
+    let origin = part.predict(others, fixed);
+    let jacobian = part.jacobian(others, fixed, &origin);
+    let plain = Covariance::new(&part_variance, &DMatrix::zeros(rows.len(), 0));
+    let mut hessian = plain.inner(&jacobian, &jacobian);
+    let precision = problem.prior_precision(others);
+    for (k, p) in precision.iter().enumerate() {
+        hessian[(k, k)] += p.max(1e-9);
+    }
+    // What the others cost where they are: nuisances that were driven far from their calibration are no bargain.
+    let pull = DVector::from_iterator(fixed.len(), fixed.iter().zip(&precision).map(|(x, p)| p * x));
+    let penalty = pull.dot(&DVector::from_column_slice(fixed));
+    let Some(factor) = hessian.cholesky() else { return Vec::new() };
+    let mut weighted = jacobian.clone();
+    for (i, v) in part_variance.iter().enumerate() {
+        weighted.row_mut(i).scale_mut(1.0 / *v);
+    }
+    let project = weighted.transpose();
+    let y = DVector::from_column_slice(&part.lateral);
+    let mut scored: Vec<(f64, Vec<f64>)> = grid
+        .into_iter()
+        .map(|tail| {
+            let mut u = fixed.to_vec();
+            u.extend(&tail);
+            let residual = &y - part.predict(members, &u);
+            let score = &project * &residual - &pull;
+            let step = factor.solve(&score);
+            let misfit: f64 = residual.iter().zip(&part_variance).map(|(r, v)| r * r / v).sum();
+            let cost = misfit + penalty - score.dot(&step);
+            for (k, s) in step.iter().enumerate() {
+                u[k] += s.clamp(-LONGEST_STEP, LONGEST_STEP);
+            }
+            (cost, u)
+        })
+        .collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+    scored
+}
+
+fn refine(
+    problem: &Problem,
+    members: &[Member],
+    fixed: usize,
+    variance: &[f64],
+    rows: &[usize],
+    scored: &[(f64, Vec<f64>)],
+    count: (usize, usize),
+) -> Vec<Fit> {
+    let part = problem.select(rows);
+    let part_variance: Vec<f64> = rows.iter().map(|&i| variance[i]).collect();
+    // Starts that differ: in the size's sign, or by more than one step of any shape.
+    let mut starts: Vec<&Vec<f64>> = Vec::new();
+    for (_, u) in scored {
+        let fresh = starts.iter().all(|s| {
+            (fixed..u.len()).any(|k| (u[k] - s[k]).abs() > if k == fixed { OTHER.0 } else { OTHER.1 })
+        });
+        if fresh {
+            starts.push(u);
+        }
+        if starts.len() == count.0 {
+            break;
+        }
+    }
+    let mut fits: Vec<Fit> =
+        starts.into_iter().map(|u| minimise(&part, members, u, &part_variance, ROUNDS.0)).collect();
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    // What is far behind by now does not catch up.
+    let ahead = fits.first().map_or(0.0, |f| f.cost);
+    fits.retain(|f| f.cost < BEHIND.0 * ahead + BEHIND.1);
+    fits.truncate(count.1 + 1);
+    for f in &mut fits {
+        *f = minimise(&part, members, &f.u, &part_variance, ROUNDS.1);
+    }
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let best = fits.first().map_or(0.0, |f| f.cost);
+    fits.retain(|f| f.cost < FAR_BEHIND.0 * best + FAR_BEHIND.1);
+    fits.truncate(count.1);
+    let mut whole: Vec<Fit> =
+        fits.iter().map(|f| minimise(problem, members, &f.u, variance, ROUNDS.2)).collect();
+    whole.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    whole
+}
+
+/// Variances with a floor of `share` of a residual gap: starts are sought on what the gap looks like at large,
+/// not on its last per cent.
+pub fn tempered(problem: &Problem, gap: &DVector<f64>, share: f64) -> Vec<f64> {
+    problem.variance.iter().zip(gap.iter()).map(|(v, g)| v + (share * g).powi(2)).collect()
+}
+
+/// Coordinates of a baseline fit followed by nothing: where a single effect starts from.
+pub fn nuisances_of(fit: &Fit) -> Vec<f64> {
+    fit.u[..NUISANCES].to_vec()
+}
+
+/// Where nuisances start: where they are, and at their calibration if they have been driven far from it to imitate a
+/// cause, from where no local fit comes back.
+pub fn nuisance_starts(u: &[f64], driven_sd: f64) -> Vec<Vec<f64>> {
+    let mut list = vec![u.to_vec()];
+    if u[..NUISANCES].iter().any(|x| x.abs() > driven_sd) {
+        let mut calibrated = u.to_vec();
+        calibrated[..NUISANCES].fill(0.0);
+        list.push(calibrated);
+    }
+    list
+}

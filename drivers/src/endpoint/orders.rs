@@ -1,0 +1,323 @@
+//! What is to be sent to an instrument, and whether it was read back off.
+//!
+//! Two rules stand here for every transport. A command that drives or moves leaves only before its expiry and never after a
+//! newer 'off'. An 'off' is owed until the instrument itself has shown it: it is handed out again wherever it was refused,
+//! or a state that came after it still says 'on'.
+
+use super::{Endpoint, Part};
+use crate::Role;
+use instruments::{Profile, SetId};
+use realtime::ports::{Nanos, NoData};
+use ringbuf::traits::Producer;
+
+/// Set-points that switch an output off leave before all others, in this order.
+const OFF_FIRST: [&str; 3] = ["enable", "velocity", "amplitude"];
+
+/// What a transport is to send now.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Due {
+    /// Nothing new.
+    Nothing,
+    /// These set-points, in their units: the loop's own command.
+    SetPoints(Vec<(SetId, f64)>),
+    /// The safe set-points, since no command is valid any more.
+    Safe(Vec<(SetId, f64)>),
+}
+
+/// What was wanted last, until it expires.
+#[derive(Debug, Clone, PartialEq)]
+struct Wanted {
+    set_points: Vec<(SetId, f64)>,
+    /// Whether it drives or moves.
+    on: bool,
+    expires_at: Nanos,
+    sent: bool,
+}
+
+/// The orders of one instrument and what it showed of them.
+#[derive(Debug, Default)]
+pub(super) struct Orders {
+    wanted: Option<Wanted>,
+    /// An order that drives or moves was handed out, and the instrument has not shown 'off' since.
+    driven: bool,
+    /// What the last state showed: whether the instrument is on, and when that arrived.
+    shown: Option<(bool, Nanos)>,
+    /// When an 'off' was last handed out.
+    off_sent: Option<Nanos>,
+    /// It was refused, wholly or in part.
+    refused: bool,
+}
+
+impl Orders {
+    /// A state came: whether the instrument drives or moves.
+    pub(super) fn read_back(&mut self, on: bool, arrived: Nanos) {
+        self.shown = Some((on, arrived));
+        if !on && self.off_sent.is_some_and(|sent| sent < arrived) {
+            self.driven = false;
+        }
+    }
+
+    /// Whether the instrument showed 'off' after an 'off' had been sent.
+    fn shown_off(&self) -> bool {
+        match (self.shown, self.off_sent) {
+            (Some((on, arrived)), Some(sent)) => !on && sent < arrived,
+            _ => false,
+        }
+    }
+}
+
+impl Endpoint {
+    /// Tells the loop at once that nothing will come, and why. Commands that wait are dropped: what
+    /// was wanted before the link went down must not be sent when it comes back.
+    pub fn link_down(&mut self, reason: NoData) {
+        self.seen.fill(false);
+        self.discard_commands();
+        let _ = match &mut self.part {
+            Part::Force { lateral, normal, last, ring } => {
+                for (axis, kept) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
+                    *kept = Err(if axis.is_some() { reason } else { NoData::NotFitted });
+                }
+                ring.try_push(*last).is_ok()
+            }
+            Part::Amplifier { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+            Part::Stage { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+            Part::Supply { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+            Part::Contacts(contacts) => {
+                contacts.lost(reason);
+                true
+            }
+        };
+    }
+
+    /// Drops all commands that wait.
+    pub fn discard_commands(&mut self) {
+        match &self.part {
+            Part::Force { .. } | Part::Contacts(_) => {}
+            Part::Amplifier { link, .. } => link.commands.drop_waiting(),
+            Part::Stage { link, .. } => link.commands.drop_waiting(),
+            Part::Supply { link, .. } => link.commands.drop_waiting(),
+        }
+        self.orders.wanted = None;
+    }
+
+    /// What is due to be sent at `now`: the newest command, if its time has not passed; else the safe set-points, where
+    /// the instrument has been on and has not shown since that it is off.
+    pub fn due(&mut self, now: Nanos) -> Due {
+        let newest = self.newest_command();
+        let off_came = self.take_off();
+        if let Some(newest) = newest {
+            self.orders.wanted = Some(newest);
+        }
+        if off_came && self.orders.wanted.as_ref().is_some_and(|wanted| wanted.on) {
+            // An 'off' came before it. The loop repeats what it wants in its next cycle.
+            self.orders.wanted = None;
+            return self.safe(now);
+        }
+        match &mut self.orders.wanted {
+            Some(wanted) if now <= wanted.expires_at => {
+                if wanted.sent {
+                    return if wanted.on { Due::Nothing } else { self.once_more(now) };
+                }
+                if let Some(refused) =
+                    wanted.set_points.iter().find_map(|(set, value)| self.profile.allows(*set, *value).err())
+                {
+                    self.health.count(&self.health.commands_refused);
+                    self.health.problem(refused.to_string());
+                    self.orders.wanted = None;
+                    return self.safe(now);
+                }
+                wanted.sent = true;
+                let (set_points, on) = (wanted.set_points.clone(), wanted.on);
+                self.orders.driven |= on;
+                self.orders.off_sent = if on { None } else { Some(now) };
+                self.health.count(&self.health.commands_sent);
+                Due::SetPoints(set_points)
+            }
+            Some(wanted) => {
+                if !wanted.sent {
+                    self.health.count(&self.health.commands_expired);
+                }
+                self.orders.wanted = None;
+                self.once_more(now)
+            }
+            None => self.once_more(now),
+        }
+    }
+
+    /// Whether a command that drives or moves, of which a part has left, may go on leaving. Asked before each set-point that
+    /// leaves by itself: the one before may have taken its time, and an 'off' may have come meanwhile. A newer command that
+    /// drives or moves as well keeps it alive, and is handed out next.
+    #[must_use]
+    pub fn still_wanted(&mut self, now: Nanos) -> bool {
+        if let Some(mut newest) = self.newest_command() {
+            newest.sent =
+                self.orders.wanted.as_ref().is_some_and(|wanted| wanted.set_points == newest.set_points);
+            self.orders.wanted = Some(newest);
+        }
+        !self.off_waits()
+            && self.orders.wanted.as_ref().is_some_and(|wanted| wanted.on && now <= wanted.expires_at)
+    }
+
+    /// Whether what was handed out last drives or moves.
+    #[must_use]
+    pub fn wants_on(&self) -> bool {
+        self.orders.wanted.as_ref().is_some_and(|wanted| wanted.on)
+    }
+
+    /// The set-points that make the rig safe, those that switch off first; they may be sent at any time.
+    #[must_use]
+    pub fn safe_set_points(&self) -> Vec<(SetId, f64)> {
+        safe_set_points(&self.profile)
+    }
+
+    /// Hands out the safe set-points: from `now` on a state that shows 'off' counts as their read-back.
+    pub fn hand_out_off(&mut self, now: Nanos) -> Vec<(SetId, f64)> {
+        self.orders.wanted = None;
+        self.orders.off_sent = Some(now);
+        self.orders.refused = false;
+        let _ = self.take_off();
+        self.health.count(&self.health.safe_sent);
+        self.safe_set_points()
+    }
+
+    /// What was handed out last was refused, wholly or in part, or its answer made no sense. An 'off' stays owed; a command
+    /// that drives or moves is dropped, and an 'off' owed for it.
+    pub fn refused(&mut self) {
+        self.orders.refused = true;
+        if self.wants_on() {
+            self.orders.wanted = None;
+        }
+    }
+
+    /// What the instrument is to the rig.
+    #[must_use]
+    pub fn role(&self) -> Role {
+        match self.part {
+            Part::Force { .. } => Role::Force,
+            Part::Amplifier { .. } => Role::Amplifier,
+            Part::Stage { .. } => Role::Stage,
+            Part::Supply { .. } => Role::Supply,
+            Part::Contacts(_) => Role::Contacts,
+        }
+    }
+
+    /// Whether there is anything to switch off: a drive, a stage or a supply that takes safe set-points.
+    #[must_use]
+    pub fn is_actuator(&self) -> bool {
+        !self.role().only_measures() && !self.safe_set_points().is_empty()
+    }
+
+    /// Whether the instrument may be on: it was driven, or showed itself on, and has not shown 'off' since.
+    #[must_use]
+    pub fn owes_off(&self) -> bool {
+        self.is_actuator() && (self.orders.driven || self.orders.shown.is_some_and(|(on, _)| on))
+    }
+
+    /// Whether the instrument has shown 'off' after the last 'off' that it was sent.
+    #[must_use]
+    pub fn reads_off(&self) -> bool {
+        self.orders.shown_off() && !self.orders.driven
+    }
+
+    /// The safe set-points where 'off' is owed and was not sent yet, was refused, or a later state still shows 'on'.
+    fn once_more(&mut self, now: Nanos) -> Due {
+        let ignored = match (self.orders.off_sent, self.orders.shown) {
+            (None, _) => true,
+            (Some(sent), Some((true, arrived))) => sent < arrived || self.orders.refused,
+            // What the instrument shows counts, not what it says of a set-point.
+            (Some(_), _) => self.orders.refused && !self.orders.shown_off(),
+        };
+        if ignored { self.safe(now) } else { Due::Nothing }
+    }
+
+    fn safe(&mut self, now: Nanos) -> Due {
+        if self.owes_off() { Due::Safe(self.hand_out_off(now)) } else { Due::Nothing }
+    }
+
+    fn take_off(&self) -> bool {
+        match &self.part {
+            Part::Force { .. } | Part::Contacts(_) => false,
+            Part::Amplifier { link, .. } => link.commands.take_off(),
+            Part::Stage { link, .. } => link.commands.take_off(),
+            Part::Supply { link, .. } => link.commands.take_off(),
+        }
+    }
+
+    fn off_waits(&self) -> bool {
+        match &self.part {
+            Part::Force { .. } | Part::Contacts(_) => false,
+            Part::Amplifier { link, .. } => link.commands.off_waits(),
+            Part::Stage { link, .. } => link.commands.off_waits(),
+            Part::Supply { link, .. } => link.commands.off_waits(),
+        }
+    }
+
+    fn newest_command(&mut self) -> Option<Wanted> {
+        let profile = &self.profile;
+        let set = |name: &str, si: f64| {
+            profile.set(name).map(|set| (set, si / profile.description.set[set.0].si.factor))
+        };
+        let heartbeat = |sequence: u32| {
+            profile.set("heartbeat").map(|set| (set, f64::from(sequence) % profile.heartbeat_turns(set)))
+        };
+        match &self.part {
+            Part::Force { .. } | Part::Contacts(_) => None,
+            Part::Supply { link, .. } => {
+                let command = link.commands.take()?;
+                let set_points = set("closed", f64::from(u8::from(command.closed))).into_iter().collect();
+                Some(Wanted { set_points, on: command.closed, expires_at: command.expires_at, sent: false })
+            }
+            Part::Amplifier { link, .. } => {
+                let command = link.commands.take()?;
+                let mut set_points = if command.enable {
+                    let wanted = [
+                        set("amplitude", command.amplitude_pp_m),
+                        set("frequency", command.frequency_hz),
+                        set("enable", 1.0),
+                    ];
+                    wanted.into_iter().flatten().collect()
+                } else {
+                    // Off leaves the frequency as it is: there may be no valid one.
+                    safe_set_points(profile)
+                };
+                set_points.extend(heartbeat(command.sequence));
+                Some(Wanted { set_points, on: command.enable, expires_at: command.expires_at, sent: false })
+            }
+            Part::Stage { link, dead_weight_n, .. } => {
+                let command = link.commands.take()?;
+                let wanted = command.normal_force_n;
+                if let Some(weight) =
+                    dead_weight_n.filter(|weight| wanted != 0.0 && (wanted - weight).abs() > 1e-6)
+                {
+                    let text = format!("the load stands on a weight of {weight} N: {wanted} N cannot be had");
+                    self.health.count(&self.health.commands_refused);
+                    self.health.problem(text);
+                    return None;
+                }
+                let wanted = [
+                    set("velocity", command.velocity_m_s),
+                    set("load", command.normal_force_n),
+                    heartbeat(command.sequence),
+                ];
+                Some(Wanted {
+                    set_points: wanted.into_iter().flatten().collect(),
+                    on: !command.rests(),
+                    expires_at: command.expires_at,
+                    sent: false,
+                })
+            }
+        }
+    }
+}
+
+fn safe_set_points(profile: &Profile) -> Vec<(SetId, f64)> {
+    let sets = profile.description.set.iter().enumerate();
+    let mut safe: Vec<(SetId, f64)> =
+        sets.filter_map(|(i, set)| set.safe.map(|safe| (SetId(i), safe))).collect();
+    let place = |(set, _): &(SetId, f64)| {
+        let name = profile.description.set[set.0].name.as_ref();
+        OFF_FIRST.iter().position(|first| first == name).unwrap_or(OFF_FIRST.len())
+    };
+    safe.sort_by_key(place);
+    safe
+}

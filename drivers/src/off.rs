@@ -1,0 +1,92 @@
+//! How an instrument is switched off, whatever the wire: send, read back, again, until it shows 'off' or the time is over.
+//!
+//! An end of the program, a trip that ends a sweep, a signal and a panic all come here, since each of them drops
+//! [`crate::Links`]. A link that is down at that moment is made anew for the purpose. What cannot be read back is not said to
+//! be off.
+
+use super::session::{Ended, Session};
+use realtime::ports::Nanos;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// A link tries this long to switch off and to read it back, lost connections made anew included; then it is given up, and
+/// [`Closed::NotReadBack`] says so.
+pub const OFF_WITHIN: Duration = Duration::from_secs(2);
+/// An answer on the way to 'off' may take this long, in ms, where the profile allows less: a slow answer is still one.
+pub const OFF_ANSWER_MS: u32 = 600;
+/// Pause between two tries.
+const AGAIN: Duration = Duration::from_millis(4);
+
+/// How a link was closed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Closed {
+    /// A sensor, or an instrument without safe set-points: nothing to switch off.
+    NothingToSwitch,
+    /// The safe set-points were sent, and a later state of the instrument showed that it is off, or stands.
+    ReadBackOff,
+    /// No state has shown that. The reason in words.
+    NotReadBack(String),
+}
+
+/// What a transport can do for an 'off'.
+pub trait OffWay {
+    /// Sends every safe set-point, whatever became of the one before. What was refused it tells the endpoint.
+    ///
+    /// # Errors
+    /// Only where the connection carries nothing more.
+    fn send_off(&mut self, session: &mut Session) -> Result<(), Ended>;
+
+    /// From now on answers are waited for as long as [`OFF_ANSWER_MS`], where the profile allows less.
+    fn be_patient(&mut self, session: &Session);
+
+    /// Gets the next state of the instrument into the endpoint.
+    ///
+    /// # Errors
+    /// Only where the connection carries nothing more.
+    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended>;
+}
+
+/// Switches an instrument off and reads it back.
+///
+/// # Errors
+/// The connection carries nothing more, or the time is over and the instrument has not shown 'off'.
+pub fn switch_off(session: &mut Session, way: &mut dyn OffWay) -> Result<(), Ended> {
+    if !session.endpoint.is_actuator() {
+        return Ok(());
+    }
+    way.be_patient(session);
+    loop {
+        way.send_off(session)?;
+        way.read_state(session)?;
+        if session.endpoint.reads_off() {
+            return Ok(());
+        }
+        if session.off_time_over() {
+            return Err(Ended::StillOn);
+        }
+        session.sleep_until(Some(session.now().plus(Nanos(AGAIN.as_nanos() as u64))));
+    }
+}
+
+/// The end of a conversation whose thread is to stop: off, read back.
+pub fn at_the_end(session: &mut Session, way: &mut dyn OffWay) -> Ended {
+    match switch_off(session, way) {
+        Ok(()) => Ended::Stopped,
+        Err(ended) => ended,
+    }
+}
+
+/// The beginning of a conversation that follows a lost one: 'off' leaves before anything is asked, where it is owed.
+///
+/// # Errors
+/// The connection carries nothing more.
+pub fn at_the_beginning(session: &mut Session, way: &mut dyn OffWay) -> Result<(), Ended> {
+    if session.is_first() || !session.endpoint.owes_off() {
+        Ok(())
+    } else if session.stopping() {
+        switch_off(session, way)
+    } else {
+        way.send_off(session)
+    }
+}

@@ -1,0 +1,122 @@
+//! The candidate causes, one file each.
+//!
+//! A file holds everything that is known of its cause: laws, priors and sources, what a table must hold to show it,
+//! which certificate bounds it, what does the same, and which check sees it without going through friction. Nothing
+//! of that stands anywhere else. To add a cause: its file, and its line in the list below.
+
+use crate::effect::{Effect, Law};
+
+/// What every cause's file needs.
+mod prelude {
+    pub use crate::contact::Contact;
+    pub use crate::effect::{Effect, Law, Need, Parameter, Place};
+    pub use crate::operating::{Design, Reading, atmospheres};
+    pub use models::condition::Condition;
+    pub use models::rig_file::CertifiedKey;
+}
+
+/// Declares the files of this folder and lists their causes.
+macro_rules! causes {
+    (library { $($file:ident::$cause:ident)* } open_set { $($other_file:ident::$other:ident)* }) => {
+        $(pub mod $file;)*
+        $(pub mod $other_file;)*
+        static LIBRARY: &[&dyn Effect] = &[$(&$file::$cause),*];
+        static KNOWN: &[&dyn Effect] = &[$(&$file::$cause,)* $(&$other_file::$other),*];
+    };
+}
+
+causes! {
+    // In the order in which a signal passes them: instruments that falsify the condition, plate, finger, contact,
+    // instruments that read the force.
+    library {
+        normal_offset::NormalOffset
+        normal_gain::NormalGain
+        speed_error::SpeedError
+        speed_ripple::SpeedRipple
+        amplitude_miscalibration::AmplitudeMiscalibration
+        amplitude_saturation::AmplitudeSaturation
+        resonance_detuning::ResonanceDetuning
+        mode_shape::ModeShape
+        amplitude_droop::AmplitudeDroop
+        stiffness_error::StiffnessError
+        subsurface_relaxation::SubsurfaceRelaxation
+        moisture_drift::MoistureDrift
+        rate_dependent_friction::RateDependentFriction
+        load_dependent_friction::LoadDependentFriction
+        adhesion::Adhesion
+        multi_asperity::MultiAsperity
+        normal_damping::NormalDamping
+        lateral_recovery::LateralRecovery
+        contact_ageing::ContactAgeing
+        ridge_inertia::RidgeInertia
+        squeeze_film::SqueezeFilm
+        plate_tilt::PlateTilt
+        force_crosstalk::ForceCrosstalk
+        lateral_gain::LateralGain
+        lateral_offset_drift::LateralOffsetDrift
+        sensor_lag::SensorLag
+        time_misalignment::TimeMisalignment
+    }
+    // Causes of known form that no verdict names: the open set of a diagnosis takes them in.
+    open_set {
+        frictional_heating::FrictionalHeating
+    }
+}
+
+/// Every effect that a verdict may name, in the order in which effects act.
+pub fn library() -> &'static [&'static dyn Effect] {
+    LIBRARY
+}
+
+/// The library, and after it causes of known form that it does not name: a diagnosis' open set takes them in.
+pub fn known() -> &'static [&'static dyn Effect] {
+    KNOWN
+}
+
+/// Whether one of two effects nearly does what the other does, so that it stands in for it where that is missing.
+pub fn near(a: &str, b: &str) -> bool {
+    let states = |one: &str, other: &str| by_name(one).is_some_and(|e| e.near().contains(&other));
+    states(a, b) || states(b, a)
+}
+
+/// Whether two effects are one cause under two names: a law of one states that it does the same as a law of the other.
+pub fn one_cause(a: &str, b: &str) -> bool {
+    let states = |one: &str, other: &str| {
+        let laws = by_name(one).map_or(&[][..], |e| e.laws());
+        laws.iter().any(|l| l.same_as.is_some_and(|(effect, _)| effect == other))
+    };
+    states(a, b) || states(b, a)
+}
+
+/// The cause outside of the library that these effects of it together nearly imitate, where there is one.
+pub fn imitated(names: &[&str]) -> Option<&'static dyn Effect> {
+    let by =
+        |e: &&&dyn Effect| !e.imitated_by().is_empty() && e.imitated_by().iter().all(|n| names.contains(n));
+    known().iter().find(by).copied()
+}
+
+/// Every two laws that do the same for the same size, by index of effect and law: those that act as one change of the
+/// baseline, and those that say so of each other.
+pub fn twins() -> Vec<[(usize, usize); 2]> {
+    let laws: Vec<(usize, usize, &Law)> = (library().iter().enumerate())
+        .flat_map(|(e, effect)| effect.laws().iter().enumerate().map(move |(l, law)| (e, l, law)))
+        .collect();
+    let says = |a: &(usize, usize, &Law), b: &(usize, usize, &Law)| {
+        a.2.same_as == Some((library()[b.0].name(), b.2.name))
+    };
+    let mut list = Vec::new();
+    for (k, a) in laws.iter().enumerate() {
+        for b in laws[k + 1..].iter().filter(|b| b.0 != a.0) {
+            let one = a.2.acts_as.is_some() && a.2.acts_as == b.2.acts_as;
+            if one || says(a, b) || says(b, a) {
+                list.push([(a.0, a.1), (b.0, b.1)]);
+            }
+        }
+    }
+    list
+}
+
+/// The effect of that name in the library.
+pub fn by_name(name: &str) -> Option<&'static dyn Effect> {
+    library().iter().copied().find(|effect| effect.name() == name)
+}

@@ -1,0 +1,66 @@
+//! Adhesion loads the contact beyond what the normal force does, and holds it until it is pulled off.
+
+use super::prelude::*;
+use crate::contact::Attraction;
+
+/// See the module.
+pub struct Adhesion;
+
+static LAWS: [Law; 4] = [
+    Law::new("DMT", &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)]),
+    Law::new("constant shear on the touching time", &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)]),
+    Law::new(
+        "developing with the momentary load",
+        &[
+            Parameter::positive("adhesive_force", "N", 0.06, 1.0),
+            Parameter::shape("load_of_half_attraction", "N", 0.04, 1.0),
+        ],
+    ),
+    Law::new("JKR", &[Parameter::positive("pull_off_force", "N", 0.015, 0.5)]),
+];
+
+impl Effect for Adhesion {
+    fn name(&self) -> &'static str {
+        "adhesion"
+    }
+    fn place(&self) -> Place {
+        Place::Contact
+    }
+    fn summary(&self) -> &'static str {
+        "The friction limit is mu0 (F + Fa), and contact is kept until the spring pulls with Fa."
+    }
+    fn source(&self) -> &'static str {
+        "Derjaguin, Muller, Toporov 1975; Johnson, Kendall, Roberts 1971; capillary and van der Waals pull of tens of mN on a finger"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn near(&self) -> &'static [&'static str] {
+        &["normal_offset"]
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Loads]
+    }
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
+        if law == 0 {
+            c.adhesion = theta[0];
+        } else if law == 2 {
+            c.attraction = if theta[0] > 0.0 {
+                Attraction::Developing { force: theta[0], scale: theta[1] }
+            } else {
+                Attraction::None
+            };
+        } else if law == 3 {
+            c.attraction =
+                if theta[0] > 0.0 { Attraction::Jkr { pull_off: theta[0] } } else { Attraction::None };
+        } else {
+            // Added friction for the share of the cycle in which the surfaces touch.
+            let touching = if c.amplitude_pp > crate::contact::STILL_PLATE_M {
+                crate::contact::half_contact_angle(c.load_ratio(), 0.0) / std::f64::consts::PI
+            } else {
+                1.0
+            };
+            c.mu0 *= 1.0 + theta[0] * touching / c.normal_force;
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! The amplifier cannot deliver the largest amplitudes.
+
+use super::prelude::*;
+
+/// See the module.
+pub struct AmplitudeSaturation;
+
+/// What sees it without friction.
+const CHECK: &str = "Measure the plate with a vibrometer at the largest drives.";
+
+static LAWS: [Law; 3] = [
+    Law::new("hard limit", &[Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6)]).seen_by(CHECK, 2e4),
+    Law::new(
+        "limit with a bend",
+        &[
+            Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6),
+            Parameter::shape("sharpness", "1", 4.0, 0.6),
+        ],
+    )
+    .seen_by(CHECK, 2e4),
+    Law::new("compression", &[Parameter::positive("inverse_limit", "1/m", 0.2e6, 5e6)]).seen_by(CHECK, 2e4),
+];
+
+impl Effect for AmplitudeSaturation {
+    fn name(&self) -> &'static str {
+        "amplitude_saturation"
+    }
+    fn place(&self) -> Place {
+        Place::Plate
+    }
+    fn summary(&self) -> &'static str {
+        "Above some command the amplitude no longer follows."
+    }
+    fn source(&self) -> &'static str {
+        "rail voltage and depolarisation limits of piezo drives"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration, Need::Amplitudes]
+    }
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
+        let x = theta[0] * c.amplitude_pp;
+        c.amplitude_pp *= match law {
+            0 => {
+                if x > 1.0 {
+                    1.0 / x
+                } else {
+                    1.0
+                }
+            }
+            1 => (1.0 + x.powf(theta[1])).powf(-1.0 / theta[1]),
+            _ => {
+                if x > 1e-6 {
+                    x.tanh() / x
+                } else {
+                    1.0
+                }
+            }
+        };
+    }
+}

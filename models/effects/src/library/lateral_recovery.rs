@@ -1,0 +1,66 @@
+//! The skin's lateral stretch does not vanish at lift-off but recovers at a finite rate.
+
+use super::prelude::*;
+
+/// See the module.
+pub struct LateralRecovery;
+
+static LAWS: [Law; 5] = [
+    Law::new("rate limit", &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)]),
+    Law::new("exponential", &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)]),
+    Law::new(
+        "spectrum of times, in flight",
+        &[
+            Parameter::positive("relaxation_time", "s", 30e-6, 1e-3),
+            Parameter::between("exponent", "1", 0.2, 1.6),
+        ],
+    ),
+    Law::new("rate limit, in flight", &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)]),
+    Law::new(
+        "rate limit, slower near rest",
+        &[
+            Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0),
+            Parameter::shape("stretch_of_half_speed", "m", 1e-7, 1.0),
+        ],
+    ),
+];
+
+impl Effect for LateralRecovery {
+    fn name(&self) -> &'static str {
+        "lateral_recovery"
+    }
+    fn place(&self) -> Place {
+        Place::Contact
+    }
+    fn summary(&self) -> &'static str {
+        "Stretch left from the last contact lets the friction force start higher in the next."
+    }
+    fn source(&self) -> &'static str {
+        "section 5.3 of the paper (recovery at 1.5 to 15 mm/s); Kelvin-Voigt as the second form"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration]
+    }
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
+        match law {
+            0 => c.inverse_recovery_speed = theta[0],
+            1 => c.lateral_relaxation_time = theta[0],
+            2 => {
+                c.lateral_relaxation_time = theta[0];
+                c.lateral_relaxation_exponent = theta[1];
+                c.instant_slip_back = true;
+            }
+            4 => {
+                c.inverse_recovery_speed = theta[0];
+                c.recovery_knee = theta[1];
+            }
+            _ => {
+                c.inverse_recovery_speed = theta[0];
+                c.instant_slip_back = true;
+            }
+        }
+    }
+}

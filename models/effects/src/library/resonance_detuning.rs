@@ -1,0 +1,112 @@
+//! The drive is off the plate's resonance: by warming up, with time, or at one of the frequencies.
+//!
+//! A resonance that falls with the amplitude alone is not told from saturation, and belongs there.
+
+use super::prelude::*;
+
+/// See the module.
+pub struct ResonanceDetuning;
+
+/// What sees it without friction.
+const CHECK: &str = "Retune the drive (sweep its frequency) at the start and the end of a run.";
+
+static LAWS: [Law; 6] = [
+    Law::new("warming (temperature)", &[Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0)])
+        .needs(&[Need::Temperatures])
+        .seen_by(CHECK, 0.05),
+    Law::new(
+        "drift with time",
+        &[
+            Parameter::positive("detuning", "1", 1.0, 12.0),
+            Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
+        ],
+    )
+    .seen_by(CHECK, 0.05),
+    Law::new(
+        "fixed resonance",
+        &[
+            Parameter::positive("quality_factor", "1", 60.0, 600.0),
+            Parameter::between("resonance_over_reference", "1", 0.7, 1.4),
+        ],
+    )
+    .needs(&[Need::Frequencies])
+    .seen_by(CHECK, 3.0),
+    Law::new(
+        "loss with time",
+        &[
+            Parameter::positive("loss", "1", 0.5, 8.0),
+            Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
+        ],
+    )
+    .seen_by(CHECK, 0.05),
+    // The point of tuning need not be the first pass, and a softening resonator falls with its own swing.
+    Law::new(
+        "warming about a tuning point",
+        &[
+            Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0),
+            Parameter::signed("tuning_point_above_first", "K", 3.0, -20.0, 20.0),
+            Parameter::signed("softening_at_largest_amplitude", "K", 2.0, -20.0, 20.0),
+        ],
+    )
+    .needs(&[Need::Temperatures])
+    .seen_by(CHECK, 0.05),
+    Law::new(
+        "drift about a tuning point",
+        &[
+            Parameter::positive("detuning", "1", 1.0, 12.0),
+            Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
+            Parameter::signed("tuning_point", "1", 0.3, -2.0, 2.0),
+            Parameter::signed("softening_at_largest_amplitude", "1", 0.3, -3.0, 3.0),
+        ],
+    )
+    .seen_by(CHECK, 0.05),
+];
+
+impl Effect for ResonanceDetuning {
+    fn name(&self) -> &'static str {
+        "resonance_detuning"
+    }
+    fn place(&self) -> Place {
+        Place::Plate
+    }
+    fn summary(&self) -> &'static str {
+        "Off resonance the plate moves less than commanded, by the Lorentzian of its quality factor."
+    }
+    fn source(&self) -> &'static str {
+        "Q 100 at 27.5 kHz: 138 Hz halve the power; temperature coefficient of the plate's modulus"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration]
+    }
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
+        if law == 3 {
+            let tau = theta[1] * design.duration_s.max(1e-9);
+            c.amplitude_pp /= 1.0 - theta[0] * (-pass.time_s / tau).exp_m1();
+            return;
+        }
+        let swing = (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).powi(2);
+        let off = match law {
+            0 => theta[0] * pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c),
+            1 => {
+                let tau = theta[1] * design.duration_s.max(1e-9);
+                -theta[0] * (-pass.time_s / tau).exp_m1()
+            }
+            2 => {
+                let r = pass.frequency_hz / (design.reference_frequency_hz * theta[1]);
+                theta[0] * (r - 1.0 / r)
+            }
+            4 => {
+                let warmer = pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
+                theta[0] * (warmer - theta[1] + theta[2] * swing)
+            }
+            _ => {
+                let tau = theta[1] * design.duration_s.max(1e-9);
+                theta[0] * (-(-pass.time_s / tau).exp_m1() - theta[2] + theta[3] * swing)
+            }
+        };
+        c.amplitude_pp /= (1.0 + off * off).sqrt();
+    }
+}

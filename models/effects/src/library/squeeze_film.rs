@@ -1,0 +1,171 @@
+//! Air trapped under the vibrating finger carries part of the load.
+
+use super::prelude::*;
+
+/// See the module.
+pub struct SqueezeFilm;
+
+/// Load on solid contact without air that fades by 1/e over one film thickness unit, N (physics.md 4.1).
+const SOLID_SCALE_N: f64 = 1.1;
+/// Apparent area times one atmosphere, N (34 mm2, physics.md section 2).
+const AIR_SCALE_N: f64 = 3.4;
+
+/// Excursion of the plate over the mean gap beyond which the film's formula is not followed (its pole lies at one).
+const MOST_EXCURSION: f64 = 0.95;
+/// Film thickness units beyond which nothing of the load is left to solid contact.
+const FARTHEST: f64 = 60.0;
+
+/// What sees it without friction.
+const CHECK: &str = "Repeat the largest amplitudes at 0.2 atm.";
+
+static LAWS: [Law; 5] = [
+    Law::new("load shared with a film", &[Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6)])
+        .seen_by(CHECK, 5e4),
+    Law::new(
+        "rational share",
+        &[
+            Parameter::positive("share_per_amplitude_squared", "1/m^2", 0.4e12, 4e12),
+            Parameter::between("load_exponent", "1", 0.0, 1.0),
+        ],
+    )
+    .seen_by(CHECK, 3e10),
+    Law::new(
+        "exponential on friction",
+        &[Parameter::positive("decay_per_amplitude_squared", "1/m^2", 0.3e12, 3e12)],
+    )
+    .seen_by(CHECK, 2.5e10),
+    Law::new(
+        "power on friction",
+        &[
+            Parameter::positive("inverse_amplitude", "1/m", 0.5e6, 4e6),
+            Parameter::between("exponent", "1", 1.0, 3.0),
+        ],
+    )
+    .seen_by(CHECK, 5e4),
+    Law::new(
+        "load shared with a film of finite excursion",
+        &[
+            Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6),
+            Parameter::shape("film_over_apparent_area", "1", 0.5, 1.0),
+            Parameter::shape("solid_load", "N", SOLID_SCALE_N, 0.4),
+        ],
+    )
+    .seen_by(CHECK, 5e4),
+];
+
+impl Effect for SqueezeFilm {
+    fn name(&self) -> &'static str {
+        "squeeze_film"
+    }
+    fn place(&self) -> Place {
+        Place::Contact
+    }
+    fn summary(&self) -> &'static str {
+        "Compressed air carries a share of the load that grows with amplitude and ambient pressure."
+    }
+    fn source(&self) -> &'static str {
+        "Wiertlewski, Friesen, Colgate 2016 (partial levitation); infinite squeeze number, in its small-amplitude form and for \
+         any excursion (Langlois 1962, Salbu 1964)"
+    }
+    fn laws(&self) -> &'static [Law] {
+        &LAWS
+    }
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Vibration, Need::Amplitudes]
+    }
+    fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
+        let air = atmospheres(pass);
+        match law {
+            0 => c.solid_share *= film_share(theta[0] * c.half_amplitude(), air, c.normal_force),
+            1 => {
+                let eased = (design.reference_load_n / c.normal_force).powf(theta[1]);
+                c.solid_share /= 1.0 + theta[0] * c.amplitude_pp.powi(2) * air * eased;
+            }
+            2 => c.friction_factor *= (-theta[0] * c.amplitude_pp.powi(2) * air).exp(),
+            3 => c.friction_factor /= 1.0 + air * (theta[0] * c.amplitude_pp).powf(theta[1]),
+            _ => {
+                let film = theta[1] * AIR_SCALE_N * air;
+                c.solid_share *=
+                    finite_film_share(theta[0] * c.half_amplitude(), film, theta[2], c.normal_force);
+            }
+        }
+    }
+}
+
+/// The same where the film is that of a strongly squeezed isothermal gas at any excursion `e = a/u`:
+/// `Fn = solid exp(-u) + film (sqrt((1 + 3/2 e^2) / (1 - e^2)) - 1)` (Langlois 1962, Salbu 1964), whose first term is
+/// 5/4 e^2.
+fn finite_film_share(a: f64, film: f64, solid: f64, load: f64) -> f64 {
+    if a <= 0.0 {
+        return 1.0;
+    }
+    let rest = (solid / load).ln().max(0.2);
+    // exp(rest - u) + lift(u) = 1; the share without air is one.
+    let short = |u: f64| {
+        let e2 = (a / u).min(MOST_EXCURSION).powi(2);
+        1.0 - (rest - u).exp() - film / load * (((1.0 + 1.5 * e2) / (1.0 - e2)).sqrt() - 1.0)
+    };
+    let (mut low, mut high) = (rest, rest + 1.0);
+    while short(high) < 0.0 {
+        (low, high) = (high, rest + 2.0 * (high - rest));
+        if high > rest + FARTHEST {
+            return (rest - high).exp();
+        }
+    }
+    crate::contact::sweep::root(low, high, 0.0, short).map_or(1.0, |u| (rest - u).exp().min(1.0))
+}
+
+/// Share left to solid contact when `Fn = solid exp(-u) + 1.25 p A (a/u)^2`, u in film thickness units.
+fn film_share(a: f64, air: f64, load: f64) -> f64 {
+    if a <= 0.0 {
+        return 1.0;
+    }
+    let rest = (SOLID_SCALE_N / load).ln().max(0.2);
+    let lift = 1.25 * AIR_SCALE_N * air * a * a / load;
+    // exp(rest - u) + lift/u^2 = 1, falling in u.
+    let (mut low, mut high) = (rest, rest + 40.0 + 2.0 * lift.sqrt());
+    let mut u = rest + lift.sqrt() * 0.5;
+    for _ in 0..60 {
+        let solid = (rest - u).exp();
+        let value = solid + lift / (u * u) - 1.0;
+        if value > 0.0 {
+            low = u
+        } else {
+            high = u
+        }
+        let newton = u + value / (solid + 2.0 * lift / (u * u * u));
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if (next - u).abs() < 1e-10 * u {
+            u = next;
+            break;
+        }
+        u = next;
+    }
+    (rest - u).exp().min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// For small excursions the film's overpressure is 5/4 of the square: both laws agree.
+    #[test]
+    fn a_film_of_small_excursion_is_the_small_amplitude_form() {
+        for (a, load) in [(0.02, 0.3), (0.05, 0.8), (0.1, 0.15)] {
+            let (small, finite) =
+                (film_share(a, 1.0, load), finite_film_share(a, AIR_SCALE_N, SOLID_SCALE_N, load));
+            assert!((small - finite).abs() < 0.05 * (1.0 - small), "{a} {load}: {small} {finite}");
+        }
+    }
+
+    /// Load on solid and film add up to the normal force.
+    #[test]
+    fn solid_and_film_carry_the_load() {
+        let (a, film, solid, load) = (1.4, 2.0, 1.1, 0.4);
+        let share = finite_film_share(a, film, solid, load);
+        let u = (solid / load).ln() - share.ln();
+        let e2 = (a / u).powi(2);
+        let carried = share * load + film * (((1.0 + 1.5 * e2) / (1.0 - e2)).sqrt() - 1.0);
+        assert!((carried - load).abs() < 1e-9 && share < 0.9, "{carried} {share}");
+    }
+}

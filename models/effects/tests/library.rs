@@ -1,0 +1,160 @@
+//! What the library says of its causes is true: names exist, exact aliases are exact, checks and certificates fit.
+use models::condition::Condition;
+use models::quantity::{Direction, PeakToPeak};
+use models::rig_file::CertifiedKey;
+use muprime_effects::{Active, Baseline, Design, Effect, Prior, by_name, known, lateral_force, library};
+use std::collections::BTreeSet;
+
+const BASELINE: Baseline =
+    Baseline { mu0: 0.6, normal_stiffness_n_per_m: 2e6, lateral_stiffness_n_per_m: 0.8e6 };
+
+const DESIGN: Design = Design {
+    duration_s: 200.0,
+    reference_load_n: 0.35,
+    reference_speed_m_s: 0.02,
+    reference_frequency_hz: 35_000.0,
+    reference_temperature_c: 20.0,
+    stroke_m: 0.03,
+    largest_amplitude_m: 5e-6,
+};
+
+fn passes() -> Vec<Condition> {
+    let mut list = Vec::new();
+    for amplitude_pp_m in [0.0, 0.4e-6, 1.5e-6, 5e-6] {
+        for speed_m_s in [2e-3, 0.02, 0.2] {
+            for normal_force_n in [0.15, 0.8] {
+                for direction in [Direction::Forward, Direction::Backward] {
+                    list.push(Condition {
+                        time_s: 10.0,
+                        amplitude: PeakToPeak::from_metres(amplitude_pp_m),
+                        frequency_hz: 27_500.0,
+                        speed_m_s,
+                        direction,
+                        position_m: 0.01,
+                        normal_force_n,
+                        ..Condition::paper()
+                    });
+                }
+            }
+        }
+    }
+    list
+}
+
+fn forces(baseline: &Baseline, active: &[Active<'_>]) -> Vec<f64> {
+    passes().iter().map(|p| lateral_force(baseline, active, p, &DESIGN)).collect()
+}
+
+/// Largest difference, relative to the largest force.
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    let top = a.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    a.iter().zip(b).fold(0.0f64, |m, (x, y)| m.max((x - y).abs())) / top
+}
+
+/// Every effect and law that one file names in another exists, and laws of one effect differ in name.
+#[test]
+fn every_name_referred_to_exists() {
+    let names: BTreeSet<&str> = known().iter().map(|e| e.name()).collect();
+    assert_eq!(names.len(), known().len(), "two causes of one name");
+    for effect in known() {
+        for other in effect.near().iter().chain(effect.imitated_by()) {
+            assert!(by_name(other).is_some() && *other != effect.name(), "{} names '{other}'", effect.name());
+        }
+        let laws: BTreeSet<&str> = effect.laws().iter().map(|l| l.name).collect();
+        assert_eq!(laws.len(), effect.laws().len(), "{}: two laws of one name", effect.name());
+        for (other, law) in effect.laws().iter().filter_map(|l| l.same_as) {
+            let found = by_name(other).is_some_and(|e| e.laws().iter().any(|l| l.name == law));
+            assert!(found && other != effect.name(), "{} names '{other}' with '{law}'", effect.name());
+        }
+    }
+    for outside in &known()[library().len()..] {
+        assert!(by_name(outside.name()).is_none() && outside.words() != outside.name(), "{}", outside.name());
+    }
+}
+
+/// What a law says of itself as a change of the baseline is so on every pass.
+#[test]
+fn laws_that_act_as_a_change_of_the_baseline_do_so_exactly() {
+    let mut tried = 0;
+    for effect in known() {
+        for (law, form) in effect.laws().iter().enumerate() {
+            let Some([mu0, normal, lateral]) = form.acts_as else { continue };
+            for size in [-0.4, 0.1, 0.5] {
+                let changed = Baseline {
+                    mu0: BASELINE.mu0 * (mu0 * size).exp(),
+                    normal_stiffness_n_per_m: BASELINE.normal_stiffness_n_per_m * (normal * size).exp(),
+                    lateral_stiffness_n_per_m: BASELINE.lateral_stiffness_n_per_m * (lateral * size).exp(),
+                };
+                let with = forces(&BASELINE, &[Active { effect: *effect, law, theta: &[size] }]);
+                let off = apart(&with, &forces(&changed, &[]));
+                assert!(off < 1e-9, "{} ({}) at {size}: off by {off:.1e}", effect.name(), form.name);
+                assert!(apart(&with, &forces(&BASELINE, &[])) > 1e-3, "{}: nothing changes", effect.name());
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried >= 3 * 6, "{tried}");
+}
+
+/// Twins do the same for the same size, but for a rest that is small against what they do.
+#[test]
+fn twins_do_the_same() {
+    let twins = muprime_effects::twins();
+    for [(a, law_a), (b, law_b)] in &twins {
+        let of = |e: usize, law: usize| {
+            let effect: &'static dyn Effect = library()[e];
+            forces(&BASELINE, &[Active { effect, law, theta: &[0.03] }])
+        };
+        let (one, other) = (of(*a, *law_a), of(*b, *law_b));
+        let change = apart(&one, &forces(&BASELINE, &[]));
+        let names = [library()[*a].name(), library()[*b].name()];
+        assert!(apart(&one, &other) < 0.35 * change, "{names:?}: {} of {change}", apart(&one, &other));
+    }
+    let of =
+        |name: &str| twins.iter().filter(|t| t.iter().any(|(e, _)| library()[*e].name() == name)).count();
+    assert!(of("plate_tilt") == 1 && of("stiffness_error") == 2 && of("speed_error") == 1, "{twins:?}");
+}
+
+/// Each quantity that a certificate can bound is the size of some law, which starts from zero.
+#[test]
+fn every_certified_quantity_bounds_a_law() {
+    for key in CertifiedKey::ALL {
+        let laws: Vec<_> =
+            library().iter().flat_map(|e| e.laws()).filter(|l| l.certified_by == Some(key)).collect();
+        assert_eq!(laws.len(), 1, "{} bounds {} laws", key.name(), laws.len());
+        let size = &laws[0].parameters[0];
+        let unit = if key.name().ends_with("_n") {
+            "N"
+        } else if key.name().ends_with("_rad") {
+            "rad"
+        } else {
+            "1"
+        };
+        assert!(size.unit == unit && size.zero == Some(0.0), "{}: size in {}", key.name(), size.unit);
+    }
+}
+
+/// A cause outside of the library is imitated by a pair, and only by the whole of it.
+#[test]
+fn heating_is_imitated_by_rate_and_load_together() {
+    let pair = ["load_dependent_friction", "rate_dependent_friction"];
+    assert_eq!(muprime_effects::imitated(&pair).map(Effect::name), Some("frictional_heating"));
+    assert!(muprime_effects::imitated(&pair[..1]).is_none());
+}
+
+/// What a check measures is of the unit of the law's size: its deviation is a part of the size's prior, neither more than
+/// half of it nor next to nothing.
+#[test]
+fn checks_measure_in_the_unit_of_the_size() {
+    let mut checked = 0;
+    for (effect, law) in library().iter().flat_map(|e| e.laws().iter().map(move |l| (e, l))) {
+        let Some(check) = law.seen_by else { continue };
+        let (Prior::Normal(sd) | Prior::HalfNormal(sd)) = law.parameters[0].prior else {
+            panic!("{} ({}): the size comes first", effect.name(), law.name)
+        };
+        let share = check.sd / sd;
+        assert!((5e-3..=0.5).contains(&share), "{} ({}): {share:.1e} of the prior", effect.name(), law.name);
+        checked += 1;
+    }
+    assert!(checked > 20, "{checked}");
+}

@@ -1,0 +1,131 @@
+//! The way from faulted to armed: one reset edge, the second switch-off channel proved, every cause clear.
+//!
+//! A reset clears and never restarts: what was asked for before it is forgotten, and the outputs stay at zero until a request
+//! comes in a later cycle. Where a second channel is fitted, it is opened and closed again before every arming, and its own
+//! readback must show both.
+
+use super::rules::{Breach, Cause};
+use super::{Decision, Safety, State, Trip};
+use crate::ports::{Nanos, NoData, SupplyCommand, SupplyState};
+
+/// Time within which the second channel must show that it did what it was told: ten times a contactor's, and a poll.
+pub(super) const SUPPLY_ACTS: Nanos = Nanos(500_000_000);
+/// Time that an amplifier may take to come back, with every other cause clear, once its supply is closed again.
+const RESTART: Nanos = Nanos(5_000_000_000);
+
+/// What is being proved before the rig is armed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Proof {
+    /// The second channel is told to cut and must read cut.
+    Opens,
+    /// It is told to restore and must read closed; the amplifier must come back.
+    Closes,
+}
+
+/// Causes that a supply cut on purpose brings about by itself.
+const WITH_THE_CUT: &[Cause] = &[
+    Cause::RefusesOff,
+    Cause::AmplifierStale,
+    Cause::AmplifierFault,
+    Cause::AmplifierWatchdog,
+    Cause::AmplitudeSaturated,
+    Cause::OverTemperature,
+];
+
+/// What a cycle of arming looks at.
+pub(super) struct Step {
+    /// The first broken rule, and the first one that [`Safety::excused`] does not excuse.
+    pub broken: Option<Breach>,
+    pub besides_the_cut: Option<Breach>,
+    pub cuts_the_supply: bool,
+    pub supply: Result<SupplyState, NoData>,
+    pub reset_edge: bool,
+    pub cycle: u64,
+    pub now: Nanos,
+}
+
+impl Safety {
+    /// Causes that do not stand in the way now, because the supply is cut on purpose.
+    pub(super) fn excused(&self, supply: Result<SupplyState, NoData>) -> &'static [Cause] {
+        if supply == Err(NoData::NotFitted) {
+            return &[];
+        }
+        match self.state {
+            State::Proving { proof: Proof::Opens, .. } => WITH_THE_CUT,
+            // Once it is closed again an amplifier that comes back on by itself is no longer excused.
+            State::Proving { proof: Proof::Closes, .. } => &WITH_THE_CUT[1..],
+            State::Faulted(_) if self.supply_cut => WITH_THE_CUT,
+            State::Faulted(_) | State::Armed { .. } => &[],
+        }
+    }
+
+    /// Moves from state to state. Says what is new in the decision.
+    pub(super) fn advance(&mut self, step: &Step, said: &mut Decision) {
+        match self.state {
+            State::Armed { .. } => {
+                if let Some(breach) = step.broken {
+                    self.trip(breach, step, said);
+                }
+            }
+            State::Faulted(_) if step.reset_edge && step.besides_the_cut.is_none() => match step.supply {
+                Err(NoData::NotFitted) => self.arm(step.now, said),
+                _ => self.state = State::Proving { proof: Proof::Opens, since: step.now },
+            },
+            State::Faulted(_) => {}
+            State::Proving { proof, since } => self.prove(step, proof, since, said),
+        }
+        self.supply_cut |= step.cuts_the_supply && !self.is_proving();
+    }
+
+    fn prove(&mut self, step: &Step, proof: Proof, since: Nanos, said: &mut Decision) {
+        let now = step.now;
+        if let Some(breach) = step.besides_the_cut {
+            return self.trip(breach, step, said);
+        }
+        let fresh = step.supply.ok().filter(|s| s.taken_at > since && s.taken_at <= now);
+        match proof {
+            Proof::Opens if fresh.is_some_and(|s| s.cut) => {
+                self.state = State::Proving { proof: Proof::Closes, since: now };
+                self.watch.supply_is_cut();
+            }
+            Proof::Closes if fresh.is_some_and(|s| !s.cut) && step.broken.is_none() => self.arm(now, said),
+            _ => {
+                let closed = fresh.is_some_and(|s| !s.cut);
+                let within = if proof == Proof::Closes && closed { RESTART } else { SUPPLY_ACTS };
+                let waited = now.since(since);
+                if waited > within {
+                    let cause = step.broken.filter(|_| closed).map_or(Cause::SupplySwitch, |b| b.cause);
+                    let breach = Breach { cause, value: waited.seconds(), bound: within.seconds() };
+                    self.trip(breach, step, said);
+                }
+            }
+        }
+    }
+
+    fn arm(&mut self, now: Nanos, said: &mut Decision) {
+        self.state = State::Armed { since: now };
+        (self.supply_cut, self.asked) = (false, false);
+        self.watch.lateral.forget_losses();
+        self.watch.normal.forget_losses();
+        said.armed_now = true;
+    }
+
+    fn trip(&mut self, breach: Breach, step: &Step, said: &mut Decision) {
+        let Breach { cause, value, bound } = breach;
+        let trip = Trip { cause, value, bound, cycle: step.cycle, at: step.now };
+        self.state = State::Faulted(trip);
+        self.asked = false;
+        self.watch.forget_the_hand();
+        said.tripped = Some(trip);
+    }
+
+    /// What the second channel is told: closed, unless it is being proved, or was cut and has not been proved since.
+    pub(super) fn supply(&self) -> SupplyCommand {
+        match self.state {
+            State::Proving { proof: Proof::Opens, .. } => SupplyCommand::Cut,
+            State::Proving { proof: Proof::Closes, .. } => SupplyCommand::Restore,
+            _ if self.supply_cut => SupplyCommand::Cut,
+            _ => SupplyCommand::Restore,
+        }
+    }
+}

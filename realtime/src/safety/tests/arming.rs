@@ -1,0 +1,184 @@
+//! From faulted to armed: one edge, the second channel proved, and nothing that was asked before.
+
+use super::*;
+use crate::ports::SupplyState;
+
+const RESET: Controls = Controls { reset: true, stop: false, dead_man: false, new_request: false };
+
+/// A rig with a relay that does what it is told so many cycles later.
+struct Relayed {
+    bench: Bench,
+    told: Vec<SupplyCommand>,
+    delay: usize,
+    /// What it shows whatever it is told.
+    stuck: Option<bool>,
+}
+
+impl Relayed {
+    fn new(delay: usize, stuck: Option<bool>) -> Self {
+        Relayed { bench: Bench::new(), told: Vec::new(), delay, stuck }
+    }
+
+    fn cut(&self) -> bool {
+        let told = self.told.len().checked_sub(self.delay + 1).map(|i| self.told[i]);
+        self.stuck.unwrap_or(told == Some(SupplyCommand::Cut))
+    }
+
+    fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> Decision {
+        let (cut, n) = (self.cut(), self.bench.n + 1);
+        let taken_at = Nanos(u64::from(n) * T.0);
+        let decision = self.bench.cycle(
+            |s| {
+                s.supply = Ok(SupplyState { cut, taken_at, sequence: n });
+                // A cut supply takes the amplifier with it.
+                if cut {
+                    s.amplifier = Err(NoData::Disconnected);
+                }
+                spoil(s);
+            },
+            controls,
+        );
+        self.told.push(decision.supply);
+        decision
+    }
+
+    /// A reset, and what follows within so many cycles: armed, or a trip.
+    fn arm(&mut self, cycles: usize) -> (Option<Trip>, bool) {
+        self.cycle(|_| {}, Controls::default());
+        let first = self.cycle(|_| {}, RESET);
+        for _ in 0..cycles {
+            let decision = self.cycle(|_| {}, Controls::default());
+            assert!(!decision.drive.enable());
+            if decision.tripped.is_some() || decision.armed_now {
+                return (decision.tripped, decision.armed_now);
+            }
+        }
+        (first.tripped, first.armed_now)
+    }
+}
+
+#[test]
+fn the_second_channel_is_opened_and_closed_before_every_arming() {
+    let mut rig = Relayed::new(5, None);
+    assert_eq!(rig.arm(100), (None, true));
+    assert!(rig.told.contains(&SupplyCommand::Cut) && rig.told.last() == Some(&SupplyCommand::Restore));
+    // And again after a trip.
+    rig.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
+    let cuts = |rig: &Relayed| rig.told.iter().filter(|t| **t == SupplyCommand::Cut).count();
+    let before = cuts(&rig);
+    assert_eq!(rig.arm(100), (None, true));
+    assert!(cuts(&rig) > before);
+}
+
+#[test]
+fn a_second_channel_that_does_not_act_keeps_the_rig_from_arming() {
+    for stuck in [false, true] {
+        let mut rig = Relayed::new(0, Some(stuck));
+        let (trip, armed) = rig.arm(700);
+        assert!(!armed);
+        // One that stands open already is known without a proof; one that does not open is found by it.
+        match trip {
+            Some(trip) => assert!(trip.cause == Cause::SupplySwitch && trip.value > 0.5, "{trip:?}"),
+            None => assert!(stuck),
+        }
+    }
+    // Silent, it is lost: nothing is proved without a readback.
+    let mut rig = Relayed::new(0, None);
+    rig.cycle(|s| s.supply = Err(NoData::Disconnected), Controls::default());
+    let decision = rig.cycle(|s| s.supply = Err(NoData::Disconnected), RESET);
+    assert_eq!((decision.armed_now, decision.blocking), (false, Some(Cause::SupplySwitch)));
+}
+
+#[test]
+fn an_amplifier_that_does_not_come_back_is_a_trip_with_its_own_cause() {
+    let mut rig = Relayed::new(2, None);
+    rig.cycle(|_| {}, Controls::default());
+    rig.cycle(|_| {}, RESET);
+    let dead = |s: &mut Observation| s.amplifier = Err(NoData::Disconnected);
+    let trip = (0..6000).find_map(|_| rig.cycle(dead, Controls::default()).tripped).unwrap();
+    assert_eq!((trip.cause, trip.bound), (Cause::AmplifierStale, 5.0));
+    // One that comes back switched on is cut again at once.
+    let mut rig = Relayed::new(2, None);
+    rig.cycle(|_| {}, Controls::default());
+    rig.cycle(|_| {}, RESET);
+    let on = |s: &mut Observation| {
+        if let Ok(state) = &mut s.amplifier {
+            state.output_on = true;
+        }
+    };
+    let decision =
+        (0..200).map(|_| rig.cycle(on, Controls::default())).find(|d| d.tripped.is_some()).unwrap();
+    assert_eq!(decision.tripped.unwrap().cause, Cause::RefusesOff);
+    assert!(is_cut(&decision));
+}
+
+#[test]
+fn a_relay_that_falls_while_armed_trips() {
+    let mut rig = Relayed::new(1, None);
+    assert_eq!(rig.arm(100), (None, true));
+    rig.stuck = Some(true);
+    let up = |s: &mut Observation| s.amplifier = healthy(0, &DriveCommand::off(0, T)).amplifier;
+    let trip = (0..700).find_map(|_| rig.cycle(up, Controls::default()).tripped).unwrap();
+    assert!(matches!(trip.cause, Cause::SupplySwitch | Cause::AmplifierStale), "{trip:?}");
+    // A readback that grows old trips as well.
+    let mut rig = Relayed::new(1, None);
+    assert_eq!(rig.arm(100), (None, true));
+    let old = Nanos(u64::from(rig.bench.n) * T.0);
+    let (mut cycles, mut trip) = (0, None);
+    while trip.is_none() && cycles < 300 {
+        cycles += 1;
+        let stale =
+            |s: &mut Observation| s.supply = Ok(SupplyState { cut: false, taken_at: old, sequence: 1 });
+        trip = rig.cycle(stale, Controls::default()).tripped;
+    }
+    assert_eq!((trip.map(|t| t.cause), cycles), (Some(Cause::SupplySwitch), 81));
+}
+
+/// The refusal is answered by the relay, which stays open until a reset proves it anew.
+#[test]
+fn an_amplifier_that_was_cut_stays_cut_until_it_is_proved_again() {
+    let mut rig = Relayed::new(1, None);
+    assert_eq!(rig.arm(100), (None, true));
+    rig.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
+    let on = |s: &mut Observation| {
+        if let Ok(state) = &mut s.amplifier {
+            state.output_on = true;
+        }
+    };
+    let cut = (1..100).find(|_| is_cut(&rig.cycle(on, Controls::default())));
+    assert!(cut.is_some_and(|n| n <= 9 + 10 + 1), "{cut:?}");
+    for _ in 0..300 {
+        assert!(is_cut(&rig.cycle(|_| {}, Controls::default())));
+    }
+    assert_eq!(rig.arm(100), (None, true));
+}
+
+#[test]
+fn a_reset_clears_and_never_restarts() {
+    let mut bench = Bench::armed();
+    assert!(bench.last.enable());
+    bench.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
+    // Asked for again while it stands faulted, and in the very cycle of the reset: neither counts.
+    bench.cycle(|_| {}, Controls { new_request: true, ..Controls::default() });
+    let armed = bench.cycle(|_| {}, Controls { new_request: true, ..RESET });
+    assert!(armed.armed_now);
+    for _ in 0..500 {
+        let decision = bench.cycle(|_| {}, Controls::default());
+        assert!(bench.safety.is_armed() && !decision.drive.enable());
+        assert_eq!((decision.stage.velocity_m_s(), decision.stage.normal_force_n()), (0.0, 0.0));
+    }
+    let decision = bench.cycle(|_| {}, Controls { new_request: true, ..Controls::default() });
+    assert!(decision.drive.enable() && decision.stage.normal_force_n() == 0.25);
+}
+
+#[test]
+fn an_amplifier_without_watchdog_needs_the_second_channel() {
+    let mut bench = Bench::new();
+    bench.limits.amplifier_watchdog = false;
+    bench.cycle(|_| {}, Controls::default());
+    let decision = bench.cycle(|_| {}, RESET);
+    assert_eq!((decision.armed_now, decision.blocking), (false, Some(Cause::Unguarded)));
+    let mut rig = Relayed::new(1, None);
+    rig.bench.limits.amplifier_watchdog = false;
+    assert_eq!(rig.arm(100), (None, true));
+}

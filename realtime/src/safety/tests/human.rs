@@ -1,0 +1,242 @@
+//! A human finger in the rig: the contacts, the hand that confirms, and how long and how strongly it may be vibrated.
+
+use super::*;
+use crate::ports::SupplyState;
+
+/// A rig with everything that a human finger needs.
+struct Guarded {
+    bench: Bench,
+    held: bool,
+    pressed: bool,
+    open: bool,
+    cut: bool,
+}
+
+impl Guarded {
+    fn new() -> Self {
+        let mut bench = Bench::new();
+        bench.limits.human_contact = true;
+        Guarded { bench, held: false, pressed: false, open: false, cut: false }
+    }
+
+    fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> Decision {
+        let n = self.bench.n + 1;
+        let taken_at = Nanos(u64::from(n) * T.0);
+        let contact = |closed| Ok(Contact { closed, taken_at, sequence: n });
+        let (held, pressed, open, cut) = (self.held, self.pressed, self.open, self.cut);
+        let decision = self.bench.cycle(
+            |s| {
+                s.supply = Ok(SupplyState { cut, taken_at, sequence: n });
+                s.contacts = Contacts {
+                    emergency_stop: contact(!pressed),
+                    interlock: contact(!open),
+                    dead_man: contact(held),
+                };
+                spoil(s);
+            },
+            controls,
+        );
+        self.cut = is_cut(&decision);
+        decision
+    }
+
+    /// Presses the reset and waits for the proof.
+    fn reset(&mut self) -> bool {
+        let first = self.cycle(|_| {}, Controls { reset: true, ..Controls::default() });
+        first.armed_now || (0..50).any(|_| self.cycle(|_| {}, Controls::default()).armed_now)
+    }
+
+    /// Armed and driving, the hand at its device.
+    fn driving() -> Self {
+        let mut rig = Guarded::new();
+        rig.cycle(|_| {}, Controls::default());
+        rig.held = true;
+        rig.cycle(|_| {}, Controls::default());
+        assert!(rig.reset(), "{:?}", rig.cycle(|_| {}, Controls::default()).blocking);
+        rig.bench.request = Request {
+            amplitude: PeakToPeak::from_metres(2e-6),
+            frequency_hz: 27_500.0,
+            velocity_m_s: 0.0,
+            normal_force_n: 0.25,
+        };
+        assert!(rig.cycle(|_| {}, Controls::default()).drive.enable());
+        rig
+    }
+}
+
+#[test]
+fn a_hand_must_let_go_and_grip_again_before_every_arming() {
+    // Tied down from the beginning.
+    let mut rig = Guarded::new();
+    rig.held = true;
+    rig.cycle(|_| {}, Controls::default());
+    assert!(!rig.reset());
+    assert_eq!(rig.cycle(|_| {}, Controls::default()).blocking, Some(Cause::DeadMan));
+    let mut rig = Guarded::driving();
+    rig.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
+    assert!(!rig.reset(), "held all the time: nobody confirmed");
+    rig.held = false;
+    rig.cycle(|_| {}, Controls::default());
+    rig.held = true;
+    assert!(rig.reset());
+}
+
+#[test]
+fn letting_go_pressing_stop_and_opening_the_guard_switch_off_at_once() {
+    type Act = fn(&mut Guarded);
+    let acts: [(Act, Cause); 3] = [
+        (|r| r.held = false, Cause::DeadMan),
+        (|r| r.pressed = true, Cause::EmergencyStop),
+        (|r| r.open = true, Cause::Interlock),
+    ];
+    for (act, cause) in acts {
+        let mut rig = Guarded::driving();
+        act(&mut rig);
+        let decision = rig.cycle(|_| {}, Controls::default());
+        assert_eq!(decision.tripped.map(|t| t.cause), Some(cause));
+        assert!(!decision.drive.enable());
+        // The emergency stop is the one that takes the supply away.
+        assert_eq!(is_cut(&decision), cause == Cause::EmergencyStop);
+    }
+}
+
+#[test]
+fn a_contact_of_which_nothing_is_known_is_open() {
+    type Pick = fn(&mut Observation) -> &mut Result<Contact, NoData>;
+    let picks: [(Pick, Cause); 3] = [
+        (|s| &mut s.contacts.dead_man, Cause::DeadMan),
+        (|s| &mut s.contacts.emergency_stop, Cause::EmergencyStop),
+        (|s| &mut s.contacts.interlock, Cause::Interlock),
+    ];
+    for (pick, cause) in picks {
+        for reason in [NoData::Disconnected, NoData::NeverRead, NoData::Corrupt] {
+            let mut rig = Guarded::driving();
+            let decision = rig.cycle(|s| *pick(s) = Err(reason), Controls::default());
+            assert_eq!(decision.tripped.map(|t| t.cause), Some(cause), "{reason:?}");
+        }
+        // Silent: 80 ms is its age limit.
+        let mut rig = Guarded::driving();
+        let last = Nanos(u64::from(rig.bench.n) * T.0);
+        let silent = |s: &mut Observation| pick(s).as_mut().unwrap().taken_at = last;
+        let took = (1..200).find(|_| rig.cycle(silent, Controls::default()).tripped.is_some());
+        assert_eq!(took, Some(81), "{cause:?}");
+    }
+}
+
+#[test]
+fn a_human_finger_is_refused_where_anything_is_missing() {
+    type Spoil = fn(&mut Observation);
+    let missing: [(Spoil, f64); 3] = [
+        (|s| s.supply = Err(NoData::NotFitted), 2.0),
+        (|s| s.contacts.emergency_stop = Err(NoData::NotFitted), 3.0),
+        (|s| s.contacts.dead_man = Err(NoData::NotFitted), 4.0),
+    ];
+    for (spoil, which) in missing {
+        let mut rig = Guarded::driving();
+        let trip = rig.cycle(spoil, Controls::default()).tripped.unwrap();
+        match trip.cause {
+            Cause::Unguarded => assert_eq!(trip.value, which),
+            // A dead-man device that is not there is not held either.
+            cause => assert_eq!((cause, which), (Cause::DeadMan, 4.0)),
+        }
+    }
+    // An interlock that is not fitted is not missed.
+    let mut rig = Guarded::driving();
+    let without = |s: &mut Observation| s.contacts.interlock = Err(NoData::NotFitted);
+    assert_eq!(rig.cycle(without, Controls::default()).tripped, None);
+}
+
+#[test]
+fn a_key_stands_for_a_dead_man_device_only_where_the_limits_say_so() {
+    let no_device = |s: &mut Observation| s.contacts.dead_man = Err(NoData::NotFitted);
+    for allowed in [true, false] {
+        let mut rig = Guarded::driving();
+        rig.bench.limits.dead_man_key = allowed;
+        let key = Controls { dead_man: true, ..Controls::default() };
+        assert_eq!(rig.cycle(no_device, key).tripped.is_none(), allowed);
+        assert!(!allowed || rig.cycle(no_device, Controls::default()).tripped.is_some(), "released");
+    }
+    // Where a device is fitted, no key helps.
+    let mut rig = Guarded::driving();
+    (rig.bench.limits.dead_man_key, rig.held) = (true, false);
+    let key = Controls { dead_man: true, ..Controls::default() };
+    assert_eq!(rig.cycle(|_| {}, key).tripped.map(|t| t.cause), Some(Cause::DeadMan));
+}
+
+/// Driven and resting by turns; the cause and the time driven in s at the trip.
+fn driven(on: u32, off: u32, cycles: u32, change: fn(&mut Limits)) -> Option<(Cause, f64)> {
+    let mut rig = Guarded::driving();
+    change(&mut rig.bench.limits);
+    let w = rig.bench.request.amplitude;
+    let mut time = 1;
+    for i in 0..cycles {
+        let drive = i % (on + off) < on;
+        rig.bench.request.amplitude = if drive { w } else { PeakToPeak::ZERO };
+        let decision = rig.cycle(|_| {}, Controls::default());
+        if let Some(trip) = decision.tripped {
+            return Some((trip.cause, f64::from(time) * T.seconds()));
+        }
+        time += u32::from(decision.drive.enable());
+    }
+    None
+}
+
+#[test]
+fn no_pause_shorter_than_a_rest_ends_a_go() {
+    let short: fn(&mut Limits) = |l| {
+        (l.exposure_max_s, l.exposure_rest_s) = (2.0, 10.0);
+        l.frozen_after = 1000;
+    };
+    for off in [0, 1, 50, 500] {
+        let (cause, time) = driven(100, off, 60_000, short).unwrap();
+        assert_eq!(cause, Cause::Exposure, "{off}");
+        assert!((1.99..2.05).contains(&time), "{off}: {time} s");
+    }
+    // A rest of full length does.
+    assert_eq!(driven(1900, 10_100, 40_000, short), None);
+}
+
+#[test]
+fn the_hour_has_a_share_and_a_dose() {
+    let duty: fn(&mut Limits) = |l| (l.exposure_max_s, l.exposure_duty_max) = (600.0, 1e-3);
+    let (cause, time) = driven(700, 1, 10_000, duty).unwrap();
+    assert!(cause == Cause::ExposureDuty && (3.6..3.62).contains(&time), "{cause:?} {time}");
+    // 2 um at 27.5 kHz: (pi f w)^2 / 2 = 0.01493 m2/s2.
+    let dose: fn(&mut Limits) = |l| (l.exposure_max_s, l.exposure_dose_max_m2_s) = (600.0, 0.03);
+    let (cause, time) = driven(700, 1, 10_000, dose).unwrap();
+    let expected = 0.03 / (0.5 * (std::f64::consts::PI * 27_500.0 * 2e-6f64).powi(2));
+    assert!(cause == Cause::ExposureDose && (time - expected).abs() < 0.02, "{cause:?} {time} {expected}");
+    // Nobody's finger: nothing is counted against it.
+    let nobody: fn(&mut Limits) = |l| {
+        (l.exposure_max_s, l.exposure_dose_max_m2_s, l.exposure_duty_max) = (0.1, 1e-3, 1e-3);
+        l.human_contact = false;
+    };
+    assert_eq!(driven(700, 1, 10_000, nobody), None);
+}
+
+/// The window forgets a minute only when all of it is an hour ago.
+#[test]
+fn the_hour_slides_and_forgets_nothing_early() {
+    let mut exposure = exposure::Exposure::new();
+    let second = 1_000_000_000;
+    let rest = Nanos(60 * second);
+    exposure.add(false, 0.0, rest, Nanos(0));
+    // Driven for the first ten minutes, at 0.1 m/s.
+    for s in 1..=600 {
+        exposure.add(true, 0.1, rest, Nanos(s * second));
+    }
+    let (time, dose) = exposure.in_the_last_hour();
+    assert_eq!(time, Nanos(600 * second));
+    assert!((dose - 6.0).abs() < 1e-9);
+    for s in 601..=8000 {
+        exposure.add(false, 0.0, rest, Nanos(s * second));
+        let (time, dose) = exposure.in_the_last_hour();
+        // What was driven within the last 3600 s exactly is never more than what the window says, and at most a minute less.
+        let exact = 600u64.saturating_sub(s.saturating_sub(3600)).min(600);
+        let said = time.0 / second;
+        assert!(said >= exact && said <= exact + 61, "{s}: {said} s said, {exact} s driven");
+        assert!((dose - 0.01 * time.seconds()).abs() < 1e-9);
+    }
+    assert_eq!(exposure.in_the_last_hour().0, Nanos(0));
+    assert_eq!(exposure.in_one_go, Nanos(0));
+}

@@ -1,0 +1,138 @@
+//! How much the verdict depends on each constant: halved, and doubled, on the same sealed sets.
+//!
+//! Constants of the verdict rule are tried on finished fits; those of the fits need a diagnosis of their own each. What is
+//! reported beside the verdict does not enter the score and is left out.
+
+use diagnosis::Verdict;
+use diagnosis::constants::{self, Constants, Stage};
+use diagnosis::data::{RigFile, Table};
+use diagnosis::decision::decide;
+use diagnosis::hypotheses::{Fitted, Options, fit_all};
+use rayon::prelude::*;
+use serde::Serialize;
+use sim::sealed::{Set, Stratum};
+use std::sync::Arc;
+
+/// Factors by which each constant is changed.
+const FACTORS: [f64; 2] = [0.5, 2.0];
+
+/// The verdicts under one change.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Constant; `as it is` for none changed.
+    pub constant: &'static str,
+    /// Factor on it.
+    pub factor: f64,
+    /// Number of sets.
+    pub sets: usize,
+    /// Sets whose verdict is the truth: the cause named, `unknown` for one outside the library, `no_gap` for none.
+    pub right: usize,
+    /// Sets with a name that is not the truth.
+    pub misnamed: usize,
+    /// Sets whose verdict is another than with the constants as they are.
+    pub changed: usize,
+    /// Mean probability on the truth.
+    pub probability: f64,
+}
+
+/// What one set's verdict says.
+#[derive(Clone, PartialEq)]
+struct Said {
+    verdict: Verdict,
+    leader: Vec<&'static str>,
+    right: bool,
+    probability: f64,
+}
+
+fn said(set: &Set, fitted: &Fitted) -> Said {
+    let decision = decide(fitted);
+    let mut truth: Vec<&str> = set.label.causes.iter().map(|c| c.name.as_str()).collect();
+    truth.sort_unstable();
+    let outside = set.label.causes.iter().any(|c| !c.in_library);
+    let names = |i: usize| {
+        let mut names = fitted.candidates[i].names();
+        names.sort_unstable();
+        names
+    };
+    let leader = decision.leader().map(names).unwrap_or_default();
+    let true_place = (0..fitted.candidates.len()).find(|&i| names(i) == truth);
+    let (right, probability) = if truth.is_empty() {
+        (decision.verdict == Verdict::NoGap, decision.none)
+    } else if outside {
+        (decision.verdict == Verdict::Unknown, decision.unknown)
+    } else {
+        let named = decision.verdict == Verdict::Named && leader == truth;
+        (named, true_place.map_or(0.0, |i| decision.probabilities[i]))
+    };
+    Said { verdict: decision.verdict, leader, right, probability }
+}
+
+fn fitted(set: &Set, constants: Constants, pairs: bool) -> miette::Result<Fitted> {
+    let rig = RigFile::parse(&set.rig_toml).map_err(|e| miette::miette!("rig.toml of a sealed set: {e}"))?;
+    let table = Table::measured(&set.passes).map_err(|e| miette::miette!("table of a sealed set: {e}"))?;
+    let options = Options { constants: Arc::new(constants), pairs, ..Options::default() };
+    Ok(fit_all(&table, &rig, &options))
+}
+
+/// Every change on every set: what the set said, in the order of the changes, the unchanged constants first.
+fn tried(
+    set: &Set,
+    base: &Constants,
+    changes: &[(Stage, Constants)],
+    pairs: bool,
+) -> miette::Result<Vec<Said>> {
+    let mut own = fitted(set, base.clone(), pairs)?;
+    let mut list = vec![said(set, &own)];
+    for (stage, constants) in changes {
+        list.push(if *stage == Stage::Decision {
+            own.problem.constants = Arc::new(constants.clone());
+            said(set, &own)
+        } else {
+            said(set, &fitted(set, constants.clone(), pairs)?)
+        });
+    }
+    Ok(list)
+}
+
+/// The study on `count` sets from a seed, of the constants that `asked` picks.
+///
+/// # Errors
+/// A set that the diagnosis refuses.
+pub fn run(
+    seed: u64,
+    count: usize,
+    stratum: Option<Stratum>,
+    options: &Options,
+    asked: &dyn Fn(&constants::Row) -> bool,
+) -> miette::Result<Vec<Row>> {
+    let base = &*options.constants;
+    let mut labels = vec![("as it is", 1.0)];
+    let mut changes = Vec::new();
+    for row in base.rows().iter().filter(|r| r.stage != Stage::Report && asked(r)) {
+        for factor in FACTORS {
+            let mut constants = base.clone();
+            constants.scale(row.name, factor).map_err(|e| miette::miette!("{e}"))?;
+            labels.push((row.name, factor));
+            changes.push((row.stage, constants));
+        }
+    }
+    let sets: Vec<Set> = super::sets(seed, count, stratum).collect();
+    let all: miette::Result<Vec<Vec<Said>>> =
+        sets.par_iter().map(|set| tried(set, base, &changes, options.pairs)).collect();
+    let all = all?;
+    let row = |(i, (constant, factor)): (usize, (&'static str, f64))| {
+        let of = |test: &dyn Fn(&Said, &Said) -> bool| all.iter().filter(|s| test(&s[i], &s[0])).count();
+        Row {
+            constant,
+            factor,
+            sets: all.len(),
+            right: of(&|s, _| s.right),
+            misnamed: of(&|s, _| s.verdict == Verdict::Named && !s.right),
+            changed: of(&|s, base| {
+                s.verdict != base.verdict || s.verdict == Verdict::Named && s.leader != base.leader
+            }),
+            probability: all.iter().map(|s| s[i].probability).sum::<f64>() / all.len().max(1) as f64,
+        }
+    };
+    Ok(labels.into_iter().enumerate().map(row).collect())
+}

@@ -1,0 +1,356 @@
+//! The paper's figures recomputed, each with a line on how it compares with the paper. Here those of the finite element model;
+//! those of the spring-slider in [`slider`], their charts in [`plot`], what was already computed in [`store`].
+
+pub mod plot;
+pub mod slider;
+pub mod store;
+
+use miette::{IntoDiagnostic, miette};
+use models::psi::{PSI_STAR, PSI_STAR_UNCERTAINTY, PsiEq17, relative_friction};
+use models::psi_fit;
+use models::ridge::study::{Panel, StudyPoint, content_key, fig_9};
+use models::ridge::{self, Cycle, RidgeCase, RidgeRun, RunSettings};
+use plot::{Chart, Series};
+use std::path::Path;
+
+/// What a figure gives: its charts, and how it compares with the paper.
+pub struct Reproduced {
+    /// Charts to write.
+    pub charts: Vec<Chart>,
+    /// Lines of comparison.
+    pub lines: Vec<String>,
+}
+
+/// Results of the study of Fig. 9, running what is missing in `out`.
+pub fn fig_9_results(out: &Path, elements: usize) -> miette::Result<(store::Results, usize)> {
+    let base = RidgeCase { elements, ..RidgeCase::paper() };
+    let cases = fig_9(base).into_iter().map(|p| p.case);
+    store::complete(&out.join("ridge.jsonl"), cases, &settings())
+}
+
+/// How the figures' cases are run.
+pub fn settings() -> RunSettings {
+    RunSettings { energy: false, ..RunSettings::default() }
+}
+
+const MOIST_PA: [f64; 4] = [20e6, 28.3e6, 35e6, 50e6];
+const DRY_PA: [f64; 4] = [100e6, 202.4e6, 500e6, 1000e6];
+const FIG_4_AMPLITUDES_M: [f64; 14] = [
+    0.1e-6, 0.2e-6, 0.3e-6, 0.4e-6, 0.5e-6, 0.6e-6, 0.7e-6, 0.8e-6, 1.0e-6, 1.2e-6, 1.4e-6, 1.7e-6, 2.1e-6,
+    2.5e-6,
+];
+
+fn run(case: &RidgeCase) -> miette::Result<RidgeRun> {
+    ridge::run(case, &RunSettings { energy: false, ..RunSettings::default() }).into_diagnostic()
+}
+
+/// Cycle bins as (time in periods, value), over `turns` periods.
+fn trace(values: &[f64], turns: usize, scale: f64) -> Vec<(f64, f64)> {
+    let n = values.len();
+    (0..n * turns).map(|i| ((i as f64 + 0.5) / n as f64, scale * values[i % n])).collect()
+}
+
+/// Fig. 4: phase shift against amplitude, at rest as measured.
+pub fn phase_shift(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
+    let at = |young_modulus_pa: f64, w: f64| {
+        RidgeCase { young_modulus_pa, speed_m_s: 0.0, ..base }.with_amplitude_pp_m(w)
+    };
+    let moduli = || MOIST_PA.into_iter().chain(DRY_PA);
+    let cases = moduli().flat_map(|e| FIG_4_AMPLITUDES_M.map(|w| at(e, w)));
+    let (results, failed) = store::complete(&out.join("ridge.jsonl"), cases, &settings())?;
+    let curve = |e: f64| -> Vec<(f64, f64)> {
+        let kept = FIG_4_AMPLITUDES_M.iter().filter_map(|w| {
+            let phase = results.get(&content_key(&at(e, *w), &settings()))?.phase_shift_deg?;
+            // A lead of some degrees in full contact is drawn as such.
+            Some((w * 1e6, if phase > 270.0 { phase - 360.0 } else { phase }))
+        });
+        kept.collect()
+    };
+    // Where the curve passes 20 and 60 degrees of the way from contact to its plateau near 90.
+    let crossing = |e: f64, level: f64| -> f64 {
+        let points = curve(e);
+        let passing = points.windows(2).rev().find(|p| p[0].1 < level && p[1].1 >= level);
+        passing.map_or(f64::NAN, |p| p[0].0 + (p[1].0 - p[0].0) * (level - p[0].1) / (p[1].1 - p[0].1))
+    };
+    let chart = |name: &str, title: &str, moduli: [f64; 4]| Chart {
+        name: name.into(),
+        title: title.into(),
+        x: "amplitude_pp_um".into(),
+        y: "phase_shift_deg".into(),
+        series: moduli.map(|e| Series::line(format!("E_sc {} MPa", e / 1e6), curve(e))).into(),
+    };
+    let mut lines = Vec::new();
+    for (what, e, paper) in [("moist", 28.3e6, "0.8 to 1.3"), ("dry", 202.4e6, "0.4 to 0.8")] {
+        lines.push(format!(
+            "{what} ({} MPa): the phase passes 10, 30 and 60 deg at {:.2}, {:.2} and {:.2} um; paper: transition at {paper} um, plateau near 90 deg; here {:.0} deg at 2.5 um",
+            e / 1e6,
+            crossing(e, 10.0),
+            crossing(e, 30.0),
+            crossing(e, 60.0),
+            curve(e).last().map_or(f64::NAN, |p| p.1)
+        ));
+    }
+    if failed > 0 {
+        lines.push(format!("{failed} cases failed and are missing"));
+    }
+    let charts = vec![
+        chart("fig4_moist", "Phase shift, moist skin (Fig. 4a)", MOIST_PA),
+        chart("fig4_dry", "Phase shift, dry skin (Fig. 4a)", DRY_PA),
+    ];
+    Ok(Reproduced { charts, lines })
+}
+
+/// Fig. 5: velocities of plate and skin, dry, 1.35 um, at rest.
+pub fn velocities(base: RidgeCase) -> miette::Result<Reproduced> {
+    let case = RidgeCase { young_modulus_pa: 202.4e6, speed_m_s: 0.0, ..base }.with_amplitude_pp_m(1.35e-6);
+    let result = run(&case)?;
+    let skin = &result.mean_cycle.skin_velocity;
+    let n = skin.len();
+    let turn = 2.0 * std::f64::consts::PI;
+    let top = turn * case.frequency_hz * case.amplitude.sine_amplitude_m();
+    let plate: Vec<f64> = (0..n).map(|i| top * (turn * (i as f64 + 0.5) / n as f64).cos()).collect();
+    let peak = |v: &[f64]| v.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
+    let trough = |v: &[f64]| v.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+    // From the greatest to the least velocity: the unloading is slower than the loading.
+    let index = |target: f64| skin.iter().position(|v| *v == target).unwrap_or(0);
+    let (high, low) = (index(peak(skin)), index(trough(skin)));
+    let falling = ((low + n - high) % n) as f64 / n as f64;
+    Ok(Reproduced {
+        lines: vec![format!(
+            "dry, 1.35 um: skin {:.0} to {:.0} mm/s, plate +-{:.0} mm/s; the fall takes {:.0} % of the period, the rise {:.0} %; paper: the velocity peak is asymmetric, the unloading sloping through inertia",
+            1e3 * trough(skin),
+            1e3 * peak(skin),
+            1e3 * top,
+            100.0 * falling,
+            100.0 * (1.0 - falling)
+        )],
+        charts: vec![Chart {
+            name: "fig5".into(),
+            title: "Velocity of skin and plate, dry, 1.35 um (Fig. 5)".into(),
+            x: "time_periods".into(),
+            y: "velocity_m_s".into(),
+            series: vec![
+                Series::line("skin", trace(skin, 2, 1.0)),
+                Series::line("plate", trace(&plate, 2, 1.0)),
+            ],
+        }],
+    })
+}
+
+/// Fig. 6: press, slide, vibrate.
+pub fn loading(base: RidgeCase) -> miette::Result<Reproduced> {
+    // Times as they are run: 60 us each for pressing and for reaching slip, then two periods of growth.
+    let (press, period) = (60.0, 1e6 / base.frequency_hz);
+    let (slide, full) = (2.0 * press, 2.0 * press + 2.0 * period);
+    let end = full + 2.0 * period;
+    let step = |from: f64| vec![(0.0, 0.0), (from, 0.0), (from, 1.0), (end, 1.0)];
+    Ok(Reproduced {
+        lines: vec![format!(
+            "press at once and settle for {press:.0} us, slide in the quasi-static slip state for {press:.0} us, then vibrate, growing over two periods; the paper's order, without its waiting for the soft tissue"
+        )],
+        charts: vec![Chart {
+            name: "fig6".into(),
+            title: "Loading (Fig. 6), relative to its final value".into(),
+            x: "time_us".into(),
+            y: "share".into(),
+            series: vec![
+                Series::line("normal load", step(0.0)),
+                Series::line("lateral velocity", step(press)),
+                Series::line("vibration amplitude", vec![(0.0, 0.0), (slide, 0.0), (full, 1.0), (end, 1.0)]),
+            ],
+        }],
+    })
+}
+
+/// Fig. 7: reaction force at 0.1, 1 and 2 um.
+pub fn reaction_force(base: RidgeCase) -> miette::Result<Reproduced> {
+    let (mut series, mut lines) = (Vec::new(), Vec::new());
+    for w in [0.1, 1.0, 2.0] {
+        let case = base.with_amplitude_pp_m(w * 1e-6);
+        let result = run(&case)?;
+        let scale = case.finger_per_ridge_m();
+        series.push(Series::line(format!("{w} um"), trace(&result.mean_cycle.normal, 3, scale)));
+        lines.push(format!(
+            "{w} um: mean {:.4} N for {} N applied, greatest {:.3} N, contact {:.0} % of the time",
+            result.mean_reaction_force_n,
+            case.normal_force_n,
+            result.peak_reaction_force_n,
+            100.0 * result.contact_fraction
+        ));
+    }
+    lines.push("paper: always positive at 0.1 um, zero for a significant time at 1 um and longer at 2 um, the greatest force growing, the mean equal to the applied 0.25 N".into());
+    let chart = Chart {
+        name: "fig7".into(),
+        title: "Reaction force of the finger (Fig. 7)".into(),
+        x: "time_periods".into(),
+        y: "reaction_force_n".into(),
+        series,
+    };
+    Ok(Reproduced { charts: vec![chart], lines })
+}
+
+/// Fig. 8: reaction, Coulomb's limit and lateral force at 1.35 um.
+pub fn lateral_force(base: RidgeCase) -> miette::Result<Reproduced> {
+    let case = base.with_amplitude_pp_m(1.35e-6);
+    let result = run(&case)?;
+    let scale = case.finger_per_ridge_m();
+    let Cycle { normal, lateral, .. } = &result.mean_cycle;
+    let n = normal.len();
+    // From the touch-down after the longest absence to the first bin that slips.
+    let sticks = (0..n).filter(|i| normal[*i] > 0.0 && lateral[*i] < 0.99 * case.mu0 * normal[*i]).count();
+    Ok(Reproduced {
+        lines: vec![format!(
+            "1.35 um, 20 mm/s: mu' = {:.3}; below Coulomb's limit for {:.0} % of the period, contact for {:.0} %; paper: after touch-down the ridge first deforms laterally, slips once mu_0 F_reac is reached, and the force then falls with it to zero",
+            result.mu_relative,
+            100.0 * sticks as f64 / n as f64,
+            100.0 * result.contact_fraction
+        )],
+        charts: vec![Chart {
+            name: "fig8".into(),
+            title: "Forces in one period, 1.35 um (Fig. 8)".into(),
+            x: "time_periods".into(),
+            y: "force_n".into(),
+            series: vec![
+                Series::line("F_reac", trace(normal, 1, scale)),
+                Series::line("mu_0 F_reac", trace(normal, 1, scale * case.mu0)),
+                Series::line("lateral force", trace(lateral, 1, scale)),
+            ],
+        }],
+    })
+}
+
+/// mu' of every point of the study that is there.
+fn study(base: RidgeCase, out: &Path) -> miette::Result<Vec<(StudyPoint, store::Kept)>> {
+    let (results, failed) = fig_9_results(out, base.elements)?;
+    let points = fig_9(base);
+    let found: Vec<_> = points
+        .iter()
+        .filter_map(|p| results.get(&content_key(&p.case, &settings())).map(|k| (*p, k.clone())))
+        .collect();
+    if failed > 0 || found.len() < points.len() {
+        return Err(miette!(
+            "{} of {} points of Fig. 9 are missing",
+            points.len() - found.len(),
+            points.len()
+        ));
+    }
+    Ok(found)
+}
+
+/// Fig. 9: the five panels.
+pub fn parametric_study(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
+    let found = study(base, out)?;
+    let at = |panel: Panel, value: f64, w: f64| {
+        let hit = found.iter().find(|(p, _)| {
+            p.panel == panel && p.value == value && (p.case.amplitude.metres() - w).abs() < 1e-12
+        });
+        hit.map_or(f64::NAN, |(_, k)| k.mu_relative)
+    };
+    let (mut charts, mut lines) = (Vec::new(), Vec::new());
+    for (panel, letter) in Panel::ALL.into_iter().zip('a'..) {
+        let curve = |value: f64| -> Vec<(f64, f64)> {
+            let of = found.iter().filter(|(p, _)| p.panel == panel && p.value == value);
+            of.map(|(p, k)| (p.case.amplitude.metres() * 1e6, k.mu_relative)).collect()
+        };
+        let values = panel.values();
+        charts.push(Chart {
+            name: format!("fig9{letter}"),
+            title: format!("Relative friction (Fig. 9{letter})"),
+            x: "amplitude_pp_um".into(),
+            y: "mu_relative".into(),
+            series: values.map(|v| Series::line(format!("{} {v}", panel.variable()), curve(v))).into(),
+        });
+        let row = |w: f64| values.map(|v| format!("{:.3}", at(panel, v, w))).join(" ");
+        lines.push(format!(
+            "({letter}) {} {values:?}: mu' at 1 um {}, at 2.5 um {}, at 5 um {}",
+            panel.variable(),
+            row(1e-6),
+            row(2.5e-6),
+            row(5e-6)
+        ));
+    }
+    let spread = |panel: Panel| {
+        let mus: Vec<f64> = [3e-6, 4e-6, 5e-6]
+            .iter()
+            .map(|w| {
+                let all = panel.values().map(|v| at(panel, v, *w));
+                all.iter().fold(0.0, |a: f64, b| a.max(*b)) - all.iter().fold(1.0, |a: f64, b| a.min(*b))
+            })
+            .collect();
+        mus.iter().fold(0.0, |a: f64, b| a.max(*b))
+    };
+    lines.push(format!(
+        "above 2.5 um the modulus moves mu' by at most {:.3} and the normal force by {:.3}; paper: nearly independent of both there",
+        spread(Panel::YoungModulus), spread(Panel::NormalForce)
+    ));
+    lines.push(format!(
+        "mean reaction over load: {:.3} to {:.3} over the study (Eq. 4)",
+        found.iter().map(|f| f.1.reaction_over_load).fold(f64::INFINITY, f64::min),
+        found.iter().map(|f| f.1.reaction_over_load).fold(0.0, f64::max)
+    ));
+    Ok(Reproduced { charts, lines })
+}
+
+/// Fig. 12: mu' against Psi, and the refit of Psi*.
+pub fn collapse(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
+    let found = study(base, out)?;
+    let mut series: Vec<Series> = Vec::new();
+    let (mut paper_points, mut developed) = (Vec::new(), Vec::new());
+    for (n, panel) in Panel::ALL.into_iter().enumerate() {
+        let mut marks = Vec::new();
+        for (point, kept) in found.iter().filter(|(p, _)| p.panel == panel) {
+            let c = &point.case;
+            let w = c.amplitude.metres();
+            let psi = c.speed_m_s / (w * c.frequency_hz * c.mu0 * (1.0 + c.poisson_ratio));
+            // Moduli and normal forces only above 1 um, as the paper has it.
+            if matches!(panel, Panel::YoungModulus | Panel::NormalForce) && w < 1.0e-6 * 1.001 {
+                continue;
+            }
+            let value = panel.values().iter().position(|v| *v == point.value).unwrap_or(0);
+            let entry = (4 * n + value, psi, kept.mu_relative);
+            // The base curve is in every panel: it counts once.
+            let base_curve = panel != Panel::Frequency && panel.set(base, point.value) == base;
+            if !base_curve {
+                paper_points.push(entry);
+                if kept.contact_fraction < 0.7 {
+                    developed.push(entry);
+                }
+            }
+            marks.push((psi, kept.mu_relative));
+        }
+        series.push(Series::marks(panel.variable(), marks));
+    }
+    let fit = psi_fit::fit(&paper_points).ok_or_else(|| miette!("no Psi* fits"))?;
+    let open = psi_fit::fit(&developed).ok_or_else(|| miette!("no Psi* fits"))?;
+    let curve = |star: f64| {
+        (0..=200).map(|k| 0.06 * f64::from(k)).map(move |p| (p, relative_friction(PsiEq17(p), star)))
+    };
+    series.iter_mut().for_each(|s| s.points.retain(|p| p.0 <= 12.0));
+    series.push(Series::line(format!("Psi* {:.2} (refit)", fit.psi_star), curve(fit.psi_star).collect()));
+    series.push(Series::line("Psi* 2.38 (paper)", curve(PSI_STAR).collect()));
+    let mut lines = vec![
+        format!(
+            "refit on the paper's choice of data: Psi* = {:.2} +- {:.2} (jackknife over curves), rmse {:.3}, {} points; paper: {PSI_STAR} +- {PSI_STAR_UNCERTAINTY}",
+            fit.psi_star, fit.psi_star_sd, fit.rmse, fit.points
+        ),
+        format!(
+            "where contact is lost for 30 % of the time or more: Psi* = {:.2} +- {:.2}, rmse {:.3}, {} points",
+            open.psi_star, open.psi_star_sd, open.rmse, open.points
+        ),
+    ];
+    for f in Panel::Frequency.values() {
+        let k = Panel::Frequency.values().iter().position(|v| *v == f).unwrap_or(0);
+        let of: Vec<_> = developed.iter().filter(|p| p.0 == k).copied().collect();
+        if let Some(local) = psi_fit::fit(&of) {
+            lines.push(format!("local Psi* at {} kHz: {:.2}", f / 1e3, local.psi_star));
+        }
+    }
+    let chart = Chart {
+        name: "fig12".into(),
+        title: "Relative friction against Psi of Eq. 17 (Fig. 12)".into(),
+        x: "psi_eq17".into(),
+        y: "mu_relative".into(),
+        series,
+    };
+    Ok(Reproduced { charts: vec![chart], lines })
+}

@@ -1,0 +1,58 @@
+//! What of a run's folder is no longer what was written.
+
+use super::lines::whole_table;
+use super::{JOURNAL, POINTS, passes_in, records_in, sessions_in};
+use crate::sequence::MeasuredPass;
+use miette::{Context, IntoDiagnostic};
+use std::fs::{self, File};
+use std::io::BufReader;
+use std::path::Path;
+
+/// What is damaged in a run's folder: its records from their first byte to their last, and its table held against its journal.
+/// Empty where nothing is; a session that was killed or is still going has a record that is cut.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn damage_in(path: &Path) -> miette::Result<Vec<String>> {
+    let mut said = Vec::new();
+    for record in records_in(path)? {
+        let file = File::open(&record).into_diagnostic().wrap_err_with(|| record.display().to_string())?;
+        let found = realtime::recorder::inspect(BufReader::new(file));
+        said.extend(found.sentences().iter().map(|s| of_file(&record, s)));
+    }
+    said.extend(missing_records(path)?);
+    if path.join(POINTS).exists() && path.join(JOURNAL).exists() {
+        match passes_in(path) {
+            Ok(passes) => said.extend(differences(path, &passes)?),
+            Err(why) => said.push(format!("{why:#}")),
+        }
+    }
+    Ok(said)
+}
+
+/// A finding with the name of the file that it is about.
+pub fn of_file(file: &Path, finding: &str) -> String {
+    format!("{}: {finding}", file.file_name().unwrap_or_default().to_string_lossy())
+}
+
+/// Sessions whose record is gone.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn missing_records(path: &Path) -> miette::Result<Vec<String>> {
+    let sessions = sessions_in(path)?.into_iter().map(|s| s.session);
+    let gone = sessions.filter(|n| !path.join(format!("run-{n}.mcap")).exists());
+    Ok(gone.map(|n| format!("run-{n}.mcap: the record of session {n} is missing")).collect())
+}
+
+/// Points whose line in the table is not what the journal holds.
+///
+/// # Errors
+/// A table that cannot be read.
+pub fn differences(path: &Path, passes: &[MeasuredPass]) -> miette::Result<Vec<String>> {
+    let (kept, _) = whole_table(&fs::read(path.join(POINTS)).into_diagnostic()?)?;
+    let differ = passes.iter().filter(|p| kept.iter().any(|k| k.point == p.pass.point && *k != p.pass));
+    Ok(differ
+        .map(|p| format!("point {}: {POINTS} and {JOURNAL} differ: one of them was changed", p.pass.point))
+        .collect())
+}

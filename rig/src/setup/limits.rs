@@ -1,0 +1,237 @@
+//! Limits of a setup: what the file states over the paper's, timing from the instruments' profiles, and the guards that a human
+//! finger needs.
+
+use super::SetupFile;
+use drivers::InstrumentSetup;
+use models::quantity::PeakToPeak;
+use realtime::ports::Nanos;
+use realtime::safety::{ChannelTiming, LimitError, Limits, Timing};
+use serde::{Deserialize, Serialize};
+
+/// Soft limits as a setup states them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LimitsFile {
+    /// N.
+    pub normal_force_max_n: Option<f64>,
+    /// N.
+    pub lateral_force_max_n: Option<f64>,
+    /// N between two samples.
+    pub force_step_max_n: Option<f64>,
+    /// N/s.
+    pub force_rate_max_n_s: Option<f64>,
+    /// m, peak-to-peak.
+    pub amplitude_max_pp_m: Option<f64>,
+    /// m/s.
+    pub amplitude_rate_max_m_s: Option<f64>,
+    /// Hz.
+    pub frequency_min_hz: Option<f64>,
+    /// Hz.
+    pub frequency_max_hz: Option<f64>,
+    /// m/s.
+    pub speed_max_m_s: Option<f64>,
+    /// m.
+    pub travel_min_m: Option<f64>,
+    /// m.
+    pub travel_max_m: Option<f64>,
+    /// Degrees Celsius.
+    pub temperature_max_c: Option<f64>,
+    /// Whether a temperature is read.
+    pub temperature_fitted: Option<bool>,
+    /// Equal raw samples in a row.
+    pub frozen_after: Option<u32>,
+    /// Equal raw amplitudes in a row, while driven; left out, 200 where the profile states the readback's noise.
+    pub amplitude_frozen_after: Option<u32>,
+    /// A human finger is in the rig.
+    pub human_contact: Option<bool>,
+    /// A key held at the terminal stands for a dead-man device: for trials.
+    pub dead_man_key: Option<bool>,
+    /// s in one go.
+    pub exposure_max_s: Option<f64>,
+    /// s of rest that end a go.
+    pub exposure_rest_s: Option<f64>,
+    /// Share of the last hour.
+    pub exposure_duty_max: Option<f64>,
+    /// m2/s: the squared rms velocity of the plate, summed over the last hour.
+    pub exposure_dose_max_m2_s: Option<f64>,
+    /// s that a link's thread may be held up before its channel counts as stale, beyond three of its periods.
+    pub link_stall_s: Option<f64>,
+    /// Late cycles among a thousand.
+    pub late_cycles_max: Option<u32>,
+    /// Late cycles in a row that are one too many.
+    pub late_in_a_row_max: Option<u32>,
+    /// s, `Q / (pi f)` of the plate.
+    pub plate_ring_time_s: Option<f64>,
+}
+
+/// How long a link's thread may be held up on a machine that does nothing else, and the longest that a setup may allow.
+const LINK_STALL_S: f64 = 0.02;
+const LINK_STALL_MAX_S: f64 = 0.05;
+
+/// Equal amplitudes in a row that count as frozen, where the profile states that the readback has noise.
+const FROZEN_AFTER: u32 = 200;
+
+/// A human finger needs its guards, and is refused with what is missing.
+pub(super) fn guarded(file: &SetupFile) -> Result<(), String> {
+    let human = file.limits.human_contact == Some(true);
+    let key = file.limits.dead_man_key == Some(true);
+    let missing = match (&file.supply_relay, &file.safety_inputs) {
+        _ if !human => None,
+        (None, _) => Some("a second switch-off channel ([supply_relay])"),
+        (_, None) if key => Some("an emergency stop ([safety_inputs])"),
+        (_, None) => Some("an emergency stop and a dead-man device ([safety_inputs])"),
+        _ => None,
+    };
+    missing.map_or(Ok(()), |what| Err(format!("human_contact = true: a finger needs {what}")))
+}
+
+/// Rates at which a channel may be read, by who it is: what [`Limits::checked`] demands of periods, said of rates.
+fn rate(instrument: &InstrumentSetup, name: &'static str, low: f64) -> Result<f64, LimitError> {
+    let stated = instrument.rate_hz.or_else(|| drivers::nominal_rate_hz(&instrument.profile));
+    let value = stated.unwrap_or(100.0);
+    let high = 1e5;
+    if value >= low && value <= high {
+        Ok(value)
+    } else {
+        let why = "samples a second: a slower channel shows what goes wrong too late";
+        Err(LimitError::OutOfRange { name, value, low, high, why })
+    }
+}
+
+/// Slowest rates of forces and of states, in Hz.
+const FORCE_RATE_MIN_HZ: f64 = 20.0;
+const STATE_RATE_MIN_HZ: f64 = 10.0;
+
+/// Soft limits over the paper's, timing from the instruments' profiles.
+pub(super) fn of(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
+    let l = &file.limits;
+    let mut limits = Limits::paper(cycle);
+    let set = |slot: &mut f64, value: Option<f64>| *slot = value.unwrap_or(*slot);
+    set(&mut limits.normal_force_max_n, l.normal_force_max_n);
+    set(&mut limits.lateral_force_max_n, l.lateral_force_max_n);
+    set(&mut limits.force_step_max_n, l.force_step_max_n);
+    set(&mut limits.force_rate_max_n_s, l.force_rate_max_n_s);
+    set(&mut limits.amplitude_rate_max_m_s, l.amplitude_rate_max_m_s);
+    set(&mut limits.frequency_hz.0, l.frequency_min_hz);
+    set(&mut limits.frequency_hz.1, l.frequency_max_hz);
+    set(&mut limits.speed_max_m_s, l.speed_max_m_s);
+    set(&mut limits.travel_m.0, l.travel_min_m);
+    set(&mut limits.travel_m.1, l.travel_max_m);
+    set(&mut limits.temperature_max_c, l.temperature_max_c);
+    set(&mut limits.exposure_max_s, l.exposure_max_s);
+    set(&mut limits.exposure_rest_s, l.exposure_rest_s);
+    set(&mut limits.exposure_duty_max, l.exposure_duty_max);
+    set(&mut limits.exposure_dose_max_m2_s, l.exposure_dose_max_m2_s);
+    limits.amplitude_max = l.amplitude_max_pp_m.map_or(limits.amplitude_max, PeakToPeak::from_metres);
+    limits.temperature_fitted = l.temperature_fitted.unwrap_or(limits.temperature_fitted);
+    limits.frozen_after = l.frozen_after.unwrap_or(limits.frozen_after);
+    limits.late_cycles_max = l.late_cycles_max.unwrap_or(limits.late_cycles_max);
+    limits.late_in_a_row_max = l.late_in_a_row_max.unwrap_or(limits.late_in_a_row_max);
+    limits.human_contact = l.human_contact.unwrap_or(limits.human_contact);
+    limits.dead_man_key = l.dead_man_key.unwrap_or(false);
+    limits.supply_required = file.supply_relay.is_some();
+    limits.load_commanded = file.stage.dead_weight_n.is_none();
+    let profile = drivers::profile(&file.amplifier.profile).ok();
+    let fed = profile.as_ref().is_some_and(|profile| profile.set("heartbeat").is_some());
+    // A virtual rig inside this program drives nothing real: it may go without what a real one must have.
+    limits.amplifier_watchdog = fed || file.virtual_rig.is_some();
+    let noise = profile.as_ref().and_then(|profile| {
+        profile.signal("amplitude").and_then(|signal| profile.description.signal[signal.0].noise)
+    });
+    limits.amplitude_frozen_after = l.amplitude_frozen_after.or(noise.map(|_| FROZEN_AFTER));
+    if let Some(seconds) = l.plate_ring_time_s {
+        limits.timing.ring_time = Timing::ring_time_of(seconds)?;
+    }
+    limits.timing.command_expiry = Timing::longest_expiry(cycle);
+
+    // A channel is stale after a number of its own periods, never of the loop's cycles. On a general-purpose kernel a
+    // link thread may be held up for some milliseconds: the latency allows for that and is stated.
+    let stall = l.link_stall_s.unwrap_or(LINK_STALL_S);
+    if !(0.0..=LINK_STALL_MAX_S).contains(&stall) {
+        let needed = "from 0 to 0.05: an amplifier's own watchdog waits no longer";
+        return Err(LimitError::Unusable { name: "link_stall_s", value: stall, needed });
+    }
+    let stall = Nanos::from_seconds(stall);
+    let timing = |instrument: &InstrumentSetup, name: &'static str| -> Result<ChannelTiming, LimitError> {
+        let low = if name == "force" { FORCE_RATE_MIN_HZ } else { STATE_RATE_MIN_HZ };
+        let period = ((1e9 / rate(instrument, name, low)?) as u64).max(cycle.0);
+        Ok(ChannelTiming { period: Nanos(period), latency: stall, periods: 3 })
+    };
+    if let (Some(first), Some(last)) = (file.force.first(), file.force.last()) {
+        let normal_first = file.force.len() == 2 && first.normal.is_some() && first.lateral.is_none();
+        let (lateral, normal) = if normal_first { (last, first) } else { (first, last) };
+        limits.timing.lateral = timing(lateral, "force")?;
+        limits.timing.normal = timing(normal, "force")?;
+    }
+    limits.timing.amplifier = timing(&file.amplifier, "amplifier")?;
+    limits.timing.stage = timing(&file.stage, "stage")?;
+    if let Some(relay) = &file.supply_relay {
+        limits.timing.supply = timing(relay, "supply_relay")?;
+    }
+    if let Some(inputs) = &file.safety_inputs {
+        limits.timing.contacts = timing(inputs, "safety_inputs")?;
+    }
+    limits.checked()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::setup::{BUNDLED, Setup};
+    use std::path::Path;
+
+    fn refused(from: &str, to: &str) -> String {
+        let text = Setup::load("virtual-ideal").unwrap().text;
+        assert!(text.contains(from), "{from}");
+        let changed = text.replacen(from, to, 1);
+        Setup::parse("changed", &changed, Path::new(".")).err().map(|e| format!("{e:#}")).unwrap_or_default()
+    }
+
+    #[test]
+    fn every_bundled_setup_is_within_the_ranges() {
+        for (name, _) in BUNDLED {
+            Setup::load(name).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+        }
+    }
+
+    /// Setups that switched rules off, each of which 'check' called good.
+    #[test]
+    fn no_setup_switches_a_rule_off() {
+        for rate in ["0", "nan", "-5", "inf", "1", "0.001", "19.9", "1e6"] {
+            let why = refused(
+                "profile = \"muprime-force2\"",
+                &format!("profile = \"muprime-force2\"\nrate_hz = {rate}"),
+            );
+            assert!(why.contains("force") && why.contains("20 to 100000"), "{rate}: {why}");
+        }
+        for rate in ["0.01", "5", "9.9", "nan"] {
+            for profile in ["amplifier", "stage"] {
+                let stated = format!("profile = \"muprime-{profile}\"");
+                let why = refused(&stated, &format!("{stated}\nrate_hz = {rate}"));
+                assert!(why.contains(profile) && why.contains("10 to 100000"), "{rate}: {why}");
+            }
+        }
+        for (key, values) in [
+            ("plate_ring_time_s", ["2.5", "1e6", "-1", "nan"]),
+            ("force_rate_max_n_s", ["1e12", "0", "-1", "nan"]),
+            ("travel_min_m", ["-1e9", "0.5", "inf", "nan"]),
+            ("travel_max_m", ["1e9", "-0.5", "inf", "nan"]),
+            ("force_step_max_n", ["1e9", "0", "-1", "nan"]),
+            ("amplitude_rate_max_m_s", ["2.5e3", "0", "-1", "nan"]),
+            ("amplitude_frozen_after", ["19", "1001", "0", "4000000000"]),
+            ("link_stall_s", ["0.051", "2.5", "-1", "nan"]),
+            ("late_in_a_row_max", ["51", "0", "1000", "4000000000"]),
+        ] {
+            for value in values {
+                let text = Setup::load("virtual-ideal").unwrap().text;
+                let rest: String =
+                    text.lines().filter(|l| !l.starts_with(key)).map(|l| format!("{l}\n")).collect();
+                let changed = rest.replacen("[limits]\n", &format!("[limits]\n{key} = {value}\n"), 1);
+                let why = Setup::parse("changed", &changed, Path::new(".")).err().map(|e| format!("{e:#}"));
+                let why = why.unwrap_or_default();
+                assert!(why.contains(key) || why.contains("travel_max_m"), "{key} = {value}: {why}");
+            }
+        }
+        let just = refused("profile = \"muprime-stage\"", "profile = \"muprime-stage\"\nrate_hz = 10");
+        assert_eq!(just, "");
+    }
+}

@@ -1,0 +1,463 @@
+//! What is kept of a run, and what is said of it: files that vanish or lock in the middle, disks that fill at the end, readers
+//! that go away, runs that are taken up again or were finished before, refusals that leave nothing behind.
+
+use rig::plan::Plan;
+use rig::session::{Job, News, Signals, Summary};
+use rig::setup::Setup;
+use std::collections::BTreeSet;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use tests::{documents, file, muprime, served, texts};
+
+fn plan(folder: &Path, amplitudes: usize) -> PathBuf {
+    let path = folder.join("plan.toml");
+    let amplitudes: Vec<f64> = (1..=amplitudes).map(|n| n as f64 * 0.4e-6).collect();
+    std::fs::write(&path, served::plan("keeping", 4, &amplitudes)).unwrap();
+    path
+}
+
+fn sweep(plan: &Path, out: &Path) -> Command {
+    let mut command = muprime();
+    command.args(["--json", "run", "--setup", "virtual-ideal"]).arg(plan).arg("--out").arg(out);
+    command
+}
+
+fn points(run: &Path) -> BTreeSet<u64> {
+    rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
+}
+
+/// A sweep in wall-clock time, struck by `strike` after its second pass.
+struct Struck {
+    out: PathBuf,
+    status: Option<i32>,
+    acknowledged: BTreeSet<u64>,
+    outcome: serde_json::Value,
+    stderr: String,
+}
+
+/// Sweeps until one was not cut short by a machine that is too busy; its folder is `N/run`.
+fn struck(folder: &Path, mut strike: impl FnMut(&Path)) -> Struck {
+    let plan = plan(folder, 12);
+    for attempt in 1..=5 {
+        let out = folder.join(format!("{attempt}/run"));
+        let mut child = sweep(&plan, &out).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut stderr = child.stderr.take().unwrap();
+        let said = std::thread::spawn(move || {
+            let mut text = String::new();
+            let _ = stderr.read_to_string(&mut text);
+            text
+        });
+        let (mut acknowledged, mut outcome) = (BTreeSet::new(), serde_json::Value::Null);
+        for line in BufReader::new(child.stdout.take().unwrap()).lines() {
+            let said: serde_json::Value = serde_json::from_str(&line.unwrap()).unwrap();
+            if let Some(pass) = said.get("pass") {
+                acknowledged.insert(pass["pass"]["point"].as_u64().unwrap());
+                if acknowledged.len() == 2 {
+                    strike(&out);
+                }
+            }
+            if let Some(summary) = said.get("summary") {
+                outcome = summary["outcome"].clone();
+            }
+        }
+        let status = child.wait().unwrap().code();
+        let stderr = said.join().unwrap();
+        if outcome != "tripped" && outcome != "would_not_arm" {
+            return Struck { out, status, acknowledged, outcome, stderr };
+        }
+        eprintln!("attempt {attempt}: {outcome}");
+    }
+    panic!("five sweeps in a row tripped: this machine is too busy for a test in wall-clock time");
+}
+
+#[test]
+fn a_record_that_is_removed_in_mid_run_stops_the_sweep_and_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = struck(folder.path(), |out| std::fs::remove_file(out.join("run-1.mcap")).unwrap());
+    assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
+    assert!(run.stderr.contains("run-1.mcap was removed or replaced"), "{}", run.stderr);
+    let kept = points(&run.out);
+    assert!(run.acknowledged.is_subset(&kept) && kept.len() < 20, "{kept:?}");
+    let report = muprime().args(["--json", "report"]).arg(&run.out).output().unwrap();
+    assert!(documents(&report)[0]["damage"].to_string().contains("the record of session 1 is missing"));
+}
+
+#[test]
+fn a_catalogue_that_is_locked_or_removed_in_mid_run_stops_the_sweep_and_every_pass_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut lock = None;
+    let run = struck(&made(folder.path(), "locked"), |out| {
+        let db = rusqlite::Connection::open(out.with_file_name("catalogue.sqlite")).unwrap();
+        db.execute_batch("BEGIN IMMEDIATE").unwrap();
+        lock = Some(db);
+    });
+    drop(lock);
+    assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
+    assert!(run.stderr.contains("catalogue") && run.stderr.contains("locked"), "{}", run.stderr);
+    let kept = points(&run.out);
+    assert!(run.acknowledged.len() > 2 && run.acknowledged == kept, "{:?} {kept:?}", run.acknowledged);
+    let summary: Summary =
+        serde_json::from_slice(&std::fs::read(run.out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary.passes, kept.len());
+    assert!(run.out.join("report.html").exists());
+
+    let run = struck(&made(folder.path(), "removed"), |out| {
+        std::fs::remove_file(out.with_file_name("catalogue.sqlite")).unwrap();
+    });
+    assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
+    assert!(run.stderr.contains("catalogue.sqlite was removed or replaced"), "{}", run.stderr);
+    assert_eq!(run.acknowledged, points(&run.out));
+}
+
+fn made(folder: &Path, name: &str) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::create_dir(&path).unwrap();
+    path
+}
+
+/// The disk fills while the record is being ended: the last tens of kilobytes are its index.
+#[test]
+fn a_disk_that_fills_at_the_very_end_hangs_nobody() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan(folder.path(), 3);
+    let whole = folder.path().join("whole");
+    let output = sweep(&plan, &whole).output().unwrap();
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{}", texts(&output).1);
+    let length = std::fs::metadata(whole.join("run-1.mcap")).unwrap().len() / 1024;
+    let mut lost = 0;
+    for short_kib in [2, 6, 12, 24] {
+        let out = folder.path().join(format!("short-{short_kib}"));
+        let mut limited = Command::new("bash");
+        limited.args(["-c", &format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", length - short_kib), "bash"]);
+        let plain = sweep(&plan, &out);
+        let limited = limited.arg(plain.get_program()).args(plain.get_args());
+        let mut child = limited.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let stdout = child.stdout.take().unwrap();
+        let last = std::thread::spawn(move || BufReader::new(stdout).lines().map_while(Result::ok).last());
+        let began = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break status;
+            }
+            if began.elapsed() > Duration::from_secs(60) {
+                child.kill().unwrap();
+                panic!("{short_kib} kB short: it hangs");
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        let last = last.join().unwrap().unwrap_or_default();
+        if last.contains("record_lost") {
+            assert_eq!(status.code(), Some(1));
+            lost += 1;
+        }
+    }
+    assert!(lost > 0, "no limit struck the record's end");
+}
+
+#[test]
+fn the_same_command_on_a_finished_run_says_so_and_touches_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
+    for clock in [Some("--fast"), None] {
+        let again = |n: u32| {
+            let output =
+                sweep(&plan, &out).args(if n == 0 { Some("--fast") } else { clock }).output().unwrap();
+            assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
+            documents(&output).pop().unwrap()["summary"].clone()
+        };
+        let first = again(0);
+        let files = |out: &Path| {
+            let entries = std::fs::read_dir(out).unwrap().map(|e| e.unwrap().path());
+            let mut all: Vec<_> = entries.map(|p| (p.clone(), std::fs::read(&p).unwrap())).collect();
+            all.retain(|(path, _)| !path.ends_with(".lock"));
+            all.sort();
+            all
+        };
+        let before = files(&out);
+        let second = again(1);
+        assert!(files(&out) == before, "a finished run was changed");
+        assert_eq!((&first["outcome"], &second["outcome"]), (&"complete".into(), &"complete".into()));
+        assert_eq!(second["finished_before"], true);
+        let said = sweep(&plan, &out).output().unwrap();
+        assert!(!documents(&said).iter().any(|d| d["event"]["event"] == "armed"), "nothing is armed");
+    }
+}
+
+#[test]
+fn runs_in_virtual_time_are_catalogued_when_they_were_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan(folder.path(), 1);
+    let now = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs_f64();
+    let before = now();
+    for name in ["b", "a"] {
+        assert_eq!(sweep(&plan, &folder.path().join(name)).arg("--fast").status().unwrap().code(), Some(0));
+    }
+    let record = |name: &str| std::fs::read(folder.path().join(name).join("run-1.mcap")).unwrap();
+    assert!(record("a") == record("b"), "the records are the same, byte for byte");
+    let runs = muprime().args(["--json", "runs", "--folder"]).arg(folder.path()).output().unwrap();
+    let runs = documents(&runs).remove(0);
+    let started = |i: usize| runs[i]["started_unix_s"].as_f64().unwrap();
+    assert!(started(0) <= now() && started(1) >= before - 1.0, "{runs}");
+    assert_eq!((&runs[0]["folder"], &runs[1]["folder"]), (&"a".into(), &"b".into()), "newest first");
+}
+
+/// The offset drift of the virtual rig, measured in one go and in two sessions: named in both.
+#[test]
+fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {
+    const DRIFT: &str = "[[defect]]\nname = \"lateral_offset_drift\"\nparameters = { end_n = 0.02, start_over_end = -0.5, time_s = 40 }\n";
+    let folder = tempfile::tempdir().unwrap();
+    let run = |name: &str, stop_after: &[usize]| {
+        let out = folder.path().join(name);
+        for stop in stop_after.iter().copied().map(Some).chain([None]) {
+            let setup = Setup::load("virtual-ideal").unwrap();
+            let model = Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
+            let defects = Some(sim::defects::Defects::parse(DRIFT).unwrap());
+            let plan = Plan::load("first-sweep").unwrap();
+            let job =
+                Job { seed: 11, setup, plan, model, model_file: None, defects, out: out.clone(), fast: true };
+            let (signals, mut made) = (Signals::default(), 0);
+            let stops = Arc::clone(&signals.stops);
+            job.run(&signals, &mut |news| {
+                made += usize::from(matches!(news, News::Pass(_)));
+                if stop == Some(made) {
+                    stops.store(1, Ordering::Relaxed);
+                }
+            })
+            .unwrap();
+        }
+        let table = std::fs::File::open(out.join("points.csv")).unwrap();
+        let passes = models::record::read_passes(table).unwrap();
+        assert_eq!(passes.len(), 98);
+        assert!(passes.is_sorted_by_key(|p| p.time_s), "the run's time goes on");
+        let sessions: Vec<u64> = passes.iter().map(|p| p.session.unwrap()).collect();
+        assert!(
+            sessions.is_sorted() && sessions.last() == Some(&(stop_after.len() as u64 + 1)),
+            "{sessions:?}"
+        );
+        for session in 1..=stop_after.len() + 1 {
+            let record = std::fs::read(out.join(format!("run-{session}.mcap"))).unwrap();
+            assert!(realtime::recorder::read(&record).integrity.complete());
+        }
+        let replayed = muprime().arg("replay").arg(&out).output().unwrap();
+        assert_eq!(replayed.status.code(), Some(0), "{}", texts(&replayed).0);
+        let verdict = muprime().args(["--json", "diagnose"]).arg(&out).output().unwrap();
+        let verdict = documents(&verdict).remove(0);
+        verdict["verdict"].to_string() + &verdict["hypotheses"][0].to_string()
+    };
+    for verdict in [run("whole", &[]), run("resumed", &[45]), run("twice", &[20, 30])] {
+        assert!(verdict.contains("lateral_offset_drift"), "{verdict}");
+    }
+}
+
+#[test]
+fn a_refusal_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan(folder.path(), 1);
+    let setup = folder.path().join("setup.toml");
+    // Nobody listens at the discard port.
+    std::fs::write(&setup, served::setup("nobody", "127.0.0.1:9".parse().unwrap())).unwrap();
+    let out = folder.path().join("runs/deep/r");
+    let output =
+        muprime().arg("run").arg(&plan).arg("--setup").arg(&setup).arg("--out").arg(&out).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", texts(&output).1);
+    assert!(!folder.path().join("runs").exists(), "a refusal left folders");
+    // A run that is there stays as it is.
+    let made = sweep(&plan, &out).arg("--fast").output().unwrap();
+    assert_eq!(made.status.code(), Some(0), "{}", texts(&made).1);
+    let mut refused = muprime();
+    refused
+        .args(["run", "--fast", "--setup", "virtual-ideal", "--seed", "99"])
+        .arg(&plan)
+        .arg("--out")
+        .arg(&out);
+    assert_eq!(refused.output().unwrap().status.code(), Some(2));
+    assert!(out.join("points.csv").exists());
+    for verb in ["watch", "runs"] {
+        let output = muprime().arg(verb).env("MUPRIME_RUNS", folder.path().join("none")).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{verb}");
+        assert!(!folder.path().join("none").exists(), "{verb} left a folder");
+    }
+}
+
+#[test]
+fn names_that_are_no_text_and_files_that_are_none_are_refused_at_once() {
+    use std::os::unix::ffi::OsStringExt;
+    let folder = tempfile::tempdir().unwrap();
+    let name = std::ffi::OsString::from_vec(b"r\xff".to_vec());
+    let output = muprime().args(["run", "--fast", "--out"]).arg(folder.path().join(&name)).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", texts(&output).1);
+    assert!(texts(&output).1.contains("UTF-8") && std::fs::read_dir(folder.path()).unwrap().next().is_none());
+
+    let pipe = folder.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let pipe = pipe.to_str().unwrap();
+    let cases = [
+        ["check", "/dev/zero"].as_slice(),
+        &["check", pipe],
+        &["check", "/"],
+        &["run", pipe],
+        &["run", "--setup", "/dev/zero"],
+        &["run", "--model", pipe],
+        &["diagnose", pipe, "--rig", pipe],
+        &["recover", pipe],
+    ];
+    for case in cases {
+        let mut child = muprime().args(case).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let began = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break status.code();
+            }
+            if began.elapsed() > Duration::from_secs(30) {
+                child.kill().unwrap();
+                panic!("{case:?} hangs");
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        assert_eq!(status, Some(2), "{case:?}");
+    }
+}
+
+#[test]
+fn a_huge_plan_is_refused_by_check_as_by_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = folder.path().join("huge.toml");
+    let list = |step: f64| format!("{:?}", (1..=3000).map(|n| f64::from(n) * step).collect::<Vec<_>>());
+    let text = served::plan("huge", 0, &[1e-6])
+        + &format!("speed_m_s = {}\nposition_m = {}\n", list(1e-5), list(1e-6));
+    std::fs::write(&plan, text).unwrap();
+    for verb in ["check", "run"] {
+        let output = muprime().arg(verb).arg(&plan).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{verb}: {}", texts(&output).1);
+        assert!(texts(&output).1.contains("18000000 passes"), "{verb}: {}", texts(&output).1);
+    }
+}
+
+/// One bit in the middle of a record: whoever looks at the run is told, with the place and the cycles that are missing.
+#[test]
+fn one_flipped_bit_is_told_by_replay_report_recover_and_diagnose() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 6), folder.path().join("run"));
+    assert_eq!(sweep(&plan, &out).arg("--fast").output().unwrap().status.code(), Some(0));
+    let record = out.join("run-1.mcap");
+    let ask = |verb: &[&str], of: &Path| {
+        let output = muprime().arg("--json").args(verb).arg(of).output().unwrap();
+        (output.status.code(), documents(&output).remove(0))
+    };
+    for verb in ["replay", "report", "diagnose"] {
+        let (status, said) = ask(&[verb], &out);
+        assert_eq!(status, Some(0), "{verb}: {said}");
+        assert!(said.get("damage").is_none_or(|d| d.as_array().is_some_and(Vec::is_empty)), "{verb}: {said}");
+    }
+    let mut bytes = std::fs::read(&record).unwrap();
+    // Within the messages of a chunk: behind the name of its compression.
+    let half = bytes.len() / 2;
+    let middle = half + 100 + bytes[half..].windows(3).position(|w| w == b"lz4").unwrap();
+    bytes[middle] ^= 1;
+    std::fs::write(&record, &bytes).unwrap();
+    let (status, replay) = ask(&["replay"], &out);
+    assert_eq!((status, &replay["holds"]), (Some(1), &false.into()));
+    let missing = replay["integrity"]["missing"]["/cycle"].as_u64().unwrap();
+    assert!(missing > 0 && replay["replay"]["missing"] == missing, "{replay}");
+    let place = &replay["integrity"]["places"][0];
+    assert!(
+        place["from"].as_u64().unwrap() <= middle as u64 && place["to"].as_u64().unwrap() > middle as u64
+    );
+    let words = format!("{missing} cycles are missing");
+    for verb in ["report", "diagnose"] {
+        let said = ask(&[verb], &out).1["damage"].to_string();
+        assert!(said.contains("run-1.mcap: bytes") && said.contains(&words), "{verb}: {said}");
+    }
+    assert!(std::fs::read_to_string(out.join("report.html")).unwrap().contains(&words));
+    let (status, recovered) = ask(&["recover"], &record);
+    assert_eq!((status, &recovered["recovered"], &recovered["damaged"]), (Some(0), &true.into(), &1.into()));
+    assert!(recovered["because"].as_str().unwrap().contains(&words), "{recovered}");
+    let (status, after) = ask(&["replay"], &out);
+    assert_eq!((status, &after["integrity"]["missing"]["/cycle"]), (Some(1), &missing.into()), "{after}");
+    assert_eq!(after["replay"]["cycles"], replay["replay"]["cycles"], "every other cycle is kept");
+    assert_eq!(std::fs::read(out.join("run-1.mcap.original")).unwrap(), bytes);
+    // A pass that was changed by hand, or by the disk.
+    let table = std::fs::read_to_string(out.join("points.csv")).unwrap();
+    std::fs::write(out.join("points.csv"), table.replacen("27500", "27600", 1)).unwrap();
+    assert!(ask(&["report"], &out).1["damage"].to_string().contains("points.csv and passes.jsonl differ"));
+}
+
+#[test]
+fn a_reader_that_goes_away_ends_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
+    assert_eq!(sweep(&plan, &out).arg("--fast").output().unwrap().status.code(), Some(0));
+    // Standard output and standard error are pipes that nobody reads any more.
+    let deaf = |arguments: &[&str]| {
+        let mut shell = Command::new("bash");
+        shell.args(["-c", "exec 3> >(true); wait $!; exec \"$@\" >&3 2>&3", "bash"]);
+        shell.arg(muprime().get_program()).args(arguments).status().unwrap().code()
+    };
+    let (run, record) = (out.to_str().unwrap(), out.join("run-1.mcap"));
+    let (plan, record) = (plan.to_str().unwrap(), record.to_str().unwrap());
+    for verb in [
+        ["--help"].as_slice(),
+        &["completions", "bash"],
+        &["model", "effects"],
+        &["model", "point"],
+        &["replay", run],
+        &["report", run],
+        &["export", run, "--to", "csv"],
+        &["recover", record],
+        &["watch", run],
+        &["check", plan],
+        &["runs", "--folder", folder.path().to_str().unwrap()],
+    ] {
+        assert_eq!(deaf(verb), Some(0), "{verb:?}");
+    }
+    assert_eq!(deaf(&["check", "/dev/null/nothing"]), Some(2));
+    // A sweep, in virtual and in wall-clock time: all of it is made and kept.
+    let silent = folder.path().join("silent");
+    assert_eq!(
+        deaf(&["run", "--fast", "--setup", "virtual-ideal", plan, "--out", silent.to_str().unwrap()]),
+        Some(0)
+    );
+    assert_eq!(points(&silent), points(&out));
+    for attempt in 1.. {
+        let silent = folder.path().join(format!("wall-{attempt}"));
+        let status = deaf(&["run", "--setup", "virtual-ideal", plan, "--out", silent.to_str().unwrap()]);
+        if status == Some(1) && attempt < 5 && tests::cut_by_a_stall(&silent).is_some() {
+            continue;
+        }
+        assert_eq!((status, points(&silent)), (Some(0), points(&out)));
+        break;
+    }
+}
+
+#[test]
+fn what_files_say_cannot_rewrite_a_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan(folder.path(), 1);
+    let setup = folder.path().join("setup.toml");
+    let text = std::fs::read_to_string(file("rig/setups/virtual-ideal.toml")).unwrap();
+    let named = text.replacen("name = \"virtual-ideal\"", "name = \"a\\u001b[2Jb\\u009b1A\"", 1);
+    assert_ne!(text, named);
+    std::fs::write(&setup, named).unwrap();
+    let out = folder.path().join("run");
+    let output = muprime()
+        .args(["run", "--fast", "--setup"])
+        .arg(&setup)
+        .arg(&plan)
+        .arg("--out")
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
+    let listed = muprime().args(["runs", "--folder"]).arg(folder.path()).output().unwrap();
+    for said in [&output.stderr, &listed.stdout] {
+        let text = String::from_utf8_lossy(said);
+        assert!(
+            !text.contains('\u{1b}') && !text.contains('\u{9b}') && text.contains("a\\u001b[2Jb\\u009b1A"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,334 @@
+//! 'Off' always leaves: the plate is driven, or the stage slides, behind a real link; the link is struck; the run ends. The
+//! instrument must be off within the stated time by its own clock, and what is said of it must be true.
+//!
+//! `MUPRIME_OFF_SEEDS` faults are drawn for each rig (6 when it is not set). No instrument here has a watchdog that would help.
+
+#[path = "off_leaves/line.rs"]
+mod line;
+
+use line::{Fault, Kind, Trouble};
+use models::quantity::PeakToPeak;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use realtime::cycle::{Command, Marker};
+use realtime::safety::Request;
+use realtime::turn::{Ports, Row};
+use rig::setup::Setup;
+use rig::supervisor::wall::{Parts, Reins};
+use rig::supervisor::{Loop, OffReport, WallLoop};
+use sim::wire::world::WorldPlant;
+use sim::wire::{Quantity, SharedPlant};
+use sim::world::{World, WorldConfig};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// One at a time: two loops would take each other's processors.
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// Beside the profile's own time limit: an answer that is waited for ([`drivers::off::OFF_ANSWER_MS`]), a new connection, and a
+/// busy machine.
+const BESIDE: Duration = Duration::from_millis(drivers::off::OFF_ANSWER_MS as u64 + 600);
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Struck {
+    Amplifier,
+    Stage,
+}
+
+/// A rig and the instrument whose link is struck.
+struct Case {
+    name: &'static str,
+    setup: &'static str,
+    struck: Struck,
+    kinds: &'static [fn(u64) -> Kind],
+}
+
+const LATE: fn(u64) -> Kind = |r| Kind::Late(Duration::from_millis(60 + r % 440));
+const TCP: &[fn(u64) -> Kind] = &[
+    LATE,
+    |_| Kind::Garbage,
+    |_| Kind::Refused,
+    |_| Kind::Echo,
+    |_| Kind::Cut,
+    |_| Kind::Stopped,
+    |_| Kind::HalfOpen,
+];
+const LINE: &[fn(u64) -> Kind] =
+    &[LATE, |_| Kind::Garbage, |_| Kind::Refused, |_| Kind::Echo, |_| Kind::Stopped, |_| Kind::HalfOpen];
+/// No refusal is put into these protocols by the line; the instrument itself takes everything.
+const NOT_REFUSING: &[fn(u64) -> Kind] =
+    &[LATE, |_| Kind::Garbage, |_| Kind::Echo, |_| Kind::Stopped, |_| Kind::HalfOpen];
+
+const CASES: &[Case] = &[
+    Case { name: "Modbus TCP amplifier", setup: "virtual-ideal", struck: Struck::Amplifier, kinds: TCP },
+    Case { name: "Modbus TCP stage", setup: "virtual-ideal", struck: Struck::Stage, kinds: TCP },
+    Case { name: "Modbus RTU amplifier", setup: "virtual-rtu", struck: Struck::Amplifier, kinds: LINE },
+    Case { name: "Modbus RTU stage", setup: "virtual-rtu", struck: Struck::Stage, kinds: LINE },
+    Case { name: "amplifier of text lines", setup: "virtual-mixed", struck: Struck::Amplifier, kinds: LINE },
+    Case {
+        name: "CANopen stage over slcan",
+        setup: "virtual-mixed",
+        struck: Struck::Stage,
+        kinds: NOT_REFUSING,
+    },
+    Case { name: "SCPI generator", setup: "scpi", struck: Struck::Amplifier, kinds: NOT_REFUSING },
+    Case { name: "amplifier with a relay", setup: "virtual-relay", struck: Struck::Amplifier, kinds: TCP },
+];
+
+/// A generator by SCPI in the place of the amplifier: it is asked 20 to 50 times a second and has no thermometer.
+fn setup(name: &str) -> Setup {
+    if name != "scpi" {
+        return Setup::load(name).unwrap();
+    }
+    let ideal = Setup::load("virtual-ideal").unwrap().text;
+    let generator = "profile = \"keysight-33500b\"\namplitude_m_per_unit = 1e-6\n";
+    let text = ideal.replace("profile = \"muprime-amplifier\"\n", generator);
+    let text = text.replace("[limits]\n", "[limits]\ntemperature_fitted = false\n");
+    Setup::parse("scpi", &text, Path::new(".")).unwrap()
+}
+
+/// A rig behind its links, one of which can be struck.
+struct Bench {
+    rig: Option<WallLoop>,
+    reins: Reins,
+    plant: SharedPlant,
+    trouble: Trouble,
+    answer_limit: Duration,
+    _emulators: rig::embed::Embedded,
+}
+
+impl Bench {
+    fn start(case: &Case, world: impl FnOnce(&mut WorldConfig), seed: u64) -> Self {
+        let setup = setup(case.setup);
+        let mut config = WorldConfig::ideal();
+        config.amplifier.watchdog_s = 1e9;
+        world(&mut config);
+        let (epoch, origin_ns) = (Instant::now(), realtime::pacing::monotonic_ns());
+        let plant = SharedPlant::new(WorldPlant::new(World::new(&config, 1).unwrap()), epoch);
+        let mut instruments = setup.instruments();
+        let emulators = rig::embed::embed(&mut instruments, &plant, false).unwrap();
+        let trouble = Trouble::new(if case.struck == Struck::Amplifier { 100 } else { 102 }, seed);
+        let struck = match case.struck {
+            Struck::Amplifier => &mut instruments.amplifier,
+            Struck::Stage => &mut instruments.stage,
+        };
+        let (scheme, place) = match struck.address.split_once(":/") {
+            Some((scheme, path)) => (format!("{scheme}:"), format!("/{path}")),
+            None => (String::new(), struck.address.clone()),
+        };
+        struck.address = match place.parse() {
+            Ok(server) => line::before_tcp(server, &trouble).to_string(),
+            Err(_) => format!("{scheme}{}", line::before_line(&place, &trouble)),
+        };
+        let link = drivers::profile(&struck.profile).unwrap().description.link;
+        // A busy machine may keep an answer for longer than a profile allows.
+        let mut tries = (0..5).map(|_| drivers::open(&instruments, epoch));
+        let opened = tries.find_map(Result::ok).expect("five times no answer at the start");
+        let (rig, reins, _) = WallLoop::start(Parts {
+            config: setup.config,
+            model: Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap()),
+            ports: Ports::new(opened.force, opened.amplifier, opened.stage)
+                .with_supply(opened.supply)
+                .with_contacts(opened.contacts),
+            links: opened.links,
+            pacing: realtime::pacing::Pacing::default(),
+            origin_ns,
+        })
+        .unwrap();
+        let answer_limit = Duration::from_millis(u64::from(link.response_timeout_ms));
+        Bench { rig: Some(rig), reins, plant, trouble, answer_limit, _emulators: emulators }
+    }
+
+    /// Arms, drives the plate, slides the stage; false where the machine was too busy for the rig to stay armed.
+    fn drive(&mut self) -> bool {
+        let began = Instant::now();
+        let request = Request {
+            amplitude: PeakToPeak::from_metres(2e-6),
+            frequency_hz: 27_500.0,
+            velocity_m_s: 0.005,
+            normal_force_n: 0.25,
+        };
+        let mut asked: Option<Instant> = None;
+        while began.elapsed() < Duration::from_secs(10) {
+            let Some(row) = self.reins.next_row() else { continue };
+            if row.armed && self.is_on(Struck::Amplifier) && self.is_on(Struck::Stage) {
+                return true;
+            }
+            if asked.is_none_or(|at| at.elapsed() > Duration::from_millis(60)) {
+                asked = Some(Instant::now());
+                if !row.armed {
+                    self.reins.send(Command::Set(Request::default(), Marker::default()));
+                    self.reins.send(Command::Reset);
+                } else {
+                    self.reins.send(Command::Set(request, Marker::default()));
+                }
+            }
+        }
+        false
+    }
+
+    /// Whether the instrument is on, by itself.
+    fn is_on(&self, which: Struck) -> bool {
+        let (mut plant, _) = self.plant.now();
+        match which {
+            Struck::Amplifier => plant.measure(Quantity::OutputOn) != 0.0,
+            Struck::Stage => plant.measure(Quantity::Velocity).abs() > 0.5e-3,
+        }
+    }
+
+    /// Watches an instrument by its own clock until told to end; returns when it was last seen on.
+    fn watch(&self, which: Struck) -> (Arc<AtomicBool>, std::thread::JoinHandle<Option<Instant>>) {
+        let (plant, done) = (self.plant.clone(), Arc::new(AtomicBool::new(false)));
+        let ended = Arc::clone(&done);
+        let look = move || {
+            let mut last_on = None;
+            while !ended.load(Ordering::Acquire) {
+                let on = {
+                    let (mut plant, _) = plant.now();
+                    match which {
+                        Struck::Amplifier => plant.measure(Quantity::OutputOn) != 0.0,
+                        Struck::Stage => plant.measure(Quantity::Velocity).abs() > 0.5e-3,
+                    }
+                };
+                if on {
+                    last_on = Some(Instant::now());
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            last_on
+        };
+        (done, std::thread::spawn(look))
+    }
+
+    fn end(&mut self) -> OffReport {
+        self.rig.take().unwrap().end().off
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        drop(self.rig.take());
+        self.trouble.end();
+    }
+}
+
+/// One strike. The complaint, if there is one.
+fn strike(case: &Case, seed: u64) -> Result<String, String> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let kind = case.kinds[seed as usize % case.kinds.len()](random.next_u64());
+    let mut bench = Bench::start(case, |_| {}, seed);
+    if !bench.drive() {
+        return Err("it was never driven".into());
+    }
+    let (done, watch) = bench.watch(case.struck);
+    let lasts = Duration::from_millis(50 + random.next_u64() % 350);
+    // What keeps the way open for set-points never ends; what closes it does.
+    let closes = matches!(kind, Kind::Cut | Kind::Stopped | Kind::HalfOpen);
+    let from = Instant::now();
+    let until = from + if closes { lasts } else { Duration::from_secs(60) };
+    bench.trouble.strike(Fault { kind, from, until });
+    std::thread::sleep(Duration::from_millis(random.next_u64() % 300));
+    let ended = Instant::now();
+    let off = bench.end();
+    std::thread::sleep(Duration::from_millis(30));
+    done.store(true, Ordering::Release);
+    let last_on = watch.join().unwrap();
+    let left_on = bench.is_on(case.struck);
+    let carries = if closes { until } else { from };
+    let took = last_on.map_or(Duration::ZERO, |at| at.saturating_duration_since(carries.max(ended)));
+    let bound = bench.answer_limit + BESIDE;
+    let found =
+        format!("{}, seed {seed}, {kind:?}: off {} ms after the end, {off:?}", case.name, took.as_millis());
+    match (left_on, took > bound, off.read_back) {
+        (true, _, _) => Err(format!("left on: {found}")),
+        (_, true, _) => Err(format!("later than {bound:?}: {found}")),
+        (_, _, read_back) if closes && !read_back => Err(format!("off, and not read back: {found}")),
+        _ => Ok(found),
+    }
+}
+
+#[test]
+fn off_leaves_on_every_transport_whatever_strikes_the_link() {
+    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+    let seeds: u64 = std::env::var("MUPRIME_OFF_SEEDS").map_or(6, |n| n.parse().expect("a number"));
+    let only = std::env::var("MUPRIME_OFF_CASE").unwrap_or_default();
+    let mut wrong = Vec::new();
+    for case in CASES.iter().filter(|case| case.name.contains(&only)) {
+        for seed in 0..seeds {
+            match strike(case, seed) {
+                Ok(found) => println!("{found}"),
+                Err(found) => {
+                    println!("WRONG {found}");
+                    wrong.push(found);
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {} strikes: {wrong:#?}", wrong.len(), seeds * CASES.len() as u64);
+}
+
+/// An amplifier that ignores its enable, and a link that carries nothing more: neither is said to be off.
+#[test]
+fn what_was_not_read_back_off_is_not_said_to_be_off() {
+    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+    let mut stubborn = Bench::start(&CASES[0], |world| world.amplifier.refuses_off = true, 1);
+    assert!(stubborn.drive());
+    let off = stubborn.end();
+    assert!(stubborn.is_on(Struck::Amplifier), "else this test shows nothing");
+    assert!(!off.read_back && off.words().contains("may still be on: switch the supply off"), "{off:?}");
+
+    let mut dead = Bench::start(&CASES[0], |_| {}, 2);
+    assert!(dead.drive());
+    let (from, until) = (Instant::now(), Instant::now() + Duration::from_secs(600));
+    dead.trouble.strike(Fault { kind: Kind::HalfOpen, from, until });
+    let ended = Instant::now();
+    let off = dead.end();
+    assert!(!off.read_back && off.not_read_back[0].drives, "{off:?}");
+    assert!(ended.elapsed() < drivers::off::OFF_WITHIN + Duration::from_secs(4), "the wait is bounded");
+}
+
+/// The amplifier's link is dead for good, or the amplifier ignores its enable: the relay in its supply opens all the same.
+#[test]
+fn the_second_channel_switches_off_what_the_first_cannot() {
+    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+    let case = CASES.iter().find(|case| case.setup == "virtual-relay").unwrap();
+    for dead in [true, false] {
+        let mut bench = Bench::start(case, |world| world.amplifier.refuses_off = !dead, 5);
+        assert!(bench.drive());
+        if dead {
+            let (from, until) = (Instant::now(), Instant::now() + Duration::from_secs(600));
+            bench.trouble.strike(Fault { kind: Kind::HalfOpen, from, until });
+        }
+        let off = bench.end();
+        assert!(!bench.is_on(Struck::Amplifier), "dead link {dead}: {off:?}");
+        assert!(off.read_back, "dead link {dead}: {off:?}");
+    }
+}
+
+/// A panic of whoever supervises: the rig is off when it has been unwound.
+#[test]
+fn a_panic_of_the_supervising_thread_switches_off() {
+    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+    let mut bench = Bench::start(&CASES[0], |_| {}, 3);
+    assert!(bench.drive());
+    let plant = bench.plant.clone();
+    let panicked = std::thread::spawn(move || {
+        let _held = bench;
+        panic!("as an eprintln does whose terminal is gone");
+    });
+    assert!(panicked.join().is_err());
+    assert!(plant.now().0.measure(Quantity::OutputOn) == 0.0);
+}
+
+/// What a row shows is what the rig did: a guard against a test that never drove anything.
+#[test]
+fn the_rows_show_the_drive() {
+    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+    let mut bench = Bench::start(&CASES[0], |_| {}, 4);
+    assert!(bench.drive());
+    let driven = |row: &Row| row.drive_pp_m > 0.0 && row.velocity_m_s != 0.0;
+    let seen = std::iter::repeat_with(|| bench.reins.next_row()).take(2000).flatten().any(|row| driven(&row));
+    assert!(seen);
+}
