@@ -20,10 +20,11 @@
 //! use muprime_realtime::safety::Limits;
 //!
 //! // A setup may narrow the limits, and widen them up to bounds that are compiled in.
-//! let wide = Limits { normal_force_max_n: 4.0, ..Limits::paper(Nanos(1_000_000)) };
-//! assert!(wide.checked().is_ok());
-//! let wider = Limits { normal_force_max_n: 40.0, ..wide };
-//! assert!(wider.checked().is_err());
+//! let mut limits = Limits::paper(Nanos(1_000_000));
+//! limits.normal_force_max_n = 4.0;
+//! assert!(limits.checked().is_ok());
+//! limits.normal_force_max_n = 40.0;
+//! assert!(limits.checked().is_err());
 //! ```
 //!
 //! The wall clock is forbidden here, and the monotonic clock is read by `pacing` alone.
