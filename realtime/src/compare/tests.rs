@@ -1,4 +1,5 @@
 //! The comparison against passes whose truth is known.
+#![allow(clippy::disallowed_types)]
 
 use super::*;
 use models::finger::Finger;
