@@ -1,9 +1,14 @@
 //! A human finger, from the setup to the end of a sweep: refused with what is missing, armed by a hand, ended by its exposure.
 //! The finger is the virtual rig's, in virtual time: nobody is vibrated.
 
+use models::prediction::SpringSlider;
+use realtime::safety::Cause;
+use rig::plan::Plan;
+use rig::sequence::{Event, Outcome};
+use rig::session::{Job, News, Signals};
 use rig::setup::Setup;
 use std::path::Path;
-use tests::{documents, muprime, texts};
+use std::sync::Arc;
 
 const RELAY: &str = "[supply_relay]\nprofile = \"muprime-relay\"\naddress = \"127.0.0.1:0\"\n";
 const INPUTS: &str = "[safety_inputs]\nprofile = \"muprime-relay\"\naddress = \"127.0.0.1:0\"\n";
@@ -31,18 +36,31 @@ fn setup(tables: &str, limits: &str, hand: bool) -> String {
     format!("{text}\n{tables}")
 }
 
-fn run(tables: &str, limits: &str, hand: bool) -> serde_json::Value {
+/// A sweep in virtual time: how it ended, passes made and planned, and the events on the way.
+fn run(tables: &str, limits: &str, hand: bool) -> (Outcome, usize, usize, Vec<Event>) {
     let folder = tempfile::tempdir().unwrap();
-    let (setup_path, plan) = (folder.path().join("setup.toml"), folder.path().join("plan.toml"));
-    std::fs::write(&setup_path, setup(tables, limits, hand)).unwrap();
+    let plan = folder.path().join("plan.toml");
     std::fs::write(&plan, PLAN).unwrap();
-    let mut sweep = muprime();
-    sweep.args(["--json", "run"]).arg(&plan).arg("--setup").arg(&setup_path).arg("--fast");
-    let output = sweep.arg("--out").arg(folder.path().join("run")).output().unwrap();
-    let said = documents(&output);
-    let summary = said.last().map(|d| d["summary"].clone()).unwrap_or_default();
-    assert!(!summary.is_null(), "{:?}", texts(&output));
-    summary
+    let setup = Setup::parse("human", &setup(tables, limits, hand), Path::new(".")).unwrap();
+    let model = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
+    let job = Job {
+        setup,
+        plan: Plan::load(plan.to_str().unwrap()).unwrap(),
+        seed: 7,
+        model,
+        model_file: None,
+        defects: None,
+        out: folder.path().join("run"),
+        fast: true,
+    };
+    let mut events = Vec::new();
+    let mut news = |news: News<'_>| {
+        if let News::Event(event) = news {
+            events.push(event.clone());
+        }
+    };
+    let summary = job.run(&Signals::default(), &mut news).unwrap();
+    (summary.outcome, summary.passes, summary.planned, events)
 }
 
 #[test]
@@ -69,19 +87,19 @@ fn a_human_finger_is_refused_with_what_is_missing() {
 #[test]
 fn a_hand_arms_the_rig_and_without_one_it_does_not_arm() {
     let tables = format!("{RELAY}\n{INPUTS}");
-    let summary = run(&tables, "", true);
-    assert_eq!(summary["outcome"], "complete", "{summary}");
-    assert_eq!(summary["passes"], summary["planned"]);
-    let summary = run(&tables, "", false);
-    assert_eq!((&summary["outcome"], &summary["blocking"]), (&"would_not_arm".into(), &"dead_man".into()));
-    assert_eq!(summary["passes"], 0);
+    let (outcome, passes, planned, events) = run(&tables, "", true);
+    assert_eq!((outcome, passes), (Outcome::Complete, planned));
+    assert!(events.contains(&Event::Armed) && !events.contains(&Event::NoSecondChannel), "{events:?}");
+    let (outcome, passes, ..) = run(&tables, "", false);
+    assert_eq!((outcome, passes), (Outcome::WouldNotArm { blocking: Some(Cause::DeadMan) }, 0));
 }
 
 #[test]
 fn a_sweep_longer_than_its_exposure_is_ended_by_it() {
     let tables = format!("{RELAY}\n{INPUTS}");
     // Passes of 0.3 s vibrate, with pauses between that end no go.
-    let summary = run(&tables, "exposure_max_s = 0.7", true);
-    assert_eq!(summary["outcome"], "tripped", "{summary}");
-    assert!(summary.to_string().contains("exposure"), "{summary}");
+    let (outcome, passes, planned, _) = run(&tables, "exposure_max_s = 0.7", true);
+    let Outcome::Tripped(trip) = outcome else { panic!("{outcome:?}") };
+    assert_eq!((trip.cause, trip.bound), (Cause::Exposure, 0.7));
+    assert!(trip.value < 0.705 && passes < planned, "{trip:?}");
 }

@@ -1,6 +1,8 @@
 //! The promises that do not depend on the machine: the loop does not allocate, whatever the cycle does; the record's writer
 //! holds no more memory after hours than after seconds.
 
+#![allow(clippy::disallowed_methods, reason = "drivers are opened with a reading of the clock")]
+
 use models::prediction::SpringSlider;
 use realtime::cycle::{Command, CycleState};
 use realtime::ports::Nanos;

@@ -326,7 +326,7 @@ impl Setup {
         Ok(None)
     }
 
-    /// What is known of this rig, for the `rig.toml` beside a point table (contract).
+    /// What is known of this rig, for the `rig.toml` beside a point table (docs/contract.md).
     pub fn rig_file(&self) -> RigFile {
         RigFile {
             finger: models::finger::Finger { lateral_recovery_m_per_s: None, ..self.tip.finger },

@@ -251,7 +251,7 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
     let seen_hidden = bench.circumstances(&hidden, false, &mut noise);
     let at_hidden = bench.noise_free(&seen_hidden, &defects);
     let without = bench.noise_free(&seen_hidden, &Defects::none());
-    // Nominal baseline: the contract's mu0, from the table's passes without vibration.
+    // Nominal baseline: docs/contract.md's mu0, from the table's passes without vibration.
     let mut nominal = bench.nominal;
     nominal.mu0 = models::record::coulomb_coefficient(&passes).unwrap_or(nominal.mu0);
     let label = Label {

@@ -182,7 +182,7 @@ pub fn read_passes(from: impl Read) -> Result<Vec<Pass>, TableError> {
 pub fn write_passes(passes: &[Pass], to: impl Write) -> Result<(), TableError> {
     let mut writer = csv::Writer::from_writer(to);
     let before = ["lateral_force_n", "normal_force_sd_n", "lateral_force_sd_n", "samples"];
-    let after = ["phase_shift_deg", "replicate", "run"];
+    let after = ["phase_shift_deg", "replicate", "run", "session"];
     let required = std::iter::once("point").chain(covariate::REQUIRED.iter().map(|c| c.name));
     let optional = covariate::OPTIONAL.iter().map(|c| c.name);
     writer.write_record(required.chain(before).chain(optional).chain(after))?;
