@@ -52,10 +52,16 @@ pub(super) fn sound(opcode: u8, body: &[u8], wanted: Wanted) -> Result<Sound, St
         }
         Record::Metadata(metadata) => {
             let (name, mut facts) = (metadata.name, metadata.metadata);
-            if facts.remove(CHECKSUM) != Some(checksum_of(&name, &facts)) {
-                return Err("the checksum of a metadata record does not agree".into());
+            match facts.remove(CHECKSUM) {
+                None => {
+                    Err("a metadata record has no checksum: it is damaged, or from before records had one"
+                        .into())
+                }
+                Some(stated) if stated != checksum_of(&name, &facts) => {
+                    Err("the checksum of a metadata record does not agree".into())
+                }
+                Some(_) => Ok(Sound::Entry(Entry::Facts { name, facts })),
             }
-            Ok(Sound::Entry(Entry::Facts { name, facts }))
         }
         Record::DataEnd(end) => Ok(Sound::DataEnd(end.data_section_crc)),
         Record::Header(_) => Ok(Sound::Nothing),
