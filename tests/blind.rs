@@ -5,7 +5,7 @@ use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use models::record::Pass;
 use rayon::prelude::*;
-use rig::blind::score;
+use rig::validation::blind::score;
 use sim::sealed::{Ask, Stratum, generate};
 use std::collections::BTreeSet;
 

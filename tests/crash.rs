@@ -17,7 +17,8 @@ fn sweep(plan: &Path, out: &Path) -> Command {
     command
 }
 
-/// Every change of the disk that a sweep makes: which call, and the how many-th of its kind.
+/// Every change of the disk that a sweep makes: which call, and the how many-th of its kind in its thread, as strace counts
+/// when it injects. Where two threads have as many, the first to get there is the one that dies.
 fn steps(plan: &Path, folder: &Path) -> Vec<(String, u64)> {
     let log = folder.join("calls");
     let plain = sweep(plan, &folder.join("traced"));
@@ -26,12 +27,21 @@ fn steps(plan: &Path, folder: &Path) -> Vec<(String, u64)> {
     traced.arg(plain.get_program()).args(plain.get_args());
     let output = traced.output().expect("strace is needed: tests/run installs it");
     assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
-    let mut counts: BTreeMap<String, u64> = BTreeMap::new();
+    let mut counts: BTreeMap<(String, String), u64> = BTreeMap::new();
     let log = std::fs::read_to_string(log).unwrap();
-    for call in log.lines().filter_map(|l| l.split_whitespace().nth(1)?.split_once('(')) {
-        *counts.entry(call.0.to_string()).or_default() += 1;
+    for line in log.lines() {
+        let mut words = line.split_whitespace();
+        let (thread, call) = (words.next(), words.next().and_then(|call| call.split_once('(')));
+        if let (Some(thread), Some((call, _))) = (thread, call) {
+            *counts.entry((call.to_string(), thread.to_string())).or_default() += 1;
+        }
     }
-    counts.into_iter().flat_map(|(call, count)| (1..=count).map(move |n| (call.clone(), n))).collect()
+    let mut most: BTreeMap<String, u64> = BTreeMap::new();
+    for ((call, _), count) in counts {
+        let one = most.entry(call).or_default();
+        *one = count.max(*one);
+    }
+    most.into_iter().flat_map(|(call, count)| (1..=count).map(move |n| (call.clone(), n))).collect()
 }
 
 /// The sweep under strace, killed at the n-th of its calls of one kind.

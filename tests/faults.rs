@@ -1,8 +1,10 @@
 //! The fault list in virtual time: each fault in each phase, its worst reaction beside its bound, and its cause.
 
-use rig::faults::bench::STEADY_AT;
-use rig::faults::rows::What;
-use rig::faults::{Core, Expect, Moment, Pace, ROWS, Scene, Search, Strike, Tally, run, run_with, search};
+use rig::validation::faults::bench::STEADY_AT;
+use rig::validation::faults::rows::What;
+use rig::validation::faults::{
+    Core, Expect, Moment, Pace, ROWS, Scene, Search, Strike, Tally, run, run_with, search,
+};
 
 const PACES: [Pace; 2] = [Pace::Fast, Pace::Default];
 

@@ -163,7 +163,7 @@ fn a_disk_that_fills_at_the_very_end_hangs_nobody() {
             std::thread::sleep(Duration::from_millis(20));
         };
         let last = last.join().unwrap().unwrap_or_default();
-        if last.contains("record_lost") {
+        if last.contains(r#""outcome":"record_lost""#) {
             assert_eq!(status.code(), Some(1));
             lost += 1;
         }

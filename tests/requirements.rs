@@ -4,9 +4,9 @@
 //! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements` writes it anew.
 
 use realtime::safety::{Cause, RULES};
-use rig::faults::bench::STEADY_AT;
-use rig::faults::bench::{RING, T};
-use rig::faults::{ELSEWHERE, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run};
+use rig::validation::faults::bench::STEADY_AT;
+use rig::validation::faults::bench::{RING, T};
+use rig::validation::faults::{ELSEWHERE, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use tests::file;

@@ -16,6 +16,7 @@
 //! | [`model_file`] | a corrected model from its file to the loop |
 //! | [`faults`], [`blind`] | what validates: the fault list in virtual time, the diagnosis scored on sealed sets |
 //! | [`input`] | files that people wrote, refused with the place |
+//! | [`validation`] | the blind score of the diagnosis, and the fault bench of the controller |
 //! | [`cli`] | one file a subcommand |
 //!
 //! ```
@@ -32,14 +33,12 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
-pub mod blind;
 pub mod catalogue;
 pub mod certificates;
 pub mod claim;
 pub mod cli;
 pub mod embed;
 pub mod export;
-pub mod faults;
 pub mod figures;
 pub mod files;
 pub mod fingertip;
@@ -53,3 +52,4 @@ pub mod sequence;
 pub mod session;
 pub mod setup;
 pub mod supervisor;
+pub mod validation;

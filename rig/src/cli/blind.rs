@@ -1,6 +1,6 @@
 //! `muprime blind`: the diagnosis scored on sealed sets.
 
-use crate::blind::{confusion, figures, run as score_all};
+use crate::validation::blind::{confusion, figures, run as score_all};
 use crate::{out, say};
 use diagnosis::constants::{Constants, Row, Stage};
 use diagnosis::hypotheses::Options;
@@ -66,7 +66,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         Some(other) => miette::bail!("--stratum {other}: none, single, pair, alias or outside is needed"),
     };
     if let Some(folder) = &args.write {
-        for set in crate::blind::sets(args.seed, args.sets, stratum) {
+        for set in crate::validation::blind::sets(args.seed, args.sets, stratum) {
             let name = format!("{:06}", set.label.seed % 1_000_003);
             set.write(&folder.join("open").join(&name), &folder.join("sealed").join(&name))
                 .into_diagnostic()?;
@@ -141,7 +141,7 @@ fn sensitivity(
     if !options.constants.rows().iter().any(picked) {
         miette::bail!("--sensitivity {asked}: fit, decision, the name of a constant, or nothing is needed");
     }
-    let rows = crate::blind::sensitivity::run(args.seed, args.sets, stratum, options, &picked)?;
+    let rows = crate::validation::blind::sensitivity::run(args.seed, args.sets, stratum, options, &picked)?;
     if json {
         let document = serde_json::json!({
             "schema": "muprime.blind.sensitivity/1", "seed": args.seed, "sets": args.sets, "rows": rows,
@@ -168,10 +168,11 @@ fn sensitivity(
 
 /// Coverage of the size's interval, and how many sets were named in their own form.
 fn same_form(args: &Args, json: bool) -> miette::Result<ExitCode> {
-    let sets = crate::blind::same_form::run(args.seed, args.sets)?;
+    let sets = crate::validation::blind::same_form::run(args.seed, args.sets)?;
     let stated: Vec<(f64, [f64; 2])> = sets.iter().filter_map(|s| Some((s.truth, s.ci95?))).collect();
     let covered = stated.iter().map(|(t, ci)| ci[0] <= *t && *t <= ci[1]).collect();
-    let figure = crate::blind::share("size inside its 95 % interval, same form", "0.92 to 0.98", covered);
+    let figure =
+        crate::validation::blind::share("size inside its 95 % interval, same form", "0.92 to 0.98", covered);
     if json {
         let document =
             serde_json::json!({ "schema": "muprime.blind.same_form/1", "figure": figure, "sets": sets });
@@ -193,7 +194,7 @@ fn same_form(args: &Args, json: bool) -> miette::Result<ExitCode> {
 
 /// Passes until a probability of 0.9, designed and at random.
 fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
-    use crate::blind::further::{self, LIMIT};
+    use crate::validation::blind::further::{self, LIMIT};
     let each = |r: &further::Race| {
         let passes = |n: Option<usize>| n.map_or(format!("> {LIMIT}"), |n| n.to_string());
         let (designed, random) = (passes(r.designed), passes(r.random));

@@ -1,9 +1,9 @@
 //! `muprime faults`: the fault list in virtual time, from seeds.
 
-use crate::faults::Pace;
-use crate::faults::bench::{Scene, run as run_scene};
-use crate::faults::search::{Search, Tally, search};
 use crate::out;
+use crate::validation::faults::Pace;
+use crate::validation::faults::bench::{Scene, run as run_scene};
+use crate::validation::faults::search::{Search, Tally, search};
 use miette::IntoDiagnostic;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,7 +39,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(path) = &args.scene {
         let text = crate::input::text_of(path)?;
         let scene: Scene = serde_json::from_str(&text).into_diagnostic()?;
-        if scene.strikes.iter().any(|s| s.row >= crate::faults::ROWS.len()) {
+        if scene.strikes.iter().any(|s| s.row >= crate::validation::faults::ROWS.len()) {
             miette::bail!("{}: a strike's row is beyond the list", path.display());
         }
         let found = run_scene(&scene, true);
@@ -51,7 +51,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let (begun, cpu_ns) = (std::time::Instant::now(), realtime::pacing::process_cpu_ns());
     let tally = search(Search { first, seeds, pairs, twice, pace });
     let cpu_s = (realtime::pacing::process_cpu_ns() - cpu_ns) as f64 * 1e-9;
-    let simulated_s = tally.cycles as f64 * crate::faults::bench::T.seconds();
+    let simulated_s = tally.cycles as f64 * crate::validation::faults::bench::T.seconds();
     let speed = simulated_s / cpu_s.max(1e-9);
     if json {
         out!("{}", document(&tally, speed)?);

@@ -2,18 +2,19 @@
 
 use super::rows::{Expect, Moment, Pace, ROWS, TOO_LATE, What};
 use super::tamper::{Tamper, Tampered};
+use crate::supervisor::{Loop, VirtualLoop};
 use calibration::certificate::sha256_hex;
 use models::condition::{Condition, OutOfDomain};
 use models::finger::Finger;
 
 use models::prediction::{FrictionModel, Prediction, SpringSlider};
 use models::quantity::PeakToPeak;
-use realtime::cycle::{Command, Config, CycleState, Marker, Phase};
+use realtime::cycle::{Command, Config, Marker, Phase};
 use realtime::estimate::{EstimateConfig, Mu0};
 use realtime::ports::Nanos;
 use realtime::replay::replay;
 use realtime::safety::{Cause, Limits, Request, Trip};
-use realtime::turn::{Ports, Row, Tick, turn};
+use realtime::turn::{Ports, Row};
 use realtime::wrap::fault::{Fault, FaultMode, FaultyAmplifier, FaultyForce, FaultyStage};
 use serde::{Deserialize, Serialize};
 use sim::amplifier::AmplifierInput;
@@ -261,7 +262,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let config = Config { limits, estimate };
     let slider = SpringSlider::new(Finger::paper()).expect("the paper's finger is one");
     let diverges = scene.first(|w| w == What::ModelDiverges).map(time_of);
-    let model = Diverging(slider, diverges);
+    let model = Arc::new(Diverging(slider, diverges));
     let rig = VirtualRig::new(&scene.world(), scene.seed).expect("the bench's world can be");
     let [force, amplifier, stage] = rig.split();
     let world = force.clone();
@@ -273,14 +274,14 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let holds_dead_man_from = Some(time_of(20));
     world.rig().world_mut().set_operator(Operator { holds_dead_man_from, ..Operator::default() });
     let (supply, contacts) = (world.clone(), world.clone());
-    let mut ports = Ports::new(
+    let ports = Ports::new(
         Box::new(FaultyForce::new(tampered(force), &faults, scene.seed)),
         Box::new(FaultyAmplifier::new(tampered(amplifier), &faults, scene.seed)),
         Box::new(FaultyStage::new(tampered(stage), &faults, scene.seed)),
     )
     .with_supply(Box::new(supply))
     .with_contacts(Box::new(contacts));
-    let mut state = CycleState::default();
+    let mut controller = VirtualLoop::new(config, Arc::clone(&model) as Arc<dyn FrictionModel>, ports);
     let mut watch = Watch::new(scene);
     let mut rows = Vec::new();
     let mut request = Request::default();
@@ -324,12 +325,13 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
                 }
             }
         }
-        let mut commands = commands.into_iter();
+        for command in commands {
+            controller.send(command);
+        }
         if cycle >= REQUEST_AT {
             request = scene.request(cycle);
         }
-        let tick = Tick { number: cycle, lateness, now };
-        let mut row = turn(&config, &model, &mut state, &mut ports, &mut || commands.next(), tick);
+        let mut row = controller.cycle_at(now, lateness);
         if let (Core::Mistaken, Some(trip)) = (core, &mut row.tripped) {
             trip.cause = if trip.cause == Cause::Overrun { Cause::Stopped } else { Cause::Overrun };
         }
@@ -354,7 +356,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
         found.hash = Some(sha256_hex(&written));
         // What a record would hold, run again.
         let written = rows.iter().filter_map(|r| serde_json::from_slice(&serde_json::to_vec(r).ok()?).ok());
-        let again = replay(&config, &model, written.collect::<Vec<Row>>());
+        let again = replay(&config, &*model, written.collect::<Vec<Row>>());
         if again.cycles as usize != rows.len() || !again.holds() {
             found.wrong.push(format!("replayed, the decisions differ: {again:?}"));
         }
