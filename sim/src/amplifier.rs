@@ -44,7 +44,7 @@ impl Default for AmplifierConfig {
             amplitude_step_m: 1e-9,
             frequency_step_hz: 1.0,
             amplitude_max_m: 8e-6,
-            frequency_range_hz: [15_000.0, 80_000.0],
+            frequency_range_hz: [10_000.0, 100_000.0],
             watchdog_s: 0.05,
             readback_relative_sd: 1e-3,
             readback_sd_m: 1e-9,
