@@ -11,10 +11,9 @@
 //! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
 //! | [`run_dir`], [`catalogue`] | a run's folder and the catalogue of runs |
 //! | [`figures`] | the paper's figures recomputed |
-//! | [`files`], [`print`] | how files are written, and how the program speaks: each in one place |
+//! | [`files`], [`mod@print`] | how files are written, and how the program speaks: each in one place |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
 //! | [`model_file`] | a corrected model from its file to the loop |
-//! | [`faults`], [`blind`] | what validates: the fault list in virtual time, the diagnosis scored on sealed sets |
 //! | [`input`] | files that people wrote, refused with the place |
 //! | [`validation`] | the blind score of the diagnosis, and the fault bench of the controller |
 //! | [`cli`] | one file a subcommand |
