@@ -2,7 +2,7 @@
 //!
 //! | room | purpose |
 //! |---|---|
-//! | [`library`] | the candidate causes, one file each, with the facts that others need of them |
+//! | [`mod@library`] | the candidate causes, one file each, with the facts that others need of them |
 //! | [`effect`] | what a cause is: place, laws, parameters with their priors, needs, aliases, checks |
 //! | [`contact`] | the one contact that every cause acts on, and its solvers |
 //! | [`operating`] | one pass as the table has it; the baseline and the reading |
@@ -12,7 +12,7 @@
 //!
 //! An effect changes what the contact is given ([`contact::Contact`]) or what the instruments make of the
 //! force ([`operating::Reading`]); the contact itself is solved in one place. Effects therefore combine, and
-//! each nests the baseline exactly. To add one: a file in `library/`, and its line in [`library`]'s list.
+//! each nests the baseline exactly. To add one: a file in `library/`, and its line in [`mod@library`]'s list.
 //!
 //! ```
 //! use models::condition::Condition;
