@@ -31,7 +31,8 @@ fn what_stands_in_the_registers_comes_out_of_the_ports() {
         (Quantity::AmplitudeSetPoint, 2e-6),
         (Quantity::FrequencySetPoint, 27_500.3),
         (Quantity::Temperature, 31.4),
-        (Quantity::OutputOn, 1.0),
+        // An output that is found on is switched off by the link: then the registers would not stand.
+        (Quantity::OutputOn, 0.0),
         (Quantity::Position, 0.012_345_678),
         (Quantity::Velocity, -0.02),
     ] {
@@ -55,7 +56,7 @@ fn what_stands_in_the_registers_comes_out_of_the_ports() {
     assert!((amplifier.echoed_amplitude.metres() - 2e-6).abs() < 1e-15);
     assert!((amplifier.echoed_frequency_hz - 27_500.3).abs() < 1e-6);
     assert!((amplifier.temperature_c.unwrap().value - 31.4).abs() < 1e-9);
-    assert!(amplifier.output_on && !amplifier.watchdog_tripped && !amplifier.fault);
+    assert!(!amplifier.output_on && !amplifier.watchdog_tripped && !amplifier.fault);
 
     let stage = eventually("a stage state", || rig.stage.state(now(epoch)).ok());
     assert!((stage.position_m - 0.012_345_678).abs() < 1e-12 && (stage.velocity_m_s + 0.02).abs() < 1e-12);
