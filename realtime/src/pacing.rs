@@ -303,10 +303,6 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
         wait_until(grid.next(monotonic_ns()), pacing.spin_ns);
         let begun = monotonic_ns();
         let (late, missed) = grid.begin(begun);
-        // The deadlines between were late as well, each by one period less: without them a stall would count once.
-        for k in 0..=missed.min(LONGEST_NS / period) {
-            lateness_histogram.saturating_record(late - k * period);
-        }
         overruns += missed;
         cycles += 1;
         let now = Nanos(begun.saturating_sub(origin_ns));
@@ -322,6 +318,11 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
                 break;
             }
         };
+        // After the commands have left: a long stall has many deadlines. Those between were late as well, each by one period
+        // less: without them a stall would count once.
+        for k in 0..=missed.min(LONGEST_NS / period) {
+            lateness_histogram.saturating_record(late - k * period);
+        }
         if rows.try_push(row).is_err() {
             ring_drops += 1;
         }
