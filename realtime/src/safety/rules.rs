@@ -304,15 +304,20 @@ fn exposure(c: &Context<'_>) -> Option<(f64, f64)> {
     broken(c.limits.human_contact && in_one_go > c.limits.exposure_max_s, in_one_go, c.limits.exposure_max_s)
 }
 
+/// Time driven in the last hour and its dose, with a human finger: without one nobody is exposed, and nothing is summed.
+fn last_hour(c: &Context<'_>) -> Option<(f64, f64)> {
+    c.limits.human_contact.then(|| {
+        let (driven, dose) = c.watch.exposure.in_the_last_hour();
+        (driven.seconds(), dose)
+    })
+}
+
 fn exposure_duty(c: &Context<'_>) -> Option<(f64, f64)> {
-    let (driven, bound) =
-        (c.watch.exposure.in_the_last_hour().0.seconds(), 3600.0 * c.limits.exposure_duty_max);
-    broken(c.limits.human_contact && driven > bound, driven, bound)
+    above(last_hour(c).map(|(driven, _)| driven), 3600.0 * c.limits.exposure_duty_max)
 }
 
 fn exposure_dose(c: &Context<'_>) -> Option<(f64, f64)> {
-    let (dose, bound) = (c.watch.exposure.in_the_last_hour().1, c.limits.exposure_dose_max_m2_s);
-    broken(c.limits.human_contact && dose > bound, dose, bound)
+    above(last_hour(c).map(|(_, dose)| dose), c.limits.exposure_dose_max_m2_s)
 }
 
 fn supply_switch(c: &Context<'_>) -> Option<(f64, f64)> {
