@@ -107,7 +107,8 @@ fn maps(result: &Diagnosis, table: &Table) -> miette::Result<String> {
         let logarithmic = c.scale == Scale::Log;
         let all: Option<Vec<f64>> = table.passes.iter().map(|p| c.of(p).map(|v| factor * v)).collect();
         let Some(x) = all else { continue };
-        let name = format!("{}, {unit}", c.words);
+        // A direction has no unit.
+        let name = if unit.is_empty() { c.words.to_string() } else { format!("{}, {unit}", c.words) };
         let (low, high) =
             x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         if high - low <= 1e-12 * high.abs().max(1e-12) {

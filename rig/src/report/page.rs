@@ -136,10 +136,10 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
     let _ = write!(
         w,
         "<h2>Loop</h2>{}{}<p>{} cycles of {} us. Lateness: median {}, 99 % {}, 99.9 % {}, worst {}. \
-         {} deadlines skipped. Scheduling: {class}, {locked}. Page faults in the loop: {} minor, {} major. \
+         {} deadlines missed. Scheduling: {class}, {locked}. Page faults in the loop: {} minor, {} major. \
          Rows lost: {}.</p>",
         plots::lateness(report)?,
-        caption("How late cycles began after their deadline. Both axes logarithmic."),
+        caption("How late the loop was at each deadline, missed ones included. Both axes logarithmic."),
         report.cycles,
         report.period_ns / 1000,
         us(p50),

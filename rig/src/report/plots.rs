@@ -313,7 +313,7 @@ pub fn lateness(report: &LoopReport) -> miette::Result<String> {
     let svg = figure(
         (900, 300),
         (Axis::logarithmic(0.5..highest), "lateness, us"),
-        (Axis::logarithmic(0.7..most), "cycles"),
+        (Axis::logarithmic(0.7..most), "deadlines"),
         |chart| {
             let bar = |(upper, n): &(f64, f64)| {
                 Rectangle::new([(upper / 2.0, 0.7), (*upper, *n)], COLOURS[0].mix(0.6).filled())
