@@ -104,7 +104,14 @@ fn forces_over_socketcan() {
 fn can_utils_hear_and_are_heard() {
     let candump =
         Command::new("candump").args(["-L", "-n", "2", "vcan1"]).stdout(Stdio::piped()).spawn().unwrap();
-    std::thread::sleep(Duration::from_millis(500));
+    // Not a pause, nor a wait that sleeps: a guest whose clock counts instructions leaps over it, while candump is
+    // still being read from the disk.
+    let began = Instant::now();
+    let listens = |all: String| all.lines().any(|line| line.trim_start().starts_with("vcan1"));
+    while !listens(std::fs::read_to_string("/proc/net/can/rcvlist_all").unwrap()) {
+        assert!(began.elapsed() < Duration::from_secs(60), "candump never listens");
+        std::thread::yield_now();
+    }
     let mut bus = KernelCan::open("vcan1").unwrap();
     assert!(bus.send(&CanFrame::new(0x1B4, &[0x02]).unwrap()).unwrap());
     assert!(bus.send(&CanFrame::build(0x0123_4567, true, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap()).unwrap());

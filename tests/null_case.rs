@@ -3,6 +3,7 @@
 
 use models::prediction::{FrictionModel, SpringSlider};
 use rayon::prelude::*;
+use realtime::compare::{Agreement, Lack};
 use rig::plan::Plan;
 use rig::sequence::Outcome;
 use rig::session::{Rehearsal, rehearse};
@@ -44,6 +45,14 @@ fn rig() -> (Setup, Plan, Arc<dyn FrictionModel>) {
     (setup, plan, model)
 }
 
+fn departed(run: &Rehearsal) -> bool {
+    run.agreement == Agreement::Departed
+}
+
+fn agrees(run: &Rehearsal) -> bool {
+    matches!(run.agreement, Agreement::Agrees { .. })
+}
+
 fn run_all(world: &WorldConfig, runs: u64) -> Vec<Rehearsal> {
     let (setup, plan, model) = rig();
     (0..runs)
@@ -68,11 +77,25 @@ fn residuals_are_standard_normal_and_the_test_rarely_alarms() {
     let inside = z.iter().filter(|z| z.abs() <= 1.96).count() as f64 / z.len() as f64;
     let mean = z.iter().sum::<f64>() / z.len() as f64;
     let sd = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
-    let alarms = runs.iter().filter(|r| r.departed).count();
+    let alarms = runs.iter().filter(|r| departed(r)).count();
+    let agreeing = runs.iter().filter(|r| agrees(r)).count();
     println!("{} passes: {:.2} % within 1.96, mean {mean:.3}, rms {sd:.3}", z.len(), 100.0 * inside);
-    println!("{alarms} of {} runs alarmed", runs.len());
+    // The plan is short: how small a departure it shows lies about the 0.1 that agreement asks, above it for some.
+    let lacking = |lack: Lack| {
+        runs.iter().filter(|r| matches!(r.agreement, Agreement::TooLittle { why, .. } if why == lack)).count()
+    };
+    let (power, scatter) = (lacking(Lack::Power), lacking(Lack::Scatter));
+    println!(
+        "{alarms} of {} runs alarmed, {agreeing} agree, {power} lack power, {scatter} scatter",
+        runs.len()
+    );
     assert!((0.93..=0.97).contains(&inside), "{inside}");
     assert!(alarms <= 3, "{alarms}");
+    assert!(scatter <= 3, "{scatter} ideal runs scatter");
+    assert!(
+        2 * agreeing >= runs.len() && agreeing + power + scatter + alarms == runs.len(),
+        "{agreeing}, {power}"
+    );
 }
 
 #[test]
@@ -88,8 +111,11 @@ fn the_power_of_the_test_grows_with_the_size_of_one_withheld_defect() {
     let mut shares = Vec::new();
     for factor in [1.0, 0.97, 0.9, 0.8, 0.7, 0.5] {
         let runs = run_all(&world(factor), 30);
-        let alarmed = runs.iter().filter(|r| r.departed).count();
-        println!("amplitude factor {factor}: {alarmed} of {} runs alarmed", runs.len());
+        let alarmed = runs.iter().filter(|r| departed(r)).count();
+        let agreeing = runs.iter().filter(|r| agrees(r)).count();
+        println!("amplitude factor {factor}: {alarmed} of {} runs alarmed, {agreeing} agree", runs.len());
+        // A plate that moves by half of what is said never ends in agreement.
+        assert!(factor > 0.5 || agreeing == 0, "{agreeing}");
         shares.push(alarmed as f64 / runs.len() as f64);
     }
     assert!(shares[0] <= 0.05 && shares[5] >= 0.95, "{shares:?}");

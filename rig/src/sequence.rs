@@ -280,11 +280,6 @@ impl Sequence {
         self.stopping = true;
     }
 
-    /// Whether the model has left the measurement.
-    pub fn departed(&self) -> bool {
-        self.departed
-    }
-
     /// What the comparison says, for a sweep that came to its end or did not.
     pub fn agreement(&self, complete: bool) -> Agreement {
         Agreement::of(self.last_comparison.as_ref(), complete)

@@ -10,6 +10,7 @@ use crate::setup::Setup;
 use crate::supervisor::{self, End, OffReport, VirtualLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::FrictionModel;
+use realtime::compare::Agreement;
 use realtime::ports::Nanos;
 use realtime::recorder::Recorder;
 use realtime::turn::{Ports, Row};
@@ -141,8 +142,8 @@ pub struct Rehearsal {
     pub passes: Vec<MeasuredPass>,
     /// How it ended.
     pub outcome: Outcome,
-    /// Whether the model left the measurement.
-    pub departed: bool,
+    /// What the comparison says in the end.
+    pub agreement: Agreement,
     /// Cycles run.
     pub cycles: u64,
 }
@@ -171,7 +172,8 @@ pub fn rehearse(
     let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut || None, &mut |_, _, reaction| {
         passes.extend(reaction.pass);
     });
-    Ok(Rehearsal { passes, outcome, departed: sequence.departed(), cycles: rig.cycles() })
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(Rehearsal { passes, outcome, agreement, cycles: rig.cycles() })
 }
 
 /// An outcome as JSON, for the record's last words.
