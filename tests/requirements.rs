@@ -221,6 +221,62 @@ fn the_contract_names_the_commands_and_flags_that_there_are() {
     }
 }
 
+/// The keys that a strict form takes, by its own word on a key that it does not know.
+fn keys_of<T: serde::de::DeserializeOwned>() -> BTreeSet<String> {
+    let refused = toml::from_str::<T>("no_such_key = 1").err().expect("a strict form").to_string();
+    let known = refused.split_once("expected ").expect("names what it knows").1;
+    known.split('`').skip(1).step_by(2).map(str::to_string).collect()
+}
+
+#[test]
+fn every_key_of_a_setup_and_of_rig_toml_has_its_word() {
+    use drivers::{AxisSetup, InstrumentSetup, vibrometer::VibrometerSetup};
+    use models::rig_file::{Calibration, PassNoise, RigFile};
+    use rig::setup::{LimitsFile, Pace, SetupFile, VirtualRig};
+    let missing = |page: &str, keys: BTreeSet<String>| {
+        let text = std::fs::read_to_string(file(page)).unwrap();
+        let named = |key: &String| ["`", "[", "[["].iter().any(|open| text.contains(&format!("{open}{key}")));
+        keys.into_iter().filter(|key| !named(key)).collect::<Vec<_>>()
+    };
+    let setup: BTreeSet<String> = [
+        keys_of::<SetupFile>(),
+        keys_of::<Pace>(),
+        keys_of::<VirtualRig>(),
+        keys_of::<LimitsFile>(),
+        keys_of::<InstrumentSetup>(),
+        keys_of::<AxisSetup>(),
+        keys_of::<VibrometerSetup>(),
+        keys_of::<PassNoise>(),
+        keys_of::<realtime::estimate::EstimateConfig>(),
+        keys_of::<rig::fingertip::FingertipSetup>(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    assert!(setup.len() > 60, "{}", setup.len());
+    assert_eq!(missing("docs/setup.md", setup), Vec::<String>::new());
+    // The defaults that the page gives are the program's.
+    let page = std::fs::read_to_string(file("docs/setup.md")).unwrap();
+    let defaults = realtime::safety::Limits::paper(realtime::ports::Nanos(1_000_000));
+    let defaults = serde_json::to_value(defaults).unwrap();
+    let mut compared = 0;
+    for (key, value) in defaults.as_object().unwrap() {
+        let Some(row) = page.lines().find(|row| row.starts_with(&format!("| `{key}` |"))) else { continue };
+        let Ok(said) = row.split('|').nth(3).unwrap().trim().parse::<f64>() else { continue };
+        assert_eq!(Some(said), value.as_f64(), "docs/setup.md: {key}");
+        compared += 1;
+    }
+    assert!(compared > 12, "{compared}");
+    let rig: BTreeSet<String> = [keys_of::<RigFile>(), keys_of::<PassNoise>(), keys_of::<Calibration>()]
+        .into_iter()
+        .flatten()
+        .collect();
+    assert!(rig.len() > 10, "{}", rig.len());
+    let text = std::fs::read_to_string(file("docs/contract.md")).unwrap();
+    let unnamed: Vec<&String> = rig.iter().filter(|key| !text.contains(key.as_str())).collect();
+    assert_eq!(unnamed, Vec::<&String>::new());
+}
+
 #[test]
 fn a_log_filter_that_cannot_be_read_is_refused() {
     let started = |filter: &str| {
