@@ -174,9 +174,9 @@ constants! {
     alone_share: [f64; 2] = [0.93, 0.993], "Share of its alias class that a name needs: one cause, two.", "development: one cause was never wrong between 0.93 and 0.98 on 190 sets; pairs were wrong by up to 4.5 nats";
     same_forces_chi2: f64 = 4.0, "chi2 between the forces of two hypotheses below which they say the same of a table.", JUDGEMENT;
     prior_nats: f64 = 10.0, "Nats up to which such a hypothesis stays in the leader's class: priors alone make no name.", JUDGEMENT;
-    claim_probability: f64 = 0.1, "Probability of no gap above which no gap is claimed.", CONTRACT;
+    claim_probability: f64 = 0.1, "Probability of no gap above which no gap is claimed.", "judgement: the complement of `name_probability`";
     pair_gain_share: f64 = 0.03, "Share of the gap's chi2 by which a second cause must raise twice the log evidence.", "development: single causes under another form gained up to 0.026 by a spurious companion, on two generators";
-    pair_left_share: f64 = 0.05, "Or: share of the gap's chi2 that the better single cause leaves (a quarter of the gap, squared, or nearly so),", "contract: a quarter of the gap";
+    pair_left_share: f64 = 0.05, "Or: share of the gap's chi2 that the better single cause leaves (a quarter of the gap, squared, or nearly so),", "judgement: a quarter of the gap, about squared";
     pair_halves: f64 = 0.5, "of which the second cause takes up so much,", JUDGEMENT;
     pair_nats: f64 = 50.0, "and raises the log evidence by these nats.", "development: spurious companions gained up to 34";
     pair_pull_chi2: f64 = 50.0, "Or: chi2 by which it frees the nuisances.", "development: true single causes pull them by up to 30, a gain that hides in a stiffness by hundreds";
@@ -186,7 +186,7 @@ constants! {
     folds: usize = 5, "Parts that are held out in turn.", "Hastie, Tibshirani & Friedman 2009, sec. 7.10: five or ten";
     resamples: usize = 400, "Resamples of the bootstrap.", "numerical: Efron & Tibshirani 1993";
     gapless_sd: f64 = 2.0, "Deviations of the mean square's scatter within which held-out passes show no gap to shrink.", "two standard deviations";
-    stands_out_sd: f64 = 2.0, "Deviations of a pass by which the gap at a condition must stand out.", CONTRACT;
+    stands_out_sd: f64 = 2.0, "Deviations of a pass by which the gap at a condition must stand out.", "two standard deviations";
     least_contraction: f64 = 0.05, "Least contraction of the prior variance before a pull of a stiffness is stated.", JUDGEMENT;
 
     design_least_nats: f64 = 0.05, "Nats below which an experiment is not worth asking for.", JUDGEMENT;
