@@ -3,6 +3,7 @@
 use super::Pass;
 use crate::condition::Condition;
 use crate::covariate::{self, Covariate};
+use crate::quantity::PeakToPeak;
 use std::io::{Read, Write};
 
 /// What is wrong with a table, and where.
@@ -21,6 +22,12 @@ pub enum TableError {
         line: u64,
         /// Name of the column.
         column: &'static str,
+    },
+    /// A pass with vibration whose frequency is not stated.
+    #[error("line {line}: 'frequency_hz' is empty or has no column; only passes with amplitude_pp_m = 0 have none")]
+    NoFrequency {
+        /// Line in the file.
+        line: u64,
     },
     /// A cell that cannot be read as what its column holds.
     #[error("line {line}: '{column}' is '{text}'; {needed} is needed")]
@@ -47,6 +54,12 @@ const NUMBERS: [(&str, [f64; 2], &str); 4] = [
     ("phase_shift_deg", [-3600.0, 3600.0], "an angle in degrees, at most ten turns"),
 ];
 
+/// Whether a table may do without the column: one without the place has it nowhere, and a plate that stands still has no
+/// frequency.
+fn may_lack(c: &Covariate) -> bool {
+    c.name == covariate::POSITION.name || c.name == covariate::FREQUENCY.name
+}
+
 /// A header, and where each of its columns stands.
 struct Columns(csv::StringRecord);
 
@@ -54,7 +67,7 @@ impl Columns {
     /// Takes a header in which every column that a table must have stands, and none twice.
     fn of(header: csv::StringRecord) -> Result<Self, TableError> {
         let columns = Columns(header);
-        let required = covariate::REQUIRED.iter().map(|c| c.name);
+        let required = covariate::REQUIRED.iter().filter(|c| !may_lack(c)).map(|c| c.name);
         for name in std::iter::once("point").chain(required) {
             columns.place(name).ok_or(TableError::MissingColumn(name))?;
         }
@@ -113,6 +126,20 @@ impl Row<'_> {
         self.parsed(text, c.name, |v| c.admits(v) && unit(v), c.needed)
     }
 
+    /// Whether a table can go without this value here. The condition holds the row's amplitude already, which stands
+    /// before the frequency among the covariates.
+    fn may_be_empty(&self, c: &'static Covariate, condition: &Condition) -> Result<(), TableError> {
+        let nowhere = c.name == covariate::POSITION.name && self.columns.place(c.name).is_none();
+        let still = c.name == covariate::FREQUENCY.name && condition.amplitude == PeakToPeak::ZERO;
+        if nowhere || still {
+            Ok(())
+        } else if c.name == covariate::FREQUENCY.name {
+            Err(TableError::NoFrequency { line: self.line })
+        } else {
+            Err(TableError::EmptyCell { line: self.line, column: c.name })
+        }
+    }
+
     fn number(&self, column: &str) -> Result<Option<f64>, TableError> {
         let (name, [low, high], needed) =
             *NUMBERS.iter().find(|n| n.0 == column).expect("a column of numbers");
@@ -130,7 +157,11 @@ impl Row<'_> {
         let point = point.parse().map_err(|_| self.bad("point", point, "a whole number"))?;
         let mut condition = Condition::paper();
         for c in covariate::REQUIRED {
-            c.put(&mut condition, self.covariate(c, self.required(c.name)?)?);
+            let Some(text) = self.cell(c.name) else {
+                self.may_be_empty(c, &condition)?;
+                continue;
+            };
+            c.put(&mut condition, self.covariate(c, text)?);
         }
         for c in covariate::OPTIONAL {
             if let Some(text) = self.cell(c.name) {
@@ -153,6 +184,9 @@ impl Row<'_> {
 /// Reads a point table (contract: one row per steady pass). Unknown columns are passed over, empty optional
 /// cells are missing values, the order of rows carries no meaning.
 ///
+/// A table without the column `position_m` lies at one place, 0. A pass with the plate still may lack its frequency: it
+/// has none, and takes the first one that the table states (else the paper's), so that it is no level of its own.
+///
 /// # Errors
 /// The first fault with its line: a missing column, an empty or unreadable cell, a malformed row.
 pub fn read_passes(from: impl Read) -> Result<Vec<Pass>, TableError> {
@@ -169,9 +203,16 @@ pub fn read_passes(from: impl Read) -> Result<Vec<Pass>, TableError> {
     for record in reader.records() {
         let cells = record?;
         let line = cells.position().map_or(0, csv::Position::line);
-        passes.push(Row { cells: &cells, columns: &columns, line }.pass()?);
+        let row = Row { cells: &cells, columns: &columns, line };
+        let lacks_frequency = row.cell(covariate::FREQUENCY.name).is_none();
+        passes.push((row.pass()?, lacks_frequency));
     }
-    Ok(passes)
+    let stated = passes.iter().find(|(_, lacks)| !lacks).map(|(pass, _)| pass.frequency_hz);
+    let filled = passes.into_iter().map(|(pass, lacks)| match stated {
+        Some(frequency_hz) if lacks => Pass { frequency_hz, ..pass },
+        _ => pass,
+    });
+    Ok(filled.collect())
 }
 
 /// Writes a point table with every column of docs/contract.md; missing values are empty cells. Numbers have as many
@@ -249,6 +290,24 @@ mod tests {
         assert!(error(&rows("2,0,NaN,27500,0.02,1,0,0.25,0.1")).contains("'NaN'"));
         assert!(error(&rows("2,,2e-6,27500,0.02,1,0,0.25,0.1")).contains("'time_s' is empty"));
         assert!(error(&rows("2,0,2e-6")).contains("line: 3"));
+    }
+
+    /// Plain tribometers state neither a frequency nor a place.
+    #[test]
+    fn a_still_plate_has_no_frequency_and_a_table_without_places_has_one() {
+        let head = "point,time_s,amplitude_pp_m,speed_m_s,direction,normal_force_n,lateral_force_n";
+        let passes = read_passes(format!("{head}\n1,0,0,0.02,1,0.25,0.1\n").as_bytes()).unwrap();
+        assert_eq!((passes[0].position_m, passes[0].frequency_hz), (0.0, Condition::paper().frequency_hz));
+        let vibrating = read_passes(format!("{head}\n1,0,2e-6,0.02,1,0.25,0.1\n").as_bytes()).unwrap_err();
+        assert!(vibrating.to_string().starts_with("line 2: 'frequency_hz'"), "{vibrating}");
+        // A still pass is no level of frequency of its own.
+        let rows = "1,0,0,,0.02,1,0,0.25,0.1\n2,1,2e-6,30000,0.02,1,0,0.25,0.1\n";
+        let passes = read_passes(format!("{HEAD}\n{rows}").as_bytes()).unwrap();
+        assert_eq!(passes[0].frequency_hz, 30_000.0);
+        // A place that some rows lack is missing there.
+        let rows = "1,0,0,,0.02,1,,0.25,0.1\n";
+        let error = read_passes(format!("{HEAD}\n{rows}").as_bytes()).unwrap_err().to_string();
+        assert_eq!(error, "line 2: 'position_m' is empty; only optional columns may be");
     }
 
     #[test]
