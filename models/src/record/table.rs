@@ -24,7 +24,9 @@ pub enum TableError {
         column: &'static str,
     },
     /// A pass with vibration whose frequency is not stated.
-    #[error("line {line}: 'frequency_hz' is empty or has no column; only passes with amplitude_pp_m = 0 have none")]
+    #[error(
+        "line {line}: 'frequency_hz' is empty or has no column; only passes with amplitude_pp_m = 0 have none"
+    )]
     NoFrequency {
         /// Line in the file.
         line: u64,

@@ -1,0 +1,177 @@
+//! What the loop's thread asks of the machine, and the machine's clocks: scheduling, memory, CPUs, sleep.
+//!
+//! Nothing here is needed for safety: what is not granted is told in [`Grants`], and a loop that is late for the lack of it
+//! trips.
+
+use serde::{Deserialize, Serialize};
+
+/// What the thread asked of the machine and what it got, told truthfully.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Grants {
+    /// Scheduling policy as read back: `fifo`, `other`, or a number.
+    pub policy: String,
+    /// Priority as read back.
+    pub priority: i32,
+    /// Why SCHED_FIFO was not granted.
+    pub policy_refused: Option<String>,
+    /// Whether all memory is locked.
+    pub memory_locked: bool,
+    /// Why memory could not be locked.
+    pub lock_refused: Option<String>,
+    /// CPUs that the thread may run on, as read back; empty where it was not pinned.
+    #[serde(default)]
+    pub pinned_to: Vec<usize>,
+    /// Why it could not be pinned, or the CPUs kept awake.
+    #[serde(default)]
+    pub pace_refused: Option<String>,
+    /// Whether deep sleep of the CPUs is held off.
+    #[serde(default)]
+    pub cpus_kept_awake: bool,
+}
+
+/// What the loop's thread is to ask of the machine. All of it is optional; each has its price.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Pacing {
+    /// FIFO priority to ask for, with locked memory; `None` leaves scheduling and memory alone.
+    pub priority: Option<i32>,
+    /// CPU to run on and no other. Worth it on a CPU that is kept free of other work; on a shared one it is worse.
+    pub cpu: Option<usize>,
+    /// Keeps CPUs out of deep sleep (`/dev/cpu_dma_latency`): a shorter wake-up for some watts.
+    pub keep_cpus_awake: bool,
+    /// The last so many ns before a deadline are spun, not slept: of a CPU this costs that share of the period.
+    pub spin_ns: u64,
+}
+
+impl From<Option<i32>> for Pacing {
+    fn from(priority: Option<i32>) -> Self {
+        Pacing { priority, ..Pacing::default() }
+    }
+}
+
+/// CLOCK_MONOTONIC in ns.
+pub fn monotonic_ns() -> u64 {
+    let mut t = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `t` is a valid timespec for the kernel to write, and CLOCK_MONOTONIC always exists on Linux.
+    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut t) };
+    t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64
+}
+
+/// Processor time that this process has used, all threads, in ns.
+pub fn process_cpu_ns() -> u64 {
+    let mut t = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `t` is a valid timespec for the kernel to write, and this clock always exists on Linux.
+    unsafe { libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &mut t) };
+    t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64
+}
+
+/// Sleeps until CLOCK_MONOTONIC reaches a time in ns.
+pub(crate) fn sleep_until(absolute_ns: u64) {
+    let t = libc::timespec {
+        tv_sec: (absolute_ns / 1_000_000_000) as libc::time_t,
+        tv_nsec: (absolute_ns % 1_000_000_000) as libc::c_long,
+    };
+    // SAFETY: `t` is a valid timespec; no remainder is asked for with an absolute deadline, so null is allowed.
+    // A signal may end the sleep early: then sleep again until the same deadline.
+    while unsafe {
+        libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &t, std::ptr::null_mut())
+    } == libc::EINTR
+    {}
+}
+
+/// Asks for SCHED_FIFO, locked memory and a small timer slack for the calling thread, and reads back what it got.
+pub fn ask_for_real_time(priority: i32) -> Grants {
+    let mut grants = Grants::default();
+    let refused = || std::io::Error::last_os_error().to_string();
+    let wanted = libc::sched_param { sched_priority: priority };
+    // SAFETY: plain calls on the calling thread (pid 0) with a valid parameter struct. SCHED_RESET_ON_FORK keeps
+    // threads that are spawned later from inheriting the class.
+    let got = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, &wanted) };
+    if got != 0 {
+        grants.policy_refused = Some(refused());
+    }
+    let mut param = libc::sched_param { sched_priority: 0 };
+    // SAFETY: reading back the calling thread's policy and parameters into a valid struct.
+    let policy = unsafe {
+        libc::sched_getparam(0, &mut param);
+        libc::sched_getscheduler(0) & !libc::SCHED_RESET_ON_FORK
+    };
+    grants.policy = match policy {
+        libc::SCHED_FIFO => "fifo".into(),
+        libc::SCHED_OTHER => "other".into(),
+        other => other.to_string(),
+    };
+    grants.priority = param.sched_priority;
+    // SAFETY: raising one's own limit as far as the hard limit allows, then locking; no pointers outlive the calls.
+    let locked = unsafe {
+        let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+        libc::getrlimit(libc::RLIMIT_MEMLOCK, &mut limit);
+        limit.rlim_cur = limit.rlim_max;
+        libc::setrlimit(libc::RLIMIT_MEMLOCK, &limit);
+        libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0
+    };
+    grants.memory_locked = locked;
+    if !locked {
+        grants.lock_refused = Some(refused());
+    }
+    // SAFETY: sets the calling thread's timer slack to 1 ns; takes no pointers.
+    unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1, 0, 0, 0) };
+    touch_stack();
+    grants
+}
+
+/// Touches the stack that the loop will use, so that its pages are there before the first deadline.
+#[inline(never)]
+fn touch_stack() {
+    let mut pages = [0u8; 256 * 1024];
+    for i in (0..pages.len()).step_by(4096) {
+        // SAFETY: `i` is inside `pages`; volatile so that the write is not optimised away.
+        unsafe { std::ptr::write_volatile(pages.as_mut_ptr().add(i), 1) };
+    }
+}
+
+pub(super) fn thread_faults() -> (i64, i64) {
+    // SAFETY: rusage is plain data, valid when zeroed, and the kernel fills it for the calling thread.
+    let usage = unsafe {
+        let mut usage: libc::rusage = std::mem::zeroed();
+        libc::getrusage(libc::RUSAGE_THREAD, &mut usage);
+        usage
+    };
+    (usage.ru_minflt, usage.ru_majflt)
+}
+
+/// Binds the calling thread to a CPU; the CPUs that it may run on then.
+pub(super) fn pin_to(cpu: usize) -> std::io::Result<Vec<usize>> {
+    if cpu >= libc::CPU_SETSIZE as usize {
+        return Err(std::io::Error::from_raw_os_error(libc::EINVAL));
+    }
+    // SAFETY: `set` is plain data, valid when zeroed; CPU_SET stays inside it by the check above; both calls concern the
+    // calling thread (pid 0) and a set of the size given.
+    unsafe {
+        let mut set: libc::cpu_set_t = std::mem::zeroed();
+        libc::CPU_SET(cpu, &mut set);
+        let size = size_of::<libc::cpu_set_t>();
+        if libc::sched_setaffinity(0, size, &set) != 0 || libc::sched_getaffinity(0, size, &mut set) != 0 {
+            return Err(std::io::Error::last_os_error());
+        }
+        Ok((0..libc::CPU_SETSIZE as usize).filter(|cpu| libc::CPU_ISSET(*cpu, &set)).collect())
+    }
+}
+
+/// Holds the CPUs out of deep sleep for as long as the file is open.
+pub(super) fn keep_cpus_awake() -> std::io::Result<std::fs::File> {
+    use std::io::Write;
+    let mut file = std::fs::File::options().write(true).open("/dev/cpu_dma_latency")?;
+    file.write_all(&0i32.to_ne_bytes())?;
+    Ok(file)
+}
+
+/// Sleeps until `spin_ns` before a time, then spins.
+pub(super) fn wait_until(absolute_ns: u64, spin_ns: u64) {
+    sleep_until(absolute_ns - spin_ns.min(absolute_ns));
+    while spin_ns > 0 && monotonic_ns() < absolute_ns {
+        std::hint::spin_loop();
+    }
+}
+
+#[cfg(test)]
+mod tests;
