@@ -89,6 +89,28 @@ fn a_second_channel_that_does_not_act_keeps_the_rig_from_arming() {
     assert_eq!((decision.armed_now, decision.blocking), (false, Some(Cause::SupplySwitch)));
 }
 
+/// A relay that sticks where its own proof has put it: the supply stays cut, and the rig is not armed.
+#[test]
+fn a_second_channel_that_opens_and_does_not_close_again_keeps_the_rig_from_arming() {
+    let mut rig = Relayed::new(3, None);
+    rig.cycle(|_| {}, Controls::default());
+    rig.cycle(|_| {}, RESET);
+    while !rig.cut() {
+        assert!(rig.cycle(|_| {}, Controls::default()).tripped.is_none());
+    }
+    rig.stuck = Some(true);
+    let tripped = (1..2000).find_map(|n| {
+        let decision = rig.cycle(|_| {}, Controls::default());
+        assert!(!decision.armed_now && !decision.drive.enable());
+        decision.tripped.map(|trip| (n, trip))
+    });
+    let (cycles, trip) = tripped.unwrap();
+    assert!(trip.cause == Cause::SupplySwitch && trip.bound == 0.5 && trip.value > 0.5, "{trip:?}");
+    // 500 ms, and the cycles in which the cut was seen and the closing told.
+    assert!((500..=504).contains(&cycles), "{cycles}");
+    assert!(!rig.cycle(|_| {}, Controls::default()).drive.enable());
+}
+
 #[test]
 fn an_amplifier_that_does_not_come_back_is_a_trip_with_its_own_cause() {
     let mut rig = Relayed::new(2, None);
