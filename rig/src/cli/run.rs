@@ -173,16 +173,7 @@ fn describe(event: &Event) -> String {
             let when = if *after { "after" } else { "before" };
             format!("force zeros {when} the sweep: lateral {}, normal {}", mn(lateral_n), mn(normal_n))
         }
-        Event::Tripped(trip) => {
-            format!(
-                "TRIP {:?}: {} against {} at {:.3} s (cycle {})",
-                trip.cause,
-                trip.value,
-                trip.bound,
-                trip.at.seconds(),
-                trip.cycle
-            )
-        }
+        Event::Tripped(trip) => format!("TRIP {trip}\n  {}", trip.cause.remedy()),
         Event::ModelDeparted { point, log_evidence } => {
             let odds = (log_evidence / std::f64::consts::LN_10).floor();
             format!("the model has left the measurement at point {point} (evidence beyond 10^{odds:.0} to 1)")
@@ -227,6 +218,9 @@ fn tell(summary: &Summary, json: bool) {
             "just before the trip this machine kept its programs from running for {:.0} ms: see 'muprime doctor'",
             stall.lasted.seconds() * 1e3
         );
+    }
+    if let (Outcome::WouldNotArm { blocking: Some(cause) }, Some(remedy)) = (&summary.outcome, &summary.remedy) {
+        say!("the rig would not arm: {cause:?} stands in the way\n  {remedy}");
     }
     if summary.passes < summary.planned {
         say!("the same command with --out {} goes on", summary.folder.display());
