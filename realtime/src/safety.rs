@@ -29,6 +29,7 @@ use serde::{Deserialize, Serialize};
 
 pub use arming::Proof;
 pub use cause::{Cause, Unit};
+pub use exposure::{Exposed, PART_MINUTES, PARTS};
 pub use limits::{ChannelTiming, HARD, HardLimits, LimitError, Limits, Timing};
 pub use rules::{RULES, Rule};
 use watch::Watch;
@@ -275,7 +276,8 @@ impl Default for Safety {
 impl Safety {
     /// Starts faulted: nothing drives before an explicit reset.
     pub const fn new() -> Self {
-        let start = Trip { cause: Cause::StartUp, value: 0.0, bound: 0.0, unit: Unit::Flag, cycle: 0, at: Nanos(0) };
+        let start =
+            Trip { cause: Cause::StartUp, value: 0.0, bound: 0.0, unit: Unit::Flag, cycle: 0, at: Nanos(0) };
         Safety {
             state: State::Faulted(start),
             watch: Watch::new(),
@@ -285,6 +287,18 @@ impl Safety {
             asked: false,
             supply_cut: false,
         }
+    }
+
+    /// Takes over the exposure of earlier runs, before the first cycle.
+    pub fn carry(&mut self, past: &Exposed) {
+        if self.cycle == 0 {
+            self.watch.exposure.carry(past);
+        }
+    }
+
+    /// Time that the plate was driven in this run, and the squared rms velocity summed over it, in m2/s.
+    pub const fn exposure(&self) -> (Nanos, f64) {
+        self.watch.exposure.in_all
     }
 
     /// The present state.

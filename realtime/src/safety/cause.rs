@@ -1,5 +1,7 @@
 //! What a trip is told by: its cause, the unit of its value, and what to do about it.
 
+#![allow(clippy::disallowed_types, reason = "a trip is told to people beside the loop, never in it")]
+
 use super::{RULES, Trip};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -108,27 +110,17 @@ impl Cause {
     /// What a person at the rig does about it, in one sentence or two.
     pub const fn remedy(self) -> &'static str {
         match self {
-            Self::StartUp => {
-                "Nothing is wrong: the rig waits to be armed."
-            }
-            Self::Stopped => {
-                "Nothing is wrong: it was asked for. The same command goes on with the run."
-            }
-            Self::DeadMan => {
-                "Let go of the dead-man device, grip it again, and start anew."
-            }
+            Self::StartUp => "Nothing is wrong: the rig waits to be armed.",
+            Self::Stopped => "Nothing is wrong: it was asked for. The same command goes on with the run.",
+            Self::DeadMan => "Let go of the dead-man device, grip it again, and start anew.",
             Self::Exposure => {
                 "Take the finger off and rest as long as `exposure_rest_s` says; plan shorter passes."
             }
             Self::NormalOverforce => {
                 "Lift the finger off and look at load, stage and sensor before it is loaded again."
             }
-            Self::LateralOverforce => {
-                "Look for what holds the finger or the plate; ask for a smaller load."
-            }
-            Self::ForceRate => {
-                "Look for a blow or a loose sensor; load more slowly."
-            }
+            Self::LateralOverforce => "Look for what holds the finger or the plate; ask for a smaller load.",
+            Self::ForceRate => "Look for a blow or a loose sensor; load more slowly.",
             Self::LateralStale | Self::NormalStale => {
                 "Look at the force sensor's cable and power, and at `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link."
             }
@@ -147,9 +139,7 @@ impl Cause {
             Self::AmplifierStale => {
                 "Look at the amplifier's cable and power, and at `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link."
             }
-            Self::AmplifierFault => {
-                "Read the fault on the amplifier, remove its cause and reset it there."
-            }
+            Self::AmplifierFault => "Read the fault on the amplifier, remove its cause and reset it there.",
             Self::AmplifierWatchdog => {
                 "The amplifier heard nothing for longer than its watchdog waits: look at its link and at what else runs on this machine."
             }
@@ -174,9 +164,7 @@ impl Cause {
             Self::StageStale => {
                 "Look at the stage's cable and power, and at `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link."
             }
-            Self::StageFault => {
-                "Read the fault on the stage, remove its cause and reset it there."
-            }
+            Self::StageFault => "Read the fault on the stage, remove its cause and reset it there.",
             Self::OverTravel => {
                 "Move the stage back between its ends by hand; look at `travel_min_m` and `travel_max_m`."
             }
@@ -293,8 +281,7 @@ impl Unit {
         let magnitude = if value == 0.0 || !value.is_finite() { 0.0 } else { value.abs().log10().floor() };
         let digits = (3.0 - magnitude).clamp(0.0, 9.0) as usize;
         let number = format!("{value:.digits$}");
-        let number =
-            if digits > 0 { number.trim_end_matches('0').trim_end_matches('.') } else { &number };
+        let number = if digits > 0 { number.trim_end_matches('0').trim_end_matches('.') } else { &number };
         if symbol.is_empty() { number.into() } else { format!("{number} {symbol}") }
     }
 }

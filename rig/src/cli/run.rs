@@ -50,6 +50,17 @@ pub struct Args {
 /// A refusal: bad input, a busy rig, an instrument that does not answer.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let job = job(args)?;
+    if job.setup.hand_at_key() {
+        if job.fast {
+            miette::bail!(
+                help = "leave out --fast",
+                "the dead-man key is held in wall-clock time: no hand is that fast"
+            );
+        }
+        say!(
+            "dead-man key: let go of it, then hold the space bar down to arm and to go on; let go, or press any other key, and the drive is off"
+        );
+    }
     let signals = Signals::default();
     watch_signals(&signals)?;
     let bar = progress_bar(json);
@@ -219,7 +230,9 @@ fn tell(summary: &Summary, json: bool) {
             stall.lasted.seconds() * 1e3
         );
     }
-    if let (Outcome::WouldNotArm { blocking: Some(cause) }, Some(remedy)) = (&summary.outcome, &summary.remedy) {
+    if let (Outcome::WouldNotArm { blocking: Some(cause) }, Some(remedy)) =
+        (&summary.outcome, &summary.remedy)
+    {
         say!("the rig would not arm: {cause:?} stands in the way\n  {remedy}");
     }
     if summary.passes < summary.planned {
