@@ -109,7 +109,7 @@ rules! {
     "SR-20" AmplifierFault [Flag] "An amplifier that reports a fault, or numbers that are none, is switched off." => |c| broken(c.seen.amplifier.is_ok_and(|a| a.fault || !told_in_numbers(&a)), 1.0, 0.0);
     "SR-21" AmplifierWatchdog [Flag] "An amplifier whose own watchdog has fired is switched off." => |c| broken(c.seen.amplifier.is_ok_and(|a| a.watchdog_tripped) && c.watch.enabled, 1.0, 0.0);
     "SR-22" DriveNoResponse [Metre] "A driven plate vibrates: at least a fifth of the commanded amplitude after ring-up." => no_response;
-    "SR-23" EchoMismatch [Metre, Hertz] "The amplifier echoes the set-point that it was given, within its resolution." => echo;
+    "SR-23" EchoMismatch [Metre, Hertz, Flag] "The amplifier echoes the set-point that it was given, within its resolution, and shows itself on while it is driven." => echo;
     "SR-24" RefusesOff [Flag] "An amplifier that stays on when told to be off is cut from its supply." => |c| broken(c.watch.refuses_off(c.limits, c.now), 1.0, 0.0);
     "SR-25" OverTemperature [Celsius] "Plate and amplifier stay below the temperature limit; a lost sensor counts as too hot." => temperature;
     "SR-26" StageStale [Second] "The stage's state is no older than its own periods and latency allow." => |c| state_stale(c.seen.stage.map(|s| s.taken_at), c.limits.timing.stage.age_limit(), c.now);
@@ -362,7 +362,9 @@ fn echo(c: &Context<'_>) -> Option<(f64, f64, Unit)> {
     }
     let frequency = state.echoed_frequency_hz;
     let off = (frequency - c.watch.commanded_hz).abs() > 1.0 + 1e-4 * frequency;
-    off.then_some((frequency, c.watch.commanded_hz, Unit::Hertz))
+    // Another master's 'off' is no harm, but it is another master's; and what is measured then is a plate at rest.
+    let switched = (!state.output_on).then_some((0.0, 1.0, Unit::Flag));
+    off.then_some((frequency, c.watch.commanded_hz, Unit::Hertz)).or(switched)
 }
 
 fn temperature(c: &Context<'_>) -> Option<(f64, f64)> {
