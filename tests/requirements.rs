@@ -51,7 +51,7 @@ fn words(names: impl IntoIterator<Item = impl AsRef<str>>) -> String {
 }
 
 /// The units in which a rule's trip is told.
-fn units(rule: &Rule) -> String {
+fn units_of(rule: &Rule) -> String {
     let symbol = |unit: &Unit| match unit {
         Unit::Flag => "is",
         Unit::Count => "count",
@@ -80,7 +80,7 @@ fn page() -> String {
             out,
             "| {} | {cause} | {} | {} | {} | {} | {} |",
             rule.id,
-            units(rule),
+            units_of(rule),
             rule.text,
             rule.cause.remedy(),
             unit.map_or_else(String::new, words),
