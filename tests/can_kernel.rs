@@ -193,8 +193,11 @@ fn a_bus_full_of_others_frames_holds_nothing_up() {
     // A hundred frames for each look: far more than the sensor's two.
     while rig.links.health().next().unwrap().1.samples < first + 20 {
         for _ in 0..100 {
-            let frame =
-                if sent % 2 == 0 { CanFrame::new(0x7A, &[0; 8]) } else { CanFrame::new(438, &[1, 2, 3]) };
+            let frame = if sent.is_multiple_of(2) {
+                CanFrame::new(0x7A, &[0; 8])
+            } else {
+                CanFrame::new(438, &[1, 2, 3])
+            };
             sent += u32::from(noise.send(&frame.unwrap()).unwrap());
         }
         assert!(began.elapsed() < Duration::from_secs(60), "{sent} frames, and no samples");

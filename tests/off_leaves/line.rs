@@ -110,7 +110,7 @@ impl Trouble {
     /// SCPI: every other switch is not taken, and the next question for errors is answered with one. slcan: service data are
     /// aborted, and every other frame of process data is ignored.
     fn refused_line(&self, line: &[u8]) -> Option<Vec<u8>> {
-        let another = || self.refusals.fetch_add(1, Ordering::AcqRel) % 2 == 0;
+        let another = || self.refusals.fetch_add(1, Ordering::AcqRel).is_multiple_of(2);
         if line.starts_with(b"OUTP1 0") && another() {
             self.error.store(true, Ordering::Release);
             return Some(Vec::new());
