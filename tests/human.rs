@@ -77,6 +77,9 @@ fn a_human_finger_is_refused_with_what_is_missing() {
     let with_key = refused(RELAY, "dead_man_key = true");
     assert!(with_key.contains("emergency stop") && !with_key.contains("dead-man"), "{with_key}");
     assert_eq!(refused(&format!("{RELAY}\n{INPUTS}"), ""), "");
+    // A setup that says that no temperature is read would lose the rule on hot plates.
+    let cold = refused(&format!("{RELAY}\n{INPUTS}"), "temperature_fitted = false");
+    assert!(cold.contains("temperature_fitted"), "{cold}");
     // Exposure has hard ranges like every limit.
     for limit in ["exposure_rest_s = 1.0", "exposure_duty_max = 0.9", "exposure_dose_max_m2_s = nan"] {
         let why = refused(&format!("{RELAY}\n{INPUTS}"), limit);

@@ -81,3 +81,21 @@ pub fn cut_by_a_stall(out: &Path) -> Option<String> {
     });
     Some(format!("{:?}, the machine stalled for {} ms", trip.cause, stall.lasted.0 / 1_000_000))
 }
+
+/// Tries again, four times at most, where the machine stalled and the safety core tripped for it: the attempt then gives the
+/// folder of the run that was cut.
+///
+/// # Panics
+/// Where something else than a stall cut it, or every attempt was cut.
+pub fn unless_the_machine_stalls(mut attempt: impl FnMut(u32) -> Option<PathBuf>) {
+    for n in 1..=4 {
+        match attempt(n) {
+            None => return,
+            Some(out) => {
+                let why = cut_by_a_stall(&out).expect("nothing but a stall may end it otherwise");
+                eprintln!("attempt {n}: {why}");
+            }
+        }
+    }
+    panic!("four sweeps in a row were cut by stalls of the machine");
+}

@@ -1,7 +1,8 @@
 //! 'Off' always leaves: the plate is driven, or the stage slides, behind a real link; the link is struck; the run ends. The
-//! instrument must be off within the stated time by its own clock, and what is said of it must be true.
+//! instrument, in a process of its own, must be off within the stated time, and what is said of it must be true.
 //!
-//! `MUPRIME_OFF_SEEDS` faults are drawn for each rig (6 when it is not set). No instrument here has a watchdog that would help.
+//! `MUPRIME_OFF_SEEDS` faults are drawn for each rig (7 when it is not set: one of each kind). `MUPRIME_OFF_CASE` names one rig. No
+//! instrument here has a watchdog that would help.
 
 #[path = "off_leaves/line.rs"]
 mod line;
@@ -16,10 +17,9 @@ use realtime::turn::{Ports, Row};
 use rig::setup::Setup;
 use rig::supervisor::wall::{Parts, Reins};
 use rig::supervisor::{Loop, OffReport, WallLoop};
-use sim::wire::world::WorldPlant;
-use sim::wire::{Quantity, SharedPlant};
-use sim::world::{World, WorldConfig};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
+use std::process::{Child, ChildStdout, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -57,23 +57,14 @@ const TCP: &[fn(u64) -> Kind] = &[
 ];
 const LINE: &[fn(u64) -> Kind] =
     &[LATE, |_| Kind::Garbage, |_| Kind::Refused, |_| Kind::Echo, |_| Kind::Stopped, |_| Kind::HalfOpen];
-/// No refusal is put into these protocols by the line; the instrument itself takes everything.
-const NOT_REFUSING: &[fn(u64) -> Kind] =
-    &[LATE, |_| Kind::Garbage, |_| Kind::Echo, |_| Kind::Stopped, |_| Kind::HalfOpen];
-
 const CASES: &[Case] = &[
     Case { name: "Modbus TCP amplifier", setup: "virtual-ideal", struck: Struck::Amplifier, kinds: TCP },
     Case { name: "Modbus TCP stage", setup: "virtual-ideal", struck: Struck::Stage, kinds: TCP },
     Case { name: "Modbus RTU amplifier", setup: "virtual-rtu", struck: Struck::Amplifier, kinds: LINE },
     Case { name: "Modbus RTU stage", setup: "virtual-rtu", struck: Struck::Stage, kinds: LINE },
     Case { name: "amplifier of text lines", setup: "virtual-mixed", struck: Struck::Amplifier, kinds: LINE },
-    Case {
-        name: "CANopen stage over slcan",
-        setup: "virtual-mixed",
-        struck: Struck::Stage,
-        kinds: NOT_REFUSING,
-    },
-    Case { name: "SCPI generator", setup: "scpi", struck: Struck::Amplifier, kinds: NOT_REFUSING },
+    Case { name: "CANopen stage over slcan", setup: "virtual-mixed", struck: Struck::Stage, kinds: LINE },
+    Case { name: "SCPI generator", setup: "scpi", struck: Struck::Amplifier, kinds: TCP },
     Case { name: "amplifier with a relay", setup: "virtual-relay", struck: Struck::Amplifier, kinds: TCP },
 ];
 
@@ -89,26 +80,80 @@ fn setup(name: &str) -> Setup {
     Setup::parse("scpi", &text, Path::new(".")).unwrap()
 }
 
+/// A rig in another process: `muprime virtual-rig`, whose lamps are asked for over a pipe. No watchdog of its amplifier helps.
+struct Served {
+    process: Mutex<(Child, BufReader<ChildStdout>)>,
+    /// Where its instruments are, in the order of the setup.
+    places: Vec<String>,
+}
+
+impl Served {
+    fn start(setup: &Setup, refuses_off: bool) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, defects) = (folder.path().join("setup.toml"), folder.path().join("defects.toml"));
+        std::fs::write(&file, &setup.text).unwrap();
+        let refuses = if refuses_off { "[[defect]]\nname = \"amplifier_refuses_off\"\n" } else { "" };
+        std::fs::write(&defects, format!("[[defect]]\nname = \"amplifier_without_watchdog\"\n{refuses}"))
+            .unwrap();
+        let mut rig = tests::muprime();
+        rig.args(["--json", "virtual-rig", "--hands", "--modbus-tcp", "127.0.0.1:0", "--setup"]).arg(&file);
+        rig.arg("--defects")
+            .arg(&defects)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::inherit());
+        let mut child = rig.spawn().unwrap();
+        let mut out = BufReader::new(child.stdout.take().unwrap());
+        let mut said = String::new();
+        out.read_line(&mut said).unwrap();
+        let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+        let place =
+            |text: &serde_json::Value| text.as_str().unwrap().split_once(" at ").unwrap().1.to_string();
+        let places = said["instruments"].as_array().unwrap().iter().map(place).collect();
+        Served { process: Mutex::new((child, out)), places }
+    }
+
+    /// Whether the instrument is on, by itself.
+    fn is_on(&self, which: Struck) -> bool {
+        let mut process = self.process.lock().unwrap_or_else(|e| e.into_inner());
+        let (child, out) = &mut *process;
+        child.stdin.as_mut().unwrap().write_all(b"look\n").unwrap();
+        let mut said = String::new();
+        out.read_line(&mut said).unwrap();
+        let seen: serde_json::Value = serde_json::from_str(&said).unwrap();
+        match which {
+            Struck::Amplifier => seen["output_on"].as_bool().unwrap(),
+            Struck::Stage => seen["velocity_m_s"].as_f64().unwrap().abs() > 0.5e-3,
+        }
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let process = self.process.get_mut().unwrap_or_else(|e| e.into_inner());
+        let _ = process.0.kill();
+        let _ = process.0.wait();
+    }
+}
+
 /// A rig behind its links, one of which can be struck.
 struct Bench {
     rig: Option<WallLoop>,
     reins: Reins,
-    plant: SharedPlant,
+    served: Arc<Served>,
     trouble: Trouble,
     answer_limit: Duration,
-    _emulators: rig::embed::Embedded,
 }
 
 impl Bench {
-    fn start(case: &Case, world: impl FnOnce(&mut WorldConfig), seed: u64) -> Self {
+    fn start(case: &Case, refuses_off: bool, seed: u64) -> Self {
         let setup = setup(case.setup);
-        let mut simulated = WorldConfig::ideal();
-        simulated.amplifier.watchdog_s = 1e9;
-        world(&mut simulated);
+        let served = Arc::new(Served::start(&setup, refuses_off));
         let (epoch, origin_ns) = (Instant::now(), realtime::pacing::monotonic_ns());
-        let plant = SharedPlant::new(WorldPlant::new(World::new(&simulated, 1).unwrap()), epoch);
         let mut instruments = setup.instruments();
-        let emulators = rig::embed::embed(&mut instruments, &plant, false).unwrap();
+        for (instrument, place) in instruments.all_mut().zip(&served.places) {
+            instrument.address.clone_from(place);
+        }
         let trouble = Trouble::new(if case.struck == Struck::Amplifier { 100 } else { 102 }, seed);
         let struck = match case.struck {
             Struck::Amplifier => &mut instruments.amplifier,
@@ -141,7 +186,7 @@ impl Bench {
         })
         .unwrap();
         let answer_limit = Duration::from_millis(u64::from(link.response_timeout_ms));
-        Bench { rig: Some(rig), reins, plant, trouble, answer_limit, _emulators: emulators }
+        Bench { rig: Some(rig), reins, served, trouble, answer_limit }
     }
 
     /// Arms, drives the plate, slides the stage; else what the last row showed.
@@ -177,30 +222,18 @@ impl Bench {
         Err(format!("it was never driven; the last row: {seen:?}"))
     }
 
-    /// Whether the instrument is on, by itself.
     fn is_on(&self, which: Struck) -> bool {
-        let (mut plant, _) = self.plant.now();
-        match which {
-            Struck::Amplifier => plant.measure(Quantity::OutputOn) != 0.0,
-            Struck::Stage => plant.measure(Quantity::Velocity).abs() > 0.5e-3,
-        }
+        self.served.is_on(which)
     }
 
-    /// Watches an instrument by its own clock until told to end; returns when it was last seen on.
+    /// Watches an instrument until told to end; returns when it was last seen on.
     fn watch(&self, which: Struck) -> (Arc<AtomicBool>, std::thread::JoinHandle<Option<Instant>>) {
-        let (plant, done) = (self.plant.clone(), Arc::new(AtomicBool::new(false)));
+        let (served, done) = (Arc::clone(&self.served), Arc::new(AtomicBool::new(false)));
         let ended = Arc::clone(&done);
         let look = move || {
             let mut last_on = None;
             while !ended.load(Ordering::Acquire) {
-                let on = {
-                    let (mut plant, _) = plant.now();
-                    match which {
-                        Struck::Amplifier => plant.measure(Quantity::OutputOn) != 0.0,
-                        Struck::Stage => plant.measure(Quantity::Velocity).abs() > 0.5e-3,
-                    }
-                };
-                if on {
+                if served.is_on(which) {
                     last_on = Some(Instant::now());
                 }
                 std::thread::sleep(Duration::from_millis(1));
@@ -226,7 +259,7 @@ impl Drop for Bench {
 fn strike(case: &Case, seed: u64) -> Result<String, String> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let kind = case.kinds[seed as usize % case.kinds.len()](random.next_u64());
-    let mut bench = Bench::start(case, |_| {}, seed);
+    let mut bench = Bench::start(case, false, seed);
     bench.drive()?;
     let (done, watch) = bench.watch(case.struck);
     let lasts = Duration::from_millis(50 + random.next_u64() % 350);
@@ -258,7 +291,7 @@ fn strike(case: &Case, seed: u64) -> Result<String, String> {
 #[test]
 fn off_leaves_on_every_transport_whatever_strikes_the_link() {
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let seeds: u64 = std::env::var("MUPRIME_OFF_SEEDS").map_or(6, |n| n.parse().expect("a number"));
+    let seeds: u64 = std::env::var("MUPRIME_OFF_SEEDS").map_or(7, |n| n.parse().expect("a number"));
     let only = std::env::var("MUPRIME_OFF_CASE").unwrap_or_default();
     let mut wrong = Vec::new();
     for case in CASES.iter().filter(|case| case.name.contains(&only)) {
@@ -279,13 +312,13 @@ fn off_leaves_on_every_transport_whatever_strikes_the_link() {
 #[test]
 fn what_was_not_read_back_off_is_not_said_to_be_off() {
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let mut stubborn = Bench::start(&CASES[0], |world| world.amplifier.refuses_off = true, 1);
+    let mut stubborn = Bench::start(&CASES[0], true, 1);
     stubborn.drive().unwrap();
     let off = stubborn.end();
     assert!(stubborn.is_on(Struck::Amplifier), "else this test shows nothing");
     assert!(!off.read_back && off.words().contains("may still be on: switch the supply off"), "{off:?}");
 
-    let mut dead = Bench::start(&CASES[0], |_| {}, 2);
+    let mut dead = Bench::start(&CASES[0], false, 2);
     dead.drive().unwrap();
     let (from, until) = (Instant::now(), Instant::now() + Duration::from_secs(600));
     dead.trouble.strike(Fault { kind: Kind::HalfOpen, from, until });
@@ -301,7 +334,7 @@ fn the_second_channel_switches_off_what_the_first_cannot() {
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
     let case = CASES.iter().find(|case| case.setup == "virtual-relay").unwrap();
     for dead in [true, false] {
-        let mut bench = Bench::start(case, |world| world.amplifier.refuses_off = !dead, 5);
+        let mut bench = Bench::start(case, !dead, 5);
         bench.drive().unwrap();
         if dead {
             let (from, until) = (Instant::now(), Instant::now() + Duration::from_secs(600));
@@ -317,22 +350,22 @@ fn the_second_channel_switches_off_what_the_first_cannot() {
 #[test]
 fn a_panic_of_the_supervising_thread_switches_off() {
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let mut bench = Bench::start(&CASES[0], |_| {}, 3);
+    let mut bench = Bench::start(&CASES[0], false, 3);
     bench.drive().unwrap();
-    let plant = bench.plant.clone();
+    let served = Arc::clone(&bench.served);
     let panicked = std::thread::spawn(move || {
         let _held = bench;
         panic!("as an eprintln does whose terminal is gone");
     });
     assert!(panicked.join().is_err());
-    assert!(plant.now().0.measure(Quantity::OutputOn) == 0.0);
+    assert!(!served.is_on(Struck::Amplifier));
 }
 
 /// What a row shows is what the rig did: a guard against a test that never drove anything.
 #[test]
 fn the_rows_show_the_drive() {
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let mut bench = Bench::start(&CASES[0], |_| {}, 4);
+    let mut bench = Bench::start(&CASES[0], false, 4);
     bench.drive().unwrap();
     let driven = |row: &Row| row.drive_pp_m > 0.0 && row.velocity_m_s != 0.0;
     let seen = std::iter::repeat_with(|| bench.reins.next_row()).take(2000).flatten().any(|row| driven(&row));

@@ -3,7 +3,7 @@
 //!
 //! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements` writes it anew.
 
-use realtime::safety::{Cause, RULES};
+use realtime::safety::{Cause, RULES, Rule, Unit};
 use rig::validation::faults::bench::STEADY_AT;
 use rig::validation::faults::bench::{RING, T};
 use rig::validation::faults::{ELSEWHERE, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run};
@@ -50,6 +50,17 @@ fn words(names: impl IntoIterator<Item = impl AsRef<str>>) -> String {
     names.into_iter().map(|n| format!("`{}`", n.as_ref())).collect::<Vec<_>>().join(", ")
 }
 
+/// The units in which a rule's trip is told.
+fn units_of(rule: &Rule) -> String {
+    let symbol = |unit: &Unit| match unit {
+        Unit::Flag => "is",
+        Unit::Count => "count",
+        Unit::Share => "share",
+        unit => unit.symbol(),
+    };
+    rule.units.iter().map(symbol).collect::<Vec<_>>().join(", ")
+}
+
 fn page() -> String {
     let (units, (faults, tally)) = (unit_tests(), faults_by_cause(Pace::Fast));
     let (_, slow) = faults_by_cause(Pace::Default);
@@ -59,7 +70,7 @@ fn page() -> String {
          Generated: `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements`. A test fails where this page is not \
          what the code does.\n\n## From requirement to test\n\n\
          Unit tests are in `realtime/src/safety/tests.rs` and `tests/` beside it; faults are those of the list below, which `tests/faults.rs` runs.\n\n\
-         | requirement | cause | it demands | unit tests | faults that trip it |\n|---|---|---|---|---|\n",
+         | requirement | cause | unit | it demands | remedy | unit tests | faults that trip it |\n|---|---|---|---|---|---|---|\n",
     );
     for rule in RULES {
         let cause = format!("{:?}", rule.cause);
@@ -67,9 +78,11 @@ fn page() -> String {
         assert!(unit.is_some() || fault.is_some(), "{} {cause}: no test trips it", rule.id);
         let _ = writeln!(
             out,
-            "| {} | {cause} | {} | {} | {} |",
+            "| {} | {cause} | {} | {} | {} | {} | {} |",
             rule.id,
+            units_of(rule),
             rule.text,
+            rule.cause.remedy(),
             unit.map_or_else(String::new, words),
             fault.map_or_else(String::new, words),
         );

@@ -45,8 +45,13 @@ pub struct ServedRig {
 impl ServedRig {
     /// Starts an ideal rig on a free port of loopback, with a defects file if one is given.
     pub fn start(seed: u64, defects: Option<&Path>) -> Self {
+        Self::of("virtual-ideal", seed, defects)
+    }
+
+    /// The same with the instruments of a bundled setup.
+    pub fn of(setup: &str, seed: u64, defects: Option<&Path>) -> Self {
         let mut command = muprime();
-        command.args(["--json", "virtual-rig", "--setup", "virtual-ideal", "--modbus-tcp", "127.0.0.1:0"]);
+        command.args(["--json", "virtual-rig", "--setup", setup, "--modbus-tcp", "127.0.0.1:0"]);
         command.args(["--seed", &seed.to_string()]);
         if let Some(path) = defects {
             command.arg("--defects").arg(path);
@@ -64,6 +69,15 @@ impl Drop for ServedRig {
     fn drop(&mut self) {
         let _ = self.process.kill();
         let _ = self.process.wait();
+    }
+}
+
+/// Waits until a served amplifier is on, or off.
+pub fn wait_until(amplifier: &mut AmplifierWatch, on: bool) {
+    let began = std::time::Instant::now();
+    while amplifier.read().on != on {
+        assert!(began.elapsed().as_secs() < 20, "the amplifier never shows {on}");
+        std::thread::sleep(std::time::Duration::from_millis(2));
     }
 }
 

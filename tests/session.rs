@@ -218,6 +218,40 @@ fn an_interrupt_stops_safely_and_keeps_what_was_measured() {
     assert!(!last.armed && last.drive_pp_m == 0.0 && last.load_n == 0.0 && last.velocity_m_s == 0.0);
 }
 
+/// What a trip means and what to do about it: on the terminal, in the summary and in the report.
+#[test]
+fn a_trip_is_told_with_its_unit_and_its_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = short_plan(folder.path());
+    let ideal = rig::setup::Setup::load("virtual-ideal").unwrap().text;
+    // The load of the plan, and no more: its noise breaks the limit.
+    let tight = ideal.replace("[limits]\n", "[limits]\nnormal_force_max_n = 0.25\n");
+    let setup = folder.path().join("tight.toml");
+    std::fs::write(&setup, tight).unwrap();
+    let out = folder.path().join("run");
+    let output = muprime()
+        .args(["run", "--fast", &plan, "--setup"])
+        .arg(&setup)
+        .arg("--out")
+        .arg(&out)
+        .output()
+        .unwrap();
+    let (_, stderr) = texts(&output);
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    let remedy = realtime::safety::Cause::NormalOverforce.remedy();
+    let trip = stderr.lines().find(|line| line.starts_with("TRIP ")).unwrap_or_default();
+    assert!(trip.starts_with("TRIP NormalOverforce (SR-04): 0.25"), "{stderr}");
+    assert!(trip.contains(" N against 0.25 N, at ") && stderr.contains(remedy), "{stderr}");
+    let summary = std::fs::read_to_string(out.join("summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!(
+        (&summary["unit"], &summary["requirement"], &summary["remedy"]),
+        (&"N".into(), &"SR-04".into(), &remedy.into())
+    );
+    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(report.contains(remedy) && report.contains(" N against 0.25 N"), "{report}");
+}
+
 #[test]
 fn two_controllers_never_share_a_run() {
     let folder = tempfile::tempdir().unwrap();

@@ -18,6 +18,13 @@ use std::convert::Infallible;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+/// What is said of a controller whose error counters are at 96, and at 128: then nobody hears of a broken frame any more, and
+/// the link ends.
+pub(super) const WARNS: &str =
+    "the CAN controller warns: its error counters are high; look at cable and termination";
+pub(super) const PASSIVE: &str =
+    "the CAN controller is error passive; look at cable, termination and bit rate";
+
 /// Opens the bus at an address: an interface of the kernel's (`can0`), or `slcan:PATH`.
 ///
 /// # Errors
@@ -131,10 +138,9 @@ fn converse(
             Some(CanEvent::BusOff) => {
                 return Err(Ended::Io("the controller left the bus (bus-off); restart it by hand".into()));
             }
-            Some(CanEvent::Warning) => {
-                let health = session.endpoint.health();
-                health.problem("the CAN controller warns: its error counters are high");
-            }
+            Some(CanEvent::Passive) => return Err(Ended::Io(PASSIVE.into())),
+            Some(CanEvent::Warning) => session.endpoint.health().problem(WARNS),
+            Some(CanEvent::Other) => {}
             Some(CanEvent::Frame(frame, ago)) => {
                 let ago = Nanos(u64::try_from(ago.as_nanos()).unwrap_or(0));
                 let arrived = session.now().since(ago);
@@ -175,5 +181,161 @@ impl Group {
         self.bytes.extend_from_slice(frame.data());
         self.next += 1;
         self.next == self.parts.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::endpoint::Endpoint;
+    use crate::setup::AxisSetup;
+    use realtime::ports::{ForceSensor, NoData};
+    use std::collections::VecDeque;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::sync::{Arc, Mutex};
+
+    /// What happens on a bus, shared with its test.
+    #[derive(Clone)]
+    struct Bus {
+        /// The sensor answers.
+        answers: Arc<AtomicBool>,
+        /// Told once, before any frame.
+        event: Arc<Mutex<Option<CanEvent>>>,
+        waiting: VecDeque<CanFrame>,
+        read: u32,
+        sample: u16,
+    }
+
+    /// Identifiers of the two halves of a sample.
+    const HALVES: [u32; 2] = [437, 438];
+
+    impl CanPort for Bus {
+        fn send(&mut self, _: &CanFrame) -> std::io::Result<bool> {
+            if self.answers.load(Ordering::Relaxed) {
+                self.sample = self.sample.wrapping_add(1);
+                let [low, high] = self.sample.to_le_bytes();
+                self.waiting.extend(CanFrame::new(HALVES[0], &[0; 8]));
+                self.waiting.extend(CanFrame::new(HALVES[1], &[0x56, 2, 0, 0, 0, 0, low, high]));
+            }
+            Ok(true)
+        }
+
+        /// A bus that is full: something is there at every look. Of nine frames one is the sensor's; the others are unknown, of
+        /// the sensor's identifiers with a wrong length, or no frame at all.
+        fn receive(&mut self, _: Instant) -> std::io::Result<Option<CanEvent>> {
+            if let Some(event) = self.event.lock().unwrap().take() {
+                return Ok(Some(event));
+            }
+            self.read += 1;
+            let frame = match self.read % 9 {
+                0 => match self.waiting.pop_front() {
+                    Some(frame) => Some(frame),
+                    None => CanFrame::new(0x7FF, &[0xFF; 8]),
+                },
+                1 | 2 => CanFrame::new(HALVES[1], &[1, 2, 3]),
+                3 => return Ok(Some(CanEvent::Other)),
+                4 => CanFrame::build(0x1234_5678, true, &[]),
+                n => CanFrame::new(n, &[0; 8]),
+            };
+            // A frame of 8 bytes takes 222 us at 500 kbit/s.
+            std::thread::sleep(Duration::from_micros(20));
+            Ok(frame.map(|frame| CanEvent::Frame(frame, Duration::ZERO)))
+        }
+    }
+
+    /// A sensor on a full bus behind a link of its own; the bus, the port, the health, and what ends the link.
+    struct Link {
+        bus: Bus,
+        port: Box<dyn ForceSensor>,
+        health: Arc<crate::health::Health>,
+        ended: Arc<Mutex<Vec<String>>>,
+        stop: Arc<AtomicBool>,
+        epoch: Instant,
+        thread: Option<JoinHandle<Closed>>,
+    }
+
+    impl Link {
+        fn start() -> Self {
+            let axis = |signal: &str| Some(AxisSetup { signal: signal.into(), gain: 1.0, offset_n: 0.0 });
+            let setup = InstrumentSetup {
+                lateral: axis("fx"),
+                normal: axis("fz"),
+                ..InstrumentSetup::new("ati-netft-can", "none")
+            };
+            let (endpoint, port) = Endpoint::force(crate::profile(&setup.profile).unwrap(), &setup).unwrap();
+            let (health, epoch) = (endpoint.health(), Instant::now());
+            let (ready, opened) = std::sync::mpsc::sync_channel(1);
+            let stop = Arc::new(AtomicBool::new(false));
+            let session = Session::new(endpoint, epoch, Arc::clone(&stop), ready);
+            assert_eq!(groups(&session, 432, None)[0].parts, HALVES.map(|id| (id, 8)));
+            let bus = Bus {
+                answers: Arc::new(AtomicBool::new(true)),
+                event: Arc::default(),
+                waiting: VecDeque::new(),
+                read: 0,
+                sample: 0,
+            };
+            let ended = Arc::new(Mutex::new(Vec::new()));
+            let (mut shared, told) = (bus.clone(), Arc::clone(&ended));
+            let thread = session.spawn(move |session| {
+                let over = converse(session, &mut shared, 432, None);
+                told.lock().unwrap().extend(over.as_ref().err().map(ToString::to_string));
+                over
+            });
+            opened.recv().unwrap().unwrap();
+            let port = crate::ports::compose(vec![port]).unwrap();
+            Link { bus, port, health, ended, stop, epoch, thread: thread.ok() }
+        }
+
+        fn until(&mut self, what: &str, mut is: impl FnMut(&mut Self) -> bool) {
+            let began = Instant::now();
+            while !is(self) {
+                assert!(
+                    began.elapsed() < Duration::from_secs(20),
+                    "{what}: {:?}",
+                    self.ended.lock().unwrap()
+                );
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+
+        fn normal(&mut self) -> Result<f64, NoData> {
+            let now = Nanos(self.epoch.elapsed().as_nanos() as u64);
+            self.port.read(now).normal.map(|reading| reading.value)
+        }
+    }
+
+    impl Drop for Link {
+        fn drop(&mut self) {
+            self.stop.store(true, Ordering::Release);
+            let _ = self.thread.take().map(JoinHandle::join);
+        }
+    }
+
+    #[test]
+    fn a_full_bus_neither_hides_the_sensor_nor_its_silence() {
+        let mut link = Link::start();
+        link.until("samples", |link| link.health.report().samples > 100);
+        assert!((link.normal().unwrap() - 0.299).abs() < 1e-9, "{:?}", link.normal());
+        assert!(link.ended.lock().unwrap().is_empty());
+        // Silent in the midst of the others' frames: told as silent, not waited for.
+        link.bus.answers.store(false, Ordering::Relaxed);
+        let silent_from = Instant::now();
+        link.until("its end", |link| link.ended.lock().unwrap().iter().any(|why| why.contains("no answer")));
+        assert!(silent_from.elapsed() < Duration::from_secs(2), "{:?}", silent_from.elapsed());
+        link.until("told", |link| link.normal() == Err(NoData::Disconnected));
+    }
+
+    #[test]
+    fn a_controller_that_warns_is_noted_and_a_passive_one_ends_the_link() {
+        let mut link = Link::start();
+        *link.bus.event.lock().unwrap() = Some(CanEvent::Warning);
+        link.until("noted", |link| link.health.report().last_problem == WARNS);
+        let samples = link.health.report().samples;
+        link.until("goes on", |link| link.health.report().samples > samples + 20);
+        assert!(link.ended.lock().unwrap().is_empty() && link.normal().is_ok());
+
+        *link.bus.event.lock().unwrap() = Some(CanEvent::Passive);
+        link.until("its end", |link| link.ended.lock().unwrap().iter().any(|why| why == PASSIVE));
     }
 }

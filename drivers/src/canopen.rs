@@ -4,7 +4,7 @@
 //! drive is enabled only while the loop's commands are fresh. A fault is reset when a person opens
 //! the rig, never by itself.
 
-use super::can;
+use super::can::{self, PASSIVE, WARNS};
 use super::endpoint::{BadFrame, Due};
 use super::off::{self, Closed, OFF_ANSWER_MS, OffWay};
 use super::session::{Ended, LONGEST_SLEEP, Periodic, Session};
@@ -68,7 +68,9 @@ impl Map {
         });
         let (data, cob) = found.ok_or_else(|| broken("process data to read"))?;
         let status = profile.signal("statusword").ok_or_else(|| broken("signal `statusword`"))?;
-        let block = profile.description.write.first().ok_or_else(|| broken("process data to write"))?;
+        let [block] = profile.description.write.as_slice() else {
+            return Err(Ended::Io("set-points go in one frame of process data, no more and no fewer".into()));
+        };
         let out = block.cob.ok_or_else(|| broken("`cob` of its block"))? + u32::from(node);
         let length = 2 * usize::from(block.count);
         Ok(Self { data, cob, status, out, length, rate_hz: block.rate_hz.unwrap_or(100.0) })
@@ -105,7 +107,8 @@ impl Master {
                     }
                 }
                 CanEvent::BusOff => return Err(Ended::Io("the controller left the bus (bus-off)".into())),
-                CanEvent::Warning => {}
+                CanEvent::Passive => return Err(Ended::Io(PASSIVE.into())),
+                CanEvent::Warning | CanEvent::Other => {}
             }
             if Instant::now() >= deadline {
                 break;
@@ -208,6 +211,8 @@ impl Master {
                         "the controller left the bus (bus-off); restart it by hand".into(),
                     ));
                 }
+                Some(CanEvent::Passive) => return Err(Ended::Io(PASSIVE.into())),
+                Some(CanEvent::Warning) => session.endpoint.health().problem(WARNS),
                 _ => {}
             }
         }
@@ -262,11 +267,58 @@ impl OffWay for Master {
                     return Ok(());
                 }
                 // The drive slows down: what it shows next may be rest.
-                if Instant::now() >= deadline {
-                    break;
-                }
+            }
+            // Whatever came: a bus that is full of others' frames keeps nobody here.
+            if Instant::now() >= deadline {
+                break;
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::endpoint::Endpoint;
+    use std::sync::Arc;
+
+    /// A bus that is full of others' frames.
+    struct Flood;
+
+    impl CanPort for Flood {
+        fn send(&mut self, _: &CanFrame) -> std::io::Result<bool> {
+            Ok(true)
+        }
+
+        fn receive(&mut self, _: Instant) -> std::io::Result<Option<CanEvent>> {
+            Ok(CanFrame::new(0x7A, &[0; 8]).map(|frame| CanEvent::Frame(frame, Duration::ZERO)))
+        }
+    }
+
+    /// Switching off waits for the drive's state: no longer than it may, however full the bus is.
+    #[test]
+    fn a_full_bus_does_not_hold_up_an_off() {
+        let setup = InstrumentSetup {
+            dead_weight_n: Some(0.25),
+            ..InstrumentSetup::new("cia402-profile-velocity", "none")
+        };
+        let (endpoint, _port) = Endpoint::stage(crate::profile(&setup.profile).unwrap(), &setup).unwrap();
+        let (ready, _opened) = std::sync::mpsc::sync_channel(1);
+        let mut session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
+        let map = Map::of(&session, 5).unwrap();
+        let block = vec![0; map.length];
+        let port: Box<dyn CanPort> = Box::new(Flood);
+        let mut master = Master { port, node: 5, limit_ms: 20, map, block, tries: 0 };
+        let (done, ended) = std::sync::mpsc::channel();
+        // A thread of its own: what hangs must fail, not hang the test.
+        std::thread::spawn(move || {
+            let began = Instant::now();
+            let over = off::switch_off(&mut session, &mut master);
+            let _ = done.send((over.map_err(|ended| ended.to_string()), began.elapsed()));
+        });
+        let most = off::OFF_WITHIN + Duration::from_secs(3);
+        let (over, took) = ended.recv_timeout(2 * most).expect("it hangs");
+        assert!(over.unwrap_err().contains("did not show it") && took < most, "{took:?}");
     }
 }

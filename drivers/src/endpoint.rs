@@ -89,13 +89,29 @@ struct ContactsLink {
     ring: HeapProd<Contacts>,
 }
 
+/// Names of the safety contacts' signals.
+const CONTACTS: [&str; 3] = ["emergency_stop", "interlock", "dead_man"];
+
 impl ContactsLink {
-    /// The contacts that a profile has, and their port; `None` where it has none.
-    fn of(profile: &Profile) -> Option<(Self, ContactsPort)> {
-        let signals = ["emergency_stop", "interlock", "dead_man"].map(|name| profile.signal(name));
+    /// The contacts that a profile has and that are wired, and their port.
+    fn of(profile: &Profile, setup: &InstrumentSetup) -> Result<(Self, ContactsPort), String> {
+        if let Some(wired) = &setup.wired
+            && let Some(unknown) = wired
+                .iter()
+                .find(|name| !CONTACTS.contains(&name.as_str()) || profile.signal(name.as_str()).is_none())
+        {
+            return Err(format!(
+                "`wired`: the profile has no contact `{unknown}`; contacts: {}",
+                CONTACTS.join(", ")
+            ));
+        }
+        let wired = |name: &str| setup.wired.as_ref().is_none_or(|wired| wired.iter().any(|w| w == name));
+        let signals = CONTACTS.map(|name| profile.signal(name).filter(|_| wired(name)));
+        if signals.iter().all(Option::is_none) {
+            return Err(format!("none of the contacts {} is there and wired", CONTACTS.join(", ")));
+        }
         let (ring, port) = ports::contacts();
-        let link = Self { signals, last: Contacts::missing(NoData::NotFitted), ring };
-        signals.iter().any(Option::is_some).then_some((link, port))
+        Ok((Self { signals, last: Contacts::missing(NoData::NotFitted), ring }, port))
     }
 
     /// Takes what a frame says of them. `None` where it says nothing; else whether the loop's ring was full.
@@ -264,9 +280,8 @@ impl Endpoint {
     ///
     /// # Errors
     /// Where the profile has none of their signals.
-    pub fn contacts(profile: Profile) -> Result<(Self, ContactsPort), String> {
-        let (link, port) = ContactsLink::of(&profile)
-            .ok_or("the profile has none of the signals `emergency_stop`, `interlock`, `dead_man`")?;
+    pub fn contacts(profile: Profile, setup: &InstrumentSetup) -> Result<(Self, ContactsPort), String> {
+        let (link, port) = ContactsLink::of(&profile, setup)?;
         Ok((Self::new(profile, Part::Contacts(link)), port))
     }
 

@@ -16,11 +16,23 @@ pub fn identities(setup: &InstrumentsSetup) -> Result<BTreeSet<String>, OpenErro
     let mut all = BTreeSet::new();
     for instrument in setup.all() {
         all.extend(place(instrument)?);
-        all.extend(
-            instrument.serial.as_ref().map(|serial| format!("serial/{}/{serial}", instrument.profile)),
-        );
+        all.extend(by_serial(instrument));
     }
     Ok(all)
+}
+
+/// The identity of one instrument: by its serial number where the setup names it, else by its address. `None` where it exists
+/// within this process only.
+///
+/// # Errors
+/// A profile that does not exist, or an address that stands for nothing.
+pub fn identity(instrument: &InstrumentSetup) -> Result<Option<String>, OpenError> {
+    let place = place(instrument)?;
+    Ok(place.map(|place| by_serial(instrument).unwrap_or(place)))
+}
+
+fn by_serial(instrument: &InstrumentSetup) -> Option<String> {
+    instrument.serial.as_ref().map(|serial| format!("serial/{}/{serial}", instrument.profile))
 }
 
 /// Where an instrument is; `None` where the place is made by this process for itself.

@@ -279,7 +279,7 @@ fn open_safety(
         supply = Box::new(port);
     }
     if let Some(instrument) = &setup.safety_inputs {
-        let (endpoint, port) = Endpoint::contacts(profile(&instrument.profile)?)
+        let (endpoint, port) = Endpoint::contacts(profile(&instrument.profile)?, instrument)
             .map_err(|problem| mismatch(instrument, problem))?;
         start(links, instrument, endpoint, epoch)?;
         contacts = Box::new(port);

@@ -3,7 +3,7 @@
 use super::endpoint::Due;
 use super::off::{self, OFF_ANSWER_MS, OffWay};
 use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
-use instruments::profile::FrameKind;
+use instruments::profile::{FrameKind, Profile};
 use instruments::schema::{Poll, Table, Write};
 use instruments::{FrameId, SetId};
 use std::convert::Infallible;
@@ -46,8 +46,35 @@ pub trait Registers {
 
 /// A conversation's state: blocks as last sent, and bad answers in a row.
 pub struct Conversation {
-    block: Vec<u8>,
+    blocks: Blocks,
     bad: u32,
+}
+
+/// The bytes of every block of registers that set-points are written to.
+pub struct Blocks(Vec<Vec<u8>>);
+
+impl Blocks {
+    /// All of them zero.
+    pub fn of(profile: &Profile) -> Self {
+        Self(profile.description.write.iter().map(|block| vec![0; 2 * usize::from(block.count)]).collect())
+    }
+
+    /// Puts set-points in, and gives every block that holds one of them, in the order in which they name it.
+    pub fn put(&mut self, profile: &Profile, set_points: &[(SetId, f64)]) -> Vec<(Write, Vec<u16>)> {
+        let mut touched = Vec::new();
+        for (set, value) in set_points {
+            let holds = |index: &usize| profile.sets_of(*index).any(|here| here == *set);
+            if let Some(index) = (0..self.0.len()).find(holds) {
+                // Ranges were checked when the command was taken.
+                let _ = profile.encode_set(*set, *value, &mut self.0[index]);
+                if !touched.contains(&index) {
+                    touched.push(index);
+                }
+            }
+        }
+        let blocks = &profile.description.write;
+        touched.into_iter().map(|index| (blocks[index].clone(), words(&self.0[index]))).collect()
+    }
 }
 
 impl Conversation {
@@ -56,14 +83,7 @@ impl Conversation {
     /// # Errors
     /// Why the connection is of no use.
     pub fn begin(session: &mut Session, wire: &mut dyn Registers) -> Result<Self, Ended> {
-        let block = session
-            .endpoint
-            .profile()
-            .description
-            .write
-            .first()
-            .map_or(0, |block| 2 * usize::from(block.count));
-        let mut conversation = Self { block: vec![0; block], bad: 0 };
+        let mut conversation = Self { blocks: Blocks::of(session.endpoint.profile()), bad: 0 };
         off::at_the_beginning(session, &mut Way { conversation: &mut conversation, wire })?;
         for (frame, poll) in polls(session) {
             conversation.read(session, wire, frame, &poll)?;
@@ -89,19 +109,19 @@ impl Conversation {
                 poll.rate_hz.map(|rate| (Periodic::new(rate_hz.unwrap_or(rate), now), frame, poll))
             })
             .collect();
-        let block = session.endpoint.profile().description.write.first().cloned();
-        let mut write = block.as_ref().map(|block| Periodic::new(block.rate_hz.unwrap_or(100.0), now));
+        // All blocks at the rate of the fastest: one command is in all of them.
+        let blocks = session.endpoint.profile().description.write.iter();
+        let rates = blocks.map(|block| block.rate_hz.unwrap_or(100.0));
+        let mut write = rates.reduce(f64::max).map(|rate| Periodic::new(rate, now));
         loop {
             if session.stopping() {
                 return Err(off::at_the_end(session, &mut Way { conversation: &mut self, wire }));
             }
             let now = session.now();
-            if let (Some(periodic), Some(block)) =
-                (write.as_mut().filter(|periodic| periodic.is_due(now)), &block)
-            {
+            if let Some(periodic) = write.as_mut().filter(|periodic| periodic.is_due(now)) {
                 match session.endpoint.due(now) {
                     Due::Nothing => {}
-                    Due::SetPoints(set_points) => self.command(session, wire, block, &set_points)?,
+                    Due::SetPoints(set_points) => self.command(session, wire, &set_points)?,
                     Due::Safe(_) => Way { conversation: &mut self, wire }.send_off(session)?,
                 }
                 periodic.advance(session.now());
@@ -139,10 +159,9 @@ impl Conversation {
         &mut self,
         session: &mut Session,
         wire: &mut dyn Registers,
-        block: &Write,
         set_points: &[(SetId, f64)],
     ) -> Result<(), Ended> {
-        let answer = self.write(session, wire, block, set_points);
+        let answer = self.write(session, wire, set_points);
         if self.judge(session, answer)?.is_none() {
             session.endpoint.refused();
             Way { conversation: self, wire }.send_off(session)?;
@@ -150,18 +169,21 @@ impl Conversation {
         Ok(())
     }
 
+    /// Every block that holds one of the set-points, whatever becomes of the one before; the first trouble is told.
     fn write(
         &mut self,
         session: &Session,
         wire: &mut dyn Registers,
-        block: &Write,
         set_points: &[(SetId, f64)],
     ) -> Result<(), Trouble> {
-        for (set, value) in set_points {
-            // Ranges were checked when the command was taken.
-            let _ = session.endpoint.profile().encode_set(*set, *value, &mut self.block);
+        let mut told = Ok(());
+        for (block, registers) in self.blocks.put(session.endpoint.profile(), set_points) {
+            match wire.write(session, block.table, block.address, &registers) {
+                Err(Trouble::Ended(ended)) => return Err(Trouble::Ended(ended)),
+                written => told = told.and(written),
+            }
         }
-        wire.write(session, block.table, block.address, &words(&self.block))
+        told
     }
 
     /// One set-point by itself, in its own registers.
@@ -169,15 +191,13 @@ impl Conversation {
         &mut self,
         session: &Session,
         wire: &mut dyn Registers,
-        block: &Write,
         (set, value): (SetId, f64),
     ) -> Result<(), Trouble> {
         let profile = session.endpoint.profile();
-        let _ = profile.encode_set(set, value, &mut self.block);
+        let Some((block, words)) = self.blocks.put(profile, &[(set, value)]).pop() else { return Ok(()) };
         let described = &profile.description.set[set.0];
         let first = usize::from(described.register);
         let registers = described.number.map_or(1, |number| number.bytes().div_ceil(2));
-        let words = words(&self.block);
         let own = words.get(first..first + registers).unwrap_or(&words);
         wire.write(session, block.table, block.address + described.register, own)
     }
@@ -220,9 +240,6 @@ struct Way<'a> {
 
 impl OffWay for Way<'_> {
     fn send_off(&mut self, session: &mut Session) -> Result<(), Ended> {
-        let Some(block) = session.endpoint.profile().description.write.first().cloned() else {
-            return Ok(());
-        };
         let safe = session.endpoint.hand_out_off(session.now());
         let health = session.endpoint.health();
         let mut not_taken = |trouble: Trouble| match trouble {
@@ -233,14 +250,14 @@ impl OffWay for Way<'_> {
                 Ok(false)
             }
         };
-        let whole = self.conversation.write(session, self.wire, &block, &safe);
+        let whole = self.conversation.write(session, self.wire, &safe);
         if whole.map_or_else(&mut not_taken, |()| Ok(true))? {
             return Ok(());
         }
         // Some instruments refuse a block for the sake of one value in it: each by itself then, whatever becomes of the others.
         let mut all = true;
         for one in safe {
-            let taken = self.conversation.write_one(session, self.wire, &block, one);
+            let taken = self.conversation.write_one(session, self.wire, one);
             all &= taken.map_or_else(&mut not_taken, |()| Ok(true))?;
         }
         if !all {

@@ -4,7 +4,7 @@
 //! next request. So after a timeout the line is drained until it has been silent for longer than
 //! the instrument's longest answer takes, and only then is the next request made.
 
-use super::modbus::{Conversation, Registers, Trouble};
+use super::modbus::{Blocks, Conversation, Registers, Trouble};
 use super::off::Closed;
 use super::serial::Line;
 use super::session::{BAD_IN_A_ROW, Ended, LONGEST_SLEEP, Session};
@@ -77,17 +77,20 @@ struct Rtu {
 }
 
 impl Rtu {
-    /// Writes the safe set-points and waits for no answer. The 'off' that is answered and read back follows.
+    /// Writes the safe set-points, every block of them, and needs no answer. The 'off' that is answered and read back follows.
     fn send_unanswered_off(&mut self, session: &Session) -> Result<(), Ended> {
         let profile = session.endpoint.profile();
-        let Some(block) = profile.description.write.first() else { return Ok(()) };
-        let mut bytes = vec![0; 2 * usize::from(block.count)];
-        for (set, value) in session.endpoint.safe_set_points() {
-            let _ = profile.encode_set(set, value, &mut bytes);
+        let off = Blocks::of(profile).put(profile, &session.endpoint.safe_set_points());
+        for (n, (block, words)) in off.iter().enumerate() {
+            if n > 0 {
+                // One at a time has the line: where there is an answer to the one before, it is let through.
+                let answer = Duration::from_millis(u64::from(self.answer_ms));
+                self.line.drain(answer, 2 * answer)?;
+            }
+            std::thread::sleep(Duration::from_secs_f64(self.silence));
+            self.line.write(&write_request(self.unit, block.table, block.address, words).bytes)?;
         }
-        let words: Vec<u16> = bytes.chunks_exact(2).map(|p| u16::from_be_bytes([p[0], p[1]])).collect();
-        std::thread::sleep(Duration::from_secs_f64(self.silence));
-        self.line.write(&write_request(self.unit, block.table, block.address, &words).bytes)
+        Ok(())
     }
 
     /// One request and its answer.
@@ -269,5 +272,51 @@ impl Registers for Rtu {
 
     fn wait_up_to(&mut self, answer_ms: u32) {
         self.answer_ms = answer_ms;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::endpoint::Endpoint;
+    use instruments::profile::Profile;
+    use serialport::{SerialPort, TTYPort};
+    use std::io::Read;
+    use std::sync::Arc;
+
+    /// An amplifier whose enable is in a block of its own: a line that answers nothing is told all of 'off' all the same.
+    #[test]
+    fn an_unanswered_off_is_in_every_block() {
+        let text = crate::bundled::text("muprime-amplifier").unwrap();
+        let switch = "[[write]]\nname = \"switch\"\naddress = 300\ncount = 1\n\n[[signal]]";
+        let text = text.replacen("[[signal]]", switch, 1);
+        let mut parts = text.split("[[set]]");
+        let mut split = parts.next().unwrap().to_string();
+        for part in parts {
+            let part = match part.contains("name = \"enable\"") {
+                true => format!("\nblock = \"switch\"{}", part.replacen("register = 3", "register = 0", 1)),
+                false => format!("\nblock = \"command\"{part}"),
+            };
+            split += &format!("[[set]]{part}");
+        }
+        let text = split.replace("enable = 1, heartbeat = 77 }", "heartbeat = 77 }")
+            + "\n[[vector]]\nframe = \"switch\"\nregisters = [1]\nexpect = { enable = 1 }\n";
+        let profile = Profile::parse_with(&text, &|_| None).unwrap_or_else(|e| panic!("{e:?}"));
+        let instrument = InstrumentSetup::new("muprime-amplifier", "rtu:pty");
+        let (endpoint, _port) = Endpoint::amplifier(profile, &instrument).unwrap();
+        let (ready, _opened) = std::sync::mpsc::sync_channel(1);
+        let session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
+        let (mut instrument, driver) = TTYPort::pair().unwrap();
+        let line = Line::open(&driver.name().unwrap(), 115_200, "8N1").unwrap();
+        let mut wire = Rtu { line, unit: 2, answer_ms: 5, quiet_ms: 5, silence: 1e-3 };
+        wire.send_unanswered_off(&session).unwrap();
+        instrument.set_timeout(Duration::from_millis(50)).unwrap();
+        let (mut heard, mut buffer) = (Vec::new(), [0; 256]);
+        while let Ok(count) = instrument.read(&mut buffer) {
+            heard.extend_from_slice(&buffer[..count]);
+        }
+        let switch = rtu::write(2, 300, &[0]).bytes;
+        let command = rtu::write(2, 100, &[0; 5]).bytes;
+        assert_eq!(heard, [switch, command].concat(), "{heard:02x?}");
     }
 }

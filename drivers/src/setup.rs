@@ -78,6 +78,10 @@ pub struct InstrumentSetup {
     /// The same for what they measure.
     #[serde(default)]
     pub measured_m_per_unit: Option<f64>,
+    /// Safety inputs that are wired, by their signals: `emergency_stop`, `interlock`, `dead_man`. Left out: all that the profile
+    /// has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wired: Option<Vec<String>>,
     /// Stages that load nothing: the weight that does, in N.
     #[serde(default)]
     pub dead_weight_n: Option<f64>,
@@ -102,6 +106,7 @@ impl InstrumentSetup {
             baud: None,
             amplitude_m_per_unit: None,
             measured_m_per_unit: None,
+            wired: None,
             dead_weight_n: None,
             rate_hz: None,
             lateral: None,

@@ -63,12 +63,9 @@ impl CanPort for KernelCan {
                     let frame = CanFrame::build(id, data.is_extended(), data.data());
                     return Ok(frame.map(|frame| CanEvent::Frame(frame, ago)));
                 }
-                Ok((Raw::Error(error), _)) => {
-                    if let Some(event) = judge(&CanError::from(error)) {
-                        return Ok(Some(event));
-                    }
-                }
-                Ok((Raw::Remote(_), _)) => {}
+                Ok((Raw::Error(error), _)) => return Ok(Some(judge(&CanError::from(error)))),
+                // Never thrown away in here: a bus that is full of them would keep its reader for ever.
+                Ok((Raw::Remote(_), _)) => return Ok(Some(CanEvent::Other)),
                 Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
                     return Ok(None);
                 }
@@ -88,19 +85,55 @@ fn sent(written: io::Result<()>) -> io::Result<bool> {
     }
 }
 
-/// What an error frame means for the rig; `None` for what passes by itself.
-fn judge(error: &CanError) -> Option<CanEvent> {
-    use socketcan::errors::ErrorCause;
-    error.causes().find_map(|cause| match cause {
-        ErrorCause::BusOff => Some(CanEvent::BusOff),
-        ErrorCause::Controller(_) => Some(CanEvent::Warning),
-        _ => None,
-    })
+/// What an error frame means for the rig: the worst of its causes.
+fn judge(error: &CanError) -> CanEvent {
+    use socketcan::errors::{ControllerProblems, ErrorCause};
+    let passive = ControllerProblems::RX_PASSIVE | ControllerProblems::TX_PASSIVE;
+    let well = ControllerProblems::ACTIVE;
+    let (mut off, mut is_passive, mut warns) = (false, false, false);
+    for cause in error.causes() {
+        match cause {
+            ErrorCause::BusOff => off = true,
+            ErrorCause::Controller(problems) if problems.intersects(passive) => is_passive = true,
+            ErrorCause::Controller(problems) if *problems != well => warns = true,
+            _ => {}
+        }
+    }
+    match (off, is_passive, warns) {
+        (true, ..) => CanEvent::BusOff,
+        (_, true, _) => CanEvent::Passive,
+        (_, _, true) => CanEvent::Warning,
+        _ => CanEvent::Other,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What the kernel tells of its controller, as `linux/can/error.h` has it.
+    #[test]
+    fn error_frames_are_told_apart() {
+        use socketcan::CanErrorFrame;
+        let said = |class: u32, controller: u8| {
+            let frame = CanErrorFrame::new_error(class, &[0, controller, 0, 0, 0, 0, 0, 0]).unwrap();
+            judge(&CanError::from(frame))
+        };
+        const CONTROLLER: u32 = 0x004;
+        for (bits, event) in [
+            (0x04, CanEvent::Warning),
+            (0x08, CanEvent::Warning),
+            (0x10, CanEvent::Passive),
+            (0x20, CanEvent::Passive),
+            (0x28, CanEvent::Passive),
+            (0x40, CanEvent::Other),
+        ] {
+            assert_eq!(said(CONTROLLER, bits), event, "{bits:#04x}");
+        }
+        assert_eq!(said(0x040, 0), CanEvent::BusOff);
+        assert_eq!(said(0x040 | CONTROLLER, 0x30), CanEvent::BusOff);
+        assert_eq!(said(0x080, 0), CanEvent::Other);
+    }
 
     #[test]
     fn a_full_queue_is_back_pressure_and_no_error() {

@@ -9,8 +9,12 @@ use std::time::{Duration, Instant};
 pub enum CanEvent {
     /// A frame, and how long ago it was received by the adapter or the kernel.
     Frame(CanFrame, Duration),
-    /// The controller warns (error counters at 96) or is passive (128).
+    /// The controller warns: an error counter is at 96. Frames still pass.
     Warning,
+    /// The controller is passive: an error counter is at 128, and it can tell nobody of an error any more.
+    Passive,
+    /// Something that is no frame for anybody here was thrown away.
+    Other,
     /// The controller has left the bus, and comes back only when a person says so.
     BusOff,
 }

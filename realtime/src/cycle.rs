@@ -8,8 +8,8 @@
 use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
 use crate::ports::{Nanos, SupplyCommand};
 use crate::safety::{
-    Cause, Controls, Decision, DriveCommand, Limits, Observation, Remark, Request, Safety, StageCommand,
-    State, Trip,
+    Cause, Controls, Decision, DriveCommand, Exposed, Limits, Observation, Remark, Request, Safety,
+    StageCommand, State, Trip,
 };
 use models::condition::{Ambient, Condition};
 use models::prediction::FrictionModel;
@@ -74,6 +74,9 @@ pub struct Config {
     pub limits: Limits,
     /// The running estimate.
     pub estimate: EstimateConfig,
+    /// With a human finger: its exposure in earlier runs.
+    #[serde(default, skip_serializing_if = "Exposed::is_none")]
+    pub exposed: Exposed,
 }
 
 /// What changes from cycle to cycle.
@@ -83,6 +86,7 @@ pub struct CycleState {
     window: Window,
     request: Request,
     marker: Marker,
+    begun: bool,
     key_held_at: Option<Nanos>,
     mu0: Option<Mu0>,
     ambient: Ambient,
@@ -92,6 +96,11 @@ impl CycleState {
     /// Safety's state.
     pub const fn safety(&self) -> State {
         self.safety.state()
+    }
+
+    /// Time that the plate was driven in this run, and the squared rms velocity summed over it, in m2/s.
+    pub const fn exposure(&self) -> (Nanos, f64) {
+        self.safety.exposure()
     }
 }
 
@@ -167,6 +176,7 @@ pub fn step(
 /// The first half of a cycle: commands and safety. What it decides is ready to leave.
 pub fn decide(config: &Config, state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Decision {
     let controls = take_commands(state, inputs, now);
+    state.safety.carry(&config.exposed);
     state.safety.step(&config.limits, &inputs.seen, &state.request, controls, now)
 }
 
@@ -220,6 +230,10 @@ pub fn judge(
 
 fn take_commands(state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Controls {
     let mut controls = Controls::default();
+    if !state.begun {
+        // A key that was not heard yet may be held all the same: it is released when it has not been heard for its age.
+        (state.begun, state.key_held_at) = (true, Some(now));
+    }
     for command in inputs.commands.iter().flatten() {
         match command {
             Command::Set(request, marker) => {

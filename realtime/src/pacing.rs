@@ -60,6 +60,10 @@ pub struct Lifeline {
     pub end: AtomicBool,
     /// Counts cycles: the supervisor sees that the loop lives.
     pub heartbeat: AtomicU64,
+    /// Time that the plate was driven in this run, in ns.
+    pub driven_ns: AtomicU64,
+    /// The squared rms velocity summed over that, in m2/s: the bits of an `f64`.
+    pub dose_bits: AtomicU64,
 }
 
 /// What the loop needs besides its ports.
@@ -167,6 +171,9 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
         if watch.try_push(row).is_err() {
             watch_drops += 1;
         }
+        let (driven, dose_m2_s) = state.exposure();
+        life.driven_ns.store(driven.0, Ordering::Relaxed);
+        life.dose_bits.store(dose_m2_s.to_bits(), Ordering::Relaxed);
         life.heartbeat.store(cycles, Ordering::Relaxed);
         if life.end.load(Ordering::Relaxed) {
             break;

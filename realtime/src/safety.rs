@@ -3,7 +3,7 @@
 //! Duties: decide each cycle, before anything else, whether the rig may drive and move; latch what went wrong with
 //! its cause, value, bound and cycle; hand out commands that the limits allow.
 //! Owners: `limits.rs` the numbers, `watch.rs` and `exposure.rs` what must be remembered, `rules.rs` the rules with their
-//! requirement identifiers, `arming.rs` the way to armed. This file: states, requests, and commands.
+//! requirement identifiers, `cause.rs` how a trip is told, `arming.rs` the way to armed. This file: states, requests, and commands.
 //!
 //! ```text
 //!                 reset edge, causes clear             second channel opened and
@@ -17,6 +17,7 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 mod arming;
+mod cause;
 mod exposure;
 mod limits;
 mod rules;
@@ -27,8 +28,10 @@ use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 
 pub use arming::Proof;
+pub use cause::{Cause, Unit};
+pub use exposure::{Exposed, PART_MINUTES, PARTS};
 pub use limits::{ChannelTiming, HARD, HardLimits, LimitError, Limits, Timing};
-pub use rules::{Cause, RULES, Rule};
+pub use rules::{RULES, Rule};
 use watch::Watch;
 
 /// An absolute set-point for the amplifier. Only this module can make one.
@@ -124,12 +127,15 @@ impl StageCommand {
 pub struct Trip {
     /// The rule.
     pub cause: Cause,
-    /// The value that broke it, in the unit of the rule's bound; infinite where there was no data at all.
+    /// The value that broke it; infinite where there was no data at all.
     #[serde(with = "crate::number")]
     pub value: f64,
     /// The bound that it broke.
     #[serde(with = "crate::number")]
     pub bound: f64,
+    /// Unit of value and bound.
+    #[serde(default)]
+    pub unit: Unit,
     /// The cycle in which it was decided.
     pub cycle: u64,
     /// The time at which it was decided.
@@ -270,7 +276,8 @@ impl Default for Safety {
 impl Safety {
     /// Starts faulted: nothing drives before an explicit reset.
     pub const fn new() -> Self {
-        let start = Trip { cause: Cause::StartUp, value: 0.0, bound: 0.0, cycle: 0, at: Nanos(0) };
+        let start =
+            Trip { cause: Cause::StartUp, value: 0.0, bound: 0.0, unit: Unit::Flag, cycle: 0, at: Nanos(0) };
         Safety {
             state: State::Faulted(start),
             watch: Watch::new(),
@@ -280,6 +287,18 @@ impl Safety {
             asked: false,
             supply_cut: false,
         }
+    }
+
+    /// Takes over the exposure of earlier runs, before the first cycle.
+    pub fn carry(&mut self, past: &Exposed) {
+        if self.cycle == 0 {
+            self.watch.exposure.carry(past);
+        }
+    }
+
+    /// Time that the plate was driven in this run, and the squared rms velocity summed over it, in m2/s.
+    pub const fn exposure(&self) -> (Nanos, f64) {
+        self.watch.exposure.in_all
     }
 
     /// The present state.

@@ -39,13 +39,15 @@ impl RigClaim {
     }
 }
 
+/// Whether every user may write to a folder, and none replace another's file in it.
+pub(crate) fn is_shared(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|m| m.is_dir() && m.permissions().mode() & 0o7777 == SHARED)
+}
+
 /// Where locks are kept on this machine.
 fn folder() -> miette::Result<PathBuf> {
-    let shared = |path: &Path| {
-        path.symlink_metadata().is_ok_and(|m| m.is_dir() && m.permissions().mode() & 0o7777 == SHARED)
-    };
     let mut folders = FOLDERS.iter().map(PathBuf::from);
-    folders.find(|path| shared(path)).ok_or_else(|| {
+    folders.find(|path| is_shared(path)).ok_or_else(|| {
         miette::miette!(
             help = "one of them must be a folder that all may write to, with the sticky bit (mode 1777)",
             "there is no place for the rig's lock: none of {} serves",
@@ -61,7 +63,7 @@ fn take(folder: &Path, identity: &str) -> miette::Result<File> {
     let wrong = |e: io::Error| {
         miette::miette!(help = "see what it is, and remove it", "the lock {}: {e}", path.display())
     };
-    let mut file = open(&path).map_err(wrong)?;
+    let mut file = open_shared(&path).map_err(wrong)?;
     match file.try_lock() {
         Ok(()) => {
             // Who holds it, for whoever is refused. Another user's file may not be writable: the lock holds all the same.
@@ -81,8 +83,9 @@ fn take(folder: &Path, identity: &str) -> miette::Result<File> {
     }
 }
 
-/// Opens a lock file that every user can lock. Nothing is followed, and nothing but a plain file is taken.
-fn open(path: &Path) -> io::Result<File> {
+/// Opens a file that every user can open, and makes it where there is none. Nothing is followed, and nothing but a plain file
+/// is taken. Another user's may be open for reading only.
+pub(crate) fn open_shared(path: &Path) -> io::Result<File> {
     let options = |write: bool| {
         let mut options = OpenOptions::new();
         options.read(true).write(write).custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK);

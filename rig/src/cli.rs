@@ -54,10 +54,13 @@ pub fn until_the_end(subcommand: impl FnOnce() -> ExitCode + Send + 'static) -> 
     };
     // As large as a main thread's stack commonly is.
     let thread = std::thread::Builder::new().name("subcommand".into()).stack_size(8 << 20).spawn(run);
-    match thread {
+    let code = match thread {
         Ok(_) => ended.recv().unwrap_or(ExitCode::from(INTERNAL)),
         Err(_) => ExitCode::from(INTERNAL),
-    }
+    };
+    // Whoever leaves at once leaves others no time for it.
+    crate::dead_man_key::give_the_terminal_back();
+    code
 }
 
 /// Asks the main thread to end the process with that status, whatever the subcommand does.

@@ -119,6 +119,17 @@ pub enum Outcome {
     RecordLost,
 }
 
+impl Outcome {
+    /// What ended the sweep, or kept it from beginning, where a rule did.
+    pub fn cause(&self) -> Option<Cause> {
+        match self {
+            Outcome::Tripped(trip) => Some(trip.cause),
+            Outcome::WouldNotArm { blocking } => *blocking,
+            _ => None,
+        }
+    }
+}
+
 /// What a row led to.
 #[derive(Debug, Default)]
 pub struct Reaction {

@@ -63,6 +63,12 @@ pub struct Summary {
     /// How it ended.
     #[serde(flatten)]
     pub outcome: Outcome,
+    /// Requirement (`SR-..`) whose rule ended it or kept it from being armed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub requirement: Option<String>,
+    /// What to do about that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remedy: Option<String>,
     /// Folder of the run.
     pub folder: PathBuf,
     /// Passes made in all sessions.

@@ -16,6 +16,7 @@ use realtime::cycle::Config;
 use realtime::estimate::EstimateConfig;
 use realtime::pacing::Pacing;
 use realtime::ports::Nanos;
+use realtime::safety::Exposed;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -235,7 +236,7 @@ impl Setup {
             }
         })?;
         limits::guarded(&file).map_err(|problem| bad(&["limits", "human_contact"], problem))?;
-        let config = Config { limits, estimate: file.estimate };
+        let config = Config { limits, estimate: file.estimate, exposed: Exposed::default() };
         #[allow(clippy::disallowed_methods, reason = "a certificate is good until a date")]
         let now_unix_s = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
@@ -262,6 +263,16 @@ impl Setup {
     /// What the setup states of the air.
     pub fn ambient(&self) -> Ambient {
         self.file.ambient()
+    }
+
+    /// Whether a key that is held at the terminal stands for the dead-man device: the setup says so, and none is wired.
+    pub fn hand_at_key(&self) -> bool {
+        let limits = &self.config.limits;
+        let device = |inputs: &drivers::InstrumentSetup| {
+            let wired = inputs.wired.as_ref().is_none_or(|wired| wired.iter().any(|name| name == "dead_man"));
+            wired && drivers::profile(&inputs.profile).is_ok_and(|p| p.signal("dead_man").is_some())
+        };
+        limits.human_contact && limits.dead_man_key && !self.file.safety_inputs.as_ref().is_some_and(device)
     }
 
     /// The instruments' part, for the drivers.

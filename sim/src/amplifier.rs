@@ -189,7 +189,8 @@ impl Amplifier {
     /// Moves on to `now`; returns the drive (m peak-to-peak at resonance) and its frequency (Hz).
     pub fn step(&mut self, now: Nanos, room_c: f64, plate_warming_k: f64) -> (f64, f64) {
         if self.output_on && now.since(self.fed_at) > Nanos::from_seconds(self.config.watchdog_s) {
-            self.output_on = false;
+            // What refuses its enable refuses its own watchdog: only its supply switches it off.
+            self.output_on = self.config.refuses_off;
             self.watchdog_tripped = true;
         }
         self.temperature_c = room_c + self.config.warming_ratio * plate_warming_k;
@@ -268,6 +269,7 @@ mod tests {
         amplifier.command(on(1), Nanos(0));
         amplifier.command(AmplifierInput { enable: false, ..on(2) }, Nanos(1));
         assert!(amplifier.step(Nanos(2), 22.0, 0.0).0 > 0.0, "it refuses off");
+        assert!(amplifier.step(Nanos(2_000_000_000), 22.0, 0.0).0 > 0.0, "and its watchdog");
         amplifier.cut_supply();
         amplifier.command(on(3), Nanos(3));
         assert_eq!(amplifier.step(Nanos(3), 22.0, 0.0).0, 0.0);

@@ -288,6 +288,7 @@ macro_rules! kinds {
 
 kinds! {
     amplifier_refuses_off
+    amplifier_without_watchdog
     adhesion
     amplitude_droop
     amplitude_miscalibration

@@ -6,7 +6,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use serialport::{SerialPort, TTYPort};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,8 @@ pub enum Kind {
     Late(Duration),
     /// Every answer is other bytes.
     Garbage,
-    /// Blocks of set-points, and the amplitude (a stage: the load) by itself, are refused.
+    /// Set-points are refused: in registers the blocks, and the amplitude (a stage: the load) by itself; in lines see
+    /// `Trouble::refused_line`.
     Refused,
     /// What is sent comes back, and no answer.
     Echo,
@@ -44,12 +45,22 @@ pub struct Trouble {
     stop: Arc<AtomicBool>,
     /// Register whose write is refused by itself.
     refused: u16,
+    /// Lines that could have been refused so far, and whether an error waits to be asked for.
+    refusals: Arc<AtomicU32>,
+    error: Arc<AtomicBool>,
     seed: u64,
 }
 
 impl Trouble {
     pub fn new(refused: u16, seed: u64) -> Self {
-        Self { fault: Arc::default(), stop: Arc::default(), refused, seed }
+        Self {
+            fault: Arc::default(),
+            stop: Arc::default(),
+            refused,
+            refusals: Arc::default(),
+            error: Arc::default(),
+            seed,
+        }
     }
 
     pub fn strike(&self, fault: Fault) {
@@ -69,18 +80,58 @@ impl Trouble {
         self.stop.load(Ordering::Acquire)
     }
 
-    /// The answer of an instrument that refuses what these bytes ask for.
-    fn refusal(&self, asked: &[u8]) -> Option<Vec<u8>> {
+    /// What an instrument that refuses passes on of these bytes, and what it answers itself.
+    fn refuse(&self, asked: &[u8]) -> (Vec<u8>, Vec<u8>) {
         let word = |at: usize| Some(u16::from_be_bytes([*asked.get(at)?, *asked.get(at + 1)?]));
-        let refuses = |address: u16, count: u16| count >= 4 || address == self.refused;
+        let refuses = |address: Option<u16>, count: Option<u16>| {
+            count.is_some_and(|count| count >= 4) || address == Some(self.refused)
+        };
         if asked.starts_with(b"setVOLT") {
-            return Some(b"ERR\r".to_vec());
+            return (Vec::new(), b"ERR\r".to_vec());
         }
         if asked.get(2..4) == Some(&[0, 0]) && asked.get(7) == Some(&16) {
-            return refuses(word(8)?, word(10)?).then(|| [&asked[..5], &[3, asked[6], 0x90, 3]].concat());
+            let refused = refuses(word(8), word(10));
+            let answer = refused.then(|| [&asked[..5], &[3, asked[6], 0x90, 3]].concat());
+            return answer.map_or((asked.to_vec(), Vec::new()), |answer| (Vec::new(), answer));
         }
-        let rtu = asked.get(1) == Some(&16) && refuses(word(2)?, word(4)?);
-        rtu.then(|| modbus_rtu::refuse(asked[0], 16, 3))
+        if asked.get(1) == Some(&16) && refuses(word(2), word(4)) {
+            return (Vec::new(), modbus_rtu::refuse(asked[0], 16, 3));
+        }
+        let (mut pass, mut back) = (Vec::new(), Vec::new());
+        for line in asked.split_inclusive(|byte| matches!(byte, b'\n' | b'\r')) {
+            match self.refused_line(line) {
+                Some(answer) => back.extend(answer),
+                None => pass.extend_from_slice(line),
+            }
+        }
+        (pass, back)
+    }
+
+    /// SCPI: every other switch is not taken, and the next question for errors is answered with one. slcan: service data are
+    /// aborted, and every other frame of process data is ignored.
+    fn refused_line(&self, line: &[u8]) -> Option<Vec<u8>> {
+        let another = || self.refusals.fetch_add(1, Ordering::AcqRel).is_multiple_of(2);
+        if line.starts_with(b"OUTP1 0") && another() {
+            self.error.store(true, Ordering::Release);
+            return Some(Vec::new());
+        }
+        if line.starts_with(b"SYST:ERR?") && self.error.swap(false, Ordering::AcqRel) {
+            return Some(b"-221,\"Settings conflict\"\n".to_vec());
+        }
+        let identifier = line.strip_prefix(b"t").and_then(|rest| rest.get(..3))?;
+        match identifier[0] {
+            // A write (command byte 0x2.) of service data: aborted as not possible in the present state.
+            b'6' if line.get(5) == Some(&b'2') => {
+                let node = std::str::from_utf8(&identifier[1..]).ok()?;
+                let object = std::str::from_utf8(line.get(7..13)?).ok()?;
+                Some(
+                    format!("t5{:02X}880{object}22000008\r", u8::from_str_radix(node, 16).ok()? | 0x80)
+                        .into_bytes(),
+                )
+            }
+            b'2' if another() => Some(Vec::new()),
+            _ => None,
+        }
     }
 }
 
@@ -112,10 +163,12 @@ fn up(trouble: &Trouble, from: &mut dyn Read, to: &mut dyn Write, back: &mut dyn
                 if kind == Some(Kind::Echo) {
                     let _ = back.write_all(asked);
                 }
-                match trouble.refusal(asked).filter(|_| kind == Some(Kind::Refused)) {
-                    Some(answer) => drop(back.write_all(&answer)),
-                    None => drop(to.write_all(asked)),
-                }
+                let (pass, answer) = match kind {
+                    Some(Kind::Refused) => trouble.refuse(asked),
+                    _ => (asked.to_vec(), Vec::new()),
+                };
+                let _ = back.write_all(&answer);
+                let _ = to.write_all(&pass);
             }
         }
     }

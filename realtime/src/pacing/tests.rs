@@ -125,7 +125,7 @@ impl Running {
         let (rows_in, rows) = HeapRb::<Row>::new(16384).split();
         let (watch, _) = HeapRb::<Row>::new(1).split();
         let parts = LoopParts {
-            config: Config { limits: limits.checked().unwrap(), estimate },
+            config: Config { limits: limits.checked().unwrap(), estimate, exposed: Default::default() },
             model: Arc::new(SpringSlider::new(models::finger::Finger::paper()).unwrap()),
             ports: Ports::new(Box::new(rig.clone()), Box::new(rig.clone()), Box::new(rig)),
             commands: Arc::clone(&queue),

@@ -4,7 +4,8 @@
 //! comes in a later cycle. Where a second channel is fitted, it is opened and closed again before every arming, and its own
 //! readback must show both.
 
-use super::rules::{Breach, Cause};
+use super::cause::{Cause, Unit};
+use super::rules::Breach;
 use super::{Decision, Safety, State, Trip};
 use crate::ports::{Nanos, NoData, SupplyCommand, SupplyState};
 
@@ -95,7 +96,8 @@ impl Safety {
                 let waited = now.since(since);
                 if waited > within {
                     let cause = step.broken.filter(|_| closed).map_or(Cause::SupplySwitch, |b| b.cause);
-                    let breach = Breach { cause, value: waited.seconds(), bound: within.seconds() };
+                    let (value, bound) = (waited.seconds(), within.seconds());
+                    let breach = Breach { cause, value, bound, unit: Unit::Second };
                     self.trip(breach, step, said);
                 }
             }
@@ -111,8 +113,8 @@ impl Safety {
     }
 
     fn trip(&mut self, breach: Breach, step: &Step, said: &mut Decision) {
-        let Breach { cause, value, bound } = breach;
-        let trip = Trip { cause, value, bound, cycle: step.cycle, at: step.now };
+        let Breach { cause, value, bound, unit } = breach;
+        let trip = Trip { cause, value, bound, unit, cycle: step.cycle, at: step.now };
         self.state = State::Faulted(trip);
         self.asked = false;
         self.watch.forget_the_hand();

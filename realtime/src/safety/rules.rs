@@ -1,105 +1,10 @@
 //! The rules, each with its requirement identifier. Add a rule: one variant, one line in [`RULES`], one function.
 
 use super::arming::SUPPLY_ACTS;
+use super::cause::{Cause, Unit};
 use super::watch::{ForceWatch, STAGE_RESPONSE, Watch};
 use super::{Controls, HARD, Limits, Observation, Remark, Request};
 use crate::ports::{AmplifierState, Channel, Contact, Nanos, NoData, SupplyCommand};
-use serde::{Deserialize, Serialize};
-
-/// Why the rig is, or would be, faulted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Cause {
-    /// The rig has not been armed since it was started.
-    StartUp,
-    /// An operator, a signal or the end of a sweep stopped the rig.
-    Stopped,
-    /// The dead-man input was released in human-contact mode.
-    DeadMan,
-    /// Vibration on a human finger lasted too long.
-    Exposure,
-    /// Normal force above its limit.
-    NormalOverforce,
-    /// Lateral force above its limit.
-    LateralOverforce,
-    /// Normal force changes too fast.
-    ForceRate,
-    /// A lateral sample is older than its age limit, or there is none.
-    LateralStale,
-    /// A normal sample is older than its age limit, or there is none.
-    NormalStale,
-    /// Three cycles without a valid lateral sample.
-    LateralInvalid,
-    /// Three cycles without a valid normal sample.
-    NormalInvalid,
-    /// The lateral channel is at the end of its range.
-    LateralSaturated,
-    /// The normal channel is at the end of its range.
-    NormalSaturated,
-    /// The lateral channel repeats itself.
-    LateralFrozen,
-    /// The normal channel repeats itself.
-    NormalFrozen,
-    /// Five spikes within fifty cycles on either force.
-    Noisy,
-    /// The amplifier's state is older than its age limit, or there is none.
-    AmplifierStale,
-    /// The amplifier reports a fault.
-    AmplifierFault,
-    /// The amplifier's own watchdog has switched it off while it was to be on.
-    AmplifierWatchdog,
-    /// Measured amplitude above its limit.
-    OverAmplitude,
-    /// Measured amplitude above what was commanded.
-    AmplitudeRunaway,
-    /// Measured amplitude rises too fast.
-    AmplitudeRate,
-    /// The plate does not respond to the drive.
-    DriveNoResponse,
-    /// The amplifier echoes another set-point than it was given.
-    EchoMismatch,
-    /// The amplifier stays on although it was told to be off.
-    RefusesOff,
-    /// Too hot, or the temperature is not known where it must be.
-    OverTemperature,
-    /// The stage's state is older than its age limit, or there is none.
-    StageStale,
-    /// The stage reports a fault.
-    StageFault,
-    /// The stage is outside its travel.
-    OverTravel,
-    /// The loop missed too many deadlines in a row, or of a thousand.
-    Overrun,
-    /// A request beyond the limits.
-    RequestRefused,
-    /// The loop was held up for so long that nothing is known of the rig.
-    Suspended,
-    /// The stage does not move as it is told: stalled, or faster.
-    StageNotFollowing,
-    /// Most lateral samples are lost.
-    LateralLossy,
-    /// Most normal samples are lost.
-    NormalLossy,
-    /// The emergency stop is pressed, or nothing is known of it.
-    EmergencyStop,
-    /// The guard is open, or nothing is known of it.
-    Interlock,
-    /// The second switch-off channel does not do what it is told, or nothing is known of it.
-    SupplySwitch,
-    /// What must be there to switch off is not fitted: 1 a second channel beside an amplifier without watchdog; with a
-    /// human finger 2 a second channel, 3 an emergency stop, 4 a dead-man device.
-    Unguarded,
-    /// With a human finger: too large a share of the last hour was vibrated.
-    ExposureDuty,
-    /// With a human finger: the vibration of the last hour was too strong for its length.
-    ExposureDose,
-    /// The amplitude's channel is at the end of its range.
-    AmplitudeSaturated,
-    /// The amplitude's channel repeats itself while the plate is driven.
-    AmplitudeFrozen,
-    /// The normal force is not that of the load that the stage was told to apply, or to lift off.
-    LoadImplausible,
-}
 
 /// A rule and what it is for.
 #[derive(Clone, Copy)]
@@ -108,9 +13,11 @@ pub struct Rule {
     pub id: &'static str,
     /// The cause that it latches.
     pub cause: Cause,
+    /// The units that value and bound of its trip may be in.
+    pub units: &'static [Unit],
     /// What it demands, in one sentence.
     pub text: &'static str,
-    check: fn(&Context<'_>) -> Option<(f64, f64)>,
+    check: fn(&Context<'_>) -> Option<(f64, f64, Unit)>,
 }
 
 impl std::fmt::Debug for Rule {
@@ -136,6 +43,7 @@ pub(super) struct Breach {
     pub cause: Cause,
     pub value: f64,
     pub bound: f64,
+    pub unit: Unit,
 }
 
 /// The first broken rule in the order of [`RULES`].
@@ -146,7 +54,7 @@ pub(super) fn first_broken(context: &Context<'_>) -> Option<Breach> {
 /// The first broken rule whose cause is not excused.
 pub(super) fn first_broken_but(context: &Context<'_>, excused: &[Cause]) -> Option<Breach> {
     RULES.iter().filter(|rule| !excused.contains(&rule.cause)).find_map(|rule| {
-        (rule.check)(context).map(|(value, bound)| Breach { cause: rule.cause, value, bound })
+        (rule.check)(context).map(|(value, bound, unit)| Breach { cause: rule.cause, value, bound, unit })
     })
 }
 
@@ -156,56 +64,70 @@ pub(super) fn cuts_the_supply(c: &Context<'_>) -> bool {
 }
 
 macro_rules! rules {
-    ($($id:literal $cause:ident $text:literal => $check:expr;)*) => {
+    ($($id:literal $cause:ident [$($unit:ident),+] $text:literal => $check:expr;)*) => {
         /// Every rule, most urgent first.
-        pub const RULES: &[Rule] = &[$(Rule { id: $id, cause: Cause::$cause, text: $text, check: $check },)*];
+        pub const RULES: &[Rule] = &[$(Rule {
+            id: $id,
+            cause: Cause::$cause,
+            units: &[$(Unit::$unit),+],
+            text: $text,
+            check: rules!(@check $check, $($unit)+),
+        },)*];
     };
+    // One unit belongs to the rule; where there are several, the check says which.
+    (@check $check:expr, $unit:ident) => {
+        |c| {
+            let check: fn(&Context<'_>) -> Option<(f64, f64)> = $check;
+            check(c).map(|(value, bound)| (value, bound, Unit::$unit))
+        }
+    };
+    (@check $check:expr, $($unit:ident)+) => { $check };
 }
 
 rules! {
-    "SR-35" EmergencyStop "A pressed, silent or broken emergency stop switches off and cuts the supply." => |c| contact_open(c, &c.seen.contacts.emergency_stop);
-    "SR-01" Stopped "A stop switches off and latches." => |c| broken(c.controls.stop, 1.0, 0.0);
-    "SR-36" Interlock "An open, silent or broken interlock switches off." => |c| contact_open(c, &c.seen.contacts.interlock);
-    "SR-02" DeadMan "With a human finger, releasing the dead-man input switches off; it must be seen released, then held, before arming." => dead_man;
-    "SR-03" Exposure "With a human finger, vibration in one go lasts no longer than its limit; only a rest of full length ends a go." => exposure;
-    "SR-04" NormalOverforce "Normal force stays below its limit." => |c| overforce(c, Axis::Normal);
-    "SR-05" LateralOverforce "Lateral force stays below its limit, either sign." => |c| overforce(c, Axis::Lateral);
-    "SR-06" ForceRate "Normal force does not change faster than its limit over two samples in a row." => |c| broken(c.watch.normal.fast_in_a_row >= 2, c.watch.normal.rate_n_s.abs(), c.limits.force_rate_max_n_s);
-    "SR-07" OverAmplitude "Measured amplitude stays below its limit." => |c| above(amplitude_pp_m(c), c.limits.amplitude_max.metres());
-    "SR-08" AmplitudeRunaway "Measured amplitude stays within 30 % (and 0.3 um) of what was commanded, ring-down allowed." => runaway;
-    "SR-09" AmplitudeRate "Measured amplitude does not rise faster than its limit over two samples in a row." => |c| broken(c.watch.amplitude_fast_in_a_row >= 2, c.watch.amplitude_rate_m_s, c.limits.amplitude_rate_max_m_s);
-    "SR-10" LateralInvalid "Three cycles without a valid lateral sample switch off." => |c| broken(c.watch.lateral.invalid_in_a_row >= 3, f64::from(c.watch.lateral.invalid_in_a_row), 3.0);
-    "SR-11" NormalInvalid "Three cycles without a valid normal sample switch off." => |c| broken(c.watch.normal.invalid_in_a_row >= 3, f64::from(c.watch.normal.invalid_in_a_row), 3.0);
-    "SR-12" LateralSaturated "A lateral channel at the end of its range for two cycles, or for five in fifty, switches off." => |c| saturated(&c.watch.lateral);
-    "SR-13" NormalSaturated "A normal channel at the end of its range for two cycles, or for five in fifty, switches off." => |c| saturated(&c.watch.normal);
-    "SR-14" LateralStale "A lateral sample is no older than its own periods and latency allow." => |c| stale(&c.seen.forces.lateral, c.limits.timing.lateral.age_limit(), c.now);
-    "SR-15" NormalStale "A normal sample is no older than its own periods and latency allow." => |c| stale(&c.seen.forces.normal, c.limits.timing.normal.age_limit(), c.now);
-    "SR-16" LateralFrozen "A lateral channel does not repeat its raw value more often than its noise allows." => |c| frozen(c, c.watch.lateral.equal_in_a_row);
-    "SR-17" NormalFrozen "A normal channel does not repeat its raw value more often than its noise allows." => |c| frozen(c, c.watch.normal.equal_in_a_row);
-    "SR-18" Noisy "Fewer than five spikes in fifty cycles on either force." => |c| broken(spikes(c) >= 5, f64::from(spikes(c)), 5.0);
-    "SR-19" AmplifierStale "The amplifier's state is no older than its own periods and latency allow." => |c| state_stale(c.seen.amplifier.map(|a| a.taken_at), c.limits.timing.amplifier.age_limit(), c.now);
-    "SR-20" AmplifierFault "An amplifier that reports a fault, or numbers that are none, is switched off." => |c| broken(c.seen.amplifier.is_ok_and(|a| a.fault || !told_in_numbers(&a)), 1.0, 0.0);
-    "SR-21" AmplifierWatchdog "An amplifier whose own watchdog has fired is switched off." => |c| broken(c.seen.amplifier.is_ok_and(|a| a.watchdog_tripped) && c.watch.enabled, 1.0, 0.0);
-    "SR-22" DriveNoResponse "A driven plate vibrates: at least a fifth of the commanded amplitude after ring-up." => no_response;
-    "SR-23" EchoMismatch "The amplifier echoes the set-point that it was given, within its resolution." => echo;
-    "SR-24" RefusesOff "An amplifier that stays on when told to be off is cut from its supply." => |c| broken(c.watch.refuses_off(c.limits, c.now), 1.0, 0.0);
-    "SR-25" OverTemperature "Plate and amplifier stay below the temperature limit; a lost sensor counts as too hot." => temperature;
-    "SR-26" StageStale "The stage's state is no older than its own periods and latency allow." => |c| state_stale(c.seen.stage.map(|s| s.taken_at), c.limits.timing.stage.age_limit(), c.now);
-    "SR-27" StageFault "A stage that reports a fault, or numbers that are none, is stopped." => |c| broken(c.seen.stage.is_ok_and(|s| s.fault || !(s.position_m.is_finite() && s.velocity_m_s.is_finite())), 1.0, 0.0);
-    "SR-28" OverTravel "The stage stays within its travel." => travel;
-    "SR-31" Suspended "A cycle that begins fifty periods after the deadline that was due switches off: the rig was alone for that time." => |c| above(Some(c.seen.lateness.seconds()), SUSPENDED_CYCLES * c.limits.timing.cycle.seconds());
-    "SR-29" Overrun "The loop misses fewer deadlines in a row than its limit (three by default), and of a thousand no more than another (ten by default); a skipped deadline is a missed one." => overrun;
-    "SR-30" RequestRefused "A request beyond any limit, or not finite, switches off." => request;
-    "SR-32" StageNotFollowing "The stage moves as it is told: at least a fifth of its speed after its response time, and not half as fast again." => following;
-    "SR-33" LateralLossy "At least a quarter of the lateral samples that are due in a window come." => |c| lossy(c, c.watch.lateral.share_came);
-    "SR-34" NormalLossy "At least a quarter of the normal samples that are due in a window come." => |c| lossy(c, c.watch.normal.share_came);
-    "SR-37" SupplySwitch "A second switch-off channel that is fitted reads back what it was told." => supply_switch;
-    "SR-38" Unguarded "A human finger needs a second channel, an emergency stop and a dead-man device; an amplifier without watchdog needs a second channel." => unguarded;
-    "SR-39" ExposureDuty "With a human finger, no larger share of the last hour is vibrated than its limit." => exposure_duty;
-    "SR-40" ExposureDose "With a human finger, the squared velocity summed over the last hour stays below its limit." => exposure_dose;
-    "SR-41" AmplitudeSaturated "An amplitude at the end of its range in two states in a row switches off." => |c| broken(c.watch.amplitude_saturated_in_a_row >= 2, f64::from(c.watch.amplitude_saturated_in_a_row), 2.0);
-    "SR-42" AmplitudeFrozen "While the plate is driven, a measured amplitude that has noise does not repeat its raw value more often than that allows." => amplitude_frozen;
-    "SR-43" LoadImplausible "Normal force stays near the load that the stage was told to apply, and near zero when it was told to lift off." => load_plausible;
+    "SR-35" EmergencyStop [Flag, Second] "A pressed, silent or broken emergency stop switches off and cuts the supply." => |c| contact_open(c, &c.seen.contacts.emergency_stop);
+    "SR-01" Stopped [Flag] "A stop switches off and latches." => |c| broken(c.controls.stop, 1.0, 0.0);
+    "SR-36" Interlock [Flag, Second] "An open, silent or broken interlock switches off." => |c| contact_open(c, &c.seen.contacts.interlock);
+    "SR-02" DeadMan [Flag] "With a human finger, releasing the dead-man input switches off; it must be seen released, then held, before arming." => dead_man;
+    "SR-03" Exposure [Second] "With a human finger, vibration in one go lasts no longer than its limit; only a rest of full length ends a go." => exposure;
+    "SR-04" NormalOverforce [Newton] "Normal force stays below its limit." => |c| overforce(c, Axis::Normal);
+    "SR-05" LateralOverforce [Newton] "Lateral force stays below its limit, either sign." => |c| overforce(c, Axis::Lateral);
+    "SR-06" ForceRate [NewtonPerSecond] "Normal force does not change faster than its limit over two samples in a row." => |c| broken(c.watch.normal.fast_in_a_row >= 2, c.watch.normal.rate_n_s.abs(), c.limits.force_rate_max_n_s);
+    "SR-07" OverAmplitude [Metre] "Measured amplitude stays below its limit." => |c| above(amplitude_pp_m(c), c.limits.amplitude_max.metres());
+    "SR-08" AmplitudeRunaway [Metre] "Measured amplitude stays within 30 % (and 0.3 um) of what was commanded, ring-down allowed." => runaway;
+    "SR-09" AmplitudeRate [MetrePerSecond] "Measured amplitude does not rise faster than its limit over two samples in a row." => |c| broken(c.watch.amplitude_fast_in_a_row >= 2, c.watch.amplitude_rate_m_s, c.limits.amplitude_rate_max_m_s);
+    "SR-10" LateralInvalid [Count] "Three cycles without a valid lateral sample switch off." => |c| broken(c.watch.lateral.invalid_in_a_row >= 3, f64::from(c.watch.lateral.invalid_in_a_row), 3.0);
+    "SR-11" NormalInvalid [Count] "Three cycles without a valid normal sample switch off." => |c| broken(c.watch.normal.invalid_in_a_row >= 3, f64::from(c.watch.normal.invalid_in_a_row), 3.0);
+    "SR-12" LateralSaturated [Count] "A lateral channel at the end of its range for two cycles, or for five in fifty, switches off." => |c| saturated(&c.watch.lateral);
+    "SR-13" NormalSaturated [Count] "A normal channel at the end of its range for two cycles, or for five in fifty, switches off." => |c| saturated(&c.watch.normal);
+    "SR-14" LateralStale [Second] "A lateral sample is no older than its own periods and latency allow." => |c| stale(&c.seen.forces.lateral, c.limits.timing.lateral.age_limit(), c.now);
+    "SR-15" NormalStale [Second] "A normal sample is no older than its own periods and latency allow." => |c| stale(&c.seen.forces.normal, c.limits.timing.normal.age_limit(), c.now);
+    "SR-16" LateralFrozen [Count] "A lateral channel does not repeat its raw value more often than its noise allows." => |c| frozen(c, c.watch.lateral.equal_in_a_row);
+    "SR-17" NormalFrozen [Count] "A normal channel does not repeat its raw value more often than its noise allows." => |c| frozen(c, c.watch.normal.equal_in_a_row);
+    "SR-18" Noisy [Count] "Fewer than five spikes in fifty cycles on either force." => |c| broken(spikes(c) >= 5, f64::from(spikes(c)), 5.0);
+    "SR-19" AmplifierStale [Second] "The amplifier's state is no older than its own periods and latency allow." => |c| state_stale(c.seen.amplifier.map(|a| a.taken_at), c.limits.timing.amplifier.age_limit(), c.now);
+    "SR-20" AmplifierFault [Flag] "An amplifier that reports a fault, or numbers that are none, is switched off." => |c| broken(c.seen.amplifier.is_ok_and(|a| a.fault || !told_in_numbers(&a)), 1.0, 0.0);
+    "SR-21" AmplifierWatchdog [Flag] "An amplifier whose own watchdog has fired is switched off." => |c| broken(c.seen.amplifier.is_ok_and(|a| a.watchdog_tripped) && c.watch.enabled, 1.0, 0.0);
+    "SR-22" DriveNoResponse [Metre] "A driven plate vibrates: at least a fifth of the commanded amplitude after ring-up." => no_response;
+    "SR-23" EchoMismatch [Metre, Hertz, Flag] "The amplifier echoes the set-point that it was given, within its resolution, and shows itself on while it is driven." => echo;
+    "SR-24" RefusesOff [Flag] "An amplifier that stays on when told to be off is cut from its supply." => |c| broken(c.watch.refuses_off(c.limits, c.now), 1.0, 0.0);
+    "SR-25" OverTemperature [Celsius] "Plate and amplifier stay below the temperature limit; a lost sensor counts as too hot." => temperature;
+    "SR-26" StageStale [Second] "The stage's state is no older than its own periods and latency allow." => |c| state_stale(c.seen.stage.map(|s| s.taken_at), c.limits.timing.stage.age_limit(), c.now);
+    "SR-27" StageFault [Flag] "A stage that reports a fault, or numbers that are none, is stopped." => |c| broken(c.seen.stage.is_ok_and(|s| s.fault || !(s.position_m.is_finite() && s.velocity_m_s.is_finite())), 1.0, 0.0);
+    "SR-28" OverTravel [Metre] "The stage stays within its travel." => travel;
+    "SR-31" Suspended [Second] "A cycle that begins fifty periods after the deadline that was due switches off: the rig was alone for that time." => |c| above(Some(c.seen.lateness.seconds()), SUSPENDED_CYCLES * c.limits.timing.cycle.seconds());
+    "SR-29" Overrun [Count] "The loop misses fewer deadlines in a row than its limit (three by default), and of a thousand no more than another (ten by default); a skipped deadline is a missed one." => overrun;
+    "SR-30" RequestRefused [Metre, MetrePerSecond, Newton, Hertz] "A request beyond any limit, or not finite, switches off." => request;
+    "SR-32" StageNotFollowing [MetrePerSecond] "The stage moves as it is told: at least a fifth of its speed after its response time, and not half as fast again." => following;
+    "SR-33" LateralLossy [Share] "At least a quarter of the lateral samples that are due in a window come." => |c| lossy(c, c.watch.lateral.share_came);
+    "SR-34" NormalLossy [Share] "At least a quarter of the normal samples that are due in a window come." => |c| lossy(c, c.watch.normal.share_came);
+    "SR-37" SupplySwitch [Second] "A second switch-off channel that is fitted reads back what it was told." => supply_switch;
+    "SR-38" Unguarded [Flag] "A human finger needs a second channel, an emergency stop and a dead-man device; an amplifier without watchdog needs a second channel." => unguarded;
+    "SR-39" ExposureDuty [Second] "With a human finger, no larger share of the last hour is vibrated than its limit." => exposure_duty;
+    "SR-40" ExposureDose [SquareMetrePerSecond] "With a human finger, the squared velocity summed over the last hour stays below its limit." => exposure_dose;
+    "SR-41" AmplitudeSaturated [Count] "An amplitude at the end of its range in two states in a row switches off." => |c| broken(c.watch.amplitude_saturated_in_a_row >= 2, f64::from(c.watch.amplitude_saturated_in_a_row), 2.0);
+    "SR-42" AmplitudeFrozen [Count] "While the plate is driven, a measured amplitude that has noise does not repeat its raw value more often than that allows." => amplitude_frozen;
+    "SR-43" LoadImplausible [Newton] "Normal force stays near the load that the stage was told to apply, and near zero when it was told to lift off." => load_plausible;
 }
 
 fn broken(is: bool, value: f64, bound: f64) -> Option<(f64, f64)> {
@@ -279,18 +201,17 @@ fn saturated(watch: &ForceWatch) -> Option<(f64, f64)> {
     broken(row >= 2, f64::from(row), 2.0).or_else(|| broken(window >= 5, f64::from(window), 5.0))
 }
 
-/// A contact that is fitted and not known to be closed; its age, or 0, against the age limit.
-fn contact_open(c: &Context<'_>, contact: &Result<Contact, NoData>) -> Option<(f64, f64)> {
+/// A contact that is fitted and not known to be closed; its age against the age limit, or that it is open.
+fn contact_open(c: &Context<'_>, contact: &Result<Contact, NoData>) -> Option<(f64, f64, Unit)> {
     let timing = &c.limits.timing.contacts;
     match contact {
         Err(NoData::NotFitted) => None,
-        Err(_) => Some((f64::INFINITY, timing.age_limit().seconds())),
-        Ok(contact) if !contact.closed => Some((0.0, 1.0)),
-        Ok(contact) => broken(
-            !timing.is_fresh(contact.taken_at, c.now),
-            c.now.since(contact.taken_at).seconds(),
-            timing.age_limit().seconds(),
-        ),
+        Err(_) => Some((f64::INFINITY, timing.age_limit().seconds(), Unit::Second)),
+        Ok(contact) if !contact.closed => Some((0.0, 1.0, Unit::Flag)),
+        Ok(contact) if timing.is_fresh(contact.taken_at, c.now) => None,
+        Ok(contact) => {
+            Some((c.now.since(contact.taken_at).seconds(), timing.age_limit().seconds(), Unit::Second))
+        }
     }
 }
 
@@ -429,7 +350,7 @@ fn no_response(c: &Context<'_>) -> Option<(f64, f64)> {
     amplitude_pp_m(c).filter(|w| driven && *w < bound).map(|w| (w, bound))
 }
 
-fn echo(c: &Context<'_>) -> Option<(f64, f64)> {
+fn echo(c: &Context<'_>) -> Option<(f64, f64, Unit)> {
     let state = c.seen.amplifier.ok()?;
     if !c.watch.enabled || c.now.since(c.watch.commanded_since) <= response_time(c) {
         return None;
@@ -437,10 +358,13 @@ fn echo(c: &Context<'_>) -> Option<(f64, f64)> {
     let amplitude = state.echoed_amplitude.metres();
     let wanted = c.watch.commanded_pp_m;
     if (amplitude - wanted).abs() > 0.02 * wanted + 5e-9 {
-        return Some((amplitude, wanted));
+        return Some((amplitude, wanted, Unit::Metre));
     }
     let frequency = state.echoed_frequency_hz;
-    broken((frequency - c.watch.commanded_hz).abs() > 1.0 + 1e-4 * frequency, frequency, c.watch.commanded_hz)
+    let off = (frequency - c.watch.commanded_hz).abs() > 1.0 + 1e-4 * frequency;
+    // Another master's 'off' is no harm, but it is another master's; and what is measured then is a plate at rest.
+    let switched = (!state.output_on).then_some((0.0, 1.0, Unit::Flag));
+    off.then_some((frequency, c.watch.commanded_hz, Unit::Hertz)).or(switched)
 }
 
 fn temperature(c: &Context<'_>) -> Option<(f64, f64)> {
@@ -474,21 +398,22 @@ fn overrun(c: &Context<'_>) -> Option<(f64, f64)> {
     broken(late > most && c.armed_since.is_some(), f64::from(late), f64::from(most))
 }
 
-fn request(c: &Context<'_>) -> Option<(f64, f64)> {
+fn request(c: &Context<'_>) -> Option<(f64, f64, Unit)> {
     let (r, l) = (c.request, c.limits);
     let amplitude_max = l.amplitude_max.metres().min(HARD.amplitude_max.metres());
     let checks = [
-        (r.amplitude.metres(), 0.0, amplitude_max),
-        (r.velocity_m_s, -l.speed_max_m_s, l.speed_max_m_s),
-        (r.normal_force_n, 0.0, l.normal_force_max_n),
+        (r.amplitude.metres(), 0.0, amplitude_max, Unit::Metre),
+        (r.velocity_m_s, -l.speed_max_m_s, l.speed_max_m_s, Unit::MetrePerSecond),
+        (r.normal_force_n, 0.0, l.normal_force_max_n, Unit::Newton),
     ];
-    for (value, low, high) in checks {
+    for (value, low, high, unit) in checks {
         if !(value >= low && value <= high) {
-            return Some((value, if value < low { low } else { high }));
+            return Some((value, if value < low { low } else { high }, unit));
         }
     }
     let driven = r.amplitude.metres() > 0.0;
     let (low, high) = l.frequency_hz;
     let inside = r.frequency_hz >= low && r.frequency_hz <= high;
-    broken(driven && !inside, r.frequency_hz, if r.frequency_hz < low { low } else { high })
+    let bound = if r.frequency_hz < low { low } else { high };
+    (driven && !inside).then_some((r.frequency_hz, bound, Unit::Hertz))
 }

@@ -10,6 +10,7 @@ mod arming;
 mod bounds;
 mod human;
 mod times;
+mod told;
 
 const T: Nanos = Nanos(1_000_000);
 

@@ -50,6 +50,17 @@ pub struct Args {
 /// A refusal: bad input, a busy rig, an instrument that does not answer.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let job = job(args)?;
+    if job.setup.hand_at_key() {
+        if job.fast {
+            miette::bail!(
+                help = "leave out --fast",
+                "the dead-man key is held in wall-clock time: no hand is that fast"
+            );
+        }
+        say!(
+            "dead-man key: let go of it, then hold the space bar down to arm and to go on; let go, or press any other key, and the drive is off"
+        );
+    }
     let signals = Signals::default();
     watch_signals(&signals)?;
     let bar = progress_bar(json);
@@ -173,16 +184,7 @@ fn describe(event: &Event) -> String {
             let when = if *after { "after" } else { "before" };
             format!("force zeros {when} the sweep: lateral {}, normal {}", mn(lateral_n), mn(normal_n))
         }
-        Event::Tripped(trip) => {
-            format!(
-                "TRIP {:?}: {} against {} at {:.3} s (cycle {})",
-                trip.cause,
-                trip.value,
-                trip.bound,
-                trip.at.seconds(),
-                trip.cycle
-            )
-        }
+        Event::Tripped(trip) => format!("TRIP {trip}\n  {}", trip.cause.remedy()),
         Event::ModelDeparted { point, log_evidence } => {
             let odds = (log_evidence / std::f64::consts::LN_10).floor();
             format!("the model has left the measurement at point {point} (evidence beyond 10^{odds:.0} to 1)")
@@ -227,6 +229,11 @@ fn tell(summary: &Summary, json: bool) {
             "just before the trip this machine kept its programs from running for {:.0} ms: see 'muprime doctor'",
             stall.lasted.seconds() * 1e3
         );
+    }
+    if let (Outcome::WouldNotArm { blocking: Some(cause) }, Some(remedy)) =
+        (&summary.outcome, &summary.remedy)
+    {
+        say!("the rig would not arm: {cause:?} stands in the way\n  {remedy}");
     }
     if summary.passes < summary.planned {
         say!("the same command with --out {} goes on", summary.folder.display());

@@ -5,9 +5,9 @@ use crate::{out, say};
 use drivers::InstrumentsSetup;
 use instruments::schema::LinkKind;
 use miette::{IntoDiagnostic, WrapErr};
-use sim::wire::SharedPlant;
 use sim::wire::serial::SerialEmulator;
 use sim::wire::world::{Hands, WorldPlant};
+use sim::wire::{Quantity, SharedPlant};
 use sim::world::{World, WorldConfig};
 use std::io::BufRead;
 use std::net::SocketAddr;
@@ -34,7 +34,8 @@ pub struct Args {
     #[arg(long, value_name = "PATH")]
     serial: Option<String>,
     /// Take an operator's hands from the standard input, to calibrate the virtual rig: `hang LATERAL_N NORMAL_N`
-    /// puts dead weights on the force sensor, `look` reads the plate's motion off a vibrometer; one JSON line each
+    /// puts dead weights on the force sensor, `look` reads the plate's motion off a vibrometer, and the
+    /// instruments' own lamps; one JSON line each
     #[arg(long)]
     hands: bool,
     /// Defects in place of the bundled ones
@@ -137,11 +138,14 @@ fn at_the_bench(hands: &Hands, plant: &SharedPlant) {
                 _ => serde_json::json!({ "error": "hang LATERAL_N NORMAL_N: two forces of at most 1000 N" }),
             },
             ["look"] => {
-                drop(plant.now());
+                let (mut guard, _) = plant.now();
+                let (on, velocity_m_s) =
+                    (guard.measure(Quantity::OutputOn) != 0.0, guard.measure(Quantity::Velocity));
+                drop(guard);
                 let seen = hands.look();
                 serde_json::json!({
                     "time_s": seen.time_s, "frequency_hz": seen.frequency_hz,
-                    "amplitude_pp_m": seen.amplitude_pp_m,
+                    "amplitude_pp_m": seen.amplitude_pp_m, "output_on": on, "velocity_m_s": velocity_m_s,
                 })
             }
             _ => serde_json::json!({ "error": format!("`{line}`: hang LATERAL_N NORMAL_N, or look") }),

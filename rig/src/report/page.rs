@@ -2,6 +2,7 @@
 
 use super::RunData;
 use super::plots;
+use crate::sequence::Outcome;
 use std::fmt::Write;
 
 /// Text made safe for HTML: names in records may hold markup.
@@ -83,7 +84,16 @@ fn verdict(w: &mut String, run: &RunData) {
             let word = serde_json::to_string(&s.outcome).unwrap_or_default();
             let planned = s.planned;
             match &s.outcome {
-                crate::sequence::Outcome::Complete => format!("Complete: {made} of {planned} passes."),
+                Outcome::Complete => format!("Complete: {made} of {planned} passes."),
+                Outcome::Tripped(trip) => format!(
+                    "Ended early after {made} of {planned} passes: tripped, {}.<br>{}",
+                    escape(&trip.to_string()),
+                    escape(trip.cause.remedy())
+                ),
+                Outcome::WouldNotArm { blocking: Some(cause) } => format!(
+                    "The rig would not arm: {cause:?} stood in the way.<br>{}",
+                    escape(cause.remedy())
+                ),
                 _ => format!("Ended early after {made} of {planned} passes: {}", escape(&word)),
             }
         }
@@ -96,7 +106,7 @@ fn verdict(w: &mut String, run: &RunData) {
                  Run <code>muprime diagnose</code> on this folder to learn where and why."
         )
     } else {
-        let complete = run.summary.as_ref().is_some_and(|s| s.outcome == crate::sequence::Outcome::Complete);
+        let complete = run.summary.as_ref().is_some_and(|s| s.outcome == Outcome::Complete);
         let last = run.passes.iter().rev().find_map(|p| p.comparison.as_ref());
         escape(&format!("Finding: {}.", realtime::compare::Agreement::of(last, complete)))
     };

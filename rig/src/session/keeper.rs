@@ -14,6 +14,7 @@ use realtime::cycle::Config;
 use realtime::pacing::LoopReport;
 use realtime::ports::Nanos;
 use realtime::recorder::Preamble;
+use realtime::safety::Cause;
 use realtime::witness::StallReport;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -200,6 +201,8 @@ impl Keeper {
     ) -> Summary {
         let (loop_report, stalls) = machine.unzip();
         let mut summary = Summary {
+            requirement: outcome.cause().and_then(Cause::requirement).map(String::from),
+            remedy: outcome.cause().map(|cause| cause.remedy().to_string()),
             outcome,
             folder: self.dir.path().to_path_buf(),
             passes: self.passes,

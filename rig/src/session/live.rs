@@ -9,6 +9,8 @@ use super::fast::words;
 use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary, Unfinished};
 use crate::claim::RigClaim;
+use crate::dead_man_key::DeadManKey;
+use crate::exposure::Ledger;
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use crate::supervisor::wall::{Ended, Parts};
@@ -36,14 +38,17 @@ struct Note {
 
 /// Runs a job in wall-clock time.
 pub fn run(
-    job: Job,
+    mut job: Job,
     dir: RunDir,
     mut sequence: Sequence,
     planned: usize,
     signals: &Signals,
     news: &mut dyn FnMut(News<'_>),
 ) -> miette::Result<Summary> {
+    let key = if job.setup.hand_at_key() { Some(DeadManKey::open()?) } else { None };
     let _claim = RigClaim::take(&job.setup)?;
+    let ledger = Ledger::open(&job.setup)?;
+    job.setup.config.exposed = ledger.as_ref().map(Ledger::exposed).unwrap_or_default();
     let epoch = Instant::now();
     let origin_ns = pacing::monotonic_ns();
     let start_unix_ns = keeper::unix_ns();
@@ -76,6 +81,11 @@ pub fn run(
         origin_ns,
     })
     .wrap_err(Unfinished::Internal)?;
+    let keeping = match ledger {
+        None => None,
+        Some(ledger) => Some(ledger.keep(rig.life(), reins.stopper()).into_diagnostic()?),
+    };
+    let held = key.map(|key| key.hold(reins.sender())).transpose().into_diagnostic()?;
     let (to_writer, notes) = channel();
     let (last_in, last_out) = channel();
     let writing = {
@@ -88,6 +98,7 @@ pub fn run(
     let mut unkept = None;
     let (outcome, panicked) = std::thread::scope(|scope| {
         let (following_sequence, lost, stop) = (&mut sequence, &*lost, reins.stopper());
+        let keeping = keeping.as_ref();
         let following = scope.spawn(move || {
             let (mut stops, mut knows) = (0, false);
             let mut ask = || {
@@ -96,7 +107,8 @@ pub fn run(
                     stops = asked;
                     return Some(End::Asked);
                 }
-                if !knows && lost.load(Ordering::Relaxed) {
+                let unkept = keeping.is_some_and(|keeping| !keeping.holds());
+                if !knows && (unkept || lost.load(Ordering::Relaxed)) {
                     knows = true;
                     return Some(End::NotKept);
                 }
@@ -138,6 +150,10 @@ pub fn run(
     });
     // Whatever ended it: off first.
     let Ended { report, links, off } = rig.end();
+    drop(held);
+    if let Some(keeping) = keeping {
+        keeping.end(off.read_back);
+    }
     let stalls = witnesses.finish();
     drop(to_writer);
     let outcome = outcome.map_err(|_| fault("the sweep's thread panicked"));

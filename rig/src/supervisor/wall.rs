@@ -97,6 +97,11 @@ impl WallLoop {
         Ok(rig)
     }
 
+    /// The loop's signs of life, for whoever watches it from another thread.
+    pub fn life(&self) -> Arc<Lifeline> {
+        Arc::clone(&self.life)
+    }
+
     /// Stops the rig at once; the loop goes on, and shows it.
     pub fn stop(&self) {
         self.commands.stop();
@@ -178,6 +183,14 @@ impl Reins {
     pub fn stopper(&self) -> impl Fn() + Send + Sync + 'static {
         let commands = Arc::clone(&self.commands);
         move || commands.stop()
+    }
+
+    /// Something that hands commands to the loop from another thread. A queue that is full does not take it.
+    pub fn sender(&self) -> impl Fn(Command) + Send + 'static {
+        let commands = Arc::clone(&self.commands);
+        move |command| {
+            let _ = commands.push(command);
+        }
     }
 }
 

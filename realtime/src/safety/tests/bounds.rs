@@ -86,6 +86,12 @@ fn the_echo_is_held_to_what_was_sent() {
             assert_eq!((trip.value, trip.bound), (said, told));
         }
     }
+    // Switched off by somebody else, echoes as they were: nothing else shows it where no amplitude is measured.
+    let switched = trips(&mut bench(), 60, |s| {
+        amplifier(s).output_on = false;
+        amplifier(s).amplitude = Err(NoData::NotFitted);
+    });
+    assert_eq!(switched.map(|t| (t.cause, t.unit)), Some((Cause::EchoMismatch, Unit::Flag)));
     // Off, nothing is expected of it.
     let mut off = bench();
     off.request.amplitude = PeakToPeak::ZERO;

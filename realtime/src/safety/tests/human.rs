@@ -240,3 +240,42 @@ fn the_hour_slides_and_forgets_nothing_early() {
     assert_eq!(exposure.in_the_last_hour().0, Nanos(0));
     assert_eq!(exposure.in_one_go, Nanos(0));
 }
+
+/// What earlier runs did counts on, and leaves the hour when it is an hour ago: never earlier, at most six minutes later.
+#[test]
+fn what_earlier_runs_did_is_carried_over() {
+    let second = 1_000_000_000;
+    let (rest, minute) = (Nanos(60 * second), 60);
+    for part in 0..PARTS {
+        let mut past =
+            Exposed { in_one_go: Nanos(7 * second), resting: Nanos(59 * second), ..Exposed::default() };
+        past.parts[part] = (Nanos(100 * second), 3.0);
+        let mut exposure = exposure::Exposure::new();
+        exposure.carry(&past);
+        exposure.add(false, 0.0, rest, Nanos(0));
+        assert_eq!((exposure.in_one_go, exposure.in_all), (Nanos(7 * second), (Nanos(0), 0.0)));
+        assert_eq!(exposure.in_the_last_hour(), (Nanos(100 * second), 3.0));
+        // It was driven between these times before the run, in minutes.
+        let (newest, oldest) = ((part * PART_MINUTES) as u64, ((part + 1) * PART_MINUTES) as u64);
+        let forgotten = (1..=66 * minute).find(|s| {
+            exposure.add(false, 0.0, rest, Nanos(s * second));
+            exposure.in_the_last_hour().0 == Nanos(0)
+        });
+        let forgotten = forgotten.expect("it is forgotten some time") / minute;
+        assert!(
+            forgotten + newest >= 60 && forgotten + oldest <= 60 + 6,
+            "part {part}: after {forgotten} min"
+        );
+        assert_eq!(exposure.in_one_go, Nanos(0), "the rest went on over the gap");
+    }
+    // The rules see it from the first cycle on.
+    let mut rig = Guarded::new();
+    let mut past = Exposed::default();
+    past.parts[2] = (Nanos(1801 * second), 0.0);
+    rig.bench.safety.carry(&past);
+    let decision = rig.cycle(|_| {}, Controls::default());
+    assert!(matches!(decision.blocking, Some(Cause::DeadMan)), "{:?}", decision.blocking);
+    rig.held = true;
+    let decision = rig.cycle(|_| {}, Controls::default());
+    assert_eq!(decision.blocking, Some(Cause::ExposureDuty));
+}

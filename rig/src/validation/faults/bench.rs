@@ -13,7 +13,7 @@ use realtime::cycle::{Command, Config, Marker, Phase};
 use realtime::estimate::{EstimateConfig, Mu0};
 use realtime::ports::Nanos;
 use realtime::replay::replay;
-use realtime::safety::{Cause, Limits, Request, Trip};
+use realtime::safety::{Cause, Exposed, Limits, Request, Trip};
 use realtime::turn::{Ports, Row};
 use realtime::wrap::fault::{Fault, FaultMode, FaultyAmplifier, FaultyForce, FaultyStage};
 use serde::{Deserialize, Serialize};
@@ -259,7 +259,7 @@ pub fn run(scene: &Scene, keep: bool) -> Found {
 pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let limits = scene.limits().checked().expect("the bench's limits are within the hard ones");
     let estimate = EstimateConfig { window: 50, normal_force_min_n: 0.02, sample_sd_n: 0.002 };
-    let config = Config { limits, estimate };
+    let config = Config { limits, estimate, exposed: Exposed::default() };
     let slider = SpringSlider::new(Finger::paper()).expect("the paper's finger is one");
     let diverges = scene.first(|w| w == What::ModelDiverges).map(time_of);
     let model = Arc::new(Diverging(slider, diverges));

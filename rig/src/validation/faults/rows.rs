@@ -337,8 +337,26 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)], &str)] = &[
         ],
         "",
     ),
-    (17, "CAN warning, passive", &[], "open: no test strikes it"),
-    (19, "frame flood", &[], "open: no test strikes it"),
+    (
+        17,
+        "CAN warning, passive",
+        &[
+            ("drivers/src/can.rs", "a_controller_that_warns_is_noted_and_a_passive_one_ends_the_link"),
+            ("drivers/src/socketcan.rs", "error_frames_are_told_apart"),
+            ("tests/can_kernel.rs", "a_warning_is_noted_and_a_passive_controller_ends_the_link"),
+        ],
+        "",
+    ),
+    (
+        19,
+        "frame flood",
+        &[
+            ("drivers/src/can.rs", "a_full_bus_neither_hides_the_sensor_nor_its_silence"),
+            ("drivers/src/canopen.rs", "a_full_bus_does_not_hold_up_an_off"),
+            ("tests/can_kernel.rs", "a_bus_full_of_others_frames_holds_nothing_up"),
+        ],
+        "",
+    ),
     (
         21,
         "wall-clock jump",

@@ -41,6 +41,12 @@ pub(super) struct Drive {
 impl Drive {
     /// Connects the rig of a setup and starts its loop.
     pub(super) fn start(setup: &Setup) -> miette::Result<Drive> {
+        if setup.config.limits.human_contact {
+            miette::bail!(
+                help = "set human_contact = false for the calibration, and keep hands off",
+                "a calibration drives the plate without a finger, and counts nobody's exposure"
+            );
+        }
         let epoch = Instant::now();
         let origin_ns = pacing::monotonic_ns();
         let model = SpringSlider::new(setup.tip.finger).map_err(|e| miette::miette!("{e}"))?;

@@ -1,0 +1,70 @@
+//! How a trip is told: its unit, its requirement, what to do about it.
+
+use super::*;
+
+#[test]
+fn every_cause_has_a_unit_a_requirement_and_a_remedy_of_its_own_kind() {
+    let causes = || RULES.iter().map(|rule| rule.cause).chain([Cause::StartUp]);
+    for cause in causes() {
+        let remedy = cause.remedy();
+        assert!(remedy.len() > 30 && remedy.ends_with('.'), "{cause:?}: {remedy}");
+        assert!(cause == Cause::StartUp || cause.requirement().is_some(), "{cause:?}");
+        // Only causes of one kind share a remedy.
+        let kind = |cause: Cause| {
+            let name = format!("{cause:?}");
+            let sides = ["Lateral", "Normal", "OverAmplitude", "AmplitudeRunaway"];
+            sides.iter().any(|side| name.starts_with(side))
+        };
+        let alike = causes().filter(|other| *other != cause && other.remedy() == remedy);
+        for other in alike {
+            assert!(kind(cause) && kind(other), "{cause:?} and {other:?}: {remedy}");
+        }
+    }
+    assert!(RULES.iter().all(|rule| !rule.units.is_empty()));
+}
+
+/// A healthy rig is armed, then shows or is asked for something: the trip that follows.
+fn tripped(request: Request, change: impl Fn(&mut Observation)) -> Trip {
+    let mut bench = Bench::armed();
+    bench.request = request;
+    for _ in 0..400 {
+        if let Some(trip) = bench.cycle(&change, Controls::default()).tripped {
+            return trip;
+        }
+    }
+    panic!("no trip")
+}
+
+#[test]
+fn a_trip_is_told_in_its_unit() {
+    let slow = Request::default();
+    let force = tripped(slow, |seen| {
+        if let Ok(normal) = &mut seen.forces.normal {
+            normal.value = 40.0;
+        }
+    });
+    assert_eq!(force.unit, Unit::Newton);
+    let said = force.to_string();
+    assert!(said.starts_with("NormalOverforce (SR-04): 40 N against ") && said.contains(" N, at "), "{said}");
+
+    let silent = tripped(slow, |seen| seen.forces.lateral = Err(NoData::Disconnected));
+    let said = silent.to_string();
+    assert!(silent.unit == Unit::Second && said.contains("no data against 0.0"), "{said}");
+
+    // One rule, several units: the trip has that of what broke it.
+    let much = Request { amplitude: PeakToPeak::from_metres(9e-6), frequency_hz: 27_500.0, ..slow };
+    let said = tripped(much, |_| {}).to_string();
+    assert!(said.contains("9 um against ") && said.contains("RequestRefused (SR-30)"), "{said}");
+    let high = Request { amplitude: PeakToPeak::from_metres(1e-6), frequency_hz: 2e6, ..slow };
+    let said = tripped(high, |_| {}).to_string();
+    assert!(said.contains("2000000 Hz against "), "{said}");
+}
+
+#[test]
+fn a_trip_of_an_older_record_is_read() {
+    let old = r#"{"cause":"over_travel","value":0.1,"bound":0.05,"cycle":7,"at":7000000}"#;
+    let trip: Trip = serde_json::from_str(old).unwrap();
+    assert_eq!((trip.cause, trip.unit), (Cause::OverTravel, Unit::Flag));
+    let new = serde_json::to_string(&Trip { unit: Unit::Metre, ..trip }).unwrap();
+    assert!(new.contains(r#""unit":"m""#), "{new}");
+}

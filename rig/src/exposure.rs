@@ -1,0 +1,328 @@
+//! The ledger of a human finger's exposure: what was vibrated in earlier runs counts in the next one.
+//!
+//! It is kept where a machine keeps files over a restart and every user may write (`/var/tmp`), one file for each amplifier
+//! ([`drivers::identity`]), and it is written while the run goes, once a second. What stands in it is always ahead of the truth:
+//! each entry holds [`AHEAD`] of driving at the setup's strongest as if it had happened, and the entry of an orderly end takes
+//! that back. So a program that is killed loses nothing; it is charged too much, by [`AHEAD`] at most. A file has two places
+//! that are written in turn, each with its check sum: what is torn by a power cut leaves the other.
+//!
+//! Time is that of the machine since it was started, in its sleep as well: no wall clock that somebody sets makes an hour short.
+//! After a restart of the machine only the time since then is known to be over, and only that counts as rest.
+#![allow(clippy::disallowed_methods, reason = "a ledger is written beside the loop, while the run goes")]
+
+use crate::setup::Setup;
+use miette::WrapErr;
+use realtime::pacing::Lifeline;
+use realtime::ports::Nanos;
+use realtime::safety::{Exposed, Limits, PART_MINUTES, PARTS};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Where ledgers are kept.
+const FOLDER: &str = "/var/tmp";
+/// How far an entry is ahead of what was driven: what a program that is killed is charged too much.
+pub const AHEAD: Duration = Duration::from_secs(4);
+/// How often an entry is written.
+const WRITE_EVERY: Duration = Duration::from_secs(1);
+/// An entry that is older than this does not cover what is driven until the next one any more.
+const HOLDS_FOR: Duration = Duration::from_secs(3);
+/// Bytes of a place.
+const PLACE: usize = 8192;
+const MINUTE_NS: u64 = 60_000_000_000;
+/// Minutes after which one counts no more: an hour, and itself.
+const MINUTES: i64 = 61;
+
+/// What a place holds.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    /// Counts entries: the newest that can be read is the ledger.
+    number: u64,
+    /// The amplifier.
+    amplifier: String,
+    /// Which start of the machine the times below belong to.
+    boot: String,
+    /// Time since that start in ns up to which the entry holds.
+    until_ns: u64,
+    /// Time driven since the last rest of full length, and time rested since, in ns.
+    in_one_go_ns: u64,
+    resting_ns: u64,
+    /// Minutes since that start (before it: below zero), each with the time driven in ns and the dose in m2/s.
+    minutes: BTreeMap<i64, (u64, f64)>,
+}
+
+impl Entry {
+    /// Adds what was driven since the last time, all of it in the newest minute, or what was rested.
+    fn add(&mut self, driven_ns: u64, dose_m2_s: f64, rest: Nanos, now_ns: u64) {
+        if driven_ns > 0 {
+            self.resting_ns = 0;
+            self.in_one_go_ns = self.in_one_go_ns.saturating_add(driven_ns);
+            let minute = self.minutes.entry((now_ns / MINUTE_NS) as i64).or_default();
+            *minute = (minute.0.saturating_add(driven_ns), minute.1 + dose_m2_s);
+        } else {
+            self.resting_ns = self.resting_ns.saturating_add(now_ns.saturating_sub(self.until_ns));
+            if self.resting_ns >= rest.0 {
+                self.in_one_go_ns = 0;
+            }
+        }
+        self.until_ns = self.until_ns.max(now_ns);
+        let oldest = (now_ns / MINUTE_NS) as i64 - MINUTES;
+        self.minutes.retain(|number, _| *number > oldest);
+    }
+
+    /// The same, told in the times of this start of the machine. All that was before another start was before this one.
+    fn moved_to(mut self, boot: &str) -> Self {
+        if self.boot != boot {
+            let end = self.until_ns.div_ceil(MINUTE_NS) as i64;
+            self.minutes = self.minutes.into_iter().map(|(number, held)| (number - end, held)).collect();
+            (self.boot, self.until_ns) = (boot.to_string(), 0);
+        }
+        self
+    }
+
+    /// What the loop takes over.
+    fn exposed(&self, now_ns: u64) -> Exposed {
+        let now = (now_ns / MINUTE_NS) as i64;
+        let mut parts = [(Nanos(0), 0.0); PARTS];
+        for (number, (driven_ns, dose_m2_s)) in &self.minutes {
+            let part = (now - number).max(0) as usize / PART_MINUTES;
+            if let Some((driven, dose)) = parts.get_mut(part) {
+                *driven = driven.plus(Nanos(*driven_ns));
+                *dose += dose_m2_s;
+            }
+        }
+        Exposed { in_one_go: Nanos(self.in_one_go_ns), resting: Nanos(self.resting_ns), parts }
+    }
+}
+
+/// The machine's own time: which start of it this is, and ns since then.
+fn machine_time() -> io::Result<(String, u64)> {
+    let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id")?;
+    let mut t = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `t` is a valid timespec for the kernel to write.
+    if unsafe { libc::clock_gettime(libc::CLOCK_BOOTTIME, &mut t) } != 0 {
+        return Err(io::Error::last_os_error());
+    }
+    Ok((boot.trim().to_string(), t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64))
+}
+
+/// The ledger of one amplifier, open.
+pub struct Ledger {
+    file: File,
+    path: PathBuf,
+    entry: Entry,
+    rest: Nanos,
+    /// Strongest squared rms velocity that the limits allow, in m2/s2.
+    strongest_m2_s2: f64,
+}
+
+impl Ledger {
+    /// Opens the ledger of a setup's amplifier, where a human finger is declared: what cannot be read, or cannot be written,
+    /// refuses the finger. `None` without a finger, and for an amplifier inside this program, which vibrates nobody.
+    ///
+    /// # Errors
+    /// The reason.
+    pub fn open(setup: &Setup) -> miette::Result<Option<Self>> {
+        let limits = &setup.config.limits;
+        if !limits.human_contact {
+            return Ok(None);
+        }
+        let instruments = setup.instruments();
+        let amplifier =
+            drivers::identity::identity(&instruments.amplifier).map_err(|e| miette::miette!("{e}"))?;
+        amplifier.map(|identity| Self::open_in(Path::new(FOLDER), &identity, limits)).transpose()
+    }
+
+    fn open_in(folder: &Path, amplifier: &str, limits: &Limits) -> miette::Result<Self> {
+        let name = &calibration::certificate::sha256_hex(amplifier.as_bytes())[..16];
+        let path = folder.join(format!("muprime-{name}.exposure"));
+        Self::read(&path, amplifier, limits).wrap_err_with(|| {
+            format!(
+                "no human finger: what it was exposed to in the last hour is not known ({})",
+                path.display()
+            )
+        })
+    }
+
+    fn read(path: &Path, amplifier: &str, limits: &Limits) -> miette::Result<Self> {
+        if !crate::claim::is_shared(path.parent().unwrap_or(Path::new("/"))) {
+            miette::bail!(
+                help = "make it one that all may write to, with the sticky bit (mode 1777)",
+                "the folder of the ledger cannot be trusted"
+            );
+        }
+        let file = crate::claim::open_shared(path).map_err(|e| miette::miette!("{e}"))?;
+        let (boot, now_ns) =
+            machine_time().map_err(|e| miette::miette!("this machine tells no time: {e}"))?;
+        let length = file.metadata().map_err(|e| miette::miette!("{e}"))?.len();
+        let places = [0, 1].map(|place| read_place(&file, place).filter(|e| e.amplifier == amplifier));
+        let newest = places.into_iter().flatten().max_by_key(|entry| entry.number);
+        let entry = match newest {
+            Some(entry) => entry.moved_to(&boot),
+            None if length == 0 => {
+                Entry { amplifier: amplifier.into(), boot, until_ns: now_ns, ..Entry::default() }
+            }
+            None => miette::bail!(help = "rest for an hour, then remove the file", "the ledger is damaged"),
+        };
+        let strongest = std::f64::consts::FRAC_1_SQRT_2
+            * std::f64::consts::PI
+            * limits.amplitude_max.metres()
+            * limits.frequency_hz.1;
+        let rest = Nanos::from_seconds(limits.exposure_rest_s);
+        let mut ledger =
+            Ledger { file, path: path.to_path_buf(), entry, rest, strongest_m2_s2: strongest * strongest };
+        ledger.entry.add(0, 0.0, rest, now_ns);
+        ledger.write_ahead(now_ns).map_err(|e| {
+            miette::miette!(
+                help = "give this user the right to write it",
+                "the ledger cannot be written: {e}"
+            )
+        })?;
+        Ok(ledger)
+    }
+
+    /// What the loop takes over from earlier runs.
+    pub fn exposed(&self) -> Exposed {
+        self.entry.exposed(self.entry.until_ns)
+    }
+
+    /// Writes an entry that is ahead of what was driven.
+    fn write_ahead(&mut self, now_ns: u64) -> io::Result<()> {
+        let ahead = AHEAD.as_nanos() as u64;
+        let mut entry = self.entry.clone();
+        entry.add(ahead, self.strongest_m2_s2 * AHEAD.as_secs_f64(), self.rest, now_ns.saturating_add(ahead));
+        self.write(entry)
+    }
+
+    fn write(&mut self, mut entry: Entry) -> io::Result<()> {
+        // Somebody who removed the file would make the next run start from nothing.
+        if std::fs::symlink_metadata(&self.path).map(|m| inode(&m))? != inode(&self.file.metadata()?) {
+            return Err(io::Error::other("the file was replaced"));
+        }
+        self.entry.number += 1;
+        entry.number = self.entry.number;
+        let text = serde_json::to_string(&entry)?;
+        let mut place =
+            format!("{} {text}", calibration::certificate::sha256_hex(text.as_bytes())).into_bytes();
+        if place.len() > PLACE {
+            return Err(io::Error::other("the entry is too long"));
+        }
+        place.resize(PLACE, b' ');
+        self.file.write_all_at(&place, (entry.number % 2) * PLACE as u64)?;
+        self.file.sync_data()
+    }
+
+    /// Keeps the ledger on a thread of its own while the loop behind `life` drives, until the answer ends. `stop` stops the rig
+    /// when an entry could not be written.
+    ///
+    /// # Errors
+    /// No thread can be had.
+    pub fn keep(self, life: Arc<Lifeline>, stop: impl Fn() + Send + 'static) -> io::Result<Keeping> {
+        let (end, ended) = channel::<bool>();
+        let state = Arc::new(State::default());
+        state.written(machine_time()?.1);
+        let shown = Arc::clone(&state);
+        let keep = move || {
+            let mut ledger = self;
+            let mut before = (0, 0.0);
+            loop {
+                let last = match ended.recv_timeout(WRITE_EVERY) {
+                    Err(RecvTimeoutError::Timeout) => None,
+                    Ok(off) => Some(off),
+                    Err(RecvTimeoutError::Disconnected) => Some(false),
+                };
+                let written = machine_time().and_then(|(_, now_ns)| {
+                    let driven = life.driven_ns.load(Ordering::Relaxed);
+                    let dose = f64::from_bits(life.dose_bits.load(Ordering::Relaxed));
+                    ledger.entry.add(
+                        driven.saturating_sub(before.0),
+                        (dose - before.1).max(0.0),
+                        ledger.rest,
+                        now_ns,
+                    );
+                    before = (driven, dose);
+                    match last {
+                        // It was read back off: nothing more was driven.
+                        Some(true) => ledger.write(ledger.entry.clone()),
+                        _ => ledger.write_ahead(now_ns),
+                    }
+                    .map(|()| now_ns)
+                });
+                match written {
+                    Ok(now_ns) => shown.written(now_ns),
+                    Err(why) => {
+                        tracing::error!(%why, "the exposure of the finger cannot be kept: the rig is stopped");
+                        shown.failed.store(true, Ordering::Relaxed);
+                        stop();
+                    }
+                }
+                if last.is_some() || shown.failed.load(Ordering::Relaxed) {
+                    return;
+                }
+            }
+        };
+        let thread = std::thread::Builder::new().name("exposure".into()).spawn(keep)?;
+        Ok(Keeping { state, end, thread: Some(thread) })
+    }
+}
+
+/// What the thread that keeps a ledger shows of itself.
+#[derive(Default)]
+struct State {
+    failed: AtomicBool,
+    written_ns: AtomicU64,
+}
+
+impl State {
+    fn written(&self, now_ns: u64) {
+        self.written_ns.store(now_ns, Ordering::Relaxed);
+    }
+}
+
+/// A ledger that is being kept.
+pub struct Keeping {
+    state: Arc<State>,
+    end: Sender<bool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Keeping {
+    /// Whether the newest entry still covers what is driven now.
+    pub fn holds(&self) -> bool {
+        let age = |now: u64| now.saturating_sub(self.state.written_ns.load(Ordering::Relaxed));
+        let fresh = machine_time().is_ok_and(|(_, now)| age(now) < HOLDS_FOR.as_nanos() as u64);
+        fresh && !self.state.failed.load(Ordering::Relaxed)
+    }
+
+    /// The run is over. Where the drive was read back off, the last entry holds what was driven and no more.
+    pub fn end(mut self, read_back_off: bool) {
+        let _ = self.end.send(read_back_off);
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+fn inode(metadata: &std::fs::Metadata) -> (u64, u64) {
+    use std::os::unix::fs::MetadataExt;
+    (metadata.dev(), metadata.ino())
+}
+
+/// The entry of a place, if all of it is there.
+fn read_place(file: &File, place: u64) -> Option<Entry> {
+    let mut bytes = vec![0; PLACE];
+    file.read_exact_at(&mut bytes, place * PLACE as u64).ok()?;
+    let text = String::from_utf8(bytes).ok()?;
+    let (sum, text) = text.trim_end().split_once(' ')?;
+    (calibration::certificate::sha256_hex(text.as_bytes()) == sum).then(|| serde_json::from_str(text).ok())?
+}
+
+#[cfg(test)]
+mod tests;
