@@ -118,9 +118,21 @@ constants! {
 
     stated_freedom: f64 = 40.0, "Degrees of freedom that the repeatability stated in rig.toml counts for.", "judgement: a statement is worth some forty replicates (scaled inverse chi2 prior, Gelman et al. 2013, sec. 2.6)";
     variance_factor_bounds: [f64; 2] = [0.8, 3.0], "Bounds of the factor that replicates put on the stated variance.", JUDGEMENT;
-    outlier_sd: f64 = 3.5, "Residual from the smooth surface, in deviations, from which a pass is an outlier.", "Iglewicz & Hoaglin 1993 (modified z-score of 3.5)";
-    outlier_share: f64 = 0.02, "Share of passes above which they are a gap and no outliers.", JUDGEMENT;
-    outlier_reach: f64 = 2.0, "Deviations at which an outlier counts after its variance is raised.", JUDGEMENT;
+    scatter_log_sd: f64 = 0.3, "Prior deviation of the logarithm of true over stated scatter.", "judgement: laboratories state their repeatability within a third or so";
+    scatter_scales: [f64; 13] = [0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6, 1.8, 2.1, 2.5, 3.0], "True over stated scatter: values that are tried.", NUMERICAL;
+    structure_nats: f64 = 3.0, "Nats by which a surface must beat the baseline alone, each with the scatter that suits it, before a large scatter counts as structure and the statement stands.", JUDGEMENT;
+    clustered_p: f64 = 0.02, "Family-wise p-value of clusters of what the baseline leaves at which a large scatter counts as half structure.", JUDGEMENT;
+    run_sds: [f64; 10] = [0.0, 0.004, 0.008, 0.015, 0.025, 0.04, 0.06, 0.09, 0.14, 0.22], "Relative deviations of the level from run to run that are tried.", NUMERICAL;
+    run_sd_prior: f64 = 0.1, "Deviation of the half-normal prior of that.", "judgement: repeated tests on one pair shifted by 4 to 17 %";
+    run_nats: f64 = 1.0, "Nats that a shift between runs must gain.", JUDGEMENT;
+    outside_prior: [f64; 2] = [1.0, 50.0], "Share of passes that do not belong: as if so many had been seen, of so many (beta prior).", "judgement: one pass in fifty";
+    outside_width: f64 = 5.0, "Half-width of the Cauchy density of such passes, in deviations of a pass.", "judgement: a pass at 3.5 deviations, Iglewicz & Hoaglin's (1993) limit, is then even at that share";
+    suspect_probability: f64 = 0.5, "Probability of not belonging from which a pass is called suspect.", "the likelier of two";
+    most_suspects: f64 = 0.15, "Share of suspect passes above which they are a departure.", JUDGEMENT;
+    together_level: f64 = 0.01, "Family-wise level at which suspect passes lie together, which makes them a departure.", "one in a hundred";
+    explained_sd: f64 = 3.0, "Deviations within which a cause explains a suspect pass, which then belongs.", "three standard deviations";
+    serial_probability: f64 = 0.9, "Probability from which scatter is taken to last from pass to pass.", JUDGEMENT;
+    serial_modes: usize = 16, "Cosines of its slow part.", "numerical: a drift over the table has less than eight turns";
 
     form_shares: [f64; 3] = [0.05, 0.15, 0.35], "Standard deviation of a cause's departure from its form, as a share of its net change.", "development: true causes under another formula left 13 to 49 % of their gap";
     form_weights: [f64; 3] = [0.4, 0.4, 0.2], "Prior weights of those shares.", JUDGEMENT;
@@ -186,6 +198,7 @@ constants! {
     folds: usize = 5, "Parts that are held out in turn.", "Hastie, Tibshirani & Friedman 2009, sec. 7.10: five or ten";
     resamples: usize = 400, "Resamples of the bootstrap.", "numerical: Efron & Tibshirani 1993";
     gapless_sd: f64 = 2.0, "Deviations of the mean square's scatter within which held-out passes show no gap to shrink.", "two standard deviations";
+    misstated: f64 = 1.25, "Factor from which a statement of repeatability is said to be wrong.", JUDGEMENT;
     stands_out_sd: f64 = 2.0, "Deviations of a pass by which the gap at a condition must stand out.", "two standard deviations";
     least_contraction: f64 = 0.05, "Least contraction of the prior variance before a pull of a stiffness is stated.", JUDGEMENT;
 

@@ -25,6 +25,12 @@ pub enum DataError {
         /// What would be accepted.
         needed: &'static str,
     },
+    /// Forces of one sign in both directions of motion.
+    #[error(
+        "lateral_force_n has one sign in both directions of motion, and the same size: friction turns with the direction. \
+         Give signed forces (along the plate's axis, not magnitudes)"
+    )]
+    Unsigned,
     /// A point number that stands twice.
     #[error("point {0} stands twice; number the points apart")]
     DoublePoint(u64),
@@ -62,7 +68,40 @@ impl Table {
         if kept.len() < 12 {
             return Err(DataError::TooFew(kept.len()));
         }
-        Self::build(kept, None)
+        let table = Self::build(kept, None)?;
+        if table.is_unsigned() {
+            return Err(DataError::Unsigned);
+        }
+        Ok(table)
+    }
+
+    /// Whether lateral forces are magnitudes: of one sign in both directions, and as large in one as in the other. An offset that
+    /// hides the turn of friction makes the two differ by far.
+    fn is_unsigned(&self) -> bool {
+        let of = |forward: bool| -> Vec<f64> {
+            let rows = self.passes.iter().zip(&self.lateral);
+            let own = rows.filter(|(p, _)| (p.direction.sign() > 0.0) == forward);
+            own.map(|(p, l)| l / p.normal_force_n).collect()
+        };
+        let (forward, backward) = (of(true), of(false));
+        if forward.len().min(backward.len()) < FEWEST_OF_A_DIRECTION {
+            return false;
+        }
+        let one_sign = |list: &[f64]| {
+            let up = list.iter().filter(|r| **r > 0.0).count() as f64 / list.len() as f64;
+            if up >= ONE_SIGN {
+                1
+            } else if up <= 1.0 - ONE_SIGN {
+                -1
+            } else {
+                0
+            }
+        };
+        let mean = |list: &[f64]| list.iter().sum::<f64>() / list.len() as f64;
+        let ratio = mean(&forward) / mean(&backward);
+        one_sign(&forward) != 0
+            && one_sign(&forward) == one_sign(&backward)
+            && (1.0 / AS_LARGE..=AS_LARGE).contains(&ratio)
     }
 
     /// Takes a table of conditions to predict, on the scales of the table that was diagnosed.
@@ -161,8 +200,10 @@ impl Table {
     pub fn lacks(&self, needs: &[Need]) -> Option<String> {
         let p = &self.passes;
         let spread = |f: &dyn Fn(&Condition) -> f64| -> f64 {
-            let vibrating = p.iter().filter(|q| q.amplitude > PeakToPeak::ZERO);
-            let (low, high) = vibrating.fold((f64::INFINITY, 0.0f64), |(a, b), q| (a.min(f(q)), b.max(f(q))));
+            // What acts with the plate still as well is judged on all passes.
+            let moves = |q: &&Condition| !needs.contains(&Need::Vibration) || q.amplitude > PeakToPeak::ZERO;
+            let (low, high) =
+                p.iter().filter(moves).fold((f64::INFINITY, 0.0f64), |(a, b), q| (a.min(f(q)), b.max(f(q))));
             if low > 0.0 { high / low } else { f64::INFINITY }
         };
         needs.iter().find_map(|need| {
@@ -217,6 +258,12 @@ pub struct Origin {
     design: Design,
 }
 
+/// Passes in each direction from which signs are judged, the share of one sign, and the ratio of mean forces within which
+/// both directions are as large.
+const FEWEST_OF_A_DIRECTION: usize = 4;
+const ONE_SIGN: f64 = 0.95;
+const AS_LARGE: f64 = 1.4;
+
 /// Largest lateral force over normal force that a finger on a plate can have, offsets of the sensor included.
 const LARGEST_RATIO: f64 = 100.0;
 
@@ -261,5 +308,70 @@ fn scales(passes: &[Condition]) -> Design {
         reference_temperature_c: passes.iter().find_map(|p| p.temperature_c).unwrap_or(20.0),
         stroke_m: range(&|p| p.position_m),
         largest_amplitude_m: passes.iter().map(|p| p.amplitude.metres()).fold(0.0, f64::max),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::{Deviates, rig, table};
+    use crate::hypotheses::Options;
+    use crate::verdict::diagnose;
+    use models::record::read_passes;
+
+    /// A table of passes of a plate that stands still: friction of 0.5 N/N, forces by a rule.
+    fn still(count: usize, force: impl Fn(usize, f64, f64) -> f64) -> Vec<Pass> {
+        let mut csv = String::from(
+            "point,time_s,amplitude_pp_m,frequency_hz,speed_m_s,direction,position_m,normal_force_n,lateral_force_n\n",
+        );
+        for i in 0..count {
+            let (direction, load) = (if i % 2 == 0 { 1.0 } else { -1.0 }, 0.2 + 0.05 * (i % 5) as f64);
+            let force = force(i, direction, load);
+            csv += &format!("{i},{},0,27500,0.02,{direction},0.01,{load},{force}\n", 5 * i);
+        }
+        read_passes(csv.as_bytes()).expect("a table")
+    }
+
+    /// Magnitudes in both directions are refused, with what is needed; signed forces are not, nor those with an offset that
+    /// hides the turn of friction.
+    #[test]
+    fn forces_without_a_sign_are_refused() {
+        let unsigned = Table::measured(&still(16, |_, _, load| 0.5 * load));
+        assert_eq!(unsigned.err(), Some(DataError::Unsigned));
+        assert!(DataError::Unsigned.to_string().contains("signed"));
+        assert!(Table::measured(&still(16, |_, direction, load| 0.5 * load * direction)).is_ok());
+        assert!(Table::measured(&still(16, |_, direction, load| 0.5 * load * direction + 0.4)).is_ok());
+    }
+
+    /// A plate that stands still shows laws of friction: nothing about them needs a vibration.
+    #[test]
+    fn laws_of_friction_can_be_told_with_the_plate_still() {
+        let table = Table::measured(&still(16, |_, direction, load| 0.5 * load * direction)).unwrap();
+        assert_eq!(table.lacks(&[Need::Loads]), None);
+        assert!(table.lacks(&[Need::Speeds]).is_some() && table.lacks(&[Need::Vibration]).is_some());
+        let mut vibrating = self::table(&mut Deviates(3), 0.0);
+        vibrating
+            .passes
+            .iter_mut()
+            .filter(|p| p.amplitude > PeakToPeak::ZERO)
+            .for_each(|p| p.normal_force_n = 0.3);
+        assert_eq!(vibrating.lacks(&[Need::Loads]), None, "the still passes have three loads");
+        assert!(vibrating.lacks(&[Need::Vibration, Need::Loads]).is_some());
+    }
+
+    /// Twelve still passes, in one direction and at one time, give an answer, and figures that they cannot give are none.
+    #[test]
+    fn twelve_still_passes_at_one_time_give_an_answer() {
+        let mut passes = still(12, |_, direction, load| 0.5 * load * direction);
+        passes.iter_mut().for_each(|p| {
+            p.time_s = 0.0;
+            p.lateral_force_n = p.lateral_force_n.map(f64::abs);
+            p.direction = models::quantity::Direction::Forward;
+        });
+        let table = Table::measured(&passes).unwrap();
+        let report = diagnose(&table, &rig(), &Options::default(), String::new()).report;
+        let sum: f64 = report.hypotheses.iter().map(|h| h.probability).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+        assert!(report.gap.noise_floor_rmse.is_none_or(|rmse| rmse > 0.0), "{:?}", report.gap);
     }
 }

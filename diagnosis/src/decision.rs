@@ -109,8 +109,7 @@ fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
 /// Whether a rival says the same as the leader with no more parameters.
 fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
     let [a, b] = [leader, rival].map(|i| &fitted.candidates[i].best);
-    let forces = a.prediction.iter().zip(b.prediction.iter());
-    let apart: f64 = forces.zip(&fitted.problem.variance).map(|((p, q), v)| (p - q).powi(2) / v).sum();
+    let apart = fitted.problem.chi2(&(&a.prediction - &b.prediction));
     b.u.len() <= a.u.len() && apart < fitted.problem.constants.same_forces_chi2
 }
 
@@ -119,9 +118,7 @@ fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     let problem = &fitted.problem;
     let k = &problem.constants;
-    let left = |model: &nalgebra::DVector<f64>| -> f64 {
-        (0..problem.len()).map(|i| (problem.lateral[i] - model[i]).powi(2) / problem.variance[i] - 1.0).sum()
-    };
+    let left = |model: &nalgebra::DVector<f64>| problem.misfit(model) - problem.len() as f64;
     let gap = left(&fitted.none.prediction);
     let candidates = &fitted.candidates;
     for pair in 0..candidates.len() {

@@ -6,7 +6,7 @@
 use crate::constants::Constants;
 use crate::data::Table;
 use crate::fit::Problem;
-use crate::gaussian::{Covariance, log_sum_exp};
+use crate::gaussian::{Covariance, Scaled, log_sum_exp};
 use crate::kernel::{Coordinates, Kernel, Lengths};
 use crate::layout::NUISANCES;
 use models::condition::Condition;
@@ -86,6 +86,40 @@ fn rows(
     (baseline, phi, sizes)
 }
 
+/// The forces of a table about the baseline: what is to be explained, and the columns that may explain it.
+pub(crate) struct Linear {
+    /// Covariates of the kernel.
+    pub coordinates: Coordinates,
+    /// Its pivots.
+    pub kernel: Kernel,
+    /// Baseline at the centre, N.
+    pub baseline: DVector<f64>,
+    /// Columns, N: the part that turns with the direction, the part that does not, then the nuisances.
+    pub columns: DMatrix<f64>,
+    /// Size on which a departure is measured at each pass, N.
+    pub sizes: Vec<f64>,
+    /// Measured less baseline, N, the nuisances counted from their nominal values.
+    pub residual: DVector<f64>,
+}
+
+impl Linear {
+    /// The forces of a table about the baseline at `center`, for one smoothness.
+    pub fn about(table: &Table, problem: &Problem, center: &[f64], lengths: Lengths) -> Self {
+        let k = &problem.constants;
+        let coordinates = Coordinates::of(table);
+        let largest = problem.design.largest_amplitude_m;
+        let places: Vec<_> = problem.passes.iter().map(|p| coordinates.place(p, largest, &lengths)).collect();
+        let kernel = Kernel::new(&places, k.discrepancy_rank, k.kernel_rest);
+        let (baseline, columns, sizes) =
+            rows(problem, center, &problem.passes, &coordinates, (&kernel, &lengths), (1.0, 1.0));
+        // The nuisances' prior is centred on the nominal values, not on where the baseline was recalibrated.
+        let pull = DVector::from_column_slice(&center[..NUISANCES]);
+        let residual = DVector::from_column_slice(&problem.lateral) - &baseline
+            + columns.columns(2 * kernel.rank(), NUISANCES) * pull;
+        Linear { coordinates, kernel, baseline, columns, sizes, residual }
+    }
+}
+
 impl Discrepancy {
     /// Fits the discrepancy about the baseline at `center` (nuisance coordinates): the best of some smoothnesses (of
     /// [`lengths`], unless only a level is wanted), with the evidence of their mean.
@@ -100,29 +134,17 @@ impl Discrepancy {
 
     fn with_lengths(table: &Table, problem: &Problem, center: &[f64], lengths: Lengths) -> Self {
         let k = &problem.constants;
-        let coordinates = Coordinates::of(table);
-        let places: Vec<_> = problem
-            .passes
-            .iter()
-            .map(|p| coordinates.place(p, problem.design.largest_amplitude_m, &lengths))
-            .collect();
-        let kernel = Kernel::new(&places, k.discrepancy_rank, k.kernel_rest);
+        let Linear { coordinates, kernel, baseline, columns: phi, sizes, residual } =
+            Linear::about(table, problem, center, lengths);
         let r = kernel.rank();
-        let (baseline, phi, sizes) =
-            rows(problem, center, &problem.passes, &coordinates, (&kernel, &lengths), (1.0, 1.0));
         let n = problem.len();
-        let residual = DVector::from_fn(n, |i, _| problem.lateral[i] - baseline[i]);
-        // The nuisances' prior is centred on the nominal values, not on where the baseline was recalibrated.
-        let pull: DVector<f64> = DVector::from_fn(NUISANCES, |k, _| center[k]);
-        let nuisance = phi.columns(2 * r, NUISANCES).into_owned();
-        let residual = residual + nuisance * pull;
         let mut all = Vec::new();
         let mut best = (f64::NEG_INFINITY, 0.0, 0.0, 0.0);
         for white in k.discrepancy_white {
             let variance: Vec<f64> =
                 (0..n).map(|i| problem.variance[i] + (white * sizes[i]).powi(2)).collect();
             let sqrt: DVector<f64> = DVector::from_iterator(n, variance.iter().map(|v| 1.0 / v.sqrt()));
-            let mut whitened = phi.clone();
+            let mut whitened = problem.beside_common(&phi);
             for mut c in whitened.column_iter_mut() {
                 c.component_mul_assign(&sqrt);
             }
@@ -137,30 +159,14 @@ impl Discrepancy {
                     if white == 0.0 && friction == 0.0 && odd == 0.0 {
                         continue;
                     }
-                    let size = |j: usize| {
-                        if j < r {
-                            friction
-                        } else if j < 2 * r {
-                            odd
-                        } else {
-                            1.0
-                        }
-                    };
-                    let active: Vec<usize> = (0..2 * r + NUISANCES).filter(|&j| size(j) > 0.0).collect();
-                    let a = active.len();
-                    let mut inner = DMatrix::from_fn(a, a, |i, j| {
-                        gram[(active[i], active[j])] * size(active[i]) * size(active[j])
+                    let sizes = (0..gram.ncols()).map(|j| match j / r.max(1) {
+                        0 => friction,
+                        1 => odd,
+                        _ => 1.0,
                     });
-                    for i in 0..a {
-                        inner[(i, i)] += 1.0;
-                    }
-                    let g = DVector::from_fn(a, |i, _| score[active[i]] * size(active[i]));
-                    let Some(factor) = inner.cholesky() else { continue };
-                    let inner_det: f64 =
-                        2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-                    let fitted = g.dot(&factor.solve(&g));
-                    let value =
-                        -0.5 * (chi - fitted + log_det + inner_det) - n as f64 * 0.918_938_533_204_672_8;
+                    let Some(parts) = Scaled::new(&gram, &score, sizes.collect()) else { continue };
+                    let value = -0.5 * (chi - parts.explained + log_det + parts.log_det)
+                        - n as f64 * 0.918_938_533_204_672_8;
                     all.push(value);
                     if value > best.0 {
                         best = (value, friction, odd, white);
@@ -176,8 +182,8 @@ impl Discrepancy {
             scaled.column_mut(r + j).scale_mut(odd);
         }
         let variance: Vec<f64> = (0..n).map(|i| problem.variance[i] + (white * sizes[i]).powi(2)).collect();
-        let covariance = Covariance::new(&variance, &scaled);
-        let weights = covariance.weights(&residual);
+        let covariance = Covariance::new(&variance, &problem.beside_common(&scaled));
+        let weights = covariance.weights(&residual).rows(0, scaled.ncols()).into_owned();
         let smooth = baseline
             - scaled.columns(2 * r, NUISANCES) * DVector::from_column_slice(&center[..NUISANCES])
             + &scaled * &weights;

@@ -114,9 +114,9 @@ pub fn laplace(
     let mut change = if members.is_empty() { zero.clone() } else { net_change(problem, &u, &m) };
     let build = |change: &DVector<f64>| {
         if members.is_empty() {
-            Covariance::new(&problem.variance, &empty)
+            problem.covariance(&empty)
         } else {
-            Covariance::new(&problem.variance, &form_matrix(change, basis, share))
+            problem.covariance(&form_matrix(change, basis, share))
         }
     };
     let penalty = |u: &[f64]| -> f64 { u.iter().zip(&precision).map(|(x, p)| p * x * x).sum() };
@@ -185,7 +185,8 @@ pub fn laplace(
             log_evidence += log_half_line(u[at] / sd, beyond);
         }
     }
-    let departure = if members.is_empty() { DVector::zeros(0) } else { covariance.weights(&residual) };
+    let smooth = if members.is_empty() { 0 } else { basis.ncols() };
+    let departure = covariance.weights(&residual).rows(0, smooth).into_owned();
     Posterior {
         members: members.to_vec(),
         u,
@@ -282,7 +283,7 @@ mod tests {
     fn a_law_without_effect_gains_nothing() {
         let table = table(&mut Deviates(11), 0.0);
         let mut problem = Problem::new(&table, &rig(), &Default::default());
-        crate::noise::settle(&table, &rig(), &mut problem);
+        crate::noise::settle(&table, &rig(), &mut problem, &[]);
         let coordinates = Coordinates::of(&table);
         let largest = problem.design.largest_amplitude_m;
         let places: Vec<_> = problem

@@ -2,6 +2,7 @@
 
 use crate::constants::Constants;
 use crate::data::RigFile;
+use crate::gaussian::Covariance;
 use crate::layout::{Layout, NUISANCES};
 use effects::{Active, Baseline, Design, Law, Parameter, Place, known, library};
 use models::condition::Condition;
@@ -60,8 +61,11 @@ pub struct Problem {
     pub passes: Vec<Condition>,
     /// Measured lateral forces, N.
     pub lateral: Vec<f64>,
-    /// Variances of the lateral forces, N^2.
+    /// Variances of the lateral forces, N^2: of what each pass has by itself.
     pub variance: Vec<f64>,
+    /// Scatter that passes have in common, N: independent standard deviates times these columns (shifts of runs, slow parts of
+    /// a serial correlation). No columns where passes scatter independently.
+    pub common: DMatrix<f64>,
     /// Scales of the table.
     pub design: Design,
     /// Baseline at the prior's centre.
@@ -120,6 +124,7 @@ impl Problem {
             passes: table.passes.clone(),
             lateral: table.lateral.clone(),
             variance: vec![1.0; table.len()],
+            common: DMatrix::zeros(table.len(), 0),
             design: table.design,
             nominal: Baseline {
                 mu0: guess,
@@ -148,10 +153,51 @@ impl Problem {
             passes: rows.iter().map(|&i| self.passes[i]).collect(),
             lateral: rows.iter().map(|&i| self.lateral[i]).collect(),
             variance: rows.iter().map(|&i| self.variance[i]).collect(),
+            common: self.common.select_rows(rows.iter()),
             certified: self.certified.clone(),
             constants: self.constants.clone(),
             ..*self
         }
+    }
+
+    /// The same problem at other conditions, where nothing was measured.
+    pub fn at(&self, passes: &[Condition]) -> Self {
+        let n = passes.len();
+        Problem {
+            passes: passes.to_vec(),
+            lateral: vec![0.0; n],
+            variance: vec![1.0; n],
+            common: DMatrix::zeros(n, 0),
+            ..self.select(&[])
+        }
+    }
+
+    /// Covariance of the forces: scatter, and smooth parts in the columns of `phi`, whose weights come first.
+    pub fn covariance(&self, phi: &DMatrix<f64>) -> Covariance {
+        Covariance::new(&self.variance, &self.beside_common(phi))
+    }
+
+    /// The columns of `phi`, and after them those of the scatter that passes have in common.
+    pub fn beside_common(&self, phi: &DMatrix<f64>) -> DMatrix<f64> {
+        let (own, common) = (phi.ncols(), self.common.ncols());
+        let mut all = phi.clone().resize_horizontally(own + common, 0.0);
+        all.columns_mut(own, common).copy_from(&self.common);
+        all
+    }
+
+    /// chi2 of a residual: what scatter does not explain. Its expectation is the number of passes.
+    pub fn chi2(&self, residual: &DVector<f64>) -> f64 {
+        self.covariance(&DMatrix::zeros(self.len(), 0)).quadratic(residual)
+    }
+
+    /// chi2 of the measured forces about a prediction.
+    pub fn misfit(&self, prediction: &DVector<f64>) -> f64 {
+        self.chi2(&(DVector::from_column_slice(&self.lateral) - prediction))
+    }
+
+    /// Variance of a pass's whole scatter, N^2.
+    pub fn whole_variance(&self, row: usize) -> f64 {
+        self.variance[row] + self.common.row(row).norm_squared()
     }
 
     /// The baseline at coordinates.

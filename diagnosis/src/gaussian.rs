@@ -57,14 +57,17 @@ impl Covariance {
         self.inner.solve(&(self.whitened.transpose() * r))
     }
 
-    /// Variance of the smooth part at a row of `Phi`, given the data.
+    /// Variance of the smooth part at a row of `Phi`, given the data. The row may be shorter than the table's: what it leaves
+    /// out (shifts of runs) is not there.
     pub fn posterior_variance(&self, row: &DVector<f64>) -> f64 {
-        row.dot(&self.inner.solve(row))
+        let row = row.clone().resize_vertically(self.whitened.ncols(), 0.0);
+        row.dot(&self.inner.solve(&row))
     }
 
-    /// Covariance of the smooth part between rows of `Phi`, given the data.
+    /// Covariance of the smooth part between rows of `Phi`, which may be shorter too, given the data.
     pub fn posterior_covariance(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
-        rows * self.inner.solve(&rows.transpose())
+        let rows = rows.clone().resize_horizontally(self.whitened.ncols(), 0.0);
+        &rows * self.inner.solve(&rows.transpose())
     }
 
     fn scale(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
@@ -73,6 +76,58 @@ impl Covariance {
             column.component_mul_assign(&self.inverse_sd);
         }
         m
+    }
+}
+
+/// A covariance `I + Phi S S Phi'` of whitened data for scales `S` of the columns, from products that stay the same for all
+/// scales.
+pub struct Scaled {
+    factor: Cholesky<f64, Dyn>,
+    active: Vec<usize>,
+    sizes: Vec<f64>,
+    score: DVector<f64>,
+    /// Log determinant.
+    pub log_det: f64,
+    /// Part of the residual's squared norm that the columns explain.
+    pub explained: f64,
+}
+
+impl Scaled {
+    /// Factors; `gram` is `Phi' Phi`, `score` is `Phi'` times the residual. Columns of scale zero are left out.
+    pub fn new(gram: &DMatrix<f64>, score: &DVector<f64>, sizes: Vec<f64>) -> Option<Self> {
+        let active: Vec<usize> = (0..sizes.len()).filter(|&j| sizes[j] > 0.0).collect();
+        let a = active.len();
+        let mut inner =
+            DMatrix::from_fn(a, a, |i, j| gram[(active[i], active[j])] * sizes[active[i]] * sizes[active[j]]);
+        for i in 0..a {
+            inner[(i, i)] += 1.0;
+        }
+        let score = DVector::from_fn(a, |i, _| score[active[i]] * sizes[active[i]]);
+        let factor = inner.cholesky()?;
+        let log_det = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        let explained = score.dot(&factor.solve(&score));
+        Some(Scaled { factor, active, sizes, score, log_det, explained })
+    }
+
+    /// Weights of all columns: the smooth part is `Phi` times them.
+    pub fn weights(&self) -> DVector<f64> {
+        let solved = self.factor.solve(&self.score);
+        let mut all = DVector::zeros(self.sizes.len());
+        for (w, &j) in solved.iter().zip(&self.active) {
+            all[j] = w * self.sizes[j];
+        }
+        all
+    }
+
+    /// Share of each row's variance that the other rows and columns explain, of whitened columns `phi`: the diagonal of
+    /// `Phi S (I + S Phi' Phi S)^-1 S Phi'`.
+    pub fn leverage(&self, phi: &DMatrix<f64>) -> Vec<f64> {
+        let mut rows = phi.select_columns(self.active.iter());
+        for (mut column, &j) in rows.column_iter_mut().zip(&self.active) {
+            column.scale_mut(self.sizes[j]);
+        }
+        let solved = self.factor.l().solve_lower_triangular(&rows.transpose());
+        solved.map_or_else(|| vec![0.0; phi.nrows()], |s| s.column_iter().map(|c| c.norm_squared()).collect())
     }
 }
 

@@ -9,8 +9,9 @@ use crate::gaussian::log_sum_exp;
 use crate::kernel::{Coordinates, Kernel, Lengths};
 use crate::layout::NUISANCES;
 use crate::least_squares::minimise;
-use crate::noise::{PureError, settle};
+use crate::noise::{PureError, settle, variance};
 use crate::pairs::pairs;
+use crate::scatter::Scatter;
 use crate::singles::{Search, lapsed, singles, sort, unlisted};
 use crate::starts::{nuisances_of, tempered};
 use effects::{Effect, known, library};
@@ -74,6 +75,8 @@ pub struct Fitted {
     pub problem: Problem,
     /// What the replicates said.
     pub pure: PureError,
+    /// What the table says about its own scatter.
+    pub scatter: Scatter,
     /// Recalibrated baseline.
     pub none: Posterior,
     /// Probability of no gap.
@@ -104,11 +107,26 @@ pub fn form_lengths(k: &Constants) -> Lengths {
 /// Rounds of the baseline's fit, and of its fit to what the gap looks like at large.
 const ROUNDS: [usize; 2] = [15, 10];
 
+impl Fitted {
+    /// Variances of single passes at conditions of a problem, given the level of friction there, N^2: of runs whose shift is
+    /// not known.
+    pub fn scatter_of_a_pass(&self, at: &Problem, rig: &RigFile, center: &[f64], level: &[f64]) -> Vec<f64> {
+        let run = self.scatter.run_relative_sd.unwrap_or(0.0);
+        let own = variance(at, rig, center, level, self.pure.used);
+        own.iter().zip(level).map(|(v, l)| v + (run * l).powi(2)).collect()
+    }
+}
+
 /// Fits every hypothesis to a table.
 pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
+    fit_trusting(table, rig, options, &[])
+}
+
+/// The same where some rows count as any other, however far off they lie.
+pub fn fit_trusting(table: &Table, rig: &RigFile, options: &Options, trusted: &[usize]) -> Fitted {
     let k = &*options.constants;
     let mut problem = Problem::new(table, rig, &options.constants);
-    let (discrepancy, pure) = settle(table, rig, &mut problem);
+    let (discrepancy, pure, mut scatter) = settle(table, rig, &mut problem, trusted);
     let coordinates = Coordinates::of(table);
     let places: Vec<_> = problem
         .passes
@@ -140,6 +158,10 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
     let mut candidates = singles(&problem, table, &tried, &search);
     let lapsed = lapsed(&mut problem, table, &mut candidates, &search);
     sort(&mut candidates);
+    let explained = candidates.first().map_or_else(Vec::new, |c| explained_by(&problem, &scatter, &c.best));
+    if !explained.is_empty() && 2 * explained.len() >= scatter.suspects.len() {
+        return fit_trusting(table, rig, options, &[trusted, &explained].concat());
+    }
     let unlisted = unlisted(&problem, table, &search);
 
     if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + k.pairs_from_nats)
@@ -152,9 +174,16 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
     let [none_probability, unknown_probability] = weigh(&mut candidates, evidence, tried.len(), k);
     candidates
         .sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability).then(a.effects.cmp(&b.effects)));
+    // What the leading cause explains after all belongs; it counted for little, and is not called suspect.
+    if let Some(c) = candidates.first().filter(|c| c.probability > none_probability.max(unknown_probability))
+    {
+        let belonging = explained_by(&problem, &scatter, &c.best);
+        scatter.suspects.retain(|s| !belonging.contains(&s.row));
+    }
     Fitted {
         problem,
         pure,
+        scatter,
         none,
         none_probability,
         discrepancy,
@@ -166,6 +195,16 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
         kernel,
         basis,
     }
+}
+
+/// Rows of suspect passes that a cause explains, though it was fitted almost without them.
+fn explained_by(problem: &Problem, scatter: &Scatter, cause: &Posterior) -> Vec<usize> {
+    let explains = |row: &usize| {
+        let own = problem.whole_variance(*row) / scatter.inflation[*row];
+        (problem.lateral[*row] - cause.prediction[*row]).powi(2)
+            < problem.constants.explained_sd.powi(2) * own
+    };
+    scatter.suspects.iter().map(|s| s.row).filter(explains).collect()
 }
 
 /// Why an effect is not sought that only an outside standard shows, where rig.toml states that calibration.
@@ -188,10 +227,7 @@ fn second_causes(
     search: &Search<'_>,
 ) -> Vec<Candidate> {
     let best = &singles[0].best;
-    let misfit: f64 = (0..problem.len())
-        .map(|i| (problem.lateral[i] - best.prediction[i]).powi(2) / problem.variance[i])
-        .sum::<f64>()
-        + best.pull();
+    let misfit = problem.misfit(&best.prediction) + best.pull();
     let n = problem.len() as f64;
     if misfit <= n + problem.constants.misfit_sd * (2.0 * n).sqrt() {
         return Vec::new();

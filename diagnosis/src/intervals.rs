@@ -47,7 +47,7 @@ pub fn estimates(problem: &Problem, best: &Posterior, basis: &DMatrix<f64>) -> V
         column.component_mul_assign(&best.change);
         column.scale_mut(best.share);
     }
-    let covariance = Covariance::new(&problem.variance, &phi);
+    let covariance = problem.covariance(&phi);
     let floor = cost(problem, best, &covariance, &best.u, &best.prediction);
     best.members
         .iter()

@@ -1,12 +1,13 @@
 //! The gap left on parts of the operating space that the fit did not see.
 
 use crate::constants::Constants;
-use crate::evidence::Posterior;
+use crate::evidence::{Posterior, net_change};
 use crate::fit::{Member, Problem};
 use crate::gaussian::Covariance;
 use crate::hypotheses::Fitted;
 use crate::layout::Layout;
 use crate::least_squares::{Fit, minimise};
+use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -40,10 +41,14 @@ pub struct Region {
     pub errors: Errors,
     /// Whether the rest of the table holds enough of the gap, and of each cause's own part, to learn from.
     pub informed: bool,
+    /// Whether it judges at all: not where the rest has one level of a covariate and so tells nothing of the cause.
+    pub judges: bool,
 }
 
 /// Ratio of the largest to the smallest value within which a covariate has one level.
 const ONE_LEVEL: f64 = 1.05;
+/// The same with the scatter of a setting that is measured.
+const SAME_LEVEL: f64 = 1.1;
 /// Share of a pass by which a count may miss a bound for rounding.
 const ROUNDING: f64 = 1e-6;
 /// Relative difference within which two frequencies are one.
@@ -111,7 +116,7 @@ pub fn full_friction(problem: &Problem) -> Vec<f64> {
     problem.passes.iter().map(|p| problem.nominal.mu0 * p.normal_force_n).collect()
 }
 
-/// Measured less expected at rows that a refit to the others did not see, in deviations of a pass; and the refit.
+/// Measured less expected at rows that a refit to the others did not see, N; and the refit.
 ///
 /// By least squares: a departure from form would take up part of what the rest shows of the cause, and leave the form
 /// to predict less than it can. On sealed sets causes close more that way (a cause whose standing wave is not the
@@ -119,11 +124,10 @@ pub fn full_friction(problem: &Problem) -> Vec<f64> {
 fn left_out(rest: &Problem, out: &Problem, members: &[Member], start: &[f64]) -> (DVector<f64>, Fit) {
     let refit = minimise(rest, members, start, &rest.variance, ROUNDS);
     let expected = out.predict(members, &refit.u);
-    let one = |i: usize| (out.lateral[i] - expected[i]) / out.variance[i].sqrt();
-    (DVector::from_fn(out.len(), |i, _| one(i)), refit)
+    (DVector::from_column_slice(&out.lateral) - expected, refit)
 }
 
-/// Covariance of a region's passes in their own deviations: scatter, and what the rest leaves open of the baseline.
+/// Covariance of a region's passes: scatter, and what the rest leaves open of the baseline.
 ///
 /// Stiffnesses that the rest does not tell carry baseline and hypothesis off together where they begin to matter; that
 /// says nothing of the cause. What the rest leaves open of the hypothesis is not granted: unlisted that a free shape
@@ -139,8 +143,31 @@ fn metric(rest: &Problem, out: &Problem, baseline: &Fit) -> Covariance {
     let (seen, asked) = (whitened(rest), whitened(out));
     let precision = seen.transpose() * &seen + DMatrix::from_diagonal(&rest.prior_precision(&[]).into());
     let root = precision.cholesky().and_then(|c| c.l().solve_lower_triangular(&asked.transpose()));
-    let open = root.map_or_else(|| DMatrix::zeros(out.len(), 0), |r| r.transpose());
-    Covariance::new(&vec![1.0; out.len()], &open)
+    let mut open = root.map_or_else(|| DMatrix::zeros(out.len(), 0), |r| r.transpose());
+    for (i, v) in out.variance.iter().enumerate() {
+        open.row_mut(i).scale_mut(v.sqrt());
+    }
+    out.covariance(&open)
+}
+
+/// Whether the rest of a table has one level of a covariate that has more in the whole, and what the cause changes there is
+/// but another baseline: a law cannot be learnt from one level.
+fn tells_nothing(problem: &Problem, rest: &Problem, best: &Posterior) -> bool {
+    let levels: [fn(&Condition) -> f64; 4] =
+        [|p| p.amplitude.metres(), |p| p.speed_m_s, |p| p.normal_force_n, |p| p.frequency_hz];
+    let one = |p: &Problem, value: fn(&Condition) -> f64| {
+        let seen = p.passes.iter().map(value).filter(|v| *v > 0.0);
+        let (low, high) = seen.fold((f64::INFINITY, 0.0f64), |(a, b), v| (a.min(v), b.max(v)));
+        high <= low * SAME_LEVEL
+    };
+    if !levels.into_iter().any(|value| one(rest, value) && !one(problem, value)) {
+        return false;
+    }
+    let chi2 = |p: &Problem, change: &DVector<f64>| -> f64 {
+        change.iter().zip(&p.variance).map(|(c, v)| c * c / v).sum()
+    };
+    let there = net_change(rest, &best.u, &rest.predict(&best.members, &best.u));
+    chi2(rest, &there) < problem.constants.informed_share * chi2(problem, &best.change)
 }
 
 /// All other rows.
@@ -174,9 +201,7 @@ fn own_changes(problem: &Problem, best: &Posterior) -> Vec<Vec<f64>> {
 pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
     let problem = &fitted.problem;
     let k = &problem.constants;
-    let whole: f64 = (0..problem.len())
-        .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.variance[i] - 1.0)
-        .sum();
+    let whole = problem.misfit(&fitted.none.prediction) - problem.len() as f64;
     let own = own_changes(problem, best);
     regions(problem)
         .into_par_iter()
@@ -193,12 +218,11 @@ pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
             let n = out.len();
             let mean = |r: &DVector<f64>| metric.quadratic(r) / n.max(1) as f64;
             let errors = Errors { passes: n, recalibrated: mean(&baseline), after: mean(&hypothesis) };
-            let gap: f64 = (0..rest.len())
-                .map(|i| (rest.lateral[i] - refit.prediction[i]).powi(2) / rest.variance[i] - 1.0)
-                .sum();
+            let gap = rest.misfit(&refit.prediction) - rest.len() as f64;
             let scatter = (2.0 * rest.len() as f64).sqrt();
             let informed = shown && gap > k.carrying_sd * scatter && gap > k.informed_share * whole;
-            Region { name, rows, errors, informed }
+            let judges = !tells_nothing(problem, &rest, best);
+            Region { name, rows, errors, informed, judges }
         })
         .collect()
 }
@@ -235,7 +259,7 @@ pub fn gate(k: &Constants, regions: &[Region]) -> Gate {
     let share = |gap: f64, left: f64| (gap > 0.0).then(|| 1.0 - (left.max(0.0) / gap).sqrt());
     let (mut gap, mut left, mut passes) = (0.0, 0.0, 0.0);
     let (mut carrying, mut closed) = (0, 0);
-    for r in regions {
+    for r in regions.iter().filter(|r| r.judges) {
         let e = &r.errors;
         let n = e.passes as f64;
         let scatter = (2.0 * n).sqrt();
@@ -271,7 +295,7 @@ mod tests {
         let mut rig = rig();
         rig.finger.stiffness_relative_sd = 0.3;
         let mut problem = Problem::new(&table, &rig, &Default::default());
-        crate::noise::settle(&table, &rig, &mut problem);
+        crate::noise::settle(&table, &rig, &mut problem, &[]);
         let still: Vec<usize> =
             (0..problem.len()).filter(|&i| problem.passes[i].amplitude.metres() == 0.0).collect();
         let nominal = problem.jacobian(&[], &[0.0; 3], &problem.predict(&[], &[0.0; 3]));
@@ -286,7 +310,7 @@ mod tests {
         let open = (asked[(0, 1)].powi(2) + asked[(0, 2)].powi(2) + asked[(0, 0)].powi(2) / (1.0 + mu0))
             / out.variance[0];
         assert!(open > 0.5, "{open}");
-        let miss = DVector::from_element(1, 2.5);
+        let miss = DVector::from_element(1, 2.5 * out.variance[0].sqrt());
         let counted = metric(&rest, &out, &fit).quadratic(&miss);
         assert!((counted - 6.25 / (1.0 + open)).abs() < 1e-9 * counted, "{counted} {open}");
     }

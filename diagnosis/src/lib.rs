@@ -3,7 +3,7 @@
 //! | room | purpose |
 //! |---|---|
 //! | [`data`] | the table: passes in the order of measurement, and what its design can show |
-//! | [`noise`] | the variance of each pass, from rig.toml and replicates |
+//! | [`noise`], [`scatter`] | the variance of each pass, from rig.toml, replicates and the table itself: suspects, shifts of runs |
 //! | [`constants`] | every tunable constant with its meaning and source |
 //! | [`fit`], [`layout`], [`least_squares`] | the regression problem of a hypothesis, its vector of parameters, its fit |
 //! | [`gaussian`], [`kernel`] | Gaussian algebra of low rank; smooth functions over the operating space |
@@ -16,7 +16,7 @@
 //! | [`locate`] | which part of the operating space, and of the rig, carries the gap |
 //! | [`shrinkage`], [`predict`] | how far the gap shrinks on held-out passes; the predictive distribution |
 //! | [`next`] | the experiment that would part the leading hypotheses |
-//! | [`verdict`], [`saved`] | the report; the corrected model for a run |
+//! | [`verdict`], [`remarks`], [`saved`] | the report; remarks beside it; the corrected model for a run |
 //!
 //! docs/diagnosis/model.md states the whole model once. A small table in, a verdict out:
 //!
@@ -59,7 +59,9 @@ pub mod noise;
 pub mod pairs;
 pub mod predict;
 pub mod pulls;
+pub mod remarks;
 pub mod saved;
+pub mod scatter;
 pub mod shrinkage;
 pub mod singles;
 pub mod starts;

@@ -74,7 +74,7 @@ pub fn regions(fitted: &Fitted, rig: &RigFile, model: &(Model, Problem, Posterio
         .collect();
     let total: f64 = weight.iter().sum();
     let residual: Vec<f64> = (0..n)
-        .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.variance[i])
+        .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.whole_variance(i))
         .collect();
     let cuts = cuts(&places);
     let tries: f64 = cuts.iter().map(|c| 2.0 * c.at.len() as f64).sum::<f64>().max(1.0);

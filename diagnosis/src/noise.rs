@@ -1,9 +1,11 @@
 //! The variance of each pass: stated repeatability, checked against replicates, never fitted to a residual.
 
+use crate::constants::Constants;
 use crate::data::{RigFile, Table};
 use crate::discrepancy::{Discrepancy, lengths};
 use crate::fit::Problem;
 use crate::least_squares::minimise;
+use crate::scatter::{self, Scatter};
 use models::condition::Condition;
 use models::covariate;
 use models::quantity::PeakToPeak;
@@ -30,34 +32,40 @@ const NEAR_IN_PLACE: f64 = 0.01;
 /// Before the level of friction is known: relative deviation of a pass, and the share of full friction added to its level.
 const ROUGH_SD: f64 = 0.1;
 const ROUGH_LEVEL: f64 = 0.05;
+/// Deviations, before the level is known, from which a pass counts by its distance; rounds of each of the first two fits.
+const BOUNDED_SD: f64 = 3.0;
+const START_ROUNDS: usize = 12;
 
-/// Fills in the problem's variances and gives the smooth surface on which they rest.
-pub fn settle(table: &Table, rig: &RigFile, problem: &mut Problem) -> (Discrepancy, PureError) {
-    let start = minimise(problem, &[], &[0.0; 3], &rough(problem, rig), 12);
-    problem.variance = variance(problem, rig, &start.u, start.prediction.as_slice(), 1.0);
-    // The level of friction enters the variance: it is taken from a smooth surface, not from the baseline.
-    let k = problem.constants.clone();
-    let lengths = lengths(&k, table);
-    let first = Discrepancy::fit(table, problem, &start.u, &lengths[..1]);
-    let level: Vec<f64> = first.smooth.iter().copied().collect();
-    problem.variance = variance(problem, rig, &start.u, &level, 1.0);
-    let pure = replicates(table, problem, &level);
-    for v in &mut problem.variance {
-        *v *= pure.used;
-    }
-    let second = Discrepancy::fit(table, problem, &start.u, &lengths);
-    let far: Vec<f64> = (0..problem.len())
-        .map(|i| (problem.lateral[i] - second.smooth[i]).abs() / problem.variance[i].sqrt())
+/// Fills in the problem's scatter and gives the smooth surface beside it. Rows that are `trusted` count as any other,
+/// however far off they lie.
+pub fn settle(
+    table: &Table,
+    rig: &RigFile,
+    problem: &mut Problem,
+    trusted: &[usize],
+) -> (Discrepancy, PureError, Scatter) {
+    let rough = rough(problem, rig);
+    let mut start = minimise(problem, &[], &[0.0; 3], &rough, START_ROUNDS);
+    // A pass far off must not carry the start with it: beyond some deviations it counts by its distance.
+    let bounded: Vec<f64> = (0..problem.len())
+        .map(|i| {
+            let far = (problem.lateral[i] - start.prediction[i]).abs() / rough[i].sqrt();
+            rough[i] * (far / BOUNDED_SD).max(1.0).powi(2)
+        })
         .collect();
-    let count = far.iter().filter(|d| **d > k.outlier_sd).count();
-    if count > 0 && (count as f64) <= k.outlier_share * problem.len() as f64 + 1.0 {
-        for (v, d) in problem.variance.iter_mut().zip(&far) {
-            if *d > k.outlier_sd {
-                *v *= (d / k.outlier_reach).powi(2);
-            }
-        }
-    }
-    (second, pure)
+    start = minimise(problem, &[], &start.u, &bounded, START_ROUNDS);
+    let center = start.u;
+    // The level of friction enters the variance: it is taken from a smooth surface, not from the baseline.
+    let stated = |level: &[f64]| variance(problem, rig, &center, level, 1.0);
+    let mut scatter = scatter::estimate(table, problem, &center, &stated, trusted);
+    let stated: Vec<f64> =
+        stated(&scatter.level).iter().zip(&scatter.inflation).map(|(v, i)| v * i).collect();
+    let pure = replicates(table, problem, &stated, &scatter);
+    problem.variance = stated.iter().map(|v| v * pure.used).collect();
+    scatter.scale = pure.used.sqrt();
+    scatter.enter(table, problem);
+    let lengths = lengths(&problem.constants, table);
+    (Discrepancy::fit(table, problem, &center, &lengths), pure, scatter)
 }
 
 fn rough(problem: &Problem, rig: &RigFile) -> Vec<f64> {
@@ -92,8 +100,9 @@ pub fn variance(problem: &Problem, rig: &RigFile, center: &[f64], level: &[f64],
         .collect()
 }
 
-/// Repeats of one condition, compared among themselves after a common drift in time is taken out.
-fn replicates(table: &Table, problem: &Problem, smooth: &[f64]) -> PureError {
+/// Repeats of one condition, compared among themselves after a common drift in time is taken out; and, where they leave it
+/// open, the scatter about the baseline if that is all there is.
+fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scatter) -> PureError {
     let mut groups: std::collections::BTreeMap<[Option<i64>; 6], Vec<usize>> =
         std::collections::BTreeMap::new();
     for (i, p) in table.passes.iter().enumerate() {
@@ -114,17 +123,34 @@ fn replicates(table: &Table, problem: &Problem, smooth: &[f64]) -> PureError {
                 continue;
             }
             // What regulation leaves of the load's scatter is taken out along the smooth surface.
-            let difference = (table.lateral[i] - smooth[i]) - (table.lateral[j] - smooth[j]);
-            sum += difference * difference / (problem.variance[i] + problem.variance[j]);
+            let difference = (table.lateral[i] - scatter.level[i]) - (table.lateral[j] - scatter.level[j]);
+            sum += difference * difference / (variance[i] + variance[j]);
             freedom += 1;
         }
     }
     let k = &problem.constants;
-    let used = (k.stated_freedom + sum) / (k.stated_freedom + freedom as f64);
+    let repeated = (k.stated_freedom + sum) / (k.stated_freedom + freedom as f64);
     // Scatter below the statement is believed only as far as the replicates carry it.
+    let repeated = repeated.clamp(k.variance_factor_bounds[0], k.variance_factor_bounds[1]);
+    let used =
+        repeated * (scatter.bare_scale.powi(2) / repeated).max(1.0).powf(believed(k, scatter, sum, freedom));
     PureError {
         degrees_of_freedom: freedom,
         variance_ratio: (freedom > 0).then(|| sum / freedom as f64),
-        used: used.clamp(k.variance_factor_bounds[0], k.variance_factor_bounds[1]),
+        used,
     }
+}
+
+/// How far a scatter about the recalibrated baseline is scatter, and no structure that no surface follows: less where a
+/// surface does better, where it clusters, and where replicates, which see no structure, scatter less.
+fn believed(k: &Constants, scatter: &Scatter, sum: f64, freedom: usize) -> f64 {
+    let square = scatter.bare_scale.powi(2);
+    let ratio = sum / (freedom as f64 * square).max(f64::MIN_POSITIVE);
+    let pure = if freedom > 0 && ratio < 1.0 {
+        0.5 * freedom as f64 * (ratio - 1.0 - ratio.max(1e-6).ln())
+    } else {
+        0.0
+    };
+    let clustered = scatter.clustered_p.powi(2) / (scatter.clustered_p.powi(2) + k.clustered_p.powi(2));
+    clustered / (1.0 + (scatter.structure_nats + pure - k.structure_nats).exp())
 }

@@ -126,12 +126,7 @@ fn forecast_part(
     passes: &[Condition],
 ) -> Vec<Forecast> {
     let n = passes.len();
-    let out = Problem {
-        passes: passes.to_vec(),
-        lateral: vec![0.0; n],
-        variance: vec![1.0; n],
-        ..problem.select(&[])
-    };
+    let out = problem.at(passes);
     let nominal = out.predict(&[], &[0.0; NUISANCES]);
     let recalibrated = out.predict(&[], &baseline.u);
     let (form, corrected, spread): (DVector<f64>, DVector<f64>, Vec<f64>) = match model {
@@ -170,7 +165,7 @@ fn forecast_part(
         }
     };
     let level: Vec<f64> = corrected.iter().copied().collect();
-    let scatter = crate::noise::variance(&out, rig, &baseline.u, &level, fitted.pure.used);
+    let scatter = fitted.scatter_of_a_pass(&out, rig, &baseline.u, &level);
     (0..n)
         .map(|i| Forecast {
             baseline: nominal[i],
@@ -200,9 +195,10 @@ fn departure_covariance(fitted: &Fitted, problem: &Problem, e: &Posterior) -> DM
         })
         .collect();
     let mut phi = fitted.kernel.matrix(&places);
-    for (i, v) in problem.variance.iter().enumerate() {
-        phi.row_mut(i).scale_mut(e.share * e.change[i] / v.sqrt());
+    for (mut row, change) in phi.row_iter_mut().zip(e.change.iter()) {
+        row.scale_mut(e.share * change);
     }
-    let gram = phi.transpose() * &phi + DMatrix::identity(r, r);
+    let gram =
+        problem.covariance(&DMatrix::zeros(problem.len(), 0)).inner(&phi, &phi) + DMatrix::identity(r, r);
     gram.cholesky().map_or_else(|| DMatrix::identity(r, r), |c| c.inverse())
 }

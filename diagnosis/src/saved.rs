@@ -24,7 +24,8 @@ impl Diagnosis {
         };
         let errors = best.members.iter().map(|m| known()[m.effect].interpolation_error());
         let gap = &self.report.gap;
-        let left = (gap.form_alone_rmse.powi(2) - gap.noise_floor_rmse.powi(2)).max(0.0).sqrt();
+        let square = |rmse: Option<f64>| rmse.unwrap_or(0.0).powi(2);
+        let left = (square(gap.form_alone_rmse) - square(gap.noise_floor_rmse)).max(0.0).sqrt();
         Some(SavedModel {
             schema: "muprime.model/1".to_string(),
             verdict: self.report.text.clone(),

@@ -19,21 +19,21 @@ const LEAST_DRAWS: usize = 20;
 /// Quantiles of a 95 % interval.
 const CI95: [f64; 2] = [0.025, 0.975];
 
-/// The gap in units of full friction, on held-out passes.
+/// The gap in units of full friction, on held-out passes; none where the table is too short to hold passes out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gap {
     /// Unit of the errors.
     pub unit: &'static str,
     /// Of the nominal baseline.
-    pub before_rmse: f64,
+    pub before_rmse: Option<f64>,
     /// Of the recalibrated baseline.
-    pub recalibrated_rmse: f64,
+    pub recalibrated_rmse: Option<f64>,
     /// Of the verdict's model.
-    pub after_rmse: f64,
+    pub after_rmse: Option<f64>,
     /// Of the named effects in the library's own form, without the smooth departure from it.
-    pub form_alone_rmse: f64,
+    pub form_alone_rmse: Option<f64>,
     /// What repeatability leaves.
-    pub noise_floor_rmse: f64,
+    pub noise_floor_rmse: Option<f64>,
     /// Share of the removable gap that is closed; none where there is no gap to shrink.
     pub shrinkage: Option<f64>,
     /// Its interval over groups of passes (bootstrap, 95 per cent).
@@ -80,7 +80,7 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
     let groups = groups(table, k.folds);
     let full = full_friction(&fitted.problem);
     let folds = k.folds.min(groups.iter().copied().max().unwrap_or(0) + 1).max(2);
-    let per_fold: Vec<Vec<(usize, [f64; 5])>> = (0..folds)
+    let per_fold: Vec<Vec<(usize, f64, [f64; 5])>> = (0..folds)
         .into_par_iter()
         .map(|fold| {
             let (out, kept): (Vec<usize>, Vec<usize>) =
@@ -94,24 +94,29 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
                 .iter()
                 .zip(&out)
                 .map(|(f, &i)| {
-                    let e = |m: f64| ((table.lateral[i] - m) / full[i]).powi(2);
-                    let floor = fitted.problem.variance[i] / (full[i] * full[i]);
-                    (groups[i], [e(f.baseline), e(f.recalibrated), e(f.corrected), e(f.form), floor])
+                    // A pass that may not belong counts for little, in errors and floor alike.
+                    let inflation = fitted.scatter.inflation[i];
+                    let e = |m: f64| ((table.lateral[i] - m) / full[i]).powi(2) / inflation;
+                    let common = fitted.problem.common.row(i).norm_squared();
+                    let own = fitted.problem.variance[i] / inflation;
+                    let floor = (own + common) / (full[i] * full[i]) / inflation;
+                    let errors = [e(f.baseline), e(f.recalibrated), e(f.corrected), e(f.form), floor];
+                    (groups[i], 1.0 / inflation, errors)
                 })
                 .collect()
         })
         .collect();
     let mut sums: std::collections::BTreeMap<usize, ([f64; 5], f64)> = std::collections::BTreeMap::new();
-    for (group, e) in per_fold.into_iter().flatten() {
+    for (group, weight, e) in per_fold.into_iter().flatten() {
         let entry = sums.entry(group).or_default();
         for k in 0..5 {
             entry.0[k] += e[k];
         }
-        entry.1 += 1.0;
+        entry.1 += weight;
     }
     let list: Vec<([f64; 5], f64)> = sums.into_values().collect();
     let mean = |list: &[([f64; 5], f64)]| {
-        let n: f64 = list.iter().map(|g| g.1).sum::<f64>().max(1.0);
+        let n: f64 = list.iter().map(|g| g.1).sum::<f64>().max(f64::MIN_POSITIVE);
         let mut m = [0.0; 5];
         for g in list {
             for k in 0..5 {
@@ -127,7 +132,7 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
     };
     let passes = table.len() as f64;
     // The mean square of n scatters about the floor has a relative deviation of sqrt(2/n).
-    let gapless = all[1] <= all[4] * (1.0 + k.gapless_sd * (2.0 / passes).sqrt());
+    let gapless = list.is_empty() || all[1] <= all[4] * (1.0 + k.gapless_sd * (2.0 / passes).sqrt());
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
     let mut draws: Vec<f64> = (0..k.resamples)
         .filter_map(|_| {
@@ -139,13 +144,14 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
     draws.sort_by(f64::total_cmp);
     let quantile = |q: f64| draws[((draws.len() - 1) as f64 * q).round() as usize];
     let removable = all[1] - all[4];
+    let rms = |k: usize| (!list.is_empty()).then(|| all[k].sqrt());
     Gap {
         unit: "mu_relative",
-        before_rmse: all[0].sqrt(),
-        recalibrated_rmse: all[1].sqrt(),
-        after_rmse: all[2].sqrt(),
-        form_alone_rmse: all[3].sqrt(),
-        noise_floor_rmse: all[4].sqrt(),
+        before_rmse: rms(0),
+        recalibrated_rmse: rms(1),
+        after_rmse: rms(2),
+        form_alone_rmse: rms(3),
+        noise_floor_rmse: rms(4),
         shrinkage: if gapless { None } else { shrink(&all) },
         shrinkage_ci95: (!gapless && draws.len() > LEAST_DRAWS).then(|| CI95.map(quantile)),
         unexplained_share: (!gapless).then(|| (all[2] - all[4]).max(0.0) / removable),

@@ -9,6 +9,8 @@ use crate::next::{Experiment, experiments};
 use crate::noise::PureError;
 use crate::predict::{Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
+use crate::remarks::{WithSuspects, of_scatter, of_table, with_suspects};
+use crate::scatter::Scatter;
 use crate::shrinkage::{Gap, gap};
 use effects::imitated;
 use serde::Serialize;
@@ -90,6 +92,11 @@ pub struct Report {
     pub left_out: LeftOut,
     /// What the replicates said about the stated repeatability.
     pub pure_error: PureError,
+    /// What the table says about its own scatter: shifts of runs, suspect passes.
+    pub scatter: Scatter,
+    /// The verdict if suspect passes counted as any other; none where no pass is suspect.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub with_suspects: Option<WithSuspects>,
     /// How far the verdict's model had to pull the stiffnesses from their calibration; empty for `unknown`, which
     /// has no model that holds.
     pub stiffness_pulls: Vec<Pull>,
@@ -137,22 +144,9 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     let parameters = asked.map(|best| estimates(&fitted.problem, best, &fitted.basis));
     let hypotheses = hypotheses(&fitted, &decision, parameters.as_ref());
     let next_experiment = experiments(&fitted, table, rig, &decision);
-    let mut remarks = Vec::new();
-    if leader.is_none() {
-        remarks.push(
-            "No effect of the library could be tried on this table: `not_testable` says what is missing."
-                .into(),
-        );
-    }
-    if table.still_coefficient().is_none() {
-        remarks.push("No pass has the plate still: mu0 is unknown and was fitted; add w = 0 passes.".into());
-    }
-    if fitted.pure.variance_ratio.is_none() {
-        remarks.push(
-            "No replicates lie close together: the repeatability stated in rig.toml stands for pure error."
-                .into(),
-        );
-    }
+    let with_suspects = with_suspects(&fitted, table, rig, options);
+    let mut remarks = of_table(&fitted, table, &decision);
+    remarks.extend(of_scatter(&fitted, &decision, with_suspects.as_ref()));
     let stiffness_pulls = match decision.verdict {
         Verdict::NoGap => pulls(&fitted.problem, &fitted.none, &fitted.none),
         Verdict::Named | Verdict::Ambiguous => {
@@ -171,10 +165,16 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
             pooled_closure: decision.gate.pooled,
             carrying: decision.gate.carrying,
             closed: decision.gate.closed,
-            regions: decision.regions.iter().map(|r| (r.name.clone(), r.errors.closed())).collect(),
+            regions: decision
+                .regions
+                .iter()
+                .map(|r| (r.name.clone(), r.errors.closed().filter(|_| r.judges)))
+                .collect(),
         },
         gap,
         pure_error: fitted.pure,
+        scatter: fitted.scatter.clone(),
+        with_suspects,
         stiffness_pulls,
         not_testable: fitted
             .not_testable
@@ -194,8 +194,18 @@ fn label(fitted: &Fitted, candidate: usize) -> String {
 
 fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
     let closed = gap.shrinkage.map_or_else(
-        || "held-out passes leave no gap to shrink".to_string(),
-        |s| format!("the gap shrinks by {:.0} % on held-out passes", 100.0 * s),
+        || match gap.before_rmse {
+            Some(_) => "held-out passes leave no gap to shrink".to_string(),
+            None => "the table is too short to hold passes out".to_string(),
+        },
+        |s| {
+            let percent = 100.0 * s.abs();
+            if s < 0.0 {
+                format!("on held-out passes it closes nothing: the gap grows by {percent:.0} %")
+            } else {
+                format!("the gap shrinks by {percent:.0} % on held-out passes")
+            }
+        },
     );
     let leader = decision.leader().unwrap_or_default();
     match decision.verdict {

@@ -10,6 +10,7 @@
 //! | [`design`] | which passes were made |
 //! | [`oracle`] | what the noise-free data could tell at best |
 //! | [`imitate`] | which other cause would do as well |
+//! | [`rough`] | sets whose scatter is not what rig.toml states |
 //! | [`form`] | how far a cause may depart from its formula |
 //! | `bench` | fingertip, noise, sizes, and the measurement itself |
 //! | `files` | the folders |
@@ -20,6 +21,7 @@ mod files;
 pub mod form;
 pub mod imitate;
 pub mod oracle;
+pub mod rough;
 
 use models::condition::Condition;
 use models::record::Pass;
@@ -27,8 +29,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::defects::{ALL, Defect, Defects, Kind};
 use crate::noise::Noise;
-use bench::Bench;
 pub use bench::SetNoise;
+use bench::{Bench, GAP};
 use design::{Design, Planned};
 use imitate::Imitator;
 use oracle::{Case, Fit};
@@ -234,7 +236,7 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
     let bench = Bench::draw(&mut noise, seed);
     let kinds = stratum.kinds(&mut noise);
     let seen = bench.circumstances(&planned, true, &mut noise);
-    let defects = bench.sized(&kinds, &seen, &mut noise);
+    let defects = bench.sized(&kinds, &seen, GAP, &mut noise);
     let passes = bench.measure(&seen, &planned, &defects, &mut noise);
 
     let data = bench.noise_free(&seen, &defects);

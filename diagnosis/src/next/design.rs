@@ -123,6 +123,7 @@ mod tests {
             problem.lateral.push(*force);
             problem.variance.push(*variance);
         }
+        problem.common = problem.common.resize_vertically(problem.passes.len(), 0.0);
         let largest = problem.design.largest_amplitude_m;
         let places: Vec<_> = problem
             .passes

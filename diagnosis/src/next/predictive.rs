@@ -36,12 +36,7 @@ pub fn predictives(
     grid: &[Condition],
 ) -> Vec<Predictive> {
     let k = &fitted.problem.constants;
-    let problem = Problem {
-        passes: grid.to_vec(),
-        lateral: vec![0.0; grid.len()],
-        variance: vec![1.0; grid.len()],
-        ..fitted.problem.select(&[])
-    };
+    let problem = fitted.problem.at(grid);
     let places: Vec<_> = grid
         .iter()
         .map(|p| fitted.coordinates.place(p, problem.design.largest_amplitude_m, &form_lengths(k)))
@@ -74,7 +69,7 @@ pub fn predictives(
     });
 
     let level: Vec<f64> = list[0].mean.iter().copied().collect();
-    let scatter = crate::noise::variance(&problem, rig, &fitted.none.u, &level, fitted.pure.used);
+    let scatter = fitted.scatter_of_a_pass(&problem, rig, &fitted.none.u, &level);
     for belief in &mut list {
         belief.scatter.clone_from(&scatter);
     }
@@ -116,11 +111,7 @@ fn expected(
             asked.set_column(d + k, &(basis.column(k).component_mul(&change) * e.share));
         }
     }
-    let mut whitened = seen;
-    for (i, v) in problem.variance.iter().enumerate() {
-        whitened.row_mut(i).scale_mut(1.0 / v.sqrt());
-    }
-    let mut precision = whitened.transpose() * &whitened;
+    let mut precision = problem.covariance(&DMatrix::zeros(problem.len(), 0)).inner(&seen, &seen);
     for (k, p) in problem.prior_precision(&e.members).iter().enumerate() {
         // A uniform prior is as wide as its bounds; a little keeps what the table does not touch finite.
         precision[(k, k)] += p.max(1e-2);

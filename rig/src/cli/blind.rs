@@ -36,6 +36,10 @@ pub struct Args {
     /// Instead: designed next experiments against random ones.
     #[arg(long, conflicts_with_all = ["write", "stratum"])]
     pub further: bool,
+    /// Instead: sets whose scatter is not what rig.toml states: gaussian, heavy, serial, gross, understated, runs, or all; so
+    /// many of each truth (none, a squeeze film, friction that depends on load, an offset).
+    #[arg(long, value_name = "KIND", conflicts_with_all = ["further", "write", "same_form", "stratum"])]
+    pub noise: Option<String>,
     /// Set a constant of the diagnosis for this study (may be repeated); docs/diagnosis/constants.md lists them.
     #[arg(long, value_name = "NAME=VALUE", hide = true)]
     pub constant: Vec<String>,
@@ -92,6 +96,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let options =
         Options { constants: Arc::new(constants), pairs: !args.no_pairs, without: args.without.clone() };
+    if let Some(kind) = args.noise.as_deref() {
+        return rough(&args, kind, &options, json);
+    }
     if let Some(asked) = args.sensitivity.as_deref() {
         return sensitivity(&args, asked, stratum, &options, json);
     }
@@ -120,6 +127,58 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             let list: Vec<String> = answers.iter().map(|(a, n)| format!("{a} {n}")).collect();
             out!("  {truth:40} {}", list.join("; "));
         }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Answers on scatter that is not what rig.toml states.
+fn rough(args: &Args, kind: &str, options: &Options, json: bool) -> miette::Result<ExitCode> {
+    use crate::validation::blind::rough::{Answers, TRUTHS, run};
+    use sim::sealed::rough::{RoughSet, Roughness};
+    let picked: Vec<_> =
+        Roughness::ALL.into_iter().filter(|(name, _)| kind == "all" || kind == *name).collect();
+    if picked.is_empty() {
+        let names: Vec<&str> = Roughness::ALL.iter().map(|k| k.0).collect();
+        miette::bail!("--noise {kind}: {} or all is needed", names.join(", "));
+    }
+    let mut rows: Vec<Answers> = Vec::new();
+    if !json {
+        out!(
+            "| scatter | truth | sets | right | wrong | ambiguous | unknown | missed | bad passes found | others suspect |"
+        );
+        out!("|---|---|---|---|---|---|---|---|---|---|");
+    }
+    let each = |seed: u64, set: &RoughSet, report: &diagnosis::verdict::Report| {
+        if args.verbose {
+            let suspects: Vec<u64> = report.scatter.suspects.iter().map(|s| s.point).collect();
+            let text = &report.text;
+            say!("{seed}: bad {:?}, suspect {suspects:?}, {:?}; {text}", set.bad, report.scatter.together_in);
+        }
+    };
+    for kind in picked {
+        for a in run(args.seed, args.sets, kind, &TRUTHS, options, each)? {
+            if !json {
+                let (found, others) = (format!("{}/{}", a.found, a.bad), format!("{}/{}", a.falsely, a.good));
+                out!(
+                    "| {} | {} | {} | {} | {} | {} | {} | {} | {found} | {others} |",
+                    a.noise,
+                    a.truth,
+                    a.sets,
+                    a.right,
+                    a.wrong,
+                    a.ambiguous,
+                    a.unknown,
+                    a.missed
+                );
+            }
+            rows.push(a);
+        }
+    }
+    if json {
+        let document = serde_json::json!({
+            "schema": "muprime.blind.noise/1", "seed": args.seed, "sets": args.sets, "rows": rows,
+        });
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -210,16 +210,20 @@ pub fn terminal(result: &Diagnosis) -> String {
         }
     }
     let g = &r.gap;
+    let told = |rmse: Option<f64>| {
+        rmse.map_or_else(|| "- (too short to hold passes out)".to_string(), |v| format!("{v:.4}"))
+    };
     text.push_str(&format!(
-        "\nGap on held-out passes, in units of full friction\n  nominal baseline      {:.4}\n  recalibrated baseline {:.4}\n  verdict's model       {:.4}\n  repeatability         {:.4}\n",
-        g.before_rmse, g.recalibrated_rmse, g.after_rmse, g.noise_floor_rmse
+        "\nGap on held-out passes, in units of full friction\n  nominal baseline      {}\n  recalibrated baseline {}\n  verdict's model       {}\n  repeatability         {}\n",
+        told(g.before_rmse), told(g.recalibrated_rmse), told(g.after_rmse), told(g.noise_floor_rmse)
     ));
     if let (Some(s), Some([low, high])) = (g.shrinkage, g.shrinkage_ci95) {
         text.push_str(&format!(
-            "  the removable gap shrinks by {:.0} % [{:.0}, {:.0}]\n",
-            100.0 * s,
-            100.0 * low,
-            100.0 * high
+            "  the removable gap {} by {:.0} % [{:.0}, {:.0}]\n",
+            if s < 0.0 { "grows" } else { "shrinks" },
+            100.0 * s.abs(),
+            100.0 * if s < 0.0 { -high } else { low },
+            100.0 * if s < 0.0 { -low } else { high }
         ));
     }
     if !r.location.regions.is_empty() {

@@ -59,6 +59,7 @@ fn gap(result: &Diagnosis) -> String {
     let g = &result.report.gap;
     let largest = [g.before_rmse, g.recalibrated_rmse, g.after_rmse, g.noise_floor_rmse]
         .into_iter()
+        .flatten()
         .fold(1e-12, f64::max);
     let mut rows = String::new();
     for (name, value) in [
@@ -67,6 +68,7 @@ fn gap(result: &Diagnosis) -> String {
         ("verdict's model", g.after_rmse),
         ("repeatability", g.noise_floor_rmse),
     ] {
+        let Some(value) = value else { continue };
         rows.push_str(&format!(
             "<tr><td>{name}</td><td class=\"n\">{value:.4}</td><td><span class=\"bar\" style=\"width:{:.0}px\"></span></td></tr>",
             260.0 * value / largest
@@ -74,11 +76,13 @@ fn gap(result: &Diagnosis) -> String {
     }
     let words = match (g.shrinkage, g.shrinkage_ci95) {
         (Some(s), Some([low, high])) => format!(
-            "The removable gap shrinks by {:.0} % (95 % interval {:.0} to {:.0} %).",
-            100.0 * s,
-            100.0 * low,
-            100.0 * high
+            "The removable gap {} by {:.0} % (95 % interval {:.0} to {:.0} %).",
+            if s < 0.0 { "grows" } else { "shrinks" },
+            100.0 * s.abs(),
+            100.0 * if s < 0.0 { -high } else { low },
+            100.0 * if s < 0.0 { -low } else { high }
         ),
+        _ if g.before_rmse.is_none() => "The table is too short to hold passes out.".to_string(),
         _ => "The recalibrated baseline is within its own sampling error of repeatability: no gap to shrink."
             .to_string(),
     };
@@ -95,7 +99,7 @@ fn maps(result: &Diagnosis, table: &Table) -> miette::Result<String> {
         .iter()
         .enumerate()
         .map(|(i, f)| {
-            let sd = problem.variance[i].sqrt();
+            let sd = (problem.whole_variance(i) / result.fitted.scatter.inflation[i]).sqrt();
             let d = table.passes[i].direction.sign();
             (d * (table.lateral[i] - f.recalibrated) / sd, d * (table.lateral[i] - f.corrected) / sd)
         })

@@ -4,6 +4,7 @@
 //! [`score`], after the verdict stands. Every figure comes with its number of sets and an interval.
 
 pub mod further;
+pub mod rough;
 pub mod same_form;
 pub mod sensitivity;
 

@@ -51,7 +51,7 @@ pub(super) struct NoiseFree {
 }
 
 /// Rms of the recalibrated gap in standard deviations that sizes are drawn for, evenly in the logarithm.
-const GAP: [f64; 2] = [0.12, 20.0];
+pub(super) const GAP: [f64; 2] = [0.12, 20.0];
 /// Halvings of a size's range.
 const HALVINGS: usize = 8;
 
@@ -87,6 +87,11 @@ impl Bench {
             warming_time_s: noise.log_between(40.0, 500.0),
             thermometer: noise.chance(0.6),
         }
+    }
+
+    /// States the repeatability too small by a factor, and else exactly.
+    pub(super) fn exactly_stated(&mut self, too_small: f64) {
+        self.stated = 1.0 / too_small;
     }
 
     /// The true circumstances of planned passes.
@@ -141,14 +146,20 @@ impl Bench {
         }
     }
 
-    /// Causes, each with a size whose recalibrated gap comes nearest to one drawn through the limit of detection.
-    pub(super) fn sized(&self, kinds: &[&'static Kind], points: &[Point], noise: &mut Noise) -> Defects {
+    /// Causes, each with a size whose recalibrated gap, in deviations of a pass, comes nearest to one drawn from a range.
+    pub(super) fn sized(
+        &self,
+        kinds: &[&'static Kind],
+        points: &[Point],
+        gap: [f64; 2],
+        noise: &mut Noise,
+    ) -> Defects {
         let mut out = Defects::none();
         for kind in kinds {
             let mut values = kind.draw(noise);
             kind.turn(&mut values, noise.chance(0.5));
-            let low = if kinds.len() > 1 { 1.0 } else { GAP[0] };
-            let target = noise.log_between(low, GAP[1]);
+            let low = if kinds.len() > 1 { gap[0].max(1.0) } else { gap[0] };
+            let target = noise.log_between(low, gap[1]);
             let (mut small, mut large) = (0.0, 1.0);
             let mut nearest = (f64::INFINITY, values);
             for _ in 0..HALVINGS {
@@ -209,7 +220,7 @@ impl Bench {
             .collect()
     }
 
-    fn row(&self, i: usize, plan: &Planned, point: &Point, normal_n: f64) -> Pass {
+    pub(super) fn row(&self, i: usize, plan: &Planned, point: &Point, normal_n: f64) -> Pass {
         let mut pass = Pass::at(i as u64 + 1, &plan.condition, None);
         pass.amplitude = PeakToPeak::from_metres(point.known_pp_m);
         pass.normal_force_n = normal_n;

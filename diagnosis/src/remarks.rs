@@ -1,0 +1,236 @@
+//! Remarks beside a verdict, in words: what is missing from the table, what was assumed, what its scatter says.
+
+use crate::data::{RigFile, Table};
+use crate::decision::{Decision, Verdict, decide};
+use crate::hypotheses::{Fitted, Options, fit_trusting};
+use crate::scatter::Scatter;
+use models::covariate::{Role, SMOOTH};
+use serde::Serialize;
+
+/// Suspect passes that are told in words, the farthest first.
+const TOLD: usize = 8;
+
+/// The verdict on a table whose suspect passes count as any other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WithSuspects {
+    /// The answer.
+    pub verdict: Verdict,
+    /// The leading effects; none for no gap, `unknown` for the open set.
+    pub effects: Vec<String>,
+    /// Their probability.
+    pub probability: f64,
+}
+
+/// The leading effects of a decision and their probability.
+fn leading(fitted: &Fitted, decision: &Decision) -> (Vec<String>, f64) {
+    match (decision.verdict, decision.leader()) {
+        (Verdict::NoGap, _) => (Vec::new(), decision.none),
+        (Verdict::Named | Verdict::Ambiguous, Some(leader)) => {
+            let names = fitted.candidates[leader].names().iter().map(|n| (*n).to_string()).collect();
+            (names, decision.probabilities[leader])
+        }
+        _ => (vec!["unknown".to_string()], decision.unknown),
+    }
+}
+
+/// The verdict if suspect passes counted as any other; none where no pass is suspect.
+pub fn with_suspects(
+    fitted: &Fitted,
+    table: &Table,
+    rig: &RigFile,
+    options: &Options,
+) -> Option<WithSuspects> {
+    if fitted.scatter.suspects.is_empty() {
+        return None;
+    }
+    let all: Vec<usize> = (0..table.len()).collect();
+    let fitted = fit_trusting(table, rig, options, &all);
+    let decision = decide(&fitted);
+    let (effects, probability) = leading(&fitted, &decision);
+    Some(WithSuspects { verdict: decision.verdict, effects, probability })
+}
+
+/// What a table lacks.
+pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if decision.leader().is_none() {
+        remarks.push(
+            "No effect of the library could be tried on this table: `not_testable` says what is missing."
+                .into(),
+        );
+    }
+    if table.still_coefficient().is_none() {
+        remarks.push("No pass has the plate still: mu0 is unknown and was fitted; add w = 0 passes.".into());
+    }
+    if fitted.pure.variance_ratio.is_none() {
+        remarks.push(
+            "No replicates lie close together: the repeatability stated in rig.toml stands for pure error."
+                .into(),
+        );
+    }
+    remarks.extend(together(table));
+    let silent: Vec<&str> = decision.regions.iter().filter(|r| !r.judges).map(|r| r.name.as_str()).collect();
+    if !silent.is_empty() {
+        remarks.push(format!(
+            "Two levels only: without {} the rest of the table tells nothing of the leading cause, so these regions do not judge it. \
+             A third level would.",
+            silent.join(", ")
+        ));
+    }
+    remarks
+}
+
+/// Correlation from which two covariates change together.
+const TOGETHER: f64 = 0.9;
+
+/// Covariates that change together: what one does this table cannot tell from what the other does.
+fn together(table: &Table) -> Vec<String> {
+    let largest = table.design.largest_amplitude_m;
+    let axes: Vec<(&str, Vec<f64>)> = SMOOTH
+        .iter()
+        .filter(|c| c.role != Role::Climate)
+        .filter_map(|c| {
+            let told: Option<Vec<f64>> =
+                table.passes.iter().map(|p| c.of(p).map(|v| c.scaled(v, largest))).collect();
+            let mut values = told?;
+            let n = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / n;
+            values.iter_mut().for_each(|v| *v -= mean);
+            let norm = values.iter().map(|v| v * v).sum::<f64>().sqrt();
+            values.iter_mut().for_each(|v| *v /= norm);
+            (norm > c.least_spread.max(1e-9) * n.sqrt()).then_some((c.words, values))
+        })
+        .collect();
+    let mut said = Vec::new();
+    for (k, (a, x)) in axes.iter().enumerate() {
+        for (b, y) in &axes[k + 1..] {
+            let r: f64 = x.iter().zip(y).map(|(p, q)| p * q).sum();
+            if r.abs() > TOGETHER {
+                said.push(format!(
+                    "{a} and {b} change together (correlation {r:.2}): this table cannot tell what one does from what the other \
+                     does. Vary one while the other stays."
+                ));
+            }
+        }
+    }
+    said
+}
+
+/// What a table's scatter says.
+pub fn of_scatter(fitted: &Fitted, decision: &Decision, with_suspects: Option<&WithSuspects>) -> Vec<String> {
+    let k = &fitted.problem.constants;
+    let scatter = &fitted.scatter;
+    let mut remarks = Vec::new();
+    if scatter.scale > k.misstated || scatter.scale < 1.0 / k.misstated {
+        remarks.push(format!(
+            "Your stated repeatability is wrong by x{:.2}: so much the passes scatter of what rig.toml states, and so much was \
+             used.{}",
+            scatter.scale,
+            if fitted.pure.variance_ratio.is_none() {
+                " A departure that looks like scatter would do the same: repeat some conditions to tell."
+            } else {
+                ""
+            }
+        ));
+    }
+    if let Some(sd) = scatter.run_relative_sd.filter(|sd| *sd > 0.0) {
+        remarks.push(format!(
+            "The level of friction shifts from run to run by {:.1} % (one standard deviation): counted as scatter of the runs, no \
+             cause is sought for it.",
+            100.0 * sd
+        ));
+    }
+    if scatter.serial_correlation > 0.0 {
+        remarks.push(format!(
+            "The scatter lasts from pass to pass (correlation {:.2}): a slow change of friction must stand out of that.",
+            scatter.serial_correlation
+        ));
+    }
+    if let Some(other) = with_suspects {
+        remarks.push(suspects(scatter, &leading(fitted, decision).0, decision.verdict, other));
+    }
+    if let Some(place) = &scatter.together_in {
+        remarks.push(format!(
+            "Passes that stand out lie together ({place}): they count as a departure, not as bad passes."
+        ));
+    }
+    remarks
+}
+
+fn suspects(scatter: &Scatter, effects: &[String], verdict: Verdict, other: &WithSuspects) -> String {
+    let mut list: Vec<_> = scatter.suspects.iter().collect();
+    list.sort_by(|a, b| b.deviations.abs().total_cmp(&a.deviations.abs()));
+    let told: Vec<String> = list
+        .iter()
+        .take(TOLD)
+        .map(|s| format!("{} (off by {:+.3} N, {:+.1} sd)", s.point, s.residual_n, s.deviations))
+        .collect();
+    let more = match list.len().saturating_sub(TOLD) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    let with = if other.verdict == verdict && other.effects == effects {
+        format!("The verdict is the same with them (probability {:.2})", other.probability)
+    } else {
+        format!("With them it would be {} (probability {:.2})", other.words(), other.probability)
+    };
+    format!(
+        "Suspect passes, which count for little: points {}{more}. {with}. Look them up in the record.",
+        told.join(", ")
+    )
+}
+
+impl WithSuspects {
+    fn words(&self) -> String {
+        let name = match self.verdict {
+            Verdict::NoGap => return "no gap".to_string(),
+            Verdict::Unknown => return "unknown".to_string(),
+            Verdict::Named => "named",
+            Verdict::Ambiguous => "ambiguous",
+        };
+        format!("{name} {}", self.effects.join("+"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::{Deviates, rig, table};
+    use crate::verdict::diagnose;
+
+    /// Load that rises with time is said; a table in random order has nothing to say of the kind.
+    #[test]
+    fn covariates_that_change_together_are_said() {
+        let mut table = table(&mut Deviates(5), 0.0);
+        assert!(together(&table).is_empty(), "{:?}", together(&table));
+        table.passes.iter_mut().for_each(|p| p.normal_force_n = 0.15 * (1.0 + p.time_s / 60.0));
+        let said = together(&table);
+        assert!(said.len() == 1 && said[0].contains("time") && said[0].contains("force"), "{said:?}");
+    }
+
+    /// Two speeds are enough to name friction that depends on speed: without one of them the rest tells nothing, so that region
+    /// does not judge, and that is said.
+    #[test]
+    fn a_law_of_two_levels_is_not_judged_without_one_of_them() {
+        let mut table = table(&mut Deviates(8), 0.0);
+        let mut draw = Deviates(9);
+        for (i, (p, l)) in table.passes.iter_mut().zip(&mut table.lateral).enumerate() {
+            let faster = (i / 2) % 2 == 0;
+            p.speed_m_s = if faster { 0.09 } else { 0.01 };
+            p.amplitude = models::quantity::PeakToPeak::ZERO;
+            let mu = if faster { 0.6 } else { 0.5 };
+            *l = p.direction.sign() * p.normal_force_n * mu * (1.0 + 0.02 * draw.normal());
+        }
+        let result = diagnose(&table, &rig(), &Options { pairs: false, ..Options::default() }, String::new());
+        let silent: Vec<&str> =
+            result.decision.regions.iter().filter(|r| !r.judges).map(|r| r.name.as_str()).collect();
+        assert_eq!(silent, ["low speed", "high speed"], "{}", result.report.text);
+        assert!(
+            result.report.remarks.iter().any(|r| r.starts_with("Two levels only")),
+            "{:?}",
+            result.report.remarks
+        );
+        assert_eq!(result.report.verdict, Verdict::Named, "{}", result.report.text);
+        assert_eq!(result.report.hypotheses[0].effects, ["rate_dependent_friction"]);
+    }
+}

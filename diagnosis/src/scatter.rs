@@ -1,0 +1,179 @@
+//! The scatter of real passes: how wrong the stated repeatability is, what shifts between runs, what lasts from pass to
+//! pass, and which passes do not belong.
+//!
+//! A statement of repeatability is a prior, not a truth. A flexible surface, the open set's, stands for whatever friction may
+//! do over the operating space; what single passes leave beside it is scatter:
+//!
+//! `y = surface + level * shift[run] + e`, `shift ~ N(0, run_sd^2)`,
+//! `e ~ (1 - share) N(0, scale^2 v) + share Cauchy(0, 5 scale sqrt(v))`, correlated from pass to pass.
+//!
+//! Scales climb the marginal likelihood of the surface; responsibilities come from the residual of each pass about a surface
+//! that did not see it (Rasmussen & Williams 2006, section 5.4.2), in turn. A pass counts by its responsibility, so the
+//! answer changes smoothly with the number of bad passes. All hypotheses share the result: none has a scatter of its own.
+
+mod clusters;
+mod serial;
+mod surface;
+mod suspects;
+
+use crate::data::Table;
+use crate::discrepancy::lengths;
+use crate::fit::Problem;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use serde::Serialize;
+use surface::{State, Surface};
+
+/// A pass that does not belong to the rest of its table.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Suspect {
+    /// Number of the point.
+    pub point: u64,
+    /// Row of the table.
+    #[serde(skip)]
+    pub row: usize,
+    /// Measured less what the other passes lead to expect, N.
+    pub residual_n: f64,
+    /// The same in standard deviations of a pass that belongs.
+    pub deviations: f64,
+    /// Probability that it does not belong.
+    pub probability: f64,
+}
+
+/// What a table says about its own scatter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Scatter {
+    /// Standard deviation of a pass over the stated one, as it was used.
+    pub scale: f64,
+    /// Relative standard deviation of the level of friction from run to run; `None` where the table has one run.
+    pub run_relative_sd: Option<f64>,
+    /// Correlation of a pass's scatter with that of the next.
+    pub serial_correlation: f64,
+    /// Passes that do not belong, in the order of the table.
+    pub suspects: Vec<Suspect>,
+    /// Where passes that stand out lie together, which makes them a departure and no bad passes.
+    pub together_in: Option<String>,
+    /// Factor on the variance of each pass: one, and more for a pass that may not belong.
+    #[serde(skip)]
+    pub inflation: Vec<f64>,
+    /// Friction at each pass without its scatter, N.
+    #[serde(skip)]
+    pub level: Vec<f64>,
+    /// Scale of the scatter if the recalibrated baseline were all there is.
+    #[serde(skip)]
+    pub bare_scale: f64,
+    /// Nats by which a surface beats that.
+    #[serde(skip)]
+    pub structure_nats: f64,
+    /// Probability that scatter alone clusters as much as what the baseline leaves.
+    #[serde(skip)]
+    pub clustered_p: f64,
+}
+
+/// Rounds in which scales and responsibilities take turns; in those listed every smoothness is asked: the first says little
+/// while bad passes still speak.
+const ROUNDS: usize = 8;
+const ALL_ASKED: [usize; 2] = [0, 3];
+/// Rounds in which weights are those of Student's t, before there is a scale to go by.
+const HEAVY: usize = 2;
+/// Change of a weight below which the rounds end.
+const SETTLED: f64 = 0.02;
+
+/// Estimates the scatter of a table. `stated` gives the variances that rig.toml states at a level of friction, `trusted`
+/// lists rows that count as any other whatever they say.
+pub fn estimate(
+    table: &Table,
+    problem: &Problem,
+    center: &[f64],
+    stated: &dyn Fn(&[f64]) -> Vec<f64>,
+    trusted: &[usize],
+) -> Scatter {
+    let k = &*problem.constants;
+    let n = problem.len();
+    let surfaces: Vec<Surface> =
+        lengths(k, table).into_par_iter().map(|l| Surface::new(table, problem, center, l)).collect();
+    let start = State::start(table.run_count > 1);
+    let mut level = problem.predict(&[], center).as_slice().to_vec();
+    let mut variance = stated(&level);
+    let mut weight = vec![1.0; n];
+    let (mut best, mut state) = (0, start);
+    for round in 0..ROUNDS {
+        if ALL_ASKED.contains(&round) {
+            let fits: Vec<(f64, State)> =
+                surfaces.par_iter().map(|s| s.climbed(k, &variance, &weight, &level, state)).collect();
+            best = (0..fits.len()).fold(0, |b, i| if fits[i].0 > fits[b].0 { i } else { b });
+            state = fits[best].1;
+        } else {
+            state = surfaces[best].climbed(k, &variance, &weight, &level, state).1;
+        }
+        let seen = surfaces[best].seen(k, &variance, &weight, &level, &state);
+        let mut next = if round < HEAVY {
+            suspects::heavy(&seen.left_out)
+        } else {
+            suspects::weights(k, &suspects::responsibilities(k, &seen.left_out), &seen.left_out)
+        };
+        trusted.iter().for_each(|&i| next[i] = 1.0);
+        let moved = next.iter().zip(&weight).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        (weight, level) = (next, seen.level);
+        variance = stated(&level);
+        if round > ALL_ASKED[1] && moved < SETTLED {
+            break;
+        }
+    }
+    let surface = &surfaces[best];
+    let seen = surface.seen(k, &variance, &weight, &level, &state);
+    let mut outside = suspects::responsibilities(k, &seen.left_out);
+    trusted.iter().for_each(|&i| outside[i] = 0.0);
+    let space = clusters::Space::of(problem);
+    let together_in = suspects::take_back(problem, &space, &mut outside, &seen.left_out);
+    let weight = suspects::weights(k, &outside, &seen.left_out);
+    let (whole, bare) = (
+        surface.climbed(k, &variance, &weight, &level, state).0,
+        surface.bare(k, &variance, &weight, &level, &state),
+    );
+    // A scatter about the baseline has no mean of its own anywhere.
+    let bounded = |(d, w): (&f64, &f64)| (d / w.sqrt()).clamp(-suspects::BOUNDED_SD, suspects::BOUNDED_SD);
+    let about = surface.seen(k, &variance, &weight, &level, &bare.1).beside;
+    let beside: Vec<f64> = about.iter().zip(&weight).map(bounded).collect();
+    let along = beside.iter().zip(&problem.passes).map(|(d, p)| d * p.direction.sign()).collect();
+    let clustered = space.cluster(&[beside, along], &[]).p;
+    let suspect = |i: usize| Suspect {
+        point: table.points[i],
+        row: i,
+        residual_n: seen.missed_n[i],
+        deviations: seen.left_out[i],
+        probability: outside[i],
+    };
+    Scatter {
+        scale: 1.0,
+        run_relative_sd: (table.run_count > 1).then(|| state.run(k)),
+        serial_correlation: serial::correlation(k, table, &seen.beside),
+        suspects: (0..n).filter(|&i| outside[i] > k.suspect_probability).map(suspect).collect(),
+        together_in,
+        inflation: weight.iter().map(|w| 1.0 / w).collect(),
+        level: seen.level,
+        bare_scale: bare.2,
+        structure_nats: (whole - bare.0).max(0.0),
+        clustered_p: clustered,
+    }
+}
+
+impl Scatter {
+    /// Enters a problem whose variances are those of single passes: what passes have in common leaves them and becomes columns
+    /// of its own.
+    pub fn enter(&self, table: &Table, problem: &mut Problem) {
+        let n = problem.len();
+        let (share, mut common) = serial::columns(self.serial_correlation, table, problem, &self.inflation);
+        problem.variance.iter_mut().for_each(|v| *v *= share);
+        if let Some(sd) = self.run_relative_sd.filter(|sd| *sd > 0.0) {
+            let mut shifts = DMatrix::zeros(n, table.run_count);
+            for i in 0..n {
+                shifts[(i, table.runs[i])] = sd * self.level[i];
+            }
+            let first = common.ncols();
+            common = common.resize_horizontally(first + shifts.ncols(), 0.0);
+            common.columns_mut(first, shifts.ncols()).copy_from(&shifts);
+        }
+        problem.common = common;
+    }
+}

@@ -1,0 +1,243 @@
+//! A flexible surface through a table, with the scales of its parts and of the scatter about it.
+
+use crate::constants::Constants;
+use crate::data::Table;
+use crate::discrepancy::Linear;
+use crate::fit::Problem;
+use crate::gaussian::Scaled;
+use crate::kernel::Lengths;
+use crate::layout::NUISANCES;
+use nalgebra::{DMatrix, DVector};
+
+/// Places of the scales on their grids.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    even: usize,
+    odd: usize,
+    /// Stays at the first place, zero, where runs are not told apart.
+    run: usize,
+    scale: usize,
+    with_runs: bool,
+}
+
+/// Sweeps over the four scales.
+const SWEEPS: usize = 12;
+
+impl State {
+    /// Where the climb begins: a small departure, the stated scatter.
+    pub fn start(with_runs: bool) -> Self {
+        State { even: 2, odd: 0, run: usize::from(with_runs), scale: 4, with_runs }
+    }
+
+    /// Relative deviation of the level from run to run.
+    pub fn run(&self, k: &Constants) -> f64 {
+        k.run_sds[self.run]
+    }
+
+    fn scale(&self, k: &Constants) -> f64 {
+        k.scatter_scales[self.scale]
+    }
+
+    fn log_prior(&self, k: &Constants) -> f64 {
+        let (scale, run) = (self.scale(k).ln() / k.scatter_log_sd, self.run(k) / k.run_sd_prior);
+        -0.5 * (scale * scale + run * run) - if self.run > 0 { k.run_nats } else { 0.0 }
+    }
+
+    /// States one step away.
+    fn neighbours(&self, k: &Constants) -> Vec<State> {
+        let step = |at: usize, len: usize| {
+            [at.checked_sub(1), (at + 1 < len).then_some(at + 1)].into_iter().flatten().collect::<Vec<_>>()
+        };
+        let mut list: Vec<State> = Vec::new();
+        list.extend(step(self.scale, k.scatter_scales.len()).iter().map(|&scale| State { scale, ..*self }));
+        list.extend(step(self.even, k.discrepancy_even.len()).iter().map(|&even| State { even, ..*self }));
+        list.extend(step(self.odd, k.discrepancy_odd.len()).iter().map(|&odd| State { odd, ..*self }));
+        if self.with_runs {
+            list.extend(step(self.run, k.run_sds.len()).iter().map(|&run| State { run, ..*self }));
+        }
+        list
+    }
+}
+
+/// A surface at one smoothness: what is to be explained, and the columns that explain it.
+pub struct Surface {
+    linear: Linear,
+    lateral: DVector<f64>,
+    runs: Vec<usize>,
+    run_count: usize,
+}
+
+/// A table beside a surface through it.
+pub struct Seen {
+    /// Each pass's distance from what the others lead to expect, in deviations of a pass that belongs there.
+    pub left_out: Vec<f64>,
+    /// The same distance, N.
+    pub missed_n: Vec<f64>,
+    /// Residual beside the surface in deviations of a pass, bounded where the pass counts for little.
+    pub beside: Vec<f64>,
+    /// The surface, N.
+    pub level: Vec<f64>,
+}
+
+impl Surface {
+    /// The surface of one smoothness.
+    pub fn new(table: &Table, problem: &Problem, center: &[f64], lengths: Lengths) -> Self {
+        Surface {
+            linear: Linear::about(table, problem, center, lengths),
+            lateral: DVector::from_column_slice(&problem.lateral),
+            runs: table.runs.clone(),
+            run_count: if table.run_count > 1 { table.run_count } else { 0 },
+        }
+    }
+
+    /// Columns (those of runs last) and residual in weighted deviations of a pass as stated, with the logarithms of those.
+    fn whitened(&self, variance: &[f64], weight: &[f64], level: &[f64]) -> Whitened {
+        let n = variance.len();
+        let root = DVector::from_fn(n, |i, _| (weight[i] / variance[i]).sqrt());
+        let own = self.linear.columns.ncols();
+        let mut columns = self.linear.columns.clone().resize_horizontally(own + self.run_count, 0.0);
+        if self.run_count > 0 {
+            (0..n).for_each(|i| columns[(i, own + self.runs[i])] = level[i]);
+        }
+        for mut c in columns.column_iter_mut() {
+            c.component_mul_assign(&root);
+        }
+        let z = self.linear.residual.component_mul(&root);
+        Whitened { gram: columns.tr_mul(&columns), score: columns.tr_mul(&z), z, columns, root }
+    }
+
+    fn sizes(&self, k: &Constants, s: &State) -> Vec<f64> {
+        let (r, scale) = (self.linear.kernel.rank(), s.scale(k));
+        let parts = [(r, k.discrepancy_even[s.even]), (r, k.discrepancy_odd[s.odd]), (NUISANCES, 1.0)];
+        let runs = (self.run_count, s.run(k));
+        parts.into_iter().chain([runs]).flat_map(|(count, size)| vec![size / scale; count]).collect()
+    }
+
+    fn log_posterior(&self, k: &Constants, w: &Whitened, s: &State) -> f64 {
+        let Some(parts) = Scaled::new(&w.gram, &w.score, self.sizes(k, s)) else { return f64::NEG_INFINITY };
+        let (n, scale) = (w.z.len() as f64, s.scale(k));
+        let chi2 = (w.z.norm_squared() - parts.explained) / (scale * scale);
+        s.log_prior(k) - 0.5 * (chi2 + parts.log_det) - n * scale.ln()
+    }
+
+    /// Climbs the marginal likelihood, prior included, from a state, a step of one scale at a time; its logarithm is up to what
+    /// all states share.
+    pub fn climbed(
+        &self,
+        k: &Constants,
+        variance: &[f64],
+        weight: &[f64],
+        level: &[f64],
+        start: State,
+    ) -> (f64, State) {
+        self.climb(k, &self.whitened(variance, weight, level), start, |_| true)
+    }
+
+    fn climb(
+        &self,
+        k: &Constants,
+        w: &Whitened,
+        start: State,
+        open: impl Fn(&State) -> bool,
+    ) -> (f64, State) {
+        let mut best = (self.log_posterior(k, w, &start), start);
+        let mut tried = vec![start];
+        for _ in 0..SWEEPS {
+            let before = best.0;
+            for s in best.1.neighbours(k).into_iter().filter(&open) {
+                if tried.contains(&s) {
+                    continue;
+                }
+                tried.push(s);
+                let value = self.log_posterior(k, w, &s);
+                if value > best.0 {
+                    best = (value, s);
+                }
+            }
+            if best.0 <= before {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The same of the recalibrated baseline alone, with the scale of the scatter that suits it.
+    pub fn bare(
+        &self,
+        k: &Constants,
+        variance: &[f64],
+        weight: &[f64],
+        level: &[f64],
+        s: &State,
+    ) -> (f64, State, f64) {
+        let w = self.whitened(variance, weight, level);
+        let start = State { even: 0, odd: 0, ..*s };
+        let (value, best) = self.climb(k, &w, start, |s| s.even == 0 && s.odd == 0);
+        (value, best, self.between(k, &w, best))
+    }
+
+    /// The best scale between the grid's places: a parabola through the logarithms of three of them.
+    fn between(&self, k: &Constants, w: &Whitened, best: State) -> f64 {
+        let at = best.scale;
+        if at == 0 || at + 1 == k.scatter_scales.len() {
+            return best.scale(k);
+        }
+        let point = |scale: usize| {
+            let s = State { scale, ..best };
+            (s.scale(k).ln(), self.log_posterior(k, w, &s))
+        };
+        let [(x0, y0), (x1, y1), (x2, y2)] = [at - 1, at, at + 1].map(point);
+        let (left, right) = ((y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1));
+        let bend = (right - left) / (x2 - x0);
+        let top = if bend < 0.0 { 0.5 * (x0 + x1) - 0.5 * left / bend } else { x1 };
+        top.clamp(x0, x2).exp()
+    }
+
+    /// The table beside the surface.
+    pub fn seen(&self, k: &Constants, variance: &[f64], weight: &[f64], level: &[f64], s: &State) -> Seen {
+        let w = self.whitened(variance, weight, level);
+        let n = w.z.len();
+        let scale = s.scale(k);
+        let Some(parts) = Scaled::new(&w.gram, &w.score, self.sizes(k, s)) else {
+            let none = vec![0.0; n];
+            return Seen {
+                left_out: none.clone(),
+                missed_n: none.clone(),
+                beside: none,
+                level: level.to_vec(),
+            };
+        };
+        let weights = parts.weights();
+        let explained = &w.columns * &weights;
+        let leverage = parts.leverage(&w.columns);
+        let own = self.linear.columns.ncols();
+        let surface = &self.lateral - &self.linear.residual + &self.linear.columns * weights.rows(0, own);
+        let mut seen = Seen {
+            left_out: Vec::with_capacity(n),
+            missed_n: Vec::with_capacity(n),
+            beside: Vec::with_capacity(n),
+            level: surface.as_slice().to_vec(),
+        };
+        for i in 0..n {
+            // In whitened units C = I + Phi Phi': the left-out residual is [C^-1 z]_i / [C^-1]_ii, its variance 1 / [C^-1]_ii.
+            let diagonal = (1.0 - leverage[i]).max(1e-9);
+            let beside = (w.z[i] - explained[i]) / scale;
+            let missed = beside / diagonal;
+            // The pass itself counts with its nominal variance, not with the inflated one.
+            let spread = (1.0 / diagonal - 1.0) + weight[i];
+            seen.left_out.push(missed / spread.max(1e-9).sqrt());
+            seen.missed_n.push(missed * scale / w.root[i]);
+            seen.beside.push(beside);
+        }
+        seen
+    }
+}
+
+/// A surface's columns and residual in weighted deviations of a pass, and their products.
+struct Whitened {
+    columns: DMatrix<f64>,
+    z: DVector<f64>,
+    gram: DMatrix<f64>,
+    score: DVector<f64>,
+    root: DVector<f64>,
+}

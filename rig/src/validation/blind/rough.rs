@@ -1,0 +1,113 @@
+//! The verdict on scatter that is not what rig.toml states: bad passes, heavy tails, runs, a wrong statement.
+
+use diagnosis::Verdict;
+use diagnosis::data::{RigFile, Table};
+use diagnosis::hypotheses::Options;
+use diagnosis::verdict::{Report, diagnose};
+use rayon::prelude::*;
+use serde::Serialize;
+use sim::defects::Kind;
+use sim::sealed::rough::{RoughSet, Roughness, rough};
+
+/// What a set may hold: nothing, or one of these causes.
+pub const TRUTHS: [&str; 4] = ["none", "squeeze_film", "load_dependent_friction", "lateral_offset_drift"];
+
+/// Answers on the sets of one kind of scatter and one truth.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Answers {
+    /// Kind of scatter.
+    pub noise: String,
+    /// The cause, or `none`.
+    pub truth: String,
+    /// Sets.
+    pub sets: usize,
+    /// The cause named; of sets without one, no gap.
+    pub right: usize,
+    /// Another cause named.
+    pub wrong: usize,
+    /// Ambiguous.
+    pub ambiguous: usize,
+    /// Unknown.
+    pub unknown: usize,
+    /// No gap, where there is one.
+    pub missed: usize,
+    /// Bad passes that were made, and those of them called suspect.
+    pub bad: usize,
+    /// Suspect ones of them.
+    pub found: usize,
+    /// Passes that are not bad, and those of them called suspect.
+    pub good: usize,
+    /// Suspect ones of them.
+    pub falsely: usize,
+}
+
+impl Answers {
+    fn count(&mut self, set: &RoughSet, report: &Report) {
+        let leads = &report.hypotheses[0].effects;
+        let none = self.truth == "none";
+        self.sets += 1;
+        match report.verdict {
+            Verdict::Named if *leads == [self.truth.clone()] => self.right += 1,
+            Verdict::Named => self.wrong += 1,
+            Verdict::Ambiguous => self.ambiguous += 1,
+            Verdict::Unknown => self.unknown += 1,
+            Verdict::NoGap if none => self.right += 1,
+            Verdict::NoGap => self.missed += 1,
+        }
+        let bad = |point: &u64| set.bad.contains(point);
+        let suspects = report.scatter.suspects.iter().filter(|s| bad(&s.point)).count();
+        self.bad += set.bad.len();
+        self.found += suspects;
+        self.good += set.passes.len() - set.bad.len();
+        self.falsely += report.scatter.suspects.len() - suspects;
+    }
+}
+
+/// Diagnoses `count` sets of each of some truths under one kind of scatter; `progress` is told each answer.
+///
+/// # Errors
+/// A set that the diagnosis refuses, and a truth that is no cause.
+pub fn run(
+    seed: u64,
+    count: usize,
+    (name, roughness): (&str, Roughness),
+    truths: &[&str],
+    options: &Options,
+    progress: impl Fn(u64, &RoughSet, &Report) + Sync,
+) -> miette::Result<Vec<Answers>> {
+    truths
+        .iter()
+        .map(|truth| {
+            let kind = match *truth {
+                "none" => None,
+                cause => {
+                    Some(Kind::named(cause).ok_or_else(|| miette::miette!("no cause is named '{cause}'"))?)
+                }
+            };
+            let all: Vec<(RoughSet, Report)> = (0..count as u64)
+                .into_par_iter()
+                .map(|k| {
+                    let own = seed.wrapping_mul(1_000_003).wrapping_add(k);
+                    let set = rough(own, kind, roughness);
+                    let report = answer(&set, options)?;
+                    progress(own, &set, &report);
+                    Ok((set, report))
+                })
+                .collect::<miette::Result<_>>()?;
+            let mut answers =
+                Answers { noise: name.to_string(), truth: (*truth).to_string(), ..Answers::default() };
+            all.iter().for_each(|(set, report)| answers.count(set, report));
+            Ok(answers)
+        })
+        .collect()
+}
+
+/// The report on one set.
+///
+/// # Errors
+/// A set that the diagnosis refuses.
+pub fn answer(set: &RoughSet, options: &Options) -> miette::Result<Report> {
+    let rig = RigFile::parse(&set.rig_toml).map_err(|e| miette::miette!("rig.toml: {e}"))?;
+    let table = Table::measured(&set.passes).map_err(|e| miette::miette!("table: {e}"))?;
+    Ok(diagnose(&table, &rig, options, String::new()).report)
+}

@@ -1,0 +1,95 @@
+//! The verdict on scatter that is not what rig.toml states: few, fixed seeds; the full table comes from
+//! `muprime blind --noise all`.
+use diagnosis::Verdict;
+use diagnosis::hypotheses::Options;
+use diagnosis::verdict::Report;
+use rayon::prelude::*;
+use rig::validation::blind::rough::{answer, run};
+use sim::defects::Kind;
+use sim::sealed::rough::{RoughSet, Roughness, rough};
+
+fn quick() -> Options {
+    Options { pairs: false, ..Options::default() }
+}
+
+fn report(set: &RoughSet) -> Report {
+    answer(set, &quick()).expect("a sealed table is no impossible one")
+}
+
+/// Bad passes, heavy tails, scatter that lasts, runs and a wrong statement make no gap out of nothing.
+#[test]
+fn scatter_alone_is_no_gap() {
+    for kind in Roughness::ALL {
+        let answers = run(41, 4, kind, &["none"], &quick(), |_, _, _| ()).unwrap();
+        let a = &answers[0];
+        assert!(a.right == a.sets, "{a:?}");
+    }
+}
+
+/// And they hide no cause: friction that depends on load, an offset that drifts.
+#[test]
+fn scatter_hides_no_cause() {
+    let truths = ["load_dependent_friction", "lateral_offset_drift"];
+    for kind in Roughness::ALL {
+        for a in run(43, 3, kind, &truths, &quick(), |_, _, _| ()).unwrap() {
+            assert!(a.right + 1 >= a.sets && a.wrong == 0, "{a:?}");
+        }
+    }
+}
+
+/// One bad pass is named, with how far it is off and what the verdict is with it, and leaves the verdict as it was.
+#[test]
+fn one_bad_pass_is_named_and_leaves_the_verdict_as_it_was() {
+    let film = Kind::named("squeeze_film");
+    (0..3u64).into_par_iter().for_each(|k| {
+        let seed = 4_700_000 + k;
+        let one = rough(seed, film, Roughness::Gross(1.0 / 176.0));
+        let (clean, with) = (report(&rough(seed, film, Roughness::Gaussian)), report(&one));
+        assert_eq!(one.bad.len(), 1);
+        assert_eq!(with.verdict, clean.verdict, "seed {seed}: {} / {}", clean.text, with.text);
+        assert_eq!(with.hypotheses[0].effects, clean.hypotheses[0].effects, "seed {seed}");
+        let suspects: Vec<u64> = with.scatter.suspects.iter().map(|s| s.point).collect();
+        assert!(suspects.contains(&one.bad[0]) && suspects.len() <= 3, "seed {seed}: {suspects:?}");
+        assert!(with.with_suspects.is_some(), "seed {seed}: the verdict with it is missing");
+        let named = format!("points {} (off by ", one.bad[0]);
+        assert!(with.remarks.iter().any(|r| r.contains(&named)), "seed {seed}: {:?}", with.remarks);
+    });
+}
+
+/// No cliff: from no bad passes to one in ten the verdict stays, and its probability does not jump.
+#[test]
+fn the_verdict_is_smooth_in_the_share_of_bad_passes() {
+    let shares = [0.0, 0.02, 0.04, 0.06, 0.08, 0.1];
+    for truth in [None, Kind::named("load_dependent_friction")] {
+        let curve: Vec<(Verdict, f64)> = shares
+            .par_iter()
+            .map(|&share| {
+                let report = report(&rough(4_800_007, truth, Roughness::Gross(share)));
+                (report.verdict, report.hypotheses[0].probability)
+            })
+            .collect();
+        let wanted = if truth.is_some() { Verdict::Named } else { Verdict::NoGap };
+        assert!(curve.iter().all(|(verdict, _)| *verdict == wanted), "{curve:?}");
+        assert!(curve.windows(2).all(|w| (w[0].1 - w[1].1).abs() < 0.25), "{curve:?}");
+    }
+}
+
+/// A statement that is wrong is said to be, by how much; so is a shift between runs, and scatter that lasts.
+#[test]
+fn what_is_wrong_with_the_scatter_is_said() {
+    let said = |kind: Roughness, words: &str| {
+        let report = report(&rough(4_900_001, None, kind));
+        let found = report.remarks.iter().any(|r| r.contains(words));
+        assert!(found, "{kind:?}: {:?}", report.remarks);
+        report.scatter
+    };
+    let understated = said(Roughness::Understated, "repeatability is wrong by x1.");
+    assert!((understated.scale / 1.5 - 1.0).abs() < 0.15, "{}", understated.scale);
+    let runs = said(Roughness::Runs, "shifts from run to run");
+    assert!(runs.run_relative_sd.is_some_and(|sd| (0.015..0.09).contains(&sd)), "{:?}", runs.run_relative_sd);
+    let serial = said(Roughness::Serial, "lasts from pass to pass");
+    assert!((0.4..=0.9).contains(&serial.serial_correlation), "{}", serial.serial_correlation);
+    let plain = report(&rough(4_900_001, None, Roughness::Gaussian));
+    let words = ["is wrong by", "from run to run", "from pass to pass", "Suspect"];
+    assert!(!plain.remarks.iter().any(|r| words.iter().any(|w| r.contains(w))), "{:?}", plain.remarks);
+}
