@@ -128,10 +128,11 @@ constants! {
     outside_prior: [f64; 2] = [1.0, 50.0], "Share of passes that do not belong: as if so many had been seen, of so many (beta prior).", "judgement: one pass in fifty";
     outside_width: f64 = 5.0, "Half-width of the Cauchy density of such passes, in deviations of a pass.", "judgement: a pass at 3.5 deviations, Iglewicz & Hoaglin's (1993) limit, is then even at that share";
     suspect_probability: f64 = 0.5, "Probability of not belonging from which a pass is called suspect.", "the likelier of two";
-    most_suspects: f64 = 0.15, "Share of suspect passes above which they are a departure.", JUDGEMENT;
+    most_suspects: f64 = 0.2, "Share of suspect passes above which they are a departure.", JUDGEMENT;
     together_level: f64 = 0.01, "Family-wise level at which suspect passes lie together, which makes them a departure.", "one in a hundred";
+    cause_holds_spread: f64 = 1.3, "Median residual about a leading cause, in deviations, up to which it holds and passes that stand out of it are bad.", JUDGEMENT;
     explained_sd: f64 = 3.0, "Deviations within which a cause explains a suspect pass, which then belongs.", "three standard deviations";
-    serial_probability: f64 = 0.9, "Probability from which scatter is taken to last from pass to pass.", JUDGEMENT;
+    serial_probability: f64 = 0.7, "Probability from which scatter is taken to last from pass to pass.", JUDGEMENT;
     serial_modes: usize = 16, "Cosines of its slow part.", "numerical: a drift over the table has less than eight turns";
 
     form_shares: [f64; 3] = [0.05, 0.15, 0.35], "Standard deviation of a cause's departure from its form, as a share of its net change.", "development: true causes under another formula left 13 to 49 % of their gap";

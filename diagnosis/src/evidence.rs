@@ -283,7 +283,7 @@ mod tests {
     fn a_law_without_effect_gains_nothing() {
         let table = table(&mut Deviates(11), 0.0);
         let mut problem = Problem::new(&table, &rig(), &Default::default());
-        crate::noise::settle(&table, &rig(), &mut problem, &[]);
+        crate::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::Judged);
         let coordinates = Coordinates::of(&table);
         let largest = problem.design.largest_amplitude_m;
         let places: Vec<_> = problem

@@ -11,7 +11,7 @@ use crate::layout::NUISANCES;
 use crate::least_squares::minimise;
 use crate::noise::{PureError, settle, variance};
 use crate::pairs::pairs;
-use crate::scatter::Scatter;
+use crate::scatter::{Belief, Scatter};
 use crate::singles::{Search, lapsed, singles, sort, unlisted};
 use crate::starts::{nuisances_of, tempered};
 use effects::{Effect, known, library};
@@ -119,14 +119,14 @@ impl Fitted {
 
 /// Fits every hypothesis to a table.
 pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
-    fit_trusting(table, rig, options, &[])
+    fit_believing(table, rig, options, &Belief::Judged)
 }
 
-/// The same where some rows count as any other, however far off they lie.
-pub fn fit_trusting(table: &Table, rig: &RigFile, options: &Options, trusted: &[usize]) -> Fitted {
+/// The same with a belief about which passes belong.
+pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &Belief) -> Fitted {
     let k = &*options.constants;
     let mut problem = Problem::new(table, rig, &options.constants);
-    let (discrepancy, pure, mut scatter) = settle(table, rig, &mut problem, trusted);
+    let (discrepancy, pure, mut scatter) = settle(table, rig, &mut problem, belief);
     let coordinates = Coordinates::of(table);
     let places: Vec<_> = problem
         .passes
@@ -158,9 +158,13 @@ pub fn fit_trusting(table: &Table, rig: &RigFile, options: &Options, trusted: &[
     let mut candidates = singles(&problem, table, &tried, &search);
     let lapsed = lapsed(&mut problem, table, &mut candidates, &search);
     sort(&mut candidates);
-    let explained = candidates.first().map_or_else(Vec::new, |c| explained_by(&problem, &scatter, &c.best));
-    if !explained.is_empty() && 2 * explained.len() >= scatter.suspects.len() {
-        return fit_trusting(table, rig, options, &[trusted, &explained].concat());
+    let leader = candidates.first().filter(|c| c.log_evidence > none_evidence + k.pairs_from_nats);
+    if let (Belief::Judged, Some(leader)) = (belief, leader) {
+        let departed =
+            leader.best.change.component_mul(&(&basis * &leader.best.departure)) * leader.best.share;
+        if let Some(other) = scatter.about_cause(&problem, &(&leader.best.prediction + departed)) {
+            return fit_believing(table, rig, options, &other);
+        }
     }
     let unlisted = unlisted(&problem, table, &search);
 
@@ -197,7 +201,7 @@ pub fn fit_trusting(table: &Table, rig: &RigFile, options: &Options, trusted: &[
     }
 }
 
-/// Rows of suspect passes that a cause explains, though it was fitted almost without them.
+/// Rows of suspect passes that a cause explains.
 fn explained_by(problem: &Problem, scatter: &Scatter, cause: &Posterior) -> Vec<usize> {
     let explains = |row: &usize| {
         let own = problem.whole_variance(*row) / scatter.inflation[*row];

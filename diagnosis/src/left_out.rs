@@ -295,7 +295,7 @@ mod tests {
         let mut rig = rig();
         rig.finger.stiffness_relative_sd = 0.3;
         let mut problem = Problem::new(&table, &rig, &Default::default());
-        crate::noise::settle(&table, &rig, &mut problem, &[]);
+        crate::noise::settle(&table, &rig, &mut problem, &crate::scatter::Belief::Judged);
         let still: Vec<usize> =
             (0..problem.len()).filter(|&i| problem.passes[i].amplitude.metres() == 0.0).collect();
         let nominal = problem.jacobian(&[], &[0.0; 3], &problem.predict(&[], &[0.0; 3]));

@@ -5,7 +5,7 @@ use crate::data::{RigFile, Table};
 use crate::discrepancy::{Discrepancy, lengths};
 use crate::fit::Problem;
 use crate::least_squares::minimise;
-use crate::scatter::{self, Scatter};
+use crate::scatter::{self, Belief, Scatter};
 use models::condition::Condition;
 use models::covariate;
 use models::quantity::PeakToPeak;
@@ -36,13 +36,12 @@ const ROUGH_LEVEL: f64 = 0.05;
 const BOUNDED_SD: f64 = 3.0;
 const START_ROUNDS: usize = 12;
 
-/// Fills in the problem's scatter and gives the smooth surface beside it. Rows that are `trusted` count as any other,
-/// however far off they lie.
+/// Fills in the problem's scatter and gives the smooth surface beside it.
 pub fn settle(
     table: &Table,
     rig: &RigFile,
     problem: &mut Problem,
-    trusted: &[usize],
+    belief: &Belief,
 ) -> (Discrepancy, PureError, Scatter) {
     let rough = rough(problem, rig);
     let mut start = minimise(problem, &[], &[0.0; 3], &rough, START_ROUNDS);
@@ -57,7 +56,7 @@ pub fn settle(
     let center = start.u;
     // The level of friction enters the variance: it is taken from a smooth surface, not from the baseline.
     let stated = |level: &[f64]| variance(problem, rig, &center, level, 1.0);
-    let mut scatter = scatter::estimate(table, problem, &center, &stated, trusted);
+    let mut scatter = scatter::estimate(table, problem, &center, &stated, belief);
     let stated: Vec<f64> =
         stated(&scatter.level).iter().zip(&scatter.inflation).map(|(v, i)| v * i).collect();
     let pure = replicates(table, problem, &stated, &scatter);

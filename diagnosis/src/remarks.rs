@@ -2,8 +2,8 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
-use crate::hypotheses::{Fitted, Options, fit_trusting};
-use crate::scatter::Scatter;
+use crate::hypotheses::{Fitted, Options, fit_believing};
+use crate::scatter::{Belief, Scatter};
 use models::covariate::{Role, SMOOTH};
 use serde::Serialize;
 
@@ -43,8 +43,7 @@ pub fn with_suspects(
     if fitted.scatter.suspects.is_empty() {
         return None;
     }
-    let all: Vec<usize> = (0..table.len()).collect();
-    let fitted = fit_trusting(table, rig, options, &all);
+    let fitted = fit_believing(table, rig, options, &Belief::All);
     let decision = decide(&fitted);
     let (effects, probability) = leading(&fitted, &decision);
     Some(WithSuspects { verdict: decision.verdict, effects, probability })

@@ -19,7 +19,7 @@ mod suspects;
 use crate::data::Table;
 use crate::discrepancy::lengths;
 use crate::fit::Problem;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
 use surface::{State, Surface};
@@ -53,6 +53,9 @@ pub struct Scatter {
     pub suspects: Vec<Suspect>,
     /// Where passes that stand out lie together, which makes them a departure and no bad passes.
     pub together_in: Option<String>,
+    /// Probability of each pass not to belong.
+    #[serde(skip)]
+    pub outside: Vec<f64>,
     /// Factor on the variance of each pass: one, and more for a pass that may not belong.
     #[serde(skip)]
     pub inflation: Vec<f64>,
@@ -78,15 +81,36 @@ const ALL_ASKED: [usize; 2] = [0, 3];
 const HEAVY: usize = 2;
 /// Change of a weight below which the rounds end.
 const SETTLED: f64 = 0.02;
+/// Median of a standard deviate's size.
+const HALF_NORMAL_MEDIAN: f64 = 0.6745;
+/// Deviations from which a pass that stands out of a cause is worth another fit.
+const FAR_SD: f64 = 4.5;
+/// Passes' worth of weight that is worth another fit.
+const WORTH: f64 = 2.0;
 
-/// Estimates the scatter of a table. `stated` gives the variances that rig.toml states at a level of friction, `trusted`
-/// lists rows that count as any other whatever they say.
+/// Which passes are taken to belong.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Belief {
+    /// Each by its residual about a surface that did not see it.
+    Judged,
+    /// All.
+    All,
+    /// By residuals about a leading cause, in deviations of a pass, and the probabilities not to belong that they give.
+    AboutCause {
+        /// Residuals.
+        deviations: Vec<f64>,
+        /// Probabilities.
+        outside: Vec<f64>,
+    },
+}
+
+/// Estimates the scatter of a table. `stated` gives the variances that rig.toml states at a level of friction.
 pub fn estimate(
     table: &Table,
     problem: &Problem,
     center: &[f64],
     stated: &dyn Fn(&[f64]) -> Vec<f64>,
-    trusted: &[usize],
+    belief: &Belief,
 ) -> Scatter {
     let k = &*problem.constants;
     let n = problem.len();
@@ -95,7 +119,10 @@ pub fn estimate(
     let start = State::start(table.run_count > 1);
     let mut level = problem.predict(&[], center).as_slice().to_vec();
     let mut variance = stated(&level);
-    let mut weight = vec![1.0; n];
+    let mut weight = match belief {
+        Belief::AboutCause { deviations, outside } => suspects::weights(k, outside, deviations),
+        _ => vec![1.0; n],
+    };
     let (mut best, mut state) = (0, start);
     for round in 0..ROUNDS {
         if ALL_ASKED.contains(&round) {
@@ -107,12 +134,13 @@ pub fn estimate(
             state = surfaces[best].climbed(k, &variance, &weight, &level, state).1;
         }
         let seen = surfaces[best].seen(k, &variance, &weight, &level, &state);
-        let mut next = if round < HEAVY {
-            suspects::heavy(&seen.left_out)
-        } else {
-            suspects::weights(k, &suspects::responsibilities(k, &seen.left_out), &seen.left_out)
+        let next = match belief {
+            Belief::Judged if round < HEAVY => suspects::heavy(&seen.left_out),
+            Belief::Judged => {
+                suspects::weights(k, &suspects::responsibilities(k, &seen.left_out), &seen.left_out)
+            }
+            _ => weight.clone(),
         };
-        trusted.iter().for_each(|&i| next[i] = 1.0);
         let moved = next.iter().zip(&weight).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         (weight, level) = (next, seen.level);
         variance = stated(&level);
@@ -122,11 +150,17 @@ pub fn estimate(
     }
     let surface = &surfaces[best];
     let seen = surface.seen(k, &variance, &weight, &level, &state);
-    let mut outside = suspects::responsibilities(k, &seen.left_out);
-    trusted.iter().for_each(|&i| outside[i] = 0.0);
     let space = clusters::Space::of(problem);
-    let together_in = suspects::take_back(problem, &space, &mut outside, &seen.left_out);
-    let weight = suspects::weights(k, &outside, &seen.left_out);
+    let (deviations, outside, together_in) = match belief {
+        Belief::Judged => {
+            let mut outside = suspects::responsibilities(k, &seen.left_out);
+            let place = suspects::take_back(problem, &space, &mut outside, &seen.left_out);
+            (seen.left_out, outside, place)
+        }
+        Belief::All => (seen.left_out, vec![0.0; n], None),
+        Belief::AboutCause { deviations, outside } => (deviations.clone(), outside.clone(), None),
+    };
+    let weight = suspects::weights(k, &outside, &deviations);
     let (whole, bare) = (
         surface.climbed(k, &variance, &weight, &level, state).0,
         surface.bare(k, &variance, &weight, &level, &state),
@@ -140,8 +174,8 @@ pub fn estimate(
     let suspect = |i: usize| Suspect {
         point: table.points[i],
         row: i,
-        residual_n: seen.missed_n[i],
-        deviations: seen.left_out[i],
+        residual_n: deviations[i] * variance[i].sqrt(),
+        deviations: deviations[i],
         probability: outside[i],
     };
     Scatter {
@@ -150,6 +184,7 @@ pub fn estimate(
         serial_correlation: serial::correlation(k, table, &seen.beside),
         suspects: (0..n).filter(|&i| outside[i] > k.suspect_probability).map(suspect).collect(),
         together_in,
+        outside: outside.clone(),
         inflation: weight.iter().map(|w| 1.0 / w).collect(),
         level: seen.level,
         bare_scale: bare.2,
@@ -159,6 +194,39 @@ pub fn estimate(
 }
 
 impl Scatter {
+    /// A second look at which passes belong, about the mean of a leading cause; none where it says nothing new.
+    ///
+    /// What the cause explains belongs after all, though a surface did not follow it. What stands out of it is bad where the
+    /// cause holds for the others: their scatter is no larger than it should be, and those that stand out fall anywhere.
+    pub fn about_cause(&self, problem: &Problem, mean: &DVector<f64>) -> Option<Belief> {
+        let k = &*problem.constants;
+        let n = problem.len();
+        let residual = DVector::from_column_slice(&problem.lateral) - mean;
+        let shared = problem.covariance(&DMatrix::zeros(n, 0)).weights(&residual);
+        let beside = residual - &problem.common * shared;
+        let mut deviations: Vec<f64> =
+            (0..n).map(|i| beside[i] / (problem.variance[i] / self.inflation[i]).sqrt()).collect();
+        let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let spread = sizes[n / 2] / HALF_NORMAL_MEDIAN;
+        deviations.iter_mut().for_each(|d| *d /= spread.max(1.0));
+        let mut outside = suspects::responsibilities(k, &deviations);
+        let holds = spread < k.cause_holds_spread
+            && suspects::take_back(problem, &clusters::Space::of(problem), &mut outside.clone(), &deviations)
+                .is_none();
+        if !holds {
+            outside.iter_mut().zip(&self.outside).for_each(|(o, before)| *o = o.min(*before));
+        }
+        let called = |o: &f64| *o > k.suspect_probability;
+        let found =
+            (0..n).any(|i| called(&outside[i]) && !called(&self.outside[i]) && deviations[i].abs() > FAR_SD);
+        // Passes' worth of weight that belongs after all.
+        let weight = suspects::weights(k, &outside, &deviations);
+        let kept: f64 =
+            (0..n).filter(|&i| !called(&outside[i])).map(|i| weight[i] - 1.0 / self.inflation[i]).sum();
+        (found || kept > WORTH).then_some(Belief::AboutCause { deviations, outside })
+    }
+
     /// Enters a problem whose variances are those of single passes: what passes have in common leaves them and becomes columns
     /// of its own.
     pub fn enter(&self, table: &Table, problem: &mut Problem) {

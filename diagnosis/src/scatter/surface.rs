@@ -71,8 +71,6 @@ pub struct Surface {
 pub struct Seen {
     /// Each pass's distance from what the others lead to expect, in deviations of a pass that belongs there.
     pub left_out: Vec<f64>,
-    /// The same distance, N.
-    pub missed_n: Vec<f64>,
     /// Residual beside the surface in deviations of a pass, bounded where the pass counts for little.
     pub beside: Vec<f64>,
     /// The surface, N.
@@ -103,7 +101,7 @@ impl Surface {
             c.component_mul_assign(&root);
         }
         let z = self.linear.residual.component_mul(&root);
-        Whitened { gram: columns.tr_mul(&columns), score: columns.tr_mul(&z), z, columns, root }
+        Whitened { gram: columns.tr_mul(&columns), score: columns.tr_mul(&z), z, columns }
     }
 
     fn sizes(&self, k: &Constants, s: &State) -> Vec<f64> {
@@ -200,12 +198,7 @@ impl Surface {
         let scale = s.scale(k);
         let Some(parts) = Scaled::new(&w.gram, &w.score, self.sizes(k, s)) else {
             let none = vec![0.0; n];
-            return Seen {
-                left_out: none.clone(),
-                missed_n: none.clone(),
-                beside: none,
-                level: level.to_vec(),
-            };
+            return Seen { left_out: none.clone(), beside: none, level: level.to_vec() };
         };
         let weights = parts.weights();
         let explained = &w.columns * &weights;
@@ -214,7 +207,6 @@ impl Surface {
         let surface = &self.lateral - &self.linear.residual + &self.linear.columns * weights.rows(0, own);
         let mut seen = Seen {
             left_out: Vec::with_capacity(n),
-            missed_n: Vec::with_capacity(n),
             beside: Vec::with_capacity(n),
             level: surface.as_slice().to_vec(),
         };
@@ -226,7 +218,6 @@ impl Surface {
             // The pass itself counts with its nominal variance, not with the inflated one.
             let spread = (1.0 / diagonal - 1.0) + weight[i];
             seen.left_out.push(missed / spread.max(1e-9).sqrt());
-            seen.missed_n.push(missed * scale / w.root[i]);
             seen.beside.push(beside);
         }
         seen
@@ -239,5 +230,4 @@ struct Whitened {
     z: DVector<f64>,
     gram: DMatrix<f64>,
     score: DVector<f64>,
-    root: DVector<f64>,
 }

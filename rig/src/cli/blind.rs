@@ -151,8 +151,15 @@ fn rough(args: &Args, kind: &str, options: &Options, json: bool) -> miette::Resu
     let each = |seed: u64, set: &RoughSet, report: &diagnosis::verdict::Report| {
         if args.verbose {
             let suspects: Vec<u64> = report.scatter.suspects.iter().map(|s| s.point).collect();
-            let text = &report.text;
-            say!("{seed}: bad {:?}, suspect {suspects:?}, {:?}; {text}", set.bad, report.scatter.together_in);
+            let (s, text) = (&report.scatter, &report.text);
+            say!(
+                "{seed}: bad {:?}, suspect {suspects:?}, together {:?}, scale {:.2}, runs {:?}, correlation {:.2}; {text}",
+                set.bad,
+                s.together_in,
+                s.scale,
+                s.run_relative_sd,
+                s.serial_correlation
+            );
         }
     };
     for kind in picked {
