@@ -8,7 +8,7 @@
 //! | [`estimate`] | `mu`, `mu'` with uncertainty and age; means over a pass |
 //! | [`compare`] | residuals against the model; the test that says when it has left the measurement |
 //! | [`turn`] | one turn of the loop over real ports; the row that it leaves behind |
-//! | [`pacing`] | the thread: absolute deadlines, priority, memory lock, lateness histogram |
+//! | [`pacing`] | the thread: absolute deadlines, lateness histogram; in `pacing/machine.rs` what it asks of the machine |
 //! | [`queue`] | commands to the loop; a stop waits behind nothing |
 //! | [`wrap`] | ports around ports: faults |
 //! | [`witness`] | notes when the machine kept ordinary threads from running |

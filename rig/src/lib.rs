@@ -7,7 +7,8 @@
 //! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 //! | [`sequence`] | the order of a sweep, a pure state machine over rows |
 //! | [`supervisor`] | the one way to lead a loop: it stops first, switches off, reads back |
-//! | [`claim`] | one controller a rig |
+//! | [`claim`], [`exposure`] | one controller a rig; what a human finger has had, carried from run to run |
+//! | [`dead_man_key`] | a key held at the terminal, for trials |
 //! | [`session`] | a sweep from beginning to end, in wall-clock or in virtual time |
 //! | [`run_dir`], [`catalogue`] | a run's folder and the catalogue of runs |
 //! | [`figures`] | the paper's figures recomputed |
