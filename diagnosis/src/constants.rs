@@ -120,6 +120,7 @@ constants! {
     variance_factor_bounds: [f64; 2] = [0.8, 3.0], "Bounds of the factor that replicates put on the stated variance.", JUDGEMENT;
     scatter_log_sd: f64 = 0.3, "Prior deviation of the logarithm of true over stated scatter.", "judgement: laboratories state their repeatability within a third or so";
     scatter_scales: [f64; 13] = [0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6, 1.8, 2.1, 2.5, 3.0], "True over stated scatter: values that are tried.", NUMERICAL;
+    statement_nats: f64 = 3.0, "Nats by which the scatter about the baseline must speak against the statement of repeatability for half of it to be believed.", "development: a gain of the amplitude that recalibration half takes up gave 1.7";
     structure_nats: f64 = 3.0, "Nats by which a surface must beat the baseline alone, each with the scatter that suits it, before a large scatter counts as structure and the statement stands.", JUDGEMENT;
     clustered_p: f64 = 0.02, "Family-wise p-value of clusters of what the baseline leaves at which a large scatter counts as half structure.", JUDGEMENT;
     run_sds: [f64; 10] = [0.0, 0.004, 0.008, 0.015, 0.025, 0.04, 0.06, 0.09, 0.14, 0.22], "Relative deviations of the level from run to run that are tried.", NUMERICAL;
