@@ -90,10 +90,23 @@ impl Plant for BenchPlant {
 
 /// Serves profiles by unit over the bench.
 pub fn serve(bench: &Bench, units: &[(u8, &str)], epoch: Instant) -> ModbusTcpServer {
+    serve_at("127.0.0.1", bench, units, epoch)
+}
+
+fn serve_at(host: &str, bench: &Bench, units: &[(u8, &str)], epoch: Instant) -> ModbusTcpServer {
     let plant = SharedPlant::new(BenchPlant::new(bench), epoch);
     let devices: BTreeMap<u8, Device> =
         units.iter().map(|(unit, id)| (*unit, Device::new(drivers::profile(id).unwrap()).unwrap())).collect();
-    ModbusTcpServer::start("127.0.0.1:0".parse().unwrap(), devices, plant).unwrap()
+    ModbusTcpServer::start(format!("{host}:0").parse().unwrap(), devices, plant).unwrap()
+}
+
+/// The whole virtual bench on a loopback address of its own. A link whose server has ended goes on looking for it, and sends
+/// 'off' first: on a shared address the port may be this server's by then.
+pub fn serve_apart(bench: &Bench, epoch: Instant) -> ModbusTcpServer {
+    static COUNT: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
+    let n = COUNT.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+    let host = format!("127.0.{}.{}", 2 + n / 200, 2 + n % 200);
+    serve_at(&host, bench, &[(1, "muprime-force2"), (2, "muprime-amplifier"), (3, "muprime-stage")], epoch)
 }
 
 /// The whole virtual bench: units 1 to 3.
