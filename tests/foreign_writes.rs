@@ -6,18 +6,16 @@ use models::quantity::PeakToPeak;
 use realtime::cycle::{Command, Marker};
 use realtime::safety::{Cause, Request, Trip};
 use realtime::turn::Ports;
-use rig::setup::Setup;
 use rig::supervisor::wall::{Parts, Reins};
 use rig::supervisor::{Loop, WallLoop};
 use sim::wire::world::WorldPlant;
 use sim::wire::{Command as Wire, SharedPlant};
 use sim::world::{World, WorldConfig};
 use std::fmt::Write;
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use tests::file;
+use tests::{file, setup};
 
 /// What becomes of a foreign write.
 enum Fate {
@@ -70,18 +68,6 @@ cases! {
     "keysight-33500b" "amplitude" in "scpi": Some((Wire::Amplitude, 3e-6)) => Trips(DRIVE, 600);
     "keysight-33500b" "frequency" in "scpi": Some((Wire::Frequency, 28_000.0)) => Trips(DRIVE, 600);
     "keysight-33500b" "enable" in "scpi": Some((Wire::Enable, 0.0)) => Trips(DRIVE, 600);
-}
-
-/// A generator by SCPI in the place of the amplifier has no thermometer.
-fn setup(name: &str) -> Setup {
-    if name != "scpi" {
-        return Setup::load(name).unwrap();
-    }
-    let ideal = Setup::load("virtual-ideal").unwrap().text;
-    let generator = "profile = \"keysight-33500b\"\namplitude_m_per_unit = 1e-6\n";
-    let text = ideal.replace("profile = \"muprime-amplifier\"\n", generator);
-    let text = text.replace("[limits]\n", "[limits]\ntemperature_fitted = false\n");
-    Setup::parse("scpi", &text, Path::new(".")).unwrap()
 }
 
 /// A rig that is driven, behind its links.

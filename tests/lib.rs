@@ -10,6 +10,19 @@ pub fn file(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
 }
 
+/// A setup by name; `scpi` is the ideal virtual rig with a generator by SCPI in the place of its amplifier, which has no
+/// thermometer.
+pub fn setup(name: &str) -> rig::setup::Setup {
+    if name != "scpi" {
+        return rig::setup::Setup::load(name).expect("a bundled setup");
+    }
+    let ideal = rig::setup::Setup::load("virtual-ideal").expect("a bundled setup").text;
+    let generator = "profile = \"keysight-33500b\"\namplitude_m_per_unit = 1e-6\n";
+    let text = ideal.replace("profile = \"muprime-amplifier\"\n", generator);
+    let text = text.replace("[limits]\n", "[limits]\ntemperature_fitted = false\n");
+    rig::setup::Setup::parse("scpi", &text, Path::new(".")).expect("a setup")
+}
+
 /// The `muprime` that was built beside this test. A missing one fails: build the workspace first.
 pub fn muprime() -> Command {
     let test = std::env::current_exe().expect("a test knows where it is");

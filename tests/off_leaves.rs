@@ -18,11 +18,11 @@ use rig::setup::Setup;
 use rig::supervisor::wall::{Parts, Reins};
 use rig::supervisor::{Loop, OffReport, WallLoop};
 use std::io::{BufRead, BufReader, Write};
-use std::path::Path;
 use std::process::{Child, ChildStdout, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use tests::setup;
 
 /// One at a time: two loops would take each other's processors.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -67,18 +67,6 @@ const CASES: &[Case] = &[
     Case { name: "SCPI generator", setup: "scpi", struck: Struck::Amplifier, kinds: TCP },
     Case { name: "amplifier with a relay", setup: "virtual-relay", struck: Struck::Amplifier, kinds: TCP },
 ];
-
-/// A generator by SCPI in the place of the amplifier: it is asked 20 to 50 times a second and has no thermometer.
-fn setup(name: &str) -> Setup {
-    if name != "scpi" {
-        return Setup::load(name).unwrap();
-    }
-    let ideal = Setup::load("virtual-ideal").unwrap().text;
-    let generator = "profile = \"keysight-33500b\"\namplitude_m_per_unit = 1e-6\n";
-    let text = ideal.replace("profile = \"muprime-amplifier\"\n", generator);
-    let text = text.replace("[limits]\n", "[limits]\ntemperature_fitted = false\n");
-    Setup::parse("scpi", &text, Path::new(".")).unwrap()
-}
 
 /// A rig in another process: `muprime virtual-rig`, whose lamps are asked for over a pipe. No watchdog of its amplifier helps.
 struct Served {

@@ -23,6 +23,9 @@ const LASTS_S: f64 = 1.0;
 const SILENT_MS: f64 = 45.0 + 6.0;
 /// Beside a rule's own time: two polls and a write (1 to 2 ms each), the state's period, and the world's step.
 const ON_THE_WAY_MS: f64 = 10.0;
+/// What the machine may add unseen: six threads stand between a fault and the lamp, and a witness notes delays of 3 ms and
+/// more. A case that is late by less is run again; one whose bound is wrong is late each time.
+const UNSEEN_MS: f64 = 6.0 * 3.0;
 /// The amplifier's own heartbeat timeout, the age of a state and the world's step.
 const WATCHDOG_MS: f64 = 51.5;
 
@@ -274,11 +277,10 @@ fn strike(case: &Case) -> Result<String, String> {
     let took_ms = f64::from(off_at_us.expect("seen off") - strikes_us) * 1e-3;
     let bound_ms = bound_ms + ON_THE_WAY_MS;
     if took_ms > bound_ms {
-        let stall =
-            machine.unwrap_or_else(|| panic!("{name}: off after {took_ms:.1} ms, bound {bound_ms:.1}"));
-        return Err(format!(
-            "{name}: off after {took_ms:.1} ms (bound {bound_ms:.1}), the machine stalled for {stall:.0} ms"
-        ));
+        let late = format!("{name}: off after {took_ms:.1} ms, bound {bound_ms:.1}");
+        assert!(machine.is_some() || took_ms <= bound_ms + UNSEEN_MS, "{late}");
+        let stall = machine.map_or(String::new(), |stall| format!(", the machine stalled for {stall:.0} ms"));
+        return Err(format!("{late}{stall}"));
     }
     Ok(format!(
         "{name:<22} {:<18} off after {took_ms:>5.1} ms, bound {bound_ms:.1}",

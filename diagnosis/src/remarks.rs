@@ -49,6 +49,9 @@ pub fn with_suspects(
     Some(WithSuspects { verdict: decision.verdict, effects, probability })
 }
 
+/// Relative departure of the scatter from the statement below which the statement was used.
+const AS_STATED: f64 = 0.01;
+
 /// What a table lacks.
 pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<String> {
     let mut remarks = Vec::new();
@@ -62,10 +65,15 @@ pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<Stri
         remarks.push("No pass has the plate still: mu0 is unknown and was fitted; add w = 0 passes.".into());
     }
     if fitted.pure.variance_ratio.is_none() {
-        remarks.push(
-            "No replicates lie close together: the repeatability stated in rig.toml stands for pure error."
-                .into(),
-        );
+        let used = fitted.scatter.scale;
+        let stands = if (used - 1.0).abs() < AS_STATED {
+            "the repeatability stated in rig.toml stands for pure error.".to_string()
+        } else {
+            format!(
+                "the scatter about the recalibrated baseline stands for pure error, {used:.2} times what rig.toml states."
+            )
+        };
+        remarks.push(format!("No replicates lie close together: {stands}"));
     }
     remarks.extend(together(table));
     let silent: Vec<&str> = decision.regions.iter().filter(|r| !r.judges).map(|r| r.name.as_str()).collect();

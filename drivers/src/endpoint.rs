@@ -105,8 +105,7 @@ impl ContactsLink {
                 CONTACTS.join(", ")
             ));
         }
-        let wired = |name: &str| setup.wired.as_ref().is_none_or(|wired| wired.iter().any(|w| w == name));
-        let signals = CONTACTS.map(|name| profile.signal(name).filter(|_| wired(name)));
+        let signals = CONTACTS.map(|name| profile.signal(name).filter(|_| setup.is_wired(name)));
         if signals.iter().all(Option::is_none) {
             return Err(format!("none of the contacts {} is there and wired", CONTACTS.join(", ")));
         }

@@ -94,6 +94,12 @@ pub struct InstrumentSetup {
 }
 
 impl InstrumentSetup {
+    /// Whether a contact of the instrument has a device on it.
+    #[must_use]
+    pub fn is_wired(&self, contact: &str) -> bool {
+        self.wired.as_ref().is_none_or(|wired| wired.iter().any(|name| name == contact))
+    }
+
     /// An instrument of that profile at that address, all else by the profile.
     #[must_use]
     pub fn new(profile: &str, address: &str) -> Self {

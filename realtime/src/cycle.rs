@@ -98,6 +98,14 @@ impl CycleState {
         self.safety.state()
     }
 
+    /// Before the first cycle: what earlier runs did is carried over. A key that was not heard yet may be held all the same: it
+    /// is released when it has not been heard for its age.
+    fn begin(&mut self, config: &Config, now: Nanos) {
+        self.begun = true;
+        self.key_held_at = Some(now);
+        self.safety.carry(&config.exposed);
+    }
+
     /// Time that the plate was driven in this run, and the squared rms velocity summed over it, in m2/s.
     pub const fn exposure(&self) -> (Nanos, f64) {
         self.safety.exposure()
@@ -175,8 +183,10 @@ pub fn step(
 
 /// The first half of a cycle: commands and safety. What it decides is ready to leave.
 pub fn decide(config: &Config, state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Decision {
+    if !state.begun {
+        state.begin(config, now);
+    }
     let controls = take_commands(state, inputs, now);
-    state.safety.carry(&config.exposed);
     state.safety.step(&config.limits, &inputs.seen, &state.request, controls, now)
 }
 
@@ -230,10 +240,6 @@ pub fn judge(
 
 fn take_commands(state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Controls {
     let mut controls = Controls::default();
-    if !state.begun {
-        // A key that was not heard yet may be held all the same: it is released when it has not been heard for its age.
-        (state.begun, state.key_held_at) = (true, Some(now));
-    }
     for command in inputs.commands.iter().flatten() {
         match command {
             Command::Set(request, marker) => {

@@ -29,7 +29,7 @@ use serde::{Deserialize, Serialize};
 
 pub use arming::Proof;
 pub use cause::{Cause, Unit};
-pub use exposure::{Exposed, PART_MINUTES, PARTS};
+pub use exposure::{Exposed, MINUTE_NS, MINUTES, PART_MINUTES, PARTS};
 pub use limits::{ChannelTiming, HARD, HardLimits, LimitError, Limits, Timing};
 pub use rules::{RULES, Rule};
 use watch::Watch;
@@ -289,11 +289,9 @@ impl Safety {
         }
     }
 
-    /// Takes over the exposure of earlier runs, before the first cycle.
+    /// Takes over the exposure of earlier runs. Of use before the first cycle only: what is there is replaced.
     pub fn carry(&mut self, past: &Exposed) {
-        if self.cycle == 0 {
-            self.watch.exposure.carry(past);
-        }
+        self.watch.exposure.carry(past);
     }
 
     /// Time that the plate was driven in this run, and the squared rms velocity summed over it, in m2/s.

@@ -81,6 +81,8 @@ impl DeadManKey {
                 match pressed() {
                     Ok(None) => {}
                     Ok(Some(held)) => send(Command::DeadMan(held)),
+                    // A signal came between: nothing was pressed.
+                    Err(why) if why.kind() == io::ErrorKind::Interrupted => {}
                     // The terminal is gone, and the hand with it.
                     Err(_) => return send(Command::DeadMan(false)),
                 }

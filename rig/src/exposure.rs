@@ -14,7 +14,7 @@ use crate::setup::Setup;
 use miette::WrapErr;
 use realtime::pacing::Lifeline;
 use realtime::ports::Nanos;
-use realtime::safety::{Exposed, Limits, PART_MINUTES, PARTS};
+use realtime::safety::{Exposed, Limits, MINUTE_NS, MINUTES, PART_MINUTES, PARTS};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -37,9 +37,6 @@ const WRITE_EVERY: Duration = Duration::from_secs(1);
 const HOLDS_FOR: Duration = Duration::from_secs(3);
 /// Bytes of a place.
 const PLACE: usize = 8192;
-const MINUTE_NS: u64 = 60_000_000_000;
-/// Minutes after which one counts no more: an hour, and itself.
-const MINUTES: i64 = 61;
 
 /// What a place holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -75,7 +72,7 @@ impl Entry {
             }
         }
         self.until_ns = self.until_ns.max(now_ns);
-        let oldest = (now_ns / MINUTE_NS) as i64 - MINUTES;
+        let oldest = (now_ns / MINUTE_NS) as i64 - MINUTES as i64;
         self.minutes.retain(|number, _| *number > oldest);
     }
 

@@ -269,8 +269,8 @@ impl Setup {
     pub fn hand_at_key(&self) -> bool {
         let limits = &self.config.limits;
         let device = |inputs: &drivers::InstrumentSetup| {
-            let wired = inputs.wired.as_ref().is_none_or(|wired| wired.iter().any(|name| name == "dead_man"));
-            wired && drivers::profile(&inputs.profile).is_ok_and(|p| p.signal("dead_man").is_some())
+            inputs.is_wired("dead_man")
+                && drivers::profile(&inputs.profile).is_ok_and(|p| p.signal("dead_man").is_some())
         };
         limits.human_contact && limits.dead_man_key && !self.file.safety_inputs.as_ref().is_some_and(device)
     }

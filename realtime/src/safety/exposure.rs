@@ -8,8 +8,9 @@ use crate::ports::Nanos;
 use serde::{Deserialize, Serialize};
 
 /// Minutes that are remembered, the present one included: 60 whole ones and the one that runs.
-const MINUTES: usize = 61;
-const MINUTE_NS: u64 = 60_000_000_000;
+pub const MINUTES: usize = 61;
+/// ns in a minute.
+pub const MINUTE_NS: u64 = 60_000_000_000;
 
 /// What a minute held.
 #[derive(Clone, Copy, Debug)]

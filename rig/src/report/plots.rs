@@ -124,12 +124,14 @@ fn measured(p: &MeasuredPass) -> Option<(f64, f64, f64)> {
     Some((p.pass.amplitude.micrometres(), c.mu_relative?, c.mu_relative_sd?))
 }
 
+/// A number with so many significant digits.
+fn round(v: f64, digits: i32) -> String {
+    let scale = 10f64.powi(digits - 1 - v.abs().max(1e-12).log10().floor() as i32);
+    format!("{}", (v * scale).round() / scale)
+}
+
 /// Nominal conditions, rounded so that passes of one setting fall together.
 fn setting(p: &MeasuredPass) -> (String, String, String) {
-    let round = |v: f64, digits: i32| {
-        let scale = 10f64.powi(digits - 1 - v.abs().max(1e-12).log10().floor() as i32);
-        format!("{}", (v * scale).round() / scale)
-    };
     (round(p.pass.speed_m_s * 1e3, 2), round(p.pass.frequency_hz / 1e3, 3), round(p.pass.normal_force_n, 1))
 }
 
@@ -218,7 +220,10 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
             Ok(())
         },
     )?;
-    Ok(format!("<figure>{svg}<figcaption>at {f} kHz and {n} N</figcaption></figure>"))
+    // Loads fall together by one digit, which is no word on what the load was.
+    let load_n = chosen.iter().map(|p| p.pass.normal_force_n).sum::<f64>() / chosen.len() as f64;
+    let load = round(load_n, 2);
+    Ok(format!("<figure>{svg}<figcaption>at {f} kHz and {load} N</figcaption></figure>"))
 }
 
 /// Relative friction against Psi (Eq. 17) with Eq. 20 and its stated uncertainty.

@@ -75,16 +75,13 @@ const FROZEN_AFTER: u32 = 200;
 pub(super) fn guarded(file: &SetupFile) -> Result<(), String> {
     let human = file.limits.human_contact == Some(true);
     let key = file.limits.dead_man_key == Some(true);
-    let wired = |name: &str| {
-        let of = |inputs: &InstrumentSetup| inputs.wired.as_ref().is_none_or(|w| w.iter().any(|w| w == name));
-        file.safety_inputs.as_ref().is_some_and(of)
-    };
+    let wired = |name: &str| file.safety_inputs.as_ref().is_some_and(|inputs| inputs.is_wired(name));
     // A thermometer that is said not to be fitted takes its rule away with it: that is for plates that nobody touches.
-    let warm = file.limits.temperature_fitted == Some(false);
+    let unread = file.limits.temperature_fitted == Some(false);
     let missing = match (&file.supply_relay, wired("emergency_stop"), wired("dead_man") || key) {
         _ if !human => None,
         (None, ..) => Some("a second switch-off channel ([supply_relay])"),
-        (_, true, true) if warm => Some("a temperature that is read (temperature_fitted)"),
+        (_, true, true) if unread => Some("a temperature that is read (temperature_fitted)"),
         (_, true, true) => None,
         (_, true, false) => Some("a dead-man device ([safety_inputs])"),
         (_, false, true) => Some("an emergency stop ([safety_inputs])"),
