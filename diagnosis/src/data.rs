@@ -34,6 +34,32 @@ pub enum DataError {
     /// A point number that stands twice.
     #[error("point {0} stands twice; number the points apart")]
     DoublePoint(u64),
+    /// One reading under two numbers.
+    #[error(
+        "points {0} and {1} are one reading: time, conditions and forces are equal to the last digit. Was a table appended to \
+         itself? Remove the second copy; a pass that counts twice makes every probability too sure"
+    )]
+    DoubleReading(u64, u64),
+}
+
+/// Points of a reading that stands under two numbers. Where the table knows no time, equal numbers may be two passes.
+fn read_twice(passes: &[&Pass]) -> Option<[u64; 2]> {
+    let bits = |p: &Pass| {
+        [
+            p.time_s,
+            p.normal_force_n,
+            p.lateral_force_n.unwrap_or(0.0),
+            p.speed_m_s,
+            p.amplitude.metres(),
+            p.position_m,
+        ]
+        .map(f64::to_bits)
+    };
+    let mut rows: Vec<_> = passes.iter().map(|p| (bits(p), p.run.as_deref(), p.session, p.point)).collect();
+    rows.sort_unstable();
+    let knows_time = rows.first()?.0[0] != rows.last()?.0[0];
+    let twice = rows.windows(2).find(|w| (w[0].0, w[0].1) == (w[1].0, w[1].1))?;
+    knows_time.then_some([twice[0].3, twice[1].3])
 }
 
 /// Relative difference below which two frequencies are one.
@@ -62,11 +88,14 @@ impl Table {
     /// Takes a table of measured passes.
     ///
     /// # Errors
-    /// Fewer than 12 passes, values that no pass can have, points that stand twice.
+    /// Fewer than 12 passes, values that no pass can have, points or readings that stand twice.
     pub fn measured(passes: &[Pass]) -> Result<Self, DataError> {
         let kept: Vec<&Pass> = passes.iter().filter(|p| p.lateral_force_n.is_some()).collect();
         if kept.len() < 12 {
             return Err(DataError::TooFew(kept.len()));
+        }
+        if let Some([first, second]) = read_twice(&kept) {
+            return Err(DataError::DoubleReading(first, second));
         }
         let table = Self::build(kept, None)?;
         if table.is_unsigned() {

@@ -1,5 +1,6 @@
 //! Which: from probabilities to a verdict, with what cannot be told apart said so.
 
+use crate::evidence::Posterior;
 use crate::hypotheses::Fitted;
 use crate::left_out::{Gate, Region, gate, left_out_regions};
 use effects::imitated;
@@ -46,24 +47,24 @@ impl Decision {
 /// Probability below which a pair is not looked at.
 const LEAST_PROBABILITY: f64 = 1e-6;
 
-/// Decides.
-pub fn decide(fitted: &Fitted) -> Decision {
-    let k = &*fitted.problem.constants;
-    let candidates = &fitted.candidates;
-    let mut probabilities: Vec<f64> = candidates.iter().map(|c| c.probability).collect();
+/// Decides; the leading cause gets the law that stands for it.
+pub fn decide(fitted: &mut Fitted) -> Decision {
+    let mut probabilities: Vec<f64> = fitted.candidates.iter().map(|c| c.probability).collect();
     let (none, mut unknown) = (fitted.none_probability, fitted.unknown_probability);
     fold_pairs(fitted, &mut probabilities);
     // Candidates come in the order of their own probability, which decides where all are too small for a number.
-    let leading =
-        (0..candidates.len()).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
+    let leading = (0..probabilities.len())
+        .max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
     let Some(leader) = leading else {
         // No effect could be tried: there is a gap of an unknown cause, or none.
+        let k = &fitted.problem.constants;
         let verdict = if none < k.claim_probability { Verdict::Unknown } else { Verdict::NoGap };
         let (class, regions, gate) = (Vec::new(), Vec::new(), gate(k, &[]));
         return Decision { verdict, none, unknown, probabilities, class, gate, regions };
     };
-    let regions = left_out_regions(fitted, &candidates[leader].best);
-    let judged = gate(k, &regions);
+    let (regions, judged) = judged(fitted, leader);
+    let fitted = &*fitted;
+    let (k, candidates) = (&*fitted.problem.constants, &fitted.candidates);
     let claimed = none < k.claim_probability;
     if claimed {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
@@ -89,6 +90,30 @@ pub fn decide(fitted: &Fitted) -> Decision {
         Verdict::Ambiguous
     };
     Decision { verdict, none, unknown, probabilities, class, gate: judged, regions }
+}
+
+/// The leader on the left-out regions. Of its laws that the evidence does not tell apart the one that predicts best what it has not
+/// seen stands for the cause: which of them is a tenth of a nat ahead is no ground to doubt the cause.
+fn judged(fitted: &mut Fitted, leader: usize) -> (Vec<Region>, Gate) {
+    let k = fitted.problem.constants.clone();
+    let own = &fitted.candidates[leader];
+    let top = own.laws.iter().map(|(e, _)| *e).fold(f64::NEG_INFINITY, f64::max);
+    let near = own.laws.iter().filter(|(e, _)| *e > top - k.alias_nats);
+    let mut laws: Vec<Posterior> = near.map(|(_, law)| law.clone()).collect();
+    if laws.is_empty() {
+        laws.push(own.best.clone());
+    }
+    let effects = own.effects.len();
+    let judge = |law: Posterior| {
+        let regions = left_out_regions(fitted, &law);
+        let gate = gate(&k, &regions);
+        (gate.survival(&k, effects, law.share), law, regions, gate)
+    };
+    let all = laws.into_iter().map(judge);
+    let (_, law, regions, gate) =
+        all.reduce(|a, b| if b.0 > a.0 { b } else { a }).expect("a candidate has a law");
+    fitted.candidates[leader].best = law;
+    (regions, gate)
 }
 
 /// The leader and every hypothesis of its size that the data does not tell from it.

@@ -153,7 +153,7 @@ pub fn laplace(
     let (mut hessian, gradient) = equations(&covariance, &jacobian, &residual, &precision, &u);
     // A uniform prior bounds the integral where the data say nothing: a Gaussian of its own variance stands for it. Without,
     // a shape that nothing depends on (an exponent, at size zero) would count with an endless volume.
-    let parameters = members.iter().flat_map(|member| member.parameters());
+    let parameters = members.iter().flat_map(|member| member.parameters(&problem.design));
     for (k, parameter) in parameters.enumerate().map(|(k, p)| (k + NUISANCES, p)) {
         if let Prior::Uniform(..) = parameter.prior {
             hessian[(k, k)] += 12.0 / (bounds[k].1 - bounds[k].0).powi(2);
@@ -178,7 +178,7 @@ pub fn laplace(
     let layout = Layout::of(members);
     for (index, member) in members.iter().enumerate() {
         let at = layout.size(index);
-        if let Prior::HalfNormal(_) = member.parameters()[0].prior {
+        if let Prior::HalfNormal(_) = member.parameters(&problem.design)[0].prior {
             // At the bound the optimum may lie beyond: the quadratic is integrated over the half line.
             let sd = posterior[(at, at)].sqrt();
             let beyond = if u[at] <= bounds[at].0 { gradient[at].max(0.0) * sd } else { 0.0 };
@@ -301,7 +301,7 @@ mod tests {
                 // Sizes at or near zero, shapes at an end of their range: where a fit without a gap may rest.
                 for (size, end) in [(0.0, false), (0.0, true), (1e-3, false), (1e-3, true)] {
                     let mut u = none.u.clone();
-                    for (i, p) in member.parameters().iter().enumerate() {
+                    for (i, p) in member.parameters(&problem.design).iter().enumerate() {
                         let (low, high) = p.coordinate_bounds();
                         u.push(if i == 0 {
                             low.max(0.0) + size

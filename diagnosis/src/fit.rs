@@ -36,9 +36,13 @@ impl Member {
     pub fn form(&self) -> &'static Law {
         &known()[self.effect].laws()[self.law]
     }
-    /// The law's parameters.
-    pub fn parameters(&self) -> &'static [Parameter] {
-        self.form().parameters
+    /// The law's parameters, with what the loads of a table make of their priors.
+    pub fn parameters(&self, design: &Design) -> Vec<Parameter> {
+        self.form().parameters.iter().map(|p| p.at_load(design.reference_load_n)).collect()
+    }
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.form().parameters.len()
     }
     /// The effect's name.
     pub fn name(&self) -> &'static str {
@@ -106,9 +110,10 @@ impl Problem {
         let mut certified = Vec::new();
         for (index, effect) in library().iter().enumerate() {
             for (law, form) in effect.laws().iter().enumerate() {
-                if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) =
-                    (form.certified_by.and_then(|key| rig.calibration.sd(key)), form.parameters[0].prior)
-                {
+                if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) = (
+                    form.certified_by.and_then(|key| rig.calibration.sd(key)),
+                    form.parameters[0].at_load(table.design.reference_load_n).prior,
+                ) {
                     certified.push((Member { effect: index, law }, (sd / wide).clamp(EXACT, 1.0)));
                 }
             }
@@ -214,7 +219,7 @@ impl Problem {
     pub fn bounds(&self, members: &[Member]) -> Vec<(f64, f64)> {
         let mut bounds = vec![(-FARTHEST_NUISANCE, FARTHEST_NUISANCE); NUISANCES];
         for m in members {
-            bounds.extend(m.parameters().iter().map(Parameter::coordinate_bounds));
+            bounds.extend(m.parameters(&self.design).iter().map(Parameter::coordinate_bounds));
         }
         bounds
     }
@@ -223,7 +228,7 @@ impl Problem {
     pub fn prior_precision(&self, members: &[Member]) -> Vec<f64> {
         let mut list = vec![1.0; NUISANCES];
         for m in members {
-            for (i, p) in m.parameters().iter().enumerate() {
+            for (i, p) in m.parameters(&self.design).iter().enumerate() {
                 list.push(match p.prior {
                     effects::Prior::Uniform(..) => 0.0,
                     _ if i == 0 => 1.0 / self.certificate(m).powi(2),
@@ -242,7 +247,7 @@ impl Problem {
     pub fn log_prior(&self, members: &[Member], u: &[f64]) -> f64 {
         let mut sum: f64 = u[..NUISANCES].iter().map(|x| -0.5 * x * x - HALF_LN_2PI).sum();
         for (m, places) in members.iter().zip(Layout::of(members).members()) {
-            for (i, (p, u)) in m.parameters().iter().zip(&u[places]).enumerate() {
+            for (i, (p, u)) in m.parameters(&self.design).iter().zip(&u[places]).enumerate() {
                 let sd = if i == 0 { self.certificate(m) } else { 1.0 };
                 sum += p.log_prior(u / sd) - sd.ln();
             }
@@ -251,9 +256,9 @@ impl Problem {
     }
 
     /// Parameters in the laws' own units.
-    pub fn thetas(members: &[Member], u: &[f64]) -> Vec<Vec<f64>> {
+    pub fn thetas(&self, members: &[Member], u: &[f64]) -> Vec<Vec<f64>> {
         let own = |(m, places): (&Member, std::ops::Range<usize>)| {
-            m.parameters().iter().zip(&u[places]).map(|(p, u)| p.value(*u)).collect()
+            m.parameters(&self.design).iter().zip(&u[places]).map(|(p, u)| p.value(*u)).collect()
         };
         members.iter().zip(Layout::of(members).members()).map(own).collect()
     }
@@ -266,7 +271,7 @@ impl Problem {
     /// Predicted lateral forces at other conditions, N.
     pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Condition]) -> DVector<f64> {
         let baseline = self.baseline(u);
-        let thetas = Self::thetas(members, u);
+        let thetas = self.thetas(members, u);
         // Effects act in the library's order, whatever the order of the hypothesis.
         let mut order: Vec<usize> = (0..members.len()).collect();
         order.sort_by_key(|&k| members[k]);

@@ -54,7 +54,7 @@ pub fn estimates(problem: &Problem, best: &Posterior, basis: &DMatrix<f64>) -> V
         .zip(Layout::of(&best.members).members())
         .map(|(member, places)| {
             member
-                .parameters()
+                .parameters(&problem.design)
                 .iter()
                 .zip(places)
                 .map(|(p, k)| {
@@ -78,8 +78,8 @@ pub fn estimates(problem: &Problem, best: &Posterior, basis: &DMatrix<f64>) -> V
 }
 
 /// Intervals from the curvature at the mode, for hypotheses that do not lead.
-pub fn curvature(e: &Posterior) -> Vec<Estimate> {
-    let parameters = e.members.iter().flat_map(|m| m.parameters());
+pub fn curvature(problem: &Problem, e: &Posterior) -> Vec<Estimate> {
+    let parameters = e.members.iter().flat_map(|m| m.parameters(&problem.design));
     parameters
         .zip(NUISANCES..)
         .map(|(p, at)| {

@@ -19,7 +19,7 @@ impl Layout {
     pub fn of(members: &[Member]) -> Self {
         let mut starts = vec![NUISANCES];
         starts.extend(members.iter().scan(NUISANCES, |at, m| {
-            *at += m.parameters().len();
+            *at += m.count();
             Some(*at)
         }));
         Layout { starts }
@@ -52,8 +52,8 @@ mod tests {
             let members = [Member { effect, law: 0 }, Member { effect: 0, law: 0 }];
             let layout = Layout::of(&members);
             let (first, second) = (layout.member(0), layout.member(1));
-            assert_eq!(first, NUISANCES..NUISANCES + members[0].parameters().len());
-            assert_eq!((second.start, second.len()), (first.end, members[1].parameters().len()));
+            assert_eq!(first, NUISANCES..NUISANCES + members[0].count());
+            assert_eq!((second.start, second.len()), (first.end, members[1].count()));
             assert_eq!(layout.members().collect::<Vec<_>>(), [first, second]);
         }
         assert_eq!(Layout::of(&[]).members().count(), 0);

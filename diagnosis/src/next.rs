@@ -12,7 +12,6 @@ pub mod predictive;
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict};
-use crate::fit::Problem;
 use crate::hypotheses::Fitted;
 use models::condition::Condition;
 use models::covariate;
@@ -90,7 +89,7 @@ fn actions(fitted: &Fitted, decision: &Decision) -> Vec<Experiment> {
     let (a, b) = (&fitted.candidates[leader], &fitted.candidates[second]);
     let mut list = Vec::new();
     for (one, other) in [(a, b), (b, a)] {
-        let thetas = Problem::thetas(&one.best.members, &one.best.u);
+        let thetas = fitted.problem.thetas(&one.best.members, &one.best.u);
         for (member, theta) in one.best.members.iter().zip(thetas) {
             let Some(check) = member.form().seen_by.filter(|_| !other.effects.contains(&member.effect))
             else {

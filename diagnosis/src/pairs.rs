@@ -155,7 +155,7 @@ fn refined(problem: &Problem, start: Start, loose: &[f64], basis: &DMatrix<f64>)
 }
 
 /// The same pair with the exact alias of one of its members in its place.
-fn twins(pair: &Posterior) -> Vec<(Vec<Member>, Vec<f64>)> {
+fn twins(problem: &Problem, pair: &Posterior) -> Vec<(Vec<Member>, Vec<f64>)> {
     let member = |(effect, law): (usize, usize)| Member { effect, law };
     let both = effects::twins().into_iter().flat_map(|[a, b]| [(a, b), (b, a)]);
     let both = both.map(|(one, other)| (member(one), member(other)));
@@ -166,9 +166,9 @@ fn twins(pair: &Posterior) -> Vec<(Vec<Member>, Vec<f64>)> {
         }
         let (mut members, mut u) = (pair.members.clone(), pair.u.clone());
         let size = Layout::of(&members).size(place);
-        let value = one.parameters()[0].value(u[size]);
+        let value = one.parameters(&problem.design)[0].value(u[size]);
         members[place] = other;
-        u[size] = other.parameters()[0].coordinate(value);
+        u[size] = other.parameters(&problem.design)[0].coordinate(value);
         Some((members, u))
     })
     .collect()
@@ -233,7 +233,7 @@ pub fn pairs(
     let mut found = with_every_law(problem, first, singles, loose, basis);
     let twins: Vec<Pair> = found
         .par_iter()
-        .flat_map_iter(|pair| twins(&pair.posterior))
+        .flat_map_iter(|pair| twins(problem, &pair.posterior))
         .map(|(members, u)| {
             let share = middle_form_share(k, &members);
             Pair::of(laplace(problem, &members, &u, basis, share, ROUNDS[1]))

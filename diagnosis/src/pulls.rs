@@ -86,7 +86,7 @@ pub fn pulls(problem: &Problem, none: &Posterior, model: &Posterior) -> Vec<Pull
     let judged = if named { none } else { model };
     let fitted = problem.baseline(&model.u);
     let nominal = &problem.nominal;
-    let [on_normal, on_lateral] = stiffness_factors(model);
+    let [on_normal, on_lateral] = stiffness_factors(problem, model);
     let values = [
         (nominal.normal_stiffness_n_per_m, on_normal * fitted.normal_stiffness_n_per_m),
         (nominal.lateral_stiffness_n_per_m, on_lateral * fitted.lateral_stiffness_n_per_m),
@@ -118,8 +118,8 @@ fn errs_in_the_finger(member: &Member) -> bool {
 }
 
 /// Factors on normal and lateral stiffness that a named error of a stiffness adds to the baseline's.
-fn stiffness_factors(model: &Posterior) -> [f64; 2] {
-    let thetas = Problem::thetas(&model.members, &model.u);
+fn stiffness_factors(problem: &Problem, model: &Posterior) -> [f64; 2] {
+    let thetas = problem.thetas(&model.members, &model.u);
     let mut factors = [1.0; 2];
     for (member, theta) in model.members.iter().zip(thetas).filter(|(m, _)| errs_in_the_finger(m)) {
         let e_folds = member.form().acts_as.unwrap_or_default();

@@ -4,7 +4,9 @@ use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
 use crate::hypotheses::{Fitted, Options, fit_believing};
 use crate::scatter::{Belief, Scatter};
-use models::covariate::{Role, SMOOTH};
+use effects::known;
+use models::covariate::{AMPLITUDE, Role, SMOOTH};
+use models::quantity::PeakToPeak;
 use serde::Serialize;
 
 /// Suspect passes that are told in words, the farthest first.
@@ -43,8 +45,8 @@ pub fn with_suspects(
     if fitted.scatter.suspects.is_empty() {
         return None;
     }
-    let fitted = fit_believing(table, rig, options, &Belief::All);
-    let decision = decide(&fitted);
+    let mut fitted = fit_believing(table, rig, options, &Belief::All);
+    let decision = decide(&mut fitted);
     let (effects, probability) = leading(&fitted, &decision);
     Some(WithSuspects { verdict: decision.verdict, effects, probability })
 }
@@ -76,15 +78,46 @@ pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<Stri
         remarks.push(format!("No replicates lie close together: {stands}"));
     }
     remarks.extend(together(table));
+    remarks.extend(two_levels(fitted, table, decision));
     let silent: Vec<&str> = decision.regions.iter().filter(|r| !r.judges).map(|r| r.name.as_str()).collect();
     if !silent.is_empty() {
         remarks.push(format!(
-            "Two levels only: without {} the rest of the table tells nothing of the leading cause, so these regions do not judge it. \
-             A third level would.",
+            "Without {} the rest of the table tells nothing of the leading cause, so these regions do not judge it. \
+             A further level would.",
             silent.join(", ")
         ));
     }
     remarks
+}
+
+/// Share of a covariate's range that parts two levels of it.
+const PARTED: f64 = 0.8;
+
+/// Settings that the leading cause needs and that have two levels: that it acts shows, its law does not.
+fn two_levels(fitted: &Fitted, table: &Table, decision: &Decision) -> Option<String> {
+    let asked = matches!(decision.verdict, Verdict::Named | Verdict::Ambiguous);
+    let leader = &fitted.candidates[decision.leader().filter(|_| asked)?];
+    let needs = leader.effects.iter().flat_map(|e| known()[*e].needs());
+    let largest = table.design.largest_amplitude_m;
+    let mut words: Vec<&str> = needs
+        .filter_map(|need| need.levels_of())
+        .filter(|c| {
+            let moving =
+                table.passes.iter().filter(|p| p.amplitude > PeakToPeak::ZERO || c.name != AMPLITUDE.name);
+            let mut values: Vec<f64> = moving.filter_map(|p| c.of(p)).map(|v| c.scaled(v, largest)).collect();
+            values.sort_by(f64::total_cmp);
+            let range = values.last().unwrap_or(&0.0) - values.first().unwrap_or(&0.0);
+            range > 0.0 && values.windows(2).any(|w| w[1] - w[0] > PARTED * range)
+        })
+        .map(|c| c.words)
+        .collect();
+    words.dedup();
+    (!words.is_empty()).then(|| {
+        format!(
+            "Two levels only of {}: that the leading cause acts can be told from them, by which law it cannot. Add a third level.",
+            words.join(" and ")
+        )
+    })
 }
 
 /// Correlation from which two covariates change together.
@@ -233,7 +266,7 @@ mod tests {
             result.decision.regions.iter().filter(|r| !r.judges).map(|r| r.name.as_str()).collect();
         assert_eq!(silent, ["low speed", "high speed"], "{}", result.report.text);
         assert!(
-            result.report.remarks.iter().any(|r| r.starts_with("Two levels only")),
+            result.report.remarks.iter().any(|r| r.starts_with("Two levels only of speed")),
             "{:?}",
             result.report.remarks
         );

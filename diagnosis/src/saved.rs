@@ -33,22 +33,30 @@ impl Diagnosis {
             interpolation_error: errors.fold(0.0, f64::max),
             baseline: problem.baseline(&best.u),
             design: problem.design,
-            effects: saved_effects(best),
+            effects: saved_effects(problem, best),
         })
     }
 }
 
 /// Every member with its parameters and their covariance.
-fn saved_effects(best: &Posterior) -> Vec<SavedEffect> {
-    let thetas = Problem::thetas(&best.members, &best.u);
+fn saved_effects(problem: &Problem, best: &Posterior) -> Vec<SavedEffect> {
+    let thetas = problem.thetas(&best.members, &best.u);
     let layout = Layout::of(&best.members);
     let members = best.members.iter().zip(layout.members()).zip(thetas);
-    members.map(|((member, places), theta)| saved_effect(best, *member, places.start, &theta)).collect()
+    members
+        .map(|((member, places), theta)| saved_effect(problem, best, *member, places.start, &theta))
+        .collect()
 }
 
 /// One member, whose coordinates begin at `first`.
-fn saved_effect(best: &Posterior, member: Member, first: usize, theta: &[f64]) -> SavedEffect {
-    let own = member.parameters();
+fn saved_effect(
+    problem: &Problem,
+    best: &Posterior,
+    member: Member,
+    first: usize,
+    theta: &[f64],
+) -> SavedEffect {
+    let own = member.parameters(&problem.design);
     // Covariance in the parameters' units, by the slope of each coordinate.
     let slope: Vec<f64> = (own.iter().zip(&best.u[first..]))
         .map(|(p, u)| (p.value(u + STEP) - p.value(u - STEP)) / (2.0 * STEP))

@@ -91,10 +91,10 @@ fn scanned(
     fixed: &[f64],
     variance: &[f64],
 ) -> (Vec<usize>, Vec<(f64, Vec<f64>)>) {
-    let parameters = members.last().map_or(&[][..], Member::parameters);
+    let parameters = members.last().map_or_else(Vec::new, |m| m.parameters(&problem.design));
     let fine = parameters.iter().any(is_wavelength);
     let rows = rows(problem.len(), if fine { problem.len() } else { SCAN_ROWS });
-    let scored = scan(problem, members, fixed, variance, &rows, grid(parameters, problem.design.stroke_m));
+    let scored = scan(problem, members, fixed, variance, &rows, grid(&parameters, problem.design.stroke_m));
     (rows, scored)
 }
 
@@ -107,7 +107,7 @@ pub fn coarse_scan(
     alone: &[f64],
 ) -> Option<(f64, Vec<f64>)> {
     let last = members.last()?;
-    let (low, high) = last.parameters()[0].coordinate_bounds();
+    let (low, high) = last.parameters(&problem.design)[0].coordinate_bounds();
     let mut list = vec![alone.to_vec()];
     let reach = if alone[0].abs() > 0.05 { alone[0] } else { 0.3 };
     let own = [0.15, 0.4, 1.0, 2.0, -0.4, -1.0].map(|factor| reach * factor);
@@ -134,7 +134,7 @@ pub fn full_scan(
 /// Local fit of a pair from one start.
 pub fn refine_from(problem: &Problem, members: &[Member], start: Vec<f64>, variance: &[f64]) -> Option<Fit> {
     let rows = rows(problem.len(), SCAN_ROWS);
-    let fixed = start.len() - members.last()?.parameters().len();
+    let fixed = start.len() - members.last()?.count();
     refine(problem, members, fixed, variance, &rows, &[(0.0, start)], (1, 1)).into_iter().next()
 }
 

@@ -127,8 +127,8 @@ const LISTED: f64 = 1e-6;
 
 /// Diagnoses a table.
 pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String) -> Diagnosis {
-    let fitted = fit_all(table, rig, options);
-    let decision = decide(&fitted);
+    let mut fitted = fit_all(table, rig, options);
+    let decision = decide(&mut fitted);
     let leader = decision.leader();
     let best = leader.map(|l| &fitted.candidates[l].best);
     let gap = gap(&fitted, table, rig, decision.verdict, leader);
@@ -269,7 +269,7 @@ fn hypotheses(
             let parameters = if Some(i) == decision.leader() && parameters.is_some() {
                 parameters.map(|p| p.concat()).unwrap_or_default()
             } else {
-                curvature(&c.best)
+                curvature(&fitted.problem, &c.best)
             };
             Hypothesis {
                 effects: c.names().iter().map(|n| (*n).to_string()).collect(),

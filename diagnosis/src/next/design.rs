@@ -139,8 +139,8 @@ mod tests {
     fn expected_nats_are_what_the_evidence_gains_on_average() {
         let mut draw = Deviates(5);
         let table = table(&mut draw, 0.06);
-        let fitted = fit_all(&table, &rig(), &Options { pairs: false, ..Options::default() });
-        let decision = decide(&fitted);
+        let mut fitted = fit_all(&table, &rig(), &Options { pairs: false, ..Options::default() });
+        let decision = decide(&mut fitted);
         let grid = grid::conditions(&table);
         let hypotheses = predictives(&fitted, &rig(), &decision, &grid);
         let chosen = greedy(&hypotheses, PASSES, Some(hypotheses.len() - 1), MOST);

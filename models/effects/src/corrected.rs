@@ -184,7 +184,7 @@ impl Corrected {
                 .ok_or_else(|| ModelError::Law { effect: s.name.clone(), law: s.law.clone() })?;
             let expected = effect.laws()[law].parameters;
             let mut theta = [0.0; MOST_PARAMETERS];
-            for (index, p) in expected.iter().enumerate() {
+            for (index, p) in expected.iter().map(|p| p.at_load(saved.design.reference_load_n)).enumerate() {
                 let given = s.parameters.get(index).filter(|g| g.name == p.name && g.unit == p.unit);
                 let value = given
                     .ok_or_else(|| ModelError::Parameter { effect: s.name.clone(), index, expected: p.name })?

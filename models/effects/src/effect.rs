@@ -50,6 +50,9 @@ pub enum Prior {
     Uniform(f64, f64),
 }
 
+/// Normal force about which the library states its priors, N: a fingertip's. See [`Parameter::at_load`].
+pub const STATED_AT_N: f64 = 0.3;
+
 /// One parameter of one law.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Parameter {
@@ -94,6 +97,26 @@ impl Parameter {
     /// A shape parameter anywhere between two ends.
     pub const fn between(name: &'static str, unit: &'static str, lower: f64, upper: f64) -> Self {
         Self { name, unit, zero: None, prior: Prior::Uniform(lower, upper), lower, upper }
+    }
+
+    /// The same for a table about this normal force: what has the unit of a force grows with it, and with the stiffnesses that
+    /// belong to it. Forces in another unit, or a finger in the place of a pin, then make the same verdict.
+    #[must_use]
+    pub fn at_load(self, load_n: f64) -> Self {
+        let power = match self.unit {
+            "N" | "N/K" | "kg" => 1.0,
+            "1/N" | "1/W" => -1.0,
+            "N^-2/3" => -2.0 / 3.0,
+            _ => return self,
+        };
+        let factor = (load_n / STATED_AT_N).powf(power);
+        let prior = match self.prior {
+            Prior::Normal(sd) => Prior::Normal(factor * sd),
+            Prior::HalfNormal(sd) => Prior::HalfNormal(factor * sd),
+            Prior::LogNormal(median, sd) => Prior::LogNormal(factor * median, sd),
+            Prior::Uniform(low, high) => Prior::Uniform(factor * low, factor * high),
+        };
+        Self { prior, lower: factor * self.lower, upper: factor * self.upper, ..self }
     }
 
     /// The value at coordinate `u`.
@@ -243,6 +266,17 @@ impl Need {
     pub fn covariate(self) -> Option<&'static Covariate> {
         match self {
             Need::Temperatures => Some(&covariate::TEMPERATURE),
+            _ => None,
+        }
+    }
+
+    /// The setting of which it asks more than one level.
+    pub fn levels_of(self) -> Option<&'static Covariate> {
+        match self {
+            Need::Amplitudes => Some(&covariate::AMPLITUDE),
+            Need::Loads => Some(&covariate::NORMAL_FORCE),
+            Need::Speeds => Some(&covariate::SPEED),
+            Need::Frequencies => Some(&covariate::FREQUENCY),
             _ => None,
         }
     }

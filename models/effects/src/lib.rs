@@ -45,7 +45,7 @@ pub mod listing;
 pub mod operating;
 pub mod predict;
 
-pub use effect::{Check, Effect, Law, Need, Parameter, Place, Prior};
+pub use effect::{Check, Effect, Law, Need, Parameter, Place, Prior, STATED_AT_N};
 pub use library::{by_name, imitated, known, library, near, one_cause, twins};
 pub use operating::{Baseline, Design, Reading};
 pub use predict::{Active, lateral_force};

@@ -9,8 +9,8 @@ use crate::effect::{Effect, Law};
 /// What every cause's file needs.
 mod prelude {
     pub use crate::contact::Contact;
-    pub use crate::effect::{Effect, Law, Need, Parameter, Place};
-    pub use crate::operating::{Design, Reading, atmospheres};
+    pub use crate::effect::{Effect, Law, Need, Parameter, Place, STATED_AT_N};
+    pub use crate::operating::{Design, LEAST_SHARE, Reading, atmospheres};
     pub use models::condition::Condition;
     pub use models::rig_file::CertifiedKey;
 }

@@ -83,6 +83,9 @@ impl Baseline {
     }
 }
 
+/// Share of a pass's load that is left at least where an effect takes load away: a contact without any has no closed form.
+pub const LEAST_SHARE: f64 = 3e-4;
+
 /// Pressure in units of one standard atmosphere; one where it was not measured.
 pub fn atmospheres(pass: &Condition) -> f64 {
     pass.ambient_pressure_pa.map_or(1.0, |p| p / 101_325.0)

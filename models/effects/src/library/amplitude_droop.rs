@@ -11,7 +11,7 @@ const CHECK: &str = "Measure the plate with a vibrometer while the finger is pre
 static LAWS: [Law; 3] = [
     Law::new("impedance by load", &[Parameter::positive("droop_per_load", "1/N", 0.7, 10.0)])
         .seen_by(CHECK, 0.05),
-    Law::new("impedance by Hertz area", &[Parameter::positive("droop_at_one_newton", "1", 0.5, 8.0)])
+    Law::new("impedance by Hertz area", &[Parameter::positive("droop_at_one_newton", "N^-2/3", 0.5, 8.0)])
         .seen_by(CHECK, 0.05),
     Law::new("linear loss", &[Parameter::positive("droop_per_load", "1/N", 0.4, 3.0)]).seen_by(CHECK, 0.05),
 ];

@@ -37,6 +37,6 @@ impl Effect for NormalOffset {
     }
     fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
         let share = if law == 0 { 1.0 } else { pass.time_s / design.duration_s.max(1e-9) };
-        c.normal_force = (c.normal_force - theta[0] * share).max(1e-4);
+        c.normal_force = (c.normal_force - theta[0] * share).max(LEAST_SHARE * c.normal_force);
     }
 }

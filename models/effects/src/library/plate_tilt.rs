@@ -49,6 +49,6 @@ impl Effect for PlateTilt {
 pub fn unload(c: &mut Contact, direction: f64, share: f64) {
     if share != 0.0 {
         let friction = direction * crate::contact::mean_friction(c);
-        c.normal_force = (c.normal_force + share * friction).max(1e-4);
+        c.normal_force = (c.normal_force + share * friction).max(LEAST_SHARE * c.normal_force);
     }
 }

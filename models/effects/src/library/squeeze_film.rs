@@ -75,8 +75,10 @@ impl Effect for SqueezeFilm {
     }
     fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
         let air = atmospheres(pass);
+        // Area and surface are a fingertip's at a fingertip's load; a larger contact at a larger one.
+        let size = design.reference_load_n / STATED_AT_N;
         match law {
-            0 => c.solid_share *= film_share(theta[0] * c.half_amplitude(), air, c.normal_force),
+            0 => c.solid_share *= film_share(theta[0] * c.half_amplitude(), air, c.normal_force / size),
             1 => {
                 let eased = (design.reference_load_n / c.normal_force).powf(theta[1]);
                 c.solid_share /= 1.0 + theta[0] * c.amplitude_pp.powi(2) * air * eased;
@@ -84,7 +86,7 @@ impl Effect for SqueezeFilm {
             2 => c.friction_factor *= (-theta[0] * c.amplitude_pp.powi(2) * air).exp(),
             3 => c.friction_factor /= 1.0 + air * (theta[0] * c.amplitude_pp).powf(theta[1]),
             _ => {
-                let film = theta[1] * AIR_SCALE_N * air;
+                let film = theta[1] * AIR_SCALE_N * air * size;
                 c.solid_share *=
                     finite_film_share(theta[0] * c.half_amplitude(), film, theta[2], c.normal_force);
             }

@@ -64,7 +64,7 @@ fn one(seed: u64) -> miette::Result<Covered> {
                 Prior::Uniform(..) => noise.between(-2.5, 2.5),
                 _ => 0.7 * noise.normal(),
             };
-            p.value(u)
+            p.at_load(clean.design.reference_load_n).value(u)
         })
         .collect();
     let active = [Active { effect, law, theta: &theta }];

@@ -44,7 +44,7 @@ struct Said {
     probability: f64,
 }
 
-fn said(set: &Set, fitted: &Fitted) -> Said {
+fn said(set: &Set, fitted: &mut Fitted) -> Said {
     let decision = decide(fitted);
     let mut truth: Vec<&str> = set.label.causes.iter().map(|c| c.name.as_str()).collect();
     truth.sort_unstable();
@@ -82,13 +82,13 @@ fn tried(
     pairs: bool,
 ) -> miette::Result<Vec<Said>> {
     let mut own = fitted(set, base.clone(), pairs)?;
-    let mut list = vec![said(set, &own)];
+    let mut list = vec![said(set, &mut own)];
     for (stage, constants) in changes {
         list.push(if *stage == Stage::Decision {
             own.problem.constants = Arc::new(constants.clone());
-            said(set, &own)
+            said(set, &mut own)
         } else {
-            said(set, &fitted(set, constants.clone(), pairs)?)
+            said(set, &mut fitted(set, constants.clone(), pairs)?)
         });
     }
     Ok(list)
