@@ -8,7 +8,7 @@ use crate::constants::Constants;
 use crate::fit::{Member, Problem};
 use crate::gaussian::{Covariance, log_sum_exp};
 use crate::layout::{Layout, NUISANCES};
-use crate::least_squares::{Fit, bounded_step};
+use crate::least_squares::{Fit, bounded_step, carry};
 use effects::Prior;
 use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
@@ -124,9 +124,11 @@ pub fn laplace(
     let mut cost = covariance.quadratic(&(&y - &m)) + covariance.log_det() + penalty(&u);
     let mut damping = DAMPING;
     let mut jacobian = problem.jacobian(members, &u, &m);
-    for _ in 0..rounds {
+    // Whether the Jacobian is that of this place; every second one is carried along with the step.
+    let mut own = true;
+    for round in 0..rounds {
         let (hessian, gradient) = equations(&covariance, &jacobian, &(&y - &m), &precision, &u);
-        let mut gained = 0.0;
+        let (mut gained, exact) = (0.0, own);
         for _ in 0..TRIALS {
             let Some(next) = bounded_step(&hessian, &gradient, damping, &u, &bounds) else { break };
             let there = problem.predict(members, &next);
@@ -135,19 +137,24 @@ pub fn laplace(
             let value = trial.quadratic(&(&y - &there)) + trial.log_det() + penalty(&next);
             if value < cost {
                 gained = cost - value;
+                carry(&mut jacobian, &u, &next, &(&there - &m));
+                own = false;
                 (u, m, change, covariance, cost) = (next, there, moved, trial, value);
                 damping = (damping * EASED).max(DAMPING_BOUNDS[0]);
                 break;
             }
             damping = (damping * STIFFENED).min(DAMPING_BOUNDS[1]);
         }
-        if gained == 0.0 {
+        let found = gained < CONVERGED;
+        if found && exact {
             break;
         }
+        if found || round % 2 == 1 {
+            (jacobian, own) = (problem.jacobian(members, &u, &m), true);
+        }
+    }
+    if !own {
         jacobian = problem.jacobian(members, &u, &m);
-        if gained < CONVERGED {
-            break;
-        }
     }
     let residual = &y - &m;
     let (mut hessian, gradient) = equations(&covariance, &jacobian, &residual, &precision, &u);

@@ -78,6 +78,8 @@ pub struct Problem {
     pub prior_sd: [f64; NUISANCES],
     /// Certified deviations of effect sizes, by effect and law, in units of the law's own prior.
     pub certified: Vec<(Member, f64)>,
+    /// Whether predictions may be rough: where a search only looks for places to begin.
+    pub rough: bool,
     /// Tunable constants of the diagnosis.
     pub constants: Arc<Constants>,
 }
@@ -138,6 +140,7 @@ impl Problem {
             },
             prior_sd,
             certified,
+            rough: false,
             constants: constants.clone(),
         }
     }
@@ -163,6 +166,11 @@ impl Problem {
             constants: self.constants.clone(),
             ..*self
         }
+    }
+
+    /// Some of its rows, roughly predicted: for searches that only look for places to begin.
+    pub fn sketch(&self, rows: &[usize]) -> Self {
+        Problem { rough: true, ..self.select(rows) }
     }
 
     /// The same problem at other conditions, where nothing was measured.
@@ -279,9 +287,10 @@ impl Problem {
             .into_iter()
             .map(|k| Active { effect: known()[members[k].effect], law: members[k].law, theta: &thetas[k] })
             .collect();
+        let force = if self.rough { effects::rough_lateral_force } else { effects::lateral_force };
         DVector::from_iterator(
             passes.len(),
-            passes.iter().map(|p| effects::lateral_force(&baseline, &active, p, &self.design)),
+            passes.iter().map(|p| force(&baseline, &active, p, &self.design)),
         )
     }
 

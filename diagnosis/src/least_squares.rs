@@ -45,8 +45,10 @@ pub fn minimise(
     let mut m = problem.predict(members, &u);
     let mut cost = cost_of(&u, &m);
     let mut damping = DAMPING;
-    for _ in 0..rounds {
-        let jacobian = problem.jacobian(members, &u, &m);
+    let mut jacobian = problem.jacobian(members, &u, &m);
+    // Whether the Jacobian is that of this place, or one that was carried along with the last step.
+    let mut own = true;
+    for round in 0..rounds {
         let (hessian, gradient) = normal_equations(problem, &jacobian, &m, variance, &precision, &u);
         let mut improved = false;
         for _ in 0..TRIALS {
@@ -55,6 +57,9 @@ pub fn minimise(
             let value = cost_of(&next, &there);
             if value < cost {
                 let gain = cost - value;
+                if round % 2 == 0 {
+                    carry(&mut jacobian, &u, &next, &(&there - &m));
+                }
                 (u, m, cost) = (next, there, value);
                 damping = (damping * EASED).max(LEAST_DAMPING);
                 improved = gain > GAIN * (1.0 + 1e-4 * cost);
@@ -62,11 +67,27 @@ pub fn minimise(
             }
             damping *= STIFFENED;
         }
-        if !improved {
+        if !improved && own {
             break;
+        }
+        // Every second Jacobian is computed, and one where a carried one led nowhere.
+        own = !improved || round % 2 == 1;
+        if own && round + 1 < rounds {
+            jacobian = problem.jacobian(members, &u, &m);
         }
     }
     Fit { u, prediction: m, cost }
+}
+
+/// Carries a Jacobian along with a step by the least change that agrees with it (Broyden 1965): a computed one costs a prediction a
+/// coordinate.
+pub fn carry(jacobian: &mut DMatrix<f64>, from: &[f64], to: &[f64], change: &DVector<f64>) {
+    let step = DVector::from_iterator(from.len(), to.iter().zip(from).map(|(t, f)| t - f));
+    let square = step.norm_squared();
+    if square > 0.0 {
+        let missed = change - &*jacobian * &step;
+        jacobian.ger(1.0 / square, &missed, &step, 1.0);
+    }
 }
 
 fn normal_equations(

@@ -6,7 +6,7 @@ use crate::fit::{Member, Problem};
 use crate::gaussian::log_sum_exp;
 use crate::hypotheses::Candidate;
 use crate::least_squares::Fit;
-use crate::starts::{nuisance_starts, optima};
+use crate::starts::{Sought, nuisance_starts, seek};
 use effects::{known, library};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -15,6 +15,9 @@ use rayon::prelude::*;
 const ROUNDS: usize = 6;
 /// Factor on the best tempered cost of a law, and offset, within which its other optima are looked at.
 const NEAR_OPTIMA: (f64, f64) = (1.2, 10.0);
+
+/// Factor on what is hopeless beyond which the first rounds of a fit are its last.
+const OUTRUN: f64 = 2.0;
 
 /// What the searches share: where the nuisances start, tempered variances, and the form's basis.
 pub(crate) struct Search<'a> {
@@ -88,14 +91,29 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
     // Middle share first, for every law; the other shares where they could matter. Laws cost from one millisecond to two
     // hundred: each is a task of its own.
     let k = &*problem.constants;
-    let starts: Vec<Vec<Fit>> = members
+    let sought: Vec<Vec<Sought>> = members
         .par_iter()
         .with_max_len(1)
         .map(|member| {
-            let mut fits: Vec<Fit> = nuisance_starts(search.nuisances, problem.constants.driven_sd)
-                .iter()
-                .flat_map(|fixed| optima(problem, &[*member], fixed, search.loose))
-                .collect();
+            let fixed = nuisance_starts(search.nuisances, k.driven_sd);
+            fixed.iter().map(|fixed| seek(problem, *member, fixed, search.loose)).collect()
+        })
+        .collect();
+    let ahead = sought.iter().flatten().map(Sought::cost).fold(f64::INFINITY, f64::min);
+    let outrun = |cost: f64| cost > OUTRUN * (k.hopeless[0] * ahead + k.hopeless[1]);
+    let starts: Vec<Vec<Fit>> = members
+        .par_iter()
+        .zip(sought)
+        .with_max_len(1)
+        .map(|(member, sought)| {
+            let finish = |s: Sought| {
+                if outrun(s.cost()) {
+                    s.as_it_is(problem, *member, search.loose)
+                } else {
+                    s.finished(problem, *member, search.loose)
+                }
+            };
+            let mut fits: Vec<Fit> = sought.into_iter().flat_map(finish).collect();
             fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
             fits
         })

@@ -9,19 +9,21 @@ use nalgebra::{DMatrix, DVector};
 
 /// Rows that the scan looks at.
 const SCAN_ROWS: usize = 128;
+/// The same beside another cause, where a scan only orders pairs.
+const PAIR_SCAN_ROWS: usize = 64;
 /// Starts that are fitted on the scan's rows, and those of them refined on all.
 const STARTS: (usize, usize) = (4, 2);
 /// Rounds of a local fit on the scan's rows before the starts are compared, and after, and on all rows: the search under
 /// form uncertainty goes on from there.
 const ROUNDS: (usize, usize, usize) = (4, 8, 4);
 
-/// Rounds of a fit without members.
-const BASELINE_ROUNDS: usize = 20;
 /// Factor on the best cost and offset beyond which a start is given up, after the first rounds and after the next.
 const BEHIND: (f64, f64) = (2.0, 30.0);
 const FAR_BEHIND: (f64, f64) = (1.3, 10.0);
 /// Starts differ by so much in the coordinate of the size, or of a shape.
 const OTHER: (f64, f64) = (0.8, 0.5);
+/// Difference in every coordinate within which two fits are at one place, in deviations of the prior.
+const SAME_PLACE: f64 = 0.1;
 /// Longest linear step of a fixed coordinate while the scan walks.
 const LONGEST_STEP: f64 = 2.0;
 /// Half periods over a stroke by which two wavelengths differ.
@@ -73,15 +75,36 @@ fn is_wavelength(p: &Parameter) -> bool {
     p.unit == "m" && matches!(p.prior, Prior::Uniform(..))
 }
 
-/// Local optima of the last member's parameters beside the given coordinates of the others, best first.
-///
-/// `fixed` are the coordinates of nuisances and of all members but the last; `variance` may be tempered.
-pub fn optima(problem: &Problem, members: &[Member], fixed: &[f64], variance: &[f64]) -> Vec<Fit> {
-    if members.is_empty() {
-        return vec![minimise(problem, members, fixed, variance, BASELINE_ROUNDS)];
+/// A law's best places after the first rounds of their fits, on the rows that were looked at; best first.
+pub struct Sought {
+    rows: Vec<usize>,
+    fits: Vec<Fit>,
+    of: usize,
+}
+
+/// Seeks a law alone beside given coordinates of the baseline: a scan, and the first rounds from its best places.
+pub fn seek(problem: &Problem, member: Member, nuisances: &[f64], variance: &[f64]) -> Sought {
+    let (rows, scored) = scanned(problem, &[member], nuisances, variance);
+    let fits = begun(problem, &[member], nuisances.len(), variance, &rows, &scored, STARTS.0);
+    Sought { rows, fits, of: problem.len() }
+}
+
+impl Sought {
+    /// The best cost so far, as if all of the table had been looked at.
+    pub fn cost(&self) -> f64 {
+        self.fits.first().map_or(f64::INFINITY, |f| f.cost * self.of as f64 / self.rows.len().max(1) as f64)
     }
-    let (rows, scored) = scanned(problem, members, fixed, variance);
-    refine(problem, members, fixed.len(), variance, &rows, &scored, STARTS)
+
+    /// Local optima on all rows, best first.
+    pub fn finished(self, problem: &Problem, member: Member, variance: &[f64]) -> Vec<Fit> {
+        finished(problem, &[member], variance, &self.rows, self.fits, STARTS.1)
+    }
+
+    /// The best place as it is, of a law that is far behind.
+    pub fn as_it_is(self, problem: &Problem, member: Member, variance: &[f64]) -> Vec<Fit> {
+        let best = self.fits.into_iter().next();
+        best.map(|f| minimise(problem, &[member], &f.u, variance, 0)).into_iter().collect()
+    }
 }
 
 /// The whole grid of the last member, on the rows that show it: those rows, and every place with its cost, best first.
@@ -93,7 +116,8 @@ fn scanned(
 ) -> (Vec<usize>, Vec<(f64, Vec<f64>)>) {
     let parameters = members.last().map_or_else(Vec::new, |m| m.parameters(&problem.design));
     let fine = parameters.iter().any(is_wavelength);
-    let rows = rows(problem.len(), if fine { problem.len() } else { SCAN_ROWS });
+    let some = if members.len() > 1 { PAIR_SCAN_ROWS } else { SCAN_ROWS };
+    let rows = rows(problem.len(), if fine { problem.len() } else { some });
     let scored = scan(problem, members, fixed, variance, &rows, grid(&parameters, problem.design.stroke_m));
     (rows, scored)
 }
@@ -117,7 +141,7 @@ pub fn coarse_scan(
         tail[0] = size.clamp(low, high);
         list.push(tail);
     }
-    let rows = rows(problem.len(), SCAN_ROWS);
+    let rows = rows(problem.len(), PAIR_SCAN_ROWS);
     scan(problem, members, fixed, variance, &rows, list).into_iter().next()
 }
 
@@ -135,7 +159,8 @@ pub fn full_scan(
 pub fn refine_from(problem: &Problem, members: &[Member], start: Vec<f64>, variance: &[f64]) -> Option<Fit> {
     let rows = rows(problem.len(), SCAN_ROWS);
     let fixed = start.len() - members.last()?.count();
-    refine(problem, members, fixed, variance, &rows, &[(0.0, start)], (1, 1)).into_iter().next()
+    let fits = begun(problem, members, fixed, variance, &rows, &[(0.0, start)], 1);
+    finished(problem, members, variance, &rows, fits, 1).into_iter().next()
 }
 
 fn rows(n: usize, limit: usize) -> Vec<usize> {
@@ -150,7 +175,7 @@ fn scan(
     rows: &[usize],
     grid: Vec<Vec<f64>>,
 ) -> Vec<(f64, Vec<f64>)> {
-    let part = problem.select(rows);
+    let part = problem.sketch(rows);
     let part_variance: Vec<f64> = rows.iter().map(|&i| variance[i]).collect();
     // Nuisances (and the other members) follow linearly while the scan walks.
     let others = &members[..members.len() - 1];
@@ -192,16 +217,17 @@ fn scan(
     scored
 }
 
-fn refine(
+/// The first rounds from the best places of a scan that differ.
+fn begun(
     problem: &Problem,
     members: &[Member],
     fixed: usize,
     variance: &[f64],
     rows: &[usize],
     scored: &[(f64, Vec<f64>)],
-    count: (usize, usize),
+    count: usize,
 ) -> Vec<Fit> {
-    let part = problem.select(rows);
+    let part = problem.sketch(rows);
     let part_variance: Vec<f64> = rows.iter().map(|&i| variance[i]).collect();
     // Starts that differ: in the size's sign, or by more than one step of any shape.
     let mut starts: Vec<&Vec<f64>> = Vec::new();
@@ -212,28 +238,56 @@ fn refine(
         if fresh {
             starts.push(u);
         }
-        if starts.len() == count.0 {
+        if starts.len() == count {
             break;
         }
     }
     let mut fits: Vec<Fit> =
         starts.into_iter().map(|u| minimise(&part, members, u, &part_variance, ROUNDS.0)).collect();
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    fits
+}
+
+/// The further rounds of those that may still win, and the last ones on all rows.
+fn finished(
+    problem: &Problem,
+    members: &[Member],
+    variance: &[f64],
+    rows: &[usize],
+    mut fits: Vec<Fit>,
+    count: usize,
+) -> Vec<Fit> {
+    let part = problem.sketch(rows);
+    let part_variance: Vec<f64> = rows.iter().map(|&i| variance[i]).collect();
     // What is far behind by now does not catch up.
     let ahead = fits.first().map_or(0.0, |f| f.cost);
     fits.retain(|f| f.cost < BEHIND.0 * ahead + BEHIND.1);
-    fits.truncate(count.1 + 1);
+    distinct(&mut fits);
+    fits.truncate(count + 1);
     for f in &mut fits {
         *f = minimise(&part, members, &f.u, &part_variance, ROUNDS.1);
     }
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let best = fits.first().map_or(0.0, |f| f.cost);
     fits.retain(|f| f.cost < FAR_BEHIND.0 * best + FAR_BEHIND.1);
-    fits.truncate(count.1);
+    distinct(&mut fits);
+    fits.truncate(count);
     let mut whole: Vec<Fit> =
         fits.iter().map(|f| minimise(problem, members, &f.u, variance, ROUNDS.2)).collect();
     whole.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     whole
+}
+
+/// Leaves one of those that have come to the same place, the best.
+fn distinct(fits: &mut Vec<Fit>) {
+    let mut kept: Vec<Fit> = Vec::with_capacity(fits.len());
+    for fit in fits.drain(..) {
+        let same = |k: &Fit| k.u.iter().zip(&fit.u).all(|(a, b)| (a - b).abs() < SAME_PLACE);
+        if !kept.iter().any(same) {
+            kept.push(fit);
+        }
+    }
+    *fits = kept;
 }
 
 /// Variances with a floor of `share` of a residual gap: starts are sought on what the gap looks like at large,

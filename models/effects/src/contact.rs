@@ -69,6 +69,8 @@ pub struct Contact {
     pub ridge_damping_ratio: f64,
     /// Index into [`impact::LANDINGS`] where there is mass.
     pub landing: usize,
+    /// Whether a sweep may be coarse: for searches that only look for places to begin.
+    pub coarse: bool,
 }
 
 /// Attraction between skin and plate that friction feels beside the normal force.

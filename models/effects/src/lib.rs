@@ -48,4 +48,4 @@ pub mod predict;
 pub use effect::{Check, Effect, Law, Need, Parameter, Place, Prior, STATED_AT_N};
 pub use library::{by_name, imitated, known, library, near, one_cause, twins};
 pub use operating::{Baseline, Design, Reading};
-pub use predict::{Active, lateral_force};
+pub use predict::{Active, lateral_force, rough_lateral_force};

@@ -74,6 +74,7 @@ impl Baseline {
             mass: 0.0,
             ridge_damping_ratio: 1.0,
             landing: 0,
+            coarse: false,
         }
     }
 

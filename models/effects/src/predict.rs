@@ -1,6 +1,6 @@
 //! The lateral force of a pass under the baseline and any effects.
 
-use crate::contact::mean_friction;
+use crate::contact::{Contact, mean_friction};
 use crate::effect::Effect;
 use crate::operating::{Baseline, Design, Reading};
 use models::condition::Condition;
@@ -19,7 +19,20 @@ pub struct Active<'a> {
 /// Signed mean lateral force that the sensor reads, N. Effects act in the library's order; allocates nothing. The
 /// friction coefficient is the baseline's, not the condition's.
 pub fn lateral_force(baseline: &Baseline, effects: &[Active<'_>], pass: &Condition, design: &Design) -> f64 {
-    let mut contact = baseline.contact(pass, design);
+    read(baseline.contact(pass, design), effects, pass, design)
+}
+
+/// The same within a per cent or so, for searches that only look for places to begin.
+pub fn rough_lateral_force(
+    baseline: &Baseline,
+    effects: &[Active<'_>],
+    pass: &Condition,
+    design: &Design,
+) -> f64 {
+    read(Contact { coarse: true, ..baseline.contact(pass, design) }, effects, pass, design)
+}
+
+fn read(mut contact: Contact, effects: &[Active<'_>], pass: &Condition, design: &Design) -> f64 {
     let mut reading = Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 };
     for active in effects {
         active.effect.change(active.law, active.theta, pass, design, &mut contact);
