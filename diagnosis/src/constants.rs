@@ -111,6 +111,8 @@ constants! {
     prior_single: f64 = 0.36, "Prior probability of one cause of the library, shared evenly by the testable ones.", JUDGEMENT;
     prior_pair: f64 = 0.07, "Prior probability of two causes, shared evenly by their pairs.", JUDGEMENT;
     prior_open: f64 = 0.07, "Prior probability of the open set.", JUDGEMENT;
+    structure_share: f64 = 0.5, "Share of the open set's weight for departures that are sudden, periodic or local.", JUDGEMENT;
+    structure_asked_nats: f64 = 10.0, "Nats behind the best hypothesis up to which no gap is asked for its structure.", NUMERICAL;
     unlisted_share: f64 = 0.1, "Share of the open set's weight for causes of known form that the library does not name.", JUDGEMENT;
     lapse_probability: f64 = 0.02, "Probability that a certificate no longer holds when a table is taken.", "judgement: one certificate in fifty is outdated by a knock or a change";
     mu0_log_sd: [f64; 2] = [0.3, 0.8], "Prior deviation of ln mu0, with passes at w = 0 and without.", "judgement: wide against the 1 % to which such passes give mu0";

@@ -14,6 +14,7 @@ use crate::pairs::pairs;
 use crate::scatter::{Belief, Scatter};
 use crate::singles::{Search, lapsed, singles, sort, unlisted};
 use crate::starts::{nuisances_of, tempered};
+use crate::structure::{Structure, structure};
 use effects::{Effect, known, library};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -85,6 +86,8 @@ pub struct Fitted {
     pub discrepancy: Discrepancy,
     /// Causes of known form that the library does not name, best first: part of the open set.
     pub unlisted: Vec<Candidate>,
+    /// The strongest structure in what the recalibrated baseline leaves; none where no gap is out of the question.
+    pub structure: Option<Structure>,
     /// Probability of the open set.
     pub unknown_probability: f64,
     /// Single effects and pairs, most probable first.
@@ -174,7 +177,13 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
         candidates.extend(companions);
     }
 
-    let evidence = [none_evidence, open_evidence(k, &discrepancy, &unlisted)];
+    let smooth = open_evidence(k, &discrepancy, &unlisted);
+    let top = candidates.iter().map(|c| c.log_evidence).fold(smooth, f64::max);
+    let structure =
+        if none_evidence > top - k.structure_asked_nats { structure(&problem, &none) } else { None };
+    let rough = structure.as_ref().map_or(f64::NEG_INFINITY, |s| none_evidence + s.nats());
+    let share = k.structure_share;
+    let evidence = [none_evidence, log_sum_exp(&[smooth + (1.0 - share).ln(), rough + share.ln()])];
     let [none_probability, unknown_probability] = weigh(&mut candidates, evidence, tried.len(), k);
     candidates
         .sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability).then(a.effects.cmp(&b.effects)));
@@ -192,6 +201,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
         none_probability,
         discrepancy,
         unlisted,
+        structure,
         unknown_probability,
         candidates,
         not_testable,

@@ -65,6 +65,7 @@ pub mod scatter;
 pub mod shrinkage;
 pub mod singles;
 pub mod starts;
+mod structure;
 pub mod verdict;
 
 pub use decision::Verdict;

@@ -54,6 +54,9 @@ pub fn with_suspects(
 /// Relative departure of the scatter from the statement below which the statement was used.
 const AS_STATED: f64 = 0.01;
 
+/// Family-wise p-value from which structure is told.
+const STRUCTURED: f64 = 0.01;
+
 /// What a table lacks.
 pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<String> {
     let mut remarks = Vec::new();
@@ -77,6 +80,13 @@ pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<Stri
         };
         remarks.push(format!("No replicates lie close together: {stands}"));
     }
+    let told = fitted.structure.as_ref().filter(|s| s.p < STRUCTURED && decision.verdict != Verdict::Named);
+    remarks.extend(told.map(|s| {
+        format!(
+            "What the recalibrated baseline leaves is not like scatter: {} stands out (p = {:.1e} over all that was looked at).",
+            s.place, s.p
+        )
+    }));
     remarks.extend(together(table));
     remarks.extend(two_levels(fitted, table, decision));
     let silent: Vec<&str> = decision.regions.iter().filter(|r| !r.judges).map(|r| r.name.as_str()).collect();

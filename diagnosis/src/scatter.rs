@@ -11,7 +11,7 @@
 //! that did not see it (Rasmussen & Williams 2006, section 5.4.2), in turn. A pass counts by its responsibility, so the
 //! answer changes smoothly with the number of bad passes. All hypotheses share the result: none has a scatter of its own.
 
-mod clusters;
+pub(crate) mod clusters;
 mod serial;
 mod surface;
 mod suspects;

@@ -99,10 +99,8 @@ impl Space {
             .collect();
         let n = signals.first().map_or(0, |s| s.1.len());
         let shuffles = (MOST_WORK / n.max(1)).clamp(100, SHUFFLES);
-        let (mut order, mut signs): (Vec<usize>, Vec<f64>) = ((0..n).collect(), vec![1.0; n]);
-        let (mut state, mut sums) = (0x5EED_u64, Vec::new());
-        let mut scores: Vec<Vec<f64>> = Vec::with_capacity(shuffles + 1);
-        for _ in 0..=shuffles {
+        let mut sums = Vec::new();
+        let scores = shuffled(n, shuffles, |order, signs| {
             let mut row = Vec::with_capacity(self.0.len() * signals.len());
             for cells in &self.0 {
                 for (turns, values) in &signals {
@@ -110,12 +108,8 @@ impl Space {
                     row.push(cells.score(order.iter().map(value), &mut sums));
                 }
             }
-            scores.push(row);
-            for i in (1..n).rev() {
-                order.swap(i, (split_mix(&mut state) % (i as u64 + 1)) as usize);
-            }
-            signs.iter_mut().for_each(|s| *s = if split_mix(&mut state) & 1 == 0 { 1.0 } else { -1.0 });
-        }
+            row
+        });
         let tests = scores[0].len();
         let centre: Vec<(f64, f64)> = (0..tests)
             .map(|t| {
@@ -141,6 +135,26 @@ impl Space {
         let rows = (0..n).filter(|&i| Some(cells.of[i]) == cell).collect();
         Cluster { place: cells.name.clone(), rows, p: (1 + beyond) as f64 / (1 + shuffles) as f64 }
     }
+}
+
+/// Scores of passes as they are, and after them of passes that are shuffled and turned either way.
+pub fn shuffled(
+    n: usize,
+    shuffles: usize,
+    mut score: impl FnMut(&[usize], &[f64]) -> Vec<f64>,
+) -> Vec<Vec<f64>> {
+    let (mut order, mut signs): (Vec<usize>, Vec<f64>) = ((0..n).collect(), vec![1.0; n]);
+    let mut state = 0x5EED_u64;
+    (0..=shuffles)
+        .map(|_| {
+            let row = score(&order, &signs);
+            for i in (1..n).rev() {
+                order.swap(i, (split_mix(&mut state) % (i as u64 + 1)) as usize);
+            }
+            signs.iter_mut().for_each(|s| *s = if split_mix(&mut state) & 1 == 0 { 1.0 } else { -1.0 });
+            row
+        })
+        .collect()
 }
 
 fn mean(values: &[f64]) -> f64 {
