@@ -262,3 +262,21 @@ fn a_lost_sample_stays_lost_until_the_next() {
         assert!((1..80).contains(&distinct), "{mode:?} lets {distinct} of 80 through unchanged");
     }
 }
+
+/// What is not decided sample by sample goes on between samples: a delayed one comes when its time has come.
+#[test]
+fn a_delay_goes_on_between_samples() {
+    let sensor = Port {
+        state: |now: Nanos| Forces { lateral: Ok(nth(now.0 / T / 5)), normal: Err(NoData::NotFitted) },
+        command: (),
+    };
+    let mut faulty = FaultyForce::new(sensor, &[always(Target::Lateral, FaultMode::Delayed, 0.003)], 2);
+    for cycle in 0..100 {
+        let shown = faulty.read(at(cycle)).lateral;
+        assert_eq!(
+            shown,
+            if cycle < 3 { Err(NoData::NeverRead) } else { Ok(nth((cycle - 3) / 5)) },
+            "cycle {cycle}"
+        );
+    }
+}
