@@ -98,7 +98,7 @@ fn off_leaves_the_frequency_alone() {
 }
 
 /// A state of the amplifier: counter, time and whether the output is on.
-fn state(counter: u16, output_on: bool) -> Vec<u8> {
+pub(crate) fn state(counter: u16, output_on: bool) -> Vec<u8> {
     let mut registers = [0_u16; 20];
     (registers[0], registers[1]) = (0x6D75, 0x3241);
     (registers[3], registers[5]) = (counter, counter);
