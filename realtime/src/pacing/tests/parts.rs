@@ -170,8 +170,7 @@ fn a_port_that_panics_at_the_end_keeps_no_other_from_being_told() {
         let end = || Box::new(End(Arc::clone(&told)));
         let mut ports = Ports::new(end(), end(), end()).with_supply(end());
         switch_off(&mut ports, Nanos(7));
-        let by = told.lock().unwrap().by.clone();
-        by
+        told.lock().unwrap().by.clone()
     };
     assert_eq!(told([false, false, false]), ["off", "stop"]);
     assert_eq!(told([true, false, false]), ["off", "stop", "cut"]);

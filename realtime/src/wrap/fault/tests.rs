@@ -1,6 +1,7 @@
 //! Each fault does what its word says, in its time, to its channel, and to nothing else; and the same again from the same seed.
 //!
 //! The tests of the rules lean on this: a fault that does less than it says would let a rule pass that catches nothing.
+#![allow(clippy::disallowed_types)]
 
 use super::*;
 
