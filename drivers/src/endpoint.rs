@@ -484,4 +484,4 @@ fn need_set(profile: &Profile, name: &str) -> Result<SetId, String> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

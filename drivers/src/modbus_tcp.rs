@@ -155,3 +155,6 @@ impl Registers for Tcp<'_> {
         self.answer_ms = answer_ms;
     }
 }
+
+#[cfg(test)]
+mod tests;

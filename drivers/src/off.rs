@@ -90,3 +90,6 @@ pub fn at_the_beginning(session: &mut Session, way: &mut dyn OffWay) -> Result<(
         way.send_off(session)
     }
 }
+
+#[cfg(test)]
+mod tests;

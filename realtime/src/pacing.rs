@@ -117,9 +117,7 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
     let pacing = pacing.into();
     let LoopParts { config, model, mut ports, commands, mut rows, mut watch, life, origin_ns } = parts;
     let period = config.limits.timing.cycle.0;
-    // 1 us to 10 s at two digits: some 40 kB, allocated here and never again.
-    let mut lateness_histogram =
-        Histogram::<u64>::new_with_bounds(1_000, LONGEST_NS, 2).expect("the bounds are constants");
+    let mut lateness_histogram = lateness_histogram();
     let mut grants = match pacing.priority {
         Some(priority) => ask_for_real_time(priority),
         None => Grants { policy: "unchanged".into(), ..Grants::default() },
@@ -160,11 +158,8 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
                 break;
             }
         };
-        // After the commands have left: a long stall has many deadlines. Those between were late as well, each by one period
-        // less: without them a stall would count once.
-        for k in 0..=missed.min(LONGEST_NS / period) {
-            lateness_histogram.saturating_record(late - k * period);
-        }
+        // After the commands have left: a long stall has many deadlines.
+        count_deadlines(&mut lateness_histogram, late, missed, period);
         if rows.try_push(row).is_err() {
             ring_drops += 1;
         }
@@ -184,7 +179,7 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
     }
     switch_off(&mut ports, Nanos(monotonic_ns().saturating_sub(origin_ns)));
     drop(awake);
-    let faults = thread_faults();
+    let (minor_faults, major_faults) = faults_between(faults_at_start, thread_faults());
     let quantile = |q| lateness_histogram.value_at_quantile(q);
     LoopReport {
         grants,
@@ -193,8 +188,8 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
         overruns,
         ring_drops,
         watch_drops,
-        minor_faults: faults.0 - faults_at_start.0,
-        major_faults: faults.1 - faults_at_start.1,
+        minor_faults,
+        major_faults,
         lateness_ns: [
             quantile(0.5),
             quantile(0.9),
@@ -212,6 +207,24 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
 
 /// Longest lateness that is told from longer ones, in ns.
 const LONGEST_NS: u64 = 10_000_000_000;
+
+/// 1 us to 10 s at two digits: some 40 kB, allocated once.
+fn lateness_histogram() -> Histogram<u64> {
+    Histogram::new_with_bounds(1_000, LONGEST_NS, 2).expect("the bounds are constants")
+}
+
+/// Counts the lateness of a cycle and of the deadlines that were missed before it. Those were late as well, each by one period
+/// less: without them a stall would count once.
+fn count_deadlines(histogram: &mut Histogram<u64>, late: u64, missed: u64, period: u64) {
+    for k in 0..=missed.min(LONGEST_NS / period) {
+        histogram.saturating_record(late - k * period);
+    }
+}
+
+/// Minor and major faults from one count of them to a later one.
+const fn faults_between(before: (i64, i64), now: (i64, i64)) -> (i64, i64) {
+    (now.0 - before.0, now.1 - before.1)
+}
 
 /// Tells every port that can still be told: off, at rest. A port that panics keeps no other from being told; then the
 /// instrument's own watchdog is left, and the second channel.
@@ -243,12 +256,15 @@ pub fn lateness_of_sleep(during: std::time::Duration, period: std::time::Duratio
         sleep_until(deadline);
         let begun = monotonic_ns();
         late.push(begun.saturating_sub(deadline));
-        deadline += period_ns;
-        if begun > deadline {
-            deadline = begun + period_ns;
-        }
+        deadline = deadline_after(deadline, begun, period_ns);
     }
     late
+}
+
+/// The deadline after one that was met at `begun`: on the grid, or a period from now where that one is past as well.
+const fn deadline_after(deadline: u64, begun: u64, period: u64) -> u64 {
+    let next = deadline + period;
+    if begun > next { begun + period } else { next }
 }
 
 #[cfg(test)]

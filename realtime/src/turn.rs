@@ -164,3 +164,6 @@ pub fn turn(
     let out = cycle::judge(config, model, state, &inputs, &decision, now);
     Row::of(number, now, &inputs, &out)
 }
+
+#[cfg(test)]
+mod tests;

@@ -321,3 +321,6 @@ fn safe_set_points(profile: &Profile) -> Vec<(SetId, f64)> {
     safe.sort_by_key(place);
     safe
 }
+
+#[cfg(test)]
+mod tests;

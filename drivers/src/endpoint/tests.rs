@@ -2,12 +2,12 @@ use super::*;
 use crate::ports::DriveSetPoint;
 use crate::profile;
 
-fn amplifier() -> (Endpoint, AmplifierPort) {
+pub(crate) fn amplifier() -> (Endpoint, AmplifierPort) {
     Endpoint::amplifier(profile("muprime-amplifier").unwrap(), &InstrumentSetup::new("muprime-amplifier", ""))
         .unwrap()
 }
 
-fn on(sequence: u32, expires_at: u64) -> DriveSetPoint {
+pub(crate) fn on(sequence: u32, expires_at: u64) -> DriveSetPoint {
     DriveSetPoint {
         amplitude_pp_m: 2e-6,
         frequency_hz: 27_500.0,
@@ -18,7 +18,7 @@ fn on(sequence: u32, expires_at: u64) -> DriveSetPoint {
 }
 
 /// The value that a set-point would get, if it is sent.
-fn sent(endpoint: &Endpoint, due: &Due, name: &str) -> Option<f64> {
+pub(crate) fn sent(endpoint: &Endpoint, due: &Due, name: &str) -> Option<f64> {
     let (Due::SetPoints(set_points) | Due::Safe(set_points)) = due else { return None };
     let wanted = endpoint.profile().set(name)?;
     set_points.iter().find(|(set, _)| *set == wanted).map(|(_, value)| *value)
@@ -98,7 +98,7 @@ fn off_leaves_the_frequency_alone() {
 }
 
 /// A state of the amplifier: counter, time and whether the output is on.
-fn state(counter: u16, output_on: bool) -> Vec<u8> {
+pub(crate) fn state(counter: u16, output_on: bool) -> Vec<u8> {
     let mut registers = [0_u16; 20];
     (registers[0], registers[1]) = (0x6D75, 0x3241);
     (registers[3], registers[5]) = (counter, counter);
@@ -106,7 +106,7 @@ fn state(counter: u16, output_on: bool) -> Vec<u8> {
     registers.iter().flat_map(|register| register.to_be_bytes()).collect()
 }
 
-fn show(endpoint: &mut Endpoint, counter: u16, output_on: bool, arrived: u64) {
+pub(crate) fn show(endpoint: &mut Endpoint, counter: u16, output_on: bool, arrived: u64) {
     let frame = endpoint.profile().frame("state").unwrap();
     endpoint.frame(frame, &state(counter, output_on), Nanos(arrived)).unwrap();
 }

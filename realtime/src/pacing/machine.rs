@@ -174,4 +174,4 @@ pub(super) fn wait_until(absolute_ns: u64, spin_ns: u64) {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -12,9 +12,13 @@ use crate::safety::{Cause, Limits, Request};
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
 use ringbuf::HeapRb;
-use ringbuf::traits::{Consumer, Split};
+use ringbuf::traits::{Consumer, Observer, Split};
 use std::sync::Mutex;
 use std::time::Duration;
+
+mod parts;
+
+use parts::touch_new_pages;
 
 const PERIOD: Nanos = Nanos(5_000_000);
 
@@ -29,6 +33,8 @@ struct Scene {
     blocks: Duration,
     /// The force port panics.
     panics: bool,
+    /// New pages that the force port touches, once.
+    touches: usize,
 }
 
 #[derive(Clone)]
@@ -44,11 +50,12 @@ fn reading(value: f64, sequence: u32, taken_at: Nanos) -> Reading {
 
 impl ForceSensor for Rig {
     fn read(&mut self, now: Nanos) -> Forces {
-        let (blocks, panics) = {
-            let scene = self.scene.lock().unwrap();
-            (scene.blocks, scene.panics)
+        let (blocks, panics, touches) = {
+            let mut scene = self.scene.lock().unwrap();
+            (scene.blocks, scene.panics, std::mem::take(&mut scene.touches))
         };
         assert!(!panics, "the port gives up");
+        touch_new_pages(touches);
         sleep_until(monotonic_ns() + blocks.as_nanos() as u64);
         self.sequence += 1;
         Forces { lateral: Ok(reading(0.0, self.sequence, now)), normal: Ok(reading(0.0, self.sequence, now)) }
@@ -107,6 +114,10 @@ struct Running {
 
 impl Running {
     fn start(late_in_a_row_max: u32) -> Self {
+        Self::with(late_in_a_row_max, 16384, Scene::default())
+    }
+
+    fn with(late_in_a_row_max: u32, rows: usize, scene: Scene) -> Self {
         let mut limits = Limits::paper(PERIOD);
         (limits.late_in_a_row_max, limits.late_cycles_max) = (late_in_a_row_max, 100);
         for channel in [
@@ -118,11 +129,11 @@ impl Running {
             channel.latency = Nanos(50_000_000);
         }
         let estimate = EstimateConfig { window: 50, normal_force_min_n: 0.02, sample_sd_n: 0.002 };
-        let scene = Arc::new(Mutex::new(Scene::default()));
+        let scene = Arc::new(Mutex::new(scene));
         let rig = Rig { scene: Arc::clone(&scene), sequence: 0, last: DriveCommand::off(0, PERIOD) };
         let queue = Arc::new(CommandQueue::new(64));
         let life = Arc::new(Lifeline::default());
-        let (rows_in, rows) = HeapRb::<Row>::new(16384).split();
+        let (rows_in, rows) = HeapRb::<Row>::new(rows).split();
         let (watch, _) = HeapRb::<Row>::new(1).split();
         let parts = LoopParts {
             config: Config { limits: limits.checked().unwrap(), estimate, exposed: Default::default() },
@@ -233,6 +244,12 @@ fn a_full_ring_is_counted_and_holds_nothing_up() {
     assert_eq!(report.watch_drops, report.cycles - 1);
     assert_eq!(report.ring_drops, 0);
     assert!(report.cycles + report.overruns >= 50, "{report:?}");
+    let running = Running::with(50, 1, Scene::default());
+    sleep_until(monotonic_ns() + 100_000_000);
+    let Running { life, thread, rows, .. } = running;
+    life.end.store(true, Ordering::Relaxed);
+    let report = thread.join().unwrap();
+    assert_eq!((report.ring_drops, rows.occupied_len()), (report.cycles - 1, 1));
 }
 
 #[test]

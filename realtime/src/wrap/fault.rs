@@ -84,6 +84,11 @@ impl FaultMode {
             _ => 0.0,
         }
     }
+
+    /// Whether it strikes some samples and leaves others, so that it is decided once for each.
+    const fn strikes_samples(self) -> bool {
+        matches!(self, Self::Slow | Self::Intermittent | Self::Spikes | Self::Disordered)
+    }
 }
 
 /// Which channel is at fault.
@@ -267,6 +272,9 @@ struct Line<S: Sample> {
     shown: Option<S>,
     held: Option<S>,
     spiked: bool,
+    /// What each fault that strikes some samples made of the newest: a loop that turns faster than the instrument samples is
+    /// shown a sample many times, and one that was lost must not come after all.
+    struck: [Option<Result<S, NoData>>; FAULTS],
 }
 
 impl<S: Sample> Line<S> {
@@ -285,6 +293,7 @@ impl<S: Sample> Line<S> {
             shown: None,
             held: None,
             spiked: false,
+            struck: [None; FAULTS],
         }
     }
 
@@ -309,8 +318,18 @@ impl<S: Sample> Line<S> {
         }
         let mut out = came;
         let mut touched = false;
-        for fault in self.faults.into_iter().flatten().filter(|f| f.acts(now)) {
-            touched |= self.apply(&fault, fresh, &mut out, now);
+        for (which, fault) in self.faults.into_iter().enumerate() {
+            if fresh {
+                self.struck[which] = None;
+            }
+            let Some(fault) = fault.filter(|f| f.acts(now)) else { continue };
+            if let (Ok(_), Some(made)) = (out, self.struck[which]) {
+                out = made;
+                touched = true;
+            } else if self.apply(&fault, fresh, &mut out, now) {
+                self.struck[which] = fault.mode.strikes_samples().then_some(out);
+                touched = true;
+            }
         }
         if !touched {
             self.held = None;
@@ -355,8 +374,8 @@ impl<S: Sample> Line<S> {
                 *out = self.nothing_new();
             }
             FaultMode::Delayed => {
-                let then = Nanos(now.0.saturating_sub((fault.strength * 1e9) as u64));
-                *out = self.arrived_by(then).ok_or(NoData::NeverRead);
+                let then = now.0.checked_sub((fault.strength * 1e9) as u64).map(Nanos);
+                *out = then.and_then(|then| self.arrived_by(then)).ok_or(NoData::NeverRead);
             }
             FaultMode::Intermittent => {
                 if !fresh || self.dice.unit() >= fault.strength {
@@ -455,11 +474,10 @@ impl<P: Amplifier> FaultyAmplifier<P> {
     }
 
     fn deliver(&mut self, now: Nanos) {
-        for slot in &mut self.under_way {
-            if let Some((due, command)) = *slot
-                && due <= now
-            {
-                *slot = None;
+        // From the oldest on: what is due together arrives in the order in which it was sent.
+        for i in 0..LINE {
+            let slot = &mut self.under_way[(self.next + i) % LINE];
+            if let Some((_, command)) = slot.take_if(|(due, _)| *due <= now) {
                 self.inner.command(command, now);
             }
         }
@@ -517,3 +535,6 @@ impl<P: Stage> Stage for FaultyStage<P> {
         self.states.pass(came, now)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,7 +7,7 @@ use std::time::Duration;
 /// Locked memory and page faults concern the whole process: one test at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
-fn alone() -> MutexGuard<'static, ()> {
+pub(in crate::pacing) fn alone() -> MutexGuard<'static, ()> {
     ALONE.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
@@ -29,18 +29,43 @@ fn locked_kib() -> u64 {
     line.split_whitespace().nth(1).unwrap().parse().unwrap()
 }
 
+/// Whether the kernel gives a thread of this process FIFO, and locks its memory: asked by other ways than those of the code, and
+/// given back.
+fn what_the_kernel_allows() -> (bool, bool) {
+    std::thread::spawn(|| {
+        let wanted = libc::sched_param { sched_priority: 37 };
+        // SAFETY: concerns the calling thread, with a valid parameter struct.
+        let fifo =
+            unsafe { libc::pthread_setschedparam(libc::pthread_self(), libc::SCHED_FIFO, &wanted) } == 0;
+        // SAFETY: locks what is there and gives it back; the limit is raised as far as it may be; no pointers outlive the calls.
+        let locked = unsafe {
+            let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+            libc::getrlimit(libc::RLIMIT_MEMLOCK, &mut limit);
+            limit.rlim_cur = limit.rlim_max;
+            libc::setrlimit(libc::RLIMIT_MEMLOCK, &limit);
+            let locked = libc::mlockall(libc::MCL_CURRENT) == 0;
+            libc::munlockall();
+            locked
+        };
+        (fifo, locked)
+    })
+    .join()
+    .unwrap()
+}
+
 #[test]
 fn what_is_granted_is_what_the_kernel_says() {
     let _alone = alone();
     let asked = std::thread::spawn(|| {
+        let allowed = what_the_kernel_allows();
         let grants = ask_for_real_time(37);
         let (priority, policy) = (stat(40), stat(41));
         let child = std::thread::spawn(|| stat(41)).join().unwrap();
         // SAFETY: asks for the calling thread's timer slack; takes no pointers.
         let slack_ns = unsafe { libc::prctl(libc::PR_GET_TIMERSLACK, 0, 0, 0, 0) };
-        (grants, priority, policy, child, locked_kib(), slack_ns)
+        (grants, priority, policy, child, locked_kib(), slack_ns, allowed)
     });
-    let (grants, priority, policy, child, locked, slack_ns) = asked.join().unwrap();
+    let (grants, priority, policy, child, locked, slack_ns, allowed) = asked.join().unwrap();
     // SAFETY: gives the process's pages back; takes no pointers.
     unsafe { libc::munlockall() };
     match &grants.policy_refused {
@@ -52,6 +77,7 @@ fn what_is_granted_is_what_the_kernel_says() {
     assert_eq!(child, i64::from(libc::SCHED_OTHER), "a thread of its own inherits the class");
     assert_eq!(grants.memory_locked, locked > 0, "{locked} KiB are locked");
     assert_eq!(grants.memory_locked, grants.lock_refused.is_none());
+    assert_eq!((named == "fifo", grants.memory_locked), allowed, "{grants:?}");
     // A FIFO thread has no slack, whatever was asked.
     assert!(slack_ns <= 1, "{slack_ns}");
 }
@@ -85,8 +111,8 @@ fn processor_time_is_what_the_kernel_accounts() {
         let ns = |t: libc::timeval| t.tv_sec as u64 * 1_000_000_000 + t.tv_usec as u64 * 1000;
         ns(usage.ru_utime) + ns(usage.ru_stime)
     };
-    // Seconds and their fraction both count: beyond the first second.
-    while accounted() < 1_200_000_000 {
+    // Seconds and their fraction both count: beyond the second second, as one of them is the same however it is put together.
+    while accounted() < 2_200_000_000 {
         std::hint::black_box((0..1000).sum::<u64>());
     }
     let (before, ours, after) = (accounted(), process_cpu_ns(), accounted());
@@ -181,4 +207,34 @@ fn a_sleep_ends_at_its_time() {
     let began = uptime_s();
     sleep_until(monotonic_ns() + 1_020_000_000);
     assert!(uptime_s() - began >= 1.0, "{began}");
+}
+
+/// The stack of the loop is there before it turns: a call that needs much of it meets no new page.
+#[test]
+fn a_touched_stack_makes_no_faults() {
+    // The pages of a frame come when its function begins, so the faults are counted around the call.
+    #[inline(never)]
+    fn deep() {
+        let mut used = [0u8; 200 * 1024];
+        for page in used.chunks_mut(4096) {
+            page[0] = 1;
+        }
+        std::hint::black_box(&used);
+    }
+    let _alone = alone();
+    // A stack of an ended thread is used again, pages and all; one as large as this is not kept.
+    let on_a_new_stack = |touches: bool| {
+        let thread = std::thread::Builder::new().stack_size(64 << 20).spawn(move || {
+            if touches {
+                touch_stack();
+            }
+            let before = thread_faults().0;
+            deep();
+            thread_faults().0 - before
+        });
+        thread.unwrap().join().unwrap()
+    };
+    let (touched, untouched) = (on_a_new_stack(true), on_a_new_stack(false));
+    // Where the kernel gives stacks in large pages there is nothing to tell.
+    assert!(touched <= 10, "{touched} faults where a stack that was not touched has {untouched}");
 }

@@ -1,0 +1,154 @@
+//! 'Off' over TCP on this machine: an instrument that refuses a part of it, and one whose connection is lost.
+
+use super::*;
+use crate::endpoint::Endpoint;
+use crate::endpoint::tests::{amplifier, on, state};
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+/// Whatever hangs fails instead.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// What the instrument is asked: on which connection, and what.
+#[derive(Debug, Clone, PartialEq)]
+enum Asked {
+    State(usize),
+    Write(usize, u16, Vec<u16>),
+}
+
+/// How the instrument behaves.
+#[derive(Default)]
+struct Ways {
+    /// It takes no block that switches off, and not the output's own register either.
+    refuses_output: AtomicBool,
+    /// It cuts its connection, once.
+    cuts: AtomicBool,
+    /// Its output, and how many states it has given.
+    output: Mutex<(bool, u16)>,
+}
+
+/// One connection: requests are answered until either side ends it.
+fn serve(mut stream: TcpStream, number: usize, ways: &Ways, asked: &Sender<Asked>) -> std::io::Result<()> {
+    loop {
+        let mut head = [0; 8];
+        stream.read_exact(&mut head)?;
+        let mut body = vec![0; usize::from(u16::from_be_bytes([head[4], head[5]])) - 2];
+        stream.read_exact(&mut body)?;
+        if ways.cuts.swap(false, Ordering::SeqCst) {
+            return Ok(());
+        }
+        let mut answer = vec![head[7]];
+        if head[7] == 3 {
+            let _ = asked.send(Asked::State(number));
+            let mut output = ways.output.lock().unwrap();
+            output.1 += 1;
+            let registers = state(output.1, output.0);
+            answer.push(registers.len() as u8);
+            answer.extend(registers);
+        } else {
+            let address = u16::from_be_bytes([body[0], body[1]]);
+            let registers: Vec<u16> =
+                body[5..].chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
+            let enable = registers.get(usize::from(103_u16.wrapping_sub(address))).copied();
+            let _ = asked.send(Asked::Write(number, address, registers));
+            if enable == Some(0) && ways.refuses_output.load(Ordering::SeqCst) {
+                answer = vec![head[7] | 0x80, 3];
+            } else {
+                answer.extend(&body[..4]);
+                // An amplitude by itself is one of zero: the plate stands.
+                ways.output.lock().unwrap().0 = enable.is_some_and(|enable| enable != 0);
+            }
+        }
+        let mut whole = head[..7].to_vec();
+        whole[4..6].copy_from_slice(&(answer.len() as u16 + 1).to_be_bytes());
+        whole.extend(answer);
+        stream.write_all(&whole)?;
+    }
+}
+
+/// An instrument on a port of this machine, and what it is asked.
+fn instrument() -> (String, Arc<Ways>, Receiver<Asked>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let (asked, told) = channel();
+    let ways = Arc::<Ways>::default();
+    let shared = Arc::clone(&ways);
+    std::thread::spawn(move || {
+        for (number, stream) in listener.incoming().enumerate() {
+            // The client ends a connection by dropping it.
+            let _ = serve(stream.unwrap(), number + 1, &shared, &asked);
+        }
+    });
+    (address, ways, told)
+}
+
+/// The driver of that instrument, driving. What it is asked from the first 'on' on is left in `told`.
+fn driving(
+    address: &str,
+    told: &Receiver<Asked>,
+) -> (JoinHandle<Closed>, Arc<AtomicBool>, impl Sized + use<>) {
+    let (endpoint, mut port): (Endpoint, _) = amplifier();
+    let (ready, opened) = sync_channel(1);
+    let stop = Arc::<AtomicBool>::default();
+    let session = Session::new(endpoint, Instant::now(), Arc::clone(&stop), ready);
+    let thread = spawn(&InstrumentSetup::new("muprime-amplifier", address), session).unwrap();
+    assert_eq!(opened.recv_timeout(PATIENCE), Ok(Ok(())));
+    port.push(on(1, u64::MAX));
+    let on = |asked: &Asked| matches!(asked, Asked::Write(_, 100, registers) if registers[3] == 1);
+    while !on(&told.recv_timeout(PATIENCE).unwrap()) {}
+    (thread, stop, port)
+}
+
+/// The writes among what is asked, up to the one that is looked for.
+fn writes_until(told: &Receiver<Asked>, is: impl Fn(&Asked) -> bool) -> Vec<Asked> {
+    let mut writes = Vec::new();
+    loop {
+        let asked = told.recv_timeout(PATIENCE).expect("it was never asked");
+        let found = is(&asked);
+        if matches!(asked, Asked::Write(..)) {
+            writes.push(asked);
+        }
+        if found {
+            return writes;
+        }
+    }
+}
+
+#[test]
+fn a_set_point_that_is_refused_keeps_no_other_from_being_sent() {
+    let (address, ways, told) = instrument();
+    let (thread, stop, _port) = driving(&address, &told);
+    ways.refuses_output.store(true, Ordering::SeqCst);
+    stop.store(true, Ordering::Release);
+    let amplitude = |asked: &Asked| matches!(asked, Asked::Write(_, 100, registers) if *registers == [0]);
+    let writes = writes_until(&told, amplitude);
+    let [block, output, amplitude] = &writes[..] else { panic!("{writes:?}") };
+    assert!(matches!(block, Asked::Write(1, 100, registers) if registers.len() == 5 && registers[3] == 0));
+    assert_eq!((output, amplitude), (&Asked::Write(1, 103, vec![0]), &Asked::Write(1, 100, vec![0])));
+    assert_eq!(thread.join().unwrap(), Closed::ReadBackOff, "what it shows counts");
+}
+
+#[test]
+fn a_new_connection_begins_with_off() {
+    let (address, ways, told) = instrument();
+    let (thread, stop, port) = driving(&address, &told);
+    ways.cuts.store(true, Ordering::SeqCst);
+    // Neither state nor signature is asked for before.
+    let first = loop {
+        match told.recv_timeout(PATIENCE).unwrap() {
+            Asked::State(1) | Asked::Write(1, ..) => {}
+            first => break first,
+        }
+    };
+    assert!(
+        matches!(&first, Asked::Write(2, 100, registers) if registers[3] == 0 && registers[0] == 0),
+        "{first:?}"
+    );
+    stop.store(true, Ordering::Release);
+    assert_eq!(thread.join().unwrap(), Closed::ReadBackOff);
+    drop(port);
+}

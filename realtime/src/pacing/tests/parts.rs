@@ -1,0 +1,179 @@
+//! The parts of the loop's thread, each by itself: the first deadline, what is counted, and what the ports are told at the end.
+
+use super::*;
+use crate::ports::{SupplyState, SupplySwitch};
+
+/// Touches so many pages that the thread has not met before, each a page of its own.
+pub(super) fn touch_new_pages(pages: usize) {
+    if pages == 0 {
+        return;
+    }
+    let length = pages * 4096;
+    // SAFETY: a new private mapping of `length` bytes, written inside its bounds one byte a page, and given back; it is not
+    // used where the kernel refuses it.
+    unsafe {
+        let (prot, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_PRIVATE | libc::MAP_ANONYMOUS);
+        let memory = libc::mmap(std::ptr::null_mut(), length, prot, flags, -1, 0);
+        assert_ne!(memory, libc::MAP_FAILED);
+        libc::madvise(memory, length, libc::MADV_NOHUGEPAGE);
+        for page in 0..pages {
+            std::ptr::write_volatile(memory.cast::<u8>().add(4096 * page), 1);
+        }
+        libc::munmap(memory, length);
+    }
+}
+
+/// The first cycle waits for the first deadline, a period after the loop begins; on a busy machine the best of some tries.
+#[test]
+fn the_first_cycle_misses_no_deadline() {
+    let first = || {
+        let mut running = Running::start(50);
+        let row = running.until("the first row", |row| row.cycle == 1);
+        let (report, _) = running.end();
+        assert_eq!((report.grants.policy.as_str(), report.grants.priority), ("unchanged", 0));
+        row.inputs.seen.lateness
+    };
+    let least = (0..20).map(|_| first()).find(|late| *late < PERIOD);
+    assert!(least.is_some(), "the first cycle of 20 loops was late by a period");
+}
+
+/// Page faults are those after the first cycle, which brings in what the loop needs.
+#[test]
+fn faults_are_counted_from_the_second_cycle_on() {
+    let _alone = super::super::machine::tests::alone();
+    let mut running = Running::with(50, 16384, Scene { touches: 4000, ..Scene::default() });
+    running.until("some cycles", |row| row.cycle >= 3);
+    running.scene.lock().unwrap().touches = 500;
+    let at = running.rows.try_iter_last_cycle();
+    running.until("some more", |row| row.cycle >= at + 3);
+    let (report, _) = running.end();
+    assert!((500..4000).contains(&report.minor_faults), "{report:?}");
+    assert_eq!(faults_between((10, 3), (25, 4)), (15, 1));
+}
+
+/// Each deadline has its place in the histogram: the last of a stall is late by the least.
+#[test]
+fn a_stall_counts_every_deadline_at_its_place() {
+    const MS: u64 = 1_000_000;
+    let mut histogram = lateness_histogram();
+    count_deadlines(&mut histogram, 41 * MS, 4, 10 * MS);
+    assert_eq!(histogram.len(), 5);
+    for late in [1, 11, 21, 31, 41] {
+        assert_eq!(histogram.count_at(late * MS), 1, "{late} ms");
+    }
+    // In time: one.
+    let mut histogram = lateness_histogram();
+    count_deadlines(&mut histogram, 5_000, 0, MS);
+    assert_eq!((histogram.len(), histogram.count_at(5_000)), (1, 1));
+}
+
+/// However long a stall, what is counted of it is bounded: it is the loop's own time.
+#[test]
+fn a_stall_of_hours_counts_ten_seconds_of_deadlines() {
+    let mut histogram = lateness_histogram();
+    let (stall, period) = (3600 * LONGEST_NS, 100_000_000);
+    count_deadlines(&mut histogram, stall, stall / period, period);
+    assert_eq!(histogram.len(), 101);
+    assert!(histogram.min() >= LONGEST_NS / 100 * 99, "all of them longer than is told apart");
+}
+
+#[test]
+fn a_bare_sleep_has_one_lateness_a_deadline() {
+    let (during, period) = (Duration::from_millis(200), Duration::from_millis(10));
+    let one = || {
+        let began = monotonic_ns();
+        let late = lateness_of_sleep(during, period);
+        assert_eq!(late.len(), 20);
+        assert!(monotonic_ns() - began >= 200_000_000, "twenty deadlines, each a period after the other");
+        late[0]
+    };
+    let least = (0..20).map(|_| one()).find(|late| *late < 10_000_000);
+    assert!(least.is_some(), "the first deadline of 20 runs was missed by a period");
+    // Shorter than a period, or no period at all: one sleep.
+    assert_eq!(lateness_of_sleep(Duration::from_millis(1), period).len(), 1);
+    assert_eq!(lateness_of_sleep(Duration::ZERO, Duration::ZERO).len(), 1);
+}
+
+#[test]
+fn deadlines_stay_on_their_grid_until_one_is_missed() {
+    assert_eq!(deadline_after(100, 103, 10), 110);
+    assert_eq!(deadline_after(100, 110, 10), 110, "just in time");
+    assert_eq!(deadline_after(100, 111, 10), 121, "missed: a period from now");
+    assert_eq!(deadline_after(100, 175, 10), 185);
+}
+
+/// What the ports were told, in its order, and which of them panics at being told.
+#[derive(Default)]
+struct Told {
+    by: Vec<&'static str>,
+    panics: [bool; 3],
+}
+
+struct End(Arc<Mutex<Told>>);
+
+impl End {
+    fn tell(&self, which: usize, what: &'static str) {
+        let panics = {
+            let mut told = self.0.lock().unwrap();
+            told.by.push(what);
+            told.panics[which]
+        };
+        assert!(!panics, "{what} is too much");
+    }
+}
+
+impl ForceSensor for End {
+    fn read(&mut self, _: Nanos) -> Forces {
+        Forces::missing(NoData::NotFitted)
+    }
+}
+
+impl Amplifier for End {
+    fn command(&mut self, command: DriveCommand, now: Nanos) {
+        assert!(!command.enable() && command.amplitude() == PeakToPeak::ZERO && command.expires_at() > now);
+        self.tell(0, "off");
+    }
+
+    fn state(&mut self, _: Nanos) -> Result<AmplifierState, NoData> {
+        Err(NoData::NotFitted)
+    }
+}
+
+impl Stage for End {
+    fn command(&mut self, command: StageCommand, now: Nanos) {
+        assert!(
+            command.velocity_m_s() == 0.0 && command.normal_force_n() == 0.0 && command.expires_at() > now
+        );
+        self.tell(1, "stop");
+    }
+
+    fn state(&mut self, _: Nanos) -> Result<StageState, NoData> {
+        Err(NoData::NotFitted)
+    }
+}
+
+impl SupplySwitch for End {
+    fn command(&mut self, command: SupplyCommand, _: Nanos) {
+        self.tell(2, if command == SupplyCommand::Cut { "cut" } else { "restore" });
+    }
+
+    fn state(&mut self, _: Nanos) -> Result<SupplyState, NoData> {
+        Err(NoData::NotFitted)
+    }
+}
+
+/// The supply is cut where the amplifier could not be told, and only there: a cut wants a proof before the next run.
+#[test]
+fn a_port_that_panics_at_the_end_keeps_no_other_from_being_told() {
+    let told = |panics| {
+        let told = Arc::new(Mutex::new(Told { by: Vec::new(), panics }));
+        let end = || Box::new(End(Arc::clone(&told)));
+        let mut ports = Ports::new(end(), end(), end()).with_supply(end());
+        switch_off(&mut ports, Nanos(7));
+        told.lock().unwrap().by.clone()
+    };
+    assert_eq!(told([false, false, false]), ["off", "stop"]);
+    assert_eq!(told([true, false, false]), ["off", "stop", "cut"]);
+    assert_eq!(told([false, true, false]), ["off", "stop"]);
+    assert_eq!(told([true, true, true]), ["off", "stop", "cut"]);
+}
