@@ -37,7 +37,7 @@ pub enum DataError {
     /// One reading under two numbers.
     #[error(
         "points {0} and {1} are one reading: time, conditions and forces are equal to the last digit. Was a table appended to \
-         itself? Remove the second copy; a pass that counts twice makes every probability too sure"
+         itself? Remove the second copy, for a pass that counts twice makes every probability too sure; two passes have a time each"
     )]
     DoubleReading(u64, u64),
 }
@@ -51,6 +51,8 @@ fn read_twice(passes: &[&Pass]) -> Option<[u64; 2]> {
             p.lateral_force_n.unwrap_or(0.0),
             p.speed_m_s,
             p.amplitude.metres(),
+            p.frequency_hz,
+            p.direction.sign(),
             p.position_m,
         ]
         .map(f64::to_bits)

@@ -62,10 +62,10 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
         let (class, regions, gate) = (Vec::new(), Vec::new(), gate(k, &[]));
         return Decision { verdict, none, unknown, probabilities, class, gate, regions };
     };
-    let (regions, judged) = judged(fitted, leader);
+    let claimed = none < fitted.problem.constants.claim_probability;
+    let (regions, judged) = judged(fitted, leader, claimed);
     let fitted = &*fitted;
     let (k, candidates) = (&*fitted.problem.constants, &fitted.candidates);
-    let claimed = none < k.claim_probability;
     if claimed {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
         let survival = judged.survival(k, candidates[leader].effects.len(), candidates[leader].best.share);
@@ -94,11 +94,12 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
 
 /// The leader on the left-out regions. Of its laws that the evidence does not tell apart the one that predicts best what it has not
 /// seen stands for the cause: which of them is a tenth of a nat ahead is no ground to doubt the cause.
-fn judged(fitted: &mut Fitted, leader: usize) -> (Vec<Region>, Gate) {
+/// Where no gap is claimed there is nothing to choose for.
+fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Gate) {
     let k = fitted.problem.constants.clone();
     let own = &fitted.candidates[leader];
     let top = own.laws.iter().map(|(e, _)| *e).fold(f64::NEG_INFINITY, f64::max);
-    let near = own.laws.iter().filter(|(e, _)| *e > top - k.alias_nats);
+    let near = own.laws.iter().filter(|(e, _)| claimed && *e > top - k.alias_nats);
     let mut laws: Vec<Posterior> = near.map(|(_, law)| law.clone()).collect();
     if laws.is_empty() {
         laws.push(own.best.clone());

@@ -44,6 +44,9 @@ pub fn minimise(
     let mut u: Vec<f64> = start.iter().zip(&bounds).map(|(x, b)| x.clamp(b.0, b.1)).collect();
     let mut m = problem.predict(members, &u);
     let mut cost = cost_of(&u, &m);
+    if rounds == 0 {
+        return Fit { u, prediction: m, cost };
+    }
     let mut damping = DAMPING;
     let mut jacobian = problem.jacobian(members, &u, &m);
     // Whether the Jacobian is that of this place, or one that was carried along with the last step.

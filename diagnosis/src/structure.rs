@@ -8,14 +8,11 @@
 
 use crate::evidence::Posterior;
 use crate::fit::Problem;
-use crate::scatter::clusters::shuffled;
+use crate::scatter::clusters::{moments, shuffled, strongest};
 use models::covariate::{Role, TOLD};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{E, PI};
 
-/// Shuffles against which a table is held; fewer for long ones.
-const SHUFFLES: usize = 400;
-const MOST_WORK: usize = 400_000;
 /// Shortest window, and the ratio of each to the next.
 const SHORTEST: usize = 4;
 const LONGER: f64 = 1.5;
@@ -137,7 +134,7 @@ pub fn structure(problem: &Problem, model: &Posterior) -> Option<Structure> {
     let along = bounded.iter().zip(&problem.passes).map(|(d, p)| d * p.direction.sign()).collect();
     let signals: [Vec<f64>; 2] = [bounded, along];
     let (mut sums, mut moved) = (Vec::new(), vec![0.0; n]);
-    let scores = shuffled(n, (MOST_WORK / n).clamp(100, SHUFFLES), |order, signs| {
+    let scores = shuffled(n, |order, signs| {
         let mut row = Vec::with_capacity(looks.len() * signals.len());
         for look in &looks {
             for values in &signals {
@@ -147,7 +144,7 @@ pub fn structure(problem: &Problem, model: &Posterior) -> Option<Structure> {
         }
         row
     });
-    let (largest, which) = largest(&scores);
+    let (largest, which) = strongest(&scores);
     let (mean, sd) = moments(&largest[1..]);
     // Of the largest of many the distribution is Gumbel's: its tail reaches farther than the shuffles do.
     let scale = sd.max(f64::MIN_POSITIVE) * 6f64.sqrt() / PI;
@@ -176,24 +173,4 @@ fn innovations(problem: &Problem, model: &Posterior) -> Vec<f64> {
     }
     let shared = problem.covariance(&DMatrix::zeros(n, 0)).weights(&residual);
     own(&(residual - &problem.common * shared))
-}
-
-/// The largest score of each row in deviations of that look among the shuffles, and which look it is in the first row.
-fn largest(scores: &[Vec<f64>]) -> (Vec<f64>, usize) {
-    let looks = scores[0].len();
-    let own: Vec<(f64, f64)> =
-        (0..looks).map(|t| moments(&scores[1..].iter().map(|row| row[t]).collect::<Vec<_>>())).collect();
-    let standard = |row: &Vec<f64>, t: usize| (row[t] - own[t].0) / own[t].1.max(f64::MIN_POSITIVE);
-    let best = |row: &Vec<f64>| {
-        (0..looks).fold((f64::NEG_INFINITY, 0), |a, t| {
-            if standard(row, t) > a.0 { (standard(row, t), t) } else { a }
-        })
-    };
-    (scores.iter().map(|row| best(row).0).collect(), best(&scores[0]).1)
-}
-
-fn moments(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt())
 }

@@ -98,9 +98,8 @@ impl Space {
             .chain(magnitudes.iter().filter_map(|s| Some((false, scaled(s, mean(s))?))))
             .collect();
         let n = signals.first().map_or(0, |s| s.1.len());
-        let shuffles = (MOST_WORK / n.max(1)).clamp(100, SHUFFLES);
         let mut sums = Vec::new();
-        let scores = shuffled(n, shuffles, |order, signs| {
+        let scores = shuffled(n, |order, signs| {
             let mut row = Vec::with_capacity(self.0.len() * signals.len());
             for cells in &self.0 {
                 for (turns, values) in &signals {
@@ -110,20 +109,8 @@ impl Space {
             }
             row
         });
-        let tests = scores[0].len();
-        let centre: Vec<(f64, f64)> = (0..tests)
-            .map(|t| {
-                let of: Vec<f64> = scores[1..].iter().map(|row| row[t]).collect();
-                let m = mean(&of);
-                (m, mean(&of.iter().map(|v| (v - m).powi(2)).collect::<Vec<_>>()).sqrt())
-            })
-            .collect();
-        let strongest = |row: &Vec<f64>| {
-            let each = row.iter().zip(&centre).map(|(v, (m, sd))| (v - m) / sd.max(f64::MIN_POSITIVE));
-            each.enumerate().fold((f64::NEG_INFINITY, 0), |a, (t, z)| if z > a.0 { (z, t) } else { a })
-        };
-        let (own, which) = strongest(&scores[0]);
-        let beyond = scores[1..].iter().filter(|row| strongest(row).0 >= own).count();
+        let (largest, which) = strongest(&scores);
+        let beyond = largest[1..].iter().filter(|other| **other >= largest[0]).count();
         let (Some(cells), Some((_, values))) =
             (self.0.get(which / signals.len().max(1)), signals.get(which % signals.len().max(1)))
         else {
@@ -133,16 +120,13 @@ impl Space {
         let part = |cell: usize| sums[cell].powi(2) / (cells.counts[cell] as f64 + SMALL * n as f64);
         let cell = (0..sums.len()).max_by(|&a, &b| part(a).total_cmp(&part(b)));
         let rows = (0..n).filter(|&i| Some(cells.of[i]) == cell).collect();
-        Cluster { place: cells.name.clone(), rows, p: (1 + beyond) as f64 / (1 + shuffles) as f64 }
+        Cluster { place: cells.name.clone(), rows, p: (1 + beyond) as f64 / largest.len() as f64 }
     }
 }
 
 /// Scores of passes as they are, and after them of passes that are shuffled and turned either way.
-pub fn shuffled(
-    n: usize,
-    shuffles: usize,
-    mut score: impl FnMut(&[usize], &[f64]) -> Vec<f64>,
-) -> Vec<Vec<f64>> {
+pub fn shuffled(n: usize, mut score: impl FnMut(&[usize], &[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
+    let shuffles = (MOST_WORK / n.max(1)).clamp(100, SHUFFLES);
     let (mut order, mut signs): (Vec<usize>, Vec<f64>) = ((0..n).collect(), vec![1.0; n]);
     let mut state = 0x5EED_u64;
     (0..=shuffles)
@@ -155,6 +139,24 @@ pub fn shuffled(
             row
         })
         .collect()
+}
+
+/// The largest score of each row in deviations of its test among the shuffles, and which test that is in the first row.
+pub fn strongest(scores: &[Vec<f64>]) -> (Vec<f64>, usize) {
+    let centre: Vec<(f64, f64)> = (0..scores[0].len())
+        .map(|t| moments(&scores[1..].iter().map(|row| row[t]).collect::<Vec<_>>()))
+        .collect();
+    let of = |row: &Vec<f64>| {
+        let each = row.iter().zip(&centre).map(|(v, (m, sd))| (v - m) / sd.max(f64::MIN_POSITIVE));
+        each.enumerate().fold((f64::NEG_INFINITY, 0), |a, (t, z)| if z > a.0 { (z, t) } else { a })
+    };
+    (scores.iter().map(|row| of(row).0).collect(), of(&scores[0]).1)
+}
+
+/// Mean and deviation.
+pub fn moments(values: &[f64]) -> (f64, f64) {
+    let m = mean(values);
+    (m, mean(&values.iter().map(|v| (v - m).powi(2)).collect::<Vec<_>>()).sqrt())
 }
 
 fn mean(values: &[f64]) -> f64 {

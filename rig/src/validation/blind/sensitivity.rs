@@ -82,10 +82,13 @@ fn tried(
     pairs: bool,
 ) -> miette::Result<Vec<Said>> {
     let mut own = fitted(set, base.clone(), pairs)?;
+    // A decision settles the leader's law: each begins with what was fitted.
+    let as_fitted = own.candidates.clone();
     let mut list = vec![said(set, &mut own)];
     for (stage, constants) in changes {
         list.push(if *stage == Stage::Decision {
             own.problem.constants = Arc::new(constants.clone());
+            own.candidates.clone_from(&as_fitted);
             said(set, &mut own)
         } else {
             said(set, &mut fitted(set, constants.clone(), pairs)?)
