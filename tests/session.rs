@@ -78,6 +78,7 @@ fn a_sweep_over_real_modbus_tcp_ends_with_table_record_and_report() {
         report.matches("<svg").count() >= 4 && !report.contains("http-equiv") && !report.contains("<script")
     );
     assert!(report.contains("at 27.5 kHz and 0.25 N"), "the load of the plan stands below the curve");
+    assert!(report.contains("the spring-slider alone"), "it is said which model is drawn");
     let histogram = summary["loop_report"]["histogram"].as_array().unwrap();
     let counted: u64 = histogram.iter().map(|b| b[1].as_u64().unwrap()).sum();
     let of_loop = |name: &str| summary["loop_report"][name].as_u64().unwrap();

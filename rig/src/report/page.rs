@@ -51,8 +51,9 @@ pub(super) fn page(run: &RunData) -> miette::Result<String> {
          <h2>Residuals</h2>{}{}",
         plots::mu_against_amplitude(run)?,
         caption(
-            "Points: measured passes with one standard uncertainty. Lines and bands: the model's prediction at the \
-                 base condition of each speed, with twice its standard uncertainty. w is peak-to-peak."
+            "Points: measured passes with one standard uncertainty. Lines and bands: the spring-slider alone at the \
+                 base condition of each speed, with twice its standard uncertainty; what a corrected model adds is not drawn, \
+                 it stands in the residuals and in the table. w is peak-to-peak."
         ),
         plots::mu_against_psi(run)?,
         caption(
