@@ -192,9 +192,10 @@ constants! {
     prior_nats: f64 = 10.0, "Nats up to which such a hypothesis stays in the leader's class: priors alone make no name.", JUDGEMENT;
     claim_probability: f64 = 0.1, "Probability of no gap above which no gap is claimed.", "judgement: the complement of `name_probability`";
     pair_gain_share: f64 = 0.03, "Share of the gap's chi2 by which a second cause must raise twice the log evidence.", "development: single causes under another form gained up to 0.026 by a spurious companion, on two generators";
-    pair_left_share: f64 = 0.05, "Or: share of the gap's chi2 that the better single cause leaves (a quarter of the gap, squared, or nearly so),", "judgement: a quarter of the gap, about squared";
-    pair_halves: f64 = 0.5, "of which the second cause takes up so much,", JUDGEMENT;
+    pair_halves: f64 = 0.5, "Or: share of what the better single cause leaves, where that is a misfit, that the second cause takes up,", JUDGEMENT;
     pair_nats: f64 = 50.0, "and raises the log evidence by these nats.", "development: spurious companions gained up to 34";
+    pair_complete_sd: f64 = 1.0, "Or: deviations of scatter within which it leaves nothing, where the better single cause leaves a misfit,", JUDGEMENT;
+    pair_complete_nats: f64 = 20.0, "and raises the log evidence by these nats.", JUDGEMENT;
     pair_pull_chi2: f64 = 50.0, "Or: chi2 by which it frees the nuisances.", "development: true single causes pull them by up to 30, a gain that hides in a stiffness by hundreds";
 
     }

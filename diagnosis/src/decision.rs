@@ -161,11 +161,15 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
                 }
                 let gain = own.log_evidence - c.log_evidence;
                 let c_left = left(&c.best.prediction);
-                let needed = c_left > k.pair_left_share * gap
-                    && own_left < k.pair_halves * c_left
-                    && gain > k.pair_nats;
+                let scatter = (2.0 * problem.len() as f64).sqrt();
+                let needed =
+                    c_left > k.misfit_sd * scatter && own_left < k.pair_halves * c_left && gain > k.pair_nats;
+                // Or the pair leaves nothing that the scatter does not, and the single cause does.
+                let complete = own_left < k.pair_complete_sd * scatter
+                    && c_left > k.misfit_sd * scatter
+                    && gain > k.pair_complete_nats;
                 let pulled = c.best.pull() > own.best.pull() + k.pair_pull_chi2;
-                2.0 * gain < k.pair_gain_share * gap && !needed && !pulled
+                2.0 * gain < k.pair_gain_share * gap && !needed && !complete && !pulled
             })
             .collect();
         let Some(best) = alone.iter().map(|&i| candidates[i].log_evidence).reduce(f64::max) else { continue };

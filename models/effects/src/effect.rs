@@ -68,16 +68,19 @@ pub struct Parameter {
     pub lower: f64,
     /// Largest value that the fit may take.
     pub upper: f64,
+    /// Whether it only bends the law about its middle, where the coordinate is zero: a search begins there, and the local fit
+    /// finds it.
+    pub bends: bool,
 }
 
 impl Parameter {
     /// A size of either sign, absent at zero.
     pub const fn signed(name: &'static str, unit: &'static str, sd: f64, lower: f64, upper: f64) -> Self {
-        Self { name, unit, zero: Some(0.0), prior: Prior::Normal(sd), lower, upper }
+        Self { name, unit, zero: Some(0.0), prior: Prior::Normal(sd), lower, upper, bends: false }
     }
     /// A size that cannot be negative, absent at zero.
     pub const fn positive(name: &'static str, unit: &'static str, sd: f64, upper: f64) -> Self {
-        Self { name, unit, zero: Some(0.0), prior: Prior::HalfNormal(sd), lower: 0.0, upper }
+        Self { name, unit, zero: Some(0.0), prior: Prior::HalfNormal(sd), lower: 0.0, upper, bends: false }
     }
     /// A positive shape parameter with a lognormal prior, bounded at three deviations.
     pub const fn shape(name: &'static str, unit: &'static str, median: f64, sd_ln: f64) -> Self {
@@ -88,7 +91,12 @@ impl Parameter {
             prior: Prior::LogNormal(median, sd_ln),
             lower: 0.0,
             upper: f64::INFINITY,
+            bends: false,
         }
+    }
+    /// The same as a shape that only bends the law about its middle: see [`Parameter::bends`].
+    pub const fn bending(self) -> Self {
+        Self { bends: true, ..self }
     }
     /// The same with a largest value of its own, where another effect begins.
     pub const fn at_most(self, upper: f64) -> Self {
@@ -96,7 +104,7 @@ impl Parameter {
     }
     /// A shape parameter anywhere between two ends.
     pub const fn between(name: &'static str, unit: &'static str, lower: f64, upper: f64) -> Self {
-        Self { name, unit, zero: None, prior: Prior::Uniform(lower, upper), lower, upper }
+        Self { name, unit, zero: None, prior: Prior::Uniform(lower, upper), lower, upper, bends: false }
     }
 
     /// The same for a table about this normal force: what has the unit of a force grows with it, and with the stiffnesses that

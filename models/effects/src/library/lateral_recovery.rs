@@ -5,8 +5,14 @@ use super::prelude::*;
 /// See the module.
 pub struct LateralRecovery;
 
-static LAWS: [Law; 5] = [
-    Law::new("rate limit", &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)]),
+/// A speed of recovery that falls with the stretch below a knee: a limit of speed for long stretches, of time for short ones.
+const LIMITS: [Parameter; 2] = [
+    Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0),
+    Parameter::shape("stretch_of_half_speed", "m", 1e-7, 1.3).bending(),
+];
+
+static LAWS: [Law; 4] = [
+    Law::new("rate limit, slower near rest", &LIMITS),
     Law::new("exponential", &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)]),
     Law::new(
         "spectrum of times, in flight",
@@ -15,14 +21,7 @@ static LAWS: [Law; 5] = [
             Parameter::between("exponent", "1", 0.2, 1.6),
         ],
     ),
-    Law::new("rate limit, in flight", &[Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0)]),
-    Law::new(
-        "rate limit, slower near rest",
-        &[
-            Parameter::positive("inverse_recovery_speed", "s/m", 150.0, 3000.0),
-            Parameter::shape("stretch_of_half_speed", "m", 1e-7, 1.0),
-        ],
-    ),
+    Law::new("rate limit, slower near rest, in flight", &LIMITS),
 ];
 
 impl Effect for LateralRecovery {
@@ -45,21 +44,16 @@ impl Effect for LateralRecovery {
         &[Need::Vibration]
     }
     fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
+        c.instant_slip_back = law >= 2;
         match law {
-            0 => c.inverse_recovery_speed = theta[0],
             1 => c.lateral_relaxation_time = theta[0],
             2 => {
                 c.lateral_relaxation_time = theta[0];
                 c.lateral_relaxation_exponent = theta[1];
-                c.instant_slip_back = true;
-            }
-            4 => {
-                c.inverse_recovery_speed = theta[0];
-                c.recovery_knee = theta[1];
             }
             _ => {
                 c.inverse_recovery_speed = theta[0];
-                c.instant_slip_back = true;
+                c.recovery_knee = theta[1];
             }
         }
     }

@@ -9,13 +9,22 @@ pub struct ModeShape;
 /// What sees it without friction.
 const CHECK: &str = "Scan the plate with a vibrometer along the stroke.";
 
-static LAWS: [Law; 4] = [
+/// Least square of the amplitude at a node over that at an antinode: a finger is wider than a node.
+const LEAST_SQUARE: f64 = 4e-4;
+
+static LAWS: [Law; 3] = [
     Law::new(
         "standing wave",
         &[
             Parameter::positive("depth", "1", 0.5, 1.0),
-            Parameter::between("node_spacing", "m", 0.004, 0.03),
+            Parameter::between("node_spacing_at_reference", "m", 0.004, 0.03),
             Parameter::between("phase", "1", -0.25, 1.25),
+            // Flexural waves shorten as the root of the frequency; a plate that is driven at one mode's does not.
+            Parameter::between("frequency_exponent", "1", 0.0, 1.0).bending(),
+            // At one half the root of a sum of squares, of what stands and what travels.
+            Parameter::shape("sharpness", "1", 0.5, 0.5).bending(),
+            // The amplitude was calibrated at one place, which need not be an antinode.
+            Parameter::signed("antinode_over_calibrated_e_folds", "1", 0.3, -1.0, 1.0).bending(),
         ],
     )
     .seen_by(CHECK, 0.03),
@@ -28,17 +37,6 @@ static LAWS: [Law; 4] = [
     )
     .seen_by(CHECK, 130.0),
     Law::new("gradient", &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)]).seen_by(CHECK, 1.0),
-    // Flexural waves shorten as the root of the frequency.
-    Law::new(
-        "standing wave, shorter at higher frequency",
-        &[
-            Parameter::positive("depth", "1", 0.5, 1.0),
-            Parameter::between("node_spacing_at_reference", "m", 0.004, 0.03),
-            Parameter::between("phase", "1", -0.25, 1.25),
-        ],
-    )
-    .needs(&[Need::Frequencies])
-    .seen_by(CHECK, 0.03),
 ];
 
 impl Effect for ModeShape {
@@ -63,12 +61,12 @@ impl Effect for ModeShape {
     fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
         let x = pass.position_m;
         c.amplitude_pp *= match law {
-            0 | 3 => {
-                let shorter =
-                    if law == 3 { (pass.frequency_hz / design.reference_frequency_hz).sqrt() } else { 1.0 };
+            0 => {
+                let shorter = (pass.frequency_hz / design.reference_frequency_hz).powf(theta[3]);
                 let s = (PI * (x * shorter / theta[1] + theta[2])).sin();
                 // Depth one is |cos|; the mean over a stroke through nodes is shallower.
-                (1.0 - theta[0].min(1.0) * s * s).max(4e-4).sqrt()
+                let depth = theta[0].min(1.0);
+                (1.0 - depth * s * s).max(LEAST_SQUARE).powf(theta[4]) * (depth * theta[5]).exp()
             }
             1 => 1.0 / (1.0 + theta[0] * (x - theta[1] * design.stroke_m).powi(2)),
             _ => (theta[0] * (x - 0.5 * design.stroke_m)).clamp(-2.0, 2.0).exp(),

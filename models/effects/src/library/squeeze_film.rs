@@ -15,33 +15,25 @@ const MOST_EXCURSION: f64 = 0.95;
 /// Film thickness units beyond which nothing of the load is left to solid contact.
 const FARTHEST: f64 = 60.0;
 
+/// Bluntness below which the film ends as an exponential does: the difference is of the order of it.
+const STEEPEST: f64 = 1e-6;
+
 /// What sees it without friction.
 const CHECK: &str = "Repeat the largest amplitudes at 0.2 atm.";
 
-static LAWS: [Law; 5] = [
+/// Shapes of a film whose lift goes with powers of amplitude, frequency and load, and which ends between a slow fade
+/// (`1/(1 + lift)`, and slower) and a steep one (`exp(-lift)`).
+const POWERS: [Parameter; 5] = [
+    Parameter::positive("lift_at_largest_amplitude", "1", 3.0, 200.0),
+    Parameter::shape("amplitude_exponent", "1", 2.0, 0.3).bending(),
+    Parameter::signed("frequency_exponent", "1", 0.7, -2.0, 3.0).bending(),
+    Parameter::between("load_exponent", "1", -0.5, 2.5).bending(),
+    Parameter::between("bluntness", "1", 0.0, 2.0).bending(),
+];
+
+static LAWS: [Law; 4] = [
     Law::new("load shared with a film", &[Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6)])
         .seen_by(CHECK, 5e4),
-    Law::new(
-        "rational share",
-        &[
-            Parameter::positive("share_per_amplitude_squared", "1/m^2", 0.4e12, 4e12),
-            Parameter::between("load_exponent", "1", 0.0, 1.0),
-        ],
-    )
-    .seen_by(CHECK, 3e10),
-    Law::new(
-        "exponential on friction",
-        &[Parameter::positive("decay_per_amplitude_squared", "1/m^2", 0.3e12, 3e12)],
-    )
-    .seen_by(CHECK, 2.5e10),
-    Law::new(
-        "power on friction",
-        &[
-            Parameter::positive("inverse_amplitude", "1/m", 0.5e6, 4e6),
-            Parameter::between("exponent", "1", 1.0, 3.0),
-        ],
-    )
-    .seen_by(CHECK, 5e4),
     Law::new(
         "load shared with a film of finite excursion",
         &[
@@ -51,6 +43,8 @@ static LAWS: [Law; 5] = [
         ],
     )
     .seen_by(CHECK, 5e4),
+    Law::new("share by powers", &POWERS).seen_by(CHECK, 0.1),
+    Law::new("friction by powers", &POWERS).seen_by(CHECK, 0.1),
 ];
 
 impl Effect for SqueezeFilm {
@@ -80,18 +74,25 @@ impl Effect for SqueezeFilm {
         match law {
             0 => c.solid_share *= film_share(theta[0] * c.half_amplitude(), air, c.normal_force / size),
             1 => {
-                let eased = (design.reference_load_n / c.normal_force).powf(theta[1]);
-                c.solid_share /= 1.0 + theta[0] * c.amplitude_pp.powi(2) * air * eased;
-            }
-            2 => c.friction_factor *= (-theta[0] * c.amplitude_pp.powi(2) * air).exp(),
-            3 => c.friction_factor /= 1.0 + air * (theta[0] * c.amplitude_pp).powf(theta[1]),
-            _ => {
                 let film = theta[1] * AIR_SCALE_N * air * size;
                 c.solid_share *=
                     finite_film_share(theta[0] * c.half_amplitude(), film, theta[2], c.normal_force);
             }
+            2 => c.solid_share *= share_by_powers(theta, pass, design, c),
+            _ => c.friction_factor *= share_by_powers(theta, pass, design, c),
         }
     }
+}
+
+/// Share of solid contact under a lift that goes with powers: `(1 + b lift)^(-1/b)`, with `b` the bluntness.
+fn share_by_powers(theta: &[f64], pass: &Condition, design: &Design, c: &Contact) -> f64 {
+    let lift = theta[0]
+        * atmospheres(pass)
+        * (c.amplitude_pp / design.largest_amplitude_m).powf(theta[1])
+        * (pass.frequency_hz / design.reference_frequency_hz).powf(theta[2])
+        * (design.reference_load_n / c.normal_force).powf(theta[3]);
+    let b = theta[4];
+    if b < STEEPEST { (-lift).exp() } else { (-(b * lift).ln_1p() / b).exp() }
 }
 
 /// The same where the film is that of a strongly squeezed isothermal gas at any excursion `e = a/u`:
