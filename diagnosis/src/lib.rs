@@ -57,6 +57,7 @@ pub mod locate;
 pub mod next;
 pub mod noise;
 pub mod pairs;
+pub mod power;
 pub mod predict;
 pub mod pulls;
 pub mod remarks;

@@ -7,6 +7,7 @@ use crate::intervals::{Estimate, curvature, estimates};
 use crate::locate::{Region, ledger, regions};
 use crate::next::{Experiment, experiments};
 use crate::noise::PureError;
+use crate::power::{SeenFrom, seen_from};
 use crate::predict::{Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
 use crate::remarks::{WithSuspects, of_scatter, of_table, with_suspects};
@@ -102,6 +103,9 @@ pub struct Report {
     pub stiffness_pulls: Vec<Pull>,
     /// Effects that the table cannot show.
     pub not_testable: Vec<NotTestable>,
+    /// Under no gap: the size of each effect from which this table would have shown it, most visible first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub seen_from: Vec<SeenFrom>,
     /// What to measure next.
     pub next_experiment: Vec<Experiment>,
     /// Remarks: what is missing from the table, what was assumed.
@@ -154,6 +158,8 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
         }
         Verdict::Unknown => Vec::new(),
     };
+    let seen_from = if decision.verdict == Verdict::NoGap { seen_from(&fitted) } else { Vec::new() };
+    remarks.extend(crate::power::remark(&seen_from));
     remarks.extend(stiffness_pulls.iter().filter_map(Pull::remark));
     let report = Report {
         schema: "muprime.verdict/1",
@@ -181,6 +187,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
             .iter()
             .map(|(e, because)| NotTestable { effect: (*e).to_string(), because: because.clone() })
             .collect(),
+        seen_from,
         next_experiment,
         remarks,
         data: DataNote { points: table.len(), sha256 },

@@ -1,5 +1,7 @@
 //! `muprime blind`: the diagnosis scored on sealed sets.
 
+use crate::validation::blind::distance::by_cause;
+use crate::validation::blind::reliability::{diagram, told};
 use crate::validation::blind::{confusion, figures, run as score_all};
 use crate::{out, say};
 use diagnosis::constants::{Constants, Row, Stage};
@@ -112,7 +114,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if json {
         let document = serde_json::json!({
             "schema": "muprime.blind/1", "seed": args.seed, "sets": args.sets,
-            "figures": figures, "confusion": confusion, "scored": scored,
+            "figures": figures, "reliability": diagram(scored.iter()),
+            "reliability_of_what_can_be_told": diagram(scored.iter().filter(|s| told(s))),
+            "distances": by_cause(&scored), "confusion": confusion, "scored": scored,
         });
         out!("{}", serde_json::to_string(&document).into_diagnostic()?);
     } else {
@@ -126,6 +130,23 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         for (truth, answers) in &confusion {
             let list: Vec<String> = answers.iter().map(|(a, n)| format!("{a} {n}")).collect();
             out!("  {truth:40} {}", list.join("; "));
+        }
+        out!("\ncause: distance from the library's nearest law, median (sets)");
+        for (cause, (distance, sets)) in by_cause(&scored) {
+            out!("  {cause:28} {distance:.3} ({sets})");
+        }
+        let told_only = diagram(scored.iter().filter(|s| told(s)));
+        for (title, bins) in [("all sets", diagram(scored.iter())), ("what can be told", told_only)] {
+            out!("\nentries of the lists, {title}: stated probability, share that is right");
+            for b in bins {
+                let ([from, to], [low, high]) = (b.from_to, b.ci95);
+                out!(
+                    "  {from:5.3} to {to:5.3}  {:.4}  {:.4} [{low:.4}, {high:.4}]  n {}",
+                    b.stated,
+                    b.observed,
+                    b.entries
+                );
+            }
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -3,7 +3,9 @@
 //! The diagnoser gets the table, rig.toml and the hidden conditions of a set; label and truth are opened only by
 //! [`score`], after the verdict stands. Every figure comes with its number of sets and an interval.
 
+pub mod distance;
 pub mod further;
+pub mod reliability;
 pub mod rough;
 pub mod same_form;
 pub mod sensitivity;
@@ -14,6 +16,7 @@ use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use models::covariate;
 use rayon::prelude::*;
+use reliability::{Entry, told};
 use serde::Serialize;
 use sim::sealed::{Ask, DETECTABLE, PAIR_LEAVES, Set, Stratum, generate};
 use std::collections::BTreeMap;
@@ -49,8 +52,16 @@ pub struct Scored {
     pub top_probability: f64,
     /// Whether the first entry is the truth.
     pub top_right: bool,
+    /// Every entry of the list of hypotheses, and whether it is the truth.
+    pub entries: Vec<Entry>,
+    /// Distance of the cause from the library's law of its name; see [`distance`].
+    pub distance: Option<f64>,
     /// Claimed shrinkage.
     pub claimed: Option<f64>,
+    /// Its interval.
+    pub claimed_ci95: Option<[f64; 2]>,
+    /// Share of hidden passes, as they would be measured, inside their 95 % predictive intervals (expected over the noise).
+    pub covered: f64,
     /// Achieved on the hidden passes against noise-free truth.
     pub achieved: Option<f64>,
     /// The same by the named effects in the library's own form alone.
@@ -101,7 +112,7 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
     // Hidden passes: errors over mu0 F against noise-free truth, in the order of the conditions as given.
     let mu0 = table.still_coefficient().unwrap_or(label.true_mu0);
     let place: BTreeMap<u64, usize> = set.conditions.iter().enumerate().map(|(i, p)| (p.point, i)).collect();
-    let (mut recalibrated, mut after, mut form) = (0.0, 0.0, 0.0);
+    let (mut recalibrated, mut after, mut form, mut covered) = (0.0, 0.0, 0.0, 0.0);
     let mut wanted = Vec::new();
     for (point, (pass, f)) in conditions.points.iter().zip(conditions.passes.iter().zip(&forecasts)) {
         let i = place[point];
@@ -110,6 +121,7 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
         recalibrated += ((t - f.recalibrated) / full).powi(2);
         after += ((t - f.corrected) / full).powi(2);
         form += ((t - f.form) / full).powi(2);
+        covered += inside(t - f.corrected, set.sd_n[i], Z95 * f.corrected_sd) / forecasts.len() as f64;
         let relative = rig.noise.pass_relative_sd * t;
         let sd = (relative * relative + rig.noise.force_sd_n.powi(2) * (1.0 + mu0 * mu0)).sqrt();
         wanted.push((t - f.recalibrated).abs() > 2.0 * sd);
@@ -145,12 +157,29 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
         probability_of_truth,
         top_probability: first.probability,
         top_right: says_truth(&first.effects),
+        entries: report
+            .hypotheses
+            .iter()
+            .map(|h| Entry { probability: h.probability, right: says_truth(&h.effects) })
+            .collect(),
+        distance: distance::distance(set),
         claimed: report.gap.shrinkage,
+        claimed_ci95: report.gap.shrinkage_ci95,
+        covered,
         achieved: shrink(after),
         achieved_form: shrink(form),
         region_f1,
         truth,
     })
+}
+
+/// Deviations of a 95 % interval.
+const Z95: f64 = 1.959_963_985;
+
+/// Probability that a normal number of this mean and deviation lies within a reach of zero.
+fn inside(mean: f64, sd: f64, reach: f64) -> f64 {
+    let below = |x: f64| 0.5 * statrs::function::erf::erfc(-(x - mean) / (sd * std::f64::consts::SQRT_2));
+    below(reach) - below(-reach)
 }
 
 /// Makes and scores `count` sets of a stratum (all strata in their shares where none is given).
@@ -304,14 +333,21 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let regions: Vec<f64> = all.iter().filter(detectable).filter_map(|s| s.region_f1).collect();
     let faint_regions: Vec<f64> = all.iter().filter(faint).filter_map(|s| s.region_f1).collect();
     let (pairs, murky_pairs): (Vec<&Scored>, Vec<&Scored>) = pairs.iter().partition(|s| s.decidable);
-    // No gap, or a cause that the data show; of two causes, where no single one all but explains the gap.
-    let told = all.iter().filter(|s| {
-        let both = s.stratum != Stratum::Pair || s.best_single_leaves.is_some_and(|x| x >= PAIR_LEAVES);
-        s.stratum == Stratum::None || (detectable(s) && both)
-    });
+    let told_sets = all.iter().filter(|s| told(s));
+    let coverage: Vec<f64> = all.iter().map(|s| s.covered).collect();
+    let promised = |s: &&Scored| Some((s.claimed_ci95?, s.achieved?));
+    let kept = gapped.iter().filter_map(promised).map(|(ci, a)| ci[0] <= a && a <= ci[1]).collect();
+    let near = |s: &&&Scored, band: usize| {
+        s.distance.is_some_and(|d| distance::BANDS.partition_point(|b| *b <= d) == band)
+    };
+    let at =
+        |band: usize| of(&clear.iter().filter(|s| near(s, band)).copied().collect::<Vec<_>>(), &named_right);
     vec![
         share("singles, detectable and decidable: named right", ">= 0.90", of(&clear, &named_right)),
         share("  confidently wrong", "<= 0.02", of(&clear, &named_wrong)),
+        share("  cause within 0.05 of a law: named right", "reported", at(0)),
+        share("  cause 0.05 to 0.15 from every law: named right", "reported", at(1)),
+        share("  cause 0.15 and more from every law: named right", "reported", at(2)),
         statistic("  mean probability on the truth", ">= 0.85", &probability, mean),
         statistic("  mean log score, nats", "reported", &log, mean),
         share("  gap below the floor: named right", "reported", of(&faint_singles, &named_right)),
@@ -337,7 +373,9 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
         statistic("where: mean F1 of the regions", ">= 0.80", &regions, mean),
         statistic("  gap below the floor: mean F1", "reported", &faint_regions, mean),
         calibration("calibration error of the first entry, debiased", all.iter()),
-        calibration("  of sets whose truth can be told", told),
+        calibration("  of sets whose truth can be told", told_sets),
+        share("achieved shrinkage inside its 95 % interval", "0.90 to 0.98", kept),
+        statistic("hidden passes inside 95 % predictive intervals", "0.90 to 0.98", &coverage, mean),
     ]
 }
 
