@@ -80,7 +80,8 @@ pub struct Table {
     pub lateral: Vec<f64>,
     /// Run of each pass, numbered in the order of appearance.
     pub runs: Vec<usize>,
-    /// Number of runs that the table tells apart.
+    /// Number of runs that the table tells apart; of conditions to predict, the number of runs of the table that was diagnosed:
+    /// runs from this number on are new.
     pub run_count: usize,
     /// Reference scales.
     pub design: Design,
@@ -155,7 +156,8 @@ impl Table {
             check(p)?;
         }
         let start = origin.map_or_else(|| rows.first().map_or(0.0, |p| p.time_s), |o| o.time_s);
-        let mut names: Vec<(Option<&str>, f64)> = Vec::new();
+        let known = origin.map_or(&[][..], |o| &o.runs);
+        let mut names: Vec<(Option<&str>, f64)> = known.iter().map(|(n, t)| (n.as_deref(), *t)).collect();
         let mut runs = Vec::with_capacity(rows.len());
         for p in &rows {
             let name = p.run.as_deref();
@@ -165,20 +167,12 @@ impl Table {
             });
             runs.push(index);
         }
-        let starts: Vec<f64> = names
-            .iter()
-            .map(|(name, first)| {
-                origin
-                    .and_then(|o| o.runs.iter().find(|(n, _)| n.as_deref() == *name))
-                    .map_or(*first, |(_, t)| *t)
-            })
-            .collect();
         let passes: Vec<Condition> = rows
             .iter()
             .zip(&runs)
             .map(|(p, &run)| Condition {
                 time_s: p.time_s - start,
-                run_time_s: Some(p.time_s - starts[run]),
+                run_time_s: Some(p.time_s - names[run].1),
                 // What friction is without vibration is the baseline's to say, not the condition's.
                 ..p.condition(1.0)
             })
@@ -188,7 +182,7 @@ impl Table {
             points: rows.iter().map(|p| p.point).collect(),
             lateral: rows.iter().map(|p| p.lateral_force_n.unwrap_or(0.0)).collect(),
             passes,
-            run_count: names.len(),
+            run_count: origin.map_or(names.len(), |o| o.runs.len()),
             runs,
             design,
         })

@@ -56,6 +56,7 @@ pub mod left_out;
 pub mod locate;
 pub mod next;
 pub mod noise;
+pub mod novelty;
 pub mod pairs;
 pub mod power;
 pub mod predict;

@@ -7,6 +7,7 @@ use crate::intervals::{Estimate, curvature, estimates};
 use crate::locate::{Region, ledger, regions};
 use crate::next::{Experiment, experiments};
 use crate::noise::PureError;
+use crate::novelty::widened;
 use crate::power::{SeenFrom, seen_from};
 use crate::predict::{Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
@@ -307,10 +308,12 @@ fn hypotheses(
 }
 
 impl Diagnosis {
-    /// Predicts conditions with the verdict's model.
+    /// Predicts conditions with the verdict's model; those in runs that the table does not have, or after its end, with the
+    /// deviations that such passes of the table needed.
     pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {
-        let leader = self.decision.leader();
-        let whole = model(&self.fitted, &self.table, self.decision.verdict, leader, None);
-        forecast(&self.fitted, &self.rig, &whole, &conditions.passes)
+        let answer = (self.decision.verdict, self.decision.leader());
+        let whole = model(&self.fitted, &self.table, answer.0, answer.1, None);
+        let plain = forecast(&self.fitted, &self.rig, &whole, &conditions.passes);
+        widened(&self.fitted, &self.table, &self.rig, answer, conditions, plain)
     }
 }

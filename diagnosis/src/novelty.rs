@@ -1,0 +1,125 @@
+//! Predictions of what the table has nothing of: a run of its own, or a time after its end.
+//!
+//! A fit knows how passes scatter about it, not how far the next set-up, or the next hour, will lie from those that it has seen.
+//! That is measured instead, as in conformal prediction: each run is left out and predicted from the others, the end of the
+//! table from its beginning. Where 95 % of the errors need more deviations than a normal number does, the deviation stated
+//! for such conditions is widened by as much, and it is no less than those errors are as shares of the force: what is left out
+//! may leave a law so open that nothing misses. Of runs it is their root mean square with Student's quantile for so few, of
+//! later times the worst.
+
+use crate::data::{RigFile, Table};
+use crate::decision::Verdict;
+use crate::hypotheses::Fitted;
+use crate::predict::{Forecast, forecast, model};
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// Share of the errors that an interval must hold, and the deviations in which a normal number does.
+const HELD: f64 = 0.95;
+const DEVIATIONS: f64 = 1.959_963_985;
+/// Fewest passes that a left-out part may leave to the fit, and that it must have.
+const LEAST: [usize; 2] = [10, 4];
+/// Shares of the table, in time, after which the rest is predicted.
+const CUTS: [f64; 2] = [0.5, 0.75];
+
+/// Widens the deviations of conditions in runs that the table does not have, and later than its last pass.
+pub fn widened(
+    fitted: &Fitted,
+    table: &Table,
+    rig: &RigFile,
+    (verdict, leader): (Verdict, Option<usize>),
+    conditions: &Table,
+    mut forecasts: Vec<Forecast>,
+) -> Vec<Forecast> {
+    let end = table.passes.iter().map(|p| p.time_s).fold(f64::NEG_INFINITY, f64::max);
+    let strange = |i: usize| conditions.runs[i] >= conditions.run_count;
+    let later = |i: usize| conditions.passes[i].time_s > end;
+    let rows = || 0..conditions.len();
+    let measure = |parts: Vec<Vec<usize>>| -> Vec<Misses> {
+        parts.par_iter().filter_map(|out| misses(fitted, table, rig, (verdict, leader), out)).collect()
+    };
+    let of_run = if rows().any(strange) { Misses::of_another(&measure(runs(table))) } else { STATED };
+    let of_time = if rows().any(later) { Misses::at_worst(&measure(ends(table))) } else { STATED };
+    for (i, f) in forecasts.iter_mut().enumerate() {
+        let own = if strange(i) { of_run } else { STATED };
+        let own = if later(i) { own.worst(of_time) } else { own };
+        f.corrected_sd = (own.factor * f.corrected_sd).max(own.share * f.corrected.abs());
+    }
+    forecasts
+}
+
+/// How far passes that were left out lie from their prediction.
+#[derive(Debug, Clone, Copy)]
+struct Misses {
+    /// Factor on the stated deviations that holds them.
+    factor: f64,
+    /// Their own deviation as a share of the force.
+    share: f64,
+}
+
+/// Nothing is widened.
+const STATED: Misses = Misses { factor: 1.0, share: 0.0 };
+
+impl Misses {
+    fn worst(self, other: Self) -> Self {
+        Misses { factor: self.factor.max(other.factor), share: self.share.max(other.share) }
+    }
+
+    fn at_worst(parts: &[Misses]) -> Self {
+        parts.iter().copied().fold(STATED, Misses::worst)
+    }
+
+    /// What one more of some equals may do: their root mean square, with Student's quantile for their number.
+    fn of_another(parts: &[Misses]) -> Self {
+        let freedom = parts.len() as f64 - 1.0;
+        let Ok(student) = StudentsT::new(0.0, 1.0, freedom) else { return Misses::at_worst(parts) };
+        let few = student.inverse_cdf(0.5 + 0.5 * HELD) / DEVIATIONS;
+        let rms = |of: fn(&Misses) -> f64| {
+            few * (parts.iter().map(|p| of(p).powi(2)).sum::<f64>() / parts.len() as f64).sqrt()
+        };
+        STATED.worst(Misses { factor: rms(|p| p.factor), share: rms(|p| p.share) })
+    }
+}
+
+/// Each run of a table that has several.
+fn runs(table: &Table) -> Vec<Vec<usize>> {
+    if table.run_count < 2 {
+        return Vec::new();
+    }
+    (0..table.run_count).map(|run| (0..table.len()).filter(|&i| table.runs[i] == run).collect()).collect()
+}
+
+/// Ends of the table, predicted from what was seen before.
+fn ends(table: &Table) -> Vec<Vec<usize>> {
+    let n = table.len() as f64;
+    CUTS.iter().map(|from| ((n * from) as usize..table.len()).collect()).collect()
+}
+
+/// How far the passes left out lie from their prediction; none where too few are left, or out.
+fn misses(
+    fitted: &Fitted,
+    table: &Table,
+    rig: &RigFile,
+    (verdict, leader): (Verdict, Option<usize>),
+    out: &[usize],
+) -> Option<Misses> {
+    let kept: Vec<usize> = (0..table.len()).filter(|i| out.binary_search(i).is_err()).collect();
+    if kept.len() < LEAST[0] || out.len() < LEAST[1] {
+        return None;
+    }
+    let fit = model(fitted, table, verdict, leader, Some(&kept));
+    let passes: Vec<_> = out.iter().map(|&i| table.passes[i]).collect();
+    let forecasts = forecast(fitted, rig, &fit, &passes);
+    let held = |unit: &dyn Fn(&Forecast) -> f64| {
+        let error = |(f, &i): (&Forecast, &usize)| {
+            (table.lateral[i] - f.corrected).abs() / unit(f) / fitted.scatter.inflation[i].sqrt()
+        };
+        let mut ratios: Vec<f64> = forecasts.iter().zip(out).map(error).collect();
+        ratios.sort_by(f64::total_cmp);
+        let place = ((ratios.len() as f64 + 1.0) * HELD).ceil() as usize;
+        ratios[place.min(ratios.len()) - 1] / DEVIATIONS
+    };
+    // A share of a force that is hardly there says nothing: no less than the scatter.
+    let share = held(&|f| f.corrected.abs().max(f.scatter_sd));
+    Some(Misses { factor: held(&|f| f.corrected_sd), share })
+}
