@@ -189,3 +189,25 @@ fn passes_among_scattered_runs_lie_in_their_intervals() {
         late(&table);
     }
 }
+
+/// Every command of the page is run, and each of its lines stands at the beginning of a line that the command prints.
+#[test]
+fn the_worked_example_prints_what_its_page_says() {
+    let page = std::fs::read_to_string(file("docs/diagnosis/example.md")).unwrap();
+    let blocks: Vec<&str> =
+        page.split("```console\n").skip(1).map(|b| b.split("```").next().unwrap()).collect();
+    assert_eq!(blocks.len(), 4);
+    for block in blocks {
+        let (command, wanted) = block.split_once('\n').unwrap();
+        let arguments = command.strip_prefix("$ muprime ").unwrap().split(' ');
+        let output = tests::muprime().args(arguments).current_dir(file("")).output().unwrap();
+        let (printed, said) = tests::texts(&output);
+        assert!(output.status.success(), "{command}: {said}");
+        for line in wanted.lines() {
+            assert!(
+                printed.lines().any(|l| l.starts_with(line)),
+                "{command}: '{line}' is not printed:\n{printed}"
+            );
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! What a verdict of no gap would have seen: of each effect the size from which this table would claim it.
 
-use crate::evidence::net_change;
+use crate::evidence::{Posterior, net_change};
 use crate::hypotheses::{Candidate, Fitted};
 use crate::layout::Layout;
 use crate::left_out::full_friction;
@@ -11,7 +11,7 @@ use serde::Serialize;
 pub struct SeenFrom {
     /// Name of the effect.
     pub effect: &'static str,
-    /// The law that fits it best.
+    /// The law by which it would.
     pub law: &'static str,
     /// The size; none where no size within the law's bounds would show.
     pub size: Option<f64>,
@@ -41,17 +41,24 @@ pub fn seen_from(fitted: &Fitted) -> Vec<SeenFrom> {
     list
 }
 
+/// By the law that fits best, else by the first that shows: the shapes of a law that fits nothing may be such that it does nothing.
 fn one(fitted: &Fitted, candidate: &Candidate, asked: f64) -> SeenFrom {
-    let problem = &fitted.problem;
-    let (member, place) = (candidate.best.members[0], Layout::of(&candidate.best.members).size(0));
-    let parameter = member.parameters(&problem.design)[0];
     let behind = (fitted.none.log_evidence - candidate.log_evidence).max(0.0);
+    let own = by_law(fitted, &candidate.best, asked + behind);
+    let mut others = candidate.laws.iter().map(|(_, law)| by_law(fitted, law, asked + behind));
+    if own.size.is_some() { own } else { others.find(|s| s.size.is_some()).unwrap_or(own) }
+}
+
+fn by_law(fitted: &Fitted, law: &Posterior, asked: f64) -> SeenFrom {
+    let problem = &fitted.problem;
+    let (member, place) = (law.members[0], Layout::of(&law.members).size(0));
+    let parameter = member.parameters(&problem.design)[0];
     let change = |size: f64| {
-        let mut u = candidate.best.u.clone();
+        let mut u = law.u.clone();
         u[place] = size;
-        net_change(problem, &u, &problem.predict(&candidate.best.members, &u))
+        net_change(problem, &u, &problem.predict(&law.members, &u))
     };
-    let seen = |size: f64| 0.5 * problem.chi2(&change(size)) > asked + behind;
+    let seen = |size: f64| 0.5 * problem.chi2(&change(size)) > asked;
     let (mut low, mut high) = (0.0, parameter.coordinate_bounds().1);
     let found = seen(high).then(|| {
         for _ in 0..HALVINGS {
