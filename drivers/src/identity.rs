@@ -2,7 +2,7 @@
 
 use super::modbus_tcp::resolve;
 use super::setup::{InstrumentSetup, InstrumentsSetup};
-use super::{OpenError, mismatch, profile};
+use super::{OpenError, mismatch};
 use instruments::schema::LinkKind;
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
@@ -38,7 +38,7 @@ fn by_serial(instrument: &InstrumentSetup) -> Option<String> {
 /// Where an instrument is; `None` where the place is made by this process for itself.
 fn place(instrument: &InstrumentSetup) -> Result<Option<String>, OpenError> {
     let address = instrument.address.as_str();
-    let profile = profile(&instrument.profile)?;
+    let profile = instrument.description()?;
     let link = &profile.description.link;
     let line = |address: &str| {
         let path = address.split_once(':').map_or(address, |(_, path)| path);

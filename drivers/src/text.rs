@@ -39,7 +39,7 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
     let tcp = if link.kind == LinkKind::Scpi { Some(resolve(&address, link.port)?) } else { None };
-    let rate_hz = instrument.rate_hz;
+    let (rate_hz, baud) = (instrument.rate_hz, instrument.baud.or(link.baud).unwrap_or(9600));
     session.spawn(move |session| {
         let way = match tcp {
             Some(address) => {
@@ -50,7 +50,7 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
             }
             None => {
                 let format = link.format.clone().unwrap_or_else(|| "8N1".into());
-                Way::Serial(Line::open(&address, link.baud.unwrap_or(9600), &format)?)
+                Way::Serial(Line::open(&address, baud, &format)?)
             }
         };
         let health = session.endpoint.health();

@@ -190,6 +190,16 @@ impl Profile {
         Compiler { text, description: &description, file }.compile()
     }
 
+    /// The files that a profile names, such as its DBC file: what [`Profile::parse_with`] will ask for.
+    ///
+    /// # Errors
+    /// Where the text is no profile, with the place.
+    pub fn names_files(text: &str) -> Result<Vec<String>, ProfileError> {
+        let description: Description =
+            toml::from_str(text).map_err(|error| ProfileError::from_toml(text, &error))?;
+        Ok(description.link.dbc.into_iter().chain(description.link.eds).collect())
+    }
+
     /// The name that setups use.
     #[must_use]
     pub fn id(&self) -> &str {

@@ -59,7 +59,7 @@ pub fn embed(
     }
     let mut all: Vec<&mut InstrumentSetup> = setup.all_mut().collect();
     for instrument in &mut all {
-        let mut profile = drivers::profile(&instrument.profile).map_err(|error| error.to_string())?;
+        let mut profile = instrument.description().map_err(|error| error.to_string())?;
         if let Some(rate) = instrument.rate_hz {
             // What comes by itself comes as often as the setup expects it.
             let unasked = profile.description.message.iter_mut().filter(|message| message.request.is_none());
@@ -135,7 +135,7 @@ pub fn embed(
 /// # Errors
 /// A line that cannot be served, or a profile that names what the world does not have.
 pub fn vibrometer(setup: &mut VibrometerSetup, plant: &SharedPlant) -> Result<SerialEmulator, String> {
-    let profile = drivers::profile(&setup.profile).map_err(|error| error.to_string())?;
+    let profile = setup.description().map_err(|error| error.to_string())?;
     let device = Device::new(profile).map_err(|error| error.to_string())?;
     let port = port(&mut setup.address)?;
     SerialEmulator::lines(port, LineInstrument::new(device, plant.clone()), || None)
@@ -177,7 +177,7 @@ fn port(address: &mut String) -> Result<Box<dyn SerialPort>, String> {
 pub fn emulators(setup: &InstrumentsSetup) -> miette::Result<BTreeMap<u8, Device>> {
     let mut devices = BTreeMap::new();
     for instrument in setup.all() {
-        let profile = drivers::profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
+        let profile = instrument.description().map_err(|e| miette::miette!("{e}"))?;
         if !matches!(profile.description.link.kind, LinkKind::ModbusTcp | LinkKind::ModbusRtu) {
             continue;
         }
