@@ -52,6 +52,7 @@
 //! | [`text`] | the conversation in lines, over a serial line or SCPI over TCP |
 //! | [`canopen`] | the conversation with a CANopen drive of CiA 402 |
 //! | [`serial`] | serial lines |
+//! | [`stream`] | frames that come by themselves |
 //! | [`vibrometer`] | the settings of a vibrometer's controller, read back for a calibration |
 //! | [`probe`] | each instrument asked by itself, for `muprime doctor` |
 #![allow(
@@ -78,6 +79,7 @@ pub mod session;
 pub mod setup;
 pub mod slcan;
 pub mod socketcan;
+pub mod stream;
 pub mod text;
 pub mod timebase;
 pub mod vibrometer;

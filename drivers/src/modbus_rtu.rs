@@ -7,10 +7,9 @@
 use super::modbus::{Blocks, Conversation, Registers, Trouble};
 use super::off::Closed;
 use super::serial::Line;
-use super::session::{BAD_IN_A_ROW, Ended, LONGEST_SLEEP, Session};
+use super::session::{BAD_IN_A_ROW, Ended, Session};
 use super::setup::InstrumentSetup;
 use instruments::codec::modbus_rtu::{self as rtu, Request, RtuError};
-use instruments::codec::stream::{Cutter, Shape};
 use instruments::profile::read_function;
 use instruments::schema::{Stream, Table};
 use std::convert::Infallible;
@@ -52,7 +51,6 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         let longest = Duration::from_millis(u64::from(link.response_timeout_ms));
         wire.line.drain(longest, 10 * longest)?;
         let conversation = Conversation::begin(session, &mut wire)?;
-        wire.initialise(session)?;
         match stream {
             None => conversation.go_on(session, &mut wire, rate_hz),
             Some(stream) => wire.listen(session, &stream),
@@ -131,7 +129,7 @@ impl Rtu {
 
     /// Stops a stream by talking into it, until the line falls silent.
     fn stop_stream(&mut self, stream: &Stream) -> Result<(), Ended> {
-        let (byte, count) = stream.stop;
+        let Some((byte, count)) = stream.stop else { return Ok(()) };
         for _ in 0..STOP_TRIES {
             self.line.write(&vec![byte; usize::from(count)])?;
             let settle = Duration::from_millis(u64::from(stream.settle_ms));
@@ -142,33 +140,8 @@ impl Rtu {
         Err(Ended::Io("the instrument's stream cannot be stopped".into()))
     }
 
-    /// What the profile wants done before the samples count, once the signature is known to hold.
-    fn initialise(&mut self, session: &Session) -> Result<(), Ended> {
-        for init in &session.endpoint.profile().description.init {
-            let done = match (init.function, init.copy) {
-                (Some((function, data)), _) => self.own_function(function, data),
-                (None, Some((from, to, count))) => {
-                    self.read(session, Table::Holding, from, count).and_then(|bytes| {
-                        let pairs = bytes.chunks_exact(2);
-                        let words: Vec<u16> = pairs.map(|p| u16::from_be_bytes([p[0], p[1]])).collect();
-                        self.write(session, Table::Holding, to, &words)
-                    })
-                }
-                (None, None) => Ok(()),
-            };
-            match done {
-                Ok(()) => {}
-                Err(Trouble::Ended(ended)) => return Err(ended),
-                Err(Trouble::Refused(said) | Trouble::Corrupt(said)) => {
-                    return Err(Ended::Refused(format!("{}: {said}", init.text)));
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// A function of the maker's own with its byte.
-    fn own_function(&mut self, function: u8, data: u8) -> Result<(), Trouble> {
+    fn own(&mut self, function: u8, data: u8) -> Result<(), Trouble> {
         let request = rtu::custom(self.unit, function, &[data], 5);
         let answer = self.ask(&request)?;
         // The first bytes of a stream may follow at once: only the answer itself is judged.
@@ -181,44 +154,8 @@ impl Rtu {
 
     /// Starts the stream and hands over its frames until something is wrong.
     fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
-        let frame = session
-            .endpoint
-            .profile()
-            .frame("stream")
-            .ok_or_else(|| Ended::Io("the profile has no stream".into()))?;
         self.start_stream(session, stream)?;
-        let shape = Shape {
-            sync: stream.sync.clone(),
-            length: usize::from(stream.length),
-            check: stream.check,
-            believed_after: stream.believed_after,
-        };
-        let mut cutter = Cutter::new(shape);
-        let health = session.endpoint.health();
-        let mut skipped = 0;
-        let mut last = Instant::now();
-        let patience = Duration::from_millis(u64::from(self.answer_ms));
-        let mut buffer = [0; 1024];
-        while !session.stopping() {
-            let count = self.line.read(&mut buffer, Instant::now() + LONGEST_SLEEP)?;
-            let arrived = session.now();
-            let mut outcome = Ok(());
-            cutter.push(&buffer[..count], |bytes| {
-                last = Instant::now();
-                if outcome.is_ok() {
-                    outcome = session.endpoint.frame(frame, bytes, arrived);
-                }
-            });
-            outcome?;
-            if health.report().samples > 0 {
-                session.tell(Ok(()));
-            }
-            health.corrupt_frames.fetch_add(cutter.lost - skipped, std::sync::atomic::Ordering::Relaxed);
-            skipped = cutter.lost;
-            if last.elapsed() > patience {
-                return Err(Ended::Timeout(self.answer_ms));
-            }
-        }
+        super::stream::listen(session, stream, &mut |buffer, deadline| self.line.read(buffer, deadline))?;
         self.stop_stream(stream)?;
         Err(Ended::Stopped)
     }
@@ -229,7 +166,7 @@ impl Rtu {
             let started = if let Some((address, value)) = stream.start_register {
                 self.write(session, Table::Holding, address, &[value])
             } else if let Some((function, data)) = stream.start_function {
-                self.own_function(function, data)
+                self.own(function, data)
             } else {
                 break;
             };
@@ -268,6 +205,10 @@ impl Registers for Rtu {
         let length = rtu::answer_length(&request, &answer).unwrap_or(answer.len()).min(answer.len());
         // A stream that this write starts may follow its answer at once.
         self.judged(rtu::written(&request, &answer[..length]))
+    }
+
+    fn own_function(&mut self, function: u8, data: u8) -> Result<(), Trouble> {
+        self.own(function, data)
     }
 
     fn wait_up_to(&mut self, answer_ms: u32) {

@@ -5,11 +5,14 @@
 
 mod compile;
 mod computed;
+mod fits;
 
 use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::codec::dbc::DbcSignal;
+use crate::codec::pattern::Pattern;
+use crate::codec::text::Form;
 use crate::error::ProfileError;
 use crate::expression::Expression;
 use crate::field::Field;
@@ -74,6 +77,45 @@ pub struct Frame {
     pub device_time: Option<SignalId>,
     /// What it is.
     pub kind: FrameKind,
+    /// What its lines look like, where it is one of text: its bytes are then the numbers as doubles, high byte first.
+    pub text: Option<Form>,
+}
+
+impl Frame {
+    /// The bytes of a line of text; `None` where it is no such line.
+    #[must_use]
+    pub fn read_line(&self, line: &str) -> Option<Vec<u8>> {
+        let numbers = self.text.as_ref()?.read(line)?;
+        Some(numbers.into_iter().flat_map(f64::to_be_bytes).collect())
+    }
+
+    /// The line of text of these bytes, its numbers times `factor`; `None` for a frame that is none of text.
+    #[must_use]
+    pub fn write_line(&self, bytes: &[u8], factor: f64) -> Option<String> {
+        let number = |eight: &[u8]| eight.try_into().map_or(f64::NAN, f64::from_be_bytes) * factor;
+        let numbers: Vec<f64> = bytes.chunks_exact(8).map(number).collect();
+        self.text.as_ref().map(|form| form.write(&numbers))
+    }
+}
+
+/// One CAN message of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// Identifier, less the base that it is counted from.
+    pub id: u32,
+    /// The DBC file gives the identifier 29 bits.
+    pub extended: bool,
+    /// Bytes.
+    pub length: usize,
+}
+
+impl Part {
+    /// Its identifier, and whether that has 29 bits, for an instrument at that base.
+    #[must_use]
+    pub const fn at(self, base: u32) -> (u32, bool) {
+        let id = base.saturating_add(self.id);
+        (id, self.extended || id > 0x7FF)
+    }
 }
 
 /// What a frame is.
@@ -83,8 +125,8 @@ pub enum FrameKind {
     Poll(usize),
     /// Frames that come by themselves.
     Stream,
-    /// CAN messages; the index in the description, and each message's identifier (less its base) and length.
-    Messages(usize, Vec<(u32, usize)>),
+    /// CAN messages; the index in the description, and the messages.
+    Messages(usize, Vec<Part>),
     /// A question; the index in the description.
     Query(usize),
 }
@@ -112,8 +154,11 @@ impl Place {
     fn counts(&self, frame: &[u8]) -> Option<i64> {
         match self {
             Place::Bytes(field) => field.counts(frame),
-            // counts of at most 32 bits
-            Place::Dbc(at, signal) => signal.read(frame.get(*at..)?).map(|value| value as i64),
+            // of floating-point numbers the bits; of the others the counts, which the file's offset shifts
+            Place::Dbc(at, signal) if signal.float => signal.raw(frame.get(*at..)?),
+            Place::Dbc(at, signal) => {
+                signal.read(frame.get(*at..)?).map(|value| (value / signal.factor).round() as i64)
+            }
             Place::Computed(_) => None,
         }
     }
@@ -147,6 +192,10 @@ pub(crate) struct CompiledSignal {
     si_factor: f64,
     range: Option<(f64, f64)>,
     valid_when: Option<Expression>,
+    /// SI value of the smallest change, as the profile states it.
+    resolution_si: Option<f64>,
+    /// The smallest change of what stands in the frame, before `scale`; NaN where nobody knows it.
+    step: f64,
 }
 
 /// One block of set-points, compiled.
@@ -155,6 +204,8 @@ struct CompiledSet {
     /// Block and place; `None` for a line of text.
     block: Option<(usize, Field)>,
     scale: f64,
+    /// The line of text, with the set-points whose values stand in it; `None` for its own.
+    line: Option<(Pattern, Vec<Option<SetId>>)>,
 }
 
 /// An instrument's description, ready for use.
@@ -363,15 +414,19 @@ impl Profile {
         values.get(signal) * self.signals[signal.0].si_factor
     }
 
-    /// The size of one count in SI units, at the scale that holds now.
+    /// The smallest change that a signal shows, in SI units, at the scale that holds now: what the profile states, else one
+    /// count. NaN where neither is known, as with floats.
     #[must_use]
     pub fn lsb_si(&self, signal: SignalId, values: &Values) -> f64 {
+        if let Some(stated) = self.signals[signal.0].resolution_si {
+            return stated;
+        }
         if let Place::Computed(value) = &self.signals[signal.0].place {
             return self.smallest_step(signal, value, values);
         }
         let signal = &self.signals[signal.0];
         let expression = signal.scale_expression.as_ref().map_or(1.0, |scale| scale.value(values.as_slice()));
-        (signal.scale * expression * signal.si_factor).abs()
+        (signal.step * signal.scale * expression * signal.si_factor).abs()
     }
 
     /// Why a decoded value does not count, if it does not.
@@ -442,20 +497,39 @@ impl Profile {
     }
 
     /// The line of text that carries a set-point, and what its answer begins with; `None` where the
-    /// set-point is no line of text.
+    /// set-point is no line of text. `newest` gives the values of others that stand in the line.
     #[must_use]
-    pub fn line(&self, set: SetId, value: f64) -> Option<(String, Option<&str>)> {
+    pub fn line(
+        &self,
+        set: SetId,
+        value: f64,
+        newest: &dyn Fn(SetId) -> f64,
+    ) -> Option<(String, Option<&str>)> {
         let description = &self.description.set[set.0];
         let (for_value, for_zero) =
             description.answer.as_ref().map(|(v, z)| (v.as_str(), z.as_str())).unzip();
         if let (true, Some(zero)) = (value == 0.0, &description.send_zero) {
             return Some((zero.clone(), for_zero));
         }
+        let (pattern, owners) = self.sets[set.0].line.as_ref()?;
+        let value = |owner: &Option<SetId>| {
+            owner.map_or_else(|| self.quantise(set, value), |other| self.quantise(other, newest(other)))
+        };
+        let values: Vec<f64> = owners.iter().map(value).collect();
         // Counts are whole numbers; the scale says how many decimals the unit's value needs.
-        let scale = self.sets[set.0].scale;
-        let decimals = (-scale.log10()).ceil().clamp(0.0, 12.0);
-        let text = format!("{:.*}", decimals as usize, self.quantise(set, value));
-        description.send.as_ref().map(|send| (send.replace("{}", &text), for_value))
+        let decimals = (-self.sets[set.0].scale.log10()).ceil().clamp(0.0, 12.0) as u8;
+        Some((pattern.write(&values, decimals), for_value))
+    }
+
+    /// The set-point that a line of text carries, as an emulator hears it: its own value, and those of others that stand in
+    /// the line. A line without a number is 1.
+    #[must_use]
+    pub fn heard(&self, set: SetId, line: &str) -> Option<Vec<(SetId, f64)>> {
+        let (pattern, owners) = self.sets[set.0].line.as_ref()?;
+        let values = pattern.read(line)?;
+        let named = owners.iter().map(|owner| owner.unwrap_or(set));
+        let heard: Vec<(SetId, f64)> = named.zip(values).collect();
+        Some(if heard.is_empty() { vec![(set, 1.0)] } else { heard })
     }
 
     /// How many values a heartbeat has before it runs round.

@@ -5,6 +5,7 @@
 
 use crate::Profile;
 use crate::codec::modbus_rtu::silence_s;
+use crate::codec::pattern::Pattern;
 use crate::profile::FrameKind;
 use crate::schema::LinkKind;
 
@@ -66,7 +67,9 @@ impl Profile {
                 let ends = |end: &Option<String>| end.as_ref().map_or(1, String::len);
                 let (sent, came) = (ends(&d.link.tx_terminator), ends(&d.link.rx_terminator));
                 let queries = d.query.iter().map(|query| {
-                    let answer = query.length.map_or(came + 1, usize::from);
+                    let line = query.answer.as_deref().and_then(|answer| Pattern::parse(answer).ok());
+                    let least = line.map_or(1, |line| line.least_length());
+                    let answer = query.length.map_or(came + least, usize::from);
                     let bytes = query.send.len() + sent + answer;
                     let seconds = bytes as f64 * byte_s(baud);
                     setup.rate_hz.unwrap_or(query.rate_hz) * seconds.max(d.link.min_gap_ms * 1e-3)
@@ -82,10 +85,8 @@ impl Profile {
                         .request
                         .as_ref()
                         .map_or(0.0, |data| can_overhead(false) + 8.0 * data.len() as f64);
-                    let answered: f64 = parts
-                        .iter()
-                        .map(|(id, length)| can_overhead(*id > 0x7FF) + 8.0 * *length as f64)
-                        .sum();
+                    let answered: f64 =
+                        parts.iter().map(|part| can_overhead(part.extended) + 8.0 * part.length as f64).sum();
                     Some(setup.rate_hz.unwrap_or(message.rate_hz) * (asked + answered))
                 });
                 groups.sum::<f64>() / bitrate
@@ -95,7 +96,14 @@ impl Profile {
     }
 
     fn stream_bytes_s(&self) -> f64 {
-        self.description.stream.as_ref().map_or(0.0, |stream| stream.rate_hz * f64::from(stream.length))
+        let d = &self.description;
+        d.stream.as_ref().map_or(0.0, |stream| {
+            let line = stream.line.as_deref().and_then(|line| Pattern::parse(line).ok());
+            let end = d.link.rx_terminator.as_ref().map_or(1, String::len);
+            let bytes =
+                line.map_or(usize::from(stream.length.unwrap_or(0)), |line| line.least_length() + end);
+            stream.rate_hz * bytes as f64
+        })
     }
 }
 

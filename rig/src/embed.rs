@@ -100,6 +100,11 @@ pub fn embed(
             }
             LinkKind::Serial => {
                 let port = port(&mut instrument.address)?;
+                if device.profile().description.stream.is_some() {
+                    let emulator = SerialEmulator::stream(port, device, plant.clone()).map_err(failed)?;
+                    embedded.serial.push(emulator);
+                    continue;
+                }
                 let served = LineInstrument::new(device, plant.clone());
                 embedded.serial.push(SerialEmulator::lines(port, served, || None).map_err(failed)?);
             }
