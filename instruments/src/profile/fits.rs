@@ -219,7 +219,7 @@ impl Compiler<'_> {
                 return Err(self.at(query.name.span(), said));
             }
         }
-        for set in d.set.iter().filter(|set| text != set.send.is_some()) {
+        if let Some(set) = d.set.iter().find(|set| text != set.send.is_some()) {
             let said = if text {
                 "needs `send`: its link speaks in lines"
             } else {
