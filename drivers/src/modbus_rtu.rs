@@ -3,10 +3,12 @@
 //! RTU has no transaction number: a late answer of the right length looks like the answer to the
 //! next request. So after a timeout the line is drained until it has been silent for longer than
 //! the instrument's longest answer takes, and only then is the next request made.
+//! Sensors may share a line, each with a thread of its own: an exchange has the line to itself. What takes set-points has a
+//! line of its own, so that nothing holds up an 'off'.
 
 use super::modbus::{Blocks, Conversation, Registers, Trouble};
 use super::off::Closed;
-use super::serial::Line;
+use super::serial::{Line, SharedLine};
 use super::session::{BAD_IN_A_ROW, Ended, Session};
 use super::setup::InstrumentSetup;
 use instruments::codec::modbus_rtu::{self as rtu, Request, RtuError};
@@ -34,7 +36,7 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         tracing::warn!(path, "the adapter holds bytes back for up to {late} ms; set its latency_timer to 1");
     }
     session.spawn(move |session| {
-        let line = Line::open(&path, baud, &format)?;
+        let line = SharedLine::open(&path, baud, &format)?;
         let (answer_ms, silence) = (link.response_timeout_ms, rtu::silence_s(baud));
         let mut wire = Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence };
         let health = session.endpoint.health();
@@ -49,7 +51,7 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         }
         // Whatever an earlier connection was still owed comes now or never.
         let longest = Duration::from_millis(u64::from(link.response_timeout_ms));
-        wire.line.drain(longest, 10 * longest)?;
+        wire.line.with(|line| line.drain(longest, 10 * longest))?;
         let conversation = Conversation::begin(session, &mut wire)?;
         match stream {
             None => conversation.go_on(session, &mut wire, rate_hz),
@@ -67,7 +69,7 @@ fn write_request(unit: u8, table: Table, address: u16, registers: &[u16]) -> Req
 }
 
 struct Rtu {
-    line: Line,
+    line: SharedLine,
     unit: u8,
     answer_ms: u32,
     quiet_ms: u32,
@@ -83,34 +85,38 @@ impl Rtu {
             if n > 0 {
                 // One at a time has the line: where there is an answer to the one before, it is let through.
                 let answer = Duration::from_millis(u64::from(self.answer_ms));
-                self.line.drain(answer, 2 * answer)?;
+                self.line.with(|line| line.drain(answer, 2 * answer))?;
             }
             std::thread::sleep(Duration::from_secs_f64(self.silence));
-            self.line.write(&write_request(self.unit, block.table, block.address, words).bytes)?;
+            let request = write_request(self.unit, block.table, block.address, words);
+            self.line.with(|line| line.write(&request.bytes))?;
         }
         Ok(())
     }
 
     /// One request and its answer.
     fn ask(&mut self, request: &Request) -> Result<Vec<u8>, Trouble> {
-        let ended = Trouble::Ended;
-        self.line.write(&request.bytes).map_err(ended)?;
-        let deadline = Instant::now() + Duration::from_millis(u64::from(self.answer_ms));
-        let mut answer = Vec::with_capacity(request.answer_length);
-        let mut buffer = [0; 260];
-        loop {
-            let count = self.line.read(&mut buffer, deadline).map_err(ended)?;
-            if count == 0 {
-                return Err(Trouble::Ended(Ended::Timeout(self.answer_ms)));
+        let (answer_ms, silence) = (self.answer_ms, Duration::from_secs_f64(self.silence));
+        let exchange = |line: &mut Line| {
+            line.write(&request.bytes)?;
+            let deadline = Instant::now() + Duration::from_millis(u64::from(answer_ms));
+            let mut answer = Vec::with_capacity(request.answer_length);
+            let mut buffer = [0; 260];
+            loop {
+                let count = line.read(&mut buffer, deadline)?;
+                if count == 0 {
+                    return Err(Ended::Timeout(answer_ms));
+                }
+                answer.extend_from_slice(&buffer[..count]);
+                // The length is known from the request, however the bytes come.
+                if rtu::answer_length(request, &answer).is_some_and(|length| answer.len() >= length) {
+                    break;
+                }
             }
-            answer.extend_from_slice(&buffer[..count]);
-            // The length is known from the request, however the bytes come.
-            if rtu::answer_length(request, &answer).is_some_and(|length| answer.len() >= length) {
-                break;
-            }
-        }
-        std::thread::sleep(Duration::from_secs_f64(self.silence));
-        Ok(answer)
+            std::thread::sleep(silence);
+            Ok(answer)
+        };
+        self.line.with(exchange).map_err(Trouble::Ended)
     }
 
     /// Judges an answer; after a bad one the line is drained, so that its rest is no next answer.
@@ -119,7 +125,7 @@ impl Rtu {
             RtuError::Exception(code) => Trouble::Refused(format!("exception {code}")),
             other => {
                 let quiet = Duration::from_millis(u64::from(self.quiet_ms));
-                match self.line.drain(quiet, 10 * quiet) {
+                match self.line.with(|line| line.drain(quiet, 10 * quiet)) {
                     Ok(_) => Trouble::Corrupt(other.to_string()),
                     Err(ended) => Trouble::Ended(ended),
                 }
@@ -131,9 +137,9 @@ impl Rtu {
     fn stop_stream(&mut self, stream: &Stream) -> Result<(), Ended> {
         let Some((byte, count)) = stream.stop else { return Ok(()) };
         for _ in 0..STOP_TRIES {
-            self.line.write(&vec![byte; usize::from(count)])?;
+            self.line.with(|line| line.write(&vec![byte; usize::from(count)]))?;
             let settle = Duration::from_millis(u64::from(stream.settle_ms));
-            if self.line.drain(settle, settle * 3)? {
+            if self.line.with(|line| line.drain(settle, settle * 3))? {
                 return Ok(());
             }
         }
@@ -155,7 +161,9 @@ impl Rtu {
     /// Starts the stream and hands over its frames until something is wrong.
     fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
         self.start_stream(session, stream)?;
-        super::stream::listen(session, stream, &mut |buffer, deadline| self.line.read(buffer, deadline))?;
+        super::stream::listen(session, stream, &mut |buffer, deadline| {
+            self.line.with(|line| line.read(buffer, deadline))
+        })?;
         self.stop_stream(stream)?;
         Err(Ended::Stopped)
     }
@@ -248,7 +256,7 @@ mod tests {
         let (ready, _opened) = std::sync::mpsc::sync_channel(1);
         let session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
         let (mut instrument, driver) = TTYPort::pair().unwrap();
-        let line = Line::open(&driver.name().unwrap(), 115_200, "8N1").unwrap();
+        let line = SharedLine::open(&driver.name().unwrap(), 115_200, "8N1").unwrap();
         let mut wire = Rtu { line, unit: 2, answer_ms: 5, quiet_ms: 5, silence: 1e-3 };
         wire.send_unanswered_off(&session).unwrap();
         instrument.set_timeout(Duration::from_millis(50)).unwrap();

@@ -67,6 +67,20 @@ proptest! {
         let _ = dbc::parse(&text);
     }
 
+    /// What a line holds is a finite number or none, whatever the line and the pattern are.
+    #[test]
+    fn lines(text in "(\\{a\\}|\\{b:x\\}|\\{c:.2\\}|\\{d:ON\\|OFF\\}|\\{\\*\\}|\\{\\{|[ -~µ]){0,12}", line in "[ -~µ\r]{0,40}") {
+        if let Ok(pattern) = muprime_instruments::codec::pattern::Pattern::parse(&text) {
+            let count = pattern.fields().count();
+            let own = pattern.write(&[12.5; 4], 3);
+            for line in [line, own] {
+                if let Some(values) = pattern.read(&line) {
+                    prop_assert!(values.len() == count && values.iter().all(|value| value.is_finite()));
+                }
+            }
+        }
+    }
+
     #[test]
     fn conditions(text in "[a-c0-9 &|=<>!()+*/x.-]{0,60}") {
         if let Ok(expression) = muprime_instruments::expression::Expression::compile(&text, &|name| (name == "a").then_some(0)) {

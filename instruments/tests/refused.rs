@@ -169,6 +169,22 @@ fn what_a_dbc_file_says_beyond_plain_signals_is_read_or_refused() {
     assert!(float.contains("float of 16 bits"), "{float}");
 }
 
+/// Several set-points in one line, hexadecimal, and the emulator's ear for them.
+#[test]
+fn a_line_carries_several_set_points() {
+    let text = changed(SCPI, "SOUR1:FREQ {}", "APPL {},{amplitude:.2},{enable:04X}");
+    let profile = Profile::parse(&text).unwrap();
+    let set = |name: &str| profile.set(name).unwrap();
+    let newest = |other| if other == set("amplitude") { 1.25 } else { 1.0 };
+    let (line, answer) = profile.line(set("frequency"), 27_500.5, &newest).unwrap();
+    assert_eq!((line.as_str(), answer), ("APPL 27500.500,1.25,0001", None));
+    let heard = profile.heard(set("frequency"), &line).unwrap();
+    assert_eq!(heard, [(set("frequency"), 27_500.5), (set("amplitude"), 1.25), (set("enable"), 1.0)]);
+    assert_eq!(profile.heard(set("frequency"), "APPL 27500.5"), None);
+    assert_eq!(profile.heard(set("enable"), "OUTP1 1"), Some(vec![(set("enable"), 1.0)]));
+    assert_eq!(profile.line(set("enable"), 0.0, &newest).unwrap().0, "OUTP1 0");
+}
+
 /// A float's type says nothing of its resolution, a DBC signal's factor does.
 #[test]
 fn a_resolution_is_stated_or_known_or_unknown() {

@@ -54,6 +54,7 @@ pub fn embed(
     let mut embedded = Embedded::default();
     let mut registers: BTreeMap<String, BTreeMap<u8, Device>> = BTreeMap::new();
     let mut buses: BTreeMap<String, Vec<CanDevice>> = BTreeMap::new();
+    let mut shared: BTreeMap<String, BTreeMap<u8, Device>> = BTreeMap::new();
     if let Some(weight) = setup.stage.dead_weight_n {
         plant.now().0.command(&[(Command::NormalForce, weight)]);
     }
@@ -82,6 +83,15 @@ pub fn embed(
             }
             LinkKind::ModbusTcp | LinkKind::ModbusRtu => {
                 let unit = instrument.unit.or(link.unit).unwrap_or(1);
+                if !instrument.address.ends_with("pty") {
+                    if shared.entry(instrument.address.clone()).or_default().insert(unit, device).is_some() {
+                        let at = &instrument.address;
+                        return Err(format!(
+                            "two instruments at {at} have Modbus unit {unit}; give one another `unit`"
+                        ));
+                    }
+                    continue;
+                }
                 let port = port(&mut instrument.address)?;
                 let units = [(unit, device)].into_iter().collect();
                 embedded.serial.push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
@@ -124,6 +134,11 @@ pub fn embed(
             instrument.address = server.address().to_string();
         }
         embedded.tcp.push(server);
+    }
+    for (mut address, units) in shared {
+        let port = port(&mut address)?;
+        let failed = |error: std::io::Error| format!("{address} cannot be served: {error}");
+        embedded.serial.push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
     }
     for (interface, devices) in buses {
         let bus = KernelCan::open(&interface).map_err(|error| error.to_string())?;

@@ -82,6 +82,70 @@ fn a_board_in_python_that_sends_by_itself() {
     expect_forces(&mut rig, epoch, [-0.12345, 0.25001], 1e-9);
 }
 
+/// A board that prints lines: the half line at the beginning and lines that are none are no samples.
+#[test]
+fn a_board_that_prints_lines() {
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let others = bench::serve_all(&bench, epoch);
+    let whole = source("bench-board").text;
+    let (head, _) = whole.split_once("[stream]").unwrap();
+    let signal =
+        |name: &str| format!("[[signal]]\nname = \"{name}\"\nsi = {{ factor = 1e-3, unit = \"N\" }}\n");
+    let text = format!(
+        "{head}[stream]\nrate_hz = 100\nline = \"{{*}}: {{lateral:.2}} {{normal:.2}} mN\"\n{}{}\
+         [[vector]]\nline = \"7: 125.00 -250.00 mN\"\nexpect = {{ lateral = 125, normal = -250 }}\n",
+        signal("lateral"),
+        signal("normal")
+    );
+    let source = Source { text, ..source("bench-board") };
+    let profile = source.profile().unwrap_or_else(|error| panic!("{error}"));
+    let lateral = profile.signal("lateral").unwrap();
+    assert!(
+        (profile.lsb_si(lateral, &profile.values()) - 1e-5).abs() < 1e-15,
+        "two decimals of a millinewton"
+    );
+    let (mut port, path) = pty();
+    let ended = Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let end = Arc::clone(&ended);
+    let board = std::thread::spawn(move || {
+        port.set_timeout(std::time::Duration::from_millis(5)).unwrap();
+        for count in 0.. {
+            let line = match count % 10 {
+                3 => "12: 99.9 mN".to_string(),
+                6 => "3: nan 1 mN".into(),
+                _ => format!("{count}: -123.45 250.01 mN"),
+            };
+            // While nobody listens it is lost, as on a real line.
+            let _ = port.write_all(format!("{line}\n").as_bytes());
+            std::thread::sleep(std::time::Duration::from_millis(10));
+            if end.load(std::sync::atomic::Ordering::Relaxed) {
+                return;
+            }
+        }
+    });
+    let mut setup = setup(others.address());
+    setup.force = vec![InstrumentSetup {
+        source: Some(Arc::new(source)),
+        ..InstrumentSetup::new("bench-board", &path)
+    }];
+    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let read = |rig: &mut drivers::Rig| {
+        let forces = rig.force.read(now(epoch));
+        Some((forces.lateral.ok()?, forces.normal.ok()?))
+    };
+    let first = eventually("both axes", || read(&mut rig)).0.sequence;
+    eventually("forty samples, each of them right", || {
+        let (lateral, normal) = read(&mut rig)?;
+        let right = (lateral.value + 0.12345).abs() < 1e-12 && (normal.value - 0.25001).abs() < 1e-12;
+        assert!(right, "{lateral:?} {normal:?}");
+        (lateral.sequence.wrapping_sub(first) >= 40).then_some(())
+    });
+    let health = rig.links.health().next().unwrap().1;
+    assert!(health.corrupt_frames >= 4 && health.last_problem.contains("mN"), "{health:?}");
+    ended.store(true, std::sync::atomic::Ordering::Relaxed);
+    board.join().unwrap();
+}
+
 #[test]
 fn a_strain_gauge_amplifier_by_pymodbus_gets_its_filter_and_gives_floats() {
     let (bench, epoch) = (Bench::default(), Instant::now());

@@ -5,6 +5,7 @@ use calibration::certificate::sha256_hex;
 use drivers::endpoint::Endpoint;
 use drivers::library::{Library, Source};
 use drivers::{InstrumentSetup, bundled};
+use instruments::schema::LinkKind;
 use instruments::traffic::LineSetup;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -75,7 +76,8 @@ pub(super) fn fit(file: &SetupFile) -> Result<(), Problem> {
     let inputs = file.safety_inputs.iter().map(|instrument| ("safety_inputs", instrument));
     let all =
         force.chain([("amplifier", &file.amplifier), ("stage", &file.stage)]).chain(relay).chain(inputs);
-    for (table, instrument) in all {
+    let all: Vec<(&'static str, &InstrumentSetup)> = all.collect();
+    for &(table, instrument) in &all {
         let place = |key: &'static str| if table == "force" { vec![table] } else { vec![table, key] };
         one_fits(table, instrument).map_err(|(key, problem)| {
             (place(key), format!("instrument `{}` at {}: {problem}", instrument.profile, instrument.address))
@@ -87,6 +89,51 @@ pub(super) fn fit(file: &SetupFile) -> Result<(), Problem> {
                     sim::wire::device::Device::new(profile).map_err(|error| error.to_string())
                 })
                 .map_err(|problem| (place("profile"), problem))?;
+        }
+    }
+    share_lines(&all)
+}
+
+/// Whether instruments at one serial line can share it: sensors with Modbus RTU can.
+fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> {
+    let line = |instrument: &InstrumentSetup| {
+        let path = instrument.address.split_once(':').map_or(instrument.address.as_str(), |(_, path)| path);
+        let kind = instrument.description().ok()?.description.link.kind;
+        let over_rtu = instrument.address.starts_with("rtu:");
+        let serial = over_rtu || matches!(kind, LinkKind::ModbusRtu | LinkKind::Serial);
+        // Each `pty` is a line of its own.
+        let path = std::fs::canonicalize(path).ok().filter(|_| serial && path != "pty")?;
+        Some((path, over_rtu || kind == LinkKind::ModbusRtu))
+    };
+    let mut lines: BTreeMap<PathBuf, Vec<(&'static str, &InstrumentSetup, bool)>> = BTreeMap::new();
+    for &(table, instrument) in all {
+        if let Some((path, rtu)) = line(instrument) {
+            lines.entry(path).or_default().push((table, instrument, rtu));
+        }
+    }
+    for (path, shared) in lines.into_iter().filter(|(_, shared)| shared.len() > 1) {
+        let place = |table: &'static str| if table == "force" { vec![table] } else { vec![table, "address"] };
+        let mut share = 0.0;
+        for (table, instrument, rtu) in shared {
+            let profile = instrument.description().map_err(|error| (place(table), error.to_string()))?;
+            let said = if !rtu || profile.description.stream.is_some() {
+                "only units that are asked by Modbus RTU can share a line"
+            } else if !matches!(table, "force" | "safety_inputs") {
+                "what takes set-points needs a line of its own: another unit's silence would hold up an 'off'"
+            } else {
+                let setup = LineSetup { over_rtu: true, baud: instrument.baud, rate_hz: instrument.rate_hz };
+                share += profile.line_share(setup).unwrap_or(0.0);
+                continue;
+            };
+            return Err((place(table), format!("`{}` at {}: {said}", instrument.profile, path.display())));
+        }
+        if share > 1.0 {
+            let said = format!(
+                "the units at {} take {:.0} % of its capacity together; state a lower `rate_hz`",
+                path.display(),
+                share * 1e2
+            );
+            return Err((vec!["force"], said));
         }
     }
     Ok(())
@@ -192,6 +239,36 @@ mod tests {
         let said = rtu(9600).unwrap_err();
         assert!(said.contains("capacity"), "{said}");
         rtu(115_200).unwrap();
+    }
+
+    #[test]
+    fn sensors_share_a_line_and_what_takes_set_points_does_not() {
+        let line = std::env::temp_dir().join(format!("muprime-line-{}", std::process::id()));
+        std::fs::write(&line, "").unwrap();
+        let axis = |axis: &str, unit: u8, rate_hz: f64| {
+            format!(
+                "[[force]]\nprofile = \"robotiq-ft300\"\naddress = \"{}\"\nunit = {unit}\nrate_hz = {rate_hz}\n\
+                 {axis} = {{ signal = \"fz\" }}\n",
+                line.display()
+            )
+        };
+        let both = |rate_hz: f64| {
+            let one = "[[force]]\nprofile = \"muprime-force2\"\naddress = \"127.0.0.1:0\"";
+            changed(one, &format!("{}{}", axis("lateral", 9, rate_hz), axis("normal", 10, rate_hz)))
+        };
+        let (good, full) = (both(25.0), both(50.0));
+        let stage = "profile = \"muprime-stage\"\naddress = \"127.0.0.1:0\"";
+        let shared = format!(
+            "profile = \"muprime-stage\"\naddress = \"rtu:{}\"\nbaud = 19200\nrate_hz = 20",
+            line.display()
+        );
+        let text = good.as_ref().unwrap().text.replacen(stage, &shared, 1);
+        let moved = Setup::parse("changed", &text, Path::new(".")).map_err(|e| format!("{e:?}"));
+        std::fs::remove_file(&line).unwrap();
+        let full = full.unwrap_err();
+        assert!(full.contains("together"), "{full}");
+        let moved = moved.unwrap_err();
+        assert!(moved.contains("of its own"), "{moved}");
     }
 
     #[test]
