@@ -45,17 +45,20 @@ fn place(instrument: &InstrumentSetup) -> Result<Option<String>, OpenError> {
         let canonical = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
         (path != "pty").then(|| format!("line{}", canonical.display()))
     };
-    let socket = || {
+    let socket = |address: &str| {
         let found = resolve(address, link.port).map_err(|problem| mismatch(instrument, problem))?;
         Ok((found.port() != 0).then(|| spelt_one_way(found)))
     };
     Ok(match link.kind {
         LinkKind::ModbusTcp if !address.starts_with("rtu:") => {
             let unit = instrument.unit.or(link.unit).unwrap_or(255);
-            socket()?.map(|socket| format!("tcp/{socket}/unit {unit}"))
+            socket(address)?.map(|socket| format!("tcp/{socket}/unit {unit}"))
         }
-        LinkKind::Scpi => socket()?.map(|socket| format!("tcp/{socket}")),
-        LinkKind::ModbusTcp | LinkKind::ModbusRtu | LinkKind::Serial => line(address),
+        LinkKind::Scpi | LinkKind::Serial if link.kind == LinkKind::Scpi || address.starts_with("tcp:") => {
+            let host = address.strip_prefix("tcp:").unwrap_or(address);
+            socket(host)?.map(|socket| format!("tcp/{socket}"))
+        }
+        LinkKind::ModbusTcp | LinkKind::ModbusRtu | LinkKind::Serial | LinkKind::Scpi => line(address),
         LinkKind::Can | LinkKind::Canopen if address.starts_with("slcan:") => line(address),
         LinkKind::Can | LinkKind::Canopen => {
             let node = instrument.base.or(link.base).or(link.node.map(u32::from)).unwrap_or(0);
@@ -95,6 +98,8 @@ mod tests {
         assert_eq!(found.len(), 1, "{found:?}");
         assert_ne!(of("muprime-amplifier", "127.0.0.1:1502"), of("muprime-amplifier", "127.0.0.1:1503"));
         assert_ne!(of("muprime-amplifier", "127.0.0.1"), of("muprime-stage", "127.0.0.1"), "two units");
+        let served = |address: &str| of("piezodrive-pdus210", address).unwrap();
+        assert_eq!(served("tcp:127.0.0.1:4001"), served("tcp:localhost:4001"), "behind a device server");
     }
 
     #[test]

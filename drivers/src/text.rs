@@ -1,4 +1,5 @@
-//! The conversation in lines of text and blocks of bytes, over a serial line or SCPI over TCP.
+//! The conversation in lines of text and blocks of bytes, over a serial line, a device server in front of one (`tcp:HOST:PORT`)
+//! or SCPI over TCP.
 //!
 //! Every set-point is absolute and is sent when it changes, and again each second. Lines that an
 //! instrument sends without being asked are taken out before an answer is looked for: they must
@@ -39,7 +40,8 @@ const COMMAND_RATE_HZ: f64 = 500.0;
 pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
-    let tcp = if link.kind == LinkKind::Scpi { Some(resolve(&address, link.port)?) } else { None };
+    let host = address.strip_prefix("tcp:").or((link.kind == LinkKind::Scpi).then_some(address.as_str()));
+    let tcp = host.map(|host| resolve(host, link.port)).transpose()?;
     let (rate_hz, baud) = (instrument.rate_hz, instrument.baud.or(link.baud).unwrap_or(9600));
     session.spawn(move |session| {
         let way = match tcp {

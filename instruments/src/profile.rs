@@ -6,18 +6,21 @@
 mod compile;
 mod computed;
 mod fits;
+mod frame;
+mod sets;
 
 use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::codec::dbc::DbcSignal;
-use crate::codec::pattern::Pattern;
-use crate::codec::text::Form;
 use crate::error::ProfileError;
 use crate::expression::Expression;
 use crate::field::Field;
 use crate::schema::{Description, Role, Severity};
 use compile::Compiler;
+pub use frame::{Frame, FrameKind, Part};
+use sets::CompiledSet;
+pub use sets::SetError;
 
 /// Index of a frame (poll) of one profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,73 +65,6 @@ pub enum FrameError {
         /// Bytes that came.
         found: usize,
     },
-}
-
-/// One frame, compiled: a poll, the stream, a group of messages or a query. Each yields one sample.
-#[derive(Debug, Clone)]
-pub struct Frame {
-    /// Name.
-    pub name: String,
-    /// Length in bytes.
-    pub bytes: usize,
-    /// The signal that counts the instrument's samples.
-    pub sequence: Option<SignalId>,
-    /// The signal that holds the instrument's own time.
-    pub device_time: Option<SignalId>,
-    /// What it is.
-    pub kind: FrameKind,
-    /// What its lines look like, where it is one of text: its bytes are then the numbers as doubles, high byte first.
-    pub text: Option<Form>,
-}
-
-impl Frame {
-    /// The bytes of a line of text; `None` where it is no such line.
-    #[must_use]
-    pub fn read_line(&self, line: &str) -> Option<Vec<u8>> {
-        let numbers = self.text.as_ref()?.read(line)?;
-        Some(numbers.into_iter().flat_map(f64::to_be_bytes).collect())
-    }
-
-    /// The line of text of these bytes, its numbers times `factor`; `None` for a frame that is none of text.
-    #[must_use]
-    pub fn write_line(&self, bytes: &[u8], factor: f64) -> Option<String> {
-        let number = |eight: &[u8]| eight.try_into().map_or(f64::NAN, f64::from_be_bytes) * factor;
-        let numbers: Vec<f64> = bytes.chunks_exact(8).map(number).collect();
-        self.text.as_ref().map(|form| form.write(&numbers))
-    }
-}
-
-/// One CAN message of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Part {
-    /// Identifier, less the base that it is counted from.
-    pub id: u32,
-    /// The DBC file gives the identifier 29 bits.
-    pub extended: bool,
-    /// Bytes.
-    pub length: usize,
-}
-
-impl Part {
-    /// Its identifier, and whether that has 29 bits, for an instrument at that base.
-    #[must_use]
-    pub const fn at(self, base: u32) -> (u32, bool) {
-        let id = base.saturating_add(self.id);
-        (id, self.extended || id > 0x7FF)
-    }
-}
-
-/// What a frame is.
-#[derive(Debug, Clone, PartialEq)]
-pub enum FrameKind {
-    /// Registers; the index of the poll in the description.
-    Poll(usize),
-    /// Frames that come by themselves.
-    Stream,
-    /// CAN messages; the index in the description, and the messages.
-    Messages(usize, Vec<Part>),
-    /// A question; the index in the description.
-    Query(usize),
 }
 
 /// Where a signal stands in its frame.
@@ -196,16 +132,6 @@ pub(crate) struct CompiledSignal {
     resolution_si: Option<f64>,
     /// The smallest change of what stands in the frame, before `scale`; NaN where nobody knows it.
     step: f64,
-}
-
-/// One block of set-points, compiled.
-#[derive(Debug, Clone)]
-struct CompiledSet {
-    /// Block and place; `None` for a line of text.
-    block: Option<(usize, Field)>,
-    scale: f64,
-    /// The line of text, with the set-points whose values stand in it; `None` for its own.
-    line: Option<(Pattern, Vec<Option<SetId>>)>,
 }
 
 /// An instrument's description, ready for use.
@@ -377,15 +303,6 @@ impl Profile {
         }
     }
 
-    /// Whether a set-point may take `value` (in its `unit`).
-    ///
-    /// # Errors
-    /// A value outside the stated range, or not a number.
-    pub fn allows(&self, set: SetId, value: f64) -> Result<(), SetError> {
-        let (low, high) = self.description.set[set.0].range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-        if value >= low && value <= high { Ok(()) } else { Err(SetError { value, low, high }) }
-    }
-
     /// Gives the set-point of that name, or else the signal, another way to SI: a certificate's.
     pub fn set_si(&mut self, name: &str, factor: f64) {
         match self.description.set.iter_mut().find(|set| set.name.as_ref() == name) {
@@ -470,81 +387,6 @@ impl Profile {
         (0..self.faults.len()).filter(|&i| self.faults[i].holds(values.as_slice())).min_by_key(grave)
     }
 
-    /// Encodes a set-point (in its `unit`) into its block's bytes.
-    ///
-    /// # Errors
-    /// A value outside the stated range, or not a number, is refused.
-    pub fn encode_set(&self, set: SetId, value: f64, block: &mut [u8]) -> Result<(), SetError> {
-        self.allows(set, value)?;
-        let compiled = &self.sets[set.0];
-        if let Some((_, field)) = compiled.block {
-            field.write(block, value / compiled.scale);
-        }
-        Ok(())
-    }
-
-    /// A set-point's value (in its `unit`) from its block's bytes.
-    #[must_use]
-    pub fn decode_set(&self, set: SetId, block: &[u8]) -> Option<f64> {
-        let compiled = &self.sets[set.0];
-        compiled.block?.1.read(block).map(|raw| raw * compiled.scale)
-    }
-
-    /// The set-points of one block.
-    pub fn sets_of(&self, block: usize) -> impl Iterator<Item = SetId> {
-        let stands = move |set: &CompiledSet| set.block.is_some_and(|(stands, _)| stands == block);
-        self.sets.iter().enumerate().filter(move |(_, set)| stands(set)).map(|(i, _)| SetId(i))
-    }
-
-    /// The line of text that carries a set-point, and what its answer begins with; `None` where the
-    /// set-point is no line of text. `newest` gives the values of others that stand in the line.
-    #[must_use]
-    pub fn line(
-        &self,
-        set: SetId,
-        value: f64,
-        newest: &dyn Fn(SetId) -> f64,
-    ) -> Option<(String, Option<&str>)> {
-        let description = &self.description.set[set.0];
-        let (for_value, for_zero) =
-            description.answer.as_ref().map(|(v, z)| (v.as_str(), z.as_str())).unzip();
-        if let (true, Some(zero)) = (value == 0.0, &description.send_zero) {
-            return Some((zero.clone(), for_zero));
-        }
-        let (pattern, owners) = self.sets[set.0].line.as_ref()?;
-        let value = |owner: &Option<SetId>| {
-            owner.map_or_else(|| self.quantise(set, value), |other| self.quantise(other, newest(other)))
-        };
-        let values: Vec<f64> = owners.iter().map(value).collect();
-        // Counts are whole numbers; the scale says how many decimals the unit's value needs.
-        let decimals = (-self.sets[set.0].scale.log10()).ceil().clamp(0.0, 12.0) as u8;
-        Some((pattern.write(&values, decimals), for_value))
-    }
-
-    /// The set-point that a line of text carries, as an emulator hears it: its own value, and those of others that stand in
-    /// the line. A line without a number is 1.
-    #[must_use]
-    pub fn heard(&self, set: SetId, line: &str) -> Option<Vec<(SetId, f64)>> {
-        let (pattern, owners) = self.sets[set.0].line.as_ref()?;
-        let values = pattern.read(line)?;
-        let named = owners.iter().map(|owner| owner.unwrap_or(set));
-        let heard: Vec<(SetId, f64)> = named.zip(values).collect();
-        Some(if heard.is_empty() { vec![(set, 1.0)] } else { heard })
-    }
-
-    /// How many values a heartbeat has before it runs round.
-    #[must_use]
-    pub fn heartbeat_turns(&self, set: SetId) -> f64 {
-        self.sets[set.0].block.map_or(65536.0, |(_, field)| field.number.limits().1 + 1.0)
-    }
-
-    /// The value nearest to `value` that the set-point can take (both in its `unit`).
-    #[must_use]
-    pub fn quantise(&self, set: SetId, value: f64) -> f64 {
-        let scale = self.sets[set.0].scale;
-        (value / scale).round() * scale
-    }
-
     /// The bytes of the file where a set-point, signal, poll or block is named, for messages.
     #[must_use]
     pub fn span_of_signal(&self, signal: SignalId) -> Range<usize> {
@@ -561,18 +403,6 @@ pub enum Refusal {
     MarkedInvalid,
     /// At or beyond the end of the stated range.
     OutOfRange,
-}
-
-/// A set-point was refused.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the set-point {value} lies outside {low} to {high}")]
-pub struct SetError {
-    /// The value, in the set-point's unit.
-    pub value: f64,
-    /// Smallest.
-    pub low: f64,
-    /// Largest.
-    pub high: f64,
 }
 
 /// The function code that reads a table.

@@ -14,6 +14,8 @@ use crate::schema::LinkKind;
 pub struct LineSetup {
     /// Registers of a Modbus TCP profile over a serial line.
     pub over_rtu: bool,
+    /// A serial line behind a device server: how fast that is, nobody states.
+    pub over_tcp: bool,
     /// Symbols per second, where they are not the profile's.
     pub baud: Option<u32>,
     /// Samples per second, where they are not the profile's.
@@ -44,6 +46,7 @@ impl Profile {
         let share: f64 = match d.link.kind {
             LinkKind::ModbusTcp if !setup.over_rtu => return None,
             LinkKind::Scpi => return None,
+            LinkKind::Serial if setup.over_tcp => return None,
             LinkKind::ModbusTcp | LinkKind::ModbusRtu => {
                 let baud = serial(19_200);
                 let pause = silence_s(baud as u32);

@@ -82,6 +82,27 @@ fn a_board_in_python_that_sends_by_itself() {
     expect_forces(&mut rig, epoch, [-0.12345, 0.25001], 1e-9);
 }
 
+/// The same board behind a device server: socat passes its line on over TCP.
+#[test]
+fn a_board_behind_a_device_server() {
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let others = bench::serve_all(&bench, epoch);
+    let folder = tempfile::tempdir().unwrap();
+    let line = folder.path().join("line");
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let ends =
+        [format!("pty,raw,echo=0,link={}", line.display()), format!("tcp-listen:{port},bind=127.0.0.1")];
+    let _server = super::peers::Peer(std::process::Command::new("socat").args(ends).spawn().unwrap());
+    eventually("the line", || line.exists().then_some(()));
+    let (_board, ready) =
+        start(python().arg(file("tests/peers/bench_board.py")).arg(&line).args(["-123.45", "250.01"]));
+    assert_eq!(ready, "ready");
+    let mut setup = setup(others.address());
+    setup.force = vec![own("bench-board", &format!("tcp:127.0.0.1:{port}"))];
+    let mut rig = drivers::open(&setup, epoch).unwrap();
+    expect_forces(&mut rig, epoch, [-0.12345, 0.25001], 1e-9);
+}
+
 /// A board that prints lines: the half line at the beginning and lines that are none are no samples.
 #[test]
 fn a_board_that_prints_lines() {
@@ -268,4 +289,72 @@ fn a_sweep_with_the_board_as_its_force_sensor() {
     // Friction falls with the amplitude, as the rig behind the board has it.
     assert!(mean(0.5e-6) > mean(2e-6) + 0.1 && mean(2e-6) > mean(3e-6), "{found:?}");
     assert!(!said.contains("has left the measurement"), "an ideal rig: {said}");
+}
+
+/// A setup over `server` whose force sensor is one of the page's, described by `profile`.
+fn setup_with(profile: &str, address: &str) -> String {
+    let server: std::net::SocketAddr = "127.0.0.1:1502".parse().unwrap();
+    let text = tests::served::setup("own", server);
+    let force = format!("profile = \"muprime-force2\"\naddress = \"{server}\"");
+    assert!(text.contains(&force), "{text}");
+    text.replacen(&force, &format!("profile = \"{profile}\"\naddress = \"{address}\""), 1)
+}
+
+/// What a float's count is worth was read off its type: 1 N, so that every sweep was refused.
+#[test]
+fn a_float_sensor_is_judged_by_its_stated_resolution_or_not_by_its_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = source("strain-amp").text;
+    let count = |text: &str| {
+        std::fs::write(folder.path().join("amp.toml"), text).unwrap();
+        let setup = setup_with("amp.toml", "127.0.0.1:1502");
+        let setup =
+            rig::setup::Setup::parse("own", &setup, folder.path()).unwrap_or_else(|e| panic!("{e:?}"));
+        setup.lateral_channel().unwrap().unwrap().count_n
+    };
+    assert_eq!(count(&text), Some(2e-4));
+    let unstated: Vec<&str> = text.lines().filter(|line| !line.starts_with("resolution_si")).collect();
+    assert_eq!(count(&unstated.join("\n")), None);
+}
+
+/// From a folder, by path, or not at all: `check`, `virtual-rig` and their status.
+#[test]
+fn the_program_finds_profiles_where_it_is_told_to_look() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (home, shelf) = (at("home"), at("shelf"));
+    std::fs::create_dir_all(home.join("muprime/profiles")).unwrap();
+    std::fs::create_dir_all(&shelf).unwrap();
+    let virtual_one =
+        setup_with("bench-board", "pty").replace("127.0.0.1:1502", "127.0.0.1:0") + "[virtual]\n";
+    std::fs::write(at("setup.toml"), virtual_one).unwrap();
+    let command = |arguments: &[&str]| {
+        let mut command = tests::muprime();
+        command.env("XDG_CONFIG_HOME", &home).args(arguments);
+        command
+    };
+    let check = |more: &[&str]| {
+        let output = command(more).arg("check").arg(at("setup.toml")).output().unwrap();
+        (output.status.code(), tests::texts(&output).1.split_whitespace().collect::<Vec<_>>().join(" "))
+    };
+    let (status, said) = check(&[]);
+    assert_eq!(status, Some(2), "{said}");
+    assert!(said.contains("no profile is called `bench-board`") && said.contains("looked in:"), "{said}");
+    let board = file("docs/profiles/bench-board.toml");
+    std::fs::copy(&board, shelf.join("bench-board.toml")).unwrap();
+    let (status, said) = check(&["--profiles", shelf.to_str().unwrap()]);
+    assert_eq!(status, Some(0), "{said}");
+    std::fs::copy(&board, home.join("muprime/profiles/bench-board.toml")).unwrap();
+    let (status, said) = check(&[]);
+    assert_eq!(status, Some(0), "{said}");
+    let setup = at("setup.toml");
+    let mut served = command(&["--json", "virtual-rig", "--modbus-tcp", "127.0.0.1:0", "--setup"]);
+    let (_rig, places) = start(served.arg(&setup).stderr(Stdio::null()));
+    assert!(places.contains("bench-board at /dev/pts"), "{places}");
+    // A profile that is wrong is refused with file and line, by the setup's own check.
+    let wrong = source("bench-board").text.replacen("\"CRC-16/XMODEM\"", "\"CRC-16/XMODEN\"", 1);
+    std::fs::write(home.join("muprime/profiles/bench-board.toml"), wrong).unwrap();
+    let (status, said) = check(&[]);
+    assert_eq!(status, Some(2), "{said}");
+    assert!(said.contains("CRC-16/MODBUS") && said.contains("line "), "{said}");
 }

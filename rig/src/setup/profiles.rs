@@ -82,6 +82,10 @@ pub(super) fn fit(file: &SetupFile) -> Result<(), Problem> {
         one_fits(table, instrument).map_err(|(key, problem)| {
             (place(key), format!("instrument `{}` at {}: {problem}", instrument.profile, instrument.address))
         })?;
+        if file.virtual_rig.is_some() && instrument.address.starts_with("tcp:") {
+            let said = "the virtual rig serves a serial line as `pty` or at a path, not over TCP";
+            return Err((place("address"), said.into()));
+        }
         if file.virtual_rig.is_some() {
             let served = instrument.description().map_err(|error| error.to_string());
             served
@@ -121,7 +125,12 @@ fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> 
             } else if !matches!(table, "force" | "safety_inputs") {
                 "what takes set-points needs a line of its own: another unit's silence would hold up an 'off'"
             } else {
-                let setup = LineSetup { over_rtu: true, baud: instrument.baud, rate_hz: instrument.rate_hz };
+                let setup = LineSetup {
+                    over_rtu: true,
+                    baud: instrument.baud,
+                    rate_hz: instrument.rate_hz,
+                    ..LineSetup::default()
+                };
                 share += profile.line_share(setup).unwrap_or(0.0);
                 continue;
             };
@@ -144,9 +153,13 @@ fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static s
     let profile = instrument.description().map_err(|error| ("profile", error.to_string()))?;
     let line = LineSetup {
         over_rtu: instrument.address.starts_with("rtu:"),
+        over_tcp: instrument.address.starts_with("tcp:"),
         baud: instrument.baud,
         rate_hz: instrument.rate_hz,
     };
+    if line.over_tcp && profile.description.link.kind != LinkKind::Serial {
+        return Err(("address", "`tcp:` is for serial lines behind a device server; leave it out".into()));
+    }
     let share = profile.line_share(line);
     match table {
         "force" => Endpoint::force(profile, instrument).map(drop),
