@@ -16,5 +16,7 @@ mod lines;
 mod main_job;
 #[path = "wire/modbus_tcp.rs"]
 mod modbus_tcp;
+#[path = "wire/own_profiles.rs"]
+mod own_profiles;
 #[path = "wire/peers.rs"]
 mod peers;

@@ -12,7 +12,7 @@ use super::socketcan::KernelCan;
 use instruments::FrameId;
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;
-use instruments::profile::FrameKind;
+use instruments::profile::{FrameKind, Part};
 use realtime::ports::Nanos;
 use std::convert::Infallible;
 use std::thread::JoinHandle;
@@ -63,7 +63,8 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
 /// One group of messages, on its way to a sample.
 struct Group {
     frame: FrameId,
-    parts: Vec<(u32, usize)>,
+    parts: Vec<Part>,
+    base: u32,
     request: Option<(CanFrame, Periodic)>,
     bytes: Vec<u8>,
     next: usize,
@@ -77,11 +78,13 @@ fn groups(session: &Session, base: u32, rate_hz: Option<f64>) -> Vec<Group> {
     let group = |(i, frame): (usize, &instruments::profile::Frame)| {
         let FrameKind::Messages(index, parts) = &frame.kind else { return None };
         let message = &profile.description.message[*index];
-        let request = message.request.as_ref().and_then(|data| CanFrame::build(base, base > 0x7FF, data));
+        let extended = base > 0x7FF || parts.iter().any(|part| part.extended);
+        let request = message.request.as_ref().and_then(|data| CanFrame::build(base, extended, data));
         let periodic = Periodic::new(rate_hz.unwrap_or(message.rate_hz), now);
         Some(Group {
             frame: FrameId(i),
-            parts: parts.iter().map(|(id, length)| (base + id, *length)).collect(),
+            parts: parts.clone(),
+            base,
             request: request.map(|request| (request, periodic)),
             bytes: Vec::new(),
             next: 0,
@@ -166,9 +169,9 @@ impl Group {
         if self.request.is_some() && self.asked_at.is_none() {
             return false;
         }
-        let Some(place) =
-            self.parts.iter().position(|(id, length)| *id == frame.id && *length == frame.data().len())
-        else {
+        let Some(place) = (self.parts.iter()).position(|part| {
+            part.at(self.base) == (frame.id, frame.extended) && part.length == frame.data().len()
+        }) else {
             return false;
         };
         if place != self.next {
@@ -193,6 +196,21 @@ mod tests {
     use std::collections::VecDeque;
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::sync::{Arc, Mutex};
+
+    #[test]
+    fn an_identifier_of_29_bits_is_not_the_one_of_11() {
+        let axis = |signal: &str| Some(AxisSetup { signal: signal.into(), gain: 1.0, offset_n: 0.0 });
+        let setup = InstrumentSetup { normal: axis("fz"), ..InstrumentSetup::new("ati-netft-can", "none") };
+        let (endpoint, _port) = Endpoint::force(setup.description().unwrap(), &setup).unwrap();
+        let (ready, _opened) = std::sync::mpsc::sync_channel(1);
+        let session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
+        let mut group = groups(&session, 432, None).remove(0);
+        group.asked_at = Some(Instant::now());
+        group.take(&CanFrame::build(HALVES[0], true, &[9; 8]).unwrap());
+        assert!(group.bytes.is_empty(), "another instrument's");
+        group.take(&CanFrame::build(HALVES[0], false, &[7; 8]).unwrap());
+        assert_eq!(group.bytes, [7; 8]);
+    }
 
     /// What happens on a bus, shared with its test.
     #[derive(Clone)]
@@ -267,7 +285,10 @@ mod tests {
             let (ready, opened) = std::sync::mpsc::sync_channel(1);
             let stop = Arc::new(AtomicBool::new(false));
             let session = Session::new(endpoint, epoch, Arc::clone(&stop), ready);
-            assert_eq!(groups(&session, 432, None)[0].parts, HALVES.map(|id| (id, 8)));
+            assert_eq!(
+                groups(&session, 432, None)[0].parts.iter().map(|p| p.at(432).0).collect::<Vec<_>>(),
+                HALVES
+            );
             let bus = Bus {
                 answers: Arc::new(AtomicBool::new(true)),
                 event: Arc::default(),

@@ -63,7 +63,7 @@ impl Map {
         let broken = |what: &str| Ended::Io(format!("the profile has no {what}"));
         let mut frames = profile.frames().iter().enumerate();
         let found = frames.find_map(|(i, frame)| match &frame.kind {
-            FrameKind::Messages(_, parts) => Some((FrameId(i), parts.first()?.0 + u32::from(node))),
+            FrameKind::Messages(_, parts) => Some((FrameId(i), parts.first()?.id + u32::from(node))),
             _ => None,
         });
         let (data, cob) = found.ok_or_else(|| broken("process data to read"))?;

@@ -2,7 +2,7 @@
 
 use super::modbus_tcp::resolve;
 use super::setup::{InstrumentSetup, InstrumentsSetup};
-use super::{OpenError, mismatch, profile};
+use super::{OpenError, mismatch};
 use instruments::schema::LinkKind;
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
@@ -38,24 +38,27 @@ fn by_serial(instrument: &InstrumentSetup) -> Option<String> {
 /// Where an instrument is; `None` where the place is made by this process for itself.
 fn place(instrument: &InstrumentSetup) -> Result<Option<String>, OpenError> {
     let address = instrument.address.as_str();
-    let profile = profile(&instrument.profile)?;
+    let profile = instrument.description()?;
     let link = &profile.description.link;
     let line = |address: &str| {
         let path = address.split_once(':').map_or(address, |(_, path)| path);
         let canonical = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
         (path != "pty").then(|| format!("line{}", canonical.display()))
     };
-    let socket = || {
+    let socket = |address: &str| {
         let found = resolve(address, link.port).map_err(|problem| mismatch(instrument, problem))?;
         Ok((found.port() != 0).then(|| spelt_one_way(found)))
     };
     Ok(match link.kind {
         LinkKind::ModbusTcp if !address.starts_with("rtu:") => {
             let unit = instrument.unit.or(link.unit).unwrap_or(255);
-            socket()?.map(|socket| format!("tcp/{socket}/unit {unit}"))
+            socket(address)?.map(|socket| format!("tcp/{socket}/unit {unit}"))
         }
-        LinkKind::Scpi => socket()?.map(|socket| format!("tcp/{socket}")),
-        LinkKind::ModbusTcp | LinkKind::ModbusRtu | LinkKind::Serial => line(address),
+        LinkKind::Scpi | LinkKind::Serial if link.kind == LinkKind::Scpi || address.starts_with("tcp:") => {
+            let host = address.strip_prefix("tcp:").unwrap_or(address);
+            socket(host)?.map(|socket| format!("tcp/{socket}"))
+        }
+        LinkKind::ModbusTcp | LinkKind::ModbusRtu | LinkKind::Serial | LinkKind::Scpi => line(address),
         LinkKind::Can | LinkKind::Canopen if address.starts_with("slcan:") => line(address),
         LinkKind::Can | LinkKind::Canopen => {
             let node = instrument.base.or(link.base).or(link.node.map(u32::from)).unwrap_or(0);
@@ -95,6 +98,8 @@ mod tests {
         assert_eq!(found.len(), 1, "{found:?}");
         assert_ne!(of("muprime-amplifier", "127.0.0.1:1502"), of("muprime-amplifier", "127.0.0.1:1503"));
         assert_ne!(of("muprime-amplifier", "127.0.0.1"), of("muprime-stage", "127.0.0.1"), "two units");
+        let served = |address: &str| of("piezodrive-pdus210", address).unwrap();
+        assert_eq!(served("tcp:127.0.0.1:4001"), served("tcp:localhost:4001"), "behind a device server");
     }
 
     #[test]

@@ -43,6 +43,7 @@
 //! | [`health`] | what a link counts |
 //! | [`identity`] | which instrument an address means, however it is spelt |
 //! | [`bundled`] | the profiles that come with the program |
+//! | [`library`] | profiles from files and folders |
 //! | [`mailbox`] | the newest command on its way from the loop to a link |
 //! | [`session`] | the life of a link: connect, converse, back off |
 //! | [`off`] | how an instrument is switched off and read back, whatever the wire |
@@ -51,6 +52,7 @@
 //! | [`text`] | the conversation in lines, over a serial line or SCPI over TCP |
 //! | [`canopen`] | the conversation with a CANopen drive of CiA 402 |
 //! | [`serial`] | serial lines |
+//! | [`stream`] | frames that come by themselves |
 //! | [`vibrometer`] | the settings of a vibrometer's controller, read back for a calibration |
 //! | [`probe`] | each instrument asked by itself, for `muprime doctor` |
 #![allow(
@@ -64,6 +66,7 @@ pub mod canopen;
 pub mod endpoint;
 pub mod health;
 pub mod identity;
+pub mod library;
 pub mod mailbox;
 pub mod modbus;
 pub mod modbus_rtu;
@@ -76,6 +79,7 @@ pub mod session;
 pub mod setup;
 pub mod slcan;
 pub mod socketcan;
+pub mod stream;
 pub mod text;
 pub mod timebase;
 pub mod vibrometer;
@@ -114,12 +118,34 @@ pub struct Rig {
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// The setup names a profile that does not exist.
-    #[error("no profile is called `{id}`; there are: {known}")]
+    #[error(
+        "no profile is called `{id}`; there are: {known}; looked in: {looked}; a file is named by its path, as in `my-sensor.toml`"
+    )]
     UnknownProfile {
         /// The name.
         id: String,
         /// Names that exist.
         known: String,
+        /// Folders that were looked in besides the bundled profiles.
+        looked: String,
+    },
+    /// A profile, or a file that it names, cannot be read.
+    #[error("{}: {problem}", file.display())]
+    Unreadable {
+        /// The file.
+        file: std::path::PathBuf,
+        /// Why not.
+        problem: String,
+    },
+    /// One name stands for two profiles.
+    #[error("two profiles are called `{id}`: {places}; {remedy}")]
+    Ambiguous {
+        /// The name.
+        id: String,
+        /// Where they are.
+        places: String,
+        /// What to do.
+        remedy: String,
     },
     /// The profile cannot be used.
     #[error("profile `{id}`: {error}")]
@@ -245,19 +271,18 @@ pub fn open(setup: &InstrumentsSetup, epoch: Instant) -> Result<Rig, OpenError> 
     let mut links = Links::none();
     let mut force = Vec::new();
     for instrument in &setup.force {
-        let profile = profile(&instrument.profile)?;
-        let (endpoint, port) =
-            Endpoint::force(profile, instrument).map_err(|problem| mismatch(instrument, problem))?;
+        let (endpoint, port) = Endpoint::force(instrument.description()?, instrument)
+            .map_err(|problem| mismatch(instrument, problem))?;
         start(&mut links, instrument, endpoint, epoch)?;
         force.push(port);
     }
     let force = ports::compose(force).map_err(|problem| mismatch(&setup.force[0], problem))?;
 
-    let (endpoint, amplifier) = Endpoint::amplifier(profile(&setup.amplifier.profile)?, &setup.amplifier)
+    let (endpoint, amplifier) = Endpoint::amplifier(setup.amplifier.description()?, &setup.amplifier)
         .map_err(|problem| mismatch(&setup.amplifier, problem))?;
     start(&mut links, &setup.amplifier, endpoint, epoch)?;
 
-    let (endpoint, stage) = Endpoint::stage(profile(&setup.stage.profile)?, &setup.stage)
+    let (endpoint, stage) = Endpoint::stage(setup.stage.description()?, &setup.stage)
         .map_err(|problem| mismatch(&setup.stage, problem))?;
     start(&mut links, &setup.stage, endpoint, epoch)?;
     let (supply, contacts) = open_safety(setup, &mut links, epoch)?;
@@ -273,13 +298,13 @@ fn open_safety(
     let mut supply: Box<dyn SupplySwitch> = Box::new(Absent);
     let mut contacts: Box<dyn SafetyInputs> = Box::new(Absent);
     if let Some(instrument) = &setup.supply_relay {
-        let (endpoint, port) = Endpoint::supply(profile(&instrument.profile)?)
-            .map_err(|problem| mismatch(instrument, problem))?;
+        let (endpoint, port) =
+            Endpoint::supply(instrument.description()?).map_err(|problem| mismatch(instrument, problem))?;
         start(links, instrument, endpoint, epoch)?;
         supply = Box::new(port);
     }
     if let Some(instrument) = &setup.safety_inputs {
-        let (endpoint, port) = Endpoint::contacts(profile(&instrument.profile)?, instrument)
+        let (endpoint, port) = Endpoint::contacts(instrument.description()?, instrument)
             .map_err(|problem| mismatch(instrument, problem))?;
         start(links, instrument, endpoint, epoch)?;
         contacts = Box::new(port);
@@ -295,6 +320,7 @@ pub fn profile(id: &str) -> Result<Profile, OpenError> {
     let text = bundled::text(id).ok_or_else(|| OpenError::UnknownProfile {
         id: id.into(),
         known: bundled::ids().collect::<Vec<_>>().join(", "),
+        looked: "no folder".into(),
     })?;
     Profile::parse_with(text, &|name| bundled::file(name).map(String::from))
         .and_then(|profile| profile.check(text).map(|()| profile))
@@ -357,10 +383,10 @@ fn start(
 }
 
 /// Samples per second of a profile's regular samples: of its stream, its polls, its
-/// messages or its queries. `None` for a profile that is not bundled or has none.
+/// messages or its queries. `None` for a profile that does not hold or has none.
 #[must_use]
-pub fn nominal_rate_hz(id: &str) -> Option<f64> {
-    let profile = profile(id).ok()?;
+pub fn nominal_rate_hz(instrument: &InstrumentSetup) -> Option<f64> {
+    let profile = instrument.description().ok()?;
     let d = &profile.description;
     let polled = d.poll.iter().find_map(|poll| poll.rate_hz);
     let streamed = d.stream.as_ref().map(|stream| stream.rate_hz);

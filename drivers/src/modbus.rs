@@ -40,6 +40,14 @@ pub trait Registers {
         registers: &[u16],
     ) -> Result<(), Trouble>;
 
+    /// A function of the maker's own with its byte; only over RTU.
+    ///
+    /// # Errors
+    /// See [`Trouble`].
+    fn own_function(&mut self, function: u8, _data: u8) -> Result<(), Trouble> {
+        Err(Trouble::Refused(format!("function {function:#04x} goes over RTU only")))
+    }
+
     /// From now on an answer may take so long.
     fn wait_up_to(&mut self, answer_ms: u32);
 }
@@ -88,6 +96,7 @@ impl Conversation {
         for (frame, poll) in polls(session) {
             conversation.read(session, wire, frame, &poll)?;
         }
+        initialise(session, wire)?;
         Ok(conversation)
     }
 
@@ -226,6 +235,28 @@ impl Conversation {
         let hopeless = session.is_first() && matches!(ended, Ended::Refused(_));
         if self.bad >= BAD_IN_A_ROW || hopeless { Err(ended) } else { Ok(None) }
     }
+}
+
+/// What the profile wants done before the samples count, once the signature is known to hold.
+fn initialise(session: &Session, wire: &mut dyn Registers) -> Result<(), Ended> {
+    for init in &session.endpoint.profile().description.init {
+        let done = match (init.function, init.copy, &init.registers) {
+            (Some((function, data)), ..) => wire.own_function(function, data),
+            (None, Some((from, to, count)), _) => wire
+                .read(session, Table::Holding, from, count)
+                .and_then(|bytes| wire.write(session, Table::Holding, to, &words(&bytes))),
+            (None, None, Some((first, values))) => wire.write(session, init.table, *first, values),
+            (None, None, None) => Ok(()),
+        };
+        match done {
+            Ok(()) => {}
+            Err(Trouble::Ended(ended)) => return Err(ended),
+            Err(Trouble::Refused(said) | Trouble::Corrupt(said)) => {
+                return Err(Ended::Refused(format!("{}: {said}", init.text)));
+            }
+        }
+    }
+    Ok(())
 }
 
 fn words(block: &[u8]) -> Vec<u16> {

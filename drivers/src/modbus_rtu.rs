@@ -3,14 +3,15 @@
 //! RTU has no transaction number: a late answer of the right length looks like the answer to the
 //! next request. So after a timeout the line is drained until it has been silent for longer than
 //! the instrument's longest answer takes, and only then is the next request made.
+//! Sensors may share a line, each with a thread of its own: an exchange has the line to itself. What takes set-points has a
+//! line of its own, so that nothing holds up an 'off'.
 
 use super::modbus::{Blocks, Conversation, Registers, Trouble};
 use super::off::Closed;
-use super::serial::Line;
-use super::session::{BAD_IN_A_ROW, Ended, LONGEST_SLEEP, Session};
+use super::serial::{Line, SharedLine};
+use super::session::{BAD_IN_A_ROW, Ended, Session};
 use super::setup::InstrumentSetup;
 use instruments::codec::modbus_rtu::{self as rtu, Request, RtuError};
-use instruments::codec::stream::{Cutter, Shape};
 use instruments::profile::read_function;
 use instruments::schema::{Stream, Table};
 use std::convert::Infallible;
@@ -35,7 +36,7 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         tracing::warn!(path, "the adapter holds bytes back for up to {late} ms; set its latency_timer to 1");
     }
     session.spawn(move |session| {
-        let line = Line::open(&path, baud, &format)?;
+        let line = SharedLine::open(&path, baud, &format)?;
         let (answer_ms, silence) = (link.response_timeout_ms, rtu::silence_s(baud));
         let mut wire = Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence };
         let health = session.endpoint.health();
@@ -50,9 +51,8 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         }
         // Whatever an earlier connection was still owed comes now or never.
         let longest = Duration::from_millis(u64::from(link.response_timeout_ms));
-        wire.line.drain(longest, 10 * longest)?;
+        wire.line.with(|line| line.drain(longest, 10 * longest))?;
         let conversation = Conversation::begin(session, &mut wire)?;
-        wire.initialise(session)?;
         match stream {
             None => conversation.go_on(session, &mut wire, rate_hz),
             Some(stream) => wire.listen(session, &stream),
@@ -69,7 +69,7 @@ fn write_request(unit: u8, table: Table, address: u16, registers: &[u16]) -> Req
 }
 
 struct Rtu {
-    line: Line,
+    line: SharedLine,
     unit: u8,
     answer_ms: u32,
     quiet_ms: u32,
@@ -85,34 +85,38 @@ impl Rtu {
             if n > 0 {
                 // One at a time has the line: where there is an answer to the one before, it is let through.
                 let answer = Duration::from_millis(u64::from(self.answer_ms));
-                self.line.drain(answer, 2 * answer)?;
+                self.line.with(|line| line.drain(answer, 2 * answer))?;
             }
             std::thread::sleep(Duration::from_secs_f64(self.silence));
-            self.line.write(&write_request(self.unit, block.table, block.address, words).bytes)?;
+            let request = write_request(self.unit, block.table, block.address, words);
+            self.line.with(|line| line.write(&request.bytes))?;
         }
         Ok(())
     }
 
     /// One request and its answer.
     fn ask(&mut self, request: &Request) -> Result<Vec<u8>, Trouble> {
-        let ended = Trouble::Ended;
-        self.line.write(&request.bytes).map_err(ended)?;
-        let deadline = Instant::now() + Duration::from_millis(u64::from(self.answer_ms));
-        let mut answer = Vec::with_capacity(request.answer_length);
-        let mut buffer = [0; 260];
-        loop {
-            let count = self.line.read(&mut buffer, deadline).map_err(ended)?;
-            if count == 0 {
-                return Err(Trouble::Ended(Ended::Timeout(self.answer_ms)));
+        let (answer_ms, silence) = (self.answer_ms, Duration::from_secs_f64(self.silence));
+        let exchange = |line: &mut Line| {
+            line.write(&request.bytes)?;
+            let deadline = Instant::now() + Duration::from_millis(u64::from(answer_ms));
+            let mut answer = Vec::with_capacity(request.answer_length);
+            let mut buffer = [0; 260];
+            loop {
+                let count = line.read(&mut buffer, deadline)?;
+                if count == 0 {
+                    return Err(Ended::Timeout(answer_ms));
+                }
+                answer.extend_from_slice(&buffer[..count]);
+                // The length is known from the request, however the bytes come.
+                if rtu::answer_length(request, &answer).is_some_and(|length| answer.len() >= length) {
+                    break;
+                }
             }
-            answer.extend_from_slice(&buffer[..count]);
-            // The length is known from the request, however the bytes come.
-            if rtu::answer_length(request, &answer).is_some_and(|length| answer.len() >= length) {
-                break;
-            }
-        }
-        std::thread::sleep(Duration::from_secs_f64(self.silence));
-        Ok(answer)
+            std::thread::sleep(silence);
+            Ok(answer)
+        };
+        self.line.with(exchange).map_err(Trouble::Ended)
     }
 
     /// Judges an answer; after a bad one the line is drained, so that its rest is no next answer.
@@ -121,7 +125,7 @@ impl Rtu {
             RtuError::Exception(code) => Trouble::Refused(format!("exception {code}")),
             other => {
                 let quiet = Duration::from_millis(u64::from(self.quiet_ms));
-                match self.line.drain(quiet, 10 * quiet) {
+                match self.line.with(|line| line.drain(quiet, 10 * quiet)) {
                     Ok(_) => Trouble::Corrupt(other.to_string()),
                     Err(ended) => Trouble::Ended(ended),
                 }
@@ -131,44 +135,19 @@ impl Rtu {
 
     /// Stops a stream by talking into it, until the line falls silent.
     fn stop_stream(&mut self, stream: &Stream) -> Result<(), Ended> {
-        let (byte, count) = stream.stop;
+        let Some((byte, count)) = stream.stop else { return Ok(()) };
         for _ in 0..STOP_TRIES {
-            self.line.write(&vec![byte; usize::from(count)])?;
+            self.line.with(|line| line.write(&vec![byte; usize::from(count)]))?;
             let settle = Duration::from_millis(u64::from(stream.settle_ms));
-            if self.line.drain(settle, settle * 3)? {
+            if self.line.with(|line| line.drain(settle, settle * 3))? {
                 return Ok(());
             }
         }
         Err(Ended::Io("the instrument's stream cannot be stopped".into()))
     }
 
-    /// What the profile wants done before the samples count, once the signature is known to hold.
-    fn initialise(&mut self, session: &Session) -> Result<(), Ended> {
-        for init in &session.endpoint.profile().description.init {
-            let done = match (init.function, init.copy) {
-                (Some((function, data)), _) => self.own_function(function, data),
-                (None, Some((from, to, count))) => {
-                    self.read(session, Table::Holding, from, count).and_then(|bytes| {
-                        let pairs = bytes.chunks_exact(2);
-                        let words: Vec<u16> = pairs.map(|p| u16::from_be_bytes([p[0], p[1]])).collect();
-                        self.write(session, Table::Holding, to, &words)
-                    })
-                }
-                (None, None) => Ok(()),
-            };
-            match done {
-                Ok(()) => {}
-                Err(Trouble::Ended(ended)) => return Err(ended),
-                Err(Trouble::Refused(said) | Trouble::Corrupt(said)) => {
-                    return Err(Ended::Refused(format!("{}: {said}", init.text)));
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// A function of the maker's own with its byte.
-    fn own_function(&mut self, function: u8, data: u8) -> Result<(), Trouble> {
+    fn own(&mut self, function: u8, data: u8) -> Result<(), Trouble> {
         let request = rtu::custom(self.unit, function, &[data], 5);
         let answer = self.ask(&request)?;
         // The first bytes of a stream may follow at once: only the answer itself is judged.
@@ -181,44 +160,10 @@ impl Rtu {
 
     /// Starts the stream and hands over its frames until something is wrong.
     fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
-        let frame = session
-            .endpoint
-            .profile()
-            .frame("stream")
-            .ok_or_else(|| Ended::Io("the profile has no stream".into()))?;
         self.start_stream(session, stream)?;
-        let shape = Shape {
-            sync: stream.sync.clone(),
-            length: usize::from(stream.length),
-            check: stream.check,
-            believed_after: stream.believed_after,
-        };
-        let mut cutter = Cutter::new(shape);
-        let health = session.endpoint.health();
-        let mut skipped = 0;
-        let mut last = Instant::now();
-        let patience = Duration::from_millis(u64::from(self.answer_ms));
-        let mut buffer = [0; 1024];
-        while !session.stopping() {
-            let count = self.line.read(&mut buffer, Instant::now() + LONGEST_SLEEP)?;
-            let arrived = session.now();
-            let mut outcome = Ok(());
-            cutter.push(&buffer[..count], |bytes| {
-                last = Instant::now();
-                if outcome.is_ok() {
-                    outcome = session.endpoint.frame(frame, bytes, arrived);
-                }
-            });
-            outcome?;
-            if health.report().samples > 0 {
-                session.tell(Ok(()));
-            }
-            health.corrupt_frames.fetch_add(cutter.lost - skipped, std::sync::atomic::Ordering::Relaxed);
-            skipped = cutter.lost;
-            if last.elapsed() > patience {
-                return Err(Ended::Timeout(self.answer_ms));
-            }
-        }
+        super::stream::listen(session, stream, &mut |buffer, deadline| {
+            self.line.with(|line| line.read(buffer, deadline))
+        })?;
         self.stop_stream(stream)?;
         Err(Ended::Stopped)
     }
@@ -229,7 +174,7 @@ impl Rtu {
             let started = if let Some((address, value)) = stream.start_register {
                 self.write(session, Table::Holding, address, &[value])
             } else if let Some((function, data)) = stream.start_function {
-                self.own_function(function, data)
+                self.own(function, data)
             } else {
                 break;
             };
@@ -270,6 +215,10 @@ impl Registers for Rtu {
         self.judged(rtu::written(&request, &answer[..length]))
     }
 
+    fn own_function(&mut self, function: u8, data: u8) -> Result<(), Trouble> {
+        self.own(function, data)
+    }
+
     fn wait_up_to(&mut self, answer_ms: u32) {
         self.answer_ms = answer_ms;
     }
@@ -307,7 +256,7 @@ mod tests {
         let (ready, _opened) = std::sync::mpsc::sync_channel(1);
         let session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
         let (mut instrument, driver) = TTYPort::pair().unwrap();
-        let line = Line::open(&driver.name().unwrap(), 115_200, "8N1").unwrap();
+        let line = SharedLine::open(&driver.name().unwrap(), 115_200, "8N1").unwrap();
         let mut wire = Rtu { line, unit: 2, answer_ms: 5, quiet_ms: 5, silence: 1e-3 };
         wire.send_unanswered_off(&session).unwrap();
         instrument.set_timeout(Duration::from_millis(50)).unwrap();

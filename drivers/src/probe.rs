@@ -1,7 +1,7 @@
 //! Talks to the instruments of a setup one by one and says of each what it found; one that fails keeps none of the
 //! others from being asked. Nothing is commanded but the safe set-points with which every driver ends.
 
-use super::{Endpoint, mismatch, open_one, profile};
+use super::{Endpoint, mismatch, open_one};
 use super::{HealthReport, InstrumentSetup, InstrumentsSetup, OpenError};
 use realtime::ports::{Amplifier, ForceSensor, Nanos, NoData, Reading, Stage};
 use std::time::{Duration, Instant};
@@ -38,7 +38,7 @@ fn one(
     each: Duration,
 ) -> Result<(String, HealthReport), OpenError> {
     let wrong = |problem: String| mismatch(instrument, problem);
-    let found = profile(&instrument.profile)?;
+    let found = instrument.description()?;
     let epoch = Instant::now();
     let talk = |endpoint: Endpoint, state: &mut dyn FnMut(Nanos) -> String| {
         let health = endpoint.health();

@@ -3,6 +3,9 @@
 use super::session::Ended;
 use serialport::{DataBits, Parity, SerialPort, StopBits};
 use std::io::{Read, Write};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 /// A serial line whose reads have deadlines, and on which an unplugged port is an error.
@@ -74,6 +77,59 @@ impl Line {
     }
 }
 
+/// A serial line that several units share: whoever takes it has it for one exchange.
+#[derive(Clone)]
+pub struct SharedLine(Arc<Open>);
+
+struct Open {
+    key: PathBuf,
+    settings: (u32, String),
+    line: Mutex<Line>,
+    /// A read or write has failed: whoever comes next opens the port anew.
+    gone: AtomicBool,
+}
+
+/// The lines that this process has open for sharing.
+static OPEN: Mutex<Vec<Weak<Open>>> = Mutex::new(Vec::new());
+
+impl SharedLine {
+    /// Opens a line, or takes part in one that is open.
+    ///
+    /// # Errors
+    /// What [`Line::open`] says, and a line that is open with other settings.
+    pub fn open(path: &str, baud: u32, format: &str) -> Result<Self, Ended> {
+        let key = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
+        let settings = (baud, format.to_string());
+        let mut all = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|open| open.strong_count() > 0);
+        let whole = |open: &Arc<Open>| open.key == key && !open.gone.load(Ordering::Acquire);
+        if let Some(open) = all.iter().filter_map(Weak::upgrade).find(whole) {
+            let (baud, format) = &open.settings;
+            return if open.settings == settings {
+                Ok(Self(open))
+            } else {
+                Err(Ended::Io(format!("{path} is open for another unit at {baud} baud, {format}")))
+            };
+        }
+        let line = Mutex::new(Line::open(path, baud, format)?);
+        let open = Arc::new(Open { key, settings, line, gone: AtomicBool::new(false) });
+        all.push(Arc::downgrade(&open));
+        Ok(Self(open))
+    }
+
+    /// Does one exchange while nobody else has the line.
+    ///
+    /// # Errors
+    /// What the exchange says.
+    pub fn with<T>(&self, exchange: impl FnOnce(&mut Line) -> Result<T, Ended>) -> Result<T, Ended> {
+        let done = exchange(&mut self.0.line.lock().unwrap_or_else(PoisonError::into_inner));
+        if matches!(done, Err(Ended::Io(_))) {
+            self.0.gone.store(true, Ordering::Release);
+        }
+        done
+    }
+}
+
 /// How many bytes a read brought; `None` where it is to be tried again until the deadline.
 fn came(read: std::io::Result<usize>) -> Result<Option<usize>, Ended> {
     use std::io::ErrorKind::{Interrupted, TimedOut};
@@ -118,7 +174,31 @@ pub fn latency_timer_ms(path: &str) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serialport::TTYPort;
     use std::io::{Error, ErrorKind};
+
+    #[test]
+    fn a_line_is_shared_at_one_setting_and_opened_anew_once_it_is_gone() {
+        let (instrument, driver) = TTYPort::pair().unwrap();
+        let path = driver.name().unwrap();
+        drop(driver);
+        let first = SharedLine::open(&path, 9600, "8N1").unwrap();
+        let second = SharedLine::open(&path, 9600, "8N1").unwrap();
+        assert!(Arc::ptr_eq(&first.0, &second.0));
+        let other = SharedLine::open(&path, 19_200, "8N1").err().unwrap().to_string();
+        assert!(other.contains("9600"), "{other}");
+        first.with(|_| Err::<(), _>(Ended::Timeout(5))).unwrap_err();
+        assert!(
+            Arc::ptr_eq(&SharedLine::open(&path, 9600, "8N1").unwrap().0, &first.0),
+            "a late answer is no end"
+        );
+        first.with(|_| Err::<(), _>(Ended::Io("unplugged".into()))).unwrap_err();
+        drop(first);
+        assert!(SharedLine::open(&path, 9600, "8N1").is_err(), "the second still holds the port");
+        drop(second);
+        SharedLine::open(&path, 9600, "8N1").unwrap();
+        drop(instrument);
+    }
 
     /// espmonitor issue 12: an unplugged port gives `Ok(0)` at once and for ever.
     #[test]

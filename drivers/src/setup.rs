@@ -1,6 +1,10 @@
 //! The instruments' part of a setup.
 
+use super::OpenError;
+use super::library::Source;
+use instruments::Profile;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Which instruments make up the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,8 +55,11 @@ impl InstrumentsSetup {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSetup {
-    /// Id of the profile.
+    /// Id of the profile; in a file, also the path of one.
     pub profile: String,
+    /// The profile as it was read, where it does not come with the program. Whoever reads a setup puts it here.
+    #[serde(skip)]
+    pub source: Option<Arc<Source>>,
     /// Where it is: `host` or `host:port` for TCP, a path for a serial line
     /// (`rtu:PATH` for a Modbus TCP profile that is reached so), an interface (`can0`) or `slcan:PATH` for CAN.
     pub address: String,
@@ -100,11 +107,20 @@ impl InstrumentSetup {
         self.wired.as_ref().is_none_or(|wired| wired.iter().any(|name| name == contact))
     }
 
+    /// What the instrument is: the profile that was read with the setup, else the bundled one of that name.
+    ///
+    /// # Errors
+    /// Where there is none, or it does not hold.
+    pub fn description(&self) -> Result<Profile, OpenError> {
+        self.source.as_ref().map_or_else(|| super::profile(&self.profile), |source| source.profile())
+    }
+
     /// An instrument of that profile at that address, all else by the profile.
     #[must_use]
     pub fn new(profile: &str, address: &str) -> Self {
         Self {
             profile: profile.into(),
+            source: None,
             address: address.into(),
             serial: None,
             unit: None,

@@ -1,4 +1,5 @@
-//! The conversation in lines of text and blocks of bytes, over a serial line or SCPI over TCP.
+//! The conversation in lines of text and blocks of bytes, over a serial line, a device server in front of one (`tcp:HOST:PORT`)
+//! or SCPI over TCP.
 //!
 //! Every set-point is absolute and is sent when it changes, and again each second. Lines that an
 //! instrument sends without being asked are taken out before an answer is looked for: they must
@@ -11,10 +12,11 @@ use super::off::{self, Closed, OFF_ANSWER_MS, OffWay};
 use super::serial::Line;
 use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
 use super::setup::InstrumentSetup;
-use instruments::codec::text::{number, quantity};
+use instruments::codec::pattern::Pattern;
+use instruments::codec::text::number;
 use instruments::profile::FrameKind;
-use instruments::schema::{Link, LinkKind, Query};
-use instruments::{FrameId, SetId};
+use instruments::schema::{Link, LinkKind, Query, Stream};
+use instruments::{FrameId, Profile, SetId};
 use std::collections::HashMap;
 use std::convert::Infallible;
 use std::io::{Read, Write};
@@ -38,8 +40,9 @@ const COMMAND_RATE_HZ: f64 = 500.0;
 pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
-    let tcp = if link.kind == LinkKind::Scpi { Some(resolve(&address, link.port)?) } else { None };
-    let rate_hz = instrument.rate_hz;
+    let host = address.strip_prefix("tcp:").or((link.kind == LinkKind::Scpi).then_some(address.as_str()));
+    let tcp = host.map(|host| resolve(host, link.port)).transpose()?;
+    let (rate_hz, baud) = (instrument.rate_hz, instrument.baud.or(link.baud).unwrap_or(9600));
     session.spawn(move |session| {
         let way = match tcp {
             Some(address) => {
@@ -50,7 +53,7 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
             }
             None => {
                 let format = link.format.clone().unwrap_or_else(|| "8N1".into());
-                Way::Serial(Line::open(&address, link.baud.unwrap_or(9600), &format)?)
+                Way::Serial(Line::open(&address, baud, &format)?)
             }
         };
         let health = session.endpoint.health();
@@ -60,6 +63,9 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
             // Sent before anything is listened to: nobody knows how long the line will carry.
             talk.send_unanswered_off(session)?;
             talk.settle()?;
+        }
+        if let Some(stream) = session.endpoint.profile().description.stream.clone() {
+            return talk.listen(session, &stream);
         }
         off::at_the_beginning(session, &mut talk)?;
         talk.begin(session)?;
@@ -114,12 +120,31 @@ impl Way {
     }
 }
 
+/// A line that comes without being asked for.
+struct Alarm(Pattern);
+
+impl Alarm {
+    /// Where such a line stands in what came, and its length with its end.
+    fn find(&self, came: &[u8], end: &[u8]) -> Option<(usize, usize)> {
+        let head = self.0.head().as_bytes();
+        let begins = (0..came.len().saturating_sub(head.len())).filter(|&at| came[at..].starts_with(head));
+        let whole = |at: usize| {
+            let length = came[at..].windows(end.len()).position(|window| window == end)?;
+            let line = std::str::from_utf8(&came[at..at + length]).ok()?;
+            self.0.read(line).map(|_| (at, length + end.len()))
+        };
+        begins.into_iter().find_map(whole)
+    }
+}
+
 struct Talk {
     way: Way,
     link: Link,
     came: Vec<u8>,
     asked_at: Instant,
     sent: HashMap<SetId, (String, Instant)>,
+    newest: HashMap<SetId, f64>,
+    alarms: Vec<Alarm>,
     bad: u32,
     patience_ms: u32,
 }
@@ -127,12 +152,17 @@ struct Talk {
 impl Talk {
     fn new(way: Way, link: Link) -> Self {
         let patience_ms = link.response_timeout_ms;
+        // The profile was read: every alarm is a pattern.
+        let alarms =
+            link.unsolicited.iter().filter_map(|alarm| Pattern::parse(alarm).ok()).map(Alarm).collect();
         Self {
             way,
             link,
             came: Vec::new(),
             asked_at: Instant::now(),
             sent: HashMap::new(),
+            newest: HashMap::new(),
+            alarms,
             bad: 0,
             patience_ms,
         }
@@ -162,13 +192,28 @@ impl Talk {
     /// Takes whole lines that came unasked out of what came. Returns whether one was an alarm.
     fn unasked(&mut self, session: &mut Session) {
         let end = self.link.rx_terminator.clone().unwrap_or_else(|| "\n".into());
-        for alarm in self.link.unsolicited.clone() {
-            let line = format!("{alarm}{end}").into_bytes();
-            while let Some(at) = self.came.windows(line.len()).position(|window| window == line) {
-                self.came.drain(at..at + line.len());
-                session.endpoint.alarm(&alarm);
+        for alarm in &self.alarms {
+            while let Some((at, length)) = alarm.find(&self.came, end.as_bytes()) {
+                let line: Vec<u8> = self.came.drain(at..at + length).collect();
+                session.endpoint.alarm(String::from_utf8_lossy(&line).trim());
             }
         }
+    }
+
+    /// The newest value of a set-point that stands in another's line: at first its safe one, else the smallest.
+    fn newest(&self, profile: &Profile, set: SetId) -> f64 {
+        let described = &profile.description.set[set.0];
+        let first = described.safe.or(described.range.map(|(low, _)| low));
+        self.newest.get(&set).copied().or(first).unwrap_or(0.0)
+    }
+
+    /// A stream that runs by itself: what starts it is said, then nothing more.
+    fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
+        if !session.endpoint.profile().description.init.is_empty() {
+            self.initialise(session)?;
+        }
+        super::stream::listen(session, stream, &mut |buffer, deadline| self.way.read(buffer, deadline))?;
+        Err(Ended::Stopped)
     }
 
     /// Before a question nothing may be left of earlier answers.
@@ -228,7 +273,8 @@ impl Talk {
     fn send_unanswered_off(&mut self, session: &Session) -> Result<(), Ended> {
         self.send("")?;
         for (set, value) in session.endpoint.safe_set_points() {
-            if let Some((line, _)) = session.endpoint.profile().line(set, value) {
+            let profile = session.endpoint.profile();
+            if let Some((line, _)) = profile.line(set, value, &|other| self.newest(profile, other)) {
                 self.send(&line)?;
             }
         }
@@ -236,6 +282,14 @@ impl Talk {
     }
 
     fn begin(&mut self, session: &mut Session) -> Result<(), Ended> {
+        self.initialise(session)?;
+        for (frame, query) in queries(session) {
+            self.ask(session, frame, &query)?;
+        }
+        Ok(())
+    }
+
+    fn initialise(&mut self, session: &mut Session) -> Result<(), Ended> {
         self.settle()?;
         for init in session.endpoint.profile().description.init.clone() {
             let Some(send) = &init.send else { continue };
@@ -246,9 +300,6 @@ impl Talk {
             if !expected.iter().any(|start| answer.starts_with(start.as_str())) {
                 return Err(Ended::Refused(format!("`{send}` was answered by `{answer}`: {}", init.text)));
             }
-        }
-        for (frame, query) in queries(session) {
-            self.ask(session, frame, &query)?;
         }
         Ok(())
     }
@@ -298,12 +349,8 @@ impl Talk {
             },
             None => {
                 let line = self.line(session)?;
-                let read = match &query.unit {
-                    Some(unit) => quantity(&line, unit),
-                    None => number(&line),
-                };
-                match read {
-                    Some(number) => number.to_be_bytes().to_vec(),
+                match session.endpoint.profile().frames()[frame.0].read_line(&line) {
+                    Some(numbers) => numbers,
                     None => return self.bear(session, format!("`{}` was answered by `{line}`", query.send)),
                 }
             }
@@ -354,7 +401,9 @@ impl Talk {
     /// Sends one set-point. Whether the instrument took it.
     fn set(&mut self, session: &mut Session, (set, value): (SetId, f64)) -> Result<bool, Ended> {
         let profile = session.endpoint.profile();
-        let Some((line, answer)) = profile.line(set, value) else { return Ok(true) };
+        self.newest.insert(set, value);
+        let newest = |other| self.newest(profile, other);
+        let Some((line, answer)) = profile.line(set, value, &newest) else { return Ok(true) };
         let answer = answer.map(|start| start.replace("{}", ""));
         if self.sent.get(&set).is_some_and(|(last, at)| *last == line && at.elapsed() < REPEAT) {
             return Ok(true);

@@ -4,6 +4,8 @@
 //! decoder's range and delay. They are asked for once, before a calibration, and nothing is ever set. Decoders have other
 //! numbers in other instruments, and a wrong one gives a plausible wrong amplitude: so each is asked for its name first.
 
+use super::OpenError;
+use super::library::Source;
 use super::serial::Line;
 use super::session::Ended;
 use calibration::amplitude::vibrometer::Decoder;
@@ -12,14 +14,18 @@ use instruments::profile::FrameKind;
 use instruments::schema::{Link, LinkKind};
 use instruments::{FrameId, Profile};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// `[vibrometer]` of a setup.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VibrometerSetup {
-    /// Id of the profile.
+    /// Id of the profile; in a file, also the path of one.
     pub profile: String,
+    /// The profile as it was read, where it does not come with the program.
+    #[serde(skip)]
+    pub source: Option<Arc<Source>>,
     /// Path of the serial line; `pty` for a virtual rig.
     pub address: String,
     /// Name of the decoder whose output is read, as the controller gives it. May be left out where it has one only.
@@ -28,6 +34,16 @@ pub struct VibrometerSetup {
     /// Symbols per second, where they are not the profile's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baud: Option<u32>,
+}
+
+impl VibrometerSetup {
+    /// What the controller is: the profile that was read with the setup, else the bundled one of that name.
+    ///
+    /// # Errors
+    /// Where there is none, or it does not hold.
+    pub fn description(&self) -> Result<Profile, OpenError> {
+        self.source.as_ref().map_or_else(|| super::profile(&self.profile), |source| source.profile())
+    }
 }
 
 /// What a controller says of the decoder that is read.
@@ -93,7 +109,7 @@ impl std::fmt::Display for Settings {
 /// A profile that is no vibrometer's, a line that cannot be opened, a decoder that is not there, answers that make no
 /// sense, settings that changed while they were read; in words.
 pub fn settings(setup: &VibrometerSetup) -> Result<Settings, String> {
-    let profile = super::profile(&setup.profile).map_err(|error| error.to_string())?;
+    let profile = setup.description().map_err(|error| error.to_string())?;
     let link = profile.description.link.clone();
     let (LinkKind::Serial, Some(choice)) = (link.kind, link.choice.clone()) else {
         return Err(format!("profile `{}` is not that of a vibrometer's controller", setup.profile));

@@ -8,6 +8,7 @@
 //! | [`canopen`] | NMT, SDO, heartbeat, emergency, and the states of CiA 402 |
 //! | [`eds`] | CANopen objects by an electronic data sheet |
 //! | [`dbc`] | signals of CAN messages by a DBC file |
+//! | [`pattern`] | lines of text with numbers in them |
 //! | [`text`] | answers that are lines of text |
 //! | [`checksum`] | the checks that frames end with |
 
@@ -17,5 +18,6 @@ pub mod checksum;
 pub mod dbc;
 pub mod eds;
 pub mod modbus_rtu;
+pub mod pattern;
 pub mod stream;
 pub mod text;

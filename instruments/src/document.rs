@@ -42,7 +42,9 @@ pub fn markdown(profile: &Profile) -> String {
     line("\n| signal | frame | one count | range | what |\n|---|---|---|---|---|".into());
     for (signal, id) in d.signal.iter().zip(profile.signals().map(|(_, id)| id)) {
         let frame = &profile.frames()[profile.frame_of(id).0].name;
-        let count = if signal.scale_expr.is_some() {
+        let count = if let Some(step) = signal.resolution_si {
+            format!("{step} {}", signal.si.unit)
+        } else if signal.scale_expr.is_some() {
             "varies".into()
         } else {
             format!("{} {}", signal.scale, signal.unit)

@@ -16,6 +16,7 @@
 //! | [`codec`] | frames of the wires themselves |
 //! | [`bus`] | the seam of a CAN bus: frames, and what a bus may report instead |
 //! | [`vector`] | golden vectors: bytes beside the values they stand for |
+//! | [`traffic`] | the share of a line that samples take |
 //! | [`document`] | a profile as a page for people |
 //! | [`error`] | what is wrong with a profile, where, and what to do |
 //!
@@ -65,6 +66,7 @@ pub mod expression;
 pub mod field;
 pub mod profile;
 pub mod schema;
+pub mod traffic;
 pub mod vector;
 
 pub use error::ProfileError;

@@ -5,6 +5,9 @@
 
 mod compile;
 mod computed;
+mod fits;
+mod frame;
+mod sets;
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -15,6 +18,9 @@ use crate::expression::Expression;
 use crate::field::Field;
 use crate::schema::{Description, Role, Severity};
 use compile::Compiler;
+pub use frame::{Frame, FrameKind, Part};
+use sets::CompiledSet;
+pub use sets::SetError;
 
 /// Index of a frame (poll) of one profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,34 +67,6 @@ pub enum FrameError {
     },
 }
 
-/// One frame, compiled: a poll, the stream, a group of messages or a query. Each yields one sample.
-#[derive(Debug, Clone)]
-pub struct Frame {
-    /// Name.
-    pub name: String,
-    /// Length in bytes.
-    pub bytes: usize,
-    /// The signal that counts the instrument's samples.
-    pub sequence: Option<SignalId>,
-    /// The signal that holds the instrument's own time.
-    pub device_time: Option<SignalId>,
-    /// What it is.
-    pub kind: FrameKind,
-}
-
-/// What a frame is.
-#[derive(Debug, Clone, PartialEq)]
-pub enum FrameKind {
-    /// Registers; the index of the poll in the description.
-    Poll(usize),
-    /// Frames that come by themselves.
-    Stream,
-    /// CAN messages; the index in the description, and each message's identifier (less its base) and length.
-    Messages(usize, Vec<(u32, usize)>),
-    /// A question; the index in the description.
-    Query(usize),
-}
-
 /// Where a signal stands in its frame.
 #[derive(Debug, Clone)]
 pub(crate) enum Place {
@@ -112,8 +90,11 @@ impl Place {
     fn counts(&self, frame: &[u8]) -> Option<i64> {
         match self {
             Place::Bytes(field) => field.counts(frame),
-            // counts of at most 32 bits
-            Place::Dbc(at, signal) => signal.read(frame.get(*at..)?).map(|value| value as i64),
+            // of floating-point numbers the bits; of the others the counts, which the file's offset shifts
+            Place::Dbc(at, signal) if signal.float => signal.raw(frame.get(*at..)?),
+            Place::Dbc(at, signal) => {
+                signal.read(frame.get(*at..)?).map(|value| (value / signal.factor).round() as i64)
+            }
             Place::Computed(_) => None,
         }
     }
@@ -147,14 +128,10 @@ pub(crate) struct CompiledSignal {
     si_factor: f64,
     range: Option<(f64, f64)>,
     valid_when: Option<Expression>,
-}
-
-/// One block of set-points, compiled.
-#[derive(Debug, Clone)]
-struct CompiledSet {
-    /// Block and place; `None` for a line of text.
-    block: Option<(usize, Field)>,
-    scale: f64,
+    /// SI value of the smallest change, as the profile states it.
+    resolution_si: Option<f64>,
+    /// The smallest change of what stands in the frame, before `scale`; NaN where nobody knows it.
+    step: f64,
 }
 
 /// An instrument's description, ready for use.
@@ -188,6 +165,16 @@ impl Profile {
             toml::from_str(text).map_err(|error| ProfileError::from_toml(text, &error))?;
         description.signal = computed::spread(description.signal);
         Compiler { text, description: &description, file }.compile()
+    }
+
+    /// The files that a profile names, such as its DBC file: what [`Profile::parse_with`] will ask for.
+    ///
+    /// # Errors
+    /// Where the text is no profile, with the place.
+    pub fn names_files(text: &str) -> Result<Vec<String>, ProfileError> {
+        let description: Description =
+            toml::from_str(text).map_err(|error| ProfileError::from_toml(text, &error))?;
+        Ok(description.link.dbc.into_iter().chain(description.link.eds).collect())
     }
 
     /// The name that setups use.
@@ -316,15 +303,6 @@ impl Profile {
         }
     }
 
-    /// Whether a set-point may take `value` (in its `unit`).
-    ///
-    /// # Errors
-    /// A value outside the stated range, or not a number.
-    pub fn allows(&self, set: SetId, value: f64) -> Result<(), SetError> {
-        let (low, high) = self.description.set[set.0].range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-        if value >= low && value <= high { Ok(()) } else { Err(SetError { value, low, high }) }
-    }
-
     /// Gives the set-point of that name, or else the signal, another way to SI: a certificate's.
     pub fn set_si(&mut self, name: &str, factor: f64) {
         match self.description.set.iter_mut().find(|set| set.name.as_ref() == name) {
@@ -353,15 +331,19 @@ impl Profile {
         values.get(signal) * self.signals[signal.0].si_factor
     }
 
-    /// The size of one count in SI units, at the scale that holds now.
+    /// The smallest change that a signal shows, in SI units, at the scale that holds now: what the profile states, else one
+    /// count. NaN where neither is known, as with floats.
     #[must_use]
     pub fn lsb_si(&self, signal: SignalId, values: &Values) -> f64 {
+        if let Some(stated) = self.signals[signal.0].resolution_si {
+            return stated;
+        }
         if let Place::Computed(value) = &self.signals[signal.0].place {
             return self.smallest_step(signal, value, values);
         }
         let signal = &self.signals[signal.0];
         let expression = signal.scale_expression.as_ref().map_or(1.0, |scale| scale.value(values.as_slice()));
-        (signal.scale * expression * signal.si_factor).abs()
+        (signal.step * signal.scale * expression * signal.si_factor).abs()
     }
 
     /// Why a decoded value does not count, if it does not.
@@ -405,62 +387,6 @@ impl Profile {
         (0..self.faults.len()).filter(|&i| self.faults[i].holds(values.as_slice())).min_by_key(grave)
     }
 
-    /// Encodes a set-point (in its `unit`) into its block's bytes.
-    ///
-    /// # Errors
-    /// A value outside the stated range, or not a number, is refused.
-    pub fn encode_set(&self, set: SetId, value: f64, block: &mut [u8]) -> Result<(), SetError> {
-        self.allows(set, value)?;
-        let compiled = &self.sets[set.0];
-        if let Some((_, field)) = compiled.block {
-            field.write(block, value / compiled.scale);
-        }
-        Ok(())
-    }
-
-    /// A set-point's value (in its `unit`) from its block's bytes.
-    #[must_use]
-    pub fn decode_set(&self, set: SetId, block: &[u8]) -> Option<f64> {
-        let compiled = &self.sets[set.0];
-        compiled.block?.1.read(block).map(|raw| raw * compiled.scale)
-    }
-
-    /// The set-points of one block.
-    pub fn sets_of(&self, block: usize) -> impl Iterator<Item = SetId> {
-        let stands = move |set: &CompiledSet| set.block.is_some_and(|(stands, _)| stands == block);
-        self.sets.iter().enumerate().filter(move |(_, set)| stands(set)).map(|(i, _)| SetId(i))
-    }
-
-    /// The line of text that carries a set-point, and what its answer begins with; `None` where the
-    /// set-point is no line of text.
-    #[must_use]
-    pub fn line(&self, set: SetId, value: f64) -> Option<(String, Option<&str>)> {
-        let description = &self.description.set[set.0];
-        let (for_value, for_zero) =
-            description.answer.as_ref().map(|(v, z)| (v.as_str(), z.as_str())).unzip();
-        if let (true, Some(zero)) = (value == 0.0, &description.send_zero) {
-            return Some((zero.clone(), for_zero));
-        }
-        // Counts are whole numbers; the scale says how many decimals the unit's value needs.
-        let scale = self.sets[set.0].scale;
-        let decimals = (-scale.log10()).ceil().clamp(0.0, 12.0);
-        let text = format!("{:.*}", decimals as usize, self.quantise(set, value));
-        description.send.as_ref().map(|send| (send.replace("{}", &text), for_value))
-    }
-
-    /// How many values a heartbeat has before it runs round.
-    #[must_use]
-    pub fn heartbeat_turns(&self, set: SetId) -> f64 {
-        self.sets[set.0].block.map_or(65536.0, |(_, field)| field.number.limits().1 + 1.0)
-    }
-
-    /// The value nearest to `value` that the set-point can take (both in its `unit`).
-    #[must_use]
-    pub fn quantise(&self, set: SetId, value: f64) -> f64 {
-        let scale = self.sets[set.0].scale;
-        (value / scale).round() * scale
-    }
-
     /// The bytes of the file where a set-point, signal, poll or block is named, for messages.
     #[must_use]
     pub fn span_of_signal(&self, signal: SignalId) -> Range<usize> {
@@ -477,18 +403,6 @@ pub enum Refusal {
     MarkedInvalid,
     /// At or beyond the end of the stated range.
     OutOfRange,
-}
-
-/// A set-point was refused.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the set-point {value} lies outside {low} to {high}")]
-pub struct SetError {
-    /// The value, in the set-point's unit.
-    pub value: f64,
-    /// Smallest.
-    pub low: f64,
-    /// Largest.
-    pub high: f64,
 }
 
 /// The function code that reads a table.

@@ -15,7 +15,7 @@ mod state;
 mod trial;
 mod values;
 
-pub use frames::{Init, Message, Poll, Query, Stream, Table, Write};
+pub use frames::{CheckOrder, Init, Message, Poll, Query, Stream, Table, Write};
 pub use header::{Header, Role, Verified};
 pub use link::{Choice, ErrorQuery, Link, LinkKind};
 pub use state::{Fault, Severity, Signature, Stamp, Time};

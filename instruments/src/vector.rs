@@ -5,7 +5,7 @@
 
 use crate::error::ProfileError;
 use crate::field::NumberType;
-use crate::profile::{FrameId, FrameKind, Profile};
+use crate::profile::{FrameId, Profile};
 use crate::schema::Vector;
 
 /// Relative error that a vector's value may have: decimal numbers are not exact in binary.
@@ -24,18 +24,20 @@ impl Profile {
         for vector in &d.vector {
             seen[self.check_vector(vector, text)?] = true;
         }
-        for (name, seen) in d.poll.iter().map(|p| &p.name).chain(d.write.iter().map(|w| &w.name)).zip(seen) {
+        let blocks = d.write.iter().map(|block| block.name.as_ref());
+        for (name, seen) in self.frames().iter().map(|frame| &frame.name).chain(blocks).zip(seen) {
             if !seen {
-                let message = format!("`{}` has no golden vector", name.as_ref());
-                return Err(
-                    ProfileError::at(text, Some(name.span()), message).with_help("add a [[vector]] for it")
-                );
+                let place = text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
+                let place =
+                    place.or_else(|| text.find(&format!("[{name}]")).map(|at| at..at + name.len() + 2));
+                let error = ProfileError::at(text, place, format!("`{name}` has no golden vector"));
+                return Err(error.with_help("add a [[vector]] for it"));
             }
         }
         Ok(())
     }
 
-    /// Runs one vector; returns the index of what it is for: polls first, then blocks.
+    /// Runs one vector; returns the index of what it is for: frames first, then blocks.
     fn check_vector(&self, vector: &Vector, text: &str) -> Result<usize, ProfileError> {
         let d = &self.description;
         let polls = self.frames().len();
@@ -51,11 +53,12 @@ impl Profile {
             None if names.len() == 1 => 0,
             None => return Err(error("the vector needs `frame`: the profile has several".into())),
         };
-        let unit = self.frames().get(which).and_then(|frame| match frame.kind {
-            FrameKind::Query(index) => d.query[index].unit.as_deref(),
-            _ => None,
-        });
-        let bytes = bytes_of(vector, unit).map_err(error)?;
+        let bytes = match (&vector.line, self.frames().get(which)) {
+            (Some(line), Some(frame)) => frame
+                .read_line(line)
+                .ok_or_else(|| error(format!("`{line}` is no line of `{}`", frame.name)))?,
+            _ => bytes_of(vector).map_err(error)?,
+        };
         let mut values = self.values();
         for (name, &given) in &vector.given {
             let signal = self.signal(name).filter(|&s| self.frame_of(s).0 != which);
@@ -117,17 +120,7 @@ impl Profile {
     }
 }
 
-fn bytes_of(vector: &Vector, unit: Option<&str>) -> Result<Vec<u8>, String> {
-    if let (None, None, Some(line)) = (&vector.registers, &vector.hex, &vector.line) {
-        let number = match unit {
-            Some(unit) => crate::codec::text::quantity(line, unit)
-                .ok_or_else(|| format!("`{line}` is nothing in {unit}")),
-            None => {
-                crate::codec::text::number(line).ok_or_else(|| format!("`{line}` is no number and no truth"))
-            }
-        };
-        return Ok(number?.to_be_bytes().to_vec());
-    }
+fn bytes_of(vector: &Vector) -> Result<Vec<u8>, String> {
     match (&vector.registers, &vector.hex) {
         (Some(registers), None) => Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect()),
         (None, Some(hex)) => from_hex(hex).ok_or_else(|| format!("`{hex}` is not hexadecimal bytes")),

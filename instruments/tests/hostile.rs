@@ -45,8 +45,8 @@ proptest! {
         let _ = modbus_rtu::registers(&request, &bytes);
         let _ = modbus_rtu::written(&modbus_rtu::write(9, 410, &[1]), &bytes);
         let _ = modbus_rtu::hear(&bytes, &[0x46, 0x6A]);
-        for (sync, length, check) in [(vec![0x20, 0x4E], 16, Check::Crc16Modbus), (vec![], 13, Check::Sum7WithErrorBit)] {
-            let mut cutter = stream::Cutter::new(stream::Shape { sync, length, check, believed_after: 2 });
+        for (sync, length, check) in [(vec![0x20, 0x4E], 16, Check::CRC_16_MODBUS), (vec![], 13, Check::Sum7WithErrorBit)] {
+            let mut cutter = stream::Cutter::new(stream::Shape { sync, length, check, check_from: 0, check_high_first: None, believed_after: 2 });
             let mut frames = 0;
             cutter.push(&bytes, |_| frames += 1);
             prop_assert!(frames * length <= bytes.len());
@@ -65,6 +65,20 @@ proptest! {
     fn files(text in "(\\[profile\\]|\\[link\\]|[a-z_]{1,9} = |[0-9]{1,4}|\"[a-z]{0,5}\"|\n|BO_ 1 A: 8 B\n|SG_ S : 7\\|16@0\\+ \\(1,0\\) \\[0\\|0\\] \"\" R\n|[ -~]){0,40}") {
         let _ = Profile::parse(&text);
         let _ = dbc::parse(&text);
+    }
+
+    /// What a line holds is a finite number or none, whatever the line and the pattern are.
+    #[test]
+    fn lines(text in "(\\{a\\}|\\{b:x\\}|\\{c:.2\\}|\\{d:ON\\|OFF\\}|\\{\\*\\}|\\{\\{|[ -~µ]){0,12}", line in "[ -~µ\r]{0,40}") {
+        if let Ok(pattern) = muprime_instruments::codec::pattern::Pattern::parse(&text) {
+            let count = pattern.fields().count();
+            let own = pattern.write(&[12.5; 4], 3);
+            for line in [line, own] {
+                if let Some(values) = pattern.read(&line) {
+                    prop_assert!(values.len() == count && values.iter().all(|value| value.is_finite()));
+                }
+            }
+        }
     }
 
     #[test]

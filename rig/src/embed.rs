@@ -54,12 +54,13 @@ pub fn embed(
     let mut embedded = Embedded::default();
     let mut registers: BTreeMap<String, BTreeMap<u8, Device>> = BTreeMap::new();
     let mut buses: BTreeMap<String, Vec<CanDevice>> = BTreeMap::new();
+    let mut shared: BTreeMap<String, BTreeMap<u8, Device>> = BTreeMap::new();
     if let Some(weight) = setup.stage.dead_weight_n {
         plant.now().0.command(&[(Command::NormalForce, weight)]);
     }
     let mut all: Vec<&mut InstrumentSetup> = setup.all_mut().collect();
     for instrument in &mut all {
-        let mut profile = drivers::profile(&instrument.profile).map_err(|error| error.to_string())?;
+        let mut profile = instrument.description().map_err(|error| error.to_string())?;
         if let Some(rate) = instrument.rate_hz {
             // What comes by itself comes as often as the setup expects it.
             let unasked = profile.description.message.iter_mut().filter(|message| message.request.is_none());
@@ -82,6 +83,15 @@ pub fn embed(
             }
             LinkKind::ModbusTcp | LinkKind::ModbusRtu => {
                 let unit = instrument.unit.or(link.unit).unwrap_or(1);
+                if !instrument.address.ends_with("pty") {
+                    if shared.entry(instrument.address.clone()).or_default().insert(unit, device).is_some() {
+                        let at = &instrument.address;
+                        return Err(format!(
+                            "two instruments at {at} have Modbus unit {unit}; give one another `unit`"
+                        ));
+                    }
+                    continue;
+                }
                 let port = port(&mut instrument.address)?;
                 let units = [(unit, device)].into_iter().collect();
                 embedded.serial.push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
@@ -100,6 +110,11 @@ pub fn embed(
             }
             LinkKind::Serial => {
                 let port = port(&mut instrument.address)?;
+                if device.profile().description.stream.is_some() {
+                    let emulator = SerialEmulator::stream(port, device, plant.clone()).map_err(failed)?;
+                    embedded.serial.push(emulator);
+                    continue;
+                }
                 let served = LineInstrument::new(device, plant.clone());
                 embedded.serial.push(SerialEmulator::lines(port, served, || None).map_err(failed)?);
             }
@@ -120,6 +135,11 @@ pub fn embed(
         }
         embedded.tcp.push(server);
     }
+    for (mut address, units) in shared {
+        let port = port(&mut address)?;
+        let failed = |error: std::io::Error| format!("{address} cannot be served: {error}");
+        embedded.serial.push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
+    }
     for (interface, devices) in buses {
         let bus = KernelCan::open(&interface).map_err(|error| error.to_string())?;
         embedded
@@ -135,7 +155,7 @@ pub fn embed(
 /// # Errors
 /// A line that cannot be served, or a profile that names what the world does not have.
 pub fn vibrometer(setup: &mut VibrometerSetup, plant: &SharedPlant) -> Result<SerialEmulator, String> {
-    let profile = drivers::profile(&setup.profile).map_err(|error| error.to_string())?;
+    let profile = setup.description().map_err(|error| error.to_string())?;
     let device = Device::new(profile).map_err(|error| error.to_string())?;
     let port = port(&mut setup.address)?;
     SerialEmulator::lines(port, LineInstrument::new(device, plant.clone()), || None)
@@ -177,7 +197,7 @@ fn port(address: &mut String) -> Result<Box<dyn SerialPort>, String> {
 pub fn emulators(setup: &InstrumentsSetup) -> miette::Result<BTreeMap<u8, Device>> {
     let mut devices = BTreeMap::new();
     for instrument in setup.all() {
-        let profile = drivers::profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
+        let profile = instrument.description().map_err(|e| miette::miette!("{e}"))?;
         if !matches!(profile.description.link.kind, LinkKind::ModbusTcp | LinkKind::ModbusRtu) {
             continue;
         }

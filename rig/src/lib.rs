@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`setup`], [`plan`], [`fingertip`] | what people write: rigs, plans, fingertips, all checked with the place in the file |
 //! | [`certificates`] | a setup's certificates, verified and applied once |
+//! | [`rehearsal`] | a profile tried before any instrument is |
 //! | [`embed`] | a virtual rig's instruments where the setup looks for them |
 //! | [`sequence`] | the order of a sweep, a pure state machine over rows |
 //! | [`supervisor`] | the one way to lead a loop: it stops first, switches off, reads back |
@@ -48,6 +49,7 @@ pub mod input;
 pub mod model_file;
 pub mod plan;
 pub mod print;
+pub mod rehearsal;
 pub mod report;
 pub mod run_dir;
 pub mod sequence;

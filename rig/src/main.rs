@@ -19,6 +19,9 @@ struct Cli {
     /// Print one JSON document (or one per line where a command streams) on stdout and nothing else.
     #[arg(long, global = true)]
     json: bool,
+    /// Folder of instrument profiles, besides ~/.config/muprime/profiles and the bundled ones
+    #[arg(long, global = true, value_name = "DIR")]
+    profiles: Option<std::path::PathBuf>,
     #[command(subcommand)]
     verb: Verb,
 }
@@ -87,6 +90,7 @@ fn main() -> ExitCode {
         .with(tracing_subscriber::fmt::layer().with_ansi(colours).with_writer(|| Remarks))
         .with(filter)
         .init();
+    muprime_rig::setup::look_in(cli.profiles);
     let json = cli.json;
     cli::until_the_end(move || run(cli.verb, json))
 }

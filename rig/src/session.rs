@@ -135,7 +135,7 @@ impl Job {
             .as_ref()
             .map_or_else(|| self.model.name().to_string(), |(_, text)| sha256_hex(text.as_bytes()));
         Identity {
-            setup_sha256: sha256_hex(self.setup.text.as_bytes()),
+            setup_sha256: self.setup.sha256(),
             plan_sha256: sha256_hex(self.plan.text.as_bytes()),
             seed: self.seed,
             model,
@@ -159,8 +159,7 @@ impl Job {
 
     /// What the setup's amplifier can set, by its profile.
     fn resolution(&self) -> miette::Result<Resolution> {
-        let id = &self.setup.file.amplifier.profile;
-        let profile = drivers::profile(id).map_err(|e| miette::miette!("{e}"))?;
+        let profile = self.setup.file.amplifier.description().map_err(|e| miette::miette!("{e}"))?;
         let step = |name: &str| {
             profile.set(name).map_or(0.0, |set| {
                 let described = &profile.description.set[set.0];

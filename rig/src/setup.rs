@@ -2,6 +2,7 @@
 
 mod bundled;
 mod limits;
+mod profiles;
 
 use crate::certificates::Certificates;
 use crate::fingertip::{Fingertip, FingertipSetup};
@@ -22,6 +23,7 @@ use std::path::{Path, PathBuf};
 
 pub use bundled::{BUNDLED, text as bundled_text};
 pub use limits::LimitsFile;
+pub use profiles::look_in;
 
 /// A setup file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -187,7 +189,7 @@ impl Setup {
     /// # Errors
     /// What is wrong, with the place in the file.
     pub fn parse(origin: &str, text: &str, folder: &Path) -> miette::Result<Self> {
-        let file: SetupFile = input::parse_toml(origin, text)?;
+        let mut file: SetupFile = input::parse_toml(origin, text)?;
         let bad = |path: &[&str], problem: String| {
             BadInput::new(origin, text, input::place_of(text, path), problem, None)
         };
@@ -224,6 +226,9 @@ impl Setup {
             }
         }
         let tip = Fingertip::resolve(&file.finger, folder).map_err(|p| bad(&["finger"], p))?;
+        profiles::resolve(&mut file, folder)
+            .and_then(|()| profiles::fit(&file))
+            .map_err(|(table, problem)| bad(&table, problem))?;
         let cycle = Nanos((1e9 / file.pace.rate_hz).round() as u64);
         let limits = limits::of(&file, cycle).map_err(|error| {
             // The rate of a channel stands with its instrument, every other limit under [limits].
@@ -269,8 +274,7 @@ impl Setup {
     pub fn hand_at_key(&self) -> bool {
         let limits = &self.config.limits;
         let device = |inputs: &drivers::InstrumentSetup| {
-            inputs.is_wired("dead_man")
-                && drivers::profile(&inputs.profile).is_ok_and(|p| p.signal("dead_man").is_some())
+            inputs.is_wired("dead_man") && inputs.description().is_ok_and(|p| p.signal("dead_man").is_some())
         };
         limits.human_contact && limits.dead_man_key && !self.file.safety_inputs.as_ref().is_some_and(device)
     }
@@ -314,7 +318,7 @@ impl Setup {
     /// A profile that cannot be used.
     pub fn lateral_channel(&self) -> miette::Result<Option<LateralChannel>> {
         for instrument in &self.file.force {
-            let profile = drivers::profile(&instrument.profile).map_err(|e| miette::miette!("{e}"))?;
+            let profile = instrument.description().map_err(|e| miette::miette!("{e}"))?;
             let named = instrument.lateral.as_ref().map_or("lateral", |axis| axis.signal.as_str());
             let Some(signal) = profile.signal(named) else { continue };
             let gain = instrument.lateral.as_ref().map_or(1.0, |axis| axis.gain).abs();

@@ -61,8 +61,22 @@ pub fn slcan(input: &[u8], chance: &mut Chance) {
 /// Every frame cut from a stream has the right length, sync and check, and split reads change nothing.
 pub fn streams(input: &[u8], chance: &mut Chance) {
     let shapes = [
-        Shape { sync: vec![0x20, 0x4E], length: 16, check: Check::Crc16Modbus, believed_after: 1 },
-        Shape { sync: Vec::new(), length: 13, check: Check::Sum7WithErrorBit, believed_after: 3 },
+        Shape {
+            sync: vec![0x20, 0x4E],
+            length: 16,
+            check: Check::CRC_16_MODBUS,
+            check_from: 2,
+            check_high_first: None,
+            believed_after: 1,
+        },
+        Shape {
+            sync: Vec::new(),
+            length: 13,
+            check: Check::Sum7WithErrorBit,
+            check_from: 0,
+            check_high_first: None,
+            believed_after: 3,
+        },
     ];
     for shape in &shapes {
         let cut = |pieces: &[&[u8]]| {

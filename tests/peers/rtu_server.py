@@ -1,6 +1,6 @@
 """An independent FT 300: a pymodbus RTU server on a serial line, registers put together by hand.
 
-usage: rtu_server.py PORT FX FZ (hundredths of a newton)
+usage: rtu_server.py PORT FX FZ [FX FZ ...] (hundredths of a newton; a further unit from 10 on for each further pair)
 """
 import asyncio
 import sys
@@ -11,12 +11,12 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 
 async def main():
-    fx, fz = (int(x) & 0xFFFF for x in sys.argv[2:4])
-    device = SimDevice(id=9, simdata=[
+    counts = [int(x) & 0xFFFF for x in sys.argv[2:]]
+    devices = [SimDevice(id=9 + unit, simdata=[
         SimData(180, values=[fx, 0, fz, 0, 0, 0], datatype=DataType.REGISTERS),
         SimData(514, values=[2019], datatype=DataType.REGISTERS),
-    ])
-    server = ModbusSerialServer(device, framer=FramerType.RTU, port=sys.argv[1], baudrate=19200)
+    ]) for unit, (fx, fz) in enumerate(zip(counts[::2], counts[1::2]))]
+    server = ModbusSerialServer(devices, framer=FramerType.RTU, port=sys.argv[1], baudrate=19200)
     await server.serve_forever(background=True)
     print("ready", flush=True)
     await asyncio.Event().wait()

@@ -68,6 +68,37 @@ fn our_rtu_driver_reads_a_pymodbus_server() {
     expect_forces(&mut rig, epoch, 1e-9);
 }
 
+/// Two units of a pymodbus server on one line, an axis each.
+#[test]
+fn two_units_share_a_line() {
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let others = bench::serve_all(&bench, epoch);
+    let (_pair, ours, theirs) = socat_pair();
+    let (_server, ready) =
+        start(python().arg(file("tests/peers/rtu_server.py")).arg(&theirs).args(["150", "0", "0", "-225"]));
+    assert_eq!(ready, "ready");
+    let both = axes("robotiq-ft300", &ours);
+    let lateral = InstrumentSetup { normal: None, unit: Some(9), rate_hz: Some(25.0), ..both.clone() };
+    let normal = InstrumentSetup { lateral: None, unit: Some(10), rate_hz: Some(25.0), ..both };
+    let mut setup = setup(others.address());
+    setup.force = vec![lateral, normal];
+    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let read = |rig: &mut drivers::Rig| {
+        let forces = rig.force.read(now(epoch));
+        Some((forces.lateral.ok()?, forces.normal.ok()?))
+    };
+    let first = super::bench::eventually("both axes", || read(&mut rig));
+    assert!((first.0.value - 1.5).abs() < 1e-9 && (first.1.value - 2.25).abs() < 1e-9, "{first:?}");
+    let newer = |now: u32, then: u32| now.wrapping_sub(then) >= 25;
+    super::bench::eventually("newer samples of both", || {
+        read(&mut rig)
+            .filter(|(l, n)| newer(l.sequence, first.0.sequence) && newer(n.sequence, first.1.sequence))
+    });
+    for (_, health) in rig.links.health().take(2) {
+        assert_eq!((health.corrupt_frames, health.timeouts), (0, 0), "{health:?}");
+    }
+}
+
 /// python-canopen as the master of our drive: service data, network management, process data, the
 /// state machine of CiA 402, the guard's emergency, and a fault that only a reset ends.
 #[test]

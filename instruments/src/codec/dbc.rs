@@ -15,6 +15,10 @@ pub struct DbcSignal {
     pub little_endian: bool,
     /// Two's complement.
     pub signed: bool,
+    /// IEEE 754 of 32 or 64 bits in place of a whole number.
+    pub float: bool,
+    /// It is there only in some of the messages, as another signal says.
+    pub multiplexed: bool,
     /// Value = raw times this, plus `offset`.
     pub factor: f64,
     /// See `factor`.
@@ -26,6 +30,8 @@ pub struct DbcSignal {
 pub struct DbcMessage {
     /// Identifier.
     pub id: u32,
+    /// Whether the identifier has 29 bits.
+    pub extended: bool,
     /// Bytes.
     pub length: usize,
     /// Signals by name.
@@ -43,11 +49,24 @@ pub fn parse(text: &str) -> Result<HashMap<String, DbcMessage>, String> {
         let length = usize::try_from(message.size).map_err(|_| "a message is too long".to_string())?;
         let mut signals = HashMap::new();
         for signal in &message.signals {
+            let float = match dbc.extended_value_type_for_signal(message.id, &signal.name) {
+                None | Some(can_dbc::SignalExtendedValueType::SignedOrUnsignedInteger) => None,
+                Some(can_dbc::SignalExtendedValueType::IEEEfloat32Bit) => Some(32),
+                Some(can_dbc::SignalExtendedValueType::IEEEdouble64bit) => Some(64),
+            };
+            if float.is_some_and(|bits| bits != signal.size) {
+                return Err(format!("signal {} is a float of {} bits", signal.name, signal.size));
+            }
             let place = DbcSignal {
                 start: u16::try_from(signal.start_bit).map_err(|_| "a start bit is too large")?,
                 size: u16::try_from(signal.size).map_err(|_| "a signal is too wide")?,
                 little_endian: signal.byte_order == can_dbc::ByteOrder::LittleEndian,
                 signed: signal.value_type == can_dbc::ValueType::Signed,
+                float: float.is_some(),
+                multiplexed: !matches!(
+                    signal.multiplexer_indicator,
+                    can_dbc::MultiplexIndicator::Plain | can_dbc::MultiplexIndicator::Multiplexor
+                ),
                 factor: signal.factor,
                 offset: signal.offset,
             };
@@ -56,8 +75,11 @@ pub fn parse(text: &str) -> Result<HashMap<String, DbcMessage>, String> {
             }
             signals.insert(signal.name.clone(), place);
         }
-        let id = message.id.raw() & 0x1FFF_FFFF;
-        messages.insert(message.name.clone(), DbcMessage { id, length, signals });
+        let (id, extended) = match message.id {
+            can_dbc::MessageId::Standard(id) => (u32::from(id), false),
+            can_dbc::MessageId::Extended(id) => (id, true),
+        };
+        messages.insert(message.name.clone(), DbcMessage { id, extended, length, signals });
     }
     Ok(messages)
 }
@@ -86,7 +108,14 @@ impl DbcSignal {
     #[must_use]
     // a force of more than 53 bits does not exist
     pub fn read(&self, frame: &[u8]) -> Option<f64> {
-        Some(self.raw(frame)? as f64 * self.factor + self.offset)
+        let raw = self.raw(frame)?;
+        let number = match (self.float, self.size) {
+            (true, 32) => f64::from(f32::from_bits(raw as u32)),
+            (true, _) => f64::from_bits(raw as u64),
+            (false, _) if self.signed => raw as f64,
+            (false, _) => raw as u64 as f64,
+        };
+        Some(number * self.factor + self.offset)
     }
 
     /// The raw number; `None` where the frame is too short.
@@ -104,14 +133,19 @@ impl DbcSignal {
     /// Stores `value`, rounded and held to what the bits can say. Other bits are kept.
     /// Returns `false` where the frame is too short.
     pub fn write(&self, frame: &mut [u8], value: f64) -> bool {
-        let raw = ((value - self.offset) / self.factor).round();
+        let number = (value - self.offset) / self.factor;
+        let raw = number.round();
         let width = i32::from(self.size);
         let (low, high) = if self.signed {
             (-(2_f64.powi(width - 1)), 2_f64.powi(width - 1) - 1.0)
         } else {
             (0.0, 2_f64.powi(width) - 1.0)
         };
-        let word = raw.clamp(low, high) as i128 as u64;
+        let word = match (self.float, self.size) {
+            (true, 32) => u64::from((number as f32).to_bits()),
+            (true, _) => number.to_bits(),
+            (false, _) => raw.clamp(low, high) as i128 as u64,
+        };
         for (significance, bit) in self.bits().enumerate() {
             let Some(byte) = bit.and_then(|bit| frame.get_mut(bit / 8)) else { return false };
             let bit = bit.unwrap_or(0) % 8;
@@ -164,6 +198,23 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn floats_are_read_as_such_and_the_two_kinds_of_identifier_are_kept_apart() {
+        let text = format!(
+            "{TEXT}\nBO_ 2147483650 Far: 8 RIG\n SG_ F : 0|32@1- (2,1) [0|0] \"\" RIG\n SG_ U : 32|32@1+ (1,0) [0|0] \"\" RIG\n\nBO_ 5 Mux: 8 RIG\n SG_ M M : 0|8@1+ (1,0) [0|0] \"\" RIG\n SG_ P m1 : 8|8@1+ (1,0) [0|0] \"\" RIG\n\nSIG_VALTYPE_ 2147483650 F : 1;\n"
+        );
+        let messages = parse(&text).unwrap();
+        let far = &messages["Far"];
+        assert_eq!((far.id, far.extended, messages["Meas"].extended), (2, true, false));
+        let mut frame = [0xFF; 8];
+        assert!(far.signals["F"].write(&mut frame, 1.5));
+        assert_eq!(frame[..4], 0.25_f32.to_le_bytes());
+        assert_eq!(far.signals["F"].read(&frame), Some(1.5));
+        assert_eq!(far.signals["U"].read(&frame), Some(f64::from(u32::MAX)));
+        let mux = &messages["Mux"].signals;
+        assert!(mux["P"].multiplexed && !mux["M"].multiplexed);
     }
 
     #[test]

@@ -15,6 +15,10 @@ pub struct Shape {
     pub length: usize,
     /// The check at its end.
     pub check: Check,
+    /// Bytes at its beginning that the check leaves out.
+    pub check_from: usize,
+    /// Whether the check's high byte comes first; see [`Check::of`].
+    pub check_high_first: Option<bool>,
     /// Frames in a row that make an alignment believed.
     pub believed_after: u32,
 }
@@ -67,7 +71,9 @@ impl Cutter {
 
     fn fits(&self, candidate: &[u8]) -> bool {
         let (body, check) = candidate.split_at(candidate.len() - self.shape.check.length());
-        candidate.starts_with(&self.shape.sync) && self.shape.check.holds(body, check)
+        let Shape { sync, check: kind, check_from, check_high_first, .. } = &self.shape;
+        candidate.starts_with(sync)
+            && body.get(*check_from..).is_some_and(|body| kind.holds(body, check, *check_high_first))
     }
 }
 
@@ -77,7 +83,14 @@ mod tests {
     use crate::vector::from_hex;
 
     fn ft300() -> Shape {
-        Shape { sync: vec![0x20, 0x4E], length: 16, check: Check::Crc16Modbus, believed_after: 1 }
+        Shape {
+            sync: vec![0x20, 0x4E],
+            length: 16,
+            check: Check::CRC_16_MODBUS,
+            check_from: 0,
+            check_high_first: None,
+            believed_after: 1,
+        }
     }
 
     fn cut(shape: Shape, bytes: &[u8], chunk: usize) -> Vec<Vec<u8>> {
@@ -113,12 +126,19 @@ mod tests {
     /// Without sync bytes a wrong place passes one time in 128: a few frames in a row must agree.
     #[test]
     fn a_stream_without_sync_bytes_is_aligned_by_its_sums() {
-        let shape = Shape { sync: vec![], length: 13, check: Check::Sum7WithErrorBit, believed_after: 4 };
+        let shape = Shape {
+            sync: vec![],
+            length: 13,
+            check: Check::Sum7WithErrorBit,
+            check_from: 0,
+            check_high_first: None,
+            believed_after: 4,
+        };
         let mut bytes = vec![7, 7, 7, 7, 7];
         let mut sent = Vec::new();
         for i in 0..200_u8 {
             let mut frame: Vec<u8> = (0..12).map(|j| i.wrapping_mul(37).wrapping_add(j * 91)).collect();
-            frame.push(Check::Sum7WithErrorBit.of(&frame)[0]);
+            frame.push(Check::Sum7WithErrorBit.of(&frame, None)[0]);
             bytes.extend(&frame);
             sent.push(frame);
         }

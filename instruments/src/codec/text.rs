@@ -1,5 +1,53 @@
 //! Answers that are lines of text.
 
+use super::pattern::Pattern;
+
+/// Decimals of a number whose pattern states none, where a line is written.
+const DECIMALS: u8 = 9;
+
+/// What a line of text looks like.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Form {
+    /// A bare number, or a truth.
+    Number,
+    /// A number, an SI prefix or none, and this unit.
+    Quantity(String),
+    /// Text with numbers in it.
+    Pattern(Pattern),
+}
+
+impl Form {
+    /// How many numbers a line holds.
+    #[must_use]
+    pub fn numbers(&self) -> usize {
+        match self {
+            Self::Pattern(pattern) => pattern.fields().count(),
+            Self::Number | Self::Quantity(_) => 1,
+        }
+    }
+
+    /// The numbers of a line; `None` where it is no such line.
+    #[must_use]
+    pub fn read(&self, line: &str) -> Option<Vec<f64>> {
+        match self {
+            Self::Number => number(line).map(|number| vec![number]),
+            Self::Quantity(unit) => quantity(line, unit).map(|number| vec![number]),
+            Self::Pattern(pattern) => pattern.read(line),
+        }
+    }
+
+    /// The line that holds these numbers.
+    #[must_use]
+    pub fn write(&self, values: &[f64]) -> String {
+        let first = values.first().copied().unwrap_or(f64::NAN);
+        match self {
+            Self::Number => format!("{first:+.15E}"),
+            Self::Quantity(unit) => with_prefix(first, unit),
+            Self::Pattern(pattern) => pattern.write(values, DECIMALS),
+        }
+    }
+}
+
 /// The number that a line stands for: a decimal number, or a truth (`TRUE`, `ON`, `1` / `FALSE`, `OFF`, `0`).
 /// `None` for anything else, and for numbers that are not finite.
 #[must_use]

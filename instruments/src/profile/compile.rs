@@ -3,19 +3,21 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::{CompiledSet, CompiledSignal, Frame, FrameId, FrameKind, Place, Profile, SignalId};
+use super::{CompiledSet, CompiledSignal, Frame, FrameId, FrameKind, Part, Place, Profile, SetId, SignalId};
 use crate::codec::dbc::{self, DbcMessage};
 use crate::codec::eds::{self, Objects};
+use crate::codec::pattern::Pattern;
+use crate::codec::text::Form;
 use crate::error::ProfileError;
 use crate::expression::Expression;
 use crate::field::{ByteOrder, Field, NumberType};
-use crate::schema::{Description, LinkKind, Message, Table};
+use crate::schema::{Description, Message};
 
 /// Gives the text of another file by its name.
 type Files<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 /// Turns a description into a profile.
-pub(super) struct Compiler<'a> {
+pub(in crate::profile) struct Compiler<'a> {
     /// The file, for places.
     pub text: &'a str,
     /// What it says.
@@ -32,36 +34,17 @@ impl Compiler<'_> {
     pub fn compile(&self) -> Result<Profile, ProfileError> {
         let d = self.description;
         self.check_header()?;
+        self.check_sections()?;
         let messages = self.dbc()?;
         let sheet = self.eds()?;
         self.unique(d.signal.iter().map(|s| &s.name), "signal")?;
         self.unique(d.set.iter().map(|s| &s.name), "set-point")?;
-        for poll in &d.poll {
-            self.check_poll(poll)?;
-        }
-        for block in &d.write {
-            if !(1..=123).contains(&block.count) {
-                let message = format!(
-                    "block `{}` has {} registers; one write takes 1 to 123",
-                    block.name.as_ref(),
-                    block.count
-                );
-                return Err(self.at(block.name.span(), message));
-            }
-            if !matches!(block.table, Table::Holding | Table::Coil) {
-                let message = format!(
-                    "block `{}`: only holding registers and coils can be written",
-                    block.name.as_ref()
-                );
-                return Err(self.at(block.name.span(), message));
-            }
-        }
         let by_name: HashMap<String, usize> =
             d.signal.iter().enumerate().map(|(i, s)| (s.name.as_ref().clone(), i)).collect();
         let index = |name: &str| by_name.get(name).copied();
         let frames = self.frames(&messages, &index)?;
         let signal = |s| self.signal(s, &frames, &messages, &sheet, &index);
-        let signals = d.signal.iter().map(signal).collect::<Result<_, _>>()?;
+        let signals = d.signal.iter().map(signal).collect::<Result<Vec<_>, _>>()?;
         let sets = d.set.iter().map(|s| self.set(s, &sheet)).collect::<Result<_, _>>()?;
         let condition = |when: &toml::Spanned<String>| {
             Expression::compile(when.as_ref(), &index).map_err(|said| self.at(when.span(), said))
@@ -76,10 +59,11 @@ impl Compiler<'_> {
             }
         }
         self.check_emulator(&index)?;
+        self.check_frames(&frames, &signals)?;
         Ok(Profile { description: d.clone(), frames, signals, sets, signatures, faults, by_name })
     }
 
-    fn at(&self, span: Range<usize>, message: impl Into<String>) -> ProfileError {
+    pub(super) fn at(&self, span: Range<usize>, message: impl Into<String>) -> ProfileError {
         ProfileError::at(self.text, Some(span), message)
     }
 
@@ -167,34 +151,48 @@ impl Compiler<'_> {
                 sequence: by_name(&poll.sequence),
                 device_time: by_name(&poll.device_time),
                 kind: FrameKind::Poll(i),
+                text: None,
             });
         }
         if let Some(stream) = &d.stream {
+            let text = stream.line.as_deref().map(|line| self.pattern(line)).transpose()?.map(Form::Pattern);
             frames.push(Frame {
                 name: "stream".into(),
-                bytes: usize::from(stream.length),
+                bytes: text
+                    .as_ref()
+                    .map_or(usize::from(stream.length.unwrap_or(0)), |form| 8 * form.numbers()),
                 sequence: by_name(&stream.sequence),
                 device_time: None,
                 kind: FrameKind::Stream,
+                text,
             });
         }
         for (i, message) in d.message.iter().enumerate() {
             let parts = self.parts(message, messages)?;
             frames.push(Frame {
                 name: message.name.as_ref().clone(),
-                bytes: parts.iter().map(|(_, length)| length).sum(),
+                bytes: parts.iter().map(|part| part.length).sum(),
                 sequence: by_name(&message.sequence),
                 device_time: None,
                 kind: FrameKind::Messages(i, parts),
+                text: None,
             });
         }
         for (i, query) in d.query.iter().enumerate() {
+            let text = match (query.length, &query.answer, &query.unit) {
+                (None, Some(answer), _) => Some(Form::Pattern(self.pattern(answer)?)),
+                (None, None, Some(unit)) => Some(Form::Quantity(unit.clone())),
+                (None, None, None) => Some(Form::Number),
+                (Some(_), ..) => None,
+            };
+            let numbers = text.as_ref().map_or(0, Form::numbers);
             frames.push(Frame {
                 name: query.name.as_ref().clone(),
-                bytes: query.length.map_or(NumberType::F64.bytes(), usize::from),
+                bytes: query.length.map_or(NumberType::F64.bytes() * numbers, usize::from),
                 sequence: None,
                 device_time: None,
                 kind: FrameKind::Query(i),
+                text,
             });
         }
         let mut seen = std::collections::HashSet::new();
@@ -216,10 +214,11 @@ impl Compiler<'_> {
     }
 
     /// Identifiers (less their base) and lengths of a group's messages.
-    fn parts(&self, group: &Message, messages: &Messages) -> Result<Vec<(u32, usize)>, ProfileError> {
+    fn parts(&self, group: &Message, messages: &Messages) -> Result<Vec<Part>, ProfileError> {
         let name = group.name.as_ref();
         if let Some(cob) = group.cob {
-            return Ok(vec![(cob, usize::from(group.length.unwrap_or(8)))]);
+            let length = usize::from(group.length.unwrap_or(8));
+            return Ok(vec![Part { id: cob, extended: false, length }]);
         }
         if group.replies.is_empty() {
             return Err(
@@ -233,101 +232,13 @@ impl Compiler<'_> {
             let id = message.id.checked_sub(group.dbc_base.unwrap_or(0)).ok_or_else(|| {
                 self.at(group.name.span(), format!("the identifier of `{reply}` is below `dbc_base`"))
             })?;
-            Ok((id, message.length))
+            if message.length > 8 {
+                let said = format!("`{reply}` has {} bytes: CAN FD is not spoken", message.length);
+                return Err(self.at(group.name.span(), said));
+            }
+            Ok(Part { id, extended: message.extended, length: message.length })
         };
         group.replies.iter().map(part).collect()
-    }
-
-    fn check_header(&self) -> Result<(), ProfileError> {
-        let link = &self.description.link;
-        let place = self.text.find("[profile]").map(|at| at..at + "[profile]".len());
-        let link_place = self.text.find("[link]").map(|at| at..at + "[link]".len());
-        if self.description.profile.schema != 1 {
-            return Err(ProfileError::at(
-                self.text,
-                place,
-                format!("schema {} is not known", self.description.profile.schema),
-            )
-            .with_help("this version reads schema = 1"));
-        }
-        if matches!(link.kind, LinkKind::ModbusRtu | LinkKind::Serial)
-            && (link.baud.is_none() || link.format.is_none())
-        {
-            return Err(ProfileError::at(self.text, link_place, "a serial link needs `baud` and `format`"));
-        }
-        // Modbus RTU has no transaction number: an answer that comes late to one of two requests that
-        // look alike would be taken for the other's.
-        let polls = &self.description.poll;
-        let alike = polls.iter().enumerate().find_map(|(i, a)| {
-            polls[..i].iter().find(|b| (a.table, a.count) == (b.table, b.count)).map(|b| (a, b))
-        });
-        if let (LinkKind::ModbusRtu, Some((a, b))) = (link.kind, alike) {
-            let message = format!(
-                "polls `{}` and `{}` read the same number of registers",
-                a.name.as_ref(),
-                b.name.as_ref()
-            );
-            return Err(self.at(a.name.span(), message).with_help(
-                "over RTU a late answer to one would be taken for the other's; read one register more",
-            ));
-        }
-        if self.description.vector.is_empty() {
-            return Err(ProfileError::at(self.text, place, "the profile has no golden vector")
-                .with_help("add a [[vector]] for every frame: bytes beside the values that they stand for"));
-        }
-        Ok(())
-    }
-
-    fn unique<'b>(
-        &self,
-        names: impl Iterator<Item = &'b toml::Spanned<String>>,
-        what: &str,
-    ) -> Result<(), ProfileError> {
-        let mut seen = std::collections::HashSet::new();
-        for name in names {
-            if !seen.insert(name.as_ref()) {
-                return Err(self.at(name.span(), format!("a second {what} is called `{}`", name.as_ref())));
-            }
-        }
-        Ok(())
-    }
-
-    fn check_poll(&self, poll: &crate::schema::Poll) -> Result<(), ProfileError> {
-        let name = poll.name.as_ref();
-        if !(1..=125).contains(&poll.count) {
-            return Err(self.at(
-                poll.name.span(),
-                format!("poll `{name}` has {} registers; one read takes 1 to 125", poll.count),
-            ));
-        }
-        if u32::from(poll.address) + u32::from(poll.count) > 65536 {
-            return Err(self.at(poll.name.span(), format!("poll `{name}` runs past register 65535")));
-        }
-        match (poll.once, poll.rate_hz) {
-            (true, None) => {}
-            (false, Some(rate)) if rate.is_finite() && rate > 0.0 && rate <= 20_000.0 => {}
-            _ => {
-                return Err(self.at(
-                    poll.name.span(),
-                    format!(
-                        "poll `{name}` needs either `once = true` or a `rate_hz` above 0 and at most 20000"
-                    ),
-                ));
-            }
-        }
-        for signal in poll.sequence.iter().chain(&poll.device_time) {
-            let stands = self
-                .description
-                .signal
-                .iter()
-                .any(|s| s.name.as_ref() == signal && s.frame.as_ref().is_none_or(|f| f == name));
-            if !stands {
-                return Err(
-                    self.at(poll.name.span(), format!("`{signal}` of poll `{name}` is no signal in it"))
-                );
-            }
-        }
-        Ok(())
     }
 
     fn signal(
@@ -381,8 +292,23 @@ impl Compiler<'_> {
             let said = |said| self.at(s.name.span(), format!("signal `{name}`: {said}"));
             text.as_ref().map(|text| Expression::compile(text, index).map_err(said)).transpose()
         };
+        if s.resolution_si.is_some_and(|step| !(step.is_finite() && step > 0.0)) {
+            return Err(
+                self.at(s.name.span(), format!("`resolution_si` of signal `{name}` must be above zero"))
+            );
+        }
+        let step = match (&place, &frames[frame].text) {
+            (_, Some(Form::Pattern(pattern))) => {
+                pattern.fields().find(|(field, _)| field == name).and_then(|(_, form)| form.step())
+            }
+            (Place::Bytes(Field { bits: None, number: NumberType::F32 | NumberType::F64, .. }), _) => None,
+            (Place::Dbc(_, signal), _) => (!signal.float).then_some(signal.factor),
+            _ => Some(1.0),
+        };
         Ok(CompiledSignal {
             frame: FrameId(frame),
+            resolution_si: s.resolution_si,
+            step: step.unwrap_or(f64::NAN),
             place,
             scale: s.scale,
             scale_expression: compile(&s.scale_expr)?,
@@ -409,13 +335,36 @@ impl Compiler<'_> {
             let signal = messages.get(message).and_then(|m| m.signals.get(signal)).ok_or_else(unknown)?;
             let FrameKind::Messages(group, _) = frame.kind else { return Err(unknown()) };
             let replies = &self.description.message[group].replies;
+            if signal.multiplexed {
+                let said = format!("`{path}` of signal `{name}` is multiplexed, which is not spoken");
+                return Err(self.at(s.name.span(), said).with_help("choose a message that always has it"));
+            }
             let which = replies.iter().position(|reply| reply == message).ok_or_else(unknown)?;
             let before =
                 replies[..which].iter().filter_map(|reply| messages.get(reply)).map(|m| m.length).sum();
             return Ok(Place::Dbc(before, *signal));
         }
-        let text_answer =
-            matches!(frame.kind, FrameKind::Query(i) if self.description.query[i].length.is_none());
+        let text_answer = frame.text.is_some();
+        if text_answer && (s.register.is_some() || s.byte.is_some() || s.number.is_some() || s.bits.is_some())
+        {
+            let said =
+                format!("signal `{name}` stands in a line of text: it has no register, byte, type or bits");
+            return Err(self.at(s.name.span(), said));
+        }
+        if let Some(Form::Pattern(pattern)) = &frame.text {
+            let at = pattern.fields().position(|(field, _)| field == name).ok_or_else(|| {
+                self.at(
+                    s.name.span(),
+                    format!("signal `{name}` does not stand in the line of `{}`", frame.name),
+                )
+            })?;
+            return Ok(Place::Bytes(Field {
+                at: 8 * at,
+                number: NumberType::F64,
+                order: ByteOrder::Abcd,
+                bits: None,
+            }));
+        }
         let at = match (s.register, s.byte) {
             (None, None) if text_answer => 0,
             (Some(register), None) => 2 * usize::from(register),
@@ -446,8 +395,8 @@ impl Compiler<'_> {
             let message = format!("the safe value of set-point `{name}` lies outside its range");
             return Err(self.at(s.name.span(), message));
         }
-        if s.send.is_some() {
-            return Ok(CompiledSet { block: None, scale: s.scale });
+        if let Some(send) = &s.send {
+            return Ok(CompiledSet { block: None, scale: s.scale, line: Some(self.sent_line(s, send)?) });
         }
         let blocks = &self.description.write;
         let block = match &s.block {
@@ -473,7 +422,43 @@ impl Compiler<'_> {
                 return Err(self.at(s.name.span(), message));
             }
         }
-        Ok(CompiledSet { block: Some((block, field)), scale: s.scale })
+        Ok(CompiledSet { block: Some((block, field)), scale: s.scale, line: None })
+    }
+
+    /// A pattern of the file, its place the text itself.
+    pub(super) fn pattern(&self, text: &str) -> Result<Pattern, ProfileError> {
+        let place = self.text.find(text).map(|at| at..at + text.len());
+        Pattern::parse(text).map_err(|said| ProfileError::at(self.text, place, said))
+    }
+
+    /// The line that carries a set-point, and whose values stand in it.
+    fn sent_line(
+        &self,
+        s: &crate::schema::Set,
+        send: &str,
+    ) -> Result<(Pattern, Vec<Option<SetId>>), ProfileError> {
+        let pattern = self.pattern(send)?;
+        let own = |field: &str| field.is_empty() || field == s.name.as_ref();
+        let owner = |(field, _): (&str, &_)| {
+            if own(field) {
+                return Ok(None);
+            }
+            let sets = &self.description.set;
+            let other = sets.iter().position(|set| set.name.as_ref() == field && set.send.is_some());
+            other.map(|other| Some(SetId(other))).ok_or_else(|| {
+                let said = format!(
+                    "`{{{field}}}` in the line of set-point `{}` is no set-point of text",
+                    s.name.as_ref()
+                );
+                self.at(s.name.span(), said)
+            })
+        };
+        let owners = pattern.fields().map(owner).collect::<Result<Vec<_>, _>>()?;
+        if !owners.is_empty() && !owners.contains(&None) {
+            let said = format!("the line of set-point `{}` has no `{{}}` for its own value", s.name.as_ref());
+            return Err(self.at(s.name.span(), said));
+        }
+        Ok((pattern, owners))
     }
 
     fn check_field(
@@ -493,30 +478,6 @@ impl Compiler<'_> {
             let most = 8 * field.number.bytes() as u32;
             if width == 0 || first >= most || width > most - first {
                 return Err(self.at(span, format!("the bits of `{name}` lie outside its {most} bits")));
-            }
-        }
-        Ok(())
-    }
-
-    fn check_emulator(&self, index: &dyn Fn(&str) -> Option<usize>) -> Result<(), ProfileError> {
-        let emulator = &self.description.emulator;
-        let place = self.text.find("[emulator").map(|at| at..at + "[emulator".len());
-        for name in emulator.measure.keys().chain(emulator.constant.keys()) {
-            if index(name).is_none() {
-                return Err(ProfileError::at(
-                    self.text,
-                    place,
-                    format!("[emulator] speaks of `{name}`, which is no signal"),
-                ));
-            }
-        }
-        for name in emulator.command.keys() {
-            if !self.description.set.iter().any(|set| set.name.as_ref() == name) {
-                return Err(ProfileError::at(
-                    self.text,
-                    place,
-                    format!("[emulator] speaks of `{name}`, which is no set-point"),
-                ));
             }
         }
         Ok(())

@@ -5,6 +5,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::codec::checksum::Check;
+use crate::codec::stream::Shape;
 
 /// Tables of Modbus registers. A coil or a discrete input counts as a register whose value is 0 or 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
@@ -66,10 +67,22 @@ pub struct Stream {
     /// The bytes that every frame begins with.
     #[serde(default)]
     pub sync: Vec<u8>,
-    /// Length of a frame, sync and check included.
-    pub length: u16,
-    /// The check at its end.
-    pub check: Check,
+    /// Length of a frame, sync and check included; left out for lines of text.
+    #[serde(default)]
+    pub length: Option<u16>,
+    /// The check at its end; left out for lines of text.
+    #[serde(default)]
+    pub check: Option<Check>,
+    /// Bytes at a frame's beginning that the check leaves out, such as sync bytes.
+    #[serde(default)]
+    pub check_from: u16,
+    /// `high_first` or `low_first`: the order of the check's bytes. Left out: low first where the check is reflected, as is usual.
+    #[serde(default)]
+    pub check_order: Option<CheckOrder>,
+    /// In place of length and check: the instrument sends lines of text like this one, `{lateral},{normal}`, each number by
+    /// its signal's name. See [`crate::codec::pattern`].
+    #[serde(default)]
+    pub line: Option<String>,
     /// Frames in a row that make an alignment believed.
     #[serde(default = "defaults::one_frame")]
     pub believed_after: u32,
@@ -79,9 +92,11 @@ pub struct Stream {
     /// The function of the maker's own, with its byte, that starts it.
     #[serde(default)]
     pub start_function: Option<(u8, u8)>,
-    /// Byte that stops it, and how often that is sent.
-    pub stop: (u8, u16),
+    /// Byte that stops it, and how often that is sent; left out for one that runs as long as the instrument is on.
+    #[serde(default)]
+    pub stop: Option<(u8, u16)>,
     /// Silence after the stop before the instrument listens again, in ms.
+    #[serde(default)]
     pub settle_ms: u32,
     /// A crashed client leaves an instrument streaming: stop it before the first request.
     #[serde(default)]
@@ -89,6 +104,31 @@ pub struct Stream {
     /// Signal that counts samples.
     #[serde(default)]
     pub sequence: Option<String>,
+}
+
+/// The order of a check's bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CheckOrder {
+    /// The high byte comes first.
+    HighFirst,
+    /// The low byte comes first.
+    LowFirst,
+}
+
+impl Stream {
+    /// What its binary frames look like; `None` for lines of text.
+    #[must_use]
+    pub fn shape(&self) -> Option<Shape> {
+        Some(Shape {
+            sync: self.sync.clone(),
+            length: usize::from(self.length?),
+            check: self.check?,
+            check_from: usize::from(self.check_from),
+            check_high_first: self.check_order.map(|order| order == CheckOrder::HighFirst),
+            believed_after: self.believed_after,
+        })
+    }
 }
 
 /// `[[message]]`: CAN messages that together make one sample, with what asks for them.
@@ -129,12 +169,16 @@ pub struct Query {
     pub name: Spanned<String>,
     /// The question, without its terminator.
     pub send: String,
-    /// Length of a binary answer; left out for a line of text that is one number or a truth.
+    /// Length of a binary answer; left out for a line of text.
     #[serde(default)]
     pub length: Option<u16>,
     /// The answer is a number, an SI prefix or none, and this unit, as `5mm/s/V`; left out for a bare number or a truth.
     #[serde(default)]
     pub unit: Option<String>,
+    /// The answer is a line like this one, `AMP={amplitude}%,F={frequency}`: each number by its signal's name. See
+    /// [`crate::codec::pattern`].
+    #[serde(default)]
+    pub answer: Option<String>,
     /// Questions per second.
     pub rate_hz: f64,
 }
@@ -158,6 +202,12 @@ pub struct Init {
     /// Modbus: registers read from the first address and written to the second, and how many.
     #[serde(default)]
     pub copy: Option<(u16, u16, u16)>,
+    /// Modbus: first register, and the values to be written from there on.
+    #[serde(default)]
+    pub registers: Option<(u16, Vec<u16>)>,
+    /// Table of `registers`: holding registers, or coils.
+    #[serde(default)]
+    pub table: Table,
     /// CANopen: object, subindex, bytes and value to be written.
     #[serde(default)]
     pub sdo: Option<(u16, u8, u8, i64)>,

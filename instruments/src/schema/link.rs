@@ -66,7 +66,7 @@ pub struct Link {
     /// Pause between two requests, in ms.
     #[serde(default)]
     pub min_gap_ms: f64,
-    /// Lines that come without being asked for.
+    /// Alarms: lines that come without being asked for, such as `ALARM {code}`. See [`crate::codec::pattern`].
     #[serde(default)]
     pub unsolicited: Vec<String>,
     /// A query that is put after every set-point, and what its answer must begin with.

@@ -48,14 +48,7 @@ fn check(path: &Path) -> miette::Result<&'static str> {
     let table: toml::Table = crate::input::parse_toml(&name, &text)?;
     let has = |key: &str| table.contains_key(key);
     if has("profile") {
-        // Files that a profile names (DBC) stand beside it, or come with the program.
-        let beside = |file: &str| {
-            let path = path.parent().unwrap_or(Path::new(".")).join(file);
-            let text = crate::input::text_of(&path).ok();
-            text.or_else(|| drivers::bundled::file(file).map(String::from))
-        };
-        let wrong = |e: instruments::ProfileError| miette::miette!("{e}");
-        instruments::Profile::parse_with(&text, &beside).and_then(|p| p.check(&text)).map_err(wrong)?;
+        crate::rehearsal::of(path).map_err(|problem| miette::miette!("{problem}"))?;
         Ok("profile")
     } else if has("amplifier") || has("force") || has("stage") {
         Setup::parse(&name, &text, path.parent().unwrap_or(Path::new(".")))?;

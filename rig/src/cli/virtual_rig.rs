@@ -65,7 +65,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let mut instruments = setup.instruments();
     let line = args.modbus_rtu.as_deref().map(|path| rtu(path, &instruments, &plant)).transpose()?;
     for instrument in instruments.all_mut() {
-        let kind = drivers::profile(&instrument.profile).into_diagnostic()?.description.link.kind;
+        let kind = instrument.description().into_diagnostic()?.description.link.kind;
         let place = match kind {
             LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
                 Some(args.modbus_tcp.to_string())

@@ -78,14 +78,7 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     files.push((REPLAYABLE.to_string(), serde_json::to_string_pretty(&replayed).into_diagnostic()?));
     files.extend(job.model_file.clone());
     files.extend(job.setup.certificates.files.iter().cloned());
-    for (id, text) in job
-        .setup
-        .instruments()
-        .all()
-        .filter_map(|i| drivers::bundled::text(&i.profile).map(|text| (i.profile.clone(), text)))
-    {
-        files.push((format!("profiles/{id}.toml"), text.to_string()));
-    }
+    files.extend(job.setup.profiles().into_iter().map(|(name, text)| (format!("profiles/{name}"), text)));
     let facts = facts.into_iter().map(|(k, v)| (k.to_string(), v)).collect();
     Ok(Preamble { start_unix_ns, facts, files })
 }

@@ -92,7 +92,7 @@ pub(super) fn guarded(file: &SetupFile) -> Result<(), String> {
 
 /// Rates at which a channel may be read, by who it is: what [`Limits::checked`] demands of periods, said of rates.
 fn rate(instrument: &InstrumentSetup, name: &'static str, low: f64) -> Result<f64, LimitError> {
-    let stated = instrument.rate_hz.or_else(|| drivers::nominal_rate_hz(&instrument.profile));
+    let stated = instrument.rate_hz.or_else(|| drivers::nominal_rate_hz(instrument));
     let value = stated.unwrap_or(100.0);
     let high = 1e5;
     if value >= low && value <= high {
@@ -136,7 +136,7 @@ pub(super) fn of(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     limits.dead_man_key = l.dead_man_key.unwrap_or(false);
     limits.supply_required = file.supply_relay.is_some();
     limits.load_commanded = file.stage.dead_weight_n.is_none();
-    let profile = drivers::profile(&file.amplifier.profile).ok();
+    let profile = file.amplifier.description().ok();
     let fed = profile.as_ref().is_some_and(|profile| profile.set("heartbeat").is_some());
     // A virtual rig inside this program drives nothing real: it may go without what a real one must have.
     limits.amplifier_watchdog = fed || file.virtual_rig.is_some();

@@ -6,7 +6,7 @@ use super::drive::Drive;
 use instruments::FrameId;
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::{CanFrame, SlcanReader, SlcanSaid, slcan_line};
-use instruments::profile::FrameKind;
+use instruments::profile::{FrameKind, Part};
 use instruments::schema::LinkKind;
 use realtime::ports::Nanos;
 use std::collections::VecDeque;
@@ -127,7 +127,7 @@ impl Drop for CanEmulator {
 /// A group of messages that comes by itself.
 struct Broadcast {
     frame: FrameId,
-    parts: Vec<(u32, usize)>,
+    parts: Vec<Part>,
     period: u64,
     due: Nanos,
 }
@@ -135,7 +135,7 @@ struct Broadcast {
 /// A group of messages that is asked for.
 struct Asked {
     frame: FrameId,
-    parts: Vec<(u32, usize)>,
+    parts: Vec<Part>,
     request: Vec<u8>,
 }
 
@@ -183,13 +183,13 @@ struct Bus {
 }
 
 /// The frames of one sample: the parts of its bytes.
-fn split(base: u32, parts: &[(u32, usize)], bytes: &[u8]) -> Vec<CanFrame> {
+fn split(base: u32, parts: &[Part], bytes: &[u8]) -> Vec<CanFrame> {
     let mut at = 0;
     let mut frames = Vec::with_capacity(parts.len());
-    for (id, length) in parts {
-        let id = base + id;
-        frames.extend(CanFrame::build(id, id > 0x7FF, &bytes[at..at + length]));
-        at += length;
+    for part in parts {
+        let (id, extended) = part.at(base);
+        frames.extend(CanFrame::build(id, extended, &bytes[at..at + part.length]));
+        at += part.length;
     }
     frames
 }

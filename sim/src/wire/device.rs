@@ -207,7 +207,15 @@ impl Device {
                 && usize::from(address) + registers.len()
                     <= usize::from(block.address) + usize::from(block.count)
         };
-        let index = writes.iter().position(inside).ok_or(Refused::Address)?;
+        let Some(index) = writes.iter().position(inside) else {
+            // Settings that are written at connection change nothing of the world.
+            let settings = &self.profile.description.init;
+            let set_up = settings.iter().any(|init| {
+                let first = init.registers.as_ref().map(|(first, values)| (*first, values.len()));
+                init.table == table && first == Some((address, registers.len()))
+            });
+            return if set_up { Ok(()) } else { Err(Refused::Address) };
+        };
         let first = 2 * usize::from(address - writes[index].address);
         let mut block = self.blocks[index].clone();
         for (i, register) in registers.iter().enumerate() {

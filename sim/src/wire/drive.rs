@@ -71,7 +71,7 @@ impl Drive {
     fn process_data(&self) -> Option<(FrameId, u32)> {
         let frames = self.device.profile().frames().iter().enumerate();
         let found = frames.filter_map(|(i, frame)| match &frame.kind {
-            FrameKind::Messages(_, parts) => Some((FrameId(i), parts.first()?.0)),
+            FrameKind::Messages(_, parts) => Some((FrameId(i), parts.first()?.id)),
             _ => None,
         });
         found.into_iter().next()

@@ -7,7 +7,7 @@
 use super::device::Device;
 use super::serial::SerialEmulator;
 use super::{Command, Plant, SharedPlant};
-use instruments::codec::text::with_prefix;
+use instruments::codec::pattern::Pattern;
 use instruments::profile::FrameKind;
 use instruments::{FrameId, SetId};
 use realtime::ports::Nanos;
@@ -98,31 +98,30 @@ impl LineInstrument {
         }
         if let Some((frame, index, which)) = self.query(line) {
             let query = &description.query[index];
-            let (block, unit) = (query.length.is_some(), query.unit.clone());
             // A wrong unit answers as plausibly as the right one.
             let tenfold = if query.name.as_ref() == "range" { 10f64.powi(which as i32) } else { 1.0 };
             if description.link.choice.is_some() && which >= description.emulator.names.len() {
                 return Said::Nothing;
             }
             let bytes = self.device.frame(frame, plant, now);
-            let number = || bytes.as_slice().try_into().map(f64::from_be_bytes).unwrap_or(f64::NAN);
-            return match (block, unit) {
-                (true, _) => Said::Block(bytes),
-                (false, Some(unit)) => Said::Line(with_prefix(tenfold * number(), &unit)),
-                (false, None) => Said::Line(format!("{:+.15E}", number())),
+            return match self.device.profile().frames()[frame.0].write_line(&bytes, tenfold) {
+                Some(line) => Said::Line(line),
+                None => Said::Block(bytes),
             };
         }
         match self.set(line) {
-            Some((set, value, answer)) => {
-                if self.device.set(set, value, plant).is_err() {
-                    self.error = true;
+            Some((heard, answer)) => {
+                for (set, value) in heard {
+                    self.error |= self.device.set(set, value, plant).is_err();
                 }
                 answer.map_or(Said::Nothing, Said::Line)
             }
             None => {
                 self.error = true;
                 let unknown = self.device.profile().description.link.unsolicited.last().cloned();
-                unknown.map_or(Said::Nothing, Said::Line)
+                let zeros =
+                    |alarm: String| Pattern::parse(&alarm).map_or(alarm, |pattern| pattern.write(&[], 0));
+                unknown.map(zeros).map_or(Said::Nothing, Said::Line)
             }
         }
     }
@@ -137,33 +136,23 @@ impl LineInstrument {
         })
     }
 
-    /// The set-point that a line carries, its value as the instrument takes it, and the answer.
-    fn set(&self, line: &str) -> Option<(SetId, f64, Option<String>)> {
-        let sets = &self.device.profile().description.set;
-        for (index, set) in sets.iter().enumerate() {
+    /// The set-points that a line carries, their values as the instrument takes them, and the answer.
+    fn set(&self, line: &str) -> Option<(Vec<(SetId, f64)>, Option<String>)> {
+        let profile = self.device.profile();
+        for (index, set) in profile.description.set.iter().enumerate() {
+            let own = SetId(index);
             if set.send_zero.as_deref() == Some(line) {
-                return Some((SetId(index), 0.0, set.answer.as_ref().map(|(_, zero)| zero.clone())));
+                return Some((vec![(own, 0.0)], set.answer.as_ref().map(|(_, zero)| zero.clone())));
             }
-            let Some(send) = &set.send else { continue };
-            let (value, text) = if let Some((before, after)) = send.split_once("{}") {
-                let Some(text) = line.strip_prefix(before).and_then(|rest| rest.strip_suffix(after)) else {
-                    continue;
-                };
-                let Ok(value) = text.parse::<f64>() else { continue };
-                // An instrument clips to what it can do, and answers what it took.
-                let (low, high) = set.range.unwrap_or((f64::MIN, f64::MAX));
-                let value = value.clamp(low, high);
-                (value, if set.scale.fract() == 0.0 { format!("{value:.0}") } else { format!("{value}") })
-            } else if send == line {
-                (1.0, "1".into())
-            } else {
-                continue;
-            };
-            return Some((
-                SetId(index),
-                value,
-                set.answer.as_ref().map(|(answer, _)| answer.replace("{}", &text)),
-            ));
+            let Some(mut heard) = profile.heard(own, line) else { continue };
+            // An instrument clips to what it can do, and answers what it took.
+            for (set, value) in &mut heard {
+                let (low, high) = profile.description.set[set.0].range.unwrap_or((f64::MIN, f64::MAX));
+                *value = value.clamp(low, high);
+            }
+            let value = heard.iter().find(|(set, _)| *set == own).map_or(1.0, |(_, value)| *value);
+            let text = if set.scale.fract() == 0.0 { format!("{value:.0}") } else { format!("{value}") };
+            return Some((heard, set.answer.as_ref().map(|(answer, _)| answer.replace("{}", &text))));
         }
         None
     }

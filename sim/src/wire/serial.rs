@@ -71,6 +71,25 @@ impl SerialEmulator {
         };
         Self::start(port, move |bytes| line.turn(bytes))
     }
+
+    /// Serves an instrument whose stream runs as long as it is on.
+    ///
+    /// # Errors
+    /// Where no thread can be had, or the profile has no stream.
+    pub fn stream(
+        port: Box<dyn serialport::SerialPort>,
+        mut device: Device,
+        plant: SharedPlant,
+    ) -> io::Result<Self> {
+        let stream = device.profile().description.stream.clone();
+        let stream = stream.ok_or_else(|| io::Error::other("the profile has no stream"))?;
+        let mut due = plant.now().1;
+        Self::start(port, move |_| {
+            let (sent, next) = frames(&mut device, &stream, &plant, due);
+            due = next;
+            sent
+        })
+    }
 }
 
 impl Drop for SerialEmulator {
@@ -189,38 +208,51 @@ impl RtuLine {
     fn stream(&mut self, unit: u8, due: Nanos, bytes: &[u8]) -> Vec<u8> {
         let Some(device) = self.devices.get_mut(&unit) else { return Vec::new() };
         let Some(stream) = device.profile().description.stream.clone() else { return Vec::new() };
-        let (stop, _) = stream.stop;
+        let stop = stream.stop.map(|(stop, _)| stop);
         for &byte in bytes {
-            self.zeros = if byte == stop { self.zeros + 1 } else { 0 };
+            self.zeros = if Some(byte) == stop { self.zeros + 1 } else { 0 };
         }
         if self.zeros >= 14 {
             (self.streaming, self.zeros) = (None, 0);
             self.heard.clear();
             return Vec::new();
         }
-        let (mut plant, now) = self.plant.as_left();
-        let Some(frame) = device.profile().frame("stream") else { return Vec::new() };
-        let period = Nanos::from_seconds(1.0 / stream.rate_hz).0.max(1);
-        // A thread that was held up for long leaves samples out, as the instrument's own buffer would.
-        let mut due = Nanos(due.0 + (now.since(due).0 / period).saturating_sub(FRAMES_A_TURN) * period);
-        let mut sent = Vec::new();
-        while due <= now {
-            plant.advance(due);
-            let mut bytes = device.frame(frame, &mut *plant, due);
-            close(&stream, &mut bytes);
-            sent.extend(bytes);
-            due = Nanos(due.0 + period);
-        }
+        let (sent, due) = frames(device, &stream, &self.plant, due);
         self.streaming = Some((unit, due));
         sent
     }
 }
 
+/// The frames of a stream that are due, and when the next is.
+fn frames(device: &mut Device, stream: &Stream, plant: &SharedPlant, due: Nanos) -> (Vec<u8>, Nanos) {
+    let (mut plant, now) = plant.as_left();
+    let Some(frame) = device.profile().frame("stream") else { return (Vec::new(), due) };
+    let end = device.profile().description.link.rx_terminator.clone().unwrap_or_else(|| "\n".into());
+    let period = Nanos::from_seconds(1.0 / stream.rate_hz).0.max(1);
+    // A thread that was held up for long leaves samples out, as the instrument's own buffer would.
+    let mut due = Nanos(due.0 + (now.since(due).0 / period).saturating_sub(FRAMES_A_TURN) * period);
+    let mut sent = Vec::new();
+    while due <= now {
+        plant.advance(due);
+        let mut bytes = device.frame(frame, &mut *plant, due);
+        match device.profile().frames()[frame.0].write_line(&bytes, 1.0) {
+            Some(line) => sent.extend([line, end.clone()].concat().into_bytes()),
+            None => {
+                close(stream, &mut bytes);
+                sent.extend(bytes);
+            }
+        }
+        due = Nanos(due.0 + period);
+    }
+    (sent, due)
+}
+
 /// Puts sync bytes and check into a stream's frame.
 fn close(stream: &Stream, bytes: &mut [u8]) {
-    bytes[..stream.sync.len()].copy_from_slice(&stream.sync);
-    let body = bytes.len() - stream.check.length();
-    let check = stream.check.of(&bytes[..body]);
+    let Some(shape) = stream.shape() else { return };
+    bytes[..shape.sync.len()].copy_from_slice(&shape.sync);
+    let body = bytes.len() - shape.check.length();
+    let check = shape.check.of(&bytes[shape.check_from..body], shape.check_high_first);
     bytes[body..].copy_from_slice(&check);
 }
 

@@ -1,0 +1,96 @@
+//! Frames that come by themselves: bytes in, samples out, whatever carries them.
+
+use super::session::{Ended, LONGEST_SLEEP, Session};
+use instruments::codec::stream::Cutter;
+use instruments::schema::Stream;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// The longest line that an instrument may send.
+const LONGEST_LINE: usize = 4096;
+
+/// Bytes on their way to frames.
+enum Framing {
+    /// Frames of one length that end with a check.
+    Binary(Cutter),
+    /// Lines, which end so.
+    Lines { end: Vec<u8>, came: Vec<u8>, believed: bool },
+}
+
+impl Framing {
+    fn of(session: &Session, stream: &Stream) -> Self {
+        let end = || session.endpoint.profile().description.link.rx_terminator.clone();
+        match stream.shape() {
+            Some(shape) => Self::Binary(Cutter::new(shape)),
+            // What comes before the first end is half a line.
+            None => Self::Lines {
+                end: end().unwrap_or_else(|| "\n".into()).into_bytes(),
+                came: Vec::new(),
+                believed: false,
+            },
+        }
+    }
+}
+
+/// Hands over frames until the thread is to end. `read` gives what comes until its deadline.
+///
+/// # Errors
+/// Silence for longer than an answer may take, and whatever `read` says.
+pub fn listen(
+    session: &mut Session,
+    stream: &Stream,
+    read: &mut dyn FnMut(&mut [u8], Instant) -> Result<usize, Ended>,
+) -> Result<(), Ended> {
+    let (profile, health) = (session.endpoint.profile(), session.endpoint.health());
+    let frame = profile.frame("stream").ok_or_else(|| Ended::Io("the profile has no stream".into()))?;
+    let shape = profile.frames()[frame.0].clone();
+    let limit_ms = profile.description.link.response_timeout_ms;
+    let patience = Duration::from_millis(u64::from(limit_ms));
+    let mut framing = Framing::of(session, stream);
+    let (mut skipped, mut last, mut buffer) = (0, Instant::now(), [0; 1024]);
+    while !session.stopping() {
+        let count = read(&mut buffer, Instant::now() + LONGEST_SLEEP)?;
+        let arrived = session.now();
+        let mut outcome = Ok(());
+        let mut take = |bytes: &[u8]| {
+            last = Instant::now();
+            if outcome.is_ok() {
+                outcome = session.endpoint.frame(frame, bytes, arrived);
+            }
+        };
+        match &mut framing {
+            Framing::Binary(cutter) => {
+                cutter.push(&buffer[..count], &mut take);
+                health.corrupt_frames.fetch_add(cutter.lost - skipped, Ordering::Relaxed);
+                skipped = cutter.lost;
+            }
+            Framing::Lines { end, came, believed } => {
+                came.extend_from_slice(&buffer[..count]);
+                while let Some(at) = came.windows(end.len()).position(|window| window == end.as_slice()) {
+                    let line: Vec<u8> = came.drain(..at + end.len()).take(at).collect();
+                    let whole = std::mem::replace(believed, true);
+                    let text = String::from_utf8_lossy(&line);
+                    match shape.read_line(&text) {
+                        Some(bytes) if whole => take(&bytes),
+                        None if whole => {
+                            health.count(&health.corrupt_frames);
+                            health.problem(format!("`{}` is no line of the stream", text.trim()));
+                        }
+                        _ => {}
+                    }
+                }
+                if came.len() > LONGEST_LINE {
+                    return Err(Ended::Corrupt("a line without an end".into()));
+                }
+            }
+        }
+        outcome?;
+        if health.report().samples > 0 {
+            session.tell(Ok(()));
+        }
+        if last.elapsed() > patience {
+            return Err(Ended::Timeout(limit_ms));
+        }
+    }
+    Ok(())
+}

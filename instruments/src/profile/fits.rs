@@ -1,0 +1,292 @@
+//! What the types of a profile cannot say: what its kind of link can carry, and what a role needs. Whatever would be ignored
+//! is refused.
+
+mod frames;
+
+use super::compile::Compiler;
+use crate::error::ProfileError;
+use crate::schema::{Init, LinkKind, Role, Table};
+
+/// What a role needs: signals, and set-points.
+const NEEDS: &[(Role, &[&str], &[&str])] = &[
+    (
+        Role::DriveUltrasonic,
+        &["output_on", "echo_amplitude", "echo_frequency"],
+        &["amplitude", "frequency", "enable"],
+    ),
+    (Role::MotionSlide, &["position", "velocity"], &["velocity"]),
+    (Role::MotionLoad, &[], &["load"]),
+    (Role::SafetySupply, &["closed"], &["closed"]),
+];
+
+/// Set-points that must have a `safe` value: without it there is no 'off'.
+const SAFE: &[(Role, &str)] =
+    &[(Role::DriveUltrasonic, "enable"), (Role::MotionSlide, "velocity"), (Role::SafetySupply, "closed")];
+
+/// Most samples per second.
+const FASTEST_HZ: f64 = 20_000.0;
+
+impl Compiler<'_> {
+    pub(super) fn check_header(&self) -> Result<(), ProfileError> {
+        let link = &self.description.link;
+        let place = self.text.find("[profile]").map(|at| at..at + "[profile]".len());
+        let link_place = self.text.find("[link]").map(|at| at..at + "[link]".len());
+        if self.description.profile.schema != 1 {
+            return Err(ProfileError::at(
+                self.text,
+                place,
+                format!("schema {} is not known", self.description.profile.schema),
+            )
+            .with_help("this version reads schema = 1"));
+        }
+        let id = &self.description.profile.id;
+        if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
+            return Err(ProfileError::at(
+                self.text,
+                place,
+                format!("`{id}` is no id: letters, digits, `-`, `_` and `.`"),
+            ));
+        }
+        let formed = |format: &String| {
+            let [data, parity, stop] = format.as_bytes() else { return false };
+            matches!(data, b'7' | b'8') && matches!(parity, b'N' | b'E' | b'O') && matches!(stop, b'1' | b'2')
+        };
+        if let Some(format) = link.format.as_ref().filter(|format| !formed(format)) {
+            let said = format!(
+                "`format`: `{format}` is none; data bits 7 or 8, parity N, E or O, stop bits 1 or 2, as 8N1"
+            );
+            return Err(ProfileError::at(self.text, link_place, said));
+        }
+        if link.baud == Some(0) || link.bitrate == Some(0) {
+            return Err(ProfileError::at(
+                self.text,
+                link_place,
+                "a line of no bits per second carries nothing",
+            ));
+        }
+        if matches!(link.kind, LinkKind::ModbusRtu | LinkKind::Serial)
+            && (link.baud.is_none() || link.format.is_none())
+        {
+            return Err(ProfileError::at(self.text, link_place, "a serial link needs `baud` and `format`"));
+        }
+        // Modbus RTU has no transaction number: an answer that comes late to one of two requests that
+        // look alike would be taken for the other's.
+        let polls = &self.description.poll;
+        let alike = polls.iter().enumerate().find_map(|(i, a)| {
+            polls[..i].iter().find(|b| (a.table, a.count) == (b.table, b.count)).map(|b| (a, b))
+        });
+        if let (LinkKind::ModbusRtu, Some((a, b))) = (link.kind, alike) {
+            let message = format!(
+                "polls `{}` and `{}` read the same number of registers",
+                a.name.as_ref(),
+                b.name.as_ref()
+            );
+            return Err(self.at(a.name.span(), message).with_help(
+                "over RTU a late answer to one would be taken for the other's; read one register more",
+            ));
+        }
+        if self.description.vector.is_empty() {
+            return Err(ProfileError::at(self.text, place, "the profile has no golden vector")
+                .with_help("add a [[vector]] for every frame: bytes beside the values that they stand for"));
+        }
+        Ok(())
+    }
+
+    pub(super) fn unique<'b>(
+        &self,
+        names: impl Iterator<Item = &'b toml::Spanned<String>>,
+        what: &str,
+    ) -> Result<(), ProfileError> {
+        let mut seen = std::collections::HashSet::new();
+        for name in names {
+            if !seen.insert(name.as_ref()) {
+                return Err(self.at(name.span(), format!("a second {what} is called `{}`", name.as_ref())));
+            }
+        }
+        Ok(())
+    }
+
+    /// Sections, by the kind of link that carries them.
+    pub(super) fn check_sections(&self) -> Result<(), ProfileError> {
+        use LinkKind::{Can, Canopen, ModbusRtu, ModbusTcp, Scpi, Serial};
+        let d = self.description;
+        let rows: [(&str, bool, &[LinkKind]); 6] = [
+            ("[[poll]]", !d.poll.is_empty(), &[ModbusTcp, ModbusRtu]),
+            ("[stream]", d.stream.is_some(), &[ModbusRtu, Serial]),
+            ("[[message]]", !d.message.is_empty(), &[Can, Canopen]),
+            ("[[query]]", !d.query.is_empty(), &[Serial, Scpi]),
+            ("[[write]]", !d.write.is_empty(), &[ModbusTcp, ModbusRtu, Canopen]),
+            ("[[set]]", !d.set.is_empty(), &[ModbusTcp, ModbusRtu, Canopen, Serial, Scpi]),
+        ];
+        for (section, used, kinds) in rows {
+            if used && !kinds.contains(&d.link.kind) {
+                return Err(
+                    self.at_section(section, format!("a link of kind {:?} has no {section}", d.link.kind))
+                );
+            }
+        }
+        let text = matches!(d.link.kind, Serial | Scpi);
+        let words = d.link.error_query.is_some() || d.link.choice.is_some() || !d.link.unsolicited.is_empty();
+        if words && !text {
+            return Err(self.at_section(
+                "[link]",
+                "`error_query`, `choice` and `unsolicited` are for lines of text".into(),
+            ));
+        }
+        for (key, file, kind) in [("dbc", &d.link.dbc, Can), ("eds", &d.link.eds, Canopen)] {
+            if let Some(file) = file {
+                if d.link.kind != kind {
+                    return Err(self.at_section("[link]", format!("`{key}` is for a link of kind {kind:?}")));
+                }
+                if file.contains(['/', '\\']) {
+                    return Err(
+                        self.at_section("[link]", format!("`{key}`: the file stands beside the profile"))
+                    );
+                }
+            }
+        }
+        for init in &d.init {
+            self.check_init(init)?;
+        }
+        for poll in &d.poll {
+            self.check_poll(poll)?;
+        }
+        self.check_blocks()?;
+        self.check_stream()?;
+        for alarm in &d.link.unsolicited {
+            if self.pattern(alarm)?.head().is_empty() {
+                let said = format!("the alarm `{alarm}` must begin with text of its own");
+                return Err(self.at_section("[link]", said));
+            }
+        }
+        let rates = d
+            .message
+            .iter()
+            .map(|m| (&m.name, m.rate_hz))
+            .chain(d.query.iter().map(|q| (&q.name, q.rate_hz)));
+        for (name, rate) in rates {
+            if !(rate > 0.0 && rate <= FASTEST_HZ) {
+                let said = format!("`{}`: a `rate_hz` is above 0 and at most {FASTEST_HZ}", name.as_ref());
+                return Err(self.at(name.span(), said));
+            }
+        }
+        for query in &d.query {
+            if [query.length.is_some(), query.unit.is_some(), query.answer.is_some()]
+                .iter()
+                .filter(|x| **x)
+                .count()
+                > 1
+            {
+                let said =
+                    format!("query `{}` takes one of `length`, `unit` and `answer`", query.name.as_ref());
+                return Err(self.at(query.name.span(), said));
+            }
+        }
+        if let Some(set) = d.set.iter().find(|set| text != set.send.is_some()) {
+            let said = if text {
+                "needs `send`: its link speaks in lines"
+            } else {
+                "has `send`, and no lines to send"
+            };
+            return Err(self.at(set.name.span(), format!("set-point `{}` {said}", set.name.as_ref())));
+        }
+        self.check_roles()
+    }
+
+    /// One [[init]] does one thing, and one that its link can carry.
+    fn check_init(&self, init: &Init) -> Result<(), ProfileError> {
+        use LinkKind::{Can, Canopen, ModbusRtu, ModbusTcp, Scpi, Serial};
+        let acts: [(&str, bool, &[LinkKind]); 6] = [
+            ("send", init.send.is_some(), &[Serial, Scpi]),
+            ("can", init.can.is_some(), &[Can]),
+            ("function", init.function.is_some(), &[ModbusRtu]),
+            ("copy", init.copy.is_some(), &[ModbusTcp, ModbusRtu]),
+            ("registers", init.registers.is_some(), &[ModbusTcp, ModbusRtu]),
+            ("sdo", init.sdo.is_some(), &[Canopen]),
+        ];
+        let used: Vec<&(&str, bool, &[LinkKind])> = acts.iter().filter(|(_, used, _)| *used).collect();
+        let kind = self.description.link.kind;
+        let said = match used.as_slice() {
+            [(_, _, kinds)] if kinds.contains(&kind) => match &init.registers {
+                Some((_, values)) if values.is_empty() || values.len() > 123 => {
+                    "one write takes 1 to 123 registers".into()
+                }
+                Some(_) if !matches!(init.table, Table::Holding | Table::Coil) => {
+                    "only holding registers and coils can be written".into()
+                }
+                _ if init.expect.is_some() && init.send.is_none() => {
+                    "only `send` has an answer to `expect`".into()
+                }
+                _ => return Ok(()),
+            },
+            [(act, ..)] => format!("a link of kind {kind:?} has no `{act}`"),
+            _ => "does one thing: send, can, function, copy, registers or sdo".to_string(),
+        };
+        Err(self.at_section("[[init]]", format!("an [[init]]: {said}")))
+    }
+
+    fn check_roles(&self) -> Result<(), ProfileError> {
+        let d = self.description;
+        let signal = |name: &str| d.signal.iter().any(|signal| signal.name.as_ref() == name);
+        let set = |name: &str| d.set.iter().find(|set| set.name.as_ref() == name);
+        if d.profile.roles.is_empty() {
+            return Err(
+                self.at_section("[profile]", "`roles` is empty: say what the instrument can be".into())
+            );
+        }
+        for role in &d.profile.roles {
+            let said = |what: String| {
+                Err(self.at_section("[profile]", format!("an instrument of role {role:?} needs {what}")))
+            };
+            let row = NEEDS.iter().find(|(named, ..)| named == role);
+            let (signals, sets) = row.map_or((&[][..], &[][..]), |(_, signals, sets)| (*signals, *sets));
+            if let Some(missing) = signals.iter().find(|name| !signal(name)) {
+                return said(format!("a signal `{missing}`"));
+            }
+            if let Some(missing) = sets.iter().find(|name| set(name).is_none()) {
+                return said(format!("a set-point `{missing}`"));
+            }
+            let unsafe_one = SAFE
+                .iter()
+                .find(|(named, name)| named == role && set(name).is_some_and(|s| s.safe.is_none()));
+            if let Some((_, name)) = unsafe_one {
+                return said(format!(
+                    "a `safe` value of its set-point `{name}`: without it there is no 'off'"
+                ));
+            }
+            if matches!(role, Role::ForceLateral | Role::ForceNormal) && d.signal.is_empty() {
+                return said("a signal".into());
+            }
+        }
+        Ok(())
+    }
+
+    fn at_section(&self, section: &str, message: String) -> ProfileError {
+        let place = self.text.find(section).map(|at| at..at + section.len());
+        ProfileError::at(self.text, place, message)
+    }
+
+    pub(super) fn check_emulator(&self, index: &dyn Fn(&str) -> Option<usize>) -> Result<(), ProfileError> {
+        let emulator = &self.description.emulator;
+        let place = self.text.find("[emulator").map(|at| at..at + "[emulator".len());
+        for name in emulator.measure.keys().chain(emulator.constant.keys()) {
+            if index(name).is_none() {
+                return Err(ProfileError::at(
+                    self.text,
+                    place,
+                    format!("[emulator] speaks of `{name}`, which is no signal"),
+                ));
+            }
+        }
+        for name in emulator.command.keys() {
+            if !self.description.set.iter().any(|set| set.name.as_ref() == name) {
+                return Err(ProfileError::at(
+                    self.text,
+                    place,
+                    format!("[emulator] speaks of `{name}`, which is no set-point"),
+                ));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,153 @@
+//! What a frame must be: within its table, its rate and its line, with its counters.
+
+use super::FASTEST_HZ;
+use crate::error::ProfileError;
+use crate::profile::compile::Compiler;
+use crate::profile::{CompiledSignal, Frame, FrameKind, Place};
+use crate::schema::{LinkKind, Table};
+
+impl Compiler<'_> {
+    pub(super) fn check_poll(&self, poll: &crate::schema::Poll) -> Result<(), ProfileError> {
+        let name = poll.name.as_ref();
+        if !(1..=125).contains(&poll.count) {
+            return Err(self.at(
+                poll.name.span(),
+                format!("poll `{name}` has {} registers; one read takes 1 to 125", poll.count),
+            ));
+        }
+        if u32::from(poll.address) + u32::from(poll.count) > 65536 {
+            return Err(self.at(poll.name.span(), format!("poll `{name}` runs past register 65535")));
+        }
+        match (poll.once, poll.rate_hz) {
+            (true, None) => {}
+            (false, Some(rate)) if rate.is_finite() && rate > 0.0 && rate <= 20_000.0 => {}
+            _ => {
+                return Err(self.at(
+                    poll.name.span(),
+                    format!(
+                        "poll `{name}` needs either `once = true` or a `rate_hz` above 0 and at most 20000"
+                    ),
+                ));
+            }
+        }
+        for signal in poll.sequence.iter().chain(&poll.device_time) {
+            let stands = self
+                .description
+                .signal
+                .iter()
+                .any(|s| s.name.as_ref() == signal && s.frame.as_ref().is_none_or(|f| f == name));
+            if !stands {
+                return Err(
+                    self.at(poll.name.span(), format!("`{signal}` of poll `{name}` is no signal in it"))
+                );
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn check_blocks(&self) -> Result<(), ProfileError> {
+        for block in &self.description.write {
+            let name = block.name.as_ref();
+            let said = if !(1..=123).contains(&block.count) {
+                format!("block `{name}` has {} registers; one write takes 1 to 123", block.count)
+            } else if !matches!(block.table, Table::Holding | Table::Coil) {
+                format!("block `{name}`: only holding registers and coils can be written")
+            } else if block.rate_hz.is_some_and(|rate| !(rate > 0.0 && rate <= FASTEST_HZ)) {
+                format!("block `{name}`: a `rate_hz` is above 0 and at most {FASTEST_HZ}")
+            } else {
+                continue;
+            };
+            return Err(self.at(block.name.span(), said));
+        }
+        Ok(())
+    }
+
+    pub(super) fn check_stream(&self) -> Result<(), ProfileError> {
+        let d = self.description;
+        let Some(stream) = &d.stream else { return Ok(()) };
+        let wrong = |said: &str| Err(self.at_section("[stream]", format!("[stream]: {said}")));
+        let serial = d.link.kind == LinkKind::Serial;
+        let starts = stream.start_register.is_some() || stream.start_function.is_some();
+        match (stream.line.is_some(), stream.length, stream.check) {
+            (true, None, None) if serial && stream.sync.is_empty() => {}
+            (true, ..) => {
+                return wrong("`line` is for a link of kind Serial, and goes without length, check and sync");
+            }
+            (false, Some(length), Some(check)) => {
+                let around = usize::from(stream.check_from).max(stream.sync.len()) + check.length();
+                if usize::from(length) <= around {
+                    return wrong("`length` leaves no byte between sync and check");
+                }
+            }
+            (false, ..) => {
+                return wrong(
+                    "`length` and `check` are needed, or `line`: without a check a stream cannot be trusted",
+                );
+            }
+        }
+        if !(stream.rate_hz > 0.0 && stream.rate_hz <= FASTEST_HZ) {
+            return wrong("a `rate_hz` is above 0 and at most 20000");
+        }
+        if serial && (starts || stream.stop.is_some() || stream.stop_before_open) {
+            return wrong("on a link of kind Serial it runs by itself; [[init]] `send` may start it");
+        }
+        if serial && !(d.query.is_empty() && d.set.is_empty()) {
+            return wrong("it leaves no room for [[query]] and [[set]] on its line");
+        }
+        if !serial && starts && stream.stop.is_none() {
+            return wrong("what is started needs `stop`");
+        }
+        if !serial && !starts {
+            return wrong(
+                "needs `start_register` or `start_function`; one that runs by itself is of kind `serial`",
+            );
+        }
+        if stream.stop_before_open && stream.stop.is_none() {
+            return wrong("`stop_before_open` needs `stop`");
+        }
+        if d.poll.iter().any(|poll| poll.rate_hz.is_some()) {
+            return wrong("while it runs nothing is polled: polls can be read `once`");
+        }
+        Ok(())
+    }
+
+    /// Counters stand in the frames that they count, and every number of a line has its signal.
+    pub(in crate::profile) fn check_frames(
+        &self,
+        frames: &[Frame],
+        signals: &[CompiledSignal],
+    ) -> Result<(), ProfileError> {
+        let d = self.description;
+        for (index, frame) in frames.iter().enumerate() {
+            let named = match &frame.kind {
+                FrameKind::Stream => d.stream.as_ref().and_then(|stream| stream.sequence.as_ref()),
+                FrameKind::Messages(group, _) => d.message[*group].sequence.as_ref(),
+                FrameKind::Poll(_) | FrameKind::Query(_) => None,
+            };
+            let stands = |name: &str| {
+                let own = |signal: &&CompiledSignal| {
+                    signal.frame.0 == index && !matches!(signal.place, Place::Computed(_))
+                };
+                d.signal
+                    .iter()
+                    .zip(signals)
+                    .filter(|(_, s)| own(s))
+                    .any(|(signal, _)| signal.name.as_ref() == name)
+            };
+            if let Some(name) = named.filter(|name| !stands(name)) {
+                let place = self.text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
+                let said = format!("`sequence` of `{}`: `{name}` is no signal in it", frame.name);
+                return Err(ProfileError::at(self.text, place, said));
+            }
+            if let Some(crate::codec::text::Form::Pattern(pattern)) = &frame.text
+                && let Some((name, _)) = pattern.fields().find(|(name, _)| !stands(name))
+            {
+                let place = self.text.find(&format!("{{{name}")).map(|at| at..at + name.len() + 1);
+                let said = format!("`{{{name}}}` in the line of `{}` is no signal of that frame", frame.name);
+                return Err(ProfileError::at(self.text, place, said)
+                    .with_help("`{*}` stands for what does not matter"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,204 @@
+//! What a profile cannot mean is refused with its place; nothing in it is ignored.
+
+use muprime_instruments::{Profile, ProfileError};
+
+const RTU: &str = include_str!("../../drivers/profiles/robotiq-ft300.toml");
+const STREAM: &str = include_str!("../../drivers/profiles/robotiq-ft300-stream.toml");
+const AMPLIFIER: &str = include_str!("../../drivers/profiles/muprime-amplifier.toml");
+const STAGE: &str = include_str!("../../drivers/profiles/muprime-stage.toml");
+const CAN: &str = include_str!("../../drivers/profiles/ati-netft-can.toml");
+const LINES: &str = include_str!("../../drivers/profiles/piezodrive-pdus210.toml");
+const SCPI: &str = include_str!("../../drivers/profiles/keysight-33500b.toml");
+const DBC: &str = include_str!("../../drivers/profiles/muprime-can.dbc");
+
+fn read(text: &str, dbc: &str) -> Result<(), ProfileError> {
+    let profile = Profile::parse_with(text, &|name| (name == "muprime-can.dbc").then(|| dbc.to_string()))?;
+    profile.check(text)
+}
+
+/// The text with its first `from` replaced; the change must be one.
+fn changed(text: &str, from: &str, to: &str) -> String {
+    assert!(text.contains(from), "`{from}` is not there");
+    text.replacen(from, to, 1)
+}
+
+#[test]
+fn each_wrong_profile_is_refused_with_place_and_cause() {
+    for good in [RTU, STREAM, AMPLIFIER, STAGE, CAN, LINES, SCPI] {
+        read(good, DBC).unwrap();
+    }
+    let extra = |text: &str, more: &str| format!("{text}\n{more}\n");
+    let wrong = [
+        (
+            "a stream on a line of text",
+            changed(STREAM, "kind = \"modbus_rtu\"", "kind = \"serial\""),
+            "[[poll]]",
+        ),
+        (
+            "a stream over TCP",
+            extra(AMPLIFIER, "[stream]\nrate_hz = 9\nlength = 9\ncheck = \"sum8\""),
+            "[stream]",
+        ),
+        ("a drive that does not say whether it is on", AMPLIFIER.replace("output_on", "lamp"), "`output_on`"),
+        (
+            "a drive that takes no amplitude",
+            AMPLIFIER
+                .replace("\"amplitude\"", "\"size\"")
+                .replace("\namplitude =", "\nsize =")
+                .replace(" amplitude =", " size ="),
+            "`amplitude`",
+        ),
+        (
+            "a drive without an off",
+            changed(AMPLIFIER, "name = \"enable\"", "name = \"enable\"\n#")
+                .replace("safe = 0.0\necho = \"output_on\"", "echo = \"output_on\""),
+            "`safe`",
+        ),
+        (
+            "a stage that takes no velocity",
+            STAGE.replacen("[[set]]\nname = \"velocity\"", "[[set]]\nname = \"speed\"", 1),
+            "`velocity`",
+        ),
+        (
+            "a counter of messages that is none",
+            changed(CAN, "sequence = \"sample\"", "sequence = \"sampel\""),
+            "`sampel`",
+        ),
+        (
+            "a counter of a stream that is none",
+            changed(STREAM, "length = 16", "length = 16\nsequence = \"nr\""),
+            "`nr`",
+        ),
+        ("a serial format", changed(RTU, "\"8N1\"", "\"9X7\""), "9X7"),
+        ("no baud", changed(RTU, "baud = 19200", "baud = 0"), "no bits"),
+        (
+            "polls on a CAN bus",
+            extra(CAN, "[[poll]]\nname = \"p\"\naddress = 1\ncount = 1\nrate_hz = 1"),
+            "[[poll]]",
+        ),
+        ("set-points by plain CAN", extra(CAN, "[[set]]\nname = \"load\"\nsend = \"x\""), "[[set]]"),
+        (
+            "a query of registers",
+            extra(RTU, "[[query]]\nname = \"q\"\nsend = \"q?\"\nrate_hz = 1"),
+            "[[query]]",
+        ),
+        ("a line of text at connection over Modbus", extra(AMPLIFIER, "[[init]]\nsend = \"*RST\""), "`send`"),
+        (
+            "a function of the maker's own over TCP",
+            extra(AMPLIFIER, "[[init]]\nfunction = [70, 1]"),
+            "`function`",
+        ),
+        ("an init that does nothing", extra(AMPLIFIER, "[[init]]\ntext = \"nothing\""), "one thing"),
+        (
+            "a DBC file for registers",
+            changed(RTU, "kind = \"modbus_rtu\"", "kind = \"modbus_rtu\"\ndbc = \"muprime-can.dbc\""),
+            "`dbc`",
+        ),
+        (
+            "alarms of registers",
+            changed(RTU, "kind = \"modbus_rtu\"", "kind = \"modbus_rtu\"\nunsolicited = [\"ERR\"]"),
+            "unsolicited",
+        ),
+        ("an alarm that any line could be", changed(LINES, "\"LPERR\"", "\"{code} LPERR\""), "must begin"),
+        ("a set-point without its line", changed(SCPI, "send = \"SOUR1:VOLT {}\"", ""), "`send`"),
+        (
+            "a set-point's line without its value",
+            changed(SCPI, "SOUR1:VOLT {}", "SOUR1:VOLT {frequency}"),
+            "own value",
+        ),
+        ("a brace alone", changed(SCPI, "SOUR1:VOLT {}", "SOUR1:VOLT {"), "brace"),
+        (
+            "a register in a line of text",
+            changed(SCPI, "frame = \"voltage\"", "frame = \"voltage\"\nregister = 1"),
+            "line of text",
+        ),
+        (
+            "an answer with a number that is nobody's",
+            changed(
+                SCPI,
+                "send = \"SOUR1:VOLT?\"",
+                "send = \"SOUR1:VOLT?\"\nanswer = \"{echo_amplitude} {x}\"",
+            ),
+            "`{x}`",
+        ),
+        ("a query without an end of its rate", changed(SCPI, "rate_hz = 20", "rate_hz = 0"), "rate_hz"),
+        ("a stream without a check", changed(STREAM, "check = \"crc16-modbus\"", ""), "check"),
+        ("a check that is none", changed(STREAM, "crc16-modbus", "CRC-16/MOBDUS"), "CRC-16/MODBUS"),
+        ("a stream that nothing stops", changed(STREAM, "stop = [0xFF, 50]", ""), "`stop`"),
+        ("polls beside a stream", changed(STREAM, "once = true", "rate_hz = 1"), "polled"),
+        (
+            "a resolution of nothing",
+            changed(RTU, "type = \"i16\"", "type = \"i16\"\nresolution_si = 0.0"),
+            "resolution_si",
+        ),
+        ("an id with a path in it", changed(RTU, "id = \"robotiq-ft300\"", "id = \"../ft300\""), "no id"),
+        (
+            "a file elsewhere",
+            changed(CAN, "dbc = \"muprime-can.dbc\"", "dbc = \"../muprime-can.dbc\""),
+            "beside",
+        ),
+    ];
+    for (what, text, cause) in wrong {
+        let said = match read(&text, DBC) {
+            Ok(()) => panic!("{what}: taken"),
+            Err(error) => error.to_string(),
+        };
+        assert!(said.contains(cause), "{what}: {said}");
+        assert!(said.starts_with("line "), "{what} has no place: {said}");
+    }
+}
+
+#[test]
+fn every_frame_needs_a_golden_vector() {
+    let at = STREAM.find("[[vector]]\nframe = \"stream\"").unwrap();
+    let end = STREAM[at + 1..].find("[[vector]]").map_or(STREAM.len(), |next| at + 1 + next);
+    let without = format!("{}{}", &STREAM[..at], &STREAM[end..]);
+    let said = read(&without, DBC).unwrap_err().to_string();
+    assert!(said.contains("`stream` has no golden vector"), "{said}");
+}
+
+#[test]
+fn what_a_dbc_file_says_beyond_plain_signals_is_read_or_refused() {
+    let said = |dbc: &str| read(CAN, dbc).map_err(|error| error.to_string());
+    let fx = DBC.lines().find(|line| line.contains("SG_ Fx ")).unwrap();
+    let multiplexed = said(&changed(DBC, fx, &changed(fx, "SG_ Fx ", "SG_ Fx m1 "))).unwrap_err();
+    assert!(multiplexed.contains("multiplexed"), "{multiplexed}");
+    let id = DBC.lines().find(|line| line.starts_with("BO_") && line.contains("NETFT_Short1")).unwrap();
+    let id: u32 = id.split_whitespace().nth(1).unwrap().parse().unwrap();
+    let float = said(&format!("{DBC}\nSIG_VALTYPE_ {id} Fx : 1;\n")).unwrap_err();
+    assert!(float.contains("float of 16 bits"), "{float}");
+}
+
+/// Several set-points in one line, hexadecimal, and the emulator's ear for them.
+#[test]
+fn a_line_carries_several_set_points() {
+    let text = changed(SCPI, "SOUR1:FREQ {}", "APPL {},{amplitude:.2},{enable:04X}");
+    let profile = Profile::parse(&text).unwrap();
+    let set = |name: &str| profile.set(name).unwrap();
+    let newest = |other| if other == set("amplitude") { 1.25 } else { 1.0 };
+    let (line, answer) = profile.line(set("frequency"), 27_500.5, &newest).unwrap();
+    assert_eq!((line.as_str(), answer), ("APPL 27500.500,1.25,0001", None));
+    let heard = profile.heard(set("frequency"), &line).unwrap();
+    assert_eq!(heard, [(set("frequency"), 27_500.5), (set("amplitude"), 1.25), (set("enable"), 1.0)]);
+    assert_eq!(profile.heard(set("frequency"), "APPL 27500.5"), None);
+    assert_eq!(profile.heard(set("enable"), "OUTP1 1"), Some(vec![(set("enable"), 1.0)]));
+    assert_eq!(profile.line(set("enable"), 0.0, &newest).unwrap().0, "OUTP1 0");
+}
+
+/// A float's type says nothing of its resolution, a DBC signal's factor does.
+#[test]
+fn a_resolution_is_stated_or_known_or_unknown() {
+    let lsb = |text: &str, signal: &str, dbc: &str| {
+        let profile = Profile::parse_with(text, &|_| Some(dbc.to_string())).unwrap();
+        profile.lsb_si(profile.signal(signal).unwrap(), &profile.values())
+    };
+    assert_eq!(lsb(RTU, "fx", DBC), 0.01, "a count of a whole number");
+    let float = RTU.replacen("register = 0\ntype = \"i16\"", "register = 0\ntype = \"f32\"", 1);
+    assert!(lsb(&float, "fx", DBC).is_nan());
+    let stated = float.replacen("type = \"f32\"", "type = \"f32\"\nresolution_si = 1e-4", 1);
+    assert_eq!(lsb(&stated, "fx", DBC), 1e-4);
+    let fx = DBC.lines().find(|line| line.contains("SG_ Fx ")).unwrap();
+    let factor = DBC.replacen(fx, &fx.replacen("(1,", "(0.001,", 1), 1);
+    let (one, thousandth) = (lsb(CAN, "fx", DBC), lsb(CAN, "fx", &factor));
+    assert!((thousandth / one - 1e-3).abs() < 1e-12, "{thousandth} {one}");
+}

@@ -1,0 +1,102 @@
+//! A profile tried before any instrument is: its vectors, then its own emulator's answers read for a second.
+
+use drivers::library::Source;
+use instruments::profile::{FrameKind, Refusal};
+use instruments::traffic::LineSetup;
+use instruments::{FrameId, Profile};
+use realtime::ports::Nanos;
+use sim::wire::Plant;
+use sim::wire::device::Device;
+use sim::wire::world::WorldPlant;
+use sim::world::{World, WorldConfig};
+use std::path::Path;
+
+/// Rehearses the profile in a file.
+///
+/// # Errors
+/// What is wrong with it, with the place where it is known.
+pub fn of(path: &Path) -> Result<(), String> {
+    let profile =
+        Source::read(path).and_then(|source| source.profile()).map_err(|error| error.to_string())?;
+    line(&profile)?;
+    second(profile)
+}
+
+/// Whether the samples fit the line.
+fn line(profile: &Profile) -> Result<(), String> {
+    match profile.line_share(LineSetup::default()) {
+        Some(share) if share > 1.0 => Err(format!(
+            "[link]: the samples take {:.0} % of the line's capacity; lower `rate_hz`",
+            share * 1e2
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Plays a second of the emulator's frames against the profile's own reading of them.
+fn second(profile: Profile) -> Result<(), String> {
+    let mut device = Device::new(profile.clone()).map_err(|error| error.to_string())?;
+    let world = World::new(&WorldConfig::ideal(), 1).map_err(|error| error.to_string())?;
+    let mut plant = WorldPlant::new(world);
+    let mut values = profile.values();
+    let frames: Vec<FrameId> = (0..profile.frames().len()).map(FrameId).collect();
+    let rates: Vec<Option<f64>> = frames.iter().map(|&frame| rate_hz(&profile, frame)).collect();
+    for ms in 0..1000_u32 {
+        let now = Nanos(u64::from(ms) * 1_000_000);
+        plant.advance(now);
+        for (&frame, rate) in frames.iter().zip(&rates) {
+            let every = rate.map_or(u32::MAX, |rate| (1e3 / rate).round().max(1.0) as u32);
+            if ms % every != 0 {
+                continue;
+            }
+            let name = &profile.frames()[frame.0].name;
+            let bytes = device.frame(frame, &mut plant, now);
+            profile.decode(frame, &bytes, &mut values).map_err(|error| format!("`{name}`: {error}"))?;
+        }
+        if let Some(broken) = profile.broken_signature(&values) {
+            let when = profile.description.signature[broken].when.as_ref();
+            return Err(format!(
+                "[emulator] does not satisfy the signature `{when}`: give its signals values there"
+            ));
+        }
+    }
+    let unread = |name: &&String| {
+        let signal = profile.signal(name);
+        signal.is_some_and(|signal| profile.refusal(signal, &values) == Some(Refusal::NotANumber))
+    };
+    match profile.description.emulator.measure.keys().find(unread) {
+        Some(name) => Err(format!("signal `{name}` is no number in the emulator's own frames")),
+        None => Ok(()),
+    }
+}
+
+/// How often a frame comes; `None` for once.
+fn rate_hz(profile: &Profile, frame: FrameId) -> Option<f64> {
+    let d = &profile.description;
+    match &profile.frames()[frame.0].kind {
+        FrameKind::Poll(index) => d.poll[*index].rate_hz,
+        FrameKind::Stream => d.stream.as_ref().map(|stream| stream.rate_hz),
+        FrameKind::Messages(index, _) => Some(d.message[*index].rate_hz),
+        FrameKind::Query(index) => Some(d.query[*index].rate_hz),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bundled_profile_stands_its_rehearsal() {
+        for id in drivers::bundled::ids() {
+            let profile = drivers::profile(id).unwrap();
+            line(&profile).and_then(|()| second(profile)).unwrap_or_else(|problem| panic!("{id}: {problem}"));
+        }
+    }
+
+    #[test]
+    fn a_quantity_that_the_world_does_not_have_is_told() {
+        let mut profile = drivers::profile("muprime-force2").unwrap();
+        profile.description.emulator.measure.insert("normal".into(), "force.normal_kg".into());
+        assert!(second(profile).unwrap_err().contains("force.normal_kg"));
+    }
+}
