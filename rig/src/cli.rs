@@ -9,6 +9,7 @@ pub mod diagnose;
 pub mod doctor;
 pub mod export;
 pub mod faults;
+pub mod import;
 pub mod model;
 pub mod recover;
 pub mod replay;

@@ -14,6 +14,7 @@
 //! | [`figures`] | the paper's figures recomputed |
 //! | [`files`], [`mod@print`] | how files are written, and how the program speaks: each in one place |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
+//! | [`mod@import`] | foreign tables made into point tables |
 //! | [`model_file`] | a corrected model from its file to the loop |
 //! | [`input`] | files that people wrote, refused with the place |
 //! | [`validation`] | the blind score of the diagnosis, and the fault bench of the controller |
@@ -44,6 +45,7 @@ pub mod exposure;
 pub mod figures;
 pub mod files;
 pub mod fingertip;
+pub mod import;
 pub mod input;
 pub mod model_file;
 pub mod plan;

@@ -43,6 +43,8 @@ enum Verb {
     Faults(cli::faults::Args),
     /// Evaluate the models: a point, a finite element case, a study, the paper's figures
     Model(cli::model::ModelArgs),
+    /// Make a point table of a foreign one: any delimiter, Excel, Parquet, NumPy, time series
+    Import(cli::import::Args),
     /// Write the report of a run
     Report(cli::report::Args),
     /// Run a recorded run's cycles again: the same decisions, bit for bit
@@ -103,6 +105,7 @@ fn run(verb: Verb, json: bool) -> ExitCode {
         Verb::Blind(args) => cli::blind::run(args, json),
         Verb::Faults(args) => cli::faults::run(args, json),
         Verb::Model(args) => cli::model::run(args, json),
+        Verb::Import(args) => cli::import::run(args, json),
         Verb::Report(args) => cli::report::run(args, json),
         Verb::Replay(args) => cli::replay::run(args, json),
         Verb::Export(args) => cli::export::run(args, json),
