@@ -48,7 +48,7 @@ impl InstrumentsSetup {
 }
 
 /// One instrument: its profile, and where it is.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSetup {
     /// Id of the profile.
@@ -122,7 +122,7 @@ impl InstrumentSetup {
 }
 
 /// How one axis of the rig comes out of an instrument's signal: `force = gain * signal - offset`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxisSetup {
     /// Name of the signal in the profile.

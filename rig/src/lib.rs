@@ -18,6 +18,7 @@
 //! | [`model_file`] | a corrected model from its file to the loop |
 //! | [`input`] | files that people wrote, refused with the place |
 //! | [`validation`] | the blind score of the diagnosis, and the fault bench of the controller |
+//! | [`words`] | schemas, the reference of all keys, commented beginnings, what is bundled |
 //! | [`cli`] | one file a subcommand |
 //!
 //! ```
@@ -57,3 +58,4 @@ pub mod session;
 pub mod setup;
 pub mod supervisor;
 pub mod validation;
+pub mod words;

@@ -24,7 +24,7 @@ pub use bundled::{BUNDLED, text as bundled_text};
 pub use limits::LimitsFile;
 
 /// A setup file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SetupFile {
     /// Name of the rig, for records and reports.
@@ -94,7 +94,7 @@ impl SetupFile {
 }
 
 /// Pace of the loop.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pace {
     /// Cycles per second.
@@ -129,7 +129,7 @@ impl Pace {
 }
 
 /// The embedded virtual rig.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct VirtualRig {
     /// No departure from the model at all. Otherwise the bundled world, which departs by one sealed effect.

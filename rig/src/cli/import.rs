@@ -12,19 +12,11 @@ use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "\
-Examples:
-  muprime import sweep.csv -o sweep
-  muprime import sweep.csv --map 'amp_um=amplitude_pp:um, F_N=normal_force:N, FT_N=lateral_force:N, v=speed:mm/s, t=time:s' --set frequency_hz=27500,direction=1 -o sweep
-  muprime import pins.xlsx --sheet Friction --map 't=time:s, mu=friction_coefficient' --set amplitude_pp_m=0,speed=10:mm/s,direction=1,normal_force=5:N -o pins
-  muprime import stroke.txt --series --map 't=time:s, x=position:mm, Fz=normal_force:-N, Fx=lateral_force:N' --set amplitude_pp_m=0 -o stroke
-  muprime diagnose sweep
-
-Targets, their units and the usual headers are listed in docs/reference.md.")]
 pub struct Args {
     /// The table: delimited text, Excel or OpenDocument, Parquet, NumPy
     file: PathBuf,
-    /// What is what: HEADER=TARGET:UNIT, parted by commas; may be repeated [default: guessed from the headers and shown]
+    /// What is what: HEADER=TARGET:UNIT, parted by commas; may be repeated; docs/reference.md lists targets and units [default: guessed
+    /// from the headers and shown]
     #[arg(long)]
     map: Vec<String>,
     /// Constants for what has no column: NAME=VALUE[:UNIT], parted by commas; may be repeated

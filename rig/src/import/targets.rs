@@ -88,6 +88,11 @@ impl Target {
         exact.or_else(|| TARGETS.iter().position(|t| t.column == name))
     }
 
+    /// Headers that usually mean it, without case, blanks, marks and unit.
+    pub const fn headers(&self) -> &'static [&'static str] {
+        self.headers
+    }
+
     /// Whether a header, made plain by [`plain`], usually means this.
     pub fn is_headed(&self, plain: &str) -> bool {
         let column: String = self.column.chars().filter(char::is_ascii_alphanumeric).collect();
