@@ -469,6 +469,12 @@ impl Sequence {
             return;
         }
         if row.now.since(since) > APPROACH_WITHIN {
+            // The stop that follows is an orderly one; why it comes is said here.
+            tracing::warn!(
+                "point {}: the stage did not come to its start position within {} s: the sweep stops",
+                point.number,
+                APPROACH_WITHIN.seconds()
+            );
             self.stopping = true;
             return;
         }

@@ -114,7 +114,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     say!("{source}: {}; {} rows", log.format, log.rows);
     for range in &log.ranges {
         let [low, median, high] = range.low_median_high;
-        say!("  {:<22} {low:>12.4e} to {high:.4e}, half of them below {median:.4e}", range.column);
+        say!("  {:<22} {} to {}, median {}", range.column, short(low), short(high), short(median));
     }
     log.notes.iter().for_each(|note| say!("note: {note}"));
     log.assumed.iter().for_each(|what| say!("assumed in rig.toml: {what}"));
@@ -147,6 +147,19 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         args.out.display()
     );
     super::exit(super::DONE)
+}
+
+/// Four digits, with a power of ten where the number is far from one.
+fn short(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 {
+        return "0".into();
+    }
+    if (1e-3..1e5).contains(&size) {
+        let digits = (3.0 - size.log10().floor()).clamp(0.0, 6.0);
+        return format!("{value:.*}", digits as usize);
+    }
+    format!("{value:.3e}")
 }
 
 /// The map that was stated, or the guessed one once it is confirmed.

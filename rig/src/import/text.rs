@@ -92,6 +92,9 @@ fn split(line: &str, delimiter: char) -> miette::Result<Vec<String>> {
     if delimiter == ' ' {
         return Ok(line.split_whitespace().map(String::from).collect());
     }
+    if !line.contains('"') {
+        return Ok(line.split(delimiter).map(String::from).collect());
+    }
     let delimiter = u8::try_from(delimiter).into_diagnostic()?;
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter)
