@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 pub const SCHEMA: &str = "muprime.certificate/1";
 
 /// The instrument (or fingertip) that a certificate is about.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Instrument {
     /// What it is, for people.
@@ -30,7 +30,7 @@ pub struct Instrument {
 }
 
 /// The data that was evaluated.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawData {
     /// File name or origin, for people.
@@ -49,7 +49,7 @@ impl RawData {
 }
 
 /// One parameter of the model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
     /// Name, as the model names it.
@@ -82,7 +82,7 @@ impl Parameter {
 }
 
 /// What the model left of the data.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Residuals {
     /// Number of residuals.
@@ -99,7 +99,7 @@ pub struct Residuals {
 }
 
 /// Where and for how long a certificate holds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Validity {
     /// From this instant, RFC 3339 in UTC.
@@ -115,7 +115,7 @@ pub struct Validity {
 }
 
 /// A line of the uncertainty budget: relative or absolute as its unit says.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BudgetLine {
     /// Where it comes from.
@@ -129,7 +129,7 @@ pub struct BudgetLine {
 }
 
 /// Type of evaluation of an uncertainty (GUM 0.7).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Evaluation {
     /// By statistics of observations.
     A,
@@ -138,7 +138,7 @@ pub enum Evaluation {
 }
 
 /// The content of a certificate file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Certificate {
     /// [`SCHEMA`].

@@ -292,8 +292,11 @@ const AS_LARGE: f64 = 1.4;
 /// Largest lateral force over normal force that a finger on a plate can have, offsets of the sensor included.
 const LARGEST_RATIO: f64 = 100.0;
 
-/// The first value of a pass that no pass can have.
-fn check(p: &Pass) -> Result<(), DataError> {
+/// Looks for the first value of a pass that no pass can have.
+///
+/// # Errors
+/// The column, its value and what would be accepted.
+pub fn check(p: &Pass) -> Result<(), DataError> {
     let refuse = |column, value, needed| Err(DataError::BadValue { point: p.point, column, value, needed });
     let condition = p.condition(1.0);
     for c in covariate::TOLD {

@@ -6,7 +6,7 @@ use crate::left_out::{Gate, Region, gate, left_out_regions};
 use effects::imitated;
 
 /// The four answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The recalibrated baseline explains the table.

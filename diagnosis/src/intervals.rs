@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 /// Shape of a profile.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
     /// Both ends are inside the parameter's range.
@@ -21,7 +21,7 @@ pub enum Shape {
 }
 
 /// A parameter with its interval.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Estimate {
     /// Name.
     pub name: &'static str,

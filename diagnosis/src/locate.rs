@@ -17,7 +17,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
 
 /// A box of the operating space with its share of the gap.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Region {
     /// Bounds of the covariates that are bounded.
     pub bounds: BTreeMap<&'static str, [f64; 2]>,

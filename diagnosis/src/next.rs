@@ -20,10 +20,11 @@ use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
 /// A next experiment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Experiment {
     /// Conditions to run, those that tell most first; empty for an action on an instrument.
     #[serde(serialize_with = "settings")]
+    #[schemars(with = "Vec<BTreeMap<String, f64>>")]
     pub conditions: Vec<Condition>,
     /// The two hypotheses that it parts: the leader and its strongest rival.
     pub separates: [String; 2],

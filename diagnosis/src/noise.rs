@@ -12,7 +12,7 @@ use models::quantity::PeakToPeak;
 use serde::Serialize;
 
 /// What the replicates say about the stated repeatability.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct PureError {
     /// Degrees of freedom of the replicates.
     pub degrees_of_freedom: usize,

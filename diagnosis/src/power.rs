@@ -7,7 +7,7 @@ use crate::left_out::full_friction;
 use serde::Serialize;
 
 /// The size of an effect from which a table like this would claim a gap.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct SeenFrom {
     /// Name of the effect.
     pub effect: &'static str,

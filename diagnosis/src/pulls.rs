@@ -12,7 +12,7 @@ use effects::{Law, Place, library};
 use serde::Serialize;
 
 /// Pull of one stiffness from its prior.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Pull {
     /// `normal_stiffness` or `lateral_stiffness`.
     pub quantity: &'static str,

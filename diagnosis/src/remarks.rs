@@ -13,7 +13,7 @@ use serde::Serialize;
 const TOLD: usize = 8;
 
 /// The verdict on a table whose suspect passes count as any other.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct WithSuspects {
     /// The answer.
     pub verdict: Verdict,

@@ -25,7 +25,7 @@ use serde::Serialize;
 use surface::{State, Surface};
 
 /// A pass that does not belong to the rest of its table.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Suspect {
     /// Number of the point.
     pub point: u64,
@@ -41,7 +41,7 @@ pub struct Suspect {
 }
 
 /// What a table says about its own scatter.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Scatter {
     /// Standard deviation of a pass over the stated one, as it was used.
     pub scale: f64,

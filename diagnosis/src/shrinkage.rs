@@ -20,7 +20,7 @@ const LEAST_DRAWS: usize = 20;
 const CI95: [f64; 2] = [0.025, 0.975];
 
 /// The gap in units of full friction, on held-out passes; none where the table is too short to hold passes out.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Gap {
     /// Unit of the errors.
     pub unit: &'static str,

@@ -19,7 +19,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// One hypothesis with its probability.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Hypothesis {
     /// Names; none for no gap, `unknown` for the open set.
     pub effects: Vec<String>,
@@ -35,7 +35,7 @@ pub struct Hypothesis {
 }
 
 /// Where the gap lies.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Where {
     /// Probability by place.
     pub place: BTreeMap<&'static str, f64>,
@@ -44,7 +44,7 @@ pub struct Where {
 }
 
 /// An effect that the table cannot show.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct NotTestable {
     /// Name.
     pub effect: String,
@@ -53,7 +53,7 @@ pub struct NotTestable {
 }
 
 /// What the leader did on regions that were left out of its fit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct LeftOut {
     /// Share of the gap closed, pooled.
     pub pooled_closure: f64,
@@ -66,7 +66,7 @@ pub struct LeftOut {
 }
 
 /// Size and fingerprint of the table.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct DataNote {
     /// Number of passes.
     pub points: usize,
@@ -75,7 +75,7 @@ pub struct DataNote {
 }
 
 /// Schema `muprime.verdict/1`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Report {
     /// `muprime.verdict/1`.
     pub schema: &'static str,

@@ -52,7 +52,7 @@ impl InstrumentsSetup {
 }
 
 /// One instrument: its profile, and where it is.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSetup {
     /// Id of the profile; in a file, also the path of one.
@@ -138,7 +138,7 @@ impl InstrumentSetup {
 }
 
 /// How one axis of the rig comes out of an instrument's signal: `force = gain * signal - offset`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxisSetup {
     /// Name of the signal in the profile.

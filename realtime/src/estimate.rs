@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub const WINDOW_MAX: usize = 256;
 
 /// How the running estimate is made.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EstimateConfig {
     /// Samples in the running mean, 1 to [`WINDOW_MAX`].

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// A fingertip as its file describes it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FingertipFile {
     /// Name in the library.
@@ -26,7 +26,7 @@ pub struct FingertipFile {
 }
 
 /// What kind of tip.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// A person's finger: dead-man input and exposure limits apply.
@@ -38,7 +38,7 @@ pub enum Kind {
 }
 
 /// How a setup names its fingertip: `tip = "name"`, with numbers of its own where a calibration has better ones.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FingertipSetup {
     /// Name in the library, or path of a file, relative to the setup.

@@ -15,9 +15,11 @@
 //! | [`figures`] | the paper's figures recomputed |
 //! | [`files`], [`mod@print`] | how files are written, and how the program speaks: each in one place |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
+//! | [`mod@import`] | foreign tables made into point tables |
 //! | [`model_file`] | a corrected model from its file to the loop |
 //! | [`input`] | files that people wrote, refused with the place |
 //! | [`validation`] | the blind score of the diagnosis, and the fault bench of the controller |
+//! | [`words`] | schemas, the reference of all keys, commented beginnings, what is bundled |
 //! | [`cli`] | one file a subcommand |
 //!
 //! ```
@@ -45,6 +47,7 @@ pub mod exposure;
 pub mod figures;
 pub mod files;
 pub mod fingertip;
+pub mod import;
 pub mod input;
 pub mod model_file;
 pub mod plan;
@@ -57,3 +60,4 @@ pub mod session;
 pub mod setup;
 pub mod supervisor;
 pub mod validation;
+pub mod words;

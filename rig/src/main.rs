@@ -2,10 +2,10 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use muprime_rig::cli;
 use muprime_rig::print::Remarks;
-use muprime_rig::say;
+use muprime_rig::{out, say};
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use tracing_subscriber::filter::Targets;
@@ -46,6 +46,8 @@ enum Verb {
     Faults(cli::faults::Args),
     /// Evaluate the models: a point, a finite element case, a study, the paper's figures
     Model(cli::model::ModelArgs),
+    /// Make a point table of a foreign one: any delimiter, Excel, Parquet, NumPy, time series
+    Import(cli::import::Args),
     /// Write the report of a run
     Report(cli::report::Args),
     /// Run a recorded run's cycles again: the same decisions, bit for bit
@@ -58,8 +60,25 @@ enum Verb {
     Runs(cli::runs::Args),
     /// Follow a run
     Watch(cli::watch::Args),
+    /// Print the JSON Schema of a kind of file, for editors and programs
+    Schema(cli::schema::Args),
+    /// Print a commented file to begin with: a plan, a setup, a fingertip, a profile
+    Init(cli::init::Args),
+    /// List what is bundled, or print one of it
+    Show(cli::show::Args),
+    /// Write manual pages
+    Man(cli::man::Args),
     /// Print a completion script for a shell
     Completions(cli::completions::Args),
+}
+
+/// The command line, with an example for every command.
+fn command() -> clap::Command {
+    cli::examples::with_examples(Cli::command())
+}
+
+fn parsed(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Cli, clap::Error> {
+    Cli::from_arg_matches(&command().try_get_matches_from(arguments)?)
 }
 
 fn main() -> ExitCode {
@@ -70,9 +89,16 @@ fn main() -> ExitCode {
         say!("{} is not text in UTF-8: give the file or folder another name", argument.display());
         return ExitCode::from(cli::REFUSED);
     }
-    let cli = match Cli::try_parse() {
+    let cli = match parsed(std::env::args_os()) {
         Ok(cli) => cli,
         Err(error) => {
+            if error.use_stderr() && std::env::args().any(|a| a == "--json") {
+                let said = error.to_string();
+                out!(
+                    "{}",
+                    serde_json::json!({ "error": said.lines().next().unwrap_or_default(), "status": cli::REFUSED })
+                );
+            }
             let _ = error.print();
             return ExitCode::from(if error.use_stderr() { cli::REFUSED } else { cli::DONE });
         }
@@ -107,20 +133,82 @@ fn run(verb: Verb, json: bool) -> ExitCode {
         Verb::Blind(args) => cli::blind::run(args, json),
         Verb::Faults(args) => cli::faults::run(args, json),
         Verb::Model(args) => cli::model::run(args, json),
+        Verb::Import(args) => cli::import::run(args, json),
         Verb::Report(args) => cli::report::run(args, json),
         Verb::Replay(args) => cli::replay::run(args, json),
         Verb::Export(args) => cli::export::run(args, json),
         Verb::Recover(args) => cli::recover::run(args, json),
         Verb::Runs(args) => cli::runs::run(args, json),
         Verb::Watch(args) => cli::watch::run(args, json),
-        Verb::Completions(args) => cli::completions::run(&args, &mut Cli::command()),
+        Verb::Schema(args) => cli::schema::run(&args),
+        Verb::Init(args) => cli::init::run(&args),
+        Verb::Show(args) => cli::show::run(&args, json),
+        Verb::Man(args) => cli::man::run(&args, &command()),
+        Verb::Completions(args) => cli::completions::run(&args, &mut command()),
     });
     match outcome {
         Ok(Ok(code)) => code,
         Ok(Err(report)) => {
+            let status = cli::status_of(&report);
+            if json {
+                let causes: Vec<String> = report.chain().skip(1).map(ToString::to_string).collect();
+                let help = report.help().map(|h| h.to_string());
+                out!(
+                    "{}",
+                    serde_json::json!({ "error": report.to_string(), "causes": causes, "help": help, "status": status })
+                );
+            }
             say!("{report:?}");
-            ExitCode::from(cli::status_of(&report))
+            ExitCode::from(status)
         }
         Err(_) => ExitCode::from(cli::INTERNAL),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn leaves(command: &clap::Command, path: &str, into: &mut Vec<String>) {
+        let subs: Vec<_> = command.get_subcommands().filter(|s| s.get_name() != "help").collect();
+        if subs.is_empty() {
+            assert!(
+                command.get_after_help().is_some(),
+                "{path}: no example under --help; add one in cli/examples.rs"
+            );
+            into.push(path.to_string());
+        }
+        for sub in subs {
+            leaves(sub, format!("{path} {}", sub.get_name()).trim(), into);
+        }
+    }
+
+    /// Words of a line as a shell parts them, quotes taken off.
+    fn words(line: &str) -> Vec<std::ffi::OsString> {
+        let (mut all, mut now, mut quoted) = (Vec::new(), String::new(), false);
+        for c in line.chars() {
+            match c {
+                '\'' => quoted = !quoted,
+                ' ' if !quoted => all.push(std::mem::take(&mut now)),
+                c => now.push(c),
+            }
+        }
+        all.push(now);
+        all.into_iter().filter(|w| !w.is_empty()).map(Into::into).collect()
+    }
+
+    #[test]
+    fn every_command_has_an_example_and_each_example_parses() {
+        let mut there = Vec::new();
+        leaves(&command(), "", &mut there);
+        for (path, lines) in cli::examples::EXAMPLES {
+            assert!(there.iter().any(|p| p == path), "{path}: no such command");
+            for line in lines.lines().map(str::trim) {
+                assert!(line.starts_with(&format!("muprime {path}")), "{line}");
+                if let Err(error) = parsed(words(line)) {
+                    panic!("{line}: {error}");
+                }
+            }
+        }
     }
 }

@@ -17,7 +17,7 @@ pub use points::{PlanProblem, Point, Resolution};
 pub use visible::{COUNTS_MIN, LateralChannel};
 
 /// A plan file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanFile {
     /// Name, for records and reports.
@@ -50,6 +50,7 @@ pub struct PlanFile {
     pub series: Vec<Series>,
     /// Preparation and environment, as section 2.2 of the paper records them: copied into the record.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     pub protocol: BTreeMap<String, toml::Value>,
 }
 
@@ -79,7 +80,7 @@ impl PlanFile {
 }
 
 /// Times of a pass.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PassTimes {
     /// s from loading and starting until the average begins.
@@ -97,7 +98,7 @@ impl Default for PassTimes {
 }
 
 /// Base values of a plan.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Base {
     /// m, peak-to-peak.
@@ -114,7 +115,7 @@ pub struct Base {
 }
 
 /// One series: the product of its lists.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Series {
     /// Name, for reports.

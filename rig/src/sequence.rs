@@ -18,7 +18,7 @@ use realtime::compare::{Agreement, Comparator, PassComparison};
 use realtime::cycle::{Command, Marker, Phase};
 use realtime::estimate::Moments;
 use realtime::ports::{Nanos, NoData};
-use realtime::safety::{Cause, Limits, Request, Trip};
+use realtime::safety::{Cause, ChannelTiming, Limits, Request, Trip};
 use realtime::turn::Row;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -170,6 +170,28 @@ const APPROACH_WITHIN: Nanos = Nanos(20_000_000_000);
 /// A pass without contact is made again so often before the sweep gives up.
 const TRIES: u32 = 3;
 
+/// How a start position is approached: velocity in proportion to the way that is left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Approach {
+    /// Cycles from one command to the next.
+    every: u64,
+    /// Velocity over way, 1/s.
+    gain: f64,
+}
+
+impl Approach {
+    /// Where the loop and the stage are fast: a command every five milliseconds.
+    const FASTEST: Approach = Approach { every: 5, gain: 25.0 };
+
+    /// For a loop and a stage of these periods. A command acts on a position that is as old as the stage's sample, its way
+    /// and the time since the last command: a gain beyond one over that would swing about the goal and never arrive.
+    fn at(cycle: Nanos, stage: &ChannelTiming) -> Self {
+        let every = (5e-3 / cycle.seconds()).round().max(1.0);
+        let old = (every + 1.0) * cycle.seconds() + stage.period.seconds() + stage.latency.seconds();
+        Approach { every: every as u64, gain: (0.7 / old).min(Self::FASTEST.gain) }
+    }
+}
+
 /// Sums over the steady part of a pass.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
@@ -197,6 +219,7 @@ pub struct Sequence {
     departed: bool,
     /// Of the last pass that could be compared, of earlier sessions too.
     last_comparison: Option<PassComparison>,
+    approach: Approach,
     started: bool,
     poisson_ratio: f64,
     temperature_ranges: Vec<TemperatureRange>,
@@ -231,6 +254,7 @@ impl Sequence {
             stopping: false,
             departed: false,
             last_comparison: None,
+            approach: Approach::FASTEST,
             started: false,
             poisson_ratio: tip.finger.poisson_ratio,
             temperature_ranges: Vec::new(),
@@ -260,7 +284,11 @@ impl Sequence {
 
     /// The same, with the limits of the rig that is armed: what guards are missing is told then.
     pub fn guarded_by(self, limits: &Limits) -> Self {
-        Sequence { has_watchdog: limits.amplifier_watchdog, ..self }
+        Sequence {
+            has_watchdog: limits.amplifier_watchdog,
+            approach: Approach::at(limits.timing.cycle, &limits.timing.stage),
+            ..self
+        }
     }
 
     /// Takes in a pass of an earlier session of the same run: `mu_0` and the evidence go on from there.
@@ -441,16 +469,22 @@ impl Sequence {
             return;
         }
         if row.now.since(since) > APPROACH_WITHIN {
+            // The stop that follows is an orderly one; why it comes is said here.
+            tracing::warn!(
+                "point {}: the stage did not come to its start position within {} s: the sweep stops",
+                point.number,
+                APPROACH_WITHIN.seconds()
+            );
             self.stopping = true;
             return;
         }
         // Slow down towards the goal: the stage has its own acceleration, the way here is a first-order approach.
         let fast = self.times.approach_speed_m_s;
-        let velocity = (away * 25.0).clamp(-fast, fast);
+        let velocity = (away * self.approach.gain).clamp(-fast, fast);
         let velocity = if velocity.abs() < 2e-3 { 2e-3 * away.signum() } else { velocity };
         let request = Request { velocity_m_s: velocity, ..Request::default() };
         // Only news goes to the loop, and not more often than it can matter.
-        if !self.started || row.cycle.is_multiple_of(5) {
+        if !self.started || row.cycle.is_multiple_of(self.approach.every) {
             self.started = true;
             out.commands.push(Command::Set(request, self.marker(Phase::Approach)));
         }

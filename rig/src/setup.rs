@@ -26,7 +26,7 @@ pub use limits::LimitsFile;
 pub use profiles::look_in;
 
 /// A setup file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SetupFile {
     /// Name of the rig, for records and reports.
@@ -96,7 +96,7 @@ impl SetupFile {
 }
 
 /// Pace of the loop.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pace {
     /// Cycles per second.
@@ -131,7 +131,7 @@ impl Pace {
 }
 
 /// The embedded virtual rig.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct VirtualRig {
     /// No departure from the model at all. Otherwise the bundled world, which departs by one sealed effect.

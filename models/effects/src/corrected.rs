@@ -18,7 +18,7 @@ const MOST_PARAMETERS: usize = 4;
 const MOST_EFFECTS: usize = 4;
 
 /// MODEL.toml.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SavedModel {
     /// `muprime.model/1`.
@@ -39,7 +39,7 @@ pub struct SavedModel {
 }
 
 /// One effect of a saved model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SavedEffect {
     /// Name.
@@ -56,7 +56,7 @@ pub struct SavedEffect {
 }
 
 /// One parameter of a saved effect.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SavedParameter {
     /// Name.

@@ -4,7 +4,7 @@ use crate::contact::Contact;
 use models::condition::Condition;
 
 /// Reference scales of a whole table: effects that need a zero of time, load or temperature take it from here.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 pub struct Design {
     /// Time from the first to the last pass, s.
     pub duration_s: f64,
@@ -23,7 +23,7 @@ pub struct Design {
 }
 
 /// The parameters of the baseline: all that recalibration may move.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 pub struct Baseline {
     /// Intrinsic friction coefficient.
     pub mu0: f64,

@@ -9,58 +9,62 @@ use realtime::safety::{ChannelTiming, LimitError, Limits, Timing};
 use serde::{Deserialize, Serialize};
 
 /// Soft limits as a setup states them.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LimitsFile {
-    /// N.
+    /// Largest normal force: above 0, to 5, in N. Default: 1.5.
     pub normal_force_max_n: Option<f64>,
-    /// N.
+    /// Largest lateral force: above 0, to 10, in N. Default: 2.
     pub lateral_force_max_n: Option<f64>,
-    /// N between two samples.
+    /// Largest step between two samples: 0.01 to 5, in N; a single one is a spike. Default: 0.5.
     pub force_step_max_n: Option<f64>,
-    /// N/s.
+    /// Fastest change of a force: 1 to 500, in N/s. Default: 60.
     pub force_rate_max_n_s: Option<f64>,
-    /// m, peak-to-peak.
+    /// Largest amplitude: peak-to-peak, above 0, to 10e-6, in m. Default: 6e-6.
     pub amplitude_max_pp_m: Option<f64>,
-    /// m/s.
+    /// Fastest change of the amplitude: 1e-6 to 0.1, in m/s. Default: 0.02.
     pub amplitude_rate_max_m_s: Option<f64>,
-    /// Hz.
+    /// Lowest frequency: 5e3 to 1.2e5, in Hz. Default: 1e4.
     pub frequency_min_hz: Option<f64>,
-    /// Hz.
+    /// Highest frequency: 5e3 to 1.2e5, in Hz. Default: 1e5.
     pub frequency_max_hz: Option<f64>,
-    /// m/s.
+    /// Largest speed: above 0, to 1, in m/s. Default: 0.25.
     pub speed_max_m_s: Option<f64>,
-    /// m.
+    /// Lower end of the travel: -0.5 to 0.5, at least 1e-3 below the upper one, in m. Default: -0.06.
     pub travel_min_m: Option<f64>,
-    /// m.
+    /// Upper end of the travel: -0.5 to 0.5, at least 1e-3 above the lower one, in m. Default: 0.06.
     pub travel_max_m: Option<f64>,
-    /// Degrees Celsius.
+    /// Highest temperature: to 48, in deg C. Default: 45.
     pub temperature_max_c: Option<f64>,
-    /// Whether a temperature is read.
+    /// Whether a temperature is read: either, true with a human finger; where a temperature is read, losing
+    /// it is a trip. Default: true.
     pub temperature_fitted: Option<bool>,
-    /// Equal raw samples in a row.
+    /// Equal raw samples in a row that are a frozen channel: 20 to 1000 equal raw samples in a row. Default:
+    /// 50.
     pub frozen_after: Option<u32>,
-    /// Equal raw amplitudes in a row, while driven; left out, 200 where the profile states the readback's noise.
+    /// Equal raw amplitudes in a row that are a frozen readback: 20 to 1000, while driven. Default: 200 where
+    /// the profile states the readback's noise.
     pub amplitude_frozen_after: Option<u32>,
-    /// A human finger is in the rig.
+    /// A human finger is in the rig: second channel, emergency stop, dead-man device and exposure apply.
+    /// Default: false.
     pub human_contact: Option<bool>,
-    /// A key held at the terminal stands for a dead-man device: for trials.
+    /// A key held at the terminal stands for a dead-man device: for trials. Default: false.
     pub dead_man_key: Option<bool>,
-    /// s in one go.
+    /// Of vibration in one go, to 600, in s. Default: 60.
     pub exposure_max_s: Option<f64>,
-    /// s of rest that end a go.
+    /// Rest that ends a go, 10 to 3600, in s. Default: 60.
     pub exposure_rest_s: Option<f64>,
-    /// Share of the last hour.
+    /// Share of the last hour, 1e-3 to 0.5, a ratio. Default: 0.25.
     pub exposure_duty_max: Option<f64>,
-    /// m2/s: the squared rms velocity of the plate, summed over the last hour.
+    /// Squared rms velocity of the plate over the last hour, 1e-3 to 100, in m2/s. Default: 25.
     pub exposure_dose_max_m2_s: Option<f64>,
-    /// s that a link's thread may be held up before its channel counts as stale, beyond three of its periods.
+    /// 0 to 0.05: how long a link's thread may be held up beyond three of its periods, in s. Default: 0.02.
     pub link_stall_s: Option<f64>,
-    /// Late cycles among a thousand.
+    /// Missed deadlines among a thousand, to 100. Default: 10.
     pub late_cycles_max: Option<u32>,
-    /// Late cycles in a row that are one too many.
+    /// Missed deadlines in a row that are one too many, to 50. Default: 3.
     pub late_in_a_row_max: Option<u32>,
-    /// s, `Q / (pi f)` of the plate.
+    /// `Q / (pi f)` of the plate, 1e-5 to 0.05, in s. Default: 0.0025.
     pub plate_ring_time_s: Option<f64>,
 }
 

@@ -1,0 +1,92 @@
+//! An example for every command: it stands under `--help` and in the manual, and a test parses each.
+
+/// Commands with their examples, a line each. Add one with every subcommand.
+pub const EXAMPLES: &[(&str, &str)] = &[
+    (
+        "run",
+        "muprime run\nmuprime run my-plan.toml --setup my-setup.toml --out runs/monday\nmuprime run --fast --seed 7 --model MODEL.toml",
+    ),
+    ("virtual-rig", "muprime virtual-rig --modbus-tcp 127.0.0.1:1502"),
+    ("calibrate force", "muprime calibrate force weights.csv --operator 'A. Smith' --serial SN1"),
+    (
+        "calibrate amplitude",
+        "muprime calibrate amplitude --table vibrometer.csv --operator 'A. Smith' --serial SN2",
+    ),
+    (
+        "calibrate latency",
+        "muprime calibrate latency --edges force=edges.csv --operator 'A. Smith' --serial SN1",
+    ),
+    (
+        "calibrate phase",
+        "muprime calibrate phase w1.csv w2.csv --rate-hz 1e6 --operator 'A. Smith' --serial tip-3",
+    ),
+    ("calibrate finger", "muprime calibrate finger PHASES.csv --operator 'A. Smith' --serial tip-3"),
+    ("calibrate creep", "muprime calibrate creep creep.csv --operator 'A. Smith' --serial SN1"),
+    ("calibrate gravity", "muprime calibrate gravity tilts.csv --operator 'A. Smith' --serial SN1"),
+    ("calibrate noise", "muprime calibrate noise rest.csv --rate-hz 1000 --operator 'A. Smith' --serial SN1"),
+    ("calibrate step", "muprime calibrate step steps.csv --operator 'A. Smith' --serial SN1"),
+    ("calibrate tap", "muprime calibrate tap taps.csv --operator 'A. Smith' --serial SN1"),
+    ("calibrate priors", "muprime calibrate priors force-SN1.toml amplitude-SN2.toml"),
+    (
+        "check",
+        "muprime check my-setup.toml my-plan.toml\nmuprime check my-plan.toml --setup my-setup.toml\nmuprime check first-sweep --setup virtual",
+    ),
+    ("doctor", "muprime doctor\nmuprime doctor --setup my-setup.toml --instruments-only"),
+    (
+        "diagnose",
+        "muprime diagnose runs/monday\nmuprime diagnose points.csv --rig rig.toml --report out.html --save-model MODEL.toml",
+    ),
+    ("blind", "muprime blind --sets 20"),
+    ("faults", "muprime faults --seeds 500"),
+    (
+        "import",
+        "muprime import sweep.csv -o sweep\n\
+        muprime import sweep.csv --map 'amp=amplitude_pp:um, F=normal_force:N, FT=lateral_force:N, v=velocity:mm/s, t=time:s' --set frequency_hz=27500 -o sweep\n\
+        muprime import pins.xlsx --sheet Friction --map 't=time:s, mu=friction_coefficient' --set amplitude_pp_m=0,speed=10:mm/s,direction=1,normal_force=5:N -o pins\n\
+        muprime import stroke.txt --series --map 't=time:s, x=position:mm, Fz=normal_force:-N, Fx=lateral_force:N' --set amplitude_pp_m=0 -o stroke",
+    ),
+    ("schema", "muprime schema plan"),
+    ("init", "muprime init setup"),
+    ("show", "muprime show\nmuprime show first-sweep"),
+    ("man", "muprime man man1"),
+    ("model point", "muprime model point --amplitude-pp-m 3e-6 --speed-m-s 0.01 --json"),
+    ("model ridge", "muprime model ridge --amplitude-pp-m 2e-6 --elements 200"),
+    ("model table", "muprime model table --out study --threads 2"),
+    ("model reproduce", "muprime model reproduce fig14 --out figures"),
+    ("model effects", "muprime model effects squeeze_film"),
+    ("model amplitude-for", "muprime model amplitude-for --mu-relative 0.4 --speed-m-s 0.02"),
+    ("report", "muprime report runs/monday"),
+    ("replay", "muprime replay runs/monday"),
+    ("export", "muprime export runs/monday --to parquet"),
+    ("recover", "muprime recover runs/monday/run-1.mcap"),
+    ("runs", "muprime runs --unfinished"),
+    ("watch", "muprime watch"),
+    ("completions", "muprime completions bash"),
+];
+
+/// The examples of a command, as the end of its help.
+fn help_of(path: &str) -> Option<String> {
+    let (_, lines) = EXAMPLES.iter().find(|(p, _)| *p == path)?;
+    let head = if lines.contains('\n') { "Examples:" } else { "Example:" };
+    Some(format!(
+        "{head}\n{}",
+        lines.lines().map(|l| format!("  {}", l.trim_start())).collect::<Vec<_>>().join("\n")
+    ))
+}
+
+/// A command with its examples, and those of its subcommands.
+pub fn with_examples(command: clap::Command) -> clap::Command {
+    put(command, "")
+}
+
+fn put(mut command: clap::Command, path: &str) -> clap::Command {
+    let names: Vec<String> = command.get_subcommands().map(|s| s.get_name().to_string()).collect();
+    for name in names {
+        let path = if path.is_empty() { name.clone() } else { format!("{path} {name}") };
+        command = command.mut_subcommand(&name, |sub| put(sub, &path));
+    }
+    match help_of(path) {
+        Some(text) => command.after_help(text),
+        None => command,
+    }
+}

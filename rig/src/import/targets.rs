@@ -1,0 +1,108 @@
+//! What a column of a foreign table can stand for, and which headers usually say so.
+
+use super::units::Dimension;
+
+/// How a cell is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A number with a unit.
+    Number(Dimension),
+    /// A whole number.
+    Count,
+    /// 1 or -1, `forward` or `backward`.
+    Way,
+    /// Text.
+    Text,
+}
+
+/// One thing that a column can stand for.
+#[derive(Debug)]
+pub struct Target {
+    /// Name in `--map` and `--set`.
+    pub name: &'static str,
+    /// Column of the point table that it gives.
+    pub column: &'static str,
+    /// How a cell is read.
+    pub kind: Kind,
+    /// What it is.
+    pub words: &'static str,
+    /// Headers that usually mean it: small letters and digits, the unit taken off.
+    headers: &'static [&'static str],
+}
+
+macro_rules! targets {
+    ($($id:ident $name:literal $column:literal $kind:expr, $words:literal, [$($header:literal)*];)*) => {
+        /// The places of the targets in [`TARGETS`].
+        #[allow(clippy::upper_case_acronyms)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Id { $(#[doc = $words] $id),* }
+        /// How many targets there are.
+        pub const COUNT: usize = [$($name),*].len();
+        /// Every target, in the order in which people are told of them.
+        pub static TARGETS: &[Target] =
+            &[$(Target { name: $name, column: $column, kind: $kind, words: $words, headers: &[$($header),*] }),*];
+    };
+}
+
+use Dimension as D;
+use Kind::{Count, Number, Text, Way};
+
+targets! {
+    Point "point" "point" Count, "number of the pass", ["point" "no" "nr" "number" "index"];
+    Time "time" "time_s" Number(D::Time), "start of the pass", ["t" "time" "zeit" "timestamp" "elapsed" "elapsedtime" "testtime" "clock"];
+    AmplitudePp "amplitude_pp" "amplitude_pp_m" Number(D::Length), "vibration amplitude, peak to peak", ["w" "wpp" "amp" "ampl" "amplitude" "amppp" "amplitudepp" "amplitudepeaktopeak" "amplitudep2p" "vibrationamplitude"];
+    AmplitudePeak "amplitude_peak" "amplitude_pp_m" Number(D::Length), "vibration amplitude, zero to peak: half of what the table holds", ["amplitudepeak" "amppeak" "amplitude0p" "amp0p" "amplitudezeropeak"];
+    AmplitudeRms "amplitude_rms" "amplitude_pp_m" Number(D::Length), "vibration amplitude, root mean square of a sine", ["amplituderms" "amprms"];
+    Frequency "frequency" "frequency_hz" Number(D::Frequency), "vibration frequency", ["f" "freq" "frequency" "frequenz" "vibrationfrequency"];
+    Speed "speed" "speed_m_s" Number(D::Speed), "sliding speed, a magnitude", ["speed" "slidingspeed" "geschwindigkeit" "u" "v" "vel" "velocity" "slidingvelocity" "vx"];
+    Velocity "velocity" "speed_m_s" Number(D::Speed), "sliding velocity: its sign is the direction", [];
+    Direction "direction" "direction" Way, "direction of sliding", ["direction" "dir" "richtung" "way" "sense"];
+    Position "position" "position_m" Number(D::Length), "mean position along the plate", ["x" "pos" "position" "displacement" "disp" "stroke" "weg" "distance"];
+    NormalForce "normal_force" "normal_force_n" Number(D::Force), "mean normal force, positive in compression", ["fn" "fz" "normalforce" "normal" "load" "normalload" "appliedload" "normalkraft" "forcez"];
+    LateralForce "lateral_force" "lateral_force_n" Number(D::Force), "mean lateral force, signed in the sensor's frame", ["ft" "fl" "fx" "lateralforce" "lateral" "tangentialforce" "tangential" "shearforce" "forcex" "flat"];
+    FrictionForce "friction_force" "lateral_force_n" Number(D::Force), "friction force against the sliding, a magnitude", ["ff" "friction" "frictionforce" "reibkraft" "fr" "frictionalforce"];
+    FrictionCoefficient "friction_coefficient" "lateral_force_n" Number(D::Ratio), "friction force over normal force, a magnitude", ["mu" "cof" "frictioncoefficient" "coefficientoffriction" "coefficient" "frictioncoeff" "reibzahl"];
+    NormalForceSd "normal_force_sd" "normal_force_sd_n" Number(D::Force), "standard deviation of the normal force within the pass", ["fnsd" "fnstd" "normalforcesd" "normalforcestd"];
+    LateralForceSd "lateral_force_sd" "lateral_force_sd_n" Number(D::Force), "standard deviation of the lateral force within the pass", ["ftsd" "ftstd" "lateralforcesd" "lateralforcestd"];
+    Samples "samples" "samples" Count, "samples behind the means", ["samples" "nsamples" "n"];
+    Pressure "ambient_pressure" "ambient_pressure_pa" Number(D::Pressure), "ambient pressure", ["ambientpressure" "pressure" "airpressure" "luftdruck"];
+    Temperature "temperature" "temperature_c" Number(D::Temperature), "temperature", ["temperature" "temp" "temperatur"];
+    Humidity "relative_humidity" "relative_humidity_pct" Number(D::Percentage), "relative humidity", ["relativehumidity" "humidity" "rh" "feuchte"];
+    PhaseShift "phase_shift" "phase_shift_deg" Number(D::Angle), "contact phase shift", ["phaseshift" "phase"];
+    Replicate "replicate" "replicate" Count, "number of the repeat of one condition", ["replicate" "rep" "repeat" "repetition"];
+    Run "run" "run" Text, "name of the run", ["run" "test" "testid" "sample" "sampleid" "specimen" "experiment"];
+    Session "session" "session" Count, "number of the sitting", ["session"];
+}
+
+impl Id {
+    /// What stands there.
+    pub fn target(self) -> &'static Target {
+        &TARGETS[self as usize]
+    }
+}
+
+impl Target {
+    /// The target of that name, or of that column of the point table.
+    pub fn named(name: &str) -> Option<usize> {
+        let exact = TARGETS.iter().position(|t| t.name == name);
+        exact.or_else(|| TARGETS.iter().position(|t| t.column == name))
+    }
+
+    /// Headers that usually mean it, without case, blanks, marks and unit.
+    pub const fn headers(&self) -> &'static [&'static str] {
+        self.headers
+    }
+
+    /// Whether a header, made plain by [`plain`], usually means this.
+    pub fn is_headed(&self, plain: &str) -> bool {
+        let column: String = self.column.chars().filter(char::is_ascii_alphanumeric).collect();
+        let name: String = self.name.chars().filter(char::is_ascii_alphanumeric).collect();
+        plain == name || plain == column || self.headers.contains(&plain)
+    }
+}
+
+/// A header without case, blanks and marks.
+pub fn plain(header: &str) -> String {
+    let small = header.to_lowercase().replace(['µ', 'μ'], "mu");
+    small.chars().filter(char::is_ascii_alphanumeric).collect()
+}

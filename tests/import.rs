@@ -1,0 +1,510 @@
+//! Foreign tables: ten sources of one and the same passes, each imported and compared with the truth to the last digit, and sources that are
+//! refused or remarked on.
+
+use models::record::{Pass, read_passes};
+use serde_json::Value;
+use std::fmt::Write;
+use std::path::Path;
+use std::process::Output;
+use tests::{documents, file, muprime, python, texts};
+
+/// A pass of the truth as decimal texts: what a person would type in SI is what every source holds in units of its own.
+struct Truth {
+    time_s: u32,
+    amplitude_nm: u32,
+    frequency_hz: u32,
+    speed_um_s: u32,
+    direction: i8,
+    position_um: i32,
+    normal_mn: u32,
+    lateral_un: i64,
+}
+
+/// Passes with every digit that an instrument might give, 4 amplitudes by 3 speeds by both directions.
+fn truth(still: bool) -> Vec<Truth> {
+    let mut all = Vec::new();
+    for (k, amplitude_nm) in [0, 731, 1513, 2999].into_iter().enumerate() {
+        for (j, speed_um_s) in [5003, 20_011, 79_999].into_iter().enumerate() {
+            for direction in [1i8, -1] {
+                let n = all.len() as u32;
+                let normal_mn = 247 + n % 7;
+                let amplitude_nm = if still { 0 } else { amplitude_nm };
+                let mu_ppm = 500_000 - if still { 0 } else { 70_000 * k as i64 }
+                    + 3_001 * j as i64
+                    + 17 * i64::from(n);
+                all.push(Truth {
+                    time_s: 7 * n,
+                    amplitude_nm,
+                    frequency_hz: 27_513,
+                    speed_um_s,
+                    direction,
+                    position_um: 137 * n as i32 - 900,
+                    normal_mn,
+                    lateral_un: i64::from(direction) * mu_ppm * i64::from(normal_mn) / 1000,
+                });
+            }
+        }
+    }
+    all
+}
+
+/// `n` with its point moved: the decimal that a person writes.
+fn moved(n: i64, places: usize) -> String {
+    let digits = format!("{:0width$}", n.unsigned_abs(), width = places + 1);
+    let (whole, rest) = digits.split_at(digits.len() - places);
+    let sign = if n < 0 { "-" } else { "" };
+    if places == 0 { format!("{sign}{whole}") } else { format!("{sign}{whole}.{rest}") }
+}
+
+fn number(n: i64, places: usize) -> f64 {
+    moved(n, places).parse().unwrap()
+}
+
+fn same(passes: &[Pass], truth: &[Truth], ulps: u64, what: &str) {
+    assert_eq!(passes.len(), truth.len(), "{what}");
+    for (p, t) in passes.iter().zip(truth) {
+        let pairs = [
+            ("time_s", p.time_s, f64::from(t.time_s)),
+            ("amplitude_pp_m", p.amplitude.metres(), number(t.amplitude_nm.into(), 9)),
+            ("speed_m_s", p.speed_m_s, number(t.speed_um_s.into(), 6)),
+            ("direction", p.direction.sign(), f64::from(t.direction)),
+            ("normal_force_n", p.normal_force_n, number(t.normal_mn.into(), 3)),
+            ("lateral_force_n", p.lateral_force_n.unwrap(), number(t.lateral_un, 6)),
+        ];
+        for (name, is, was) in pairs {
+            let apart = is.to_bits().abs_diff(was.to_bits());
+            assert!(apart <= ulps, "{what}: {name} is {is:e}, was {was:e}: {apart} last digits apart");
+        }
+    }
+}
+
+struct Import {
+    output: Output,
+    passes: Vec<Pass>,
+    log: Value,
+}
+
+fn import(folder: &Path, source: &Path, arguments: &[&str]) -> Import {
+    let out = folder.join(format!("out-{}", source.file_name().unwrap().to_str().unwrap()));
+    let output = muprime().arg("import").arg(source).args(arguments).arg("-o").arg(&out).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{source:?}: {}", texts(&output).1);
+    let passes = read_passes(std::fs::File::open(out.join("points.csv")).unwrap()).unwrap();
+    let log = serde_json::from_str(&std::fs::read_to_string(out.join("import.json")).unwrap()).unwrap();
+    models::rig_file::RigFile::parse(&std::fs::read_to_string(out.join("rig.toml")).unwrap()).unwrap();
+    Import { output, passes, log }
+}
+
+/// A text of the passes: a header, then a line a pass with these cells.
+fn lines(truth: &[Truth], header: &str, cell: impl Fn(&Truth) -> String) -> String {
+    let mut text = format!("{header}\n");
+    for t in truth {
+        writeln!(text, "{}", cell(t)).unwrap();
+    }
+    text
+}
+
+fn comma(text: &str) -> String {
+    text.replace('.', ",")
+}
+
+/// Text tables: delimiters, decimal commas, units in headers and rows, comments, preambles, capitals, Latin-1, UTF-16, no vibration.
+#[test]
+fn text_tables_come_in_to_the_last_digit() {
+    let folder = tempfile::tempdir().unwrap();
+    let (moving, still) = (truth(false), truth(true));
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path
+    };
+    let guess = ["--yes"];
+    // 1: commas, units in brackets, a micro sign.
+    let text = lines(&moving, "t [s],w_pp [µm],f [kHz],v [mm/s],dir,x [mm],FN [mN],FT [mN]", |t| {
+        format!(
+            "{},{},{},{},{},{},{},{}",
+            t.time_s,
+            moved(t.amplitude_nm.into(), 3),
+            moved(t.frequency_hz.into(), 3),
+            moved(t.speed_um_s.into(), 3),
+            t.direction,
+            moved(t.position_um.into(), 3),
+            t.normal_mn,
+            moved(t.lateral_un, 3)
+        )
+    });
+    let one = import(folder.path(), &write("brackets.csv", text.as_bytes()), &guess);
+    same(&one.passes, &moving, 0, "brackets");
+    assert_eq!(one.passes[3].position_m, number(i64::from(moving[3].position_um), 6));
+    assert_eq!(one.passes[3].frequency_hz, 27_513.0);
+    // 2: semicolons and decimal commas, Latin-1, a preamble, a velocity with a sign.
+    let text = comma(&lines(
+        &moving,
+        "t in s;Amplitude (µm);f (kHz);Velocity (mm/s);Normal force (N);Lateral force (N)",
+        |t| {
+            format!(
+                "{};{};{};{};{};{}",
+                t.time_s,
+                moved(t.amplitude_nm.into(), 3),
+                moved(t.frequency_hz.into(), 3),
+                moved(i64::from(t.direction) * i64::from(t.speed_um_s), 3),
+                moved(t.normal_mn.into(), 3),
+                moved(t.lateral_un, 6)
+            )
+        },
+    ));
+    let text = format!("Versuch;Reihe 3\nBediener;M. Müller\n\n{text}");
+    let latin: Vec<u8> = text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
+    let two = import(folder.path(), &write("latin.csv", &latin), &guess);
+    same(&two.passes, &moving, 0, "decimal commas");
+    assert!(
+        two.log["format"].as_str().unwrap().contains("Latin-1")
+            && two.log["notes"].to_string().contains("Versuch")
+    );
+    // 3: tabs and capitals; MN in capitals is millinewton.
+    let text = lines(&moving, "TIME_S\tAMP_PP_UM\tFREQ_KHZ\tSPEED_MM_S\tDIRECTION\tLOAD_MN\tFX_MN", |t| {
+        format!(
+            "{}\t{}\t{}\t{}\t{}\t{}\t{}",
+            t.time_s,
+            moved(t.amplitude_nm.into(), 3),
+            moved(t.frequency_hz.into(), 3),
+            moved(t.speed_um_s.into(), 3),
+            if t.direction > 0 { "FWD" } else { "BWD" },
+            t.normal_mn,
+            moved(t.lateral_un, 3)
+        )
+    });
+    same(
+        &import(folder.path(), &write("capitals.tsv", text.as_bytes()), &guess).passes,
+        &moving,
+        0,
+        "capitals",
+    );
+    // 4: blanks, the header in a comment, columns that are missing and set, UTF-16.
+    let text = lines(&moving, "# made by hand\n# clock w dir u Fz Fx", |t| {
+        format!(
+            "  {}   {} {} {} {} {}",
+            t.time_s,
+            moved(t.amplitude_nm.into(), 3),
+            t.direction,
+            moved(t.speed_um_s.into(), 3),
+            moved(-i64::from(t.normal_mn), 3),
+            moved(t.lateral_un, 6)
+        )
+    });
+    let wide: Vec<u8> = [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    let map = "clock=time:s, w=amplitude_pp:um, dir=direction, u=speed:mm/s, Fz=normal_force:-N, Fx=lateral_force:N";
+    let four =
+        import(folder.path(), &write("wide.txt", &wide), &["--map", map, "--set", "frequency=27.513:kHz"]);
+    same(&four.passes, &moving, 0, "blanks");
+    assert_eq!(four.passes[5].frequency_hz, 27_513.0);
+    // 5: a plain tribometer: no vibration, no frequency, no place, mass for load (one rounding more), a row of units.
+    let text = lines(&still, "time|speed|direction|load|lateral force\ns|m/s|1|g|N", |t| {
+        let grams = number(t.normal_mn.into(), 3) / 9.80665e-3;
+        format!(
+            "{}|{}|{}|{grams}|{}",
+            t.time_s,
+            moved(t.speed_um_s.into(), 6),
+            t.direction,
+            moved(t.lateral_un, 6)
+        )
+    });
+    let five =
+        import(folder.path(), &write("units.txt", text.as_bytes()), &["--yes", "--set", "amplitude_pp_m=0"]);
+    // A mass is rounded where it is written and where it is read.
+    same(&five.passes, &still, 2, "a row of units");
+    let head = std::fs::read_to_string(folder.path().join("out-units.txt/points.csv")).unwrap();
+    assert!(
+        head.starts_with("point,time_s,amplitude_pp_m,speed_m_s,direction,normal_force_n,lateral_force_n\n"),
+        "{head}"
+    );
+    // 6: a coefficient and peak amplitudes; a clock; the run; rows that cannot be taken are listed with their reason.
+    let text = lines(&moving, "clock,test,half amplitude,freq,v_um_s,F,mu", |t| {
+        let mu = number(t.lateral_un, 6) / number(t.normal_mn.into(), 3) * f64::from(t.direction);
+        let velocity = i64::from(t.direction) * i64::from(t.speed_um_s);
+        format!(
+            "00:{:02}:{:02},A7,{},{},{velocity},{},{mu}",
+            t.time_s / 60,
+            t.time_s % 60,
+            moved(5 * i64::from(t.amplitude_nm), 10),
+            t.frequency_hz,
+            moved(t.normal_mn.into(), 3)
+        )
+    });
+    let text = format!(
+        "{text}00:10:00,A7,broken,27513,5003,0.25,0.4\n00:10:01,A7,,27513,0,0.25,0.4\n00:10:02,A7,1e-6,27513,1,-0.25,0.4\n"
+    );
+    let map = "clock=time:s, test=run, half amplitude=amplitude_peak:m, freq=frequency:Hz, v_um_s=velocity:um/s, F=normal_force:N, mu=friction_coefficient";
+    let six = import(folder.path(), &write("clock.csv", text.as_bytes()), &["--map", map]);
+    same(&six.passes, &moving, 1, "a coefficient");
+    assert!(six.passes.iter().all(|p| p.run.as_deref() == Some("A7")));
+    let dropped = six.log["dropped"].as_array().unwrap();
+    let told: Vec<_> = dropped
+        .iter()
+        .map(|d| (d["row"].as_u64().unwrap(), d["column"].as_str().unwrap(), d["reason"].as_str().unwrap()))
+        .collect();
+    assert_eq!(told[0], (26, "half amplitude", "no number"));
+    assert_eq!((told[1].0, told[2].0, told.len()), (27, 28, 3), "{told:?}");
+    assert!(texts(&six.output).1.contains("3 rows were left out"));
+    // What comes out is what a diagnosis reads.
+    for name in ["brackets.csv", "units.txt"] {
+        let out = folder.path().join(format!("out-{name}"));
+        let said = muprime().args(["diagnose", "--no-pairs", "--json"]).arg(&out).output().unwrap();
+        assert_eq!(said.status.code(), Some(0), "{name}: {}", texts(&said).1);
+        assert_eq!(documents(&said)[0]["data"]["points"], 24);
+    }
+}
+
+/// Excel, Parquet and NumPy, written by openpyxl, pyarrow and numpy.
+#[test]
+fn binary_tables_come_in_to_the_last_digit() {
+    let folder = tempfile::tempdir().unwrap();
+    let moving = truth(false);
+    let table = lines(&moving, "t_s,w_um,f_khz,v_mm_s,dir,fn_mn,ft_mn", |t| {
+        format!(
+            "{},{},{},{},{},{},{}",
+            t.time_s,
+            moved(t.amplitude_nm.into(), 3),
+            moved(t.frequency_hz.into(), 3),
+            moved(t.speed_um_s.into(), 3),
+            t.direction,
+            t.normal_mn,
+            moved(t.lateral_un, 3)
+        )
+    });
+    let csv = folder.path().join("table.csv");
+    std::fs::write(&csv, table).unwrap();
+    let made =
+        python().arg(file("tests/peers/foreign_tables.py")).arg(&csv).arg(folder.path()).output().unwrap();
+    assert!(made.status.success(), "{}", texts(&made).1);
+    let map = "t_s=time:s, w_um=amplitude_pp:um, f_khz=frequency:kHz, v_mm_s=speed:mm/s, dir=direction, fn_mn=normal_force:mN, ft_mn=lateral_force:mN";
+    // 7 to 10.
+    for (name, arguments) in [
+        ("book.xlsx", vec!["--yes", "--sheet", "Friction"]),
+        ("table.parquet", vec!["--yes"]),
+        ("records.npy", vec!["--map", map]),
+        (
+            "matrix.npy",
+            vec![
+                "--map",
+                "#1=time:s, #2=amplitude_pp:um, #3=frequency:kHz, #4=speed:mm/s, #5=direction, #6=normal_force:mN, #7=lateral_force:mN",
+            ],
+        ),
+    ] {
+        same(&import(folder.path(), &folder.path().join(name), &arguments).passes, &moving, 0, name);
+    }
+    let several = muprime()
+        .arg("import")
+        .arg(folder.path().join("book.xlsx"))
+        .args(["--yes", "-o"])
+        .arg(folder.path().join("none"))
+        .output()
+        .unwrap();
+    assert_eq!(several.status.code(), Some(2));
+    assert!(texts(&several).1.contains("'Notes', 'Friction'"), "{}", texts(&several).1);
+}
+
+fn refused(folder: &Path, text: &str, arguments: &[&str]) -> String {
+    let source = folder.join("refused.csv");
+    std::fs::write(&source, text).unwrap();
+    let out = folder.join("refused");
+    let output = muprime().arg("import").arg(&source).args(arguments).arg("-o").arg(&out).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{text}: {}", texts(&output).1);
+    assert!(!out.exists(), "{text}: a folder was made");
+    // Lines are broken to the width of the terminal.
+    texts(&output).1.split_whitespace().filter(|w| *w != "│" && *w != "×").collect::<Vec<_>>().join(" ")
+}
+
+/// Everything that is missing at once, a guessed map that nobody confirmed, a wrong unit, what cannot be read.
+#[test]
+fn what_cannot_be_taken_is_refused_with_the_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let said = refused(folder, "t_s,fn_n\n1,2\n2,2\n", &["--yes"]);
+    for missing in [
+        "amplitude_pp_m is missing",
+        "speed_m_s is missing",
+        "direction is missing",
+        "lateral_force_n is missing",
+    ] {
+        assert!(said.contains(missing), "{missing}: {said}");
+    }
+    assert!(!said.contains("normal_force_n is missing"));
+    let whole = "t_s,w_um,f_khz,v_mm_s,dir,fn_n,ft_n\n0,1,27.5,10,1,0.25,0.1\n1,1,27.5,10,-1,0.25,-0.1\n";
+    let said = refused(folder, whole, &[]);
+    assert!(
+        said.contains("must be confirmed") && said.contains("t_s=time:s, w_um=amplitude_pp:um"),
+        "{said}"
+    );
+    assert!(
+        refused(folder, whole, &["--map", "t_s=time:s, w_um=amplitude_pp:N"])
+            .contains("'N' is no unit of amplitude_pp")
+    );
+    assert!(refused(folder, whole, &["--map", "t_s=time"]).contains("needs a unit"));
+    assert!(
+        refused(folder, "t_s,w_um,v_mm_s,dir,fn_n,ft_n\n0,1,10,1,0.25,0.1\n", &["--yes"])
+            .contains("frequency_hz is missing")
+    );
+    let negative = whole.replace("0.25", "-0.25");
+    assert!(refused(folder, &negative, &["--yes"]).contains("normal_force:-N"));
+    assert!(refused(folder, "MATLAB 5.0 MAT-file, made by hand", &["--yes"]).contains("scipy.io.loadmat"));
+    assert!(refused(folder, "\n\n", &["--yes"]).contains("no rows of numbers"));
+    // A folder with a table is left as it is.
+    let out = folder.join("taken");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("points.csv"), "mine").unwrap();
+    let output = muprime()
+        .arg("import")
+        .arg(folder.join("refused.csv"))
+        .args(["--yes", "-o"])
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(std::fs::read_to_string(out.join("points.csv")).unwrap(), "mine");
+}
+
+/// Units that slipped by a thousand or a million are remarked on, never repaired; so are magnitudes in both directions.
+#[test]
+fn slipped_units_and_lost_signs_are_remarked_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = |name: &str, unsigned: bool| {
+        let text = lines(&truth(false), "t,w,f,v,dir,fn,ft", |t| {
+            let lateral = if unsigned { t.lateral_un.abs() } else { t.lateral_un };
+            format!(
+                "{},{},{},{},{},{},{}",
+                t.time_s,
+                moved(t.amplitude_nm.into(), 3),
+                t.frequency_hz,
+                moved(t.speed_um_s.into(), 6),
+                t.direction,
+                moved(t.normal_mn.into(), 3),
+                moved(lateral, 6)
+            )
+        });
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let remarks = |name: &str, units: [&str; 3], unsigned: bool| {
+        let map = format!(
+            "t=time:s, w=amplitude_pp:{}, f=frequency:{}, v=speed:m/s, dir=direction, fn=normal_force:N, ft={}",
+            units[0], units[1], units[2]
+        );
+        import(folder.path(), &table(name, unsigned), &["--map", &map]).log["remarks"].to_string()
+    };
+    let right = remarks("right.csv", ["um", "Hz", "lateral_force:N"], false);
+    assert_eq!(right, "[]");
+    let slipped = remarks("slipped.csv", ["nm", "mHz", "lateral_force:uN"], false);
+    assert!(
+        slipped.contains("amplitude_pp_m is") && slipped.contains("a thousand times too small"),
+        "{slipped}"
+    );
+    assert!(
+        slipped.contains("frequency_hz is") && slipped.contains("lateral_force_n over normal_force_n"),
+        "{slipped}"
+    );
+    let unsigned = remarks("unsigned.csv", ["um", "Hz", "lateral_force:N"], true);
+    assert!(unsigned.contains("friction_force in place of lateral_force"), "{unsigned}");
+    assert_eq!(remarks("magnitudes.csv", ["um", "Hz", "friction_force:N"], true), "[]");
+    let turned = remarks("turned.csv", ["um", "Hz", "lateral_force:-N"], false);
+    assert!(turned.contains("friction pushes along the sliding in 24 of 24 passes"), "{turned}");
+}
+
+/// A record of strokes to and fro, each with a step of velocity within: a pass a stretch, in every one the speed and the friction that
+/// went in.
+#[test]
+fn a_series_is_cut_at_reversals_and_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let (rate, mut text) = (500.0, String::from("t_s;x_mm;Fz_N;Fx_N\n"));
+    let (mut k, mut x) = (0u32, 0.0f64);
+    let mut wanted = Vec::new();
+    let mut chance = 1u64;
+    for stroke in 0..10 {
+        let direction = if stroke % 2 == 0 { 1.0 } else { -1.0 };
+        for (part, speed) in [(0, 0.010), (1, 0.020)] {
+            let friction = direction * 0.25 * (0.4 + 0.05 * f64::from(part) + 0.002 * f64::from(stroke));
+            wanted.push((speed, direction, friction));
+            // 10 mm each.
+            for _ in 0..(0.010 / speed * rate) as usize {
+                chance =
+                    chance.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                let noise = ((chance >> 33) as f64 / f64::from(1u32 << 31) - 0.5) * 2e-3;
+                x += direction * speed / rate;
+                writeln!(
+                    text,
+                    "{:.3};{:.5};{:.6};{:.6}",
+                    f64::from(k) / rate,
+                    x * 1e3,
+                    0.25 + noise,
+                    friction + noise
+                )
+                .unwrap();
+                k += 1;
+            }
+        }
+    }
+    let source = folder.path().join("strokes.csv");
+    std::fs::write(&source, text.replace('.', ",")).unwrap();
+    let made = import(folder.path(), &source, &["--series", "--yes", "--set", "amplitude_pp_m=0"]);
+    assert_eq!(made.passes.len(), wanted.len(), "{}", made.log["series"]);
+    for (p, (speed, direction, friction)) in made.passes.iter().zip(&wanted) {
+        assert!((p.speed_m_s / speed - 1.0).abs() < 1e-3, "{} {speed}", p.speed_m_s);
+        assert_eq!(p.direction.sign(), *direction);
+        assert!((p.lateral_force_n.unwrap() - friction).abs() < 2e-4, "{:?} {friction}", p.lateral_force_n);
+        assert!(p.samples.unwrap() > 100 && p.lateral_force_sd_n.unwrap() < 1e-3);
+    }
+    let series = &made.log["series"];
+    assert_eq!(series["reversals"], 9);
+    let parts: u64 =
+        ["in_passes", "changing", "settling", "too_short"].iter().map(|k| series[*k].as_u64().unwrap()).sum();
+    assert_eq!(parts, u64::from(k), "every sample is accounted for: {series}");
+    let windows = folder.path().join("windows.csv");
+    std::fs::copy(&source, &windows).unwrap();
+    let more = import(
+        folder.path(),
+        &windows,
+        &["--series", "--window-s", "0.1", "--settle-s", "0.1", "--yes", "--set", "amplitude_pp_m=0"],
+    );
+    assert!(more.passes.len() > 2 * wanted.len(), "{}", more.passes.len());
+    let jumps = text.replacen("0.004;", "9.004;", 1);
+    let said = refused(folder.path(), &jumps, &["--series", "--yes", "--set", "amplitude_pp_m=0"]);
+    assert!(said.contains("the time does not rise"), "{said}");
+}
+
+/// The rock record that others published: one step of velocity. The windows that were made of it by a script of its own say the same.
+#[test]
+fn a_published_velocity_step_is_cut_as_its_authors_did() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = file("tests/recordings/rock-velocity-steps/velstep4_excerpt.txt");
+    let text = std::fs::read_to_string(&source).unwrap();
+    println!("{}", text.lines().take(3).collect::<Vec<_>>().join("\n"));
+    let map = "#1=time:s, #2=position:um, #3=friction_coefficient";
+    let made = import(
+        folder.path(),
+        &source,
+        &[
+            "--series",
+            "--window-s",
+            "5",
+            "--map",
+            map,
+            "--set",
+            "amplitude_pp_m=0,direction=1,normal_force_n=0.2",
+        ],
+    );
+    let speeds: Vec<f64> = made.passes.iter().map(|p| p.speed_m_s * 1e6).collect();
+    println!("{speeds:?} {}", made.log["series"]);
+    // 3 to 10 um/s; the slow part of the excerpt is a second, in which the record's own slope scatters by a tenth.
+    assert_eq!(speeds.len(), 2, "{speeds:?}");
+    assert!((speeds[0] / 3.0 - 1.0).abs() < 0.1 && (speeds[1] / 10.0 - 1.0).abs() < 0.01, "{speeds:?}");
+    // The mean of the record's own friction column over the same samples.
+    let rows: Vec<Vec<f64>> =
+        text.lines().skip(1).map(|l| l.split_whitespace().map(|c| c.parse().unwrap()).collect()).collect();
+    for p in &made.passes {
+        let first = rows.iter().position(|r| r[0] == p.time_s).unwrap();
+        let own = &rows[first..first + p.samples.unwrap() as usize];
+        let mean = own.iter().map(|r| r[2]).sum::<f64>() / own.len() as f64;
+        let friction = p.lateral_force_n.unwrap() / p.normal_force_n;
+        assert!((friction / mean - 1.0).abs() < 1e-12, "{friction} {mean}");
+    }
+}

@@ -1,0 +1,225 @@
+//! Words for everything: schemas, the reference of all keys, commented beginnings, what is bundled, manual pages; and `check` against `run`.
+//!
+//! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test words` writes docs/reference.md anew.
+
+use rig::words::bundled;
+use rig::words::reference::{objects, page};
+use rig::words::schema::Kind;
+use serde_json::Value;
+use std::collections::BTreeSet;
+use tests::{documents, file, muprime, texts};
+
+/// The page is what the code says.
+#[test]
+fn the_reference_is_that_of_the_code() {
+    let (path, now) = (file("docs/reference.md"), page());
+    if std::env::var_os("MUPRIME_UPDATE").is_some() {
+        std::fs::write(&path, &now).unwrap();
+    }
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        written == now,
+        "docs/reference.md is old: MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test words"
+    );
+}
+
+/// Every key anywhere in a schema, found without the page's own walk.
+fn keys(schema: &Value, into: &mut BTreeSet<String>) {
+    match schema {
+        Value::Object(object) => {
+            if let Some(Value::Object(properties)) = object.get("properties") {
+                into.extend(properties.keys().cloned());
+            }
+            object.values().for_each(|v| keys(v, into));
+        }
+        Value::Array(list) => list.iter().for_each(|v| keys(v, into)),
+        _ => {}
+    }
+}
+
+/// Every key of every kind has its row, with words, in its kind's part of the page.
+#[test]
+fn the_reference_covers_every_key() {
+    let page = std::fs::read_to_string(file("docs/reference.md")).unwrap();
+    let mut count = 0;
+    for kind in Kind::ALL {
+        let part =
+            page.split("\n## ").find(|p| p.starts_with(&format!("{}\n", kind.name()))).unwrap_or_default();
+        let mut all = BTreeSet::new();
+        keys(&kind.schema(), &mut all);
+        assert!(all.len() > 3, "{}: {all:?}", kind.name());
+        for key in &all {
+            let rows: Vec<&str> = part.lines().filter(|l| l.starts_with(&format!("| `{key}` |"))).collect();
+            assert!(!rows.is_empty(), "{}: `{key}` has no row", kind.name());
+            let told = |row: &&str| !row.trim_end_matches('|').trim().ends_with('|');
+            assert!(rows.iter().any(told), "{}: `{key}` has no words: {rows:?}", kind.name());
+        }
+        count += all.len();
+        let listed: usize =
+            objects(&kind.schema()).iter().map(|(_, o)| o["properties"].as_object().unwrap().len()).sum();
+        assert!(listed >= all.len(), "{}", kind.name());
+    }
+    println!("{count} keys");
+    assert!(count > 250, "{count}");
+}
+
+/// The schema of a kind takes what the reader takes: the keys of bundled files are all in it.
+#[test]
+fn schemas_know_the_keys_of_what_is_bundled() {
+    for bundled in bundled::all() {
+        let output = muprime().args(["schema", bundled.kind]).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
+        let schema: Value = serde_json::from_str(&texts(&output).0).unwrap();
+        let properties = schema["properties"].as_object().unwrap();
+        let table: toml::Table = toml::from_str(bundled.text).unwrap();
+        let unknown: Vec<_> = table.keys().filter(|k| !properties.contains_key(*k)).collect();
+        assert!(unknown.is_empty(), "{}: {unknown:?}", bundled.name);
+        for needed in schema["required"].as_array().unwrap() {
+            assert!(table.contains_key(needed.as_str().unwrap()), "{}: {needed}", bundled.name);
+        }
+    }
+}
+
+/// What `init` prints is approved by `check`, and the plan and the setup run together.
+#[test]
+fn what_is_begun_is_approved_and_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(format!("{name}.toml"));
+    for kind in ["plan", "setup", "fingertip", "profile"] {
+        let output = muprime().args(["init", kind]).output().unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        assert!(texts(&output).0.lines().filter(|l| l.contains("# ")).count() > 5, "{kind}: comments");
+        std::fs::write(path(kind), output.stdout).unwrap();
+        let checked = muprime().args(["check", "--json"]).arg(path(kind)).output().unwrap();
+        assert_eq!(documents(&checked)[0]["kind"], kind, "{:?}", texts(&checked));
+    }
+    let together = muprime().args(["check", "--json"]).args([path("plan"), path("setup")]).output().unwrap();
+    assert!(documents(&together)[0]["passes"].as_u64() > Some(10), "{:?}", texts(&together));
+    let run = muprime()
+        .arg("run")
+        .arg(path("plan"))
+        .arg("--setup")
+        .arg(path("setup"))
+        .args(["--fast", "--out"])
+        .arg(folder.path().join("run"))
+        .env("MUPRIME_RUNS", folder.path())
+        .output()
+        .unwrap();
+    assert_eq!(run.status.code(), Some(0), "{}", texts(&run).1);
+    // What the run leaves is known to `check`.
+    let left = |name: &str| folder.path().join("run").join(name);
+    let checked =
+        muprime().args(["check", "--json"]).args([left("points.csv"), left("rig.toml")]).output().unwrap();
+    let kinds: Vec<String> =
+        documents(&checked).iter().map(|d| d["kind"].as_str().unwrap_or_default().to_string()).collect();
+    assert_eq!((checked.status.code(), kinds[1].as_str()), (Some(0), "rig.toml"), "{:?}", texts(&checked));
+    assert_eq!(kinds[0], "table");
+}
+
+#[test]
+fn what_is_bundled_is_shown_as_it_is() {
+    let listed = muprime().args(["show", "--json"]).output().unwrap();
+    assert_eq!(documents(&listed).len(), bundled::all().len());
+    for bundled in bundled::all() {
+        let shown = muprime().args(["show", bundled.name]).output().unwrap();
+        assert_eq!(texts(&shown).0.trim_end(), bundled.text.trim_end(), "{}", bundled.name);
+    }
+    let none = muprime().args(["show", "no-such"]).output().unwrap();
+    assert_eq!(none.status.code(), Some(2));
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let written = muprime().arg("man").arg(folder.path()).output().unwrap();
+    assert_eq!(written.status.code(), Some(0), "{}", texts(&written).1);
+    for (command, examples) in rig::cli::examples::EXAMPLES {
+        let path = folder.path().join(format!("muprime-{}.1", command.replace(' ', "-")));
+        let page = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let first = examples.lines().next().unwrap().split(' ').take(2).collect::<Vec<_>>().join(" ");
+        assert!(page.contains(".TH") && page.contains(&first.replace('-', "\\-")), "{command}: {page}");
+    }
+}
+
+/// Every bundled plan on every bundled setup: `check` approves it and it runs, or `check` says why not and `run` refuses it.
+#[test]
+fn check_and_run_say_the_same_of_every_plan_on_every_setup() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut good, mut refused) = (0, 0);
+    for (plan, _) in rig::plan::BUNDLED {
+        for (setup, _) in rig::setup::BUNDLED {
+            let checked = muprime().args(["check", plan, "--setup", setup, "--json"]).output().unwrap();
+            let said = &documents(&checked)[0];
+            let run = muprime()
+                .args(["run", plan, "--setup", setup, "--fast", "--out"])
+                .arg(folder.path().join(format!("{plan}-{setup}")))
+                .env("MUPRIME_RUNS", folder.path())
+                .output()
+                .unwrap();
+            println!("{plan} on {setup}: {said}");
+            match said["ok"].as_bool() {
+                Some(true) => assert_eq!(run.status.code(), Some(0), "{plan} on {setup}: {}", texts(&run).1),
+                _ => assert_eq!(run.status.code(), Some(2), "{plan} on {setup}: {}", texts(&run).1),
+            }
+            if said["ok"] == true { good += 1 } else { refused += 1 }
+        }
+    }
+    println!("{good} run, {refused} are refused");
+    assert!(good > 0);
+}
+
+/// Wrong files that were once approved: each is refused with the word that names what is wrong.
+#[test]
+fn what_a_run_would_refuse_is_refused_by_check() {
+    let folder = tempfile::tempdir().unwrap();
+    let setup = rig::setup::bundled_text("virtual-ideal").unwrap();
+    let plan = rig::plan::bundled_text("first-sweep").unwrap();
+    let rig = "[finger]\nnormal_stiffness_n_per_m = 3.9e6\nlateral_stiffness_n_per_m = 1.5e6\n[noise]\npass_relative_sd = 0.015\nforce_sd_n = 0.0008\n";
+    let tip = rig::fingertip::BUNDLED[0].1;
+    let table = "point,time_s,amplitude_pp_m,speed_m_s,direction,normal_force_n,lateral_force_n\n1,0,0,0.01,1,0.25,0.1\n";
+    let wrong = [
+        ("setup.toml", setup, "muprime-force2", "no-such", "no profile is called `no-such`"),
+        ("setup.toml", setup, "[[force]]", "[[force]]\nlateral = { signal = \"nope\" }", "nope"),
+        (
+            "setup.toml",
+            setup,
+            "profile = \"muprime-amplifier\"",
+            "profile = \"muprime-stage\"",
+            "muprime-stage",
+        ),
+        (
+            "setup.toml",
+            setup,
+            "profile = \"muprime-stage\"",
+            "profile = \"muprime-force2\"",
+            "muprime-force2",
+        ),
+        ("setup.toml", setup, "rate_hz = 1000", "rate_hz = 1", "10 to 4000"),
+        ("setup.toml", setup, "artificial-silicone", "no-tip", "no-tip"),
+        ("setup.toml", setup, "[limits]", "[limits]\nspeed_max_m_s = 3", "speed_max_m_s"),
+        ("plan.toml", plan, "speed_m_s = 0.02", "speed_m_s = -0.02", "speed_m_s"),
+        ("plan.toml", plan, "frequency_hz = 27500", "frequency_hz = 27.5", "frequency_hz"),
+        ("plan.toml", plan, "0.3e-6", "2.0", "amplitude_pp_m"),
+        ("plan.toml", plan, "0.3e-6", "nan", "amplitude_pp_m"),
+        ("plan.toml", plan, "0.3e-6", "inf", "amplitude_pp_m"),
+        ("plan.toml", plan, "normal_force_n = [0.5, 0.9]", "normal_force_n = [50]", "normal_force_n"),
+        ("plan.toml", plan, "settle_s = 0.12", "settle_s = -1", "settle_s"),
+        ("plan.toml", plan, "seed = 2026", "seeds = 2026", "seeds"),
+        ("rig.toml", rig, "3.9e6", "-3.9e6", "normal_stiffness_n_per_m"),
+        ("rig.toml", rig, "pass_relative_sd", "pass_sd", "pass_sd"),
+        ("tip.toml", tip, "mu0 = ", "mu0 = -", "mu0"),
+        ("tip.toml", tip, "radius_m", "radius", "radius"),
+        ("table.csv", table, "speed_m_s", "speed_mm_s", "speed_m_s"),
+        ("table.csv", table, "0.25,", "250000,", "normal_force_n"),
+        ("table.csv", table, "0.25,", "0.25,", "at least 12"),
+    ];
+    for (name, text, from, to, word) in wrong {
+        assert!(text.contains(from), "{name}: {from}");
+        let path = folder.path().join(name);
+        std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+        let checked = muprime().args(["check", "--json"]).arg(&path).output().unwrap();
+        let said = documents(&checked)[0].to_string();
+        assert_eq!(checked.status.code(), Some(2), "{name} {to}: {said}");
+        assert!(said.contains(word), "{name} {to}: {said}");
+    }
+}
