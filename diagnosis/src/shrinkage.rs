@@ -36,7 +36,7 @@ pub struct Gap {
     pub noise_floor_rmse: Option<f64>,
     /// Share of the removable gap that is closed; none where there is no gap to shrink.
     pub shrinkage: Option<f64>,
-    /// Its interval over groups of passes (bootstrap, 95 per cent).
+    /// Its interval over groups of passes (bootstrap, 95 per cent), widened for the scatter of the refits.
     pub shrinkage_ci95: Option<[f64; 2]>,
     /// Share of the removable gap's square that is left.
     pub unexplained_share: Option<f64>,
@@ -142,7 +142,12 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
         })
         .collect();
     draws.sort_by(f64::total_cmp);
-    let quantile = |q: f64| draws[((draws.len() - 1) as f64 * q).round() as usize];
+    let estimate = shrink(&all).unwrap_or(0.0);
+    let wider = refits(folds);
+    let quantile = |q: f64| {
+        let drawn = draws[((draws.len() - 1) as f64 * q).round() as usize];
+        (estimate + wider * (drawn - estimate)).min(1.0)
+    };
     let removable = all[1] - all[4];
     let rms = |k: usize| (!list.is_empty()).then(|| all[k].sqrt());
     Gap {
@@ -156,6 +161,13 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
         shrinkage_ci95: (!gapless && draws.len() > LEAST_DRAWS).then(|| CI95.map(quantile)),
         unexplained_share: (!gapless).then(|| (all[2] - all[4]).max(0.0) / removable),
     }
+}
+
+/// Factor on the deviation of a mean over folds for the refits: folds share most of what they were fitted to, so their errors go
+/// together by about the share that is held out, and resampling the errors does not show it (Nadeau & Bengio 2003).
+fn refits(folds: usize) -> f64 {
+    let k = folds as f64;
+    ((1.0 / k + 1.0 / (k - 1.0)) * k).sqrt()
 }
 
 /// SplitMix64: a fixed stream, so that the same data gives the same interval.
