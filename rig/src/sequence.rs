@@ -183,11 +183,11 @@ impl Approach {
     /// Where the loop and the stage are fast: a command every five milliseconds.
     const FASTEST: Approach = Approach { every: 5, gain: 25.0 };
 
-    /// For a loop and a stage of these periods. A command acts on a position that is as old as the stage's sample, its way
-    /// and the time since the last command: a gain beyond one over that would swing about the goal and never arrive.
+    /// For a loop and a stage of these periods. A command acts on a position that is as old as the stage's sample, the time
+    /// since the last command and a cycle: a gain well beyond one over that would swing about the goal and never arrive.
     fn at(cycle: Nanos, stage: &ChannelTiming) -> Self {
         let every = (5e-3 / cycle.seconds()).round().max(1.0);
-        let old = (every + 1.0) * cycle.seconds() + stage.period.seconds() + stage.latency.seconds();
+        let old = (every + 1.0) * cycle.seconds() + stage.period.seconds();
         Approach { every: every as u64, gain: (0.7 / old).min(Self::FASTEST.gain) }
     }
 }
