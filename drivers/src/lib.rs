@@ -296,7 +296,8 @@ pub fn misfits(setup: &InstrumentsSetup) -> Vec<OpenError> {
     let mut wrong = Vec::new();
     let mut force = Vec::new();
     let mut judge = |instrument: &InstrumentSetup, fit: &mut dyn FnMut(Profile) -> Result<(), String>| {
-        let fits = profile(&instrument.profile)
+        let fits = instrument
+            .description()
             .and_then(|profile| fit(profile).map_err(|problem| mismatch(instrument, problem)));
         wrong.extend(fits.err());
     };
