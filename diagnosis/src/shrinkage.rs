@@ -133,12 +133,17 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
     let passes = table.len() as f64;
     // The mean square of n scatters about the floor has a relative deviation of sqrt(2/n).
     let gapless = list.is_empty() || all[1] <= all[4] * (1.0 + k.gapless_sd * (2.0 / passes).sqrt());
+    // Passes that scatter by less than is stated bound the floor themselves.
+    let stated = (all[2] / all[4]).min(1.0);
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
     let mut draws: Vec<f64> = (0..k.resamples)
         .filter_map(|_| {
             let sample: Vec<_> =
                 (0..list.len()).map(|_| list[(split_mix(&mut state) % list.len() as u64) as usize]).collect();
-            shrink(&mean(&sample))
+            // The floor is known no better than the scatter of as many passes tells: what is left may hide in that.
+            let mut means = mean(&sample);
+            means[4] *= stated * (1.0 + (2.0 / passes).sqrt() * deviate(&mut state)).max(0.0);
+            shrink(&means)
         })
         .collect();
     draws.sort_by(f64::total_cmp);
@@ -161,6 +166,11 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
         shrinkage_ci95: (!gapless && draws.len() > LEAST_DRAWS).then(|| CI95.map(quantile)),
         unexplained_share: (!gapless).then(|| (all[2] - all[4]).max(0.0) / removable),
     }
+}
+
+/// A normal deviate by the sum of twelve.
+fn deviate(state: &mut u64) -> f64 {
+    (0..12).map(|_| (split_mix(state) >> 11) as f64 / (1u64 << 53) as f64).sum::<f64>() - 6.0
 }
 
 /// Factor on the deviation of a mean over folds for the refits: folds share most of what they were fitted to, so their errors go
