@@ -289,38 +289,6 @@ pub fn open(setup: &InstrumentsSetup, epoch: Instant) -> Result<Rig, OpenError> 
     Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), supply, contacts, links })
 }
 
-/// What [`open`] would refuse of a setup by itself, before it talks to any instrument: profiles that are unknown or do not hold, and
-/// instruments that are not what the setup has them for. Everything that is wrong at once.
-#[must_use]
-pub fn misfits(setup: &InstrumentsSetup) -> Vec<OpenError> {
-    let mut wrong = Vec::new();
-    let mut force = Vec::new();
-    let mut judge = |instrument: &InstrumentSetup, fit: &mut dyn FnMut(Profile) -> Result<(), String>| {
-        let fits = instrument
-            .description()
-            .and_then(|profile| fit(profile).map_err(|problem| mismatch(instrument, problem)));
-        wrong.extend(fits.err());
-    };
-    for instrument in &setup.force {
-        judge(instrument, &mut |p| Endpoint::force(p, instrument).map(|(_, port)| force.push(port)));
-    }
-    judge(&setup.amplifier, &mut |p| Endpoint::amplifier(p, &setup.amplifier).map(drop));
-    judge(&setup.stage, &mut |p| Endpoint::stage(p, &setup.stage).map(drop));
-    if let Some(instrument) = &setup.supply_relay {
-        judge(instrument, &mut |p| Endpoint::supply(p).map(drop));
-    }
-    if let Some(instrument) = &setup.safety_inputs {
-        judge(instrument, &mut |p| Endpoint::contacts(p, instrument).map(drop));
-    }
-    if force.len() == setup.force.len() {
-        match setup.force.first() {
-            None => {}
-            Some(first) => wrong.extend(ports::compose(force).err().map(|problem| mismatch(first, problem))),
-        }
-    }
-    wrong
-}
-
 /// The second switch-off channel and the safety contacts.
 fn open_safety(
     setup: &InstrumentsSetup,

@@ -156,7 +156,7 @@ fn check(name: &str, setup: Option<&Setup>, model: Option<&Arc<dyn FrictionModel
                 drivers::profile(name).map_err(|e| told(e.to_string()))?;
             }
         }
-        "setup" => fits(&Setup::parse(name, &text, folder)?)?,
+        "setup" => complete(&Setup::parse(name, &text, folder)?)?,
         "plan" => {
             let plan = Plan::parse(name, &text)?;
             match setup {
@@ -165,7 +165,7 @@ fn check(name: &str, setup: Option<&Setup>, model: Option<&Arc<dyn FrictionModel
                     plan.points(plan.file.seed, &widest(), &fine).wrap_err("no rig may do this")?;
                 }
                 Some(setup) => {
-                    fits(setup).wrap_err_with(|| format!("the setup {}", setup.origin))?;
+                    complete(setup)?;
                     let passes = preflight(setup, plan, model)?;
                     return Ok(Good { kind, passes: Some(passes) });
                 }
@@ -209,17 +209,9 @@ fn table(path: &Path) -> miette::Result<Good> {
     Ok(Good { kind: "table", passes: Some(passes.len()) })
 }
 
-/// Whether the instruments are what the setup has them for: everything that a run would refuse before it talks to them.
-fn fits(setup: &Setup) -> miette::Result<()> {
-    let wrong: Vec<String> = drivers::misfits(&setup.instruments()).iter().map(ToString::to_string).collect();
-    if wrong.is_empty() {
-        return Ok(());
-    }
-    miette::bail!(
-        help = "`muprime show` lists the profiles; docs/devices.md says what each is",
-        "{}",
-        wrong.join("\n")
-    )
+/// What a run asks of a setup beyond what reading it does.
+fn complete(setup: &Setup) -> miette::Result<()> {
+    setup.has_both_axes().map_err(|problem| miette::miette!("the setup {}: {problem}", setup.origin))
 }
 
 /// Everything that a run looks at before it touches rig or folder. Returns the number of passes.

@@ -4,6 +4,7 @@ use super::{Setup, SetupFile};
 use calibration::certificate::sha256_hex;
 use drivers::endpoint::Endpoint;
 use drivers::library::{Library, Source};
+use drivers::ports::compose;
 use drivers::{InstrumentSetup, bundled};
 use instruments::schema::LinkKind;
 use instruments::traffic::LineSetup;
@@ -182,6 +183,18 @@ fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static s
 }
 
 impl Setup {
+    /// Whether the force instruments together give each axis once, as a run needs it; a look at one instrument does not.
+    ///
+    /// # Errors
+    /// What is missing, or given twice.
+    pub fn has_both_axes(&self) -> Result<(), String> {
+        let port = |instrument: &InstrumentSetup| {
+            let profile = instrument.description().map_err(|error| error.to_string())?;
+            Endpoint::force(profile, instrument).map(|(_, port)| port)
+        };
+        compose(self.file.force.iter().map(port).collect::<Result<_, _>>()?).map(drop)
+    }
+
     /// The profiles of its instruments, and the files that they name, by file name: for the record.
     #[must_use]
     pub fn profiles(&self) -> Vec<(String, String)> {
