@@ -5,6 +5,7 @@ use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use models::record::Pass;
 use rayon::prelude::*;
+use rig::validation::blind::distance::distance;
 use rig::validation::blind::score;
 use sim::sealed::{Ask, Stratum, generate};
 use std::collections::BTreeSet;
@@ -51,7 +52,7 @@ const ONE_OF_EACH: [(&str, u64); 23] = [
     ("speed_ripple", 1_610_004_830_025),
     ("squeeze_film", 1_610_004_830_004),
     ("stiffness_error", 1_680_005_040_032),
-    ("subsurface_relaxation", 1_610_004_830_044),
+    ("subsurface_relaxation", 1_610_009_660_114_490_317),
 ];
 
 /// Each cause in turn taken out of the library: `unknown`, or an effect that is declared near it, but no confident other name.
@@ -78,6 +79,30 @@ fn a_withheld_cause_is_no_other_cause() {
         })
         .collect();
     assert!(confident.is_empty(), "{confident:?}");
+}
+
+/// Least distance of a sealed form from the library's law of its name; see `rig::validation::blind::distance`.
+const LEAST_DISTANCE: f64 = 0.01;
+
+/// The simulation's forms are not the library's: sizes, shapes, stiffnesses and `mu0` free, no law of a cause's own name leaves
+/// less than a stated share of its noise-free gap. Gains of speed, amplitude and stiffness are exact aliases of a
+/// recalibration, whose gap is of other sources: what they leave is printed, and counts with the others.
+#[test]
+fn no_sealed_form_is_the_librarys_own() {
+    let distances: Vec<(&str, f64)> = ONE_OF_EACH
+        .par_iter()
+        .map(|&(name, seed)| {
+            let imitated = sim::defects::Kind::named(name).is_some_and(|kind| kind.imitated);
+            let stratum = if imitated { Stratum::Alias } else { Stratum::Single };
+            let set = generate(seed, stratum, Ask::Gain);
+            (name, distance(&set).expect("a set of one cause of the library"))
+        })
+        .collect();
+    for (name, distance) in &distances {
+        println!("{name}: {distance:.3}");
+    }
+    let near: Vec<_> = distances.iter().filter(|(_, d)| *d < LEAST_DISTANCE).collect();
+    assert!(near.is_empty(), "nearer than {LEAST_DISTANCE} to the library's own law: {near:?}");
 }
 
 /// Priors alone make no name: a stage that slides at another speed than it says is, pass for pass, a softer or harder
@@ -119,16 +144,14 @@ fn friction_that_heats_up_is_not_named_as_rate_and_load() {
     }
 }
 
-/// A stage that slips by more the faster it slides, beside a saturation or a detuning: with one gain for all speeds the
-/// pair left more than its forms could be uncertain by, and was lost.
+/// A stage that slips by more the faster it slides, beside a saturation: with one gain for all speeds the pair left more than
+/// its forms could be uncertain by, and was lost.
 #[test]
 fn a_speed_that_is_wrong_by_half_is_found_beside_another_cause() {
-    for seed in [1_910_005_730_477, 1_910_005_730_508] {
-        let set = generate(seed, Stratum::Pair, Ask::Gain);
-        assert!(set.label.causes.iter().any(|c| c.name == "speed_error"));
-        let scored = score(&set, &Options::default()).unwrap();
-        assert!(scored.top_right, "seed {seed}: {:?}", scored.named);
-    }
+    let set = generate(1_910_005_730_508, Stratum::Pair, Ask::Gain);
+    assert!(set.label.causes.iter().any(|c| c.name == "speed_error"));
+    let scored = score(&set, &Options::default()).unwrap();
+    assert!(scored.top_right, "{:?}", scored.named);
 }
 
 /// A vibration in the plane of the plate adds a force that goes with the load, more or less: a cross-talk, were it not off
@@ -229,7 +252,7 @@ fn a_saved_model_comes_back() {
     let rig = rig_of(&set.rig_toml);
     let table = Table::measured(&set.passes).unwrap();
     let result = diagnose(&table, &rig, &quick(), String::new());
-    let Some(saved) = result.saved_model() else { return };
+    let saved = result.saved_model().expect("a verdict with a model");
     let text = toml::to_string(&saved).unwrap();
     let back: effects::corrected::SavedModel = toml::from_str(&text).unwrap();
     assert_eq!(saved, back);
@@ -237,5 +260,18 @@ fn a_saved_model_comes_back() {
     for (pass, f) in table.passes.iter().zip(result.predict(&table)) {
         let got = compiled.lateral_force(pass);
         assert!((got - f.form).abs() < 1e-9 + 1e-6 * f.form.abs(), "{got} {}", f.form);
+    }
+}
+
+/// A zero that sinks, attraction that grows with the speed: one cause each, whose form departs
+/// from the library's so that a second cause mends it. Whether it is one is not told; the cause stands in the class.
+#[test]
+fn a_companion_that_may_be_a_form_of_its_own_is_not_named() {
+    for (seed, cause) in [(7_700_023_100_086, "normal_offset"), (7_701_023_103_049, "adhesion")] {
+        let set = generate(seed, Stratum::Single, Ask::Gain);
+        assert_eq!(set.label.causes[0].name, cause, "the set of seed {seed} has another cause by now");
+        let scored = score(&set, &Options::default()).unwrap();
+        assert_eq!(scored.verdict, Verdict::Ambiguous, "{cause}: {:?}", scored.named);
+        assert!(scored.class.iter().any(|name| name == cause), "{cause}: {:?}", scored.class);
     }
 }

@@ -45,14 +45,14 @@ fn without_a_fault_nothing_trips() {
 #[test]
 fn two_thousand_seeds_and_none_over_a_bound() {
     for pace in PACES {
-        assert_clean(&search(Search { first: 1, seeds: 2000, pairs: false, twice: false, pace }));
+        assert_clean(&search(Search { first: 1, seeds: 2000, pairs: false, twice: false, pace }, |_| {}));
     }
 }
 
 #[test]
 fn random_pairs_of_faults() {
     let pace = Pace::Fast;
-    let tally = search(Search { first: 1, seeds: 1000, pairs: true, twice: false, pace });
+    let tally = search(Search { first: 1, seeds: 1000, pairs: true, twice: false, pace }, |_| {});
     assert!(tally.reactions.values().map(|r| r.runs).sum::<u64>() > 1900, "pairs have two faults");
     assert_clean(&tally);
 }
@@ -82,7 +82,7 @@ fn faults_that_hide_each_other_are_off_within_the_slower_bound() {
 #[test]
 fn seeds_run_twice_give_equal_hashes_and_replay_to_equal_decisions() {
     let pace = Pace::Fast;
-    assert_clean(&search(Search { first: 1, seeds: 100, pairs: false, twice: true, pace }));
+    assert_clean(&search(Search { first: 1, seeds: 100, pairs: false, twice: true, pace }, |_| {}));
 }
 
 /// Negative controls: a core that sleeps, that is deaf, or that trips for a wrong cause, and the bench says so for every fault

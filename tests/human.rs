@@ -52,6 +52,7 @@ fn run(tables: &str, limits: &str, hand: bool) -> (Outcome, usize, usize, Vec<Ev
         defects: None,
         out: folder.path().join("run"),
         fast: true,
+        notes: Default::default(),
     };
     let mut events = Vec::new();
     let mut news = |news: News<'_>| {

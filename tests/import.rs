@@ -277,18 +277,19 @@ fn binary_tables_come_in_to_the_last_digit() {
         python().arg(file("tests/peers/foreign_tables.py")).arg(&csv).arg(folder.path()).output().unwrap();
     assert!(made.status.success(), "{}", texts(&made).1);
     let map = "t_s=time:s, w_um=amplitude_pp:um, f_khz=frequency:kHz, v_mm_s=speed:mm/s, dir=direction, fn_mn=normal_force:mN, ft_mn=lateral_force:mN";
-    // 7 to 10.
+    let matrix = "#1=time:s, #2=amplitude_pp:um, #3=frequency:kHz, #4=speed:mm/s, #5=direction, #6=normal_force:mN, #7=lateral_force:mN";
+    // 7 to 16.
     for (name, arguments) in [
         ("book.xlsx", vec!["--yes", "--sheet", "Friction"]),
         ("table.parquet", vec!["--yes"]),
         ("records.npy", vec!["--map", map]),
-        (
-            "matrix.npy",
-            vec![
-                "--map",
-                "#1=time:s, #2=amplitude_pp:um, #3=frequency:kHz, #4=speed:mm/s, #5=direction, #6=normal_force:mN, #7=lateral_force:mN",
-            ],
-        ),
+        ("matrix.npy", vec!["--map", matrix]),
+        ("columns.mat", vec!["--map", map]),
+        ("packed.mat", vec!["--sheet", "sweep", "--map", map]),
+        ("matrix.mat", vec!["--map", matrix]),
+        ("new.mat", vec!["--map", matrix]),
+        ("table.h5", vec!["--sheet", "run/sweep", "--map", map]),
+        ("matrix.h5", vec!["--map", matrix]),
     ] {
         same(&import(folder.path(), &folder.path().join(name), &arguments).passes, &moving, 0, name);
     }
@@ -301,6 +302,46 @@ fn binary_tables_come_in_to_the_last_digit() {
         .unwrap();
     assert_eq!(several.status.code(), Some(2));
     assert!(texts(&several).1.contains("'Notes', 'Friction'"), "{}", texts(&several).1);
+}
+
+/// Arrays of several lengths are listed; a file that is cut, or whose sizes lie, ends with words and not otherwise.
+#[test]
+fn files_of_arrays_are_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let csv = folder.path().join("plain.csv");
+    let header = "t_s,w_um,f_khz,v_mm_s,dir,fn_mn,ft_mn";
+    let rows: String = (1..20).map(|k| format!("{k},1,27.5,10,1,250,{k}\n")).collect();
+    std::fs::write(&csv, format!("{header}\n{rows}")).unwrap();
+    let made =
+        python().arg(file("tests/peers/foreign_tables.py")).arg(&csv).arg(folder.path()).output().unwrap();
+    assert!(made.status.success(), "{}", texts(&made).1);
+    let import = |name: &str, bytes: &[u8]| {
+        let (source, out) = (folder.path().join(name), folder.path().join("out"));
+        std::fs::write(&source, bytes).unwrap();
+        let output = muprime().arg("import").arg(&source).args(["--yes", "-o"]).arg(&out).output().unwrap();
+        (output.status.code(), texts(&output).1)
+    };
+    for (name, lists) in [("packed.mat", "sweep.t_s (19 x 1)"), ("table.h5", "run/sweep/t_s (19 x 1)")] {
+        let bytes = std::fs::read(folder.path().join(name)).unwrap();
+        let (code, said) = import("several.bin", &bytes);
+        let words = said.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
+        assert_eq!(code, Some(2), "{said}");
+        assert!(words.contains(lists) && words.contains("--sheet"), "{name}: {words}");
+    }
+    // Wherever it is cut and whichever byte is another: status 0 or 2, never a panic.
+    for name in ["columns.mat", "packed.mat", "table.h5", "new.mat"] {
+        let whole = std::fs::read(folder.path().join(name)).unwrap();
+        for k in 1..12 {
+            let cut = whole.len() * k / 12;
+            let mut other = whole.clone();
+            other[cut] ^= 0x5a;
+            for bytes in [&whole[..cut], &other[..]] {
+                let (code, said) = import("hurt.bin", bytes);
+                assert!(matches!(code, Some(0 | 2)), "{name} at {cut}: {code:?} {said}");
+                let _ = std::fs::remove_dir_all(folder.path().join("out"));
+            }
+        }
+    }
 }
 
 fn refused(folder: &Path, text: &str, arguments: &[&str]) -> String {
@@ -346,7 +387,9 @@ fn what_cannot_be_taken_is_refused_with_the_remedy() {
     );
     let negative = whole.replace("0.25", "-0.25");
     assert!(refused(folder, &negative, &["--yes"]).contains("normal_force:-N"));
-    assert!(refused(folder, "MATLAB 5.0 MAT-file, made by hand", &["--yes"]).contains("scipy.io.loadmat"));
+    assert!(
+        refused(folder, "MATLAB 5.0 MAT-file, made by hand", &["--yes"]).contains("cut short or damaged")
+    );
     assert!(refused(folder, "\n\n", &["--yes"]).contains("no rows of numbers"));
     // A folder with a table is left as it is.
     let out = folder.join("taken");

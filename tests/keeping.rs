@@ -89,41 +89,45 @@ fn struck(folder: &Path, mut strike: impl FnMut(&Path)) -> Struck {
 
 #[test]
 fn a_record_that_is_removed_in_mid_run_stops_the_sweep_and_is_said() {
-    let folder = tempfile::tempdir().unwrap();
-    let run = struck(folder.path(), |out| std::fs::remove_file(out.join("run-1.mcap")).unwrap());
-    assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
-    assert!(run.stderr.contains("run-1.mcap was removed or replaced"), "{}", run.stderr);
-    let kept = points(&run.out);
-    assert!(run.acknowledged.is_subset(&kept) && kept.len() < 40, "{kept:?}");
-    let report = muprime().args(["--json", "report"]).arg(&run.out).output().unwrap();
-    assert!(documents(&report)[0]["damage"].to_string().contains("the record of session 1 is missing"));
+    tests::in_wall_clock_time(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let run = struck(folder.path(), |out| std::fs::remove_file(out.join("run-1.mcap")).unwrap());
+        assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
+        assert!(run.stderr.contains("run-1.mcap was removed or replaced"), "{}", run.stderr);
+        let kept = points(&run.out);
+        assert!(run.acknowledged.is_subset(&kept) && kept.len() < 40, "{kept:?}");
+        let report = muprime().args(["--json", "report"]).arg(&run.out).output().unwrap();
+        assert!(documents(&report)[0]["damage"].to_string().contains("the record of session 1 is missing"));
+    });
 }
 
 #[test]
 fn a_catalogue_that_is_locked_or_removed_in_mid_run_stops_the_sweep_and_every_pass_is_kept() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut lock = None;
-    let run = struck(&made(folder.path(), "locked"), |out| {
-        let db = rusqlite::Connection::open(out.with_file_name("catalogue.sqlite")).unwrap();
-        db.execute_batch("BEGIN IMMEDIATE").unwrap();
-        lock = Some(db);
-    });
-    drop(lock);
-    assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
-    assert!(run.stderr.contains("catalogue") && run.stderr.contains("locked"), "{}", run.stderr);
-    let kept = points(&run.out);
-    assert!(run.acknowledged.len() > 2 && run.acknowledged == kept, "{:?} {kept:?}", run.acknowledged);
-    let summary: Summary =
-        serde_json::from_slice(&std::fs::read(run.out.join("summary.json")).unwrap()).unwrap();
-    assert_eq!(summary.passes, kept.len());
-    assert!(run.out.join("report.html").exists());
+    tests::in_wall_clock_time(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut lock = None;
+        let run = struck(&made(folder.path(), "locked"), |out| {
+            let db = rusqlite::Connection::open(out.with_file_name("catalogue.sqlite")).unwrap();
+            db.execute_batch("BEGIN IMMEDIATE").unwrap();
+            lock = Some(db);
+        });
+        drop(lock);
+        assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
+        assert!(run.stderr.contains("catalogue") && run.stderr.contains("locked"), "{}", run.stderr);
+        let kept = points(&run.out);
+        assert!(run.acknowledged.len() > 2 && run.acknowledged == kept, "{:?} {kept:?}", run.acknowledged);
+        let summary: Summary =
+            serde_json::from_slice(&std::fs::read(run.out.join("summary.json")).unwrap()).unwrap();
+        assert_eq!(summary.passes, kept.len());
+        assert!(run.out.join("report.html").exists());
 
-    let run = struck(&made(folder.path(), "removed"), |out| {
-        std::fs::remove_file(out.with_file_name("catalogue.sqlite")).unwrap();
+        let run = struck(&made(folder.path(), "removed"), |out| {
+            std::fs::remove_file(out.with_file_name("catalogue.sqlite")).unwrap();
+        });
+        assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
+        assert!(run.stderr.contains("catalogue.sqlite was removed or replaced"), "{}", run.stderr);
+        assert_eq!(run.acknowledged, points(&run.out));
     });
-    assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
-    assert!(run.stderr.contains("catalogue.sqlite was removed or replaced"), "{}", run.stderr);
-    assert_eq!(run.acknowledged, points(&run.out));
 }
 
 fn made(folder: &Path, name: &str) -> PathBuf {
@@ -135,71 +139,80 @@ fn made(folder: &Path, name: &str) -> PathBuf {
 /// The disk fills while the record is being ended: the last tens of kilobytes are its index.
 #[test]
 fn a_disk_that_fills_at_the_very_end_hangs_nobody() {
-    let folder = tempfile::tempdir().unwrap();
-    let plan = plan(folder.path(), 3);
-    let length = (1..=ATTEMPTS).find_map(|attempt| {
-        let whole = folder.path().join(format!("whole-{attempt}"));
-        let done = sweep(&plan, &whole).output().unwrap().status.code() == Some(0);
-        done.then(|| std::fs::metadata(whole.join("run-1.mcap")).unwrap().len() / 1024)
-    });
-    let length = length.expect("a machine that is not too busy for wall-clock time");
-    let mut lost = 0;
-    for short_kib in [2, 6, 12, 24] {
-        let out = folder.path().join(format!("short-{short_kib}"));
-        let mut limited = Command::new("bash");
-        limited.args(["-c", &format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", length - short_kib), "bash"]);
-        let plain = sweep(&plan, &out);
-        let limited = limited.arg(plain.get_program()).args(plain.get_args());
-        let mut child = limited.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        let stdout = child.stdout.take().unwrap();
-        let last = std::thread::spawn(move || BufReader::new(stdout).lines().map_while(Result::ok).last());
-        let began = Instant::now();
-        let status = loop {
-            if let Some(status) = child.try_wait().unwrap() {
-                break status;
+    tests::in_wall_clock_time(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = plan(folder.path(), 3);
+        let length = (1..=ATTEMPTS).find_map(|attempt| {
+            let whole = folder.path().join(format!("whole-{attempt}"));
+            let done = sweep(&plan, &whole).output().unwrap().status.code() == Some(0);
+            done.then(|| std::fs::metadata(whole.join("run-1.mcap")).unwrap().len() / 1024)
+        });
+        let length = length.expect("a machine that is not too busy for wall-clock time");
+        let mut lost = 0;
+        for short_kib in [2, 6, 12, 24] {
+            let out = folder.path().join(format!("short-{short_kib}"));
+            let mut limited = Command::new("bash");
+            limited.args([
+                "-c",
+                &format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", length - short_kib),
+                "bash",
+            ]);
+            let plain = sweep(&plan, &out);
+            let limited = limited.arg(plain.get_program()).args(plain.get_args());
+            let mut child = limited.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+            let stdout = child.stdout.take().unwrap();
+            let last =
+                std::thread::spawn(move || BufReader::new(stdout).lines().map_while(Result::ok).last());
+            let began = Instant::now();
+            let status = loop {
+                if let Some(status) = child.try_wait().unwrap() {
+                    break status;
+                }
+                if began.elapsed() > Duration::from_secs(60) {
+                    child.kill().unwrap();
+                    panic!("{short_kib} kB short: it hangs");
+                }
+                std::thread::sleep(Duration::from_millis(20));
+            };
+            let last = last.join().unwrap().unwrap_or_default();
+            if last.contains(r#""outcome":"record_lost""#) {
+                assert_eq!(status.code(), Some(1));
+                lost += 1;
             }
-            if began.elapsed() > Duration::from_secs(60) {
-                child.kill().unwrap();
-                panic!("{short_kib} kB short: it hangs");
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        };
-        let last = last.join().unwrap().unwrap_or_default();
-        if last.contains(r#""outcome":"record_lost""#) {
-            assert_eq!(status.code(), Some(1));
-            lost += 1;
         }
-    }
-    assert!(lost > 0, "no limit struck the record's end");
+        assert!(lost > 0, "no limit struck the record's end");
+    });
 }
 
 #[test]
 fn the_same_command_on_a_finished_run_says_so_and_touches_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
-    for clock in [Some("--fast"), None] {
-        let again = |n: u32| {
-            let output =
-                sweep(&plan, &out).args(if n == 0 { Some("--fast") } else { clock }).output().unwrap();
-            assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
-            documents(&output).pop().unwrap()["summary"].clone()
-        };
-        let first = again(0);
-        let files = |out: &Path| {
-            let entries = std::fs::read_dir(out).unwrap().map(|e| e.unwrap().path());
-            let mut all: Vec<_> = entries.map(|p| (p.clone(), std::fs::read(&p).unwrap())).collect();
-            all.retain(|(path, _)| !path.ends_with(".lock"));
-            all.sort();
-            all
-        };
-        let before = files(&out);
-        let second = again(1);
-        assert!(files(&out) == before, "a finished run was changed");
-        assert_eq!((&first["outcome"], &second["outcome"]), (&"complete".into(), &"complete".into()));
-        assert_eq!(second["finished_before"], true);
-        let said = sweep(&plan, &out).output().unwrap();
-        assert!(!documents(&said).iter().any(|d| d["event"]["event"] == "armed"), "nothing is armed");
-    }
+    tests::in_wall_clock_time(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
+        for clock in [Some("--fast"), None] {
+            let again = |n: u32| {
+                let output =
+                    sweep(&plan, &out).args(if n == 0 { Some("--fast") } else { clock }).output().unwrap();
+                assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
+                documents(&output).pop().unwrap()["summary"].clone()
+            };
+            let first = again(0);
+            let files = |out: &Path| {
+                let entries = std::fs::read_dir(out).unwrap().map(|e| e.unwrap().path());
+                let mut all: Vec<_> = entries.map(|p| (p.clone(), std::fs::read(&p).unwrap())).collect();
+                all.retain(|(path, _)| !path.ends_with(".lock"));
+                all.sort();
+                all
+            };
+            let before = files(&out);
+            let second = again(1);
+            assert!(files(&out) == before, "a finished run was changed");
+            assert_eq!((&first["outcome"], &second["outcome"]), (&"complete".into(), &"complete".into()));
+            assert_eq!(second["finished_before"], true);
+            let said = sweep(&plan, &out).output().unwrap();
+            assert!(!documents(&said).iter().any(|d| d["event"]["event"] == "armed"), "nothing is armed");
+        }
+    });
 }
 
 #[test]
@@ -232,8 +245,17 @@ fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {
             let model = Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
             let defects = Some(sim::defects::Defects::parse(DRIFT).unwrap());
             let plan = Plan::load("first-sweep").unwrap();
-            let job =
-                Job { seed: 11, setup, plan, model, model_file: None, defects, out: out.clone(), fast: true };
+            let job = Job {
+                seed: 11,
+                setup,
+                plan,
+                model,
+                model_file: None,
+                defects,
+                out: out.clone(),
+                fast: true,
+                notes: Default::default(),
+            };
             let (signals, mut made) = (Signals::default(), 0);
             let stops = Arc::clone(&signals.stops);
             job.run(&signals, &mut |news| {
@@ -403,50 +425,52 @@ fn one_flipped_bit_is_told_by_replay_report_recover_and_diagnose() {
 
 #[test]
 fn a_reader_that_goes_away_ends_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
-    assert_eq!(sweep(&plan, &out).arg("--fast").output().unwrap().status.code(), Some(0));
-    // Standard output and standard error are pipes that nobody reads any more.
-    let deaf = |arguments: &[&str]| {
-        let mut shell = Command::new("bash");
-        shell.args(["-c", "exec 3> >(true); wait $!; exec \"$@\" >&3 2>&3", "bash"]);
-        shell.arg(muprime().get_program()).args(arguments).status().unwrap().code()
-    };
-    let (run, record) = (out.to_str().unwrap(), out.join("run-1.mcap"));
-    let (plan, record) = (plan.to_str().unwrap(), record.to_str().unwrap());
-    for verb in [
-        ["--help"].as_slice(),
-        &["completions", "bash"],
-        &["model", "effects"],
-        &["model", "point"],
-        &["replay", run],
-        &["report", run],
-        &["export", run, "--to", "csv"],
-        &["recover", record],
-        &["watch", run],
-        &["check", plan],
-        &["runs", "--folder", folder.path().to_str().unwrap()],
-    ] {
-        assert_eq!(deaf(verb), Some(0), "{verb:?}");
-    }
-    assert_eq!(deaf(&["check", "/dev/null/nothing"]), Some(2));
-    // A sweep, in virtual and in wall-clock time: all of it is made and kept.
-    let silent = folder.path().join("silent");
-    assert_eq!(
-        deaf(&["run", "--fast", "--setup", "virtual-ideal", plan, "--out", silent.to_str().unwrap()]),
-        Some(0)
-    );
-    assert_eq!(points(&silent), points(&out));
-    let wall = (1..=ATTEMPTS).any(|attempt| {
-        let silent = folder.path().join(format!("wall-{attempt}"));
-        let status = deaf(&["run", "--setup", "virtual-ideal", plan, "--out", silent.to_str().unwrap()]);
-        assert!(matches!(status, Some(0..=2)), "{status:?}");
-        let made = || std::fs::read(silent.join("summary.json")).ok();
-        let summary: Option<Summary> = made().and_then(|text| serde_json::from_slice(&text).ok());
-        assert_eq!(status == Some(2), summary.is_none(), "a sweep that had begun has its end");
-        status == Some(0) && points(&silent) == points(&out)
+    tests::in_wall_clock_time(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
+        assert_eq!(sweep(&plan, &out).arg("--fast").output().unwrap().status.code(), Some(0));
+        // Standard output and standard error are pipes that nobody reads any more.
+        let deaf = |arguments: &[&str]| {
+            let mut shell = Command::new("bash");
+            shell.args(["-c", "exec 3> >(true); wait $!; exec \"$@\" >&3 2>&3", "bash"]);
+            shell.arg(muprime().get_program()).args(arguments).status().unwrap().code()
+        };
+        let (run, record) = (out.to_str().unwrap(), out.join("run-1.mcap"));
+        let (plan, record) = (plan.to_str().unwrap(), record.to_str().unwrap());
+        for verb in [
+            ["--help"].as_slice(),
+            &["completions", "bash"],
+            &["model", "effects"],
+            &["model", "point"],
+            &["replay", run],
+            &["report", run],
+            &["export", run, "--to", "csv"],
+            &["recover", record],
+            &["watch", run],
+            &["check", plan],
+            &["runs", "--folder", folder.path().to_str().unwrap()],
+        ] {
+            assert_eq!(deaf(verb), Some(0), "{verb:?}");
+        }
+        assert_eq!(deaf(&["check", "/dev/null/nothing"]), Some(2));
+        // A sweep, in virtual and in wall-clock time: all of it is made and kept.
+        let silent = folder.path().join("silent");
+        assert_eq!(
+            deaf(&["run", "--fast", "--setup", "virtual-ideal", plan, "--out", silent.to_str().unwrap()]),
+            Some(0)
+        );
+        assert_eq!(points(&silent), points(&out));
+        let wall = (1..=ATTEMPTS).any(|attempt| {
+            let silent = folder.path().join(format!("wall-{attempt}"));
+            let status = deaf(&["run", "--setup", "virtual-ideal", plan, "--out", silent.to_str().unwrap()]);
+            assert!(matches!(status, Some(0..=2)), "{status:?}");
+            let made = || std::fs::read(silent.join("summary.json")).ok();
+            let summary: Option<Summary> = made().and_then(|text| serde_json::from_slice(&text).ok());
+            assert_eq!(status == Some(2), summary.is_none(), "a sweep that had begun has its end");
+            status == Some(0) && points(&silent) == points(&out)
+        });
+        assert!(wall, "{ATTEMPTS} sweeps in a row were cut short");
     });
-    assert!(wall, "{ATTEMPTS} sweeps in a row were cut short");
 }
 
 #[test]

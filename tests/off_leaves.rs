@@ -278,84 +278,95 @@ fn strike(case: &Case, seed: u64) -> Result<String, String> {
 
 #[test]
 fn off_leaves_on_every_transport_whatever_strikes_the_link() {
-    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let seeds: u64 = std::env::var("MUPRIME_OFF_SEEDS").map_or(7, |n| n.parse().expect("a number"));
-    let only = std::env::var("MUPRIME_OFF_CASE").unwrap_or_default();
-    let mut wrong = Vec::new();
-    for case in CASES.iter().filter(|case| case.name.contains(&only)) {
-        for seed in 0..seeds {
-            match strike(case, seed) {
-                Ok(found) => println!("{found}"),
-                Err(found) => {
-                    println!("WRONG {found}");
-                    wrong.push(found);
+    tests::in_wall_clock_time(|| {
+        let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+        let seeds: u64 = std::env::var("MUPRIME_OFF_SEEDS").map_or(7, |n| n.parse().expect("a number"));
+        let only = std::env::var("MUPRIME_OFF_CASE").unwrap_or_default();
+        let mut wrong = Vec::new();
+        for case in CASES.iter().filter(|case| case.name.contains(&only)) {
+            for seed in 0..seeds {
+                match strike(case, seed) {
+                    Ok(found) => println!("{found}"),
+                    Err(found) => {
+                        println!("WRONG {found}");
+                        wrong.push(found);
+                    }
                 }
             }
         }
-    }
-    assert!(wrong.is_empty(), "{} of {} strikes: {wrong:#?}", wrong.len(), seeds * CASES.len() as u64);
+        assert!(wrong.is_empty(), "{} of {} strikes: {wrong:#?}", wrong.len(), seeds * CASES.len() as u64);
+    });
 }
 
 /// An amplifier that ignores its enable, and a link that carries nothing more: neither is said to be off.
 #[test]
 fn what_was_not_read_back_off_is_not_said_to_be_off() {
-    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let mut stubborn = Bench::start(&CASES[0], true, 1);
-    stubborn.drive().unwrap();
-    let off = stubborn.end();
-    assert!(stubborn.is_on(Struck::Amplifier), "else this test shows nothing");
-    assert!(!off.read_back && off.words().contains("may still be on: switch the supply off"), "{off:?}");
+    tests::in_wall_clock_time(|| {
+        let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+        let mut stubborn = Bench::start(&CASES[0], true, 1);
+        stubborn.drive().unwrap();
+        let off = stubborn.end();
+        assert!(stubborn.is_on(Struck::Amplifier), "else this test shows nothing");
+        assert!(!off.read_back && off.words().contains("may still be on: switch the supply off"), "{off:?}");
 
-    let mut dead = Bench::start(&CASES[0], false, 2);
-    dead.drive().unwrap();
-    let (from, until) = (Instant::now(), Instant::now() + Duration::from_secs(600));
-    dead.trouble.strike(Fault { kind: Kind::HalfOpen, from, until });
-    let ended = Instant::now();
-    let off = dead.end();
-    assert!(!off.read_back && off.not_read_back[0].drives, "{off:?}");
-    assert!(ended.elapsed() < drivers::off::OFF_WITHIN + Duration::from_secs(4), "the wait is bounded");
+        let mut dead = Bench::start(&CASES[0], false, 2);
+        dead.drive().unwrap();
+        let (from, until) = (Instant::now(), Instant::now() + Duration::from_secs(600));
+        dead.trouble.strike(Fault { kind: Kind::HalfOpen, from, until });
+        let ended = Instant::now();
+        let off = dead.end();
+        assert!(!off.read_back && off.not_read_back[0].drives, "{off:?}");
+        assert!(ended.elapsed() < drivers::off::OFF_WITHIN + Duration::from_secs(4), "the wait is bounded");
+    });
 }
 
 /// The amplifier's link is dead for good, or the amplifier ignores its enable: the relay in its supply opens all the same.
 #[test]
 fn the_second_channel_switches_off_what_the_first_cannot() {
-    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let case = CASES.iter().find(|case| case.setup == "virtual-relay").unwrap();
-    for dead in [true, false] {
-        let mut bench = Bench::start(case, !dead, 5);
-        bench.drive().unwrap();
-        if dead {
-            let (from, until) = (Instant::now(), Instant::now() + Duration::from_secs(600));
-            bench.trouble.strike(Fault { kind: Kind::HalfOpen, from, until });
+    tests::in_wall_clock_time(|| {
+        let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+        let case = CASES.iter().find(|case| case.setup == "virtual-relay").unwrap();
+        for dead in [true, false] {
+            let mut bench = Bench::start(case, !dead, 5);
+            bench.drive().unwrap();
+            if dead {
+                let (from, until) = (Instant::now(), Instant::now() + Duration::from_secs(600));
+                bench.trouble.strike(Fault { kind: Kind::HalfOpen, from, until });
+            }
+            let off = bench.end();
+            assert!(!bench.is_on(Struck::Amplifier), "dead link {dead}: {off:?}");
+            assert!(off.read_back, "dead link {dead}: {off:?}");
         }
-        let off = bench.end();
-        assert!(!bench.is_on(Struck::Amplifier), "dead link {dead}: {off:?}");
-        assert!(off.read_back, "dead link {dead}: {off:?}");
-    }
+    });
 }
 
 /// A panic of whoever supervises: the rig is off when it has been unwound.
 #[test]
 fn a_panic_of_the_supervising_thread_switches_off() {
-    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let mut bench = Bench::start(&CASES[0], false, 3);
-    bench.drive().unwrap();
-    let served = Arc::clone(&bench.served);
-    let panicked = std::thread::spawn(move || {
-        let _held = bench;
-        panic!("as an eprintln does whose terminal is gone");
+    tests::in_wall_clock_time(|| {
+        let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+        let mut bench = Bench::start(&CASES[0], false, 3);
+        bench.drive().unwrap();
+        let served = Arc::clone(&bench.served);
+        let panicked = std::thread::spawn(move || {
+            let _held = bench;
+            panic!("as an eprintln does whose terminal is gone");
+        });
+        assert!(panicked.join().is_err());
+        assert!(!served.is_on(Struck::Amplifier));
     });
-    assert!(panicked.join().is_err());
-    assert!(!served.is_on(Struck::Amplifier));
 }
 
 /// What a row shows is what the rig did: a guard against a test that never drove anything.
 #[test]
 fn the_rows_show_the_drive() {
-    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let mut bench = Bench::start(&CASES[0], false, 4);
-    bench.drive().unwrap();
-    let driven = |row: &Row| row.drive_pp_m > 0.0 && row.velocity_m_s != 0.0;
-    let seen = std::iter::repeat_with(|| bench.reins.next_row()).take(2000).flatten().any(|row| driven(&row));
-    assert!(seen);
+    tests::in_wall_clock_time(|| {
+        let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+        let mut bench = Bench::start(&CASES[0], false, 4);
+        bench.drive().unwrap();
+        let driven = |row: &Row| row.drive_pp_m > 0.0 && row.velocity_m_s != 0.0;
+        let seen =
+            std::iter::repeat_with(|| bench.reins.next_row()).take(2000).flatten().any(|row| driven(&row));
+        assert!(seen);
+    });
 }

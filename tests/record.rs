@@ -25,6 +25,7 @@ static RECORD: LazyLock<Vec<u8>> = LazyLock::new(|| {
         defects: None,
         out: out.clone(),
         fast: true,
+        notes: Default::default(),
     };
     job.run(&Signals::default(), &mut |_| {}).unwrap();
     std::fs::read(out.join("run-1.mcap")).unwrap()

@@ -20,7 +20,7 @@ fn report(set: &RoughSet) -> Report {
 #[test]
 fn scatter_alone_is_no_gap() {
     for kind in Roughness::ALL {
-        let answers = run(41, 4, kind, &["none"], &quick(), |_, _, _| ()).unwrap();
+        let answers = run(41, 4, kind, &["none"], &quick(), |_, _, _, _| ()).unwrap();
         let a = &answers[0];
         assert!(a.right == a.sets, "{a:?}");
     }
@@ -31,7 +31,7 @@ fn scatter_alone_is_no_gap() {
 fn scatter_hides_no_cause() {
     let truths = ["load_dependent_friction", "lateral_offset_drift"];
     for kind in Roughness::ALL {
-        for a in run(43, 3, kind, &truths, &quick(), |_, _, _| ()).unwrap() {
+        for a in run(43, 3, kind, &truths, &quick(), |_, _, _, _| ()).unwrap() {
             assert!(a.right + 1 >= a.sets && a.wrong == 0, "{a:?}");
         }
     }

@@ -65,3 +65,84 @@ fn errors_are_documents_for_scripts() {
         assert_eq!(said[0]["status"], 2, "{words:?}");
     }
 }
+
+/// Ctrl-C in what takes long: what there is so far is told as partial, and the status is 130.
+#[test]
+fn ctrl_c_tells_what_there_is_so_far() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = muprime()
+        .args(["run", "first-sweep", "--setup", "virtual", "--fast", "--out"])
+        .arg(folder.path().join("run"))
+        .env("MUPRIME_RUNS", folder.path())
+        .output()
+        .unwrap();
+    assert_eq!(run.status.code(), Some(0), "{}", texts(&run).1);
+    let data = folder.path().join("run");
+    let trials: [(&[&str], f64, &str); 10] = [
+        (&["diagnose", data.to_str().unwrap()], 0.7, "partial: stopped at"),
+        (&["blind", "--sets", "4000", "--no-pairs"], 3.0, "partial: "),
+        (&["blind", "--sets", "4000", "--noise", "gross", "--no-pairs"], 3.0, "partial: "),
+        (&["blind", "--sets", "4000", "--same-form"], 3.0, "partial: "),
+        (&["blind", "--sets", "4000", "--further"], 3.0, "partial: "),
+        (&["blind", "--sets", "300", "--sensitivity", "decision", "--no-pairs"], 3.0, "partial: "),
+        (&["blind", "--sets", "400000", "--write", "sets"], 1.5, "partial: "),
+        (&["faults", "--seeds", "4000000"], 1.5, "partial: "),
+        (&["model", "ridge", "--elements", "20000"], 1.5, "partial: "),
+        (&["model", "table"], 1.5, "partial: "),
+    ];
+    for (words, after_s, told) in trials {
+        for json in [false, true] {
+            let mut command = muprime();
+            command.args(words).current_dir(folder.path()).stdout(Stdio::piped()).stderr(Stdio::piped());
+            if json {
+                command.arg("--json");
+            }
+            let program = command.spawn().unwrap();
+            std::thread::sleep(std::time::Duration::from_secs_f64(after_s));
+            let id = libc::pid_t::try_from(program.id()).unwrap();
+            // SAFETY: a signal to a process that this test started and has not waited for.
+            assert_eq!(unsafe { libc::kill(id, libc::SIGINT) }, 0);
+            let asked = std::time::Instant::now();
+            let ended = program.wait_with_output().unwrap();
+            let (out, err) = texts(&ended);
+            assert_eq!(ended.status.code(), Some(130), "{words:?}: {out}{err}");
+            eprintln!("{words:?}{}: ended {:.1} s after the key", if json { " --json" } else { "" }, asked.elapsed().as_secs_f64());
+            assert!(err.contains("what follows is partial"), "{words:?}: {err}");
+            assert!(!err.contains('\u{1b}') && !err.contains('\r'), "{words:?}: no bar in a file: {err}");
+            match (json, words[words.len().min(2) - 1]) {
+                (_, "table") => assert!(err.contains("cases are kept in"), "{err}"),
+                (true, _) => assert_eq!(documents(&ended)[0]["partial"], true, "{out}"),
+                (false, _) => assert!(out.contains(told), "{words:?}: {out}{err}"),
+            }
+        }
+    }
+}
+
+/// What people read fits into 80 columns: findings, verdicts, what `check` says. The lines of a run fit at a terminal only: in a log they
+/// are searched.
+#[test]
+fn answers_fit_80_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |words: &[&str]| {
+        let output = muprime()
+            .args(words)
+            .env("MUPRIME_RUNS", folder.path())
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        let (out, err) = texts(&output);
+        let long: Vec<&str> = out.lines().chain(err.lines()).filter(|l| l.chars().count() > 80).collect();
+        assert!(long.is_empty(), "{words:?}: {long:#?}");
+    };
+    let swept = muprime()
+        .args(["run", "first-sweep", "--setup", "virtual", "--fast", "--out", "run"])
+        .env("MUPRIME_RUNS", folder.path())
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert_eq!(swept.status.code(), Some(0), "{}", texts(&swept).1);
+    run(&["check", "run", "run/points.csv", "first-sweep", "--setup", "virtual"]);
+    run(&["diagnose", "run", "--no-pairs"]);
+    run(&["doctor", "--seconds", "0.2", "--setup", "virtual", "--plan", "first-sweep"]);
+    run(&["check", "no-such.toml"]);
+}

@@ -8,6 +8,8 @@ mod bench;
 mod doctor;
 #[path = "wire/documents.rs"]
 mod documents;
+#[path = "wire/instruments.rs"]
+mod instruments;
 #[path = "wire/line_peers.rs"]
 mod line_peers;
 #[path = "wire/lines.rs"]

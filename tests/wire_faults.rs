@@ -155,17 +155,22 @@ impl Running {
     }
 
     /// Waits until the output has been on for a while.
-    fn until_driven(&mut self) -> AmplifierSaid {
+    ///
+    /// # Errors
+    /// The machine stalled, and the controller tripped for it.
+    fn until_driven(&mut self) -> Result<AmplifierSaid, String> {
         let begun = Instant::now();
         let mut on = 0;
         loop {
             let said = self.watch.read();
             on = if said.on { on + 1 } else { 0 };
             if on > 100 {
-                return said;
+                return Ok(said);
             }
             assert!(begun.elapsed() < Duration::from_secs(30), "the plate is never driven");
-            assert!(self.controller.try_wait().unwrap().is_none(), "the controller has left");
+            if self.controller.try_wait().unwrap().is_some() {
+                return Err(tests::cut_by_a_stall(&self.out).expect("a controller leaves for a stall alone"));
+            }
             std::thread::sleep(Duration::from_millis(2));
         }
     }
@@ -301,89 +306,105 @@ fn tried<T>(mut once: impl FnMut() -> Result<T, String>) -> T {
 
 #[test]
 fn each_fault_of_a_channel_trips_with_its_cause_and_the_amplifier_is_off_in_time() {
-    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    for case in CASES {
-        println!("{}", tried(|| strike(case)));
-    }
+    tests::in_wall_clock_time(|| {
+        let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+        for case in CASES {
+            println!("{}", tried(|| strike(case)));
+        }
+    });
 }
 
 /// The controller stands still for half a second: the amplifier's own watchdog drops the output, and the controller's first
 /// cycle afterwards trips.
 #[test]
 fn a_stopped_controller_is_outlived_by_the_amplifiers_watchdog_and_trips_when_it_goes_on() {
-    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let line = tried(|| {
-        let mut running = Running::start(None, |_, _| {});
-        let mut last = running.until_driven();
-        running.signal(running.controller.id(), libc::SIGSTOP);
-        let (mut fed_us, mut longest_us, stopped) = (last.time_us, 0, Instant::now());
-        while stopped.elapsed() < Duration::from_millis(500) {
-            let said = running.watch.read();
-            if said.heartbeat != last.heartbeat {
-                fed_us = said.time_us;
+    tests::in_wall_clock_time(|| {
+        let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+        let line = tried(|| {
+            let mut running = Running::start(None, |_, _| {});
+            let mut last = running.until_driven()?;
+            running.signal(running.controller.id(), libc::SIGSTOP);
+            let (mut fed_us, mut longest_us, stopped) = (last.time_us, 0, Instant::now());
+            while stopped.elapsed() < Duration::from_millis(500) {
+                let said = running.watch.read();
+                if said.heartbeat != last.heartbeat {
+                    fed_us = said.time_us;
+                }
+                if said.on {
+                    longest_us = said.time_us.wrapping_sub(fed_us);
+                }
+                last = said;
             }
-            if said.on {
-                longest_us = said.time_us.wrapping_sub(fed_us);
+            assert!(
+                !last.on && f64::from(longest_us) * 1e-3 <= WATCHDOG_MS,
+                "{last:?}, on for {longest_us} us"
+            );
+            running.signal(running.controller.id(), libc::SIGCONT);
+            while running.controller.try_wait().unwrap().is_none() {
+                assert!(!running.watch.read().on, "on again after the controller was stopped");
+                std::thread::sleep(Duration::from_millis(1));
             }
-            last = said;
-        }
-        assert!(!last.on && f64::from(longest_us) * 1e-3 <= WATCHDOG_MS, "{last:?}, on for {longest_us} us");
-        running.signal(running.controller.id(), libc::SIGCONT);
-        while running.controller.try_wait().unwrap().is_none() {
-            assert!(!running.watch.read().on, "on again after the controller was stopped");
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        let (status, summary) = running.end();
-        let trip = tripped(&summary).expect("a trip");
-        let lost = [
-            Cause::Suspended,
-            Cause::Overrun,
-            Cause::AmplifierWatchdog,
-            Cause::AmplifierStale,
-            Cause::LateralStale,
-            Cause::NormalStale,
-            Cause::StageStale,
-        ];
-        if !lost.contains(&trip.cause) {
-            let stall = stall_before(&summary, trip.at).unwrap_or_else(|| panic!("{trip:?}"));
-            return Err(format!("{:?}, the machine stalled for {stall:.0} ms", trip.cause));
-        }
-        assert_eq!(status, Some(1));
-        Ok(format!(
-            "controller stopped for 500 ms: output on for {:.1} ms after its last heartbeat; then {:?}",
-            f64::from(longest_us) * 1e-3,
-            trip.cause
-        ))
+            let (status, summary) = running.end();
+            let trip = tripped(&summary).expect("a trip");
+            let lost = [
+                Cause::Suspended,
+                Cause::Overrun,
+                Cause::AmplifierWatchdog,
+                Cause::AmplifierStale,
+                Cause::LateralStale,
+                Cause::NormalStale,
+                Cause::StageStale,
+            ];
+            if !lost.contains(&trip.cause) {
+                let stall = stall_before(&summary, trip.at).unwrap_or_else(|| panic!("{trip:?}"));
+                return Err(format!("{:?}, the machine stalled for {stall:.0} ms", trip.cause));
+            }
+            assert_eq!(status, Some(1));
+            Ok(format!(
+                "controller stopped for 500 ms: output on for {:.1} ms after its last heartbeat; then {:?}",
+                f64::from(longest_us) * 1e-3,
+                trip.cause
+            ))
+        });
+        println!("{line}");
     });
-    println!("{line}");
 }
 
 /// The rig stands still: its controller trips on silence, and the output is off when the rig goes on.
 #[test]
 fn a_stopped_rig_trips_its_controller_and_is_off_when_it_goes_on() {
-    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let mut running = Running::start(None, |_, _| {});
-    running.until_driven();
-    running.signal(running.rig.process.id(), libc::SIGSTOP);
-    std::thread::sleep(Duration::from_millis(400));
-    running.signal(running.rig.process.id(), libc::SIGCONT);
-    let first = running.watch.read();
-    assert!(!first.on, "the output outlived its heartbeat: {first:?}");
-    while running.controller.try_wait().unwrap().is_none() {
-        assert!(!running.watch.read().on, "on again");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    let (status, summary) = running.end();
-    let trip = tripped(&summary).expect("a trip");
-    let silent = [
-        Cause::LateralStale,
-        Cause::NormalStale,
-        Cause::AmplifierStale,
-        Cause::StageStale,
-        Cause::AmplifierWatchdog,
-    ];
-    assert!(silent.contains(&trip.cause) && status == Some(1), "{trip:?}");
-    println!("rig stopped for 400 ms: {:?}, off when it went on", trip.cause);
+    tests::in_wall_clock_time(|| {
+        let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+        let line = tried(|| {
+            let mut running = Running::start(None, |_, _| {});
+            running.until_driven()?;
+            running.signal(running.rig.process.id(), libc::SIGSTOP);
+            std::thread::sleep(Duration::from_millis(400));
+            running.signal(running.rig.process.id(), libc::SIGCONT);
+            let first = running.watch.read();
+            assert!(!first.on, "the output outlived its heartbeat: {first:?}");
+            while running.controller.try_wait().unwrap().is_none() {
+                assert!(!running.watch.read().on, "on again");
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            let (status, summary) = running.end();
+            let trip = tripped(&summary).expect("a trip");
+            let silent = [
+                Cause::LateralStale,
+                Cause::NormalStale,
+                Cause::AmplifierStale,
+                Cause::StageStale,
+                Cause::AmplifierWatchdog,
+            ];
+            if !silent.contains(&trip.cause) {
+                let stall = stall_before(&summary, trip.at).unwrap_or_else(|| panic!("{trip:?}"));
+                return Err(format!("{:?}, the machine stalled for {stall:.0} ms", trip.cause));
+            }
+            assert_eq!(status, Some(1), "{trip:?}");
+            Ok(format!("rig stopped for 400 ms: {:?}, off when it went on", trip.cause))
+        });
+        println!("{line}");
+    });
 }
 
 /// A library that gives a program another wall clock, and nothing else another time.
@@ -399,49 +420,53 @@ fn jumping_clock(folder: &Path) -> PathBuf {
 /// The wall clock jumps by an hour, forwards and back, while a sweep is driven: nothing trips, nothing is stamped by it.
 #[test]
 fn a_jump_of_the_wall_clock_trips_nothing_and_stamps_nothing_wrong() {
-    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let hours = |h: i64| format!("{}\n", h * 3600);
-    let unix_s = || std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_secs_f64();
-    let (ended_s, took_s, record) = tried(|| {
-        let mut clock = PathBuf::new();
-        let began = Instant::now();
-        let mut running = Running::start(None, |command, folder| {
-            clock = folder.join("clock");
-            std::fs::write(&clock, hours(5)).unwrap();
-            command.env("LD_PRELOAD", jumping_clock(folder)).env("WALL_CLOCK_JUMP", &clock);
+    tests::in_wall_clock_time(|| {
+        let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+        let hours = |h: i64| format!("{}\n", h * 3600);
+        let unix_s =
+            || std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_secs_f64();
+        let (ended_s, took_s, record) = tried(|| {
+            let mut clock = PathBuf::new();
+            let began = Instant::now();
+            let mut running = Running::start(None, |command, folder| {
+                clock = folder.join("clock");
+                std::fs::write(&clock, hours(5)).unwrap();
+                command.env("LD_PRELOAD", jumping_clock(folder)).env("WALL_CLOCK_JUMP", &clock);
+            });
+            running.until_driven()?;
+            for h in [6, 4, 5] {
+                std::fs::write(&clock, hours(h)).unwrap();
+                std::thread::sleep(Duration::from_millis(700));
+            }
+            let record = running.out.join("run-1.mcap");
+            let folder = tempfile::tempdir().unwrap();
+            let copy = folder.path().join("record");
+            // The folder goes with `running`: the record is copied when the run has ended.
+            let status = running.controller.wait().unwrap();
+            std::fs::copy(&record, &copy).unwrap();
+            let (_, summary) = running.end();
+            if let Some(trip) = tripped(&summary) {
+                let stall =
+                    stall_before(&summary, trip.at).unwrap_or_else(|| panic!("{trip:?} without a stall"));
+                return Err(format!("{:?}, the machine stalled for {stall:.0} ms", trip.cause));
+            }
+            assert_eq!((status.code(), &summary.outcome), (Some(0), &Outcome::Complete));
+            Ok((unix_s(), began.elapsed().as_secs_f64(), std::fs::read(copy).unwrap()))
         });
-        running.until_driven();
-        for h in [6, 4, 5] {
-            std::fs::write(&clock, hours(h)).unwrap();
-            std::thread::sleep(Duration::from_millis(700));
-        }
-        let record = running.out.join("run-1.mcap");
-        let folder = tempfile::tempdir().unwrap();
-        let copy = folder.path().join("record");
-        // The folder goes with `running`: the record is copied when the run has ended.
-        let status = running.controller.wait().unwrap();
-        std::fs::copy(&record, &copy).unwrap();
-        let (_, summary) = running.end();
-        if let Some(trip) = tripped(&summary) {
-            let stall = stall_before(&summary, trip.at).unwrap_or_else(|| panic!("{trip:?} without a stall"));
-            return Err(format!("{:?}, the machine stalled for {stall:.0} ms", trip.cause));
-        }
-        assert_eq!((status.code(), &summary.outcome), (Some(0), &Outcome::Complete));
-        Ok((unix_s(), began.elapsed().as_secs_f64(), std::fs::read(copy).unwrap()))
+        let read = realtime::recorder::read(&record);
+        // The program did live by the other clock: the record says five hours later.
+        let start = &read.facts(realtime::recorder::HEADER).expect("a header")["start_unix_ns"];
+        let start_s = start.parse::<f64>().unwrap() * 1e-9;
+        assert!((start_s - ended_s - 5.0 * 3600.0).abs() < took_s + 60.0, "{start_s} {ended_s}");
+        let times: Vec<u64> = read.rows().map(|r| r.now.0).collect();
+        assert!(times.windows(2).all(|w| w[0] < w[1]), "times go on");
+        let (first, last) = (times[0] as f64 * 1e-9, times[times.len() - 1] as f64 * 1e-9);
+        assert!(first < 5.0 && last < took_s, "from {first} s to {last} s in {took_s} s");
+        let gap = times.windows(2).map(|w| w[1] - w[0]).max().unwrap();
+        assert!(gap < 1_000_000_000, "a gap of {gap} ns");
+        println!(
+            "the wall clock jumped by an hour three times in {last:.1} s: no trip, {} rows in order",
+            times.len()
+        );
     });
-    let read = realtime::recorder::read(&record);
-    // The program did live by the other clock: the record says five hours later.
-    let start = &read.facts(realtime::recorder::HEADER).expect("a header")["start_unix_ns"];
-    let start_s = start.parse::<f64>().unwrap() * 1e-9;
-    assert!((start_s - ended_s - 5.0 * 3600.0).abs() < took_s + 60.0, "{start_s} {ended_s}");
-    let times: Vec<u64> = read.rows().map(|r| r.now.0).collect();
-    assert!(times.windows(2).all(|w| w[0] < w[1]), "times go on");
-    let (first, last) = (times[0] as f64 * 1e-9, times[times.len() - 1] as f64 * 1e-9);
-    assert!(first < 5.0 && last < took_s, "from {first} s to {last} s in {took_s} s");
-    let gap = times.windows(2).map(|w| w[1] - w[0]).max().unwrap();
-    assert!(gap < 1_000_000_000, "a gap of {gap} ns");
-    println!(
-        "the wall clock jumped by an hour three times in {last:.1} s: no trip, {} rows in order",
-        times.len()
-    );
 }

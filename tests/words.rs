@@ -88,6 +88,10 @@ fn what_is_begun_is_approved_and_runs() {
     for kind in ["plan", "setup", "fingertip", "profile"] {
         let output = muprime().args(["init", kind]).output().unwrap();
         assert_eq!(output.status.code(), Some(0));
+        // Editors take the first line (taplo, Even Better TOML): a directive, and a file that one command writes.
+        let first = texts(&output).0.lines().next().unwrap_or_default().to_string();
+        assert_eq!(first, format!("#:schema ./{kind}.schema.json"));
+        assert!(texts(&output).0.contains(&format!("`muprime schema {kind} > {kind}.schema.json`")));
         assert!(texts(&output).0.lines().filter(|l| l.contains("# ")).count() > 5, "{kind}: comments");
         std::fs::write(path(kind), output.stdout).unwrap();
         let checked = muprime().args(["check", "--json"]).arg(path(kind)).output().unwrap();
@@ -148,7 +152,8 @@ fn check_and_run_say_the_same_of_every_plan_on_every_setup() {
     let (mut good, mut refused) = (0, 0);
     for (plan, _) in rig::plan::BUNDLED {
         for (setup, _) in rig::setup::BUNDLED {
-            let checked = muprime().args(["check", plan, "--setup", setup, "--json"]).output().unwrap();
+            let checked =
+                muprime().args(["check", plan, "--setup", setup, "--offline", "--json"]).output().unwrap();
             let said = &documents(&checked)[0];
             let run = muprime()
                 .args(["run", plan, "--setup", setup, "--fast", "--out"])
@@ -166,60 +171,4 @@ fn check_and_run_say_the_same_of_every_plan_on_every_setup() {
     }
     println!("{good} run, {refused} are refused");
     assert!(good > 0);
-}
-
-/// Wrong files that were once approved: each is refused with the word that names what is wrong.
-#[test]
-fn what_a_run_would_refuse_is_refused_by_check() {
-    let folder = tempfile::tempdir().unwrap();
-    let setup = rig::setup::bundled_text("virtual-ideal").unwrap();
-    let plan = rig::plan::bundled_text("first-sweep").unwrap();
-    let rig = "[finger]\nnormal_stiffness_n_per_m = 3.9e6\nlateral_stiffness_n_per_m = 1.5e6\n[noise]\npass_relative_sd = 0.015\nforce_sd_n = 0.0008\n";
-    let tip = rig::fingertip::BUNDLED[0].1;
-    let table = "point,time_s,amplitude_pp_m,speed_m_s,direction,normal_force_n,lateral_force_n\n1,0,0,0.01,1,0.25,0.1\n";
-    let wrong = [
-        ("setup.toml", setup, "muprime-force2", "no-such", "no profile is called `no-such`"),
-        ("setup.toml", setup, "[[force]]", "[[force]]\nlateral = { signal = \"nope\" }", "nope"),
-        (
-            "setup.toml",
-            setup,
-            "profile = \"muprime-amplifier\"",
-            "profile = \"muprime-stage\"",
-            "muprime-stage",
-        ),
-        (
-            "setup.toml",
-            setup,
-            "profile = \"muprime-stage\"",
-            "profile = \"muprime-force2\"",
-            "muprime-force2",
-        ),
-        ("setup.toml", setup, "rate_hz = 1000", "rate_hz = 1", "10 to 4000"),
-        ("setup.toml", setup, "artificial-silicone", "no-tip", "no-tip"),
-        ("setup.toml", setup, "[limits]", "[limits]\nspeed_max_m_s = 3", "speed_max_m_s"),
-        ("plan.toml", plan, "speed_m_s = 0.02", "speed_m_s = -0.02", "speed_m_s"),
-        ("plan.toml", plan, "frequency_hz = 27500", "frequency_hz = 27.5", "frequency_hz"),
-        ("plan.toml", plan, "0.3e-6", "2.0", "amplitude_pp_m"),
-        ("plan.toml", plan, "0.3e-6", "nan", "amplitude_pp_m"),
-        ("plan.toml", plan, "0.3e-6", "inf", "amplitude_pp_m"),
-        ("plan.toml", plan, "normal_force_n = [0.5, 0.9]", "normal_force_n = [50]", "normal_force_n"),
-        ("plan.toml", plan, "settle_s = 0.12", "settle_s = -1", "settle_s"),
-        ("plan.toml", plan, "seed = 2026", "seeds = 2026", "seeds"),
-        ("rig.toml", rig, "3.9e6", "-3.9e6", "normal_stiffness_n_per_m"),
-        ("rig.toml", rig, "pass_relative_sd", "pass_sd", "pass_sd"),
-        ("tip.toml", tip, "mu0 = ", "mu0 = -", "mu0"),
-        ("tip.toml", tip, "radius_m", "radius", "radius"),
-        ("table.csv", table, "speed_m_s", "speed_mm_s", "speed_m_s"),
-        ("table.csv", table, "0.25,", "250000,", "normal_force_n"),
-        ("table.csv", table, "0.25,", "0.25,", "at least 12"),
-    ];
-    for (name, text, from, to, word) in wrong {
-        assert!(text.contains(from), "{name}: {from}");
-        let path = folder.path().join(name);
-        std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
-        let checked = muprime().args(["check", "--json"]).arg(&path).output().unwrap();
-        let said = documents(&checked)[0].to_string();
-        assert_eq!(checked.status.code(), Some(2), "{name} {to}: {said}");
-        assert!(said.contains(word), "{name} {to}: {said}");
-    }
 }

@@ -1,9 +1,10 @@
 //! Which: from probabilities to a verdict, with what cannot be told apart said so.
 
-use crate::evidence::Posterior;
-use crate::hypotheses::Fitted;
+use crate::evidence::{Posterior, laplace};
+use crate::hypotheses::{Candidate, Fitted};
 use crate::left_out::{Gate, Region, gate, left_out_regions};
 use effects::imitated;
+use rayon::prelude::*;
 
 /// The four answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
@@ -44,6 +45,8 @@ impl Decision {
     }
 }
 
+/// Rounds of the search for a cause's mode with a form of its own.
+const OWN_FORM_ROUNDS: usize = 6;
 /// Probability below which a pair is not looked at.
 const LEAST_PROBABILITY: f64 = 1e-6;
 
@@ -74,11 +77,14 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
             *p *= survival;
         }
     }
-    let class = alias_class(fitted, leader);
+    let mut class = alias_class(fitted, leader);
+    let departed = departed_singles(fitted, leader);
     let alone = k.alone_share[usize::from(candidates[leader].effects.len() > 1)];
     // Priors alone make no name: a rival whose forces are the same must be told apart by the data.
     let distinct = imitated(&candidates[leader].names()).is_none()
-        && class[1..].iter().all(|&i| !same_said(fitted, leader, i));
+        && class[1..].iter().all(|&i| !same_said(fitted, leader, i))
+        && departed.is_empty();
+    class.extend(departed);
     let in_class: f64 = class.iter().map(|&i| probabilities[i]).sum();
     let verdict = if !claimed || none >= in_class.max(unknown) {
         Verdict::NoGap
@@ -132,6 +138,53 @@ fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
     class
 }
 
+/// The members of a leading pair that alone might be it, with a form of their own: a smooth departure from the library's, as large as
+/// forms are known to depart, leaves next to nothing of the gap. That is enough where the pair's own forms depart too; where
+/// they do not, the evidence for the second cause must be small besides. A second cause is then not told from
+/// another form of the first.
+fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
+    let candidates = &fitted.candidates;
+    let (k, own) = (&*fitted.problem.constants, &candidates[leader]);
+    if own.effects.len() < 2 {
+        return Vec::new();
+    }
+    let gap = left(fitted, &fitted.none);
+    let departs = own.best.share > k.form_shares[0];
+    let might = |i: usize| {
+        let behind = own.log_evidence - candidates[i].log_evidence;
+        let most = match (departs, behind < k.pair_own_form_nats) {
+            (true, _) => k.pair_departure,
+            (false, true) => k.pair_own_form,
+            (false, false) => return false,
+        };
+        left_by_a_form_of_its_own(fitted, &candidates[i]) < most.powi(2) * gap
+    };
+    (0..candidates.len())
+        .filter(|&i| candidates[i].effects.len() == 1 && own.effects.contains(&candidates[i].effects[0]))
+        .filter(|&i| might(i))
+        .collect()
+}
+
+/// chi2 beyond scatter that the best of a cause's laws leaves with a smooth departure of the largest share.
+fn left_by_a_form_of_its_own(fitted: &Fitted, cause: &Candidate) -> f64 {
+    let problem = &fitted.problem;
+    let share = problem.constants.form_shares[2];
+    let laws = cause
+        .laws
+        .par_iter()
+        .map(|(_, law)| laplace(problem, &law.members, &law.u, &fitted.basis, share, OWN_FORM_ROUNDS));
+    let Some(best) = laws.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else {
+        return f64::INFINITY;
+    };
+    let departure = (&fitted.basis * &best.departure).component_mul(&best.change) * share;
+    problem.misfit(&(&best.prediction + departure)) - problem.len() as f64
+}
+
+/// chi2 that a model leaves beyond scatter.
+fn left(fitted: &Fitted, model: &Posterior) -> f64 {
+    fitted.problem.misfit(&model.prediction) - fitted.problem.len() as f64
+}
+
 /// Whether a rival says the same as the leader with no more parameters.
 fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
     let [a, b] = [leader, rival].map(|i| &fitted.candidates[i].best);
@@ -144,15 +197,14 @@ fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     let problem = &fitted.problem;
     let k = &problem.constants;
-    let left = |model: &nalgebra::DVector<f64>| problem.misfit(model) - problem.len() as f64;
-    let gap = left(&fitted.none.prediction);
+    let gap = left(fitted, &fitted.none);
     let candidates = &fitted.candidates;
     for pair in 0..candidates.len() {
         let own = &candidates[pair];
         if own.effects.len() < 2 || probabilities[pair] < LEAST_PROBABILITY {
             continue;
         }
-        let own_left = left(&own.best.prediction);
+        let own_left = left(fitted, &own.best);
         let alone: Vec<usize> = (0..candidates.len())
             .filter(|&i| {
                 let c = &candidates[i];
@@ -160,7 +212,7 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
                     return false;
                 }
                 let gain = own.log_evidence - c.log_evidence;
-                let c_left = left(&c.best.prediction);
+                let c_left = left(fitted, &c.best);
                 let scatter = (2.0 * problem.len() as f64).sqrt();
                 let needed =
                     c_left > k.misfit_sd * scatter && own_left < k.pair_halves * c_left && gain > k.pair_nats;

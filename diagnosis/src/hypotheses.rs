@@ -11,6 +11,7 @@ use crate::layout::NUISANCES;
 use crate::least_squares::minimise;
 use crate::noise::{PureError, settle, variance};
 use crate::pairs::pairs;
+use crate::progress::Progress;
 use crate::scatter::{Belief, Scatter};
 use crate::singles::{Search, lapsed, singles, sort, unlisted};
 use crate::starts::{nuisances_of, tempered};
@@ -28,11 +29,13 @@ pub struct Options {
     pub pairs: bool,
     /// Effects that are left out of the library (for leave-one-effect-out tests).
     pub without: Vec<String>,
+    /// Who is told how far it is.
+    pub progress: Progress,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { constants: Arc::default(), pairs: true, without: Vec::new() }
+        Options { constants: Arc::default(), pairs: true, without: Vec::new(), progress: Progress::default() }
     }
 }
 
@@ -107,6 +110,9 @@ pub fn form_lengths(k: &Constants) -> Lengths {
     Lengths { condition: k.form_length, time: k.form_length, position: f64::INFINITY, climate: f64::INFINITY }
 }
 
+/// Share of the work after which single effects are fitted.
+pub(crate) const SINGLES_END: f64 = 0.5;
+
 /// Rounds of the baseline's fit, and of its fit to what the gap looks like at large.
 const ROUNDS: [usize; 2] = [15, 10];
 
@@ -127,7 +133,8 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
 
 /// The same with a belief about which passes belong.
 pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &Belief) -> Fitted {
-    let k = &*options.constants;
+    let (k, progress) = (&*options.constants, &options.progress);
+    progress.at("the table's own scatter", 0.0);
     let mut problem = Problem::new(table, rig, &options.constants);
     let (discrepancy, pure, mut scatter) = settle(table, rig, &mut problem, belief);
     let coordinates = Coordinates::of(table);
@@ -157,10 +164,17 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
         }
     }
 
-    let search = Search { nuisances: &nuisances, loose: &loose, basis: &basis };
+    let search = Search { nuisances: &nuisances, loose: &loose, basis: &basis, progress };
     let mut candidates = singles(&problem, table, &tried, &search);
     let lapsed = lapsed(&mut problem, table, &mut candidates, &search);
     sort(&mut candidates);
+    let leading = |candidates: &[Candidate]| {
+        let mut list: Vec<_> =
+            candidates.iter().map(|c| (c.names(), c.log_evidence - none_evidence)).collect();
+        list.sort_by(|a, b| b.1.total_cmp(&a.1));
+        list
+    };
+    progress.with("causes that the library does not name", SINGLES_END, || leading(&candidates));
     let leader = candidates.first().filter(|c| c.log_evidence > none_evidence + k.pairs_from_nats);
     if let (Belief::Judged, Some(leader)) = (belief, leader) {
         let departed =
@@ -173,10 +187,12 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
 
     if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + k.pairs_from_nats)
     {
+        progress.with("pairs of effects", 0.6, || leading(&candidates));
         let companions = second_causes(&problem, &candidates, &lapsed, &search);
         candidates.extend(companions);
     }
 
+    progress.with("what the library cannot say", 0.7, || leading(&candidates));
     let smooth = open_evidence(k, &discrepancy, &unlisted);
     let top = candidates.iter().map(|c| c.log_evidence).fold(smooth, f64::max);
     let structure =

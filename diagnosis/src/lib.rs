@@ -60,6 +60,7 @@ pub mod novelty;
 pub mod pairs;
 pub mod power;
 pub mod predict;
+pub mod progress;
 pub mod pulls;
 pub mod remarks;
 pub mod saved;

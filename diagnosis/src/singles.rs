@@ -4,15 +4,19 @@ use crate::data::Table;
 use crate::evidence::{Posterior, averaged_over_form, laplace, middle_form_share};
 use crate::fit::{Member, Problem};
 use crate::gaussian::log_sum_exp;
-use crate::hypotheses::Candidate;
+use crate::hypotheses::{Candidate, SINGLES_END};
 use crate::least_squares::Fit;
-use crate::starts::{Sought, nuisance_starts, seek};
+use crate::progress::Progress;
+use crate::starts::{REFINED_ROWS, Sought, nuisance_starts, seek};
 use effects::{known, library};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Rounds of the search for a mode at the middle share of form uncertainty.
 const ROUNDS: usize = 6;
+/// The same from a place that was refined on a part of a large table.
+const ROUNDS_FROM_A_PART: usize = 3;
 /// Factor on the best tempered cost of a law, and offset, within which its other optima are looked at.
 const NEAR_OPTIMA: (f64, f64) = (1.2, 10.0);
 
@@ -24,6 +28,8 @@ pub(crate) struct Search<'a> {
     pub nuisances: &'a [f64],
     pub loose: &'a [f64],
     pub basis: &'a DMatrix<f64>,
+    /// Who is told of each law.
+    pub progress: &'a Progress,
 }
 
 /// Each effect in all its laws, in the order given; without those that cannot be fitted.
@@ -91,12 +97,20 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
     // Middle share first, for every law; the other shares where they could matter. Laws cost from one millisecond to two
     // hundred: each is a task of its own.
     let k = &*problem.constants;
+    let done = AtomicUsize::new(0);
+    // Causes that no library names are sought after the others, and count for what is left.
+    let told = |of: f64| {
+        let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+        search.progress.at("single effects", of * n as f64 / (2 * members.len()).max(1) as f64);
+    };
     let sought: Vec<Vec<Sought>> = members
         .par_iter()
         .with_max_len(1)
         .map(|member| {
             let fixed = nuisance_starts(search.nuisances, k.driven_sd);
-            fixed.iter().map(|fixed| seek(problem, *member, fixed, search.loose)).collect()
+            let sought = fixed.iter().map(|fixed| seek(problem, *member, fixed, search.loose)).collect();
+            told(SINGLES_END);
+            sought
         })
         .collect();
     let ahead = sought.iter().flatten().map(Sought::cost).fold(f64::INFINITY, f64::min);
@@ -115,10 +129,12 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
             };
             let mut fits: Vec<Fit> = sought.into_iter().flat_map(finish).collect();
             fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+            told(SINGLES_END);
             fits
         })
         .collect();
     let cheapest = starts.iter().flatten().map(|f| f.cost).fold(f64::INFINITY, f64::min);
+    let most = if problem.len() > REFINED_ROWS { ROUNDS_FROM_A_PART } else { ROUNDS };
     let middle: Vec<Option<Posterior>> = members
         .par_iter()
         .zip(&starts)
@@ -126,7 +142,7 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
         .map(|(member, fits)| {
             let own = fits.first()?.cost;
             // What lies far behind even on the tempered scale gets one look, not a search.
-            let rounds = if own > k.hopeless[0] * cheapest + k.hopeless[1] { 0 } else { ROUNDS };
+            let rounds = if own > k.hopeless[0] * cheapest + k.hopeless[1] { 0 } else { most };
             fits.iter()
                 .filter(|f| rounds > 0 || f.cost == own)
                 .filter(|f| f.cost < NEAR_OPTIMA.0 * own + NEAR_OPTIMA.1)

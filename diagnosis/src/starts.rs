@@ -11,6 +11,11 @@ use nalgebra::{DMatrix, DVector};
 const SCAN_ROWS: usize = 128;
 /// The same beside another cause, where a scan only orders pairs.
 const PAIR_SCAN_ROWS: usize = 64;
+/// The same where a wavelength is sought: what a stroke shows of a short wave needs many places.
+const WAVE_SCAN_ROWS: usize = 512;
+/// Rows on which a start is refined: a place from these lies within a few deviations of the whole table's, and the search
+/// under form uncertainty goes on from there.
+pub(crate) const REFINED_ROWS: usize = 1024;
 /// Starts that are fitted on the scan's rows, and those of them refined on all.
 const STARTS: (usize, usize) = (4, 2);
 /// Rounds of a local fit on the scan's rows before the starts are compared, and after, and on all rows: the search under
@@ -26,6 +31,8 @@ const OTHER: (f64, f64) = (0.8, 0.5);
 const SAME_PLACE: f64 = 0.1;
 /// Longest linear step of a fixed coordinate while the scan walks.
 const LONGEST_STEP: f64 = 2.0;
+/// Golden section: its multiples come round nowhere.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// Half periods over a stroke by which two wavelengths differ.
 const WAVE_STEP: f64 = 0.4;
 
@@ -96,15 +103,15 @@ impl Sought {
         self.fits.first().map_or(f64::INFINITY, |f| f.cost * self.of as f64 / self.rows.len().max(1) as f64)
     }
 
-    /// Local optima on all rows, best first.
+    /// Local optima on all rows, or on as many as a start is refined on, best first.
     pub fn finished(self, problem: &Problem, member: Member, variance: &[f64]) -> Vec<Fit> {
         finished(problem, &[member], variance, &self.rows, self.fits, STARTS.1)
     }
 
     /// The best place as it is, of a law that is far behind.
     pub fn as_it_is(self, problem: &Problem, member: Member, variance: &[f64]) -> Vec<Fit> {
-        let best = self.fits.into_iter().next();
-        best.map(|f| minimise(problem, &[member], &f.u, variance, 0)).into_iter().collect()
+        let best = self.fits.get(..1).unwrap_or_default();
+        refined(problem, &[member], variance, best, 0)
     }
 }
 
@@ -118,7 +125,7 @@ fn scanned(
     let parameters = members.last().map_or_else(Vec::new, |m| m.parameters(&problem.design));
     let fine = parameters.iter().any(is_wavelength);
     let some = if members.len() > 1 { PAIR_SCAN_ROWS } else { SCAN_ROWS };
-    let rows = rows(problem.len(), if fine { problem.len() } else { some });
+    let rows = rows(problem.len(), if fine { WAVE_SCAN_ROWS } else { some });
     let scored = scan(problem, members, fixed, variance, &rows, grid(&parameters, problem.design.stroke_m));
     (rows, scored)
 }
@@ -143,7 +150,13 @@ pub fn coarse_scan(
         list.push(tail);
     }
     let rows = rows(problem.len(), PAIR_SCAN_ROWS);
-    scan(problem, members, fixed, variance, &rows, list).into_iter().next()
+    let (cost, u) = scan(problem, members, fixed, variance, &rows, list).into_iter().next()?;
+    Some((of_all(cost, problem, &rows), u))
+}
+
+/// A cost as if all of the table had been looked at: laws are scanned on different numbers of rows.
+fn of_all(cost: f64, problem: &Problem, rows: &[usize]) -> f64 {
+    cost * problem.len() as f64 / rows.len().max(1) as f64
 }
 
 /// Best cost of the whole scan of the last member beside the given coordinates of the others, with the place.
@@ -153,7 +166,9 @@ pub fn full_scan(
     fixed: &[f64],
     variance: &[f64],
 ) -> Option<(f64, Vec<f64>)> {
-    scanned(problem, members, fixed, variance).1.into_iter().next()
+    let (rows, scored) = scanned(problem, members, fixed, variance);
+    let (cost, u) = scored.into_iter().next()?;
+    Some((of_all(cost, problem, &rows), u))
 }
 
 /// Local fit of a pair from one start.
@@ -164,8 +179,18 @@ pub fn refine_from(problem: &Problem, members: &[Member], start: Vec<f64>, varia
     finished(problem, members, variance, &rows, fits, 1).into_iter().next()
 }
 
+/// At most so many rows, one from each of as many even blocks, at a place in it that steps by the golden section: a table
+/// whose conditions come round every so many passes is not met at one condition only.
 fn rows(n: usize, limit: usize) -> Vec<usize> {
-    (0..n).step_by(n.div_ceil(limit).max(1)).collect()
+    if n <= limit {
+        return (0..n).collect();
+    }
+    let row = |block: usize| {
+        let (start, end) = (block * n / limit, (block + 1) * n / limit);
+        let place = (block as f64 * GOLDEN).fract();
+        start + (place * (end - start) as f64) as usize
+    };
+    (0..limit).map(row).collect()
 }
 
 fn scan(
@@ -273,10 +298,21 @@ fn finished(
     fits.retain(|f| f.cost < FAR_BEHIND.0 * best + FAR_BEHIND.1);
     distinct(&mut fits);
     fits.truncate(count);
-    let mut whole: Vec<Fit> =
-        fits.iter().map(|f| minimise(problem, members, &f.u, variance, ROUNDS.2)).collect();
+    let mut whole = refined(problem, members, variance, &fits, ROUNDS.2);
     whole.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     whole
+}
+
+/// Fits continued on the whole table, or on so many rows of a large one, their costs as of all of it.
+fn refined(problem: &Problem, members: &[Member], variance: &[f64], fits: &[Fit], rounds: usize) -> Vec<Fit> {
+    let many = rows(problem.len(), REFINED_ROWS);
+    let part = problem.select(&many);
+    let part_variance: Vec<f64> = many.iter().map(|&i| variance[i]).collect();
+    let on = |f: &Fit| {
+        let fit = minimise(&part, members, &f.u, &part_variance, rounds);
+        Fit { cost: of_all(fit.cost, problem, &many), ..fit }
+    };
+    fits.iter().map(on).collect()
 }
 
 /// Leaves one of those that have come to the same place, the best.
@@ -312,4 +348,25 @@ pub fn nuisance_starts(u: &[f64], driven_sd: f64) -> Vec<Vec<f64>> {
         list.push(calibrated);
     }
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rows;
+    use std::collections::BTreeSet;
+
+    /// Conditions that come round every so many passes are all met, whatever the round; each row once, in order.
+    #[test]
+    fn a_round_of_conditions_is_met_as_a_whole() {
+        for n in [1280, 10_000, 50_000] {
+            for round in [2, 5, 8, 10, 16] {
+                let chosen = rows(n, 128);
+                assert_eq!(chosen.len(), 128);
+                assert!(chosen.windows(2).all(|w| w[0] < w[1]) && chosen[127] < n);
+                let met: BTreeSet<usize> = chosen.iter().map(|i| i % round).collect();
+                assert_eq!(met.len(), round, "{n} passes in rounds of {round}");
+            }
+        }
+        assert_eq!(rows(5, 128), [0, 1, 2, 3, 4]);
+    }
 }

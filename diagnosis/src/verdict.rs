@@ -15,6 +15,7 @@ use crate::remarks::{WithSuspects, of_scatter, of_table, with_suspects};
 use crate::scatter::Scatter;
 use crate::shrinkage::{Gap, gap};
 use effects::imitated;
+use models::condition::Condition;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -133,7 +134,9 @@ const LISTED: f64 = 1e-6;
 /// Diagnoses a table.
 pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String) -> Diagnosis {
     let mut fitted = fit_all(table, rig, options);
+    options.progress.at("regions left out", 0.75);
     let decision = decide(&mut fitted);
+    options.progress.at("passes held out", 0.85);
     let leader = decision.leader();
     let best = leader.map(|l| &fitted.candidates[l].best);
     let gap = gap(&fitted, table, rig, decision.verdict, leader);
@@ -148,7 +151,9 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     let asked = best.filter(|_| decision.verdict != Verdict::NoGap);
     let parameters = asked.map(|best| estimates(&fitted.problem, best, &fitted.basis));
     let hypotheses = hypotheses(&fitted, &decision, parameters.as_ref());
+    options.progress.at("the next experiment", 0.92);
     let next_experiment = experiments(&fitted, table, rig, &decision);
+    options.progress.at("suspect passes", 0.96);
     let with_suspects = with_suspects(&fitted, table, rig, options);
     let mut remarks = of_table(&fitted, table, &decision);
     remarks.extend(of_scatter(&fitted, &decision, with_suspects.as_ref()));
@@ -308,6 +313,13 @@ fn hypotheses(
 }
 
 impl Diagnosis {
+    /// What the verdict's model says of conditions that lie within the table: a curve for a figure. Unlike [`Self::predict`] it does not ask
+    /// in which run they are.
+    pub fn curve(&self, passes: &[Condition]) -> Vec<Forecast> {
+        let whole = model(&self.fitted, &self.table, self.decision.verdict, self.decision.leader(), None);
+        forecast(&self.fitted, &self.rig, &whole, passes)
+    }
+
     /// Predicts conditions with the verdict's model; those in runs that the table does not have, or after its end, with the
     /// deviations that such passes of the table needed.
     pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {

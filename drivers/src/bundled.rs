@@ -3,9 +3,12 @@
 const PROFILES: &[(&str, &str)] = &[
     ("ati-digital-ft", include_str!("../profiles/ati-digital-ft.toml")),
     ("ati-netft-can", include_str!("../profiles/ati-netft-can.toml")),
+    ("ati-netft-rdt", include_str!("../profiles/ati-netft-rdt.toml")),
     ("cia402-profile-velocity", include_str!("../profiles/cia402-profile-velocity.toml")),
     ("hbk-wtx110", include_str!("../profiles/hbk-wtx110.toml")),
+    ("iio-voltage", include_str!("../profiles/iio-voltage.toml")),
     ("keysight-33500b", include_str!("../profiles/keysight-33500b.toml")),
+    ("labjack-t7", include_str!("../profiles/labjack-t7.toml")),
     ("me-gsv4-can", include_str!("../profiles/me-gsv4-can.toml")),
     ("muprime-amplifier", include_str!("../profiles/muprime-amplifier.toml")),
     ("muprime-force2", include_str!("../profiles/muprime-force2.toml")),
@@ -15,6 +18,8 @@ const PROFILES: &[(&str, &str)] = &[
     ("polytec-ofv5000", include_str!("../profiles/polytec-ofv5000.toml")),
     ("robotiq-ft300", include_str!("../profiles/robotiq-ft300.toml")),
     ("robotiq-ft300-stream", include_str!("../profiles/robotiq-ft300-stream.toml")),
+    ("siglent-sdg", include_str!("../profiles/siglent-sdg.toml")),
+    ("zaber-x-lsm", include_str!("../profiles/zaber-x-lsm.toml")),
 ];
 
 /// The files that profiles name.

@@ -9,6 +9,7 @@ use super::session::{Ended, LONGEST_SLEEP, Periodic, Session};
 use super::setup::InstrumentSetup;
 use super::slcan::Slcan;
 use super::socketcan::KernelCan;
+use super::trace::TracedBus;
 use instruments::FrameId;
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;
@@ -32,7 +33,7 @@ pub(super) const PASSIVE: &str =
 pub fn open(address: &str, bitrate: u32) -> Result<Box<dyn CanPort>, Ended> {
     match address.strip_prefix("slcan:") {
         Some(path) => Ok(Box::new(Slcan::open(path, bitrate)?)),
-        None => Ok(Box::new(KernelCan::open(address)?)),
+        None => Ok(Box::new(TracedBus { inner: KernelCan::open(address)?, interface: address.into() })),
     }
 }
 
@@ -169,9 +170,9 @@ impl Group {
         if self.request.is_some() && self.asked_at.is_none() {
             return false;
         }
-        let Some(place) = (self.parts.iter()).position(|part| {
-            part.at(self.base) == (frame.id, frame.extended) && part.length == frame.data().len()
-        }) else {
+        let Some(place) = (self.parts.iter())
+            .position(|part| part.at(self.base) == (frame.id, frame.extended) && part.selects(frame.data()))
+        else {
             return false;
         };
         if place != self.next {

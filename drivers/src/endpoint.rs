@@ -164,6 +164,8 @@ pub struct Endpoint {
     orders: Orders,
     alarm_until: Nanos,
     arrived: Nanos,
+    /// What a sensor shows is not handed on yet: it is not set up.
+    held: bool,
     health: Arc<Health>,
 }
 
@@ -306,6 +308,7 @@ impl Endpoint {
             orders: Orders::default(),
             alarm_until: Nanos(0),
             arrived: Nanos(0),
+            held: false,
             health: Arc::default(),
             profile,
         }
@@ -327,6 +330,12 @@ impl Endpoint {
     #[must_use]
     pub fn value(&self, signal: SignalId) -> f64 {
         self.values.get(signal)
+    }
+
+    /// Whether what a sensor shows is kept from the loop, since it is not set up yet: another range or filter may still hold, and
+    /// a number of it is none.
+    pub fn hold(&mut self, held: bool) {
+        self.held = held;
     }
 
     /// Takes a frame that arrived, whole and checked by its transport, and hands its sample to the loop.
@@ -400,6 +409,7 @@ impl Endpoint {
         let alarmed = mark.arrived < self.alarm_until;
         let view = View { profile: &self.profile, values: &self.values, bytes, frame, mark };
         let full = match &mut self.part {
+            Part::Force { .. } if self.held => return,
             Part::Force { lateral, normal, last, ring } => {
                 let mut touched = false;
                 for (axis, kept) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {

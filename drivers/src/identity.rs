@@ -54,11 +54,26 @@ fn place(instrument: &InstrumentSetup) -> Result<Option<String>, OpenError> {
             let unit = instrument.unit.or(link.unit).unwrap_or(255);
             socket(address)?.map(|socket| format!("tcp/{socket}/unit {unit}"))
         }
-        LinkKind::Scpi | LinkKind::Serial if link.kind == LinkKind::Scpi || address.starts_with("tcp:") => {
+        LinkKind::Sysfs => {
+            let folder = std::fs::canonicalize(address).unwrap_or_else(|_| address.into());
+            Some(format!("folder{}", folder.display()))
+        }
+        LinkKind::Udp => {
+            let own = link.local_port.map(|port| format!("udp here/{port}"));
+            own.map_or_else(
+                || socket(address).map(|s| s.map(|socket| format!("udp/{socket}"))),
+                |own| Ok(Some(own)),
+            )?
+        }
+        LinkKind::Scpi | LinkKind::Tcp | LinkKind::Serial
+            if link.kind != LinkKind::Serial || address.starts_with("tcp:") =>
+        {
             let host = address.strip_prefix("tcp:").unwrap_or(address);
             socket(host)?.map(|socket| format!("tcp/{socket}"))
         }
-        LinkKind::ModbusTcp | LinkKind::ModbusRtu | LinkKind::Serial | LinkKind::Scpi => line(address),
+        LinkKind::ModbusTcp | LinkKind::ModbusRtu | LinkKind::Serial | LinkKind::Tcp | LinkKind::Scpi => {
+            line(address)
+        }
         LinkKind::Can | LinkKind::Canopen if address.starts_with("slcan:") => line(address),
         LinkKind::Can | LinkKind::Canopen => {
             let node = instrument.base.or(link.base).or(link.node.map(u32::from)).unwrap_or(0);

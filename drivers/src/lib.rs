@@ -49,12 +49,13 @@
 //! | [`off`] | how an instrument is switched off and read back, whatever the wire |
 //! | [`modbus`] | the conversation with registers, over [`modbus_tcp`] or [`modbus_rtu`] |
 //! | [`can`] | the conversation in CAN messages, over [`slcan`] or [`socketcan`] |
-//! | [`text`] | the conversation in lines, over a serial line or SCPI over TCP |
+//! | [`text`] | the conversation in lines |
+//! | [`way`] | what carries lines and streams: a serial line, TCP, datagrams |
+//! | [`trace`] | every byte on its way, for whoever looks for a fault |
 //! | [`canopen`] | the conversation with a CANopen drive of CiA 402 |
 //! | [`serial`] | serial lines |
 //! | [`stream`] | frames that come by themselves |
 //! | [`vibrometer`] | the settings of a vibrometer's controller, read back for a calibration |
-//! | [`probe`] | each instrument asked by itself, for `muprime doctor` |
 #![allow(
     clippy::disallowed_methods,
     reason = "a link's thread lives in wall-clock time: it waits for its wire and stamps what comes"
@@ -73,7 +74,6 @@ pub mod modbus_rtu;
 pub mod modbus_tcp;
 pub mod off;
 pub mod ports;
-pub mod probe;
 pub mod serial;
 pub mod session;
 pub mod setup;
@@ -82,7 +82,9 @@ pub mod socketcan;
 pub mod stream;
 pub mod text;
 pub mod timebase;
+pub mod trace;
 pub mod vibrometer;
+pub mod way;
 
 pub use health::{Health, HealthReport};
 pub use off::Closed;
@@ -371,7 +373,9 @@ fn start(
         }
         LinkKind::Can => can::spawn(instrument, session),
         LinkKind::Canopen => canopen::spawn(instrument, session),
-        LinkKind::Serial | LinkKind::Scpi => text::spawn(instrument, session),
+        LinkKind::Serial | LinkKind::Tcp | LinkKind::Udp | LinkKind::Scpi | LinkKind::Sysfs => {
+            text::spawn(instrument, session)
+        }
     }
     .map_err(failed)?;
     links.links.push(Link { name: instrument.profile.clone(), role, health, thread: Some(thread) });

@@ -3,7 +3,7 @@
 use super::endpoint::Due;
 use super::off::{self, OFF_ANSWER_MS, OffWay};
 use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
-use instruments::profile::{FrameKind, Profile};
+use instruments::profile::{FrameKind, Profile, Span};
 use instruments::schema::{Poll, Table, Write};
 use instruments::{FrameId, SetId};
 use std::convert::Infallible;
@@ -93,10 +93,17 @@ impl Conversation {
     pub fn begin(session: &mut Session, wire: &mut dyn Registers) -> Result<Self, Ended> {
         let mut conversation = Self { blocks: Blocks::of(session.endpoint.profile()), bad: 0 };
         off::at_the_beginning(session, &mut Way { conversation: &mut conversation, wire })?;
+        let set_up = session.endpoint.profile().description.init.is_empty();
+        session.endpoint.hold(!set_up);
         for (frame, poll) in polls(session) {
             conversation.read(session, wire, frame, &poll)?;
         }
         initialise(session, wire)?;
+        session.endpoint.hold(false);
+        for (frame, poll) in polls(session).into_iter().filter(|(_, poll)| !set_up && poll.rate_hz.is_some())
+        {
+            conversation.read(session, wire, frame, &poll)?;
+        }
         Ok(conversation)
     }
 
@@ -154,7 +161,11 @@ impl Conversation {
         frame: FrameId,
         poll: &Poll,
     ) -> Result<(), Ended> {
-        let answer = wire.read(session, poll.table, poll.address, poll.count);
+        // The first read that brings nothing ends the sample.
+        let spans = session.endpoint.profile().frames()[frame.0].spans.clone();
+        let read = |span: &Span| wire.read(session, poll.table, span.address, span.count);
+        let answer: Result<Vec<Vec<u8>>, Trouble> = spans.iter().map(read).collect();
+        let answer = answer.map(|parts| parts.concat());
         let arrived = session.now();
         if let Some(bytes) = self.judge(session, answer)? {
             // A library may check the length in debug builds only; a short answer is refused here.

@@ -161,7 +161,7 @@ impl Rtu {
     /// Starts the stream and hands over its frames until something is wrong.
     fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
         self.start_stream(session, stream)?;
-        super::stream::listen(session, stream, &mut |buffer, deadline| {
+        super::stream::listen(session, stream, false, &mut |buffer, deadline| {
             self.line.with(|line| line.read(buffer, deadline))
         })?;
         self.stop_stream(stream)?;

@@ -9,6 +9,7 @@ use super::modbus::{Conversation, Registers, Trouble};
 use super::off::Closed;
 use super::session::{Ended, Session};
 use super::setup::InstrumentSetup;
+use super::trace::Traced;
 use instruments::schema::Table;
 use std::future::Future;
 use std::net::{SocketAddr, ToSocketAddrs};
@@ -88,7 +89,8 @@ impl<'a> Tcp<'a> {
             // When the connection is dropped, what the kernel still holds is discarded: a command
             // queued before an outage must not be delivered after it.
             stream.set_zero_linger()?;
-            Ok(tcp::attach_slave(stream, Slave(unit)))
+            let traced = Traced { inner: stream, port: address.to_string() };
+            Ok(tcp::attach_slave(traced, Slave(unit)))
         })?
         .map_err(|error: std::io::Error| Ended::from(error))?;
         Ok(Tcp { runtime, context, answer_ms })

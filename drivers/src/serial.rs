@@ -1,6 +1,7 @@
 //! Serial lines.
 
 use super::session::Ended;
+use super::trace;
 use serialport::{DataBits, Parity, SerialPort, StopBits};
 use std::io::{Read, Write};
 use std::path::PathBuf;
@@ -11,6 +12,8 @@ use std::time::{Duration, Instant};
 /// A serial line whose reads have deadlines, and on which an unplugged port is an error.
 pub struct Line {
     port: Box<dyn SerialPort>,
+    /// In the trace.
+    name: String,
 }
 
 impl Line {
@@ -28,7 +31,7 @@ impl Line {
             .timeout(Duration::from_millis(5))
             .open()
             .map_err(|error| Ended::Io(format!("{path}: {error}")))?;
-        Ok(Self { port })
+        Ok(Self { port, name: path.into() })
     }
 
     /// Reads what comes until `deadline`; zero bytes mean that it passed.
@@ -43,7 +46,10 @@ impl Line {
                 .set_timeout(left.max(Duration::from_micros(100)))
                 .map_err(|error| Ended::Io(error.to_string()))?;
             match came(self.port.read(buffer))? {
-                Some(count) => return Ok(count),
+                Some(count) => {
+                    trace::received(&self.name, &buffer[..count]);
+                    return Ok(count);
+                }
                 None if Instant::now() >= deadline => return Ok(0),
                 None => {}
             }
@@ -56,6 +62,7 @@ impl Line {
     /// Where the port does not take them.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), Ended> {
         self.port.set_timeout(Duration::from_millis(500)).map_err(|error| Ended::Io(error.to_string()))?;
+        trace::sent(&self.name, bytes);
         self.port.write_all(bytes)?;
         Ok(())
     }

@@ -60,7 +60,7 @@ pub struct InstrumentSetup {
     /// The profile as it was read, where it does not come with the program. Whoever reads a setup puts it here.
     #[serde(skip)]
     pub source: Option<Arc<Source>>,
-    /// Where it is: `host` or `host:port` for TCP, a path for a serial line
+    /// Where it is: `host` or `host:port` for TCP and UDP, a path for a serial line
     /// (`rtu:PATH` for a Modbus TCP profile that is reached so), an interface (`can0`) or `slcan:PATH` for CAN.
     pub address: String,
     /// Serial number: certificates must name it.

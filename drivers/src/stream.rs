@@ -13,32 +13,39 @@ const LONGEST_LINE: usize = 4096;
 enum Framing {
     /// Frames of one length that end with a check.
     Binary(Cutter),
+    /// Datagrams, each of one frame or several: they begin with sync, and their transport has checked them.
+    Datagrams { sync: Vec<u8>, length: usize },
     /// Lines, which end so.
     Lines { end: Vec<u8>, came: Vec<u8>, believed: bool },
 }
 
 impl Framing {
-    fn of(session: &Session, stream: &Stream) -> Self {
+    fn of(session: &Session, stream: &Stream, parted: bool) -> Self {
         let end = || session.endpoint.profile().description.link.rx_terminator.clone();
-        match stream.shape() {
-            Some(shape) => Self::Binary(Cutter::new(shape)),
-            // What comes before the first end is half a line.
-            None => Self::Lines {
+        match (stream.shape(), stream.length) {
+            (Some(shape), _) => Self::Binary(Cutter::new(shape)),
+            (None, Some(length)) => {
+                Self::Datagrams { sync: stream.sync.clone(), length: usize::from(length) }
+            }
+            // What comes before the first end is half a line; a datagram is whole.
+            (None, None) => Self::Lines {
                 end: end().unwrap_or_else(|| "\n".into()).into_bytes(),
                 came: Vec::new(),
-                believed: false,
+                believed: parted,
             },
         }
     }
 }
 
-/// Hands over frames until the thread is to end. `read` gives what comes until its deadline.
+/// Hands over frames until the thread is to end. `read` gives what comes until its deadline; `parted` says that each read is a
+/// datagram.
 ///
 /// # Errors
 /// Silence for longer than an answer may take, and whatever `read` says.
 pub fn listen(
     session: &mut Session,
     stream: &Stream,
+    parted: bool,
     read: &mut dyn FnMut(&mut [u8], Instant) -> Result<usize, Ended>,
 ) -> Result<(), Ended> {
     let (profile, health) = (session.endpoint.profile(), session.endpoint.health());
@@ -46,8 +53,10 @@ pub fn listen(
     let shape = profile.frames()[frame.0].clone();
     let limit_ms = profile.description.link.response_timeout_ms;
     let patience = Duration::from_millis(u64::from(limit_ms));
-    let mut framing = Framing::of(session, stream);
-    let (mut skipped, mut last, mut buffer) = (0, Instant::now(), [0; 1024]);
+    let mut framing = Framing::of(session, stream, parted);
+    // The longest datagram that there is.
+    let mut buffer = vec![0; if parted { 65_536 } else { 1024 }];
+    let (mut skipped, mut last) = (0, Instant::now());
     while !session.stopping() {
         let count = read(&mut buffer, Instant::now() + LONGEST_SLEEP)?;
         let arrived = session.now();
@@ -64,8 +73,22 @@ pub fn listen(
                 health.corrupt_frames.fetch_add(cutter.lost - skipped, Ordering::Relaxed);
                 skipped = cutter.lost;
             }
+            Framing::Datagrams { .. } if count == 0 => {}
+            Framing::Datagrams { sync, length } => {
+                let whole = count.is_multiple_of(*length)
+                    && buffer[..count].chunks_exact(*length).all(|frame| frame.starts_with(sync));
+                if whole {
+                    buffer[..count].chunks_exact(*length).for_each(take);
+                } else {
+                    health.count(&health.corrupt_frames);
+                    health.problem(format!("a datagram of {count} bytes is no frame of the stream"));
+                }
+            }
             Framing::Lines { end, came, believed } => {
                 came.extend_from_slice(&buffer[..count]);
+                if parted && count > 0 && !came.ends_with(end) {
+                    came.extend_from_slice(end);
+                }
                 while let Some(at) = came.windows(end.len()).position(|window| window == end.as_slice()) {
                     let line: Vec<u8> = came.drain(..at + end.len()).take(at).collect();
                     let whole = std::mem::replace(believed, true);

@@ -1,5 +1,5 @@
-//! The conversation in lines of text and blocks of bytes, over a serial line, a device server in front of one (`tcp:HOST:PORT`)
-//! or SCPI over TCP.
+//! The conversation in lines of text and blocks of bytes, whatever carries it: a serial line, a device server in front of one
+//! (`tcp:HOST:PORT`), or TCP; and streams, also in datagrams.
 //!
 //! Every set-point is absolute and is sent when it changes, and again each second. Lines that an
 //! instrument sends without being asked are taken out before an answer is looked for: they must
@@ -7,20 +7,18 @@
 //! the end of a line.
 
 use super::endpoint::Due;
-use super::modbus_tcp::resolve;
 use super::off::{self, Closed, OFF_ANSWER_MS, OffWay};
-use super::serial::Line;
 use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
 use super::setup::InstrumentSetup;
+use super::way::{Place, Way};
 use instruments::codec::pattern::Pattern;
 use instruments::codec::text::number;
 use instruments::profile::FrameKind;
-use instruments::schema::{Link, LinkKind, Query, Stream};
+use instruments::schema::{Init, Link, LinkKind, Query, Stream};
+use instruments::vector::from_hex;
 use instruments::{FrameId, Profile, SetId};
 use std::collections::HashMap;
 use std::convert::Infallible;
-use std::io::{Read, Write};
-use std::net::TcpStream;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -39,23 +37,10 @@ const COMMAND_RATE_HZ: f64 = 500.0;
 /// Where the address makes no sense or no thread can be had.
 pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
     let link = session.endpoint.profile().description.link.clone();
-    let address = instrument.address.clone();
-    let host = address.strip_prefix("tcp:").or((link.kind == LinkKind::Scpi).then_some(address.as_str()));
-    let tcp = host.map(|host| resolve(host, link.port)).transpose()?;
-    let (rate_hz, baud) = (instrument.rate_hz, instrument.baud.or(link.baud).unwrap_or(9600));
+    let place = Place::of(&instrument.address, &link, instrument.baud)?;
+    let rate_hz = instrument.rate_hz;
     session.spawn(move |session| {
-        let way = match tcp {
-            Some(address) => {
-                let limit = Duration::from_millis(u64::from(link.connect_timeout_ms));
-                let stream = TcpStream::connect_timeout(&address, limit)?;
-                stream.set_nodelay(true)?;
-                Way::Tcp(stream)
-            }
-            None => {
-                let format = link.format.clone().unwrap_or_else(|| "8N1".into());
-                Way::Serial(Line::open(&address, baud, &format)?)
-            }
-        };
+        let way = place.open(Duration::from_millis(u64::from(link.connect_timeout_ms)))?;
         let health = session.endpoint.health();
         health.count(&health.connections);
         let mut talk = Talk::new(way, link.clone());
@@ -71,53 +56,6 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         talk.begin(session)?;
         talk.go_on(session, rate_hz)
     })
-}
-
-enum Way {
-    Serial(Line),
-    Tcp(TcpStream),
-}
-
-impl Way {
-    fn read(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, Ended> {
-        match self {
-            Way::Serial(line) => line.read(buffer, deadline),
-            Way::Tcp(stream) => {
-                let left = deadline.saturating_duration_since(Instant::now());
-                // The kernel rounds a timeout up to its tick of some milliseconds: what is only asked whether it is
-                // there is asked without waiting.
-                let came = if left.is_zero() {
-                    stream.set_nonblocking(true)?;
-                    let came = stream.read(buffer);
-                    stream.set_nonblocking(false)?;
-                    came
-                } else {
-                    stream.set_read_timeout(Some(left.max(Duration::from_micros(100))))?;
-                    stream.read(buffer)
-                };
-                match came {
-                    Ok(0) => Err(Ended::Io("the instrument closed the connection".into())),
-                    Ok(count) => Ok(count),
-                    Err(error)
-                        if matches!(
-                            error.kind(),
-                            std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
-                        ) =>
-                    {
-                        Ok(0)
-                    }
-                    Err(error) => Err(error.into()),
-                }
-            }
-        }
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Ended> {
-        match self {
-            Way::Serial(line) => line.write(bytes),
-            Way::Tcp(stream) => stream.write_all(bytes).map_err(Ended::from),
-        }
-    }
 }
 
 /// A line that comes without being asked for.
@@ -212,7 +150,10 @@ impl Talk {
         if !session.endpoint.profile().description.init.is_empty() {
             self.initialise(session)?;
         }
-        super::stream::listen(session, stream, &mut |buffer, deadline| self.way.read(buffer, deadline))?;
+        let parted = self.way.is_parted();
+        super::stream::listen(session, stream, parted, &mut |buffer, deadline| {
+            self.way.read(buffer, deadline)
+        })?;
         Err(Ended::Stopped)
     }
 
@@ -290,9 +231,20 @@ impl Talk {
     }
 
     fn initialise(&mut self, session: &mut Session) -> Result<(), Ended> {
-        self.settle()?;
+        // A socket is new with every connection: nothing is left half said there.
+        if matches!(self.link.kind, LinkKind::Serial | LinkKind::Scpi) {
+            self.settle()?;
+        }
         for init in session.endpoint.profile().description.init.clone() {
-            let Some(send) = &init.send else { continue };
+            let send = match &init {
+                Init { send: Some(send), .. } => send,
+                Init { hex: Some(hex), .. } => {
+                    // The profile was read: they are bytes.
+                    self.way.write(&from_hex(hex).unwrap_or_default())?;
+                    continue;
+                }
+                _ => continue,
+            };
             self.clear(session)?;
             self.send(send)?;
             let Some(expected) = &init.expect else { continue };
@@ -393,7 +345,8 @@ impl Talk {
             session.endpoint.refused();
         }
         if self.bad >= BAD_IN_A_ROW {
-            return Err(Ended::Corrupt("set-points are not taken".into()));
+            let last = session.endpoint.health().report().last_problem;
+            return Err(Ended::Corrupt(format!("set-points are not taken: {last}")));
         }
         Ok(())
     }

@@ -1,89 +1,215 @@
 //! A profile as a page for people, generated so that it cannot drift from what the drivers do.
 
-use crate::Profile;
+use crate::profile::{Frame, FrameKind};
+use crate::schema::{Description, Init, Link, Table};
+use crate::{Profile, SignalId};
 use std::fmt::Write;
 
 /// The page, in Markdown.
 #[must_use]
 pub fn markdown(profile: &Profile) -> String {
     let d = &profile.description;
-    let mut page = String::new();
-    let mut line = |text: String| {
-        let _ = writeln!(page, "{text}");
-    };
-    line(format!("# {}\n", d.profile.id));
-    line(format!(
-        "{}: {}. Roles: {:?}. Tried: {:?}.\n",
-        d.profile.maker,
-        d.profile.models.join(", "),
-        d.profile.roles,
-        d.profile.verified
-    ));
-    if !d.profile.notes.is_empty() {
-        line(format!("{}\n", d.profile.notes));
+    let mut page = format!("# {}\n\n", d.profile.id);
+    let roles = d.profile.roles.iter().map(|role| format!("{role:?}")).collect::<Vec<_>>().join(", ");
+    let (maker, models) = (&d.profile.maker, d.profile.models.join(", "));
+    let _ = writeln!(page, "{maker}: {models}. Roles: {roles}. Tried: {:?}.", d.profile.verified);
+    let firmware = d.profile.firmware.as_ref().map(|firmware| format!("Firmware: {firmware}."));
+    for text in [Some(d.profile.notes.clone()), firmware].into_iter().flatten().filter(|t| !t.is_empty()) {
+        let _ = writeln!(page, "\n{text}");
     }
-    line(format!("Source of the facts: {}.\n", d.profile.provenance));
-    let link = &d.link;
-    line(format!(
-        "Link: {:?}; an answer must be complete within {} ms.\n",
-        link.kind, link.response_timeout_ms
-    ));
-    line("| frame | bytes | per second |\n|---|---|---|".into());
-    for frame in profile.frames() {
-        let rate = d.poll.iter().find(|p| *p.name.as_ref() == frame.name).map(|p| p.rate_hz);
-        let rate = rate.unwrap_or_else(|| {
-            let message = d.message.iter().find(|m| *m.name.as_ref() == frame.name).map(|m| m.rate_hz);
-            let query = d.query.iter().find(|q| *q.name.as_ref() == frame.name).map(|q| q.rate_hz);
-            message.or(query).or(d.stream.as_ref().map(|stream| stream.rate_hz))
-        });
-        let rate = rate.map_or("once".to_string(), |rate| rate.to_string());
-        line(format!("| {} | {} | {rate} |", frame.name, frame.bytes));
-    }
-    line("\n| signal | frame | one count | range | what |\n|---|---|---|---|---|".into());
-    for (signal, id) in d.signal.iter().zip(profile.signals().map(|(_, id)| id)) {
-        let frame = &profile.frames()[profile.frame_of(id).0].name;
-        let count = if let Some(step) = signal.resolution_si {
-            format!("{step} {}", signal.si.unit)
-        } else if signal.scale_expr.is_some() {
-            "varies".into()
-        } else {
-            format!("{} {}", signal.scale, signal.unit)
-        };
-        let range =
-            signal.range.map_or(String::new(), |(low, high)| format!("{low} to {high} {}", signal.unit));
-        line(format!(
-            "| {} | {frame} | {} | {range} | {} |",
-            signal.name.as_ref(),
-            count.trim(),
-            signal.text
-        ));
-    }
-    if !d.set.is_empty() {
-        line("\n| set-point | step | range | safe | echo | what |\n|---|---|---|---|---|---|".into());
-        for set in &d.set {
-            let range =
-                set.range.map_or(String::new(), |(low, high)| format!("{low} to {high} {}", set.unit));
-            let safe = set.safe.map_or(String::new(), |safe| safe.to_string());
-            let step = format!("{} {}", set.scale, set.unit);
-            let echo = set.echo.as_deref().unwrap_or("");
-            line(format!(
-                "| {} | {} | {range} | {safe} | {echo} | {} |",
-                set.name.as_ref(),
-                step.trim(),
-                set.text
-            ));
-        }
-    }
-    if !d.signature.is_empty() || !d.fault.is_empty() {
-        line("\n| when | then |\n|---|---|".into());
-        for signature in &d.signature {
-            line(format!("| not `{}` | refused: {} |", escaped(signature.when.as_ref()), signature.text));
-        }
-        for fault in &d.fault {
-            line(format!("| `{}` | {:?}: {} |", escaped(fault.when.as_ref()), fault.severity, fault.text));
-        }
-    }
+    let _ = writeln!(page, "\nSource of the facts: {}.\n\nLink: {}.", d.profile.provenance, link(&d.link));
+    table(&mut page, "frame | is | bytes | per second", profile.frames().iter().map(|f| frame_row(d, f)));
+    table(&mut page, "at connection | for", d.init.iter().map(init_row));
+    let signals: Vec<SignalId> = profile.signals().map(|(_, id)| id).collect();
+    let heads = "signal | frame | where | unit | resolution | range | noise | what";
+    table(&mut page, heads, signals.into_iter().map(|id| signal_row(profile, id)));
+    let heads = "set-point | goes as | step | range | safe | echo | what";
+    table(&mut page, heads, d.set.iter().map(|set| set_row(d, set)));
+    let refused = d.signature.iter().map(|one| {
+        vec![format!("not {}", code(one.when.as_ref())), format!("refused at connection: {}", one.text)]
+    });
+    let faults =
+        d.fault.iter().map(|one| vec![code(one.when.as_ref()), format!("{:?}: {}", one.severity, one.text)]);
+    table(&mut page, "when | then", refused.chain(faults));
+    let _ = writeln!(
+        page,
+        "\nTime: {:?}, {} ms late, give or take {} ms. Golden vectors: {}.",
+        d.time.stamp,
+        d.time.latency_ms,
+        d.time.jitter_ms,
+        d.vector.len()
+    );
     page
+}
+
+/// A table, where it has rows.
+fn table(page: &mut String, heads: &str, rows: impl Iterator<Item = Vec<String>>) {
+    for (at, row) in rows.enumerate() {
+        if at == 0 {
+            let _ = writeln!(page, "\n| {heads} |\n|{}", "---|".repeat(heads.split('|').count()));
+        }
+        let _ = writeln!(page, "| {} |", row.join(" | "));
+    }
+}
+
+/// What is fixed of the link.
+fn link(link: &Link) -> String {
+    let mut said = vec![format!("{:?}", link.kind)];
+    let mut add =
+        |name: &str, value: Option<String>| said.extend(value.map(|value| format!("{name} {value}")));
+    add("port", link.port.map(|port| port.to_string()));
+    add("to this machine's port", link.local_port.map(|port| port.to_string()));
+    add("unit", link.unit.map(|unit| unit.to_string()));
+    add("baud", link.baud.map(|baud| baud.to_string()));
+    add("format", link.format.clone());
+    add("bit rate", link.bitrate.map(|rate| rate.to_string()));
+    add("identifiers from", link.base.map(|base| format!("{base:#x}")));
+    add("node", link.node.map(|node| node.to_string()));
+    add("described by", link.dbc.clone().or_else(|| link.eds.clone()));
+    let end = |end: &Option<String>| end.as_ref().map(|end| code(&end.escape_default().to_string()));
+    add("lines sent end with", end(&link.tx_terminator));
+    add("lines that come end with", end(&link.rx_terminator));
+    let alarms =
+        (!link.unsolicited.is_empty()).then(|| link.unsolicited.iter().map(|a| code(a)).collect::<Vec<_>>());
+    add("alarms", alarms.map(|alarms| alarms.join(" ")));
+    add("an answer must be complete within", Some(format!("{} ms", link.response_timeout_ms)));
+    said.join("; ")
+}
+
+fn frame_row(d: &Description, frame: &Frame) -> Vec<String> {
+    let (is, rate) = match &frame.kind {
+        FrameKind::Poll(index) => {
+            let poll = &d.poll[*index];
+            let spans = frame.spans.iter().map(|s| match s.count {
+                1 => s.address.to_string(),
+                _ => format!("{} to {}", s.address, s.end() - 1),
+            });
+            let spans: Vec<String> = spans.collect();
+            let word = if frame.bytes == 2 { "register" } else { "registers" };
+            (format!("{} {word} {}", table_name(poll.table), spans.join(", ")), poll.rate_hz)
+        }
+        FrameKind::Stream => {
+            let stream = d.stream.as_ref();
+            let line = stream.and_then(|stream| stream.line.as_deref()).map(code);
+            let check = stream.and_then(|s| s.check).map_or("no check of its own", |check| check.name());
+            (line.unwrap_or_else(|| format!("comes by itself; {check}")), stream.map(|stream| stream.rate_hz))
+        }
+        FrameKind::Messages(index, parts) => {
+            let message = &d.message[*index];
+            let ids: Vec<String> = parts.iter().map(|part| format!("{:#x}", part.id)).collect();
+            let only = message.multiplex.map_or(String::new(), |value| format!(", multiplexor {value}"));
+            let how = if message.request.is_some() { "asked for" } else { "by themselves" };
+            let names = message.replies.join(", ");
+            (format!("{names} (base + {}), {how}{only}", ids.join(", ")), Some(message.rate_hz))
+        }
+        FrameKind::Query(index) => {
+            let query = &d.query[*index];
+            let answer = query
+                .answer
+                .as_deref()
+                .map_or(String::new(), |answer| format!(" answered by {}", code(answer)));
+            (format!("{}{answer}", code(&query.send)), Some(query.rate_hz))
+        }
+    };
+    vec![frame.name.clone(), is, frame.bytes.to_string(), rate.map_or("once".into(), |rate| rate.to_string())]
+}
+
+fn table_name(table: Table) -> &'static str {
+    match table {
+        Table::Holding => "holding",
+        Table::Input => "input",
+        Table::Coil => "coil",
+        Table::Discrete => "discrete",
+    }
+}
+
+fn init_row(init: &Init) -> Vec<String> {
+    let registers = |(first, values): &(u16, Vec<u16>)| {
+        format!("{} registers from {first}: {values:?}", table_name(init.table))
+    };
+    let said = None
+        .or_else(|| init.send.as_deref().map(code))
+        .or_else(|| init.hex.as_ref().map(|hex| format!("bytes {hex}")))
+        .or_else(|| init.registers.as_ref().map(registers))
+        .or_else(|| {
+            init.copy.map(|(from, to, count)| format!("{count} registers from {from} copied to {to}"))
+        })
+        .or_else(|| init.function.map(|(function, data)| format!("function {function:#04x} with {data}")))
+        .or_else(|| init.can.as_ref().map(|(id, data)| format!("message {id:#x}: {data:02x?}")))
+        .or_else(|| init.sdo.map(|(index, sub, _, value)| format!("object {index:04X}sub{sub}: {value}")));
+    let expect = init.expect.as_ref().map_or(String::new(), |all| {
+        format!(", answered by {}", all.iter().map(|start| code(start)).collect::<Vec<_>>().join(" or "))
+    });
+    vec![format!("{}{expect}", said.unwrap_or_default()), escaped(&init.text)]
+}
+
+fn signal_row(profile: &Profile, id: SignalId) -> Vec<String> {
+    let signal = &profile.description.signal[id.0];
+    let place = None
+        .or_else(|| signal.value.as_deref().map(|value| format!("= {}", code(value))))
+        .or_else(|| signal.dbc.as_deref().map(code))
+        .or_else(|| signal.object.map(|(index, sub)| format!("object {index:04X}sub{sub}")))
+        .or_else(|| signal.address.map(|address| format!("register {address}")))
+        .or_else(|| signal.register.map(|register| format!("+{register}")))
+        .or_else(|| signal.byte.map(|byte| format!("byte {byte}")))
+        .unwrap_or_else(|| "line".into());
+    let kind = signal.number.map_or(String::new(), |number| format!(" {number:?}").to_lowercase());
+    let bits = signal.bits.map_or(String::new(), |(first, width)| format!(", {width} bits from {first}"));
+    let step = profile.lsb_si(id, &profile.values());
+    let resolution = if signal.scale_expr.is_some() && signal.resolution_si.is_none() {
+        "varies".into()
+    } else if step.is_finite() {
+        // Ten digits: the rest is the rounding of binary factors.
+        let step: f64 = format!("{step:.9e}").parse().unwrap_or(step);
+        format!("{step} {}", signal.si.unit).trim().to_string()
+    } else {
+        "resolution unknown".into()
+    };
+    let unit = signal.unit.as_str();
+    vec![
+        signal.name.as_ref().clone(),
+        profile.frames()[profile.frame_of(id).0].name.clone(),
+        format!("{place}{kind}{bits}"),
+        unit.into(),
+        resolution,
+        range(signal.range, unit),
+        signal.noise.map_or(String::new(), |noise| format!("{noise} {unit}")),
+        escaped(&signal.text),
+    ]
+}
+
+fn set_row(d: &Description, set: &crate::schema::Set) -> Vec<String> {
+    let line = set.send.as_deref().map(|send| match &set.send_zero {
+        Some(zero) => format!("{}, zero {}", code(send), code(zero)),
+        None => code(send),
+    });
+    let block = || {
+        let named = d.write.iter().find(|write| set.block.as_ref().is_none_or(|b| b == write.name.as_ref()));
+        match (set.object, named) {
+            (Some((index, sub)), _) => format!("object {index:04X}sub{sub}"),
+            (None, Some(write)) => {
+                format!("{} register {}", table_name(write.table), write.address + set.register)
+            }
+            (None, None) => String::new(),
+        }
+    };
+    vec![
+        set.name.as_ref().clone(),
+        line.unwrap_or_else(block),
+        format!("{} {}", set.scale, set.unit).trim().to_string(),
+        range(set.range, &set.unit),
+        set.safe.map_or(String::new(), |safe| safe.to_string()),
+        set.echo.clone().unwrap_or_default(),
+        escaped(&set.text),
+    ]
+}
+
+fn range(range: Option<(f64, f64)>, unit: &str) -> String {
+    range.map_or(String::new(), |(low, high)| format!("{low} to {high} {unit}").trim().to_string())
+}
+
+fn code(text: &str) -> String {
+    format!("`{}`", escaped(text))
 }
 
 /// A bar ends a table's cell.

@@ -18,7 +18,7 @@ use crate::expression::Expression;
 use crate::field::Field;
 use crate::schema::{Description, Role, Severity};
 use compile::Compiler;
-pub use frame::{Frame, FrameKind, Part};
+pub use frame::{Frame, FrameKind, MOST_REGISTERS, Part, Span};
 use sets::CompiledSet;
 pub use sets::SetError;
 
@@ -287,6 +287,15 @@ impl Profile {
             if let (Some(scale), false) = (&signal.scale_expression, values[index].is_nan()) {
                 let scale = signal.scale * scale.value(&values);
                 signal.place.write(bytes, (values[index] - signal.offset) / scale);
+            }
+        }
+        if let FrameKind::Messages(_, parts) = &self.frames[frame.0].kind {
+            let mut at = 0;
+            for part in parts {
+                if let (Some((selector, value)), Some(data)) = (part.selector, bytes.get_mut(at..)) {
+                    selector.write(data, value as f64 * selector.factor + selector.offset);
+                }
+                at += part.length;
             }
         }
     }

@@ -45,23 +45,20 @@ impl Profile {
         let byte_s = |baud: f64| bits_a_byte(d.link.format.as_deref().unwrap_or("8N1")) / baud;
         let share: f64 = match d.link.kind {
             LinkKind::ModbusTcp if !setup.over_rtu => return None,
-            LinkKind::Scpi => return None,
+            LinkKind::Scpi | LinkKind::Tcp | LinkKind::Udp | LinkKind::Sysfs => return None,
             LinkKind::Serial if setup.over_tcp => return None,
             LinkKind::ModbusTcp | LinkKind::ModbusRtu => {
                 let baud = serial(19_200);
                 let pause = silence_s(baud as u32);
-                let polls = d.poll.iter().filter_map(|poll| {
-                    let bytes = 8.0
-                        + 5.0
-                        + if poll.table.is_bits() {
-                            f64::from(poll.count) / 8.0
-                        } else {
-                            2.0 * f64::from(poll.count)
-                        };
-                    Some(
-                        setup.rate_hz.or(poll.rate_hz).filter(|_| poll.rate_hz.is_some())?
-                            * (bytes * byte_s(baud) + pause),
-                    )
+                let polls = self.frames().iter().filter_map(|frame| {
+                    let FrameKind::Poll(index) = frame.kind else { return None };
+                    let poll = &d.poll[index];
+                    let rate = setup.rate_hz.or(poll.rate_hz).filter(|_| poll.rate_hz.is_some())?;
+                    let bytes =
+                        |count: u16| f64::from(count) * if poll.table.is_bits() { 0.125 } else { 2.0 };
+                    let reads =
+                        frame.spans.iter().map(|span| (8.0 + 5.0 + bytes(span.count)) * byte_s(baud) + pause);
+                    Some(rate * reads.sum::<f64>())
                 });
                 polls.sum::<f64>() + self.stream_bytes_s() * byte_s(baud)
             }

@@ -5,7 +5,7 @@
 
 use crate::error::ProfileError;
 use crate::field::NumberType;
-use crate::profile::{FrameId, Profile};
+use crate::profile::{FrameId, FrameKind, Profile};
 use crate::schema::Vector;
 
 /// Relative error that a vector's value may have: decimal numbers are not exact in binary.
@@ -51,7 +51,15 @@ impl Profile {
                 .position(|name| *name == frame)
                 .ok_or_else(|| error(format!("no frame is called `{frame}`")))?,
             None if names.len() == 1 => 0,
-            None => return Err(error("the vector needs `frame`: the profile has several".into())),
+            None => {
+                // What it expects says which frame or block it is of, where only one has all of that.
+                let mut having = (0..names.len()).filter(|&which| self.has_all(which, vector));
+                let (Some(one), None) = (having.next(), having.next()) else {
+                    let names: Vec<&str> = names.iter().map(|name| name.as_str()).collect();
+                    return Err(error(format!("the vector needs `frame`, one of {}", names.join(", "))));
+                };
+                one
+            }
         };
         let bytes = match (&vector.line, self.frames().get(which)) {
             (Some(line), Some(frame)) => frame
@@ -67,6 +75,7 @@ impl Profile {
         }
         if which < polls {
             self.decode(FrameId(which), &bytes, &mut values).map_err(|e| error(e.to_string()))?;
+            self.check_frame(which, &bytes).map_err(error)?;
         } else if bytes.len() != 2 * usize::from(d.write[which - polls].count) {
             return Err(error(format!(
                 "the block has {} registers, the vector {} bytes",
@@ -96,6 +105,26 @@ impl Profile {
         }
         self.check_encoding(which, &bytes, &values).map_err(error)?;
         Ok(which)
+    }
+
+    /// Whether all that a vector expects stands in one frame or block.
+    fn has_all(&self, which: usize, vector: &Vector) -> bool {
+        let polls = self.frames().len();
+        let stands = |name: &String| match which.checked_sub(polls) {
+            None => self.signal(name).is_some_and(|signal| self.frame_of(signal).0 == which),
+            Some(block) => self.sets_of(block).any(|set| self.description.set[set.0].name.as_ref() == name),
+        };
+        !vector.expect.as_ref().is_empty() && vector.expect.as_ref().keys().all(stands)
+    }
+
+    /// The bytes of a stream's frame must be one that the driver would take: its sync bytes, and its check.
+    fn check_frame(&self, which: usize, bytes: &[u8]) -> Result<(), String> {
+        let stream = matches!(self.frames().get(which).map(|frame| &frame.kind), Some(FrameKind::Stream));
+        let shape = self.description.stream.as_ref().filter(|_| stream).and_then(|stream| stream.shape());
+        match shape.and_then(|shape| shape.misfit(bytes)) {
+            Some(misfit) => Err(misfit),
+            None => Ok(()),
+        }
     }
 
     /// The decoded values, encoded over the vector's bytes, must leave them as they are.

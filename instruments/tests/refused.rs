@@ -202,3 +202,123 @@ fn a_resolution_is_stated_or_known_or_unknown() {
     let (one, thousandth) = (lsb(CAN, "fx", DBC), lsb(CAN, "fx", &factor));
     assert!((thousandth / one - 1e-3).abs() < 1e-12, "{thousandth} {one}");
 }
+
+const SCATTERED: &str = include_str!("../../drivers/profiles/labjack-t7.toml");
+const DATAGRAMS: &str = include_str!("../../drivers/profiles/ati-netft-rdt.toml");
+
+/// Registers that lie apart are read in as few reads as the profile permits, and never a number in two.
+#[test]
+fn scattered_registers_are_read_in_as_few_reads_as_may_be() {
+    let spans = |text: &str| {
+        let profile = Profile::parse(text).unwrap_or_else(|error| panic!("{error}"));
+        let frame = profile.frame("sample").unwrap();
+        profile.frames()[frame.0].spans.iter().map(|s| (s.address, s.count)).collect::<Vec<_>>()
+    };
+    assert_eq!(spans(SCATTERED), [(0, 2), (4, 2)]);
+    assert_eq!(spans(&changed(SCATTERED, "rate_hz = 250", "rate_hz = 250\ngap = 1")), [(0, 2), (4, 2)]);
+    let joined = changed(SCATTERED, "rate_hz = 250", "rate_hz = 250\ngap = 2");
+    assert_eq!(spans(&joined), [(0, 6)]);
+    let third = |address: u32, number: &str| {
+        format!(
+            "{joined}\n[[signal]]\nname = \"third\"\nframe = \"sample\"\naddress = {address}\ntype = \"{number}\"\n"
+        )
+    };
+    assert_eq!(spans(&third(1, "u16")), [(0, 6)], "within another");
+    assert_eq!(spans(&third(5, "f64")), [(0, 9)], "over the end of another");
+    assert_eq!(spans(&third(9, "u16")), [(0, 6), (9, 1)]);
+    let far = changed(&third(124, "f32"), "gap = 2", "gap = 1000");
+    assert_eq!(spans(&far), [(0, 6), (124, 2)], "one read takes 125, and a number is never parted");
+    let past = Profile::parse(&third(65535, "f32")).unwrap_err().to_string();
+    assert!(past.contains("65535") && past.starts_with("line "), "{past}");
+}
+
+#[test]
+fn what_datagrams_multiplexors_and_scattered_registers_cannot_be_is_refused() {
+    let mux = "BO_ 5 Mux: 8 RIG\n SG_ M M : 0|8@1+ (1,0) [0|0] \"\" RIG\n SG_ P m1 : 8|16@1- (1,0) [0|0] \"\" RIG\n \
+               SG_ Q m2 : 8|16@1- (1,0) [0|0] \"\" RIG\n";
+    let can = |multiplex: &str| {
+        format!(
+            "[profile]\nschema = 1\nid = \"a\"\nmaker = \"m\"\nmodels = [\"m\"]\nroles = [\"force.normal\"]\n\
+             provenance = \"p\"\nverified = \"emulator-only\"\n[link]\nkind = \"can\"\ndbc = \"mux.dbc\"\n\
+             [[message]]\nname = \"one\"\nreplies = [\"Mux\"]\nrate_hz = 100\n{multiplex}\n\
+             [[signal]]\nname = \"normal\"\ndbc = \"Mux.P\"\n\
+             [[vector]]\nhex = \"0105000000000000\"\nexpect = {{ normal = 5 }}\n"
+        )
+    };
+    let parse = |text: &str, dbc: &str| Profile::parse_with(text, &|_| Some(dbc.to_string()));
+    let good = parse(&can("multiplex = 1"), mux).unwrap_or_else(|error| panic!("{error}"));
+    good.check(&can("multiplex = 1")).unwrap();
+    // The emulator says which message it is.
+    let (frame, normal) = (good.frame("one").unwrap(), good.signal("normal").unwrap());
+    let mut bytes = vec![0; 8];
+    good.encode(frame, &mut bytes, &mut |signal| (signal == normal).then_some(5.0));
+    assert_eq!(bytes, [1, 5, 0, 0, 0, 0, 0, 0]);
+    let muprime_instruments::profile::FrameKind::Messages(_, parts) = &good.frames()[0].kind else {
+        panic!()
+    };
+    assert!(
+        parts[0].selects(&bytes)
+            && !parts[0].selects(&[2, 5, 0, 0, 0, 0, 0, 0])
+            && !parts[0].selects(&[1, 5])
+    );
+    let nested = format!("{mux}\nSG_MUL_VAL_ 5 P M 1-3;\n");
+    let wrong = [
+        ("a multiplexed signal where it is not", can(""), mux, "multiplex = 1"),
+        ("the other of the multiplexor's values", can("multiplex = 2"), mux, "multiplex = 1"),
+        ("a value that its multiplexor cannot have", can("multiplex = 300"), mux, "8 bits"),
+        ("ranges of a multiplexor", can("multiplex = 1"), nested.as_str(), "SG_MUL_VAL_"),
+        (
+            "no multiplexor at all",
+            can("multiplex = 1"),
+            &mux.replace("M M :", "M :").replace(" m1", "").replace(" m2", ""),
+            "no",
+        ),
+        (
+            "datagrams to nobody",
+            changed(DATAGRAMS, "[[init]]\nhex = \"1234 0002 00000000\"", ""),
+            "",
+            "local_port",
+        ),
+        (
+            "a question in datagrams",
+            format!("{DATAGRAMS}\n[[query]]\nname = \"q\"\nsend = \"q?\"\nrate_hz = 1\n"),
+            "",
+            "[[query]]",
+        ),
+        ("bytes that are none", changed(DATAGRAMS, "1234 0002 00000000", "12 3"), "", "hexadecimal"),
+        ("a stream over TCP without a check", changed(DATAGRAMS, "\"udp\"", "\"tcp\""), "", "check"),
+        (
+            "a port of this machine over TCP",
+            changed(DATAGRAMS, "kind = \"udp\"", "kind = \"tcp\"\nlocal_port = 5"),
+            "",
+            "local_port",
+        ),
+        ("a poll of nothing", changed(SCATTERED, "address = 60000", "register = 0"), "", "`address`"),
+        ("half a place", changed(SCATTERED, "once = true", "once = true\naddress = 60000"), "", "both"),
+        (
+            "a gap in neighbours",
+            changed(SCATTERED, "once = true", "once = true\naddress = 60000\ncount = 2\ngap = 3"),
+            "",
+            "`gap`",
+        ),
+        ("two places", changed(SCATTERED, "address = 4", "address = 4\nregister = 2"), "", "takes the place"),
+        (
+            "reads that look alike over RTU",
+            changed(
+                SCATTERED,
+                "kind = \"modbus_tcp\"",
+                "kind = \"modbus_rtu\"\nbaud = 19200\nformat = \"8N1\"",
+            ),
+            "",
+            "same number",
+        ),
+    ];
+    for (what, text, dbc, cause) in wrong {
+        let said = match parse(&text, dbc) {
+            Ok(_) => panic!("{what}: taken"),
+            Err(error) => error.to_string(),
+        };
+        assert!(said.contains(cause), "{what}: {said}");
+        assert!(said.starts_with("line "), "{what} has no place: {said}");
+    }
+}

@@ -165,7 +165,7 @@ fn modbus_tcp() {
     let server = ModbusTcpServer::start("127.0.0.1:0".parse().unwrap(), units, plant()).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let profile = drivers::profile("muprime-force2").unwrap();
-    let poll = profile.description.poll[0].clone();
+    let poll = profile.frames()[0].spans[0];
     let address = server.address();
     let bare = move || {
         let connected = runtime.block_on(async {

@@ -131,7 +131,7 @@ fn modbus_round_trip_bare_client(bencher: Bencher<'_, '_>) {
     let server = server();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let profile = drivers::profile("muprime-force2").unwrap();
-    let poll = &profile.description.poll[0];
+    let poll = profile.frames()[0].spans[0];
     let slave = tokio_modbus::Slave(profile.description.link.unit.unwrap_or(1));
     let mut client = runtime
         .block_on(async {
@@ -151,10 +151,11 @@ fn modbus_round_trip_driver(bencher: Bencher<'_, '_>) {
     let server = server();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let profile = drivers::profile("muprime-force2").unwrap();
-    let (poll, link) = (&profile.description.poll[0], &profile.description.link);
+    let (table, poll) = (profile.description.poll[0].table, profile.frames()[0].spans[0]);
+    let link = &profile.description.link;
     let unit = link.unit.unwrap_or(1);
     let mut wire =
         drivers::modbus_tcp::Tcp::connect(&runtime, server.address(), unit, 1000, link.response_timeout_ms)
             .unwrap();
-    bencher.bench_local(|| wire.read_registers(poll.table, poll.address, poll.count).unwrap());
+    bencher.bench_local(|| wire.read_registers(table, poll.address, poll.count).unwrap());
 }

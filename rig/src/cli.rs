@@ -4,8 +4,11 @@
 pub mod blind;
 pub mod calibrate;
 pub mod check;
+pub mod compare;
 pub mod completions;
+pub mod dashboard;
 pub mod diagnose;
+pub mod doc;
 pub mod doctor;
 pub mod examples;
 pub mod export;
@@ -65,7 +68,7 @@ pub fn until_the_end(subcommand: impl FnOnce() -> ExitCode + Send + 'static) -> 
         Err(_) => ExitCode::from(INTERNAL),
     };
     // Whoever leaves at once leaves others no time for it.
-    crate::dead_man_key::give_the_terminal_back();
+    crate::terminal::give_back();
     code
 }
 

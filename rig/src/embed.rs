@@ -6,6 +6,7 @@
 use drivers::socketcan::KernelCan;
 use drivers::vibrometer::VibrometerSetup;
 use drivers::{InstrumentSetup, InstrumentsSetup};
+use instruments::Profile;
 use instruments::schema::LinkKind;
 use serialport::{SerialPort, TTYPort};
 use sim::wire::can::{CanDevice, CanEmulator, EmulatedAdapter};
@@ -13,7 +14,9 @@ use sim::wire::device::Device;
 use sim::wire::lines::{LineInstrument, TcpLines};
 use sim::wire::modbus_tcp::ModbusTcpServer;
 use sim::wire::serial::SerialEmulator;
-use sim::wire::{Command, SharedPlant};
+use sim::wire::streams::NetworkStream;
+use sim::wire::sysfs::SysfsFolder;
+use sim::wire::{Command, Quantity, SharedPlant};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 
@@ -24,6 +27,8 @@ pub struct Embedded {
     serial: Vec<SerialEmulator>,
     can: Vec<CanEmulator>,
     lines: Vec<TcpLines>,
+    streams: Vec<NetworkStream>,
+    folders: Vec<SysfsFolder>,
     /// Where each instrument is, in words.
     pub places: Vec<String>,
 }
@@ -38,7 +43,12 @@ impl Embedded {
     /// How many emulators run.
     #[must_use]
     pub fn count(&self) -> usize {
-        self.tcp.len() + self.serial.len() + self.can.len() + self.lines.len()
+        self.tcp.len()
+            + self.serial.len()
+            + self.can.len()
+            + self.lines.len()
+            + self.streams.len()
+            + self.folders.len()
     }
 }
 
@@ -67,7 +77,7 @@ pub fn embed(
             unasked.for_each(|message| message.rate_hz = rate);
         }
         let link = profile.description.link.clone();
-        let device = Device::new(profile).map_err(|error| error.to_string())?;
+        let device = mounted(profile, instrument)?;
         let failed = |error: std::io::Error| format!("{} cannot be served: {error}", instrument.profile);
         match link.kind {
             LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
@@ -118,7 +128,18 @@ pub fn embed(
                 let served = LineInstrument::new(device, plant.clone());
                 embedded.serial.push(SerialEmulator::lines(port, served, || None).map_err(failed)?);
             }
-            LinkKind::Scpi => {
+            LinkKind::Tcp | LinkKind::Udp if device.profile().description.stream.is_some() => {
+                let place = socket(&instrument.address, everywhere)?;
+                let served = NetworkStream::start(place, device, plant.clone()).map_err(failed)?;
+                instrument.address = served.address().to_string();
+                embedded.streams.push(served);
+            }
+            LinkKind::Sysfs => {
+                let served = SysfsFolder::start(device, plant.clone()).map_err(failed)?;
+                instrument.address = served.path().display().to_string();
+                embedded.folders.push(served);
+            }
+            LinkKind::Scpi | LinkKind::Tcp | LinkKind::Udp => {
                 let served = LineInstrument::new(device, plant.clone());
                 let server =
                     TcpLines::start(socket(&instrument.address, everywhere)?, served).map_err(failed)?;
@@ -148,6 +169,18 @@ pub fn embed(
     }
     embedded.places = all.iter().map(|one| format!("{} at {}", one.profile, one.address)).collect();
     Ok(embedded)
+}
+
+/// An emulated instrument as it is mounted: a force sensor shows the axes that the setup has it for.
+fn mounted(profile: Profile, instrument: &InstrumentSetup) -> Result<Device, String> {
+    let mut device = Device::new(profile).map_err(|error| error.to_string())?;
+    let axes = [(&instrument.lateral, Quantity::LateralForce), (&instrument.normal, Quantity::NormalForce)];
+    for (axis, quantity) in axes {
+        if let Some(axis) = axis {
+            device.mount(&axis.signal, quantity, axis.gain, axis.offset_n);
+        }
+    }
+    Ok(device)
 }
 
 /// Serves a vibrometer's controller where the setup looks for it.
@@ -202,7 +235,8 @@ pub fn emulators(setup: &InstrumentsSetup) -> miette::Result<BTreeMap<u8, Device
             continue;
         }
         let unit = instrument.unit.or(profile.description.link.unit).unwrap_or(1);
-        let device = Device::new(profile).map_err(|e| miette::miette!("{}: {e}", instrument.profile))?;
+        let device =
+            mounted(profile, instrument).map_err(|e| miette::miette!("{}: {e}", instrument.profile))?;
         let other = |served: &Device| served.profile().id() != instrument.profile;
         if devices.insert(unit, device).is_some_and(|served| other(&served)) {
             miette::bail!(

@@ -78,6 +78,28 @@ pub const BUNDLED: &[(&str, &str)] = &[
     ("probe-pmma-sphere", include_str!("../fingertips/probe-pmma-sphere.toml")),
 ];
 
+impl FingertipFile {
+    /// What of it cannot be used: table and key (or the whole), and the problem.
+    pub fn problems(&self) -> Vec<(Vec<&'static str>, String)> {
+        let above = |v: f64| v.is_finite() && v > 0.0;
+        let mut wrong = Vec::new();
+        if !above(self.mu0) {
+            wrong.push((vec!["mu0"], format!("mu0 = {}; a number above zero is needed", self.mu0)));
+        }
+        if !(above(self.radius_m) && self.radius_m <= RADIUS_MAX_M) {
+            let needed = format!("above 0, to {RADIUS_MAX_M}, in m");
+            wrong.push((vec!["radius_m"], format!("radius_m = {}; {needed} is needed", self.radius_m)));
+        }
+        if let Err(error) = self.finger.check() {
+            wrong.push((vec!["finger", error.name], error.to_string()));
+        }
+        wrong
+    }
+}
+
+/// Largest radius of a tip, m: a fist.
+const RADIUS_MAX_M: f64 = 0.2;
+
 impl Fingertip {
     /// The tip that a setup names, with the setup's overrides.
     ///
@@ -95,6 +117,9 @@ impl Fingertip {
         };
         let file: FingertipFile =
             toml::from_str(&text).map_err(|e| format!("fingertip '{}': {e}", setup.tip))?;
+        if let Some((_, problem)) = file.problems().into_iter().next() {
+            return Err(format!("fingertip '{}': {problem}", setup.tip));
+        }
         let finger = Finger {
             normal_stiffness_n_per_m: setup
                 .normal_stiffness_n_per_m

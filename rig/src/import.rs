@@ -1,10 +1,16 @@
 //! Foreign tables made into point tables: what is in them is found out or stated, every number is brought to SI once, and
 //! nothing is repaired, dropped or assumed without being told.
 
+#[cfg(feature = "matlab")]
+mod arrays;
 mod binary;
 mod grid;
+#[cfg(feature = "matlab")]
+mod hdf5;
 pub mod map;
-mod remarks;
+#[cfg(feature = "matlab")]
+mod mat;
+pub(crate) mod remarks;
 mod series;
 pub mod targets;
 mod text;
@@ -25,6 +31,23 @@ pub use grid::Grid;
 pub use remarks::Range;
 pub use series::{Cut, Told};
 pub use text::Marks;
+
+/// Refuses: built without MAT and HDF5.
+#[cfg(not(feature = "matlab"))]
+mod mat {
+    /// Refuses.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn read(_: &[u8], _: Option<&str>) -> miette::Result<super::Grid> {
+        miette::bail!(
+            help = "build it with `cargo install --path rig` (the feature is on by default), or take CSV",
+            "this muprime was built without its feature `matlab`"
+        )
+    }
+}
+#[cfg(not(feature = "matlab"))]
+use mat as hdf5;
 
 /// How a column was taken.
 #[derive(Clone, Debug, Serialize)]
@@ -131,11 +154,10 @@ pub fn read(path: &Path, bytes: &[u8], sheet: Option<&str>, marks: Marks) -> mie
         binary::parquet(path)
     } else if bytes.starts_with(b"\x93NUMPY") {
         binary::npy(bytes)
-    } else if bytes.starts_with(b"MATLAB 5.0 MAT-file") || bytes.starts_with(b"\x89HDF\r\n") {
-        miette::bail!(
-            help = "in MATLAB: writetable(array2table(M, 'VariableNames', {...}), 'table.csv'); in Python: scipy.io.loadmat or h5py, then numpy.savetxt",
-            "{shown}: MAT and HDF5 files are not read"
-        )
+    } else if bytes.starts_with(b"MATLAB 5.0 MAT-file") {
+        mat::read(bytes, sheet)
+    } else if bytes.starts_with(b"\x89HDF\r\n") || bytes.starts_with(b"MATLAB 7.3 MAT-file") {
+        hdf5::read(bytes, sheet)
     } else if workbook || bytes.starts_with(b"\xd0\xcf\x11\xe0") {
         binary::workbook(bytes, sheet)
     } else if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"\x1f\x8b") {

@@ -37,6 +37,105 @@ impl BadInput {
     }
 }
 
+/// Everything that is wrong with one file.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+#[error("{} problems: {}", .all.len(), .all.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
+pub struct Several {
+    #[related]
+    all: Vec<BadInput>,
+}
+
+/// Problems of one file as they are found: all are told at once.
+pub struct Problems<'a> {
+    name: &'a str,
+    text: &'a str,
+    all: Vec<BadInput>,
+}
+
+impl<'a> Problems<'a> {
+    /// None yet, in the `text` of the file called `name`.
+    pub fn of(name: &'a str, text: &'a str) -> Self {
+        Problems { name, text, all: Vec::new() }
+    }
+
+    /// One more, at the value of a key.
+    pub fn add(&mut self, path: &[&str], problem: impl Into<String>, remedy: impl Into<Option<String>>) {
+        self.add_at(place_of(self.text, path), problem, remedy);
+    }
+
+    /// One more, at a place.
+    pub fn add_at(
+        &mut self,
+        place: Option<std::ops::Range<usize>>,
+        problem: impl Into<String>,
+        remedy: impl Into<Option<String>>,
+    ) {
+        self.all.push(BadInput::new(self.name, self.text, place, problem, remedy));
+    }
+
+    /// The value, or one problem more.
+    pub fn keep<T>(&mut self, path: &[&str], value: Result<T, String>) -> Option<T> {
+        value.map_err(|problem| self.add(path, problem, None)).ok()
+    }
+
+    /// Whether there is none so far.
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// Nothing where there was none.
+    ///
+    /// # Errors
+    /// The problem, or all of them.
+    pub fn end(self) -> miette::Result<()> {
+        let Problems { mut all, .. } = self;
+        match all.len() {
+            0 => Ok(()),
+            1 => Err(all.remove(0).into()),
+            _ => Err(Several { all }.into()),
+        }
+    }
+}
+
+/// The unit that a key's name ends with.
+pub fn unit_of(key: &str) -> &'static str {
+    const UNITS: [(&str, &str); 10] = [
+        ("_n_per_m", "N/m"),
+        ("_m_per_s", "m/s"),
+        ("_n_s", "N/s"),
+        ("_m_s", "m/s"),
+        ("_hz", "Hz"),
+        ("_pa", "Pa"),
+        ("_m", "m"),
+        ("_n", "N"),
+        ("_s", "s"),
+        ("_c", "deg C"),
+    ];
+    UNITS.iter().find(|(ending, _)| key.ends_with(ending)).map_or("", |(_, unit)| unit)
+}
+
+/// The unit that was meant, where a value is a thousand or a million times off what is allowed: '27.5 Hz: kHz meant? ...'.
+pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String> {
+    let unit = unit_of(key);
+    let within = |v: f64| v.is_finite() && v.abs() >= low && v.abs() <= high;
+    if unit.is_empty() || value == 0.0 || within(value) {
+        return None;
+    }
+    let prefixes: [(f64, &str); 4] = if value.abs() > high {
+        [(1e-3, "m"), (1e-6, "u"), (1e3, "k"), (1e6, "M")]
+    } else {
+        [(1e3, "k"), (1e6, "M"), (1e-3, "m"), (1e-6, "u")]
+    };
+    let (factor, prefix) = prefixes.into_iter().find(|(factor, _)| within(value * factor))?;
+    // The prefix stands for the whole unit: N/um reads better than MN/m.
+    let meant = match (unit, prefix) {
+        ("N/m", "k") => "N/mm".to_string(),
+        ("N/m", "M") => "N/um".to_string(),
+        _ => format!("{prefix}{unit}"),
+    };
+    Some(format!("{value} {unit}: {meant} meant? Then write {:e}, in {unit}", value * factor))
+}
+
 /// The largest file that is read as configuration.
 pub const MAX_BYTES: u64 = 1 << 20;
 
@@ -84,19 +183,51 @@ pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, BadI
 /// Reads a rig.toml.
 ///
 /// # Errors
-/// A file that cannot be read, and what [`RigFile::parse`] refuses, with the place.
+/// A file that cannot be read, and all that [`RigFile::check`] refuses, with the places.
 pub fn rig_file(path: &Path) -> miette::Result<RigFile> {
-    let text = text_of(path)?;
-    let name = path.display().to_string();
-    let file: RigFile = parse_toml(&name, &text)?;
-    file.check().map_err(|error| {
-        let place = match &error {
-            RigFileError::Value { section, key, .. } => place_of(&text, &[section, key]),
-            RigFileError::Form(error) => error.span(),
+    rig_text(&path.display().to_string(), &text_of(path)?)
+}
+
+/// The same from the text of the file called `name`.
+///
+/// # Errors
+/// As [`rig_file`].
+pub fn rig_text(name: &str, text: &str) -> miette::Result<RigFile> {
+    let file: RigFile = parse_toml(name, text)?;
+    let mut wrong = Problems::of(name, text);
+    let mut rest: toml::Table = parse_toml(name, text)?;
+    let mut judged = file.check();
+    // What was told of is taken for a good value, and the rest is looked at again.
+    while let Err(error) = judged {
+        let RigFileError::Value { section, key, value, .. } = &error else {
+            wrong.add(&[], error.to_string(), None);
+            break;
         };
-        BadInput::new(&name, &text, place, error.to_string(), None)
-    })?;
+        wrong.add(&[section, key], error.to_string(), unit_meant(key, *value, usual(key)));
+        let good = toml::Value::Float(usual(key)[0].max(0.1));
+        let before = rest
+            .get_mut(*section)
+            .and_then(toml::Value::as_table_mut)
+            .and_then(|table| table.insert((*key).to_string(), good.clone()));
+        if before.is_none_or(|before| before == good) {
+            break;
+        }
+        judged = rest.clone().try_into::<RigFile>().map_or(Ok(()), |file| file.check());
+    }
+    wrong.end()?;
     Ok(file)
+}
+
+/// Values of fingertips and rigs beyond which a unit is suspected: a value is compared with them, never refused for them.
+pub fn usual(key: &str) -> [f64; 2] {
+    match key {
+        "normal_stiffness_n_per_m" | "lateral_stiffness_n_per_m" => [1e4, 1e9],
+        "young_modulus_pa" => [1e3, 1e12],
+        "radius_m" => [1e-5, 0.2],
+        "force_sd_n" => [1e-6, 0.2],
+        "lateral_recovery_m_per_s" => [1e-5, 1e3],
+        _ => [0.0, f64::INFINITY],
+    }
 }
 
 /// Where the value of a key stands: `path` names tables and the key, for instance `["limits", "speed_max_m_s"]`.

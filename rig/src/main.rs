@@ -14,7 +14,7 @@ use tracing_subscriber::util::SubscriberInitExt;
 
 /// Controller of a hardware-in-the-loop tribometer: ultrasonic friction reduction, measured and explained.
 #[derive(Parser)]
-#[command(name = "muprime", version, arg_required_else_help = true)]
+#[command(name = "muprime", version, arg_required_else_help = true, max_term_width = 80)]
 struct Cli {
     /// Print one JSON document (or one per line where a command streams) on stdout and nothing else.
     #[arg(long, global = true)]
@@ -50,6 +50,8 @@ enum Verb {
     Import(cli::import::Args),
     /// Write the report of a run
     Report(cli::report::Args),
+    /// Two runs side by side: whether they differ beyond their uncertainty, and in what
+    Compare(cli::compare::Args),
     /// Run a recorded run's cycles again: the same decisions, bit for bit
     Replay(cli::replay::Args),
     /// Convert the passes of a run
@@ -60,12 +62,16 @@ enum Verb {
     Runs(cli::runs::Args),
     /// Follow a run
     Watch(cli::watch::Args),
+    /// See the rig, the catalogue and the reports in a browser
+    Dashboard(cli::dashboard::Args),
     /// Print the JSON Schema of a kind of file, for editors and programs
     Schema(cli::schema::Args),
     /// Print a commented file to begin with: a plan, a setup, a fingertip, a profile
     Init(cli::init::Args),
     /// List what is bundled, or print one of it
     Show(cli::show::Args),
+    /// Print a page on an instrument profile: what it reads and writes
+    Doc(cli::doc::Args),
     /// Write manual pages
     Man(cli::man::Args),
     /// Print a completion script for a shell
@@ -135,14 +141,17 @@ fn run(verb: Verb, json: bool) -> ExitCode {
         Verb::Model(args) => cli::model::run(args, json),
         Verb::Import(args) => cli::import::run(args, json),
         Verb::Report(args) => cli::report::run(args, json),
+        Verb::Compare(args) => cli::compare::run(&args, json),
         Verb::Replay(args) => cli::replay::run(args, json),
         Verb::Export(args) => cli::export::run(args, json),
         Verb::Recover(args) => cli::recover::run(args, json),
         Verb::Runs(args) => cli::runs::run(args, json),
+        Verb::Dashboard(args) => cli::dashboard::run(args, json),
         Verb::Watch(args) => cli::watch::run(args, json),
         Verb::Schema(args) => cli::schema::run(&args),
         Verb::Init(args) => cli::init::run(&args),
         Verb::Show(args) => cli::show::run(&args, json),
+        Verb::Doc(args) => cli::doc::run(&args, json),
         Verb::Man(args) => cli::man::run(&args, &command()),
         Verb::Completions(args) => cli::completions::run(&args, &mut command()),
     });
@@ -195,6 +204,25 @@ mod tests {
         }
         all.push(now);
         all.into_iter().filter(|w| !w.is_empty()).map(Into::into).collect()
+    }
+
+    fn pages(command: &mut clap::Command, pages: &mut Vec<String>) {
+        pages.push(command.render_long_help().to_string());
+        pages.push(command.render_help().to_string());
+        for sub in command.get_subcommands_mut() {
+            self::pages(sub, pages);
+        }
+    }
+
+    #[test]
+    fn every_help_page_fits_80_columns() {
+        let mut all = Vec::new();
+        let mut whole = command();
+        whole.build();
+        pages(&mut whole, &mut all);
+        assert!(all.len() > 60, "{}", all.len());
+        let long: Vec<&str> = all.iter().flat_map(|p| p.lines()).filter(|l| l.chars().count() > 80).collect();
+        assert!(long.is_empty(), "{long:#?}");
     }
 
     #[test]

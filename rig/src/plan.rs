@@ -2,9 +2,10 @@
 
 mod bundled;
 mod points;
+mod reach;
 mod visible;
 
-use crate::input::{self, BadInput};
+use crate::input::{self, Problems};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::quantity::PeakToPeak;
@@ -14,6 +15,7 @@ use std::path::Path;
 
 pub use bundled::{BUNDLED, text as bundled_text};
 pub use points::{PlanProblem, Point, Resolution};
+pub use reach::{Reach, times};
 pub use visible::{COUNTS_MIN, LateralChannel};
 
 /// A plan file.
@@ -87,7 +89,7 @@ pub struct PassTimes {
     pub settle_s: f64,
     /// s that are averaged.
     pub measure_s: f64,
-    /// m/s of the lifted travel to the start of a pass.
+    /// m/s of the lifted travel to the start of a pass. Left out: 0.15, or what the stage takes where that is less.
     pub approach_speed_m_s: f64,
 }
 
@@ -215,27 +217,26 @@ impl Plan {
     /// What is wrong, with the place in the file.
     pub fn parse(origin: &str, text: &str) -> miette::Result<Self> {
         let file: PlanFile = input::parse_toml(origin, text)?;
-        let bad = |path: &[&str], problem: &str| {
-            BadInput::new(origin, text, input::place_of(text, path), problem, None)
-        };
+        let mut wrong = Problems::of(origin, text);
         if file.series.is_empty() {
-            return Err(bad(&["name"], "a plan needs at least one [[series]]").into());
+            wrong.add(
+                &["name"],
+                "a plan needs at least one [[series]]",
+                "add [[series]] with a list, as in amplitude_pp_m = [1e-6, 2e-6]".to_string(),
+            );
         }
         let listed = file.directions.iter().chain(file.series.iter().flat_map(|s| &s.directions));
         if file.directions.is_empty() || listed.into_iter().any(|d| *d != 1 && *d != -1) {
-            return Err(bad(&["directions"], "directions are 1, -1 or both").into());
+            wrong.add(&["directions"], "directions are 1, -1 or both", None);
         }
         if !(1..=1000).contains(&file.replicates) {
-            return Err(bad(&["replicates"], "replicates are 1 to 1000").into());
+            wrong.add(&["replicates"], "replicates are 1 to 1000", None);
         }
         let passes = file.passes();
         if passes > MAX_PASSES {
             let problem =
                 format!("the plan asks for {passes} passes; at most {MAX_PASSES} are made in one run");
-            let remedy = "shorten the lists, or make several plans of it".to_string();
-            return Err(
-                BadInput::new(origin, text, input::place_of(text, &["series"]), problem, remedy).into()
-            );
+            wrong.add(&["series"], problem, "shorten the lists, or make several plans of it".to_string());
         }
         let times = [
             ("settle_s", file.pass.settle_s),
@@ -244,13 +245,10 @@ impl Plan {
         ];
         for (name, value) in times {
             if !(value.is_finite() && value > 0.0 && value < 3600.0) {
-                return Err(bad(
-                    &["pass", name],
-                    &format!("{name} = {value}: a number above zero is needed"),
-                )
-                .into());
+                wrong.add(&["pass", name], format!("{name} = {value}: a number above zero is needed"), None);
             }
         }
+        wrong.end()?;
         Ok(Plan { file, text: text.to_string(), origin: origin.to_string() })
     }
 

@@ -2,6 +2,7 @@
 
 use drivers::library::Source;
 use instruments::profile::{FrameKind, Refusal};
+use instruments::schema::Severity;
 use instruments::traffic::LineSetup;
 use instruments::{FrameId, Profile};
 use realtime::ports::Nanos;
@@ -52,13 +53,41 @@ fn second(profile: Profile) -> Result<(), String> {
             let name = &profile.frames()[frame.0].name;
             let bytes = device.frame(frame, &mut plant, now);
             profile.decode(frame, &bytes, &mut values).map_err(|error| format!("`{name}`: {error}"))?;
+            let shape = &profile.frames()[frame.0];
+            // What the world does not know yet, such as a set-point that nobody has sent, is no number of a line.
+            let known =
+                |eight: &[u8]| eight.try_into().is_ok_and(|eight| f64::from_be_bytes(eight).is_finite());
+            let line = shape.write_line(&bytes, 1.0).filter(|_| bytes.chunks_exact(8).all(known));
+            if let Some(line) = line.filter(|line| shape.read_line(line).is_none()) {
+                return Err(format!("`{name}`: the emulator's own line `{line}` is none of its answers"));
+            }
         }
         if let Some(broken) = profile.broken_signature(&values) {
             let when = profile.description.signature[broken].when.as_ref();
+            let d = &profile.description;
+            let open = d.signal.iter().map(|signal| signal.name.as_ref()).filter(|name| {
+                when.contains(name.as_str())
+                    && !d.emulator.constant.contains_key(*name)
+                    && !d.emulator.measure.contains_key(*name)
+            });
+            let open: Vec<String> = open.map(|name| format!("`{name} = ...`")).collect();
+            let what = if open.is_empty() { "other values of its signals".into() } else { open.join(", ") };
             return Err(format!(
-                "[emulator] does not satisfy the signature `{when}`: give its signals values there"
+                "[emulator] does not satisfy the signature `{when}`: state {what} under [emulator.constant], so that \
+                 the profile can be tried without the instrument"
             ));
         }
+    }
+    let d = &profile.description;
+    if let Some(fault) = profile.fault(&values).map(|fault| &d.fault[fault])
+        && fault.severity == Severity::Stop
+    {
+        return Err(format!(
+            "[emulator] shows the fault `{}` ({}) all the time: state what its signals are in good order, under \
+             [emulator.constant]",
+            fault.when.as_ref(),
+            fault.text
+        ));
     }
     let unread = |name: &&String| {
         let signal = profile.signal(name);
@@ -94,9 +123,27 @@ mod tests {
     }
 
     #[test]
+    fn a_fault_that_the_emulator_always_shows_is_told() {
+        let mut profile = drivers::profile("muprime-force2").unwrap();
+        profile.description.emulator.measure.remove("fault");
+        profile.description.emulator.constant.insert("fault".into(), 1.0);
+        let said = second(profile).unwrap_err();
+        assert!(said.contains("`fault == 1`") && said.contains("[emulator.constant]"), "{said}");
+    }
+
+    #[test]
+    fn an_open_signature_says_what_to_write() {
+        let mut profile = drivers::profile("muprime-force2").unwrap();
+        profile.description.emulator.constant.remove("magic");
+        let said = second(profile).unwrap_err();
+        assert!(said.contains("`magic = ...`"), "{said}");
+    }
+
+    #[test]
     fn a_quantity_that_the_world_does_not_have_is_told() {
         let mut profile = drivers::profile("muprime-force2").unwrap();
         profile.description.emulator.measure.insert("normal".into(), "force.normal_kg".into());
-        assert!(second(profile).unwrap_err().contains("force.normal_kg"));
+        let said = second(profile).unwrap_err();
+        assert!(said.contains("force.normal_kg") && said.contains("force.normal_n"), "{said}");
     }
 }

@@ -1,6 +1,11 @@
 //! The report of a run: one self-contained HTML page. No script, no font, no picture from elsewhere.
 
+pub mod about;
+pub mod comparison;
 pub mod diagnosis;
+pub mod events;
+pub mod html;
+pub mod human;
 mod page;
 pub mod plots;
 
@@ -15,10 +20,12 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-pub use page::escape;
+pub use html::escape;
 
 /// Everything a report is made of, read from a run's folder.
 pub struct RunData {
+    /// What is known of the run, for the top of a page.
+    pub about: Vec<(&'static str, String)>,
     /// Facts of the record's first words.
     pub facts: BTreeMap<String, String>,
     /// The passes with their comparisons.
@@ -67,7 +74,8 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
     let summary =
         std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
     let rig = crate::input::rig_file(&folder.join("rig.toml"))?;
-    Ok(RunData { facts, passes, events, summary, finger: rig.finger, damage })
+    let about = about::of_run(folder, &facts, Some(&rig));
+    Ok(RunData { about, facts, passes, events, summary, finger: rig.finger, damage })
 }
 
 /// The report of a run as HTML.

@@ -5,15 +5,17 @@
 mod damage;
 mod lines;
 mod lock;
+mod said;
 
 use crate::files::{self, Placed, write_whole};
 use crate::plan::Point;
 use crate::sequence::MeasuredPass;
 pub use damage::{damage_in, differences, missing_records, of_file};
 use lines::{whole_passes, whole_table};
-pub use lock::{claim, is_held};
+pub use lock::{claim, holder, is_held};
 use miette::{Context, IntoDiagnostic};
 use models::record::{self, Pass};
+pub use said::{Said, said};
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
@@ -82,7 +84,7 @@ impl Drop for New {
 
 const IDENTITY: &str = "run.toml";
 const POINTS: &str = "points.csv";
-const JOURNAL: &str = "passes.jsonl";
+pub(crate) const JOURNAL: &str = "passes.jsonl";
 const SESSIONS: &str = "sessions.jsonl";
 
 impl RunDir {

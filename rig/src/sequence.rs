@@ -4,12 +4,17 @@
 //! ```text
 //! Arm -> Zero -> [ Approach -> Settle -> Measure ]* -> Zero -> Done
 //!  any -> Failed(trip)      Stopped by request at any time
+//!  before a pass: Paused, by request, until it is to go on
 //! ```
+
+mod told;
+
+pub use told::{Event, MeasuredPass, Outcome};
 
 use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
 use crate::plan::{PassTimes, Point};
 use models::condition::{Ambient, Condition};
-use models::prediction::{FrictionModel, Regime};
+use models::prediction::FrictionModel;
 use models::psi::PsiEq17;
 use models::quantity::PeakToPeak;
 use models::record::Pass;
@@ -18,117 +23,9 @@ use realtime::compare::{Agreement, Comparator, PassComparison};
 use realtime::cycle::{Command, Marker, Phase};
 use realtime::estimate::Moments;
 use realtime::ports::{Nanos, NoData};
-use realtime::safety::{Cause, ChannelTiming, Limits, Request, Trip};
+use realtime::safety::{Cause, ChannelTiming, Limits, Request};
 use realtime::turn::Row;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-
-/// A finished pass with its comparison: what the record, the catalogue and the report hold.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MeasuredPass {
-    /// The row of the point table.
-    pub pass: Pass,
-    /// A reference without vibration.
-    pub reference: bool,
-    /// Held against the model; `None` where the condition is outside the model's domain.
-    pub comparison: Option<PassComparison>,
-    /// Regime that the model predicts.
-    pub regime: Option<Regime>,
-    /// Psi of Eq. 17 at the measured condition; `None` without vibration or without `mu_0`.
-    pub psi_eq17: Option<f64>,
-    /// Certificates that do not hold at the temperature that the pass began with. Nothing was corrected for it.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub temperature_flags: Vec<TemperatureFlag>,
-}
-
-/// Something worth a line in the record and on the terminal.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "event", rename_all = "snake_case")]
-pub enum Event {
-    /// The rig was armed.
-    Armed,
-    /// It was armed without a second switch-off channel: what the amplifier refuses, nothing else switches off.
-    NoSecondChannel,
-    /// It was armed with an amplifier that has no watchdog of its own: if this program dies, the second channel is what
-    /// switches off.
-    NoWatchdog,
-    /// Force zeros, lifted off, in N: mean of each axis. They are recorded, never taken off silently.
-    Zeros {
-        /// Lateral.
-        lateral_n: Option<f64>,
-        /// Normal.
-        normal_n: Option<f64>,
-        /// Before or after the sweep.
-        after: bool,
-    },
-    /// Safety tripped.
-    Tripped(Trip),
-    /// The model has left the measurement, after so many passes.
-    ModelDeparted {
-        /// Point after which.
-        point: u64,
-        /// ln of the evidence.
-        log_evidence: f64,
-    },
-    /// A stop was asked for (signal or operator).
-    StopRequested,
-    /// A pass was started again because contact was lost.
-    PassRepeated {
-        /// Which.
-        point: u32,
-    },
-    /// From this pass on a certificate does not hold at the temperature that the amplifier reports, or that is not
-    /// known: every pass until it holds again carries the flag.
-    TemperatureBeyondCertificate {
-        /// The first such pass.
-        point: u32,
-        /// What does not hold.
-        flag: TemperatureFlag,
-    },
-    /// A certificate holds within a range of temperatures, and the amplifier reports none: only the setup's
-    /// `temperature_c` was checked.
-    TemperatureUnwatched {
-        /// Which certificate.
-        certificate: String,
-    },
-}
-
-/// How a sweep ended.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "outcome", rename_all = "snake_case")]
-pub enum Outcome {
-    /// Every pass was made.
-    Complete,
-    /// Stopped on request; what was measured is kept.
-    Stopped,
-    /// A safety trip ended it.
-    Tripped(Trip),
-    /// The rig would not arm; the cause that stood in the way.
-    WouldNotArm {
-        /// What stood in the way.
-        blocking: Option<Cause>,
-    },
-    /// No finger: normal force never came.
-    NoContact {
-        /// At which point.
-        point: u32,
-    },
-    /// Nothing was heard of the loop.
-    LoopLost,
-    /// Record, passes, catalogue, summary or report could not be written: a measurement that is not kept is not made.
-    RecordLost,
-}
-
-impl Outcome {
-    /// What ended the sweep, or kept it from beginning, where a rule did.
-    pub fn cause(&self) -> Option<Cause> {
-        match self {
-            Outcome::Tripped(trip) => Some(trip.cause),
-            Outcome::WouldNotArm { blocking } => *blocking,
-            _ => None,
-        }
-    }
-}
 
 /// What a row led to.
 #[derive(Debug, Default)]
@@ -147,6 +44,7 @@ pub struct Reaction {
 enum Stage {
     Arm { since: Option<Nanos>, clear_since: Option<Nanos>, asked: Option<Nanos>, asks: u32 },
     Zero { since: Option<Nanos>, after: bool },
+    Paused,
     Approach { since: Nanos },
     Settle { since: Nanos },
     Measure { since: Nanos },
@@ -216,6 +114,7 @@ pub struct Sequence {
     model: Arc<dyn FrictionModel>,
     comparator: Comparator,
     stopping: bool,
+    paused: bool,
     departed: bool,
     /// Of the last pass that could be compared, of earlier sessions too.
     last_comparison: Option<PassComparison>,
@@ -252,6 +151,7 @@ impl Sequence {
             model,
             comparator,
             stopping: false,
+            paused: false,
             departed: false,
             last_comparison: None,
             approach: Approach::FASTEST,
@@ -319,6 +219,11 @@ impl Sequence {
         self.stopping = true;
     }
 
+    /// Has the sweep rest before the next pass, without drive and lifted off, or go on. A pass that slides already is made first.
+    pub fn pause(&mut self, paused: bool) {
+        self.paused = paused;
+    }
+
     /// What the comparison says, for a sweep that came to its end or did not.
     pub fn agreement(&self, complete: bool) -> Agreement {
         Agreement::of(self.last_comparison.as_ref(), complete)
@@ -348,6 +253,8 @@ impl Sequence {
         match self.stage {
             Stage::Arm { .. } => self.arm(row, &mut out),
             Stage::Zero { since, after } => self.zero(row, since, after, &mut out),
+            Stage::Paused => self.rest(row, &mut out),
+            Stage::Approach { .. } if self.paused => self.begin_next(row, &mut out),
             Stage::Approach { since } => self.approach(row, since, &mut out),
             Stage::Settle { since } => self.settle(row, since, &mut out),
             Stage::Measure { since } => self.measure(row, since, &mut out),
@@ -440,6 +347,12 @@ impl Sequence {
             self.stage = Stage::Zero { since: None, after: true };
             return;
         }
+        if self.paused {
+            out.events.push(Event::Paused { point: self.points[self.next].number });
+            out.commands.push(Command::Set(Request::default(), self.marker(Phase::Idle)));
+            self.stage = Stage::Paused;
+            return;
+        }
         self.sums = Sums::default();
         let ambient = Ambient::of(&self.points[self.next].condition.within(&self.ambient));
         if ambient != self.ambient_sent {
@@ -448,6 +361,14 @@ impl Sequence {
         }
         self.stage = Stage::Approach { since: row.now };
         self.approach(row, row.now, out);
+    }
+
+    /// Waits until it is to go on.
+    fn rest(&mut self, row: &Row, out: &mut Reaction) {
+        if !self.paused {
+            out.events.push(Event::Resumed);
+            self.begin_next(row, out);
+        }
     }
 
     fn approach(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
@@ -626,3 +547,6 @@ impl Sequence {
         MeasuredPass { pass, reference, comparison, regime, psi_eq17, temperature_flags }
     }
 }
+
+#[cfg(test)]
+mod tests;

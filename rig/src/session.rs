@@ -4,10 +4,12 @@
 //! virtual time in this thread with the virtual rig's ports.
 
 mod fast;
+mod glimpse;
 mod keeper;
 mod live;
 
 pub use fast::{Rehearsal, rehearse};
+pub use glimpse::{Extremes, Glimpse};
 pub use keeper::{REPLAYABLE, Replayable, unix_ns};
 
 use crate::plan::{Plan, Point, Resolution};
@@ -25,7 +27,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
 
 /// What is to be run.
 pub struct Job {
@@ -45,6 +47,17 @@ pub struct Job {
     pub out: PathBuf,
     /// In virtual time.
     pub fast: bool,
+    /// Who runs it, and on what: for the record.
+    pub notes: Notes,
+}
+
+/// What a person says of a run. It stands in the record and on the report, and changes nothing.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Notes {
+    /// Who leads the run.
+    pub operator: Option<String>,
+    /// What is measured: the fingertip, its preparation, the plate.
+    pub sample: Option<String>,
 }
 
 /// What happened, for whoever watches.
@@ -55,6 +68,8 @@ pub enum News<'a> {
     Event(&'a Event),
     /// Passes made, planned, s to go.
     Progress(usize, usize, f64),
+    /// A cycle ten times a second, and the extremes of all cycles since the last one.
+    State(&'a Glimpse),
 }
 
 /// What a run comes to. Its JSON form is what `muprime run --json` ends with.
@@ -120,11 +135,13 @@ pub enum Unfinished {
     NotOff,
 }
 
-/// Signals that a run looks at: how often a stop was asked for.
+/// What a run looks at while it goes on: what was asked of it from outside.
 #[derive(Clone, Debug, Default)]
 pub struct Signals {
-    /// SIGINT, SIGTERM or SIGHUP so far.
+    /// How often a stop was asked for: SIGINT, SIGTERM, SIGHUP, or somebody who watches.
     pub stops: Arc<AtomicUsize>,
+    /// Whether the sweep is to rest before its next pass. In virtual time nothing waits.
+    pub paused: Arc<AtomicBool>,
 }
 
 impl Job {
@@ -145,12 +162,22 @@ impl Job {
     /// The passes of the plan, checked.
     ///
     /// # Errors
-    /// The first value that the rig cannot do, or the first series whose expected change of force its sensor cannot
-    /// see, with its place in the plan.
+    /// The values that the rig cannot do, or the first series whose expected change of force its sensor cannot
+    /// see, with their places in the plan.
     pub fn points(&self) -> miette::Result<Vec<Point>> {
+        self.points_seen(None)
+    }
+
+    /// The same, with the noise in N that the lateral channel was found to have.
+    ///
+    /// # Errors
+    /// As [`Job::points`].
+    pub fn points_seen(&self, noise_n: Option<f64>) -> miette::Result<Vec<Point>> {
         let resolution = self.resolution()?;
         let points = self.plan.points(self.seed, &self.setup.config.limits, &resolution)?;
-        if let Some(channel) = self.setup.lateral_channel()? {
+        self.plan.check_reach(&self.setup.reaches()?)?;
+        if let Some(mut channel) = self.setup.lateral_channel()? {
+            channel.noise_n = noise_n.or(channel.noise_n);
             let mu0 = self.setup.tip.mu0;
             self.plan.check_visible(&points, &resolution, &*self.model, mu0, &channel)?;
         }
@@ -159,11 +186,13 @@ impl Job {
 
     /// What the setup's amplifier can set, by its profile.
     fn resolution(&self) -> miette::Result<Resolution> {
-        let profile = self.setup.file.amplifier.description().map_err(|e| miette::miette!("{e}"))?;
+        let amplifier = &self.setup.file.amplifier;
+        let profile = amplifier.description().map_err(|e| miette::miette!("{e}"))?;
         let step = |name: &str| {
             profile.set(name).map_or(0.0, |set| {
                 let described = &profile.description.set[set.0];
-                described.scale * described.si.factor
+                let per_unit = amplifier.amplitude_m_per_unit.filter(|_| name == "amplitude");
+                described.scale * per_unit.unwrap_or(described.si.factor)
             })
         };
         Ok(Resolution { amplitude_pp_m: step("amplitude"), frequency_hz: step("frequency") })
@@ -181,7 +210,7 @@ impl Job {
         let session = dir.plan_session(keeper::unix_ns(), self.plan.file.pass.measure_s, self.fast);
         let mut sequence = Sequence::new(
             left,
-            self.plan.file.pass,
+            crate::plan::times(&self.setup.reaches()?, self.plan.file.pass),
             Arc::clone(&self.model),
             &self.setup.tip,
             self.setup.file.noise,

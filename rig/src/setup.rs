@@ -2,12 +2,12 @@
 
 mod bundled;
 mod limits;
-mod profiles;
+pub(crate) mod profiles;
 
 use crate::certificates::Certificates;
 use crate::fingertip::{Fingertip, FingertipSetup};
-use crate::input::{self, BadInput};
-use crate::plan::LateralChannel;
+use crate::input::{self, Problems, unit_meant};
+use crate::plan::{LateralChannel, Reach};
 use drivers::vibrometer::{Settings, VibrometerSetup};
 use drivers::{InstrumentSetup, InstrumentsSetup};
 use models::condition::Ambient;
@@ -190,64 +190,70 @@ impl Setup {
     /// What is wrong, with the place in the file.
     pub fn parse(origin: &str, text: &str, folder: &Path) -> miette::Result<Self> {
         let mut file: SetupFile = input::parse_toml(origin, text)?;
-        let bad = |path: &[&str], problem: String| {
-            BadInput::new(origin, text, input::place_of(text, path), problem, None)
-        };
-        if !(10.0..=4000.0).contains(&file.pace.rate_hz) {
-            return Err(bad(&["loop", "rate_hz"], "the loop runs at 10 to 4000 Hz".into()).into());
+        let mut wrong = Problems::of(origin, text);
+        let rate_hz = file.pace.rate_hz;
+        let loops = (10.0..=4000.0).contains(&rate_hz);
+        if !loops {
+            let remedy = unit_meant("rate_hz", rate_hz, [10.0, 4000.0]);
+            wrong.add(
+                &["loop", "rate_hz"],
+                format!("rate_hz = {rate_hz}: the loop runs at 10 to 4000 Hz"),
+                remedy,
+            );
         }
         if !(0..=98).contains(&file.pace.priority) {
-            return Err(bad(&["loop", "priority"], "a priority is 0 (none) to 98".into()).into());
+            wrong.add(&["loop", "priority"], "a priority is 0 (none) to 98", None);
         }
-        let half_period_us = 0.5e6 / file.pace.rate_hz;
-        if !(0.0..=half_period_us).contains(&file.pace.spin_us) {
+        let half_period_us = 0.5e6 / rate_hz;
+        if loops && !(0.0..=half_period_us).contains(&file.pace.spin_us) {
             let problem = format!("spin_us = {}: 0 to {half_period_us} (half a period)", file.pace.spin_us);
-            return Err(bad(&["loop", "spin_us"], problem).into());
+            wrong.add(&["loop", "spin_us"], problem, None);
         }
         if !(1..=realtime::estimate::WINDOW_MAX).contains(&file.estimate.window) {
             let most = realtime::estimate::WINDOW_MAX;
-            return Err(bad(&["estimate", "window"], format!("a window has 1 to {most} samples")).into());
+            wrong.add(&["estimate", "window"], format!("a window has 1 to {most} samples"), None);
         }
         for (name, value) in
             [("pass_relative_sd", file.noise.pass_relative_sd), ("force_sd_n", file.noise.force_sd_n)]
         {
             if !(value.is_finite() && value > 0.0) {
-                return Err(bad(
-                    &["noise", name],
-                    format!("{name} = {value}: a finite number above zero is needed"),
-                )
-                .into());
+                let problem = format!("{name} = {value}: a finite number above zero is needed");
+                wrong.add(&["noise", name], problem, None);
             }
         }
         let air = models::condition::Condition::paper().within(&file.ambient());
         for c in covariate::OPTIONAL {
             if let Some(value) = c.of(&air).filter(|v| !c.admits(*v)) {
-                return Err(bad(&[c.name], format!("{} = {value}: {} is needed", c.name, c.needed)).into());
+                let remedy = unit_meant(c.name, value, c.range);
+                wrong.add(&[c.name], format!("{} = {value}: {} is needed", c.name, c.needed), remedy);
             }
         }
-        let tip = Fingertip::resolve(&file.finger, folder).map_err(|p| bad(&["finger"], p))?;
-        profiles::resolve(&mut file, folder)
-            .and_then(|()| profiles::fit(&file))
-            .map_err(|(table, problem)| bad(&table, problem))?;
-        let cycle = Nanos((1e9 / file.pace.rate_hz).round() as u64);
-        let limits = limits::of(&file, cycle).map_err(|error| {
-            // The rate of a channel stands with its instrument, every other limit under [limits].
-            match error.name() {
-                table @ ("amplifier" | "stage" | "supply_relay" | "safety_inputs") => {
-                    bad(&[table, "rate_hz"], error.to_string())
-                }
-                "force" => bad(&["force"], error.to_string()),
-                name => bad(&["limits", name], error.to_string()),
-            }
-        })?;
-        limits::guarded(&file).map_err(|problem| bad(&["limits", "human_contact"], problem))?;
-        let config = Config { limits, estimate: file.estimate, exposed: Exposed::default() };
+        let tip = wrong.keep(&["finger"], Fingertip::resolve(&file.finger, folder));
+        let mut unfit = profiles::resolve(&mut file, folder);
+        if unfit.is_empty() {
+            unfit = profiles::fit(&file);
+        }
+        let described = unfit.is_empty();
+        for (table, problem) in unfit {
+            wrong.add(&table, problem, None);
+        }
+        let limits = if loops && described {
+            limits::all_of(&file, Nanos((1e9 / rate_hz).round() as u64), &mut wrong)
+        } else {
+            None
+        };
+        let guarded = limits::guarded(&file);
+        wrong.keep(&["limits", "human_contact"], guarded);
         #[allow(clippy::disallowed_methods, reason = "a certificate is good until a date")]
         let now_unix_s = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
             .map_or(0, |since| since.as_secs() as i64);
-        let certificates =
-            Certificates::load(&file, folder, now_unix_s).map_err(|p| bad(&["certificates"], p))?;
+        let certificates = wrong.keep(&["certificates"], Certificates::load(&file, folder, now_unix_s));
+        wrong.end()?;
+        let (Some(tip), Some(limits), Some(certificates)) = (tip, limits, certificates) else {
+            miette::bail!("{origin}: a part is missing, and nothing says which");
+        };
+        let config = Config { limits, estimate: file.estimate, exposed: Exposed::default() };
         let setup =
             Setup { file, text: text.to_string(), origin: origin.to_string(), tip, config, certificates };
         // What goes beside the point table in the end is known now.
@@ -260,7 +266,9 @@ impl Setup {
                 RigFileError::Value { section: "calibration", .. } => &["certificates"],
                 _ => &["finger"],
             };
-            return Err(bad(path, error.to_string()).into());
+            let mut wrong = Problems::of(origin, text);
+            wrong.add(path, error.to_string(), None);
+            wrong.end()?;
         }
         Ok(setup)
     }
@@ -339,6 +347,59 @@ impl Setup {
             }));
         }
         Ok(None)
+    }
+
+    /// What its instruments take and see, by their profiles and this setup.
+    ///
+    /// # Errors
+    /// A profile that cannot be used.
+    pub fn reaches(&self) -> miette::Result<Vec<Reach>> {
+        let instruments = self.instruments();
+        let described = |i: &drivers::InstrumentSetup| i.description().map_err(|e| miette::miette!("{e}"));
+        let mut all = Vec::new();
+        let (amplifier, stage) = (described(&instruments.amplifier)?, described(&instruments.stage)?);
+        let gain = instruments.amplifier.amplitude_m_per_unit;
+        for (profile, set, column, gain) in [
+            (&amplifier, "amplitude", "amplitude_pp_m", gain),
+            (&amplifier, "frequency", "frequency_hz", None),
+            (&stage, "velocity", "speed_m_s", None),
+            (&stage, "load", "normal_force_n", None),
+        ] {
+            let Some(set) = profile.set(set).map(|set| &profile.description.set[set.0]) else { continue };
+            let factor = gain.unwrap_or(set.si.factor);
+            // A drive that a certificate puts on another scale has its range on that scale.
+            let scaled = column == "amplitude_pp_m" && self.certificates.amplitude.is_some();
+            if let Some((low, high)) = set.range.filter(|_| !scaled) {
+                // At zero the output is off, whatever the smallest amplitude; a speed is driven both ways.
+                let range = match column {
+                    "amplitude_pp_m" => [0.0, high * factor],
+                    "speed_m_s" => [0.0, low.abs().min(high.abs()) * factor.abs()],
+                    _ => [low * factor, high * factor],
+                };
+                let by = format!("`{}` takes", profile.id());
+                all.push(Reach { column, range, by });
+            }
+        }
+        if self.certificates.force.is_some() {
+            return Ok(all);
+        }
+        for instrument in &instruments.force {
+            let profile = described(instrument)?;
+            for (axis, name, per_load) in
+                [(&instrument.normal, "normal", 1.0), (&instrument.lateral, "lateral", self.tip.mu0)]
+            {
+                let (signal, gain) = axis.as_ref().map_or((name, 1.0), |a| (a.signal.as_str(), a.gain));
+                let Some(signal) = profile.signal(signal) else { continue };
+                let signal = &profile.description.signal[signal.0];
+                let Some((low, high)) = signal.range else { continue };
+                let ends = [low, high].map(|end| (end * signal.si.factor * gain).abs());
+                // Compression is positive, and sliding goes both ways.
+                let end = if name == "normal" && gain > 0.0 { ends[1] } else { ends[0].min(ends[1]) };
+                let by = format!("`{}` sees as {name} force", profile.id());
+                all.push(Reach { column: "normal_force_n", range: [0.0, end / per_load], by });
+            }
+        }
+        Ok(all)
     }
 
     /// What is known of this rig, for the `rig.toml` beside a point table (docs/contract.md).

@@ -43,22 +43,33 @@ pub enum End {
     NotKept,
 }
 
-/// Feeds a sequence with the loop's rows and sends its commands, until it ends. `ask` says whether the sweep is to end before
-/// that; `each` takes every row with what it led to, after the commands have left.
+/// What whoever leads a sweep asks of it now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Asked {
+    /// It is to end before its plan does.
+    pub end: Option<End>,
+    /// It is to rest before the next pass.
+    pub pause: bool,
+}
+
+/// Feeds a sequence with the loop's rows and sends its commands, until it ends. `ask` says what is asked of the sweep; `each` takes
+/// every row with what it led to, after the commands have left.
 pub fn sweep(
     rig: &mut impl Loop,
     sequence: &mut Sequence,
-    ask: &mut dyn FnMut() -> Option<End>,
+    ask: &mut dyn FnMut() -> Asked,
     each: &mut dyn FnMut(&Row, &Sequence, Reaction),
 ) -> Outcome {
     let mut lost = false;
     loop {
-        if let Some(end) = ask() {
+        let asked = ask();
+        if let Some(end) = asked.end {
             // Safe state first: the command goes out before anything else is looked at.
             rig.stop();
             sequence.stop();
             lost |= end == End::NotKept;
         }
+        sequence.pause(asked.pause);
         let Some(row) = rig.next_row() else {
             if rig.is_lost() {
                 return Outcome::LoopLost;

@@ -12,6 +12,8 @@
 //! | [`drive`] | a CANopen drive of CiA 402 |
 //! | [`serial`] | serial lines, Modbus RTU, streams |
 //! | [`lines`] | instruments of lines of text, over serial and TCP |
+//! | [`streams`] | instruments that send by themselves over TCP and in datagrams |
+//! | [`sysfs`] | a device of the kernel's by its attributes |
 //! | [`modbus_tcp`] | a Modbus TCP server over devices |
 //! | [`world`] | the virtual world as the emulators meet it |
 #![allow(
@@ -26,6 +28,8 @@ pub mod lines;
 pub mod modbus_tcp;
 pub mod quantity;
 pub mod serial;
+pub mod streams;
+pub mod sysfs;
 pub mod world;
 
 pub use quantity::{Command, Quantity};

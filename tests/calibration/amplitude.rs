@@ -125,7 +125,7 @@ fn gain_resonance_droop_are_covered_as_stated() {
         config.plate.resonance_hz = draw.between(27_450.0, 27_550.0);
         config.plate.warming_k = 0.0;
         config.defects = defects(&format!(
-            "[[defect]]\nname = \"amplitude_droop\"\nparameters = {{ load_ratio_at_1_n = {load_ratio} }}\n"
+            "[[defect]]\nname = \"amplitude_droop\"\nparameters = {{ load_ratio_at_1_n = {load_ratio}, flight_per_um = 0 }}\n"
         ));
         let (f0, q) = (config.plate.resonance_hz, config.plate.quality_factor);
         let mut bench = Bench::new(&config, seed(trial));
@@ -218,7 +218,7 @@ fn mode_shapes_are_covered_as_stated() {
             (draw.between(0.3, 0.9), draw.between(0.2, 2.9), draw.between(9e-3, 18e-3));
         let config = WorldConfig {
             defects: defects(&format!(
-                "[[defect]]\nname = \"mode_shape\"\nparameters = {{ depth = {depth}, phase_rad = {phase}, half_wave_at_25_khz_m = {half_wave} }}\n"
+                "[[defect]]\nname = \"mode_shape\"\nparameters = {{ depth = {depth}, phase_rad = {phase}, half_wave_at_25_khz_m = {half_wave}, edge_over_wave = 0 }}\n"
             )),
             ..WorldConfig::default()
         };

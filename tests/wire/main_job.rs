@@ -98,9 +98,11 @@ fn compare(setup: &str, prefix: Option<&Path>) {
 
 #[test]
 fn the_same_friction_over_tcp_rtu_slcan_and_mixed_buses() {
-    for setup in ["virtual-rtu", "virtual-slcan", "virtual-mixed"] {
-        compare(setup, None);
-    }
+    tests::in_wall_clock_time(|| {
+        for setup in ["virtual-rtu", "virtual-slcan", "virtual-mixed"] {
+            compare(setup, None);
+        }
+    });
 }
 
 /// The same in the guest kernel, on its CAN bus, with a CANopen stage beside the force cell.

@@ -4,7 +4,7 @@
 //! newer 'off'. An 'off' is owed until the instrument itself has shown it: it is handed out again wherever it was refused,
 //! or a state that came after it still says 'on'.
 
-use super::{Endpoint, Part};
+use super::{ALARM_HOLDS, Endpoint, Part};
 use crate::Role;
 use instruments::{Profile, SetId};
 use realtime::ports::{Nanos, NoData};
@@ -181,11 +181,13 @@ impl Endpoint {
     }
 
     /// What was handed out last was refused, wholly or in part, or its answer made no sense. An 'off' stays owed; a command
-    /// that drives or moves is dropped, and an 'off' owed for it.
+    /// that drives or moves is dropped, an 'off' is owed for it, and the state shows a fault: else the loop's next command
+    /// would switch on again what was switched off a moment before, and the run would go on through the gap.
     pub fn refused(&mut self) {
         self.orders.refused = true;
         if self.wants_on() {
             self.orders.wanted = None;
+            self.alarm_until = self.arrived.plus(ALARM_HOLDS);
         }
     }
 
@@ -297,6 +299,7 @@ impl Endpoint {
                 let wanted = [
                     set("velocity", command.velocity_m_s),
                     set("load", command.normal_force_n),
+                    set("enable", f64::from(u8::from(!command.rests()))),
                     heartbeat(command.sequence),
                 ];
                 Some(Wanted {

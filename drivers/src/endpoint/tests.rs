@@ -186,3 +186,23 @@ fn what_switches_off_leaves_first() {
         assert!(first.contains(&names(&endpoint)[0].as_str()), "{id}: {:?}", names(&endpoint));
     }
 }
+
+/// A range or a filter of before may still hold: a number of it is no force.
+#[test]
+fn what_a_sensor_shows_before_it_is_set_up_is_kept_from_the_loop() {
+    let setup = InstrumentSetup::new("muprime-force2", "");
+    let (mut endpoint, port) = Endpoint::force(profile("muprime-force2").unwrap(), &setup).unwrap();
+    let mut force = crate::ports::compose(vec![port]).unwrap();
+    let registers = endpoint.profile().description.vector[0].registers.clone().unwrap();
+    let frame = endpoint.profile().frame("sample").unwrap();
+    let mut bytes: Vec<u8> = registers.iter().flat_map(|register| register.to_be_bytes()).collect();
+    endpoint.hold(true);
+    endpoint.frame(frame, &bytes, Nanos(10)).unwrap();
+    assert!(force.read(Nanos(11)).lateral.is_err());
+    assert_eq!(endpoint.health().report().samples, 0);
+    endpoint.hold(false);
+    // The next sample: its count is one on.
+    bytes[7] = bytes[7].wrapping_add(1);
+    endpoint.frame(frame, &bytes, Nanos(20)).unwrap();
+    assert!(force.read(Nanos(21)).lateral.is_ok());
+}

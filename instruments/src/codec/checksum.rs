@@ -37,6 +37,52 @@ impl Cyclic {
     }
 }
 
+/// Other names that the catalogue gives, as they are compared: capitals, `_` for what is no letter or digit.
+const ALIASES: &[(&str, &str)] = &[
+    ("CRC_8", "CRC_8_SMBUS"),
+    ("CRC_8_ITU", "CRC_8_I_432_1"),
+    ("CRC_8_MAXIM", "CRC_8_MAXIM_DOW"),
+    ("DOW_CRC", "CRC_8_MAXIM_DOW"),
+    ("CRC_8_AES", "CRC_8_TECH_3250"),
+    ("ARC", "CRC_16_ARC"),
+    ("CRC_16", "CRC_16_ARC"),
+    ("CRC_16_LHA", "CRC_16_ARC"),
+    ("CRC_IBM", "CRC_16_ARC"),
+    ("CRC_16_AUTOSAR", "CRC_16_IBM_3740"),
+    ("CRC_16_CCITT_FALSE", "CRC_16_IBM_3740"),
+    ("CRC_16_AUG_CCITT", "CRC_16_SPI_FUJITSU"),
+    ("CRC_16_BLUETOOTH", "CRC_16_KERMIT"),
+    ("CRC_16_CCITT", "CRC_16_KERMIT"),
+    ("CRC_16_CCITT_TRUE", "CRC_16_KERMIT"),
+    ("CRC_CCITT", "CRC_16_KERMIT"),
+    ("KERMIT", "CRC_16_KERMIT"),
+    ("CRC16_MODBUS", "CRC_16_MODBUS"),
+    ("MODBUS", "CRC_16_MODBUS"),
+    ("CRC16_X25", "CRC_16_IBM_SDLC"),
+    ("CRC_16_ISO_HDLC", "CRC_16_IBM_SDLC"),
+    ("CRC_16_ISO_IEC_14443_3_B", "CRC_16_IBM_SDLC"),
+    ("CRC_16_X_25", "CRC_16_IBM_SDLC"),
+    ("CRC_B", "CRC_16_IBM_SDLC"),
+    ("X_25", "CRC_16_IBM_SDLC"),
+    ("CRC_16_MAXIM", "CRC_16_MAXIM_DOW"),
+    ("CRC_16_BUYPASS", "CRC_16_UMTS"),
+    ("CRC_16_VERIFONE", "CRC_16_UMTS"),
+    ("CRC_16_ACORN", "CRC_16_XMODEM"),
+    ("CRC_16_LTE", "CRC_16_XMODEM"),
+    ("XMODEM", "CRC_16_XMODEM"),
+    ("ZMODEM", "CRC_16_XMODEM"),
+    ("CRC_32", "CRC_32_ISO_HDLC"),
+    ("CRC_32_ADCCP", "CRC_32_ISO_HDLC"),
+    ("CRC_32_V_42", "CRC_32_ISO_HDLC"),
+    ("CRC_32_XZ", "CRC_32_ISO_HDLC"),
+    ("PKZIP", "CRC_32_ISO_HDLC"),
+    ("CRC_32_CASTAGNOLI", "CRC_32_ISCSI"),
+    ("CRC_32C", "CRC_32_ISCSI"),
+    ("CRC_32_AAL5", "CRC_32_BZIP2"),
+    ("CRC_32_POSIX", "CRC_32_CKSUM"),
+    ("CKSUM", "CRC_32_CKSUM"),
+];
+
 macro_rules! catalogue {
     ($($width:ident: $($name:ident)+;)+) => {
         /// Names as the crate spells them.
@@ -85,14 +131,30 @@ impl TryFrom<String> for Check {
             "SUM7_WITH_ERROR_BIT" => Self::Sum7WithErrorBit,
             "SUM8" => Self::Sum8,
             "XOR8" => Self::Xor8,
-            "CRC16_MODBUS" => Self::CRC_16_MODBUS,
-            "CRC16_X25" => Self::Crc(Cyclic::W16(&crc::CRC_16_IBM_SDLC)),
             other => {
-                let found = CATALOGUE.iter().find(|(known, _)| *known == other);
+                let meant =
+                    ALIASES.iter().find(|(alias, _)| *alias == other).map_or(other, |(_, meant)| meant);
+                let found = CATALOGUE.iter().find(|(known, _)| *known == meant);
                 let unknown = || {
+                    // As wide as the one that is asked for: the usual remedy is a look at what there is.
+                    let width = spelt.split('_').find(|part| part.chars().all(|c| c.is_ascii_digit()));
+                    let wide = width.map(|width| format!("CRC_{width}_"));
+                    let alike = CATALOGUE
+                        .iter()
+                        .filter(|(known, _)| wide.as_ref().is_some_and(|wide| known.starts_with(wide)));
+                    // As the catalogue writes them.
+                    let written = |(known, _): &(&str, Cyclic)| {
+                        known.replacen('_', "-", 1).replacen('_', "/", 1).replace('_', "-")
+                    };
+                    let like: Vec<String> = alike.map(written).collect();
+                    let like = if like.is_empty() {
+                        "CRC-16/MODBUS, CRC-32/ISO-HDLC".into()
+                    } else {
+                        like.join(", ")
+                    };
                     format!(
                         "no check is called `{name}`; sum8, xor8, sum7-with-error-bit, or a CRC by its name in the catalogue, \
-                         such as CRC-16/MODBUS or CRC-32/ISO-HDLC"
+                         such as {like}"
                     )
                 };
                 Self::Crc(found.ok_or_else(unknown)?.1)
@@ -104,6 +166,19 @@ impl TryFrom<String> for Check {
 impl Check {
     /// CRC-16/MODBUS.
     pub const CRC_16_MODBUS: Self = Self::Crc(Cyclic::W16(&crc::CRC_16_MODBUS));
+
+    /// Its name, a CRC's as the crate crc spells it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sum7WithErrorBit => "sum7-with-error-bit",
+            Self::Sum8 => "sum8",
+            Self::Xor8 => "xor8",
+            Self::Crc(cyclic) => {
+                CATALOGUE.iter().find(|(_, known)| *known == cyclic).map_or("CRC", |(name, _)| name)
+            }
+        }
+    }
 
     /// Bytes that the check takes.
     #[must_use]
@@ -191,6 +266,32 @@ mod tests {
             let sent = check.of(b"muprime", None);
             assert_eq!(sent.len(), check.length(), "{name}");
             assert!(check.holds(b"muprime", &sent, None) && !check.holds(b"muprimf", &sent, None), "{name}");
+        }
+    }
+
+    /// The catalogue's check values, of the digits 1 to 9.
+    #[test]
+    fn the_other_names_stand_for_what_the_catalogue_says() {
+        for (alias, meant) in ALIASES {
+            assert!(CATALOGUE.iter().any(|(known, _)| known == meant), "{alias}");
+            assert!(Check::try_from((*alias).to_string()).is_ok(), "{alias}");
+        }
+        for (name, value) in [
+            ("CRC-16/CCITT-FALSE", 0x29B1_u32),
+            ("XMODEM", 0x31C3),
+            ("KERMIT", 0x2189),
+            ("CRC-16/X-25", 0x906E),
+            ("ARC", 0xBB3D),
+            ("MODBUS", 0x4B37),
+            ("CRC-16/AUG-CCITT", 0xE5CC),
+            ("CRC-32", 0xCBF4_3926),
+            ("CRC-32C", 0xE306_9283),
+            ("CRC-8", 0xF4),
+        ] {
+            let check = Check::try_from(name.to_string()).unwrap();
+            let high_first = check.of(b"123456789", Some(true));
+            let found = high_first.iter().fold(0_u32, |all, byte| all << 8 | u32::from(*byte));
+            assert_eq!(found, value, "{name}");
         }
     }
 

@@ -17,12 +17,25 @@ pub struct DbcSignal {
     pub signed: bool,
     /// IEEE 754 of 32 or 64 bits in place of a whole number.
     pub float: bool,
-    /// It is there only in some of the messages, as another signal says.
-    pub multiplexed: bool,
+    /// Whether it is there in every message.
+    pub multiplex: Multiplex,
     /// Value = raw times this, plus `offset`.
     pub factor: f64,
     /// See `factor`.
     pub offset: f64,
+}
+
+/// Whether a signal is there in every message of its identifier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Multiplex {
+    /// It is.
+    Always,
+    /// It is, and says which others are.
+    Selector,
+    /// Only where the message's selector has this value.
+    Where(u64),
+    /// As several selectors say, or one that is itself not always there (`SG_MUL_VAL_`).
+    Nested,
 }
 
 /// One message.
@@ -48,6 +61,9 @@ pub fn parse(text: &str) -> Result<HashMap<String, DbcMessage>, String> {
     for message in &dbc.messages {
         let length = usize::try_from(message.size).map_err(|_| "a message is too long".to_string())?;
         let mut signals = HashMap::new();
+        let ranges = |name: &str| {
+            dbc.extended_multiplex.iter().any(|one| one.message_id == message.id && one.signal_name == name)
+        };
         for signal in &message.signals {
             let float = match dbc.extended_value_type_for_signal(message.id, &signal.name) {
                 None | Some(can_dbc::SignalExtendedValueType::SignedOrUnsignedInteger) => None,
@@ -63,10 +79,13 @@ pub fn parse(text: &str) -> Result<HashMap<String, DbcMessage>, String> {
                 little_endian: signal.byte_order == can_dbc::ByteOrder::LittleEndian,
                 signed: signal.value_type == can_dbc::ValueType::Signed,
                 float: float.is_some(),
-                multiplexed: !matches!(
-                    signal.multiplexer_indicator,
-                    can_dbc::MultiplexIndicator::Plain | can_dbc::MultiplexIndicator::Multiplexor
-                ),
+                multiplex: match signal.multiplexer_indicator {
+                    _ if ranges(&signal.name) => Multiplex::Nested,
+                    can_dbc::MultiplexIndicator::Plain => Multiplex::Always,
+                    can_dbc::MultiplexIndicator::Multiplexor => Multiplex::Selector,
+                    can_dbc::MultiplexIndicator::MultiplexedSignal(value) => Multiplex::Where(value),
+                    can_dbc::MultiplexIndicator::MultiplexorAndMultiplexedSignal(_) => Multiplex::Nested,
+                },
                 factor: signal.factor,
                 offset: signal.offset,
             };
@@ -84,7 +103,21 @@ pub fn parse(text: &str) -> Result<HashMap<String, DbcMessage>, String> {
     Ok(messages)
 }
 
+impl DbcMessage {
+    /// The signal that says which others are there.
+    #[must_use]
+    pub fn selector(&self) -> Option<DbcSignal> {
+        self.signals.values().find(|signal| signal.multiplex == Multiplex::Selector).copied()
+    }
+}
+
 impl DbcSignal {
+    /// Its bits, all set, at the low end.
+    #[must_use]
+    pub const fn mask(&self) -> u64 {
+        if self.size >= 64 { u64::MAX } else { (1 << self.size) - 1 }
+    }
+
     fn fits(&self, length: usize) -> bool {
         (1..=64).contains(&self.size) && self.bits().all(|bit| bit.is_some_and(|bit| bit / 8 < length))
     }
@@ -214,7 +247,7 @@ mod tests {
         assert_eq!(far.signals["F"].read(&frame), Some(1.5));
         assert_eq!(far.signals["U"].read(&frame), Some(f64::from(u32::MAX)));
         let mux = &messages["Mux"].signals;
-        assert!(mux["P"].multiplexed && !mux["M"].multiplexed);
+        assert_eq!((mux["P"].multiplex, mux["M"].multiplex), (Multiplex::Where(1), Multiplex::Selector));
     }
 
     #[test]

@@ -23,6 +23,26 @@ pub struct Shape {
     pub believed_after: u32,
 }
 
+impl Shape {
+    /// What keeps bytes from being such a frame; `None` where they are one.
+    #[must_use]
+    pub fn misfit(&self, frame: &[u8]) -> Option<String> {
+        let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+        if frame.len() != self.length {
+            return Some(format!("the frame has {} bytes, not {}", self.length, frame.len()));
+        }
+        if !frame.starts_with(&self.sync) {
+            return Some(format!("the frame begins with {}", hex(&self.sync)));
+        }
+        let (body, check) = frame.split_at(frame.len() - self.check.length());
+        let body = body.get(self.check_from..)?;
+        (!self.check.holds(body, check, self.check_high_first)).then(|| {
+            let due = self.check.of(body, self.check_high_first);
+            format!("the check of these bytes is {}, and the frame ends with {}", hex(&due), hex(check))
+        })
+    }
+}
+
 /// Cuts a stream of bytes into frames.
 #[derive(Debug, Clone)]
 pub struct Cutter {

@@ -3,15 +3,17 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::{CompiledSet, CompiledSignal, Frame, FrameId, FrameKind, Part, Place, Profile, SetId, SignalId};
-use crate::codec::dbc::{self, DbcMessage};
+use super::{
+    CompiledSet, CompiledSignal, Frame, FrameId, FrameKind, Part, Place, Profile, SetId, SignalId, Span,
+};
+use crate::codec::dbc::{self, DbcMessage, Multiplex};
 use crate::codec::eds::{self, Objects};
 use crate::codec::pattern::Pattern;
 use crate::codec::text::Form;
 use crate::error::ProfileError;
 use crate::expression::Expression;
 use crate::field::{ByteOrder, Field, NumberType};
-use crate::schema::{Description, Message};
+use crate::schema::{Description, Message, Poll};
 
 /// Gives the text of another file by its name.
 type Files<'a> = &'a dyn Fn(&str) -> Option<String>;
@@ -43,6 +45,7 @@ impl Compiler<'_> {
             d.signal.iter().enumerate().map(|(i, s)| (s.name.as_ref().clone(), i)).collect();
         let index = |name: &str| by_name.get(name).copied();
         let frames = self.frames(&messages, &index)?;
+        self.check_reads(&frames)?;
         let signal = |s| self.signal(s, &frames, &messages, &sheet, &index);
         let signals = d.signal.iter().map(signal).collect::<Result<Vec<_>, _>>()?;
         let sets = d.set.iter().map(|s| self.set(s, &sheet)).collect::<Result<_, _>>()?;
@@ -145,9 +148,11 @@ impl Compiler<'_> {
         let by_name = |name: &Option<String>| name.as_deref().and_then(index).map(SignalId);
         let mut frames = Vec::new();
         for (i, poll) in d.poll.iter().enumerate() {
+            let spans = self.spans(poll)?;
             frames.push(Frame {
                 name: poll.name.as_ref().clone(),
-                bytes: 2 * usize::from(poll.count),
+                bytes: spans.iter().map(|span| 2 * usize::from(span.count)).sum(),
+                spans,
                 sequence: by_name(&poll.sequence),
                 device_time: by_name(&poll.device_time),
                 kind: FrameKind::Poll(i),
@@ -163,6 +168,7 @@ impl Compiler<'_> {
                     .map_or(usize::from(stream.length.unwrap_or(0)), |form| 8 * form.numbers()),
                 sequence: by_name(&stream.sequence),
                 device_time: None,
+                spans: Vec::new(),
                 kind: FrameKind::Stream,
                 text,
             });
@@ -174,6 +180,7 @@ impl Compiler<'_> {
                 bytes: parts.iter().map(|part| part.length).sum(),
                 sequence: by_name(&message.sequence),
                 device_time: None,
+                spans: Vec::new(),
                 kind: FrameKind::Messages(i, parts),
                 text: None,
             });
@@ -191,6 +198,7 @@ impl Compiler<'_> {
                 bytes: query.length.map_or(NumberType::F64.bytes() * numbers, usize::from),
                 sequence: None,
                 device_time: None,
+                spans: Vec::new(),
                 kind: FrameKind::Query(i),
                 text,
             });
@@ -218,7 +226,7 @@ impl Compiler<'_> {
         let name = group.name.as_ref();
         if let Some(cob) = group.cob {
             let length = usize::from(group.length.unwrap_or(8));
-            return Ok(vec![Part { id: cob, extended: false, length }]);
+            return Ok(vec![Part { id: cob, extended: false, length, selector: None }]);
         }
         if group.replies.is_empty() {
             return Err(
@@ -236,9 +244,58 @@ impl Compiler<'_> {
                 let said = format!("`{reply}` has {} bytes: CAN FD is not spoken", message.length);
                 return Err(self.at(group.name.span(), said));
             }
-            Ok(Part { id, extended: message.extended, length: message.length })
+            let selector = group.multiplex.zip(message.selector()).map(|(value, signal)| (signal, value));
+            if let Some((signal, value)) = selector.filter(|(signal, value)| *value > signal.mask()) {
+                let said = format!("`multiplex` of `{name}`: {value} does not fit the {} bits", signal.size);
+                return Err(self.at(group.name.span(), said));
+            }
+            Ok(Part { id, extended: message.extended, length: message.length, selector })
         };
-        group.replies.iter().map(part).collect()
+        let parts: Vec<Part> = group.replies.iter().map(part).collect::<Result<_, _>>()?;
+        if group.multiplex.is_some() && parts.iter().all(|part| part.selector.is_none()) {
+            let said = format!("`multiplex` of `{name}`: none of its messages has a multiplexor");
+            return Err(self.at(group.name.span(), said));
+        }
+        Ok(parts)
+    }
+
+    /// The reads of a poll.
+    fn spans(&self, poll: &Poll) -> Result<Vec<Span>, ProfileError> {
+        if let (Some(address), Some(count)) = (poll.address, poll.count) {
+            return Ok(vec![Span { address, count }]);
+        }
+        let (name, alone) = (poll.name.as_ref(), self.description.poll.len() == 1);
+        let mut wanted = Vec::new();
+        for signal in &self.description.signal {
+            let stands = signal.frame.as_ref().map_or(alone, |frame| frame == name);
+            let Some(address) = signal.address.filter(|_| stands) else { continue };
+            // A number has at most 8 bytes.
+            let count = signal.number.map_or(1, |number| number.bytes().div_ceil(2)) as u16;
+            if u32::from(address) + u32::from(count) > 65536 {
+                let said = format!("signal `{}` runs past register 65535", signal.name.as_ref());
+                return Err(self.at(signal.name.span(), said));
+            }
+            wanted.push(Span { address, count });
+        }
+        if wanted.is_empty() {
+            let said = format!(
+                "poll `{name}` needs `address` and `count`, or signals with an `address` of their own"
+            );
+            return Err(self.at(poll.name.span(), said));
+        }
+        Ok(Span::cover(wanted, poll.gap))
+    }
+
+    /// Where a register of the instrument's map stands in a frame; `None` where the frame does not hold all of the number.
+    fn within(spans: &[Span], wanted: Span) -> Option<usize> {
+        let mut before = 0;
+        for span in spans {
+            if wanted.address >= span.address && wanted.end() <= span.end() {
+                return Some(before + 2 * usize::from(wanted.address - span.address));
+            }
+            before += 2 * usize::from(span.count);
+        }
+        None
     }
 
     fn signal(
@@ -256,9 +313,18 @@ impl Compiler<'_> {
             })?,
             None if frames.len() == 1 => 0,
             None => {
-                let message =
-                    format!("signal `{name}` needs `frame`: the profile has {} frames", frames.len());
-                return Err(self.at(s.name.span(), message));
+                // The pattern of an answer says itself which numbers it holds.
+                let holds = |frame: &Frame| match &frame.text {
+                    Some(Form::Pattern(pattern)) => pattern.fields().any(|(field, _)| field == name),
+                    _ => false,
+                };
+                let mut holding = (0..frames.len()).filter(|&i| holds(&frames[i]));
+                let (Some(one), None) = (holding.next(), holding.next()) else {
+                    let names: Vec<&str> = frames.iter().map(|frame| frame.name.as_str()).collect();
+                    let message = format!("signal `{name}` needs `frame`, one of {}", names.join(", "));
+                    return Err(self.at(s.name.span(), message));
+                };
+                one
             }
         };
         let place = match &s.value {
@@ -271,7 +337,12 @@ impl Compiler<'_> {
             }
             None => self.place(s, &frames[frame], messages)?,
             Some(value) => {
-                if s.register.is_some() || s.byte.is_some() || s.dbc.is_some() || s.number.is_some() {
+                if s.register.is_some()
+                    || s.address.is_some()
+                    || s.byte.is_some()
+                    || s.dbc.is_some()
+                    || s.number.is_some()
+                {
                     let message = format!("signal `{name}` is worked out: it stands nowhere and has no type");
                     return Err(self.at(s.name.span(), message));
                 }
@@ -335,9 +406,24 @@ impl Compiler<'_> {
             let signal = messages.get(message).and_then(|m| m.signals.get(signal)).ok_or_else(unknown)?;
             let FrameKind::Messages(group, _) = frame.kind else { return Err(unknown()) };
             let replies = &self.description.message[group].replies;
-            if signal.multiplexed {
-                let said = format!("`{path}` of signal `{name}` is multiplexed, which is not spoken");
-                return Err(self.at(s.name.span(), said).with_help("choose a message that always has it"));
+            let of_group = self.description.message[group].multiplex;
+            let (said, help) = match signal.multiplex {
+                Multiplex::Where(value) if of_group != Some(value) => (
+                    format!(
+                        "`{path}` of signal `{name}` is multiplexed: it is there only where the multiplexor is {value}"
+                    ),
+                    format!("put it into a [[message]] of its own with `multiplex = {value}`"),
+                ),
+                Multiplex::Nested => (
+                    format!(
+                        "`{path}` of signal `{name}` is multiplexed by ranges or in two steps (SG_MUL_VAL_), which is not spoken"
+                    ),
+                    "choose a message that always has it".to_string(),
+                ),
+                _ => (String::new(), String::new()),
+            };
+            if !said.is_empty() {
+                return Err(self.at(s.name.span(), said).with_help(&help));
             }
             let which = replies.iter().position(|reply| reply == message).ok_or_else(unknown)?;
             let before =
@@ -345,7 +431,12 @@ impl Compiler<'_> {
             return Ok(Place::Dbc(before, *signal));
         }
         let text_answer = frame.text.is_some();
-        if text_answer && (s.register.is_some() || s.byte.is_some() || s.number.is_some() || s.bits.is_some())
+        if text_answer
+            && (s.register.is_some()
+                || s.address.is_some()
+                || s.byte.is_some()
+                || s.number.is_some()
+                || s.bits.is_some())
         {
             let said =
                 format!("signal `{name}` stands in a line of text: it has no register, byte, type or bits");
@@ -364,6 +455,32 @@ impl Compiler<'_> {
                 order: ByteOrder::Abcd,
                 bits: None,
             }));
+        }
+        if let Some(address) = s.address {
+            let number =
+                s.number.ok_or_else(|| self.at(s.name.span(), format!("signal `{name}` needs `type`")))?;
+            let wanted = Span { address, count: number.bytes().div_ceil(2) as u16 };
+            let stands =
+                Self::within(&frame.spans, wanted).filter(|_| s.register.is_none() && s.byte.is_none());
+            let at = stands.ok_or_else(|| {
+                let said = format!("`address` {address} of signal `{name}` is not read by `{}`", frame.name);
+                self.at(s.name.span(), said).with_help(
+                    "`address` is a register of a [[poll]], and takes the place of `register` and `byte`",
+                )
+            })?;
+            return Ok(Place::Bytes(Field { at, number, order: s.byte_order, bits: s.bits }));
+        }
+        if self
+            .description
+            .poll
+            .iter()
+            .any(|poll| *poll.name.as_ref() == frame.name && poll.address.is_none())
+        {
+            let said = format!(
+                "signal `{name}` needs `address`: poll `{}` names no registers of its own",
+                frame.name
+            );
+            return Err(self.at(s.name.span(), said));
         }
         let at = match (s.register, s.byte) {
             (None, None) if text_answer => 0,

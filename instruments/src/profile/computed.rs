@@ -19,6 +19,7 @@ pub(super) fn spread(signals: Vec<Signal>) -> Vec<Signal> {
             let mut member = Signal {
                 array: None,
                 register: signal.register.map(|at| after(at, width / 2)),
+                address: signal.address.map(|at| after(at, width / 2)),
                 byte: signal.byte.map(|at| after(at, width)),
                 ..signal.clone()
             };

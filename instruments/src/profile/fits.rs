@@ -4,8 +4,10 @@
 mod frames;
 
 use super::compile::Compiler;
+use super::{Frame, FrameKind};
 use crate::error::ProfileError;
 use crate::schema::{Init, LinkKind, Role, Table};
+use crate::vector::from_hex;
 
 /// What a role needs: signals, and set-points.
 const NEEDS: &[(Role, &[&str], &[&str])] = &[
@@ -19,9 +21,21 @@ const NEEDS: &[(Role, &[&str], &[&str])] = &[
     (Role::SafetySupply, &["closed"], &["closed"]),
 ];
 
-/// Set-points that must have a `safe` value: without it there is no 'off'.
-const SAFE: &[(Role, &str)] =
-    &[(Role::DriveUltrasonic, "enable"), (Role::MotionSlide, "velocity"), (Role::SafetySupply, "closed")];
+/// Set-points that must have a `safe` value where they are: without it there is no 'off'.
+const SAFE: &[(Role, &str)] = &[
+    (Role::DriveUltrasonic, "enable"),
+    (Role::MotionSlide, "velocity"),
+    (Role::MotionSlide, "enable"),
+    (Role::SafetySupply, "closed"),
+];
+
+/// The set-points that are commanded, by role: what has another name would be sent by nobody.
+const COMMANDED: &[(Role, &[&str])] = &[
+    (Role::DriveUltrasonic, &["amplitude", "frequency", "enable", "heartbeat"]),
+    (Role::MotionSlide, &["velocity", "enable", "heartbeat"]),
+    (Role::MotionLoad, &["load", "heartbeat"]),
+    (Role::SafetySupply, &["closed"]),
+];
 
 /// Most samples per second.
 const FASTEST_HZ: f64 = 20_000.0;
@@ -69,22 +83,6 @@ impl Compiler<'_> {
         {
             return Err(ProfileError::at(self.text, link_place, "a serial link needs `baud` and `format`"));
         }
-        // Modbus RTU has no transaction number: an answer that comes late to one of two requests that
-        // look alike would be taken for the other's.
-        let polls = &self.description.poll;
-        let alike = polls.iter().enumerate().find_map(|(i, a)| {
-            polls[..i].iter().find(|b| (a.table, a.count) == (b.table, b.count)).map(|b| (a, b))
-        });
-        if let (LinkKind::ModbusRtu, Some((a, b))) = (link.kind, alike) {
-            let message = format!(
-                "polls `{}` and `{}` read the same number of registers",
-                a.name.as_ref(),
-                b.name.as_ref()
-            );
-            return Err(self.at(a.name.span(), message).with_help(
-                "over RTU a late answer to one would be taken for the other's; read one register more",
-            ));
-        }
         if self.description.vector.is_empty() {
             return Err(ProfileError::at(self.text, place, "the profile has no golden vector")
                 .with_help("add a [[vector]] for every frame: bytes beside the values that they stand for"));
@@ -108,15 +106,15 @@ impl Compiler<'_> {
 
     /// Sections, by the kind of link that carries them.
     pub(super) fn check_sections(&self) -> Result<(), ProfileError> {
-        use LinkKind::{Can, Canopen, ModbusRtu, ModbusTcp, Scpi, Serial};
+        use LinkKind::{Can, Canopen, ModbusRtu, ModbusTcp, Scpi, Serial, Sysfs, Tcp, Udp};
         let d = self.description;
         let rows: [(&str, bool, &[LinkKind]); 6] = [
             ("[[poll]]", !d.poll.is_empty(), &[ModbusTcp, ModbusRtu]),
-            ("[stream]", d.stream.is_some(), &[ModbusRtu, Serial]),
+            ("[stream]", d.stream.is_some(), &[ModbusRtu, Serial, Tcp, Udp]),
             ("[[message]]", !d.message.is_empty(), &[Can, Canopen]),
-            ("[[query]]", !d.query.is_empty(), &[Serial, Scpi]),
+            ("[[query]]", !d.query.is_empty(), &[Serial, Tcp, Scpi, Sysfs]),
             ("[[write]]", !d.write.is_empty(), &[ModbusTcp, ModbusRtu, Canopen]),
-            ("[[set]]", !d.set.is_empty(), &[ModbusTcp, ModbusRtu, Canopen, Serial, Scpi]),
+            ("[[set]]", !d.set.is_empty(), &[ModbusTcp, ModbusRtu, Canopen, Serial, Tcp, Scpi]),
         ];
         for (section, used, kinds) in rows {
             if used && !kinds.contains(&d.link.kind) {
@@ -125,7 +123,7 @@ impl Compiler<'_> {
                 );
             }
         }
-        let text = matches!(d.link.kind, Serial | Scpi);
+        let text = matches!(d.link.kind, Serial | Tcp | Scpi);
         let words = d.link.error_query.is_some() || d.link.choice.is_some() || !d.link.unsolicited.is_empty();
         if words && !text {
             return Err(self.at_section(
@@ -148,6 +146,7 @@ impl Compiler<'_> {
         for init in &d.init {
             self.check_init(init)?;
         }
+        self.check_udp()?;
         for poll in &d.poll {
             self.check_poll(poll)?;
         }
@@ -171,6 +170,12 @@ impl Compiler<'_> {
             }
         }
         for query in &d.query {
+            let name = &query.send;
+            if d.link.kind == Sysfs && (name.is_empty() || name.starts_with('.') || name.contains(['/', ' ']))
+            {
+                let said = format!("query `{}`: `{name}` is no name of an attribute", query.name.as_ref());
+                return Err(self.at(query.name.span(), said));
+            }
             if [query.length.is_some(), query.unit.is_some(), query.answer.is_some()]
                 .iter()
                 .filter(|x| **x)
@@ -193,11 +198,55 @@ impl Compiler<'_> {
         self.check_roles()
     }
 
+    /// Datagrams: somebody must know where they are to go.
+    fn check_udp(&self) -> Result<(), ProfileError> {
+        let d = self.description;
+        if d.link.kind != LinkKind::Udp {
+            return match d.link.local_port {
+                Some(_) => Err(self.at_section("[link]", "`local_port` is for a link of kind Udp".into())),
+                None => Ok(()),
+            };
+        }
+        let said = if d.stream.is_none() {
+            "a link of kind Udp needs a [stream]"
+        } else if d.link.local_port.is_none() && d.init.is_empty() {
+            "a link of kind Udp needs `local_port`, or an [[init]] that tells the instrument where to send"
+        } else {
+            return Ok(());
+        };
+        Err(self.at_section("[link]", said.into()))
+    }
+
+    /// Modbus RTU has no transaction number: an answer that comes late to one of two requests that
+    /// look alike would be taken for the other's.
+    pub(super) fn check_reads(&self, frames: &[Frame]) -> Result<(), ProfileError> {
+        if self.description.link.kind != LinkKind::ModbusRtu {
+            return Ok(());
+        }
+        let mut seen: Vec<(Table, u16)> = Vec::new();
+        for frame in frames {
+            let FrameKind::Poll(index) = frame.kind else { continue };
+            let poll = &self.description.poll[index];
+            for span in &frame.spans {
+                if seen.contains(&(poll.table, span.count)) {
+                    let said =
+                        format!("poll `{}` reads the same number of registers as a read before", frame.name);
+                    return Err(self.at(poll.name.span(), said).with_help(
+                        "over RTU a late answer to one would be taken for the other's; read one register more, or raise `gap`",
+                    ));
+                }
+                seen.push((poll.table, span.count));
+            }
+        }
+        Ok(())
+    }
+
     /// One [[init]] does one thing, and one that its link can carry.
     fn check_init(&self, init: &Init) -> Result<(), ProfileError> {
-        use LinkKind::{Can, Canopen, ModbusRtu, ModbusTcp, Scpi, Serial};
-        let acts: [(&str, bool, &[LinkKind]); 6] = [
-            ("send", init.send.is_some(), &[Serial, Scpi]),
+        use LinkKind::{Can, Canopen, ModbusRtu, ModbusTcp, Scpi, Serial, Sysfs, Tcp, Udp};
+        let acts: [(&str, bool, &[LinkKind]); 7] = [
+            ("send", init.send.is_some(), &[Serial, Tcp, Udp, Scpi, Sysfs]),
+            ("hex", init.hex.is_some(), &[Serial, Tcp, Udp]),
             ("can", init.can.is_some(), &[Can]),
             ("function", init.function.is_some(), &[ModbusRtu]),
             ("copy", init.copy.is_some(), &[ModbusTcp, ModbusRtu]),
@@ -214,13 +263,20 @@ impl Compiler<'_> {
                 Some(_) if !matches!(init.table, Table::Holding | Table::Coil) => {
                     "only holding registers and coils can be written".into()
                 }
-                _ if init.expect.is_some() && init.send.is_none() => {
+                _ if init
+                    .hex
+                    .as_deref()
+                    .is_some_and(|hex| from_hex(hex).is_none_or(|bytes| bytes.is_empty())) =>
+                {
+                    "`hex` is no bytes in hexadecimal".into()
+                }
+                _ if init.expect.is_some() && (init.send.is_none() || kind == Udp) => {
                     "only `send` has an answer to `expect`".into()
                 }
                 _ => return Ok(()),
             },
             [(act, ..)] => format!("a link of kind {kind:?} has no `{act}`"),
-            _ => "does one thing: send, can, function, copy, registers or sdo".to_string(),
+            _ => "does one thing: send, hex, can, function, copy, registers or sdo".to_string(),
         };
         Err(self.at_section("[[init]]", format!("an [[init]]: {said}")))
     }
@@ -258,7 +314,29 @@ impl Compiler<'_> {
                 return said("a signal".into());
             }
         }
-        Ok(())
+        self.check_commanded()
+    }
+
+    /// Whether each set-point is one that the roles command.
+    fn check_commanded(&self) -> Result<(), ProfileError> {
+        let d = self.description;
+        let has = |role: &Role| d.profile.roles.contains(role);
+        let of_roles = COMMANDED.iter().filter(|(role, _)| has(role)).flat_map(|(_, names)| names.iter());
+        let mut known: Vec<&str> = of_roles.copied().collect();
+        if d.link.kind == LinkKind::Canopen {
+            known.push("control");
+        }
+        match d.set.iter().find(|set| !known.contains(&set.name.as_ref().as_str())) {
+            None => Ok(()),
+            Some(set) => {
+                let names = known.join(", ");
+                let said = format!(
+                    "nobody would send the set-point `{}`; its roles have: {names}",
+                    set.name.as_ref()
+                );
+                Err(self.at(set.name.span(), said).with_help("what is done once goes into an [[init]]"))
+            }
+        }
     }
 
     fn at_section(&self, section: &str, message: String) -> ProfileError {

@@ -1,6 +1,7 @@
 //! Frames: what comes as one, and yields one sample.
 
 use super::SignalId;
+use crate::codec::dbc::DbcSignal;
 use crate::codec::text::Form;
 
 /// One frame, compiled: a poll, the stream, a group of messages or a query. Each yields one sample.
@@ -16,6 +17,8 @@ pub struct Frame {
     pub device_time: Option<SignalId>,
     /// What it is.
     pub kind: FrameKind,
+    /// The reads that it is made of, one after the other; none but for registers.
+    pub spans: Vec<Span>,
     /// What its lines look like, where it is one of text: its bytes are then the numbers as doubles, high byte first.
     pub text: Option<Form>,
 }
@@ -37,8 +40,50 @@ impl Frame {
     }
 }
 
-/// One CAN message of a frame.
+/// Neighbouring registers that one read brings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Span {
+    /// The first.
+    pub address: u16,
+    /// How many: 1 to 125.
+    pub count: u16,
+}
+
+impl Span {
+    /// The first register behind it.
+    #[must_use]
+    pub const fn end(self) -> u32 {
+        self.address as u32 + self.count as u32
+    }
+
+    /// The fewest reads that bring all of `wanted` (first register and count of each), where so many registers between
+    /// two of them may be read in vain. Each of them lies within one read.
+    #[must_use]
+    pub fn cover(mut wanted: Vec<Span>, gap: u16) -> Vec<Span> {
+        wanted.sort_by_key(|span| (span.address, span.count));
+        let mut spans: Vec<Span> = Vec::new();
+        for next in wanted {
+            if let Some(last) = spans.last_mut() {
+                let end = last.end().max(next.end());
+                let count = end - u32::from(last.address);
+                if u32::from(next.address) <= last.end() + u32::from(gap)
+                    && count <= u32::from(MOST_REGISTERS)
+                {
+                    last.count = count as u16;
+                    continue;
+                }
+            }
+            spans.push(next);
+        }
+        spans
+    }
+}
+
+/// Registers that one read can bring.
+pub const MOST_REGISTERS: u16 = 125;
+
+/// One CAN message of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
     /// Identifier, less the base that it is counted from.
     pub id: u32,
@@ -46,9 +91,19 @@ pub struct Part {
     pub extended: bool,
     /// Bytes.
     pub length: usize,
+    /// The signal whose value tells it from others of its identifier, and that value.
+    pub selector: Option<(DbcSignal, u64)>,
 }
 
 impl Part {
+    /// Whether the data of a message of its identifier is this one's.
+    #[must_use]
+    pub fn selects(&self, data: &[u8]) -> bool {
+        let unsigned = |signal: DbcSignal| signal.raw(data).map(|raw| raw as u64 & signal.mask());
+        data.len() == self.length
+            && self.selector.is_none_or(|(signal, value)| unsigned(signal) == Some(value))
+    }
+
     /// Its identifier, and whether that has 29 bits, for an instrument at that base.
     #[must_use]
     pub const fn at(self, base: u32) -> (u32, bool) {

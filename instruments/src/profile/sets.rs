@@ -62,8 +62,9 @@ impl Profile {
         let description = &self.description.set[set.0];
         let (for_value, for_zero) =
             description.answer.as_ref().map(|(v, z)| (v.as_str(), z.as_str())).unzip();
+        let answer = if value == 0.0 { for_zero } else { for_value };
         if let (true, Some(zero)) = (value == 0.0, &description.send_zero) {
-            return Some((zero.clone(), for_zero));
+            return Some((zero.clone(), answer));
         }
         let (pattern, owners) = self.sets[set.0].line.as_ref()?;
         let value = |owner: &Option<SetId>| {
@@ -72,7 +73,7 @@ impl Profile {
         let values: Vec<f64> = owners.iter().map(value).collect();
         // Counts are whole numbers; the scale says how many decimals the unit's value needs.
         let decimals = (-self.sets[set.0].scale.log10()).ceil().clamp(0.0, 12.0) as u8;
-        Some((pattern.write(&values, decimals), for_value))
+        Some((pattern.write(&values, decimals), answer))
     }
 
     /// The set-point that a line of text carries, as an emulator hears it: its own value, and those of others that stand in

@@ -30,7 +30,8 @@ impl Table {
     }
 }
 
-/// `[[poll]]`: one read of neighbouring registers, which yields one sample.
+/// `[[poll]]`: registers that are read together, and yield one sample: `count` of them from `address` on, or those that its
+/// signals name by their own `address`, in as few reads as `gap` permits.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Poll {
@@ -40,10 +41,16 @@ pub struct Poll {
     /// Table.
     #[serde(default)]
     pub table: Table,
-    /// First register.
-    pub address: u16,
-    /// How many registers: 1 to 125.
-    pub count: u16,
+    /// First register; left out where the signals name theirs.
+    #[serde(default)]
+    pub address: Option<u16>,
+    /// How many registers: 1 to 125; left out where the signals name theirs.
+    #[serde(default)]
+    pub count: Option<u16>,
+    /// Where the signals name theirs: so many registers between two of them may be read although nobody wants them, to save
+    /// a read.
+    #[serde(default)]
+    pub gap: u16,
     /// Reads per second; left out for one that is read once, at connection.
     #[serde(default)]
     pub rate_hz: Option<f64>,
@@ -70,7 +77,7 @@ pub struct Stream {
     /// Length of a frame, sync and check included; left out for lines of text.
     #[serde(default)]
     pub length: Option<u16>,
-    /// The check at its end; left out for lines of text.
+    /// The check at its end; left out for lines of text, and for datagrams, which have one of their own.
     #[serde(default)]
     pub check: Option<Check>,
     /// Bytes at a frame's beginning that the check leaves out, such as sync bytes.
@@ -117,7 +124,7 @@ pub enum CheckOrder {
 }
 
 impl Stream {
-    /// What its binary frames look like; `None` for lines of text.
+    /// What its binary frames look like; `None` for lines of text and for datagrams without a check.
     #[must_use]
     pub fn shape(&self) -> Option<Shape> {
         Some(Shape {
@@ -144,6 +151,10 @@ pub struct Message {
     /// The identifier that the DBC file's identifiers were written for; they move with `link.base`.
     #[serde(default)]
     pub dbc_base: Option<u32>,
+    /// Only messages whose multiplexor, by the DBC file, has this value: the signals that are there only then stand in this
+    /// group.
+    #[serde(default)]
+    pub multiplex: Option<u64>,
     /// CANopen: identifier less the node number.
     #[serde(default)]
     pub cob: Option<u32>,
@@ -190,7 +201,10 @@ pub struct Init {
     /// A line of text.
     #[serde(default)]
     pub send: Option<String>,
-    /// What its answer must begin with; left out where there is none.
+    /// Bytes in hexadecimal, sent as they are.
+    #[serde(default)]
+    pub hex: Option<String>,
+    /// What the answer to `send` must begin with; left out where there is none.
     #[serde(default)]
     pub expect: Option<Vec<String>>,
     /// A CAN frame: identifier (less the node for CANopen) and data.

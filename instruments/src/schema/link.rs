@@ -17,8 +17,15 @@ pub enum LinkKind {
     Canopen,
     /// Lines of text and blocks of bytes over a serial line.
     Serial,
+    /// The same over TCP, for instruments with a socket of their own.
+    Tcp,
+    /// Frames or lines that come by themselves in datagrams.
+    Udp,
     /// SCPI over TCP.
     Scpi,
+    /// Attributes of a device that the kernel drives, such as an IIO converter's in sysfs: a question is the name of one, its
+    /// content the answer.
+    Sysfs,
 }
 
 /// `[link]`: how the instrument is reached. The address itself stands in the setup.
@@ -27,9 +34,12 @@ pub enum LinkKind {
 pub struct Link {
     /// Kind of link.
     pub kind: LinkKind,
-    /// TCP port, unless the setup names one.
+    /// TCP or UDP port, unless the setup names one.
     #[serde(default)]
     pub port: Option<u16>,
+    /// UDP: the port of this machine that the instrument is set to send to. Left out: it sends to where an `[[init]]` comes from.
+    #[serde(default)]
+    pub local_port: Option<u16>,
     /// Modbus unit, unless the setup names one.
     #[serde(default)]
     pub unit: Option<u8>,

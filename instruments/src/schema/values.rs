@@ -19,6 +19,9 @@ pub struct Signal {
     /// First register, counted from the start of the frame.
     #[serde(default)]
     pub register: Option<u16>,
+    /// First register by the instrument's own map, in place of `register`.
+    #[serde(default)]
+    pub address: Option<u16>,
     /// First byte, counted from the start of the frame.
     #[serde(default)]
     pub byte: Option<u16>,
@@ -119,7 +122,7 @@ pub struct Set {
     /// The line of text where the value is zero.
     #[serde(default)]
     pub send_zero: Option<String>,
-    /// What the answer to `send` and to `send_zero` begins with; left out where there is none.
+    /// What the answer begins with: where the value is not zero, and where it is; left out where there is none.
     #[serde(default)]
     pub answer: Option<(String, String)>,
     /// Byte order.

@@ -51,8 +51,8 @@ pub struct Contact {
     pub lateral_relaxation_time: f64,
     /// Exponent of that relaxation: 1 exponential, less for a broad spectrum of times.
     pub lateral_relaxation_exponent: f64,
-    /// True: finite recovery holds in flight only, and in contact the stretch follows the limit down at once.
-    pub instant_slip_back: bool,
+    /// What a stretch beyond the friction limit does in contact, where recovery is finite.
+    pub slip_back: SlipBack,
     /// Time in which bonds form after touch-down, s. 0 in the baseline.
     pub bonding_time: f64,
     /// Exponent of the growth of bonds: 1 first order, 0.5 stretched.
@@ -71,6 +71,17 @@ pub struct Contact {
     pub landing: usize,
     /// Whether a sweep may be coarse: for searches that only look for places to begin.
     pub coarse: bool,
+}
+
+/// What the stretch does in contact while the spring pulls harder than friction holds. In flight it recovers in each case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SlipBack {
+    /// It follows the limit down no faster than the recovery allows, and does not grow.
+    Recovering,
+    /// It follows the limit down at once: finite recovery holds in flight only.
+    Instant,
+    /// It recovers towards the limit while the plate goes on drawing the skin along: slip against viscosity (Perzyna).
+    Drawn,
 }
 
 /// Attraction between skin and plate that friction feels beside the normal force.

@@ -12,8 +12,6 @@ use models::covariate::Covariate;
 use models::prediction::{FrictionModel, Prediction, Regime, Validity};
 use serde::{Deserialize, Serialize};
 
-/// Most parameters of one law.
-const MOST_PARAMETERS: usize = 4;
 /// Most effects of one model.
 const MOST_EFFECTS: usize = 4;
 
@@ -128,12 +126,11 @@ pub struct Lack {
     pub covariate: &'static Covariate,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Compiled {
     effect: &'static dyn Effect,
     law: usize,
-    theta: [f64; MOST_PARAMETERS],
-    count: usize,
+    theta: Vec<f64>,
 }
 
 /// Standard deviation of a law's form, as a share of the change that the effects make: a real cause never has exactly
@@ -183,7 +180,7 @@ impl Corrected {
                 .position(|l| l.name == s.law)
                 .ok_or_else(|| ModelError::Law { effect: s.name.clone(), law: s.law.clone() })?;
             let expected = effect.laws()[law].parameters;
-            let mut theta = [0.0; MOST_PARAMETERS];
+            let mut theta = Vec::with_capacity(expected.len());
             for (index, p) in expected.iter().map(|p| p.at_load(saved.design.reference_load_n)).enumerate() {
                 let given = s.parameters.get(index).filter(|g| g.name == p.name && g.unit == p.unit);
                 let value = given
@@ -199,10 +196,10 @@ impl Corrected {
                         upper: p.upper,
                     });
                 }
-                theta[index] = value;
+                theta.push(value);
             }
             effect.prepare(law, &theta);
-            effects.push(Compiled { effect, law, theta, count: expected.len() });
+            effects.push(Compiled { effect, law, theta });
         }
         effects.sort_by_key(|c| {
             crate::library().iter().position(|e| e.name() == c.effect.name()).unwrap_or(usize::MAX)
@@ -247,7 +244,7 @@ impl Corrected {
         let idle = Active { effect: &crate::library::sensor_lag::SensorLag, law: 0, theta: &zero };
         let mut active = [idle; MOST_EFFECTS];
         for (slot, c) in active.iter_mut().zip(&self.effects) {
-            *slot = Active { effect: c.effect, law: c.law, theta: &c.theta[..c.count] };
+            *slot = Active { effect: c.effect, law: c.law, theta: &c.theta };
         }
         lateral_force(baseline, &active[..self.effects.len()], pass, &self.design)
     }

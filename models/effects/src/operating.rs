@@ -1,6 +1,6 @@
 //! The baseline's parameters, what the whole design says about scales, and what a reading is.
 
-use crate::contact::Contact;
+use crate::contact::{Contact, SlipBack};
 use models::condition::Condition;
 
 /// Reference scales of a whole table: effects that need a zero of time, load or temperature take it from here.
@@ -65,7 +65,7 @@ impl Baseline {
             recovery_knee: 0.0,
             lateral_relaxation_time: 0.0,
             lateral_relaxation_exponent: 1.0,
-            instant_slip_back: false,
+            slip_back: SlipBack::Recovering,
             bonding_time: 0.0,
             bonding_exponent: 1.0,
             asperity_height: 0.0,

@@ -3,7 +3,7 @@ use models::condition::Condition;
 use models::quantity::PeakToPeak;
 use muprime_effects::contact::asperities::Heights;
 use muprime_effects::contact::impact::{Bouncing, LANDINGS, STATED_ERROR};
-use muprime_effects::contact::{Attraction, Contact, mean_friction};
+use muprime_effects::contact::{Attraction, Contact, SlipBack, half_contact_angle, mean_friction};
 use muprime_effects::{Baseline, Design};
 use std::f64::consts::PI;
 
@@ -212,7 +212,7 @@ fn a_soft_recovery_has_both_limits() {
     let hard = mean_friction(&Contact { inverse_recovery_speed: 200.0, recovery_knee: 1e-14, ..c });
     assert!((plain / hard - 1.0).abs() < 1e-4, "{plain} {hard}");
     // In flight only: in contact an exponential relaxes towards what the limit holds, a soft speed towards rest.
-    let flight = Contact { instant_slip_back: true, ..c };
+    let flight = Contact { slip_back: SlipBack::Instant, ..c };
     let slow = mean_friction(&Contact { inverse_recovery_speed: 0.02, recovery_knee: 1e-3, ..flight });
     let exponential =
         mean_friction(&Contact { lateral_relaxation_time: 2e-5, lateral_relaxation_exponent: 1.0, ..flight });
@@ -227,4 +227,42 @@ fn jkr_adds_four_pull_offs_at_no_load() {
     let c = Contact { attraction: jkr, ..contact(0.0, 0.02, 0.5, 1e6, 0.4e6) };
     let expected = 0.5 * (0.5 + 0.04 + 2.0 * (0.02f64 * 0.52).sqrt());
     assert!((mean_friction(&c) - expected).abs() < 1e-12);
+}
+
+/// Slip against viscosity by small explicit steps of `x' = U - (x - limit)/time`, which share nothing with the sweep's.
+#[test]
+fn slip_against_viscosity_is_that_of_small_steps() {
+    for (amplitude, speed, load, time) in [
+        (3e-6, 0.02, 0.25, 2e-5),
+        (0.5e-6, 0.005, 0.3, 1.5e-5),
+        (1e-6, 0.08, 1.2, 5e-6),
+        (2e-6, 0.04, 0.5, 1e-7),
+    ] {
+        let c = contact(amplitude, speed, load, 1e6, 0.4e6);
+        let swept = mean_friction(&Contact {
+            slip_back: SlipBack::Drawn,
+            lateral_relaxation_time: time,
+            lateral_relaxation_exponent: 1.0,
+            ..c
+        });
+        let scale = c.normal_stiffness * c.half_amplitude();
+        let phi = half_contact_angle(c.load_ratio(), 0.0);
+        let offset = if phi >= PI { c.load_ratio() } else { -phi.cos() };
+        let steps = 20_000;
+        let dt = 1.0 / (c.frequency * f64::from(steps));
+        let (mut x, mut sum) = (0.0f64, 0.0);
+        for _cycle in 0..60 {
+            sum = 0.0;
+            for i in 0..steps {
+                let phase = 2.0 * PI * (f64::from(i) + 0.5) / f64::from(steps) - PI;
+                let pressed = scale * (phase.cos() + offset).max(0.0);
+                let limit = c.mu0 * pressed / c.lateral_stiffness;
+                let drag = if pressed > 0.0 { c.speed } else { 0.0 };
+                x += drag * dt - (x - limit).max(0.0) * -(-dt / time).exp_m1();
+                sum += c.lateral_stiffness * x.min(limit) / f64::from(steps);
+            }
+        }
+        println!("{swept} {sum}");
+        assert!((swept / sum - 1.0).abs() < 2e-3, "{swept} {sum}");
+    }
 }

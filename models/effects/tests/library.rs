@@ -2,6 +2,7 @@
 use models::condition::Condition;
 use models::quantity::{Direction, PeakToPeak};
 use models::rig_file::CertifiedKey;
+use muprime_effects::corrected::{Corrected, SavedEffect, SavedModel, SavedParameter};
 use muprime_effects::{Active, Baseline, Design, Effect, Prior, by_name, known, lateral_force, library};
 use std::collections::BTreeSet;
 
@@ -157,4 +158,50 @@ fn checks_measure_in_the_unit_of_the_size() {
         checked += 1;
     }
     assert!(checked > 20, "{checked}");
+}
+
+/// Every law can be made ready for the loop, however many parameters it has, and the model predicts what the law does.
+#[test]
+fn every_law_can_be_made_ready_for_the_loop() {
+    for effect in library() {
+        for (law, form) in effect.laws().iter().enumerate() {
+            let parameters: Vec<_> =
+                form.parameters.iter().map(|p| p.at_load(DESIGN.reference_load_n)).collect();
+            let theta: Vec<f64> = parameters.iter().map(|p| p.value(0.2)).collect();
+            let saved = SavedModel {
+                schema: "muprime.model/1".into(),
+                verdict: String::new(),
+                relative_sd: 0.01,
+                interpolation_error: 0.0,
+                baseline: BASELINE,
+                design: DESIGN,
+                effects: vec![SavedEffect {
+                    name: effect.name().into(),
+                    law: form.name.into(),
+                    acts_on: "prediction".into(),
+                    parameters: parameters
+                        .iter()
+                        .zip(&theta)
+                        .map(|(p, value)| SavedParameter {
+                            name: p.name.into(),
+                            unit: p.unit.into(),
+                            value: *value,
+                        })
+                        .collect(),
+                    covariance: Vec::new(),
+                }],
+            };
+            let model = Corrected::compile(&saved).unwrap();
+            let active = [Active { effect: *effect, law, theta: &theta }];
+            for (pass, force) in passes().iter().zip(forces(&BASELINE, &active)) {
+                let got = model.lateral_force(pass);
+                assert!(
+                    (got - force).abs() <= 1e-9 * force.abs().max(1e-3),
+                    "{}: {}",
+                    effect.name(),
+                    form.name
+                );
+            }
+        }
+    }
 }

@@ -254,6 +254,18 @@ impl Tally {
 /// # Errors
 /// Bad input, an unstable step, or a run that diverged.
 pub fn run(case: &RidgeCase, settings: &RunSettings) -> Result<RidgeRun, RidgeError> {
+    run_watched(case, settings, &mut |_| {})
+}
+
+/// The same; `each` is told the relative friction of each cycle with the whole amplitude.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_watched(
+    case: &RidgeCase,
+    settings: &RunSettings,
+    each: &mut dyn FnMut(f64),
+) -> Result<RidgeRun, RidgeError> {
     let (mut rig, per_bin) = Rig::new(case, settings)?;
     let load = case.line_load_n_m();
     let settle = (SETTLE_S / rig.dt).ceil() as usize;
@@ -281,6 +293,7 @@ pub fn run(case: &RidgeCase, settings: &RunSettings) -> Result<RidgeRun, RidgeEr
         pull += FOLLOW * (lateral - pull);
         rig.load(load, pull);
         values.push([lateral / (case.mu0 * normal), normal / load]);
+        each(lateral / (case.mu0 * normal));
         history.push(cycle);
         if let Some(window) = settings.steady.window(&values) {
             break Some(window);

@@ -3,18 +3,23 @@
 mod certificates;
 
 use crate::input::{MAX_TABLE_BYTES, bytes_of};
+use crate::print::folded;
+use crate::report::about;
 use crate::{out, say};
 use calibration::certificate::sha256_hex;
 use clap::Args as ClapArgs;
 use diagnosis::data::Table;
 use diagnosis::hypotheses::Options;
+use diagnosis::progress::{Progress, Stage};
 use diagnosis::verdict::{Diagnosis, diagnose};
+use indicatif::ProgressBar;
 use miette::{Context, IntoDiagnostic};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::record::{Pass, read_passes};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Parts of the operating space that are told in words, the largest first.
 const TOLD: usize = 6;
@@ -87,8 +92,12 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         None => None,
     };
-    let options = Options { pairs: !args.no_pairs, without: args.without.clone(), ..Options::default() };
+    let bar = crate::progress::bar(1000, "per mille");
+    let progress = follow(&bar, json)?;
+    let options =
+        Options { pairs: !args.no_pairs, without: args.without.clone(), progress, ..Options::default() };
     let result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
+    bar.finish_and_clear();
     if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
         write_text(out, &predictions(&result, conditions))?;
     }
@@ -107,7 +116,14 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
     }
     if let Some(out) = &args.report {
-        write_text(out, &crate::report::diagnosis::page(&result, &table)?)?;
+        let about = if args.data.is_dir() {
+            about::of_run(&args.data, &crate::run_dir::said(&args.data).unwrap_or_default(), Some(&rig))
+        } else {
+            let named =
+                vec![("table", table_path.display().to_string()), ("rig", rig_path.display().to_string())];
+            [named, about::of_rig(&rig)].concat()
+        };
+        write_text(out, &crate::report::diagnosis::page(&result, &table, &about)?)?;
     }
     let mut report = serde_json::to_value(&result.report).into_diagnostic()?;
     let faults = certificates::at_fault(&result, &rig);
@@ -124,12 +140,57 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         out!("{}", serde_json::to_string(&report).into_diagnostic()?);
     } else {
-        damage.iter().for_each(|d| say!("damaged: {d}"));
-        out!("{}", terminal(&result).trim_end());
-        faults.iter().for_each(|fault| out!("{}", fault.text()));
-        doubts.iter().for_each(|doubt| out!("{}", doubt.text()));
+        damage.iter().for_each(|d| say!("{}", folded(&format!("damaged: {d}"), 4)));
+        out!("{}", folded(terminal(&result).trim_end(), 4));
+        faults.iter().for_each(|fault| out!("{}", folded(&fault.text(), 4)));
+        doubts.iter().for_each(|doubt| out!("{}", folded(&doubt.text(), 4)));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A bar that follows a diagnosis; on Ctrl-C the effects that lead so far are told.
+fn follow(bar: &ProgressBar, json: bool) -> miette::Result<Progress> {
+    let reached: Arc<Mutex<Option<Stage>>> = Arc::default();
+    let kept = Arc::clone(&reached);
+    crate::progress::on_interrupt(bar, move |_| {
+        let stage = reached.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        tell_partial(stage.as_ref(), json);
+    })?;
+    let bar = bar.clone();
+    Ok(Progress::to(move |stage| {
+        // A second look at the table begins anew: the bar stays where it was.
+        bar.set_position(bar.position().max((1e3 * stage.share) as u64));
+        bar.set_message(stage.doing);
+        let mut reached = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let leading = reached.take().map(|before| before.leading).filter(|_| stage.leading.is_empty());
+        *reached = Some(Stage { leading: leading.unwrap_or(stage.leading), ..stage });
+    }))
+}
+
+/// What a diagnosis that was stopped knew.
+fn tell_partial(stage: Option<&Stage>, json: bool) {
+    let leading: &[_] = stage.map_or(&[], |stage| &stage.leading);
+    let (doing, share) = stage.map_or(("reading", 0.0), |stage| (stage.doing, stage.share));
+    if json {
+        let leading: Vec<_> = leading
+            .iter()
+            .map(
+                |(effects, nats)| serde_json::json!({ "effects": effects, "log_evidence_over_no_gap": nats }),
+            )
+            .collect();
+        out!(
+            "{}",
+            serde_json::json!({ "partial": true, "doing": doing, "share": share, "leading": leading })
+        );
+        return;
+    }
+    out!("partial: stopped at {:.0} % ({doing}); no verdict", 100.0 * share);
+    if leading.is_empty() {
+        out!("  no effect was fitted yet");
+    }
+    for (effects, nats) in leading.iter().take(TOLD) {
+        out!("  {:+9.1} nats over no gap  {}", nats, effects.join(" + "));
+    }
 }
 
 fn read_table(path: &Path) -> miette::Result<Vec<Pass>> {
@@ -202,10 +263,8 @@ pub fn terminal(result: &Diagnosis) -> String {
         text.push('\n');
         if h.probability > 0.05 {
             for p in &h.parameters {
-                text.push_str(&format!(
-                    "         {} = {:.4e} [{:.4e}, {:.4e}] {}\n",
-                    p.name, p.value, p.ci95[0], p.ci95[1], p.unit
-                ));
+                let value = crate::report::human::with_interval(p.value, p.ci95, p.unit);
+                text.push_str(&format!("         {} = {value}\n", p.name));
             }
         }
     }

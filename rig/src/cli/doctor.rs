@@ -1,11 +1,16 @@
 //! `muprime doctor`: judges this machine truthfully, and talks to the instruments of a setup.
 
+use crate::doctor::{Asked, Finding};
+use crate::embed::Embedded;
 use crate::out;
+use crate::plan::Plan;
+use crate::print::folded;
 use crate::setup::Setup;
-use drivers::OpenError;
-use drivers::probe::Probed;
 use realtime::pacing;
 use serde::Serialize;
+use sim::wire::SharedPlant;
+use sim::wire::world::WorldPlant;
+use sim::world::{World, WorldConfig};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -15,20 +20,15 @@ pub struct Args {
     /// Setup whose instruments are talked to
     #[arg(long)]
     setup: Option<String>,
+    /// Plan that is to run on it: forces, loads and noise are judged by what it asks for
+    #[arg(long, requires = "setup")]
+    plan: Option<String>,
     /// How long lateness is measured, in s
     #[arg(long, default_value_t = 3.0)]
     seconds: f64,
     /// Only the setup's instruments, not the machine: the exit status then speaks of them alone
     #[arg(long, requires = "setup")]
     instruments_only: bool,
-}
-
-#[derive(Debug, Serialize)]
-struct Finding {
-    subject: String,
-    good: bool,
-    found: String,
-    advice: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -49,12 +49,13 @@ struct Lateness {
 /// Judges.
 ///
 /// # Errors
-/// A setup that cannot be used.
+/// A setup or a plan that cannot be used.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let setup = args.setup.as_deref().map(Setup::load).transpose()?;
     let (findings, lateness_us) =
         if args.instruments_only { (Vec::new(), None) } else { judge(args.seconds) };
-    let instruments = setup.as_ref().map(talk).unwrap_or_default();
+    let plan = args.plan.as_deref().map(Plan::load).transpose()?;
+    let instruments = setup.as_ref().map(|setup| talk(setup, plan.as_ref())).transpose()?.unwrap_or_default();
     let good = findings.iter().chain(&instruments).all(|f| f.good);
     let judgement = Judgement { findings, lateness_us, instruments };
     if json {
@@ -62,16 +63,20 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     } else {
         for f in judgement.findings.iter().chain(&judgement.instruments) {
             let mark = if f.good { "good" } else { "POOR" };
-            out!("{mark}  {}: {}", f.subject, f.found);
+            out!("{}", folded(&format!("{mark}  {}: {}", f.subject, f.found), 6));
             if !f.good {
-                out!("      {}", f.advice);
+                out!("{}", folded(&format!("      {}", f.advice), 0));
+            }
+            for channel in &f.channels {
+                out!("{}", folded(&format!("      {}", channel.words()), 2));
             }
         }
         if let Some(late) = &judgement.lateness_us {
             for (when, [p50, p99, p999, max]) in [("idle", late.idle), ("loaded", late.loaded)] {
-                out!(
+                let said = format!(
                     "      lateness {when}: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us"
                 );
+                out!("{}", folded(&said, 2));
             }
         }
     }
@@ -90,6 +95,7 @@ fn judge(seconds: f64) -> (Vec<Finding>, Option<Lateness>) {
         good: loaded[2] < 500.0,
         found: format!("99.9 % {:.0} us, worst {:.0} us", loaded[2], loaded[3]),
         advice: "use a PREEMPT_RT kernel, isolate a core (isolcpus, nohz_full), no virtual machine".into(),
+        ..Finding::default()
     });
     (findings, Some(Lateness { idle, loaded, quantiles: [0.5, 0.99, 0.999, 1.0] }))
 }
@@ -145,6 +151,7 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
                 Some(why) => format!("{}; SCHED_FIFO was refused: {why}", grants.policy),
             },
             advice: "give the user RLIMIT_RTPRIO (limits.d: '@realtime - rtprio 98') or CAP_SYS_NICE".into(),
+            ..Finding::default()
         },
         Finding {
             subject: "memory lock".into(),
@@ -154,18 +161,21 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
                 Some(why) => format!("refused: {why}"),
             },
             advice: "give the user RLIMIT_MEMLOCK (limits.d: '@realtime - memlock unlimited')".into(),
+            ..Finding::default()
         },
         Finding {
             subject: "kernel".into(),
             good: preempt_rt,
             found: format!("{kernel}, {}", if preempt_rt { "PREEMPT_RT" } else { "not PREEMPT_RT" }),
             advice: "install a PREEMPT_RT kernel (Debian: linux-image-rt-amd64)".into(),
+            ..Finding::default()
         },
         Finding {
             subject: "real-time throttling".into(),
             good: throttle.as_deref() != Some("0"),
             found: throttle.map_or("not readable".into(), |t| format!("sched_rt_runtime_us = {t}")),
             advice: "0 forbids real-time threads; set kernel.sched_rt_runtime_us to 950000".into(),
+            ..Finding::default()
         },
         Finding {
             subject: "real-time group scheduling".into(),
@@ -173,6 +183,7 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
             found: if group { "in force" } else { "not in force" }.into(),
             advice: "outside the root group SCHED_FIFO may be taken away silently: give the group rt_runtime"
                 .into(),
+            ..Finding::default()
         },
         Finding {
             subject: "timer slack".into(),
@@ -181,12 +192,14 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
                 format!("{s} ns for ordinary threads; the loop sets its own to 1 ns")
             }),
             advice: String::new(),
+            ..Finding::default()
         },
         Finding {
             subject: "CPU frequency".into(),
             good: governor.as_deref().is_none_or(|g| g == "performance"),
             found: governor.unwrap_or_else(|| "no frequency governor is visible".into()),
             advice: "set the governor to 'performance'".into(),
+            ..Finding::default()
         },
         Finding {
             subject: "virtual machine".into(),
@@ -194,6 +207,7 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
             found: if virtual_machine { "yes: its host may hold it up for milliseconds" } else { "no" }
                 .into(),
             advice: "run a real rig on a machine of its own".into(),
+            ..Finding::default()
         },
         Finding {
             subject: "CAN".into(),
@@ -204,74 +218,46 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
                 "the kernel has no SocketCAN (slcan over a serial port needs none)".into()
             },
             advice: String::new(),
+            ..Finding::default()
         },
     ]
 }
 
-/// Talks to every instrument of a setup, also after one that fails, and says of each what it found.
-fn talk(setup: &Setup) -> Vec<Finding> {
+/// Looks at every instrument of a setup as a run would, also after one that fails, and says of each what it found.
+fn talk(setup: &Setup, plan: Option<&Plan>) -> miette::Result<Vec<Finding>> {
+    let mut instruments = setup.instruments();
+    let (_claim, _served);
     if setup.file.virtual_rig.is_some() {
-        return vec![Finding {
-            subject: "instruments".into(),
-            good: true,
-            found: format!("'{}' is a virtual rig: it is started by 'muprime run'", setup.file.name),
-            advice: String::new(),
-        }];
+        _served = serve(setup, &mut instruments)?;
+    } else {
+        // Every driver ends with an 'off': that must not reach a rig that another program drives.
+        _claim = match crate::claim::RigClaim::take(setup) {
+            Ok(claim) => claim,
+            Err(why) => {
+                let found = format!("{why}: {}", why.root_cause());
+                return Ok(vec![Finding::new("instruments", false, found, "wait until it ends, or end it")]);
+            }
+        };
     }
-    // Every driver ends with an 'off': that must not reach a rig that another program drives.
-    let _claim = match crate::claim::RigClaim::take(setup) {
-        Ok(claim) => claim,
-        Err(why) => {
-            return vec![Finding {
-                subject: "instruments".into(),
-                good: false,
-                found: format!("{why}: {}", why.root_cause()),
-                advice: "wait until it ends, or end it".into(),
-            }];
-        }
-    };
-    let probed = drivers::probe::probe(&setup.instruments(), Duration::from_secs(1));
-    let vibrometer = setup.file.vibrometer.as_ref().map(|v| {
+    let look = crate::doctor::look(setup, &instruments);
+    let mut findings = crate::doctor::judge(&look, &Asked { setup, plan });
+    if let Some(v) = &setup.file.vibrometer {
         let settings = drivers::vibrometer::settings(v);
-        Finding {
-            subject: format!("vibrometer `{}` at {}", v.profile, v.address),
-            good: settings.is_ok(),
-            found: settings.map_or_else(|problem| problem, |settings| settings.to_string()),
-            advice: "check line, power and that no other program holds it; Echo must be off".into(),
-        }
-    });
-    probed.into_iter().map(found).chain(vibrometer).collect()
+        findings.push(Finding::new(
+            format!("vibrometer `{}` at {}", v.profile, v.address),
+            settings.is_ok(),
+            settings.map_or_else(|problem| problem, |settings| settings.to_string()),
+            "check line, power and that no other program holds it; Echo must be off",
+        ));
+    }
+    Ok(findings)
 }
 
-fn found(probed: Probed) -> Finding {
-    let subject = format!("{} `{}` at {}", probed.role, probed.id, probed.address);
-    match probed.outcome {
-        Err(error) => Finding {
-            subject,
-            good: false,
-            found: match error {
-                // The subject names the instrument already.
-                OpenError::Mismatch { problem, .. } | OpenError::Link { problem, .. } => problem,
-                other => other.to_string(),
-            },
-            advice: "check address, wiring, power, and that no other program holds the link".into(),
-        },
-        Ok((state, health)) => {
-            let bad = health.corrupt_frames + health.timeouts + health.exceptions;
-            let last = if health.last_problem.is_empty() {
-                String::new()
-            } else {
-                format!("; {}", health.last_problem)
-            };
-            Finding {
-                subject,
-                good: health.samples > 0 && health.last_problem.is_empty(),
-                found: format!(
-                    "{state}; {} samples in a second, {} lost, {bad} bad answers{last}",
-                    health.samples, health.lost_samples
-                ),
-                advice: "see what is said last; 'docs/devices.md' lists the traps of each bus".into(),
-            }
-        }
-    }
+/// A virtual rig's instruments, served for the look.
+fn serve(setup: &Setup, instruments: &mut drivers::InstrumentsSetup) -> miette::Result<Embedded> {
+    let ideal = setup.file.virtual_rig.as_ref().is_some_and(|v| v.ideal);
+    let config = if ideal { WorldConfig::ideal() } else { WorldConfig::bundled() };
+    let world = World::new(&config, 1).map_err(|e| miette::miette!("{e}"))?;
+    let plant = SharedPlant::new(WorldPlant::new(world), Instant::now());
+    crate::embed::embed(instruments, &plant, false).map_err(|problem| miette::miette!("{problem}"))
 }

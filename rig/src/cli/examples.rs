@@ -1,10 +1,12 @@
 //! An example for every command: it stands under `--help` and in the manual, and a test parses each.
 
+use crate::print::{COLUMNS, folded};
+
 /// Commands with their examples, a line each. Add one with every subcommand.
 pub const EXAMPLES: &[(&str, &str)] = &[
     (
         "run",
-        "muprime run\nmuprime run my-plan.toml --setup my-setup.toml --out runs/monday\nmuprime run --fast --seed 7 --model MODEL.toml",
+        "muprime run\nmuprime run my-plan.toml --setup my-setup.toml --out runs/monday\nmuprime run --tui --operator Ada\nmuprime run --fast --seed 7 --model MODEL.toml",
     ),
     ("virtual-rig", "muprime virtual-rig --modbus-tcp 127.0.0.1:1502"),
     ("calibrate force", "muprime calibrate force weights.csv --operator 'A. Smith' --serial SN1"),
@@ -48,6 +50,7 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("schema", "muprime schema plan"),
     ("init", "muprime init setup"),
     ("show", "muprime show\nmuprime show first-sweep"),
+    ("doc profile", "muprime doc profile my-sensor.toml\nmuprime doc profile labjack-t"),
     ("man", "muprime man man1"),
     ("model point", "muprime model point --amplitude-pp-m 3e-6 --speed-m-s 0.01 --json"),
     ("model ridge", "muprime model ridge --amplitude-pp-m 2e-6 --elements 200"),
@@ -56,11 +59,13 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("model effects", "muprime model effects squeeze_film"),
     ("model amplitude-for", "muprime model amplitude-for --mu-relative 0.4 --speed-m-s 0.02"),
     ("report", "muprime report runs/monday"),
+    ("compare", "muprime compare runs/first runs/second --report both.html"),
     ("replay", "muprime replay runs/monday"),
     ("export", "muprime export runs/monday --to parquet"),
     ("recover", "muprime recover runs/monday/run-1.mcap"),
     ("runs", "muprime runs --unfinished"),
-    ("watch", "muprime watch"),
+    ("watch", "muprime watch\nmuprime watch runs/monday --json"),
+    ("dashboard", "muprime dashboard\nmuprime dashboard --folder runs --listen 127.0.0.1:0 --allow-control"),
     ("completions", "muprime completions bash"),
 ];
 
@@ -68,10 +73,29 @@ pub const EXAMPLES: &[(&str, &str)] = &[
 fn help_of(path: &str) -> Option<String> {
     let (_, lines) = EXAMPLES.iter().find(|(p, _)| *p == path)?;
     let head = if lines.contains('\n') { "Examples:" } else { "Example:" };
-    Some(format!(
-        "{head}\n{}",
-        lines.lines().map(|l| format!("  {}", l.trim_start())).collect::<Vec<_>>().join("\n")
-    ))
+    Some(format!("{head}\n{}", lines.lines().map(|l| broken(l.trim_start())).collect::<Vec<_>>().join("\n")))
+}
+
+/// A command line as a shell takes it within the columns of a page: broken between its words with a backslash, and within quotes as it is,
+/// which the map of an import does not mind.
+fn broken(line: &str) -> String {
+    let (mut shown, mut now, mut quoted) = (String::new(), String::from("  "), false);
+    for word in line.split(' ') {
+        // Room for the blank and the backslash.
+        if !now.trim_start().is_empty() && now.chars().count() + 1 + word.chars().count() > COLUMNS - 2 {
+            shown.push_str(&now);
+            shown.push_str(if quoted { "\n" } else { " \\\n" });
+            now = " ".repeat(6);
+            now.push_str(word);
+        } else {
+            if !now.trim_start().is_empty() {
+                now.push(' ');
+            }
+            now.push_str(word);
+        }
+        quoted ^= word.matches('\'').count() % 2 == 1;
+    }
+    shown + &now
 }
 
 /// A command with its examples, and those of its subcommands.
@@ -85,8 +109,25 @@ fn put(mut command: clap::Command, path: &str) -> clap::Command {
         let path = if path.is_empty() { name.clone() } else { format!("{path} {name}") };
         command = command.mut_subcommand(&name, |sub| put(sub, &path));
     }
+    if let Some(usage) = short_usage(&command, path) {
+        command = command.override_usage(usage);
+    }
     match help_of(path) {
         Some(text) => command.after_help(text),
         None => command,
     }
+}
+
+/// The usage of a command, folded where it is longer than a line: clap folds every other part of a page.
+fn short_usage(command: &clap::Command, path: &str) -> Option<String> {
+    const HEAD: &str = "Usage: ";
+    let usage = command.clone().bin_name(format!("muprime {path}")).render_usage().to_string();
+    let usage = usage.strip_prefix(HEAD)?;
+    if usage.contains('\n') || HEAD.len() + usage.chars().count() <= COLUMNS {
+        return None;
+    }
+    // A flag stays with its value.
+    let words = usage.replace(" <", "\u{a0}<");
+    let whole = folded(&format!("{HEAD}{words}"), HEAD.len());
+    Some(whole.trim_start_matches(HEAD).replace('\u{a0}', " "))
 }

@@ -7,6 +7,7 @@ use crate::validation::faults::search::{Search, Tally, search};
 use miette::IntoDiagnostic;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -49,12 +50,36 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let Args { seeds, first, pairs, twice, default_limits, .. } = args;
     let pace = if default_limits { Pace::Default } else { Pace::Fast };
     let (begun, cpu_ns) = (std::time::Instant::now(), realtime::pacing::process_cpu_ns());
-    let tally = search(Search { first, seeds, pairs, twice, pace });
+    let bar = crate::progress::bar(seeds, "scenes");
+    let so_far: Arc<Mutex<Tally>> = Arc::default();
+    let kept = Arc::clone(&so_far);
+    crate::progress::on_interrupt(&bar, move |_| {
+        let tally = so_far.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if json {
+            match document(&tally, None, true) {
+                Ok(text) => out!("{text}"),
+                Err(why) => crate::say!("{why}"),
+            }
+        } else {
+            table(&tally);
+            out!(
+                "partial: {} of {seeds} runs, {} over a bound or otherwise wrong",
+                tally.scenes,
+                tally.failed
+            );
+        }
+    })?;
+    let tally = search(Search { first, seeds, pairs, twice, pace }, |chunk| {
+        bar.inc(chunk.scenes);
+        let mut so_far = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        *so_far = std::mem::take(&mut *so_far).with(chunk.clone());
+    });
+    bar.finish_and_clear();
     let cpu_s = (realtime::pacing::process_cpu_ns() - cpu_ns) as f64 * 1e-9;
     let simulated_s = tally.cycles as f64 * crate::validation::faults::bench::T.seconds();
     let speed = simulated_s / cpu_s.max(1e-9);
     if json {
-        out!("{}", document(&tally, speed)?);
+        out!("{}", document(&tally, Some(speed), false)?);
     } else {
         table(&tally);
         out!(
@@ -78,7 +103,7 @@ fn json_of(value: &impl serde::Serialize) -> miette::Result<String> {
     serde_json::to_string(value).into_diagnostic()
 }
 
-fn document(tally: &Tally, speed: f64) -> miette::Result<String> {
+fn document(tally: &Tally, speed: Option<f64>, partial: bool) -> miette::Result<String> {
     let rows: Vec<_> = tally
         .reactions
         .iter()
@@ -86,9 +111,13 @@ fn document(tally: &Tally, speed: f64) -> miette::Result<String> {
             serde_json::json!({ "number": number, "fault": name, "phase": moment, "reactions": r })
         })
         .collect();
-    json_of(&serde_json::json!({
+    let mut document = serde_json::json!({
         "runs": tally.scenes, "simulated_seconds_per_core_second": speed, "failed": tally.failed, "rows": rows, "failures": tally.failures
-    }))
+    });
+    if partial {
+        document["partial"] = true.into();
+    }
+    json_of(&document)
 }
 
 /// Worst reactions beside their bounds, in cycles of 1 ms.

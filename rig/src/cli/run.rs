@@ -1,22 +1,38 @@
 //! `muprime run`: an automated friction sweep.
 
+use super::dashboard::Place;
 use crate::catalogue::runs_folder;
+use crate::dashboard::LISTEN;
+use crate::live::{self, Feed};
 use crate::plan::Plan;
-use crate::print::clean;
+use crate::print::{clean, folded};
+use crate::publish::{Broker, Publisher};
 use crate::sequence::{Event, Outcome};
-use crate::session::{Job, News, Signals, Summary, unix_ns};
+use crate::session::{Job, News, Notes, Signals, Summary, unix_ns};
 use crate::setup::Setup;
 use crate::supervisor::MAY_BE_ON;
+use crate::watch::{Lead, Watch};
 use crate::{out, say};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
 use models::prediction::{FrictionModel, SpringSlider};
 use realtime::ports::Nanos;
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+
+/// Lines on standard error.
+macro_rules! told {
+    ($($text:tt)*) => { say!("{}", fitted(format!($($text)*))) };
+}
+
+/// Within the columns of a page for a person; as it is for a log, which is searched by lines.
+fn fitted(text: String) -> String {
+    if std::io::stderr().is_terminal() { folded(&text, 2) } else { text }
+}
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -42,6 +58,24 @@ pub struct Args {
     /// In virtual time: a minute's sweep in a second or so
     #[arg(long)]
     fast: bool,
+    /// Who leads the run, for its record and report
+    #[arg(long, value_name = "NAME")]
+    operator: Option<String>,
+    /// What is measured, for its record and report: the fingertip, its preparation, the plate
+    #[arg(long, value_name = "WORDS")]
+    sample: Option<String>,
+    /// Show the run live on the whole terminal, as 'muprime watch' does
+    #[arg(long)]
+    tui: bool,
+    /// Publish states, passes, trips and progress by MQTT, read only: mqtt://[user@]host[:port]/prefix
+    #[arg(long, value_name = "BROKER")]
+    publish: Option<Broker>,
+    /// Serve this run in a browser while it goes on, and the folder that it stands in: at the address, or on 127.0.0.1:8417
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = LISTEN, conflicts_with = "tui")]
+    dashboard: Option<SocketAddr>,
+    /// The run may be paused and told to go on from the browser; a stop may always be asked for
+    #[arg(long, requires = "dashboard")]
+    allow_control: bool,
 }
 
 /// Runs the sweep.
@@ -49,6 +83,15 @@ pub struct Args {
 /// # Errors
 /// A refusal: bad input, a busy rig, an instrument that does not answer.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let (broker, tui) = (args.publish.clone(), args.tui);
+    if tui && json {
+        miette::bail!(
+            help = "leave out one of them",
+            "--tui shows a picture, --json prints documents: not both"
+        );
+    }
+    let browsers =
+        args.dashboard.map(|listen| Place { listen, hosts: Vec::new(), allow_control: args.allow_control });
     let job = job(args)?;
     if job.setup.hand_at_key() {
         if job.fast {
@@ -63,10 +106,23 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let signals = Signals::default();
     watch_signals(&signals)?;
-    let bar = progress_bar(json);
     let planned = job.points()?.len();
+    if let Some(place) = browsers {
+        // An address that is taken is a refusal: nothing was touched yet, and nobody was told of a run.
+        let runs = job.out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        told!("dashboard: {}", place.serve(runs.to_path_buf())?.link());
+    }
+    // Up before anything moves, and down before the summary is told. What is said meanwhile is held and said then.
+    let watch = match tui {
+        true => Some(Watch::begin(&job.out, Lead::Own(signals.clone()), job.setup.hand_at_key())?),
+        false => None,
+    };
+    let bar = progress_bar(json || tui);
     bar.set_length(planned as u64);
-    let say = |text: String| if bar.is_hidden() { say!("{text}") } else { bar.println(clean(&text)) };
+    let say = |text: String| {
+        let text = fitted(text);
+        if bar.is_hidden() { say!("{text}") } else { bar.println(clean(&text)) }
+    };
     if !json {
         let clock = if job.fast { "virtual time" } else { "wall-clock time" };
         say(format!(
@@ -76,30 +132,85 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             job.out.display()
         ));
     }
-    let summary = job.run(&signals, &mut |news| match news {
-        News::Pass(pass) => {
-            if json {
-                out!("{}", serde_json::json!({ "pass": pass }));
+    let mut publisher = broker.as_ref().map(Publisher::start).transpose()?;
+    let mut publish = |name: &str, message: &dyn Fn() -> serde_json::Value| {
+        if let Some(publisher) = &mut publisher {
+            publisher.publish(name, &message());
+        }
+    };
+    let of =
+        serde_json::json!({ "plan": job.plan.file.name, "setup": job.setup.file.name, "planned": planned });
+    let began = |state: &str| {
+        let mut run = of.clone();
+        run["state"] = state.into();
+        run
+    };
+    publish("run", &|| began("running"));
+    let before = crate::run_dir::passes_in(&job.out).unwrap_or_default();
+    let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, &signals);
+    let summary = job.run(&signals, &mut |news| {
+        feed.news(&news);
+        match news {
+            News::Pass(pass) => {
+                publish("pass", &|| serde_json::json!(pass));
+                if json {
+                    out!("{}", serde_json::json!({ "pass": pass }));
+                }
+            }
+            News::Event(event) => {
+                publish("event", &|| serde_json::json!(event));
+                if let Event::Tripped(trip) = event {
+                    publish("trip", &|| tripped(trip));
+                }
+                if json {
+                    out!("{}", serde_json::json!({ "event": event }));
+                } else {
+                    say(crate::report::events::describe(event));
+                }
+            }
+            News::State(glimpse) => publish("state", &|| serde_json::json!(live::State::of(glimpse))),
+            News::Progress(made, all, left_s) => {
+                publish(
+                    "progress",
+                    &|| serde_json::json!({ "made": made, "planned": all, "remaining_s": left_s }),
+                );
+                let resumed = planned as u64 - bar.length().unwrap_or(0).min(planned as u64);
+                bar.set_position(made as u64 + resumed);
+                bar.set_message(format!("{left_s:.0} s to go"));
             }
         }
-        News::Event(event) => {
-            if json {
-                out!("{}", serde_json::json!({ "event": event }));
-            } else {
-                say(describe(event));
-            }
-        }
-        News::Progress(made, _, left_s) => {
-            let resumed = planned as u64 - bar.length().unwrap_or(0).min(planned as u64);
-            bar.set_position(made as u64 + resumed);
-            bar.set_message(format!("{left_s:.0} s to go"));
-        }
-    })?;
+    });
+    feed.end(live::Ended::of(&summary));
+    publish("run", &|| {
+        let mut ended = began("ended");
+        ended["summary"] = summary.as_ref().map_or_else(
+            |why| serde_json::json!({ "error": why.to_string() }),
+            |summary| serde_json::json!({ "passes": summary.passes, "outcome": summary.outcome }),
+        );
+        ended
+    });
     bar.finish_and_clear();
+    drop(watch);
+    if let (Some(publisher), Some(broker)) = (publisher, &broker) {
+        let (dropped, whole) = publisher.end();
+        if dropped > 0 || !whole {
+            let rest = if whole { "" } else { ", and the last ones may be missing" };
+            told!("{}:{}: {dropped} messages were not published{rest}", broker.host, broker.port);
+        }
+    }
+    let summary = summary?;
     tell(&summary, json);
     super::exit(match summary.outcome {
         Outcome::Complete if summary.off.read_back => super::DONE,
         _ => super::FAILED,
+    })
+}
+
+/// A trip for whoever follows from afar.
+fn tripped(trip: &realtime::safety::Trip) -> serde_json::Value {
+    serde_json::json!({
+        "cause": trip.cause, "value": Some(trip.value).filter(|v| v.is_finite()), "bound": trip.bound, "unit": trip.unit.symbol(),
+        "at_s": trip.at.seconds(), "requirement": trip.cause.requirement(), "remedy": trip.cause.remedy(),
     })
 }
 
@@ -130,7 +241,8 @@ fn job(args: Args) -> miette::Result<Job> {
     };
     let seed = args.seed.unwrap_or(plan.file.seed);
     let out = args.out.unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
-    Ok(Job { setup, plan, seed, model, model_file, defects, out, fast: args.fast })
+    let notes = Notes { operator: args.operator, sample: args.sample };
+    Ok(Job { setup, plan, seed, model, model_file, defects, out, fast: args.fast, notes })
 }
 
 /// Name of a new run: UTC date and time, and the plan.
@@ -150,9 +262,10 @@ fn watch_signals(signals: &Signals) -> miette::Result<()> {
             for (i, _) in caught.forever().enumerate() {
                 stops.fetch_add(1, Ordering::Relaxed);
                 if i > 0 {
+                    // A terminal that takes nothing keeps nobody from leaving.
+                    std::thread::spawn(|| say!("leaving at once: {MAY_BE_ON}"));
                     // The first one has sent the stop; nobody can wait here for what was read back.
                     std::thread::sleep(std::time::Duration::from_millis(1500));
-                    say!("leaving at once: {MAY_BE_ON}");
                     super::leave_now(super::FAILED);
                 }
             }
@@ -171,51 +284,21 @@ fn progress_bar(json: bool) -> ProgressBar {
     bar
 }
 
-fn describe(event: &Event) -> String {
-    match event {
-        Event::Armed => "armed".into(),
-        Event::NoSecondChannel => {
-            "no second switch-off channel: what the amplifier refuses, only a hand at its supply switches off"
-                .into()
-        }
-        Event::NoWatchdog => "the amplifier has no watchdog: the second channel stands for it".into(),
-        Event::Zeros { lateral_n, normal_n, after } => {
-            let mn = |v: &Option<f64>| v.map_or("none".into(), |v| format!("{:+.2} mN", v * 1e3));
-            let when = if *after { "after" } else { "before" };
-            format!("force zeros {when} the sweep: lateral {}, normal {}", mn(lateral_n), mn(normal_n))
-        }
-        Event::Tripped(trip) => format!("TRIP {trip}\n  {}", trip.cause.remedy()),
-        Event::ModelDeparted { point, log_evidence } => {
-            let odds = (log_evidence / std::f64::consts::LN_10).floor();
-            format!("the model has left the measurement at point {point} (evidence beyond 10^{odds:.0} to 1)")
-        }
-        Event::StopRequested => "stopping: the rig goes to its safe state first".into(),
-        Event::PassRepeated { point } => format!("point {point}: no contact, once more"),
-        Event::TemperatureBeyondCertificate { point, flag } => {
-            format!("point {point} and on: {flag}; the passes are flagged, nothing is corrected")
-        }
-        Event::TemperatureUnwatched { certificate } => format!(
-            "{certificate} holds within a range of temperatures, and the amplifier reports none: only the setup's \
-             temperature_c was checked"
-        ),
-    }
-}
-
 fn tell(summary: &Summary, json: bool) {
     if json {
         out!("{}", serde_json::json!({ "summary": summary }));
         return;
     }
     if !summary.off.read_back {
-        say!("{}", summary.off.words());
+        told!("{}", summary.off.words());
     }
     if summary.finished_before {
-        say!("every pass of this run was made before: nothing was driven, nothing was recorded");
+        told!("every pass of this run was made before: nothing was driven, nothing was recorded");
     }
-    say!("{} of {} passes", summary.passes, summary.planned);
+    told!("{} of {} passes", summary.passes, summary.planned);
     if let Some(report) = &summary.loop_report {
         let [p50, _, p99, _, max] = report.lateness_ns.map(|ns| ns as f64 / 1e3);
-        say!(
+        told!(
             "loop: {} cycles, lateness median {p50:.0} us, 99 % {p99:.0} us, worst {max:.0} us; {} overruns, {} rows lost",
             report.cycles,
             report.overruns,
@@ -225,7 +308,7 @@ fn tell(summary: &Summary, json: bool) {
     if let (Outcome::Tripped(trip), Some(stalls)) = (&summary.outcome, &summary.stalls)
         && let Some(stall) = stalls.within(Nanos(trip.at.0.saturating_sub(100_000_000)), trip.at)
     {
-        say!(
+        told!(
             "just before the trip this machine kept its programs from running for {:.0} ms: see 'muprime doctor'",
             stall.lasted.seconds() * 1e3
         );
@@ -233,14 +316,14 @@ fn tell(summary: &Summary, json: bool) {
     if let (Outcome::WouldNotArm { blocking: Some(cause) }, Some(remedy)) =
         (&summary.outcome, &summary.remedy)
     {
-        say!("the rig would not arm: {cause:?} stands in the way\n  {remedy}");
+        told!("the rig would not arm: {cause:?} stands in the way\n  {remedy}");
     }
     if summary.passes < summary.planned {
-        say!("the same command with --out {} goes on", summary.folder.display());
+        told!("the same command with --out {} goes on", summary.folder.display());
     }
-    say!("{}", summary.agreement);
+    told!("{}", summary.agreement);
     if summary.model_departed {
-        say!("'muprime diagnose {}' says where and why", summary.folder.display());
+        told!("'muprime diagnose {}' says where and why", summary.folder.display());
     }
-    say!("report: {}", summary.folder.join("report.html").display());
+    told!("report: {}", summary.folder.join("report.html").display());
 }

@@ -1,10 +1,11 @@
-//! `muprime watch RUN`: follows a run by its journal.
+//! `muprime watch RUN`: follows a run, at a terminal with the live view, else line by line from its journal.
 
 use crate::catalogue::{Catalogue, runs_folder};
 use crate::out;
 use crate::sequence::MeasuredPass;
+use crate::watch::{Lead, Watch};
 use miette::{IntoDiagnostic, WrapErr};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, IsTerminal};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -16,7 +17,7 @@ pub struct Args {
     run: Option<PathBuf>,
 }
 
-/// Prints passes as they come, until the run has ended.
+/// Shows a run until somebody leaves it; with `--json`, or where no terminal is, prints passes as they come until the run has ended.
 ///
 /// # Errors
 /// No run there.
@@ -33,6 +34,11 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let file = std::fs::File::open(&journal)
         .into_diagnostic()
         .wrap_err_with(|| format!("{} holds no run", run.display()))?;
+    if !json && std::io::stdout().is_terminal() && crate::terminal::has_keys().is_ok() {
+        leave_on_signals()?;
+        Watch::begin(&run, Lead::Other, false)?.wait();
+        return super::exit(super::DONE);
+    }
     let mut reader = BufReader::new(file);
     let mut line = String::new();
     loop {
@@ -50,6 +56,19 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         std::thread::sleep(Duration::from_millis(200));
     }
+}
+
+/// A signal takes the view down, and nothing else: the run is another process's.
+fn leave_on_signals() -> miette::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let mut caught = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]).into_diagnostic()?;
+    let leave = move || {
+        if caught.forever().next().is_some() {
+            super::leave_now(super::DONE);
+        }
+    };
+    std::thread::Builder::new().name("signals".into()).spawn(leave).into_diagnostic()?;
+    Ok(())
 }
 
 fn show(line: &str, json: bool) {

@@ -2,7 +2,6 @@
 //! stopped goes on where it was, and a case that is there is not run again.
 
 use crate::say;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use models::ridge::study::content_key;
 use models::ridge::{self, RidgeCase, RidgeRun, RunSettings};
@@ -98,9 +97,11 @@ pub fn complete(
     let file = file.wrap_err_with(|| format!("cannot write {}", path.display()))?;
     drop_cut_line(path, &file)?;
     let file = Mutex::new(file);
-    let bar = ProgressBar::with_draw_target(Some(todo.len() as u64), ProgressDrawTarget::stderr());
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} cases, {elapsed} gone, {eta} to go");
-    bar.set_style(style.into_diagnostic()?);
+    let bar = crate::progress::bar(todo.len() as u64, "cases");
+    let (kept_in, of) = (path.display().to_string(), todo.len());
+    crate::progress::on_interrupt(&bar, move |done| {
+        say!("partial: {done} of {of} cases are kept in {kept_in}; the same command goes on with the others");
+    })?;
     let run = |(key, case): &(String, RidgeCase)| {
         let outcome = ridge::run(case, settings).map(|run| Kept::of(key.clone(), case, &run));
         bar.inc(1);

@@ -1,7 +1,7 @@
 //! From a plan to its passes, each checked against the limits before anything moves.
 
 use super::Plan;
-use crate::input::{self, BadInput};
+use crate::input::{self, BadInput, Problems, unit_meant};
 use models::condition::Condition;
 use models::covariate::Covariate;
 use models::quantity::{Direction, PeakToPeak};
@@ -59,13 +59,17 @@ impl Plan {
     /// The passes in the order of measurement.
     ///
     /// # Errors
-    /// The first value beyond a limit, or that the rig cannot do, with its place in the file. Nothing has moved.
+    /// Every value beyond a limit, or else the first pass that needs more travel than there is, with its place in the file. Nothing
+    /// has moved.
     pub fn points(&self, seed: u64, limits: &Limits, resolution: &Resolution) -> miette::Result<Vec<Point>> {
-        let mut conditions = Vec::new();
+        let mut wrong = Problems::of(&self.origin, &self.text);
+        let allows = |c: &Covariate| Some((allowed(c, limits), "this rig allows".to_string()));
         for index in 0..self.file.series.len() {
-            self.check_series(index, limits)?;
-            conditions.extend(self.conditions_of(index, resolution));
+            self.check_series(index, &allows, &mut wrong);
         }
+        wrong.end()?;
+        let conditions: Vec<Visit<'_>> =
+            (0..self.file.series.len()).flat_map(|index| self.conditions_of(index, resolution)).collect();
         self.check_travel(&conditions, limits)?;
         Ok(self.order(&conditions, seed))
     }
@@ -138,12 +142,18 @@ impl Plan {
         speed_m_s * (self.file.pass.settle_s + self.file.pass.measure_s) * 1.1 + 1e-3
     }
 
-    fn check_series(&self, index: usize, limits: &Limits) -> Result<(), BadInput> {
+    /// Tells of every value of a series that is outside what somebody allows.
+    pub(super) fn check_series(
+        &self,
+        index: usize,
+        allows: &dyn Fn(&Covariate) -> Option<([f64; 2], String)>,
+        wrong: &mut Problems<'_>,
+    ) {
         let series = &self.file.series[index];
         let base = self.file.base.condition();
         for (covariate, list) in series.lists() {
             let name = covariate.name;
-            let [low, high] = allowed(covariate, limits);
+            let Some(([low, high], by)) = allows(covariate) else { continue };
             let based = covariate.of(&base).filter(|_| list.is_empty()).map(|v| (false, v));
             for (in_series, value) in list.iter().map(|v| (true, *v)).chain(based) {
                 if value.is_finite() && value >= low && value <= high {
@@ -154,15 +164,14 @@ impl Plan {
                 } else {
                     input::place_of(&self.text, &["base", name])
                 };
+                let remedy = unit_meant(name, value, [low, high]).unwrap_or_else(|| {
+                    "change the plan, or the [limits] of the setup below the hard limits".into()
+                });
                 let low = if low == f64::MIN_POSITIVE { 0.0 } else { low };
-                let problem =
-                    format!("{name} = {value:e} is outside what this rig allows, {low:e} to {high:e}");
-                let remedy =
-                    "change the plan, or the [limits] of the setup below the hard limits".to_string();
-                return Err(BadInput::new(&self.origin, &self.text, place, problem, remedy));
+                let problem = format!("{name} = {value:e} is outside what {by}, {low:e} to {high:e}");
+                wrong.add_at(place, problem, remedy);
             }
         }
-        Ok(())
     }
 
     fn check_travel(&self, conditions: &[Visit<'_>], limits: &Limits) -> Result<(), BadInput> {

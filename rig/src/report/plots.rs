@@ -1,19 +1,19 @@
-//! The figures, as SVG text.
+//! The figures, as SVG text: what all of them share. Each is drawn twice, wide for a page and narrow for a telephone, with its own
+//! letters in both; the page shows one of them. Series differ by mark and dash as well as by colour.
 
-use super::RunData;
-use crate::sequence::MeasuredPass;
-use models::condition::Condition;
-use models::prediction::{FrictionModel, SpringSlider};
-use models::psi::{self, PsiEq17};
-use models::quantity::PeakToPeak;
+pub mod comparison;
+pub mod run;
+pub mod verdict;
+
+use super::html::escape;
 use plotters::coord::combinators::LogCoord;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
+use plotters::element::{Drawable, PointCollection};
 use plotters::prelude::*;
-use realtime::pacing::LoopReport;
+use plotters_backend::{BackendCoord, DrawingErrorKind};
 use std::ops::Range;
 
-const SIZE: (u32, u32) = (900, 480);
 /// Colours that stay apart on white, also for colour-blind readers (after Okabe and Ito, the yellow darkened).
 pub const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
@@ -26,25 +26,74 @@ pub const COLOURS: [RGBColor; 8] = [
     RGBColor(130, 130, 130),
 ];
 const GREY: RGBColor = RGBColor(90, 90, 90);
+/// Width and height of a figure across the page, and of one on a telephone, px.
+const WIDE: (u32, u32) = (900, 460);
+const NARROW: (u32, u32) = (360, 320);
+/// The same for one of several side by side.
+const PANEL: (u32, u32) = (400, 280);
 
 fn wrong(e: impl std::fmt::Display) -> miette::Report {
     miette::miette!("a figure: {e}")
 }
 
-/// One axis of a figure.
+/// One axis from end to end.
+#[derive(Clone, Copy, Debug)]
+pub struct Span {
+    low: f64,
+    high: f64,
+    logarithmic: bool,
+}
+
+impl Span {
+    fn linear(range: Range<f64>) -> Self {
+        Span { low: range.start, high: range.end, logarithmic: false }
+    }
+
+    fn logarithmic(range: Range<f64>) -> Self {
+        Span { low: range.start, high: range.end, logarithmic: true }
+    }
+
+    /// From zero on, over all of these values.
+    pub fn from_zero(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = values.fold((0.0f64, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+        Span::linear(low..high + 0.05 * (high - low).max(1e-300))
+    }
+
+    /// Over all of these values with a margin, logarithmic where it may be and they span more than a decade: within one such an
+    /// axis has a single label.
+    fn over(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        if logarithmic && low > 0.0 && high > 10.0 * low {
+            let margin = (high / low).powf(0.04);
+            return Span::logarithmic(low / margin..high * margin);
+        }
+        let margin = 0.04 * (high - low).max(1e-12 * high.abs().max(1e-300));
+        Span::linear(low - margin..high + margin)
+    }
+
+    /// So many places along it, the lower end left out.
+    pub fn places(&self, n: u32) -> impl Iterator<Item = f64> + use<> {
+        let Span { low, high, logarithmic } = *self;
+        (1..=n).map(move |k| {
+            let share = f64::from(k) / f64::from(n);
+            if logarithmic { low * (high / low).powf(share) } else { low + share * (high - low) }
+        })
+    }
+
+    fn axis(&self) -> Axis {
+        let range = self.low..self.high;
+        if self.logarithmic {
+            Axis::Logarithmic(range.log_scale().into())
+        } else {
+            Axis::Linear(range.into())
+        }
+    }
+}
+
+/// The same as the drawing library has it.
 enum Axis {
     Linear(RangedCoordf64),
     Logarithmic(LogCoord<f64>),
-}
-
-impl Axis {
-    fn linear(range: Range<f64>) -> Axis {
-        Axis::Linear(range.into())
-    }
-
-    fn logarithmic(range: Range<f64>) -> Axis {
-        Axis::Logarithmic(range.log_scale().into())
-    }
 }
 
 impl Ranged for Axis {
@@ -84,280 +133,161 @@ impl ValueFormatter<f64> for Axis {
 
 type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 
-/// A figure with named axes as SVG; `draw` puts the curves in.
+/// What a figure is: its sizes, its axes with their titles, and what it shows in one sentence for who cannot see it.
+struct Frame<'a> {
+    sizes: [(u32, u32); 2],
+    x: (Span, &'a str),
+    y: (Span, &'a str),
+    alt: &'a str,
+}
+
+/// A figure as SVG, wide and narrow; `draw` puts the curves in and is told the size of a mark.
 fn figure(
-    size: (u32, u32),
-    (x, x_name): (Axis, &str),
-    (y, y_name): (Axis, &str),
-    draw: impl for<'a> FnOnce(&mut Chart<'a>) -> miette::Result<()>,
+    frame: &Frame<'_>,
+    draw: impl for<'a> Fn(&mut Chart<'a>, u32) -> miette::Result<()>,
 ) -> miette::Result<String> {
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        area.fill(&WHITE).map_err(wrong)?;
-        let letters = if size.0 < SIZE.0 / 2 { 11 } else { 14 };
-        let mut chart = ChartBuilder::on(&area)
-            .margin(12)
-            .x_label_area_size(3 * letters)
-            .y_label_area_size(4 * letters)
-            .build_cartesian_2d(x, y)
-            .map_err(wrong)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .x_labels((size.0 / 75) as usize)
-            .x_desc(x_name)
-            .y_desc(y_name)
-            .label_style(("sans-serif", letters))
-            .draw()
-            .map_err(wrong)?;
-        draw(&mut chart)?;
-        area.present().map_err(wrong)?;
-    }
-    Ok(svg)
-}
-
-/// A measured `mu'` of a pass with vibration: amplitude in um, value, sd.
-fn measured(p: &MeasuredPass) -> Option<(f64, f64, f64)> {
-    let c = p.comparison?;
-    (p.pass.amplitude > PeakToPeak::ZERO).then_some(())?;
-    Some((p.pass.amplitude.micrometres(), c.mu_relative?, c.mu_relative_sd?))
-}
-
-/// A number with so many significant digits.
-fn round(v: f64, digits: i32) -> String {
-    let scale = 10f64.powi(digits - 1 - v.abs().max(1e-12).log10().floor() as i32);
-    format!("{}", (v * scale).round() / scale)
-}
-
-/// Nominal conditions, rounded so that passes of one setting fall together.
-fn setting(p: &MeasuredPass) -> (String, String, String) {
-    (round(p.pass.speed_m_s * 1e3, 2), round(p.pass.frequency_hz / 1e3, 3), round(p.pass.normal_force_n, 1))
-}
-
-/// The most common frequency and load: the base condition of the figure by speed.
-fn base(passes: &[MeasuredPass]) -> Option<(String, String)> {
-    let mut counts = std::collections::BTreeMap::<(String, String), usize>::new();
-    for p in passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO) {
-        let (_, f, n) = setting(p);
-        *counts.entry((f, n)).or_default() += 1;
-    }
-    counts.into_iter().max_by_key(|(_, n)| *n).map(|(key, _)| key)
-}
-
-/// Relative friction against amplitude, a colour a speed, with prediction bands.
-///
-/// # Errors
-/// Only if the drawing library fails.
-pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
-    let Some((f, n)) = base(&run.passes) else { return Ok("<p>No pass with vibration.</p>".into()) };
-    let chosen: Vec<&MeasuredPass> = run
-        .passes
-        .iter()
-        .filter(|p| {
-            let (_, pf, pn) = setting(p);
-            p.pass.amplitude > PeakToPeak::ZERO && pf == f && pn == n
-        })
-        .collect();
-    let mut speeds: Vec<String> = chosen.iter().map(|p| setting(p).0).collect();
-    speeds.sort_by(|a, b| a.parse::<f64>().unwrap_or(0.0).total_cmp(&b.parse().unwrap_or(0.0)));
-    speeds.dedup();
-    let widest = chosen.iter().map(|p| p.pass.amplitude.micrometres()).fold(1.0, f64::max) * 1.05;
-    let model = SpringSlider::new(run.finger).map_err(wrong)?;
-    let mu0 =
-        models::record::coulomb_coefficient(&run.passes.iter().map(|p| p.pass.clone()).collect::<Vec<_>>());
-    let svg = figure(
-        SIZE,
-        (Axis::linear(0.0..widest), "amplitude w, um peak-to-peak"),
-        (Axis::linear(0.0..1.1), "relative friction mu'"),
-        |chart| {
-            for (i, speed) in speeds.iter().enumerate() {
-                let colour = COLOURS[i % COLOURS.len()];
-                let of_speed: Vec<&&MeasuredPass> =
-                    chosen.iter().filter(|p| setting(p).0 == *speed).collect();
-                if let (Some(mu0), Some(first)) = (mu0, of_speed.first()) {
-                    let at = |w: f64| {
-                        let c = Condition {
-                            amplitude: PeakToPeak::from_metres(w * 1e-6),
-                            ..first.pass.condition(mu0)
-                        };
-                        model.predict(&c).ok()
-                    };
-                    let grid: Vec<f64> = (1..=200).map(|k| widest * f64::from(k) / 200.0).collect();
-                    let line: Vec<(f64, f64, f64)> = grid
-                        .iter()
-                        .filter_map(|w| at(*w).map(|p| (*w, p.mu_relative, p.mu_relative_sd)))
-                        .collect();
-                    let upper = line.iter().map(|(w, m, s)| (*w, (m + 2.0 * s).min(1.1)));
-                    let lower = line.iter().rev().map(|(w, m, s)| (*w, (m - 2.0 * s).max(0.0)));
-                    let band: Vec<(f64, f64)> = upper.chain(lower).collect();
-                    chart.draw_series([Polygon::new(band, colour.mix(0.18))]).map_err(wrong)?;
-                    chart
-                        .draw_series(LineSeries::new(
-                            line.iter().map(|(w, m, _)| (*w, *m)),
-                            colour.stroke_width(2),
-                        ))
-                        .map_err(wrong)?
-                        .label(format!("{speed} mm/s"))
-                        .legend(move |(x, y)| {
-                            PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(3))
-                        });
-                }
-                let points = of_speed.iter().filter_map(|p| measured(p));
-                chart
-                    .draw_series(points.map(|(w, m, s)| {
-                        ErrorBar::new_vertical(w, m - s, m.min(1.09), m + s, colour.filled(), 6)
-                    }))
-                    .map_err(wrong)?;
-            }
+    let mut text = String::new();
+    for (class, size) in ["wide", "narrow"].iter().zip(frame.sizes) {
+        let mut svg = String::new();
+        {
+            let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+            let letters = if size.0 < WIDE.0 / 2 { 13 } else { 15 };
+            let mut chart = ChartBuilder::on(&area)
+                .margin(10)
+                .x_label_area_size(3 * letters)
+                .y_label_area_size(4 * letters)
+                .build_cartesian_2d(frame.x.0.axis(), frame.y.0.axis())
+                .map_err(wrong)?;
             chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .label_font(("sans-serif", 14))
-                .background_style(WHITE.mix(0.8))
+                .configure_mesh()
+                .light_line_style(TRANSPARENT)
+                .bold_line_style(BLACK.mix(0.12))
+                .x_labels((size.0 / 75) as usize)
+                .y_labels((size.1 / 45) as usize)
+                .x_desc(frame.x.1)
+                .y_desc(frame.y.1)
+                .label_style(("sans-serif", letters))
                 .draw()
                 .map_err(wrong)?;
-            Ok(())
-        },
-    )?;
-    // Loads fall together by one digit, which is no word on what the load was.
-    let load_n = chosen.iter().map(|p| p.pass.normal_force_n).sum::<f64>() / chosen.len() as f64;
-    let load = round(load_n, 2);
-    Ok(format!("<figure>{svg}<figcaption>at {f} kHz and {load} N</figcaption></figure>"))
-}
-
-/// Relative friction against Psi (Eq. 17) with Eq. 20 and its stated uncertainty.
-///
-/// # Errors
-/// Only if the drawing library fails.
-pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
-    let points: Vec<(f64, f64, f64)> =
-        run.passes.iter().filter_map(|p| Some((p.psi_eq17?, measured(p)?.1, measured(p)?.2))).collect();
-    if points.is_empty() {
-        return Ok("<p>No pass with a Psi.</p>".into());
-    }
-    let lowest = points.iter().map(|p| p.0).fold(0.1, f64::min) * 0.8;
-    let highest = points.iter().map(|p| p.0).fold(10.0, f64::max) * 1.2;
-    let svg = figure(
-        SIZE,
-        (Axis::logarithmic(lowest..highest), "Psi of Eq. 17"),
-        (Axis::linear(0.0..1.1), "relative friction mu'"),
-        |chart| {
-            let grid: Vec<f64> =
-                (0..=200).map(|k| lowest * (highest / lowest).powf(f64::from(k) / 200.0)).collect();
-            let law = |star: f64| grid.iter().map(move |p| (*p, psi::relative_friction(PsiEq17(*p), star)));
-            let (star, sd) = (psi::PSI_STAR, psi::PSI_STAR_UNCERTAINTY);
-            let mut band: Vec<(f64, f64)> = law(star - sd).collect();
-            band.extend(law(star + sd).collect::<Vec<_>>().into_iter().rev());
-            chart.draw_series([Polygon::new(band, GREY.mix(0.2))]).map_err(wrong)?;
-            chart.draw_series(LineSeries::new(law(star), GREY.stroke_width(2))).map_err(wrong)?;
-            chart
-                .draw_series(points.iter().map(|(p, m, s)| {
-                    ErrorBar::new_vertical(*p, m - s, m.min(1.09), m + s, COLOURS[0].filled(), 6)
-                }))
-                .map_err(wrong)?;
-            Ok(())
-        },
-    )?;
-    Ok(format!("<figure>{svg}</figure>"))
-}
-
-/// Standardised residuals in the order of measurement.
-///
-/// # Errors
-/// Only if the drawing library fails.
-pub fn residuals(run: &RunData) -> miette::Result<String> {
-    let points: Vec<(f64, f64, bool)> = run
-        .passes
-        .iter()
-        .filter_map(|p| Some((p.pass.time_s, p.comparison?.z, p.reference)))
-        .filter(|(_, z, _)| z.is_finite())
-        .collect();
-    if points.is_empty() {
-        return Ok("<p>No residual.</p>".into());
-    }
-    let end = points.iter().map(|p| p.0).fold(1.0, f64::max) * 1.02;
-    let most = points.iter().map(|p| p.1.abs()).fold(3.0, f64::max).min(40.0) * 1.1;
-    let svg = figure(
-        (900, 360),
-        (Axis::linear(0.0..end), "time, s"),
-        (Axis::linear(-most..most), "residual, standard deviations"),
-        |chart| {
-            for level in [-1.96, 1.96] {
-                let dashes = DashedLineSeries::new([(0.0, level), (end, level)], 6, 5, GREY.stroke_width(1));
-                chart.draw_series(dashes).map_err(wrong)?;
-            }
-            chart
-                .draw_series(points.iter().map(|(t, z, reference)| {
-                    let colour = if *reference { GREY } else { COLOURS[1] };
-                    Circle::new((*t, z.clamp(-most, most)), 3, colour.filled())
-                }))
-                .map_err(wrong)?;
-            Ok(())
-        },
-    )?;
-    Ok(format!("<figure>{svg}<figcaption>grey: references without vibration</figcaption></figure>"))
-}
-
-/// Histogram of the loop's lateness.
-///
-/// # Errors
-/// Only if the drawing library fails.
-pub fn lateness(report: &LoopReport) -> miette::Result<String> {
-    let bars: Vec<(f64, f64)> = report
-        .histogram
-        .iter()
-        .filter(|(_, n)| *n > 0)
-        .map(|(ns, n)| (*ns as f64 / 1e3, *n as f64))
-        .collect();
-    if bars.is_empty() {
-        return Ok("<p>No cycle was timed.</p>".into());
-    }
-    let highest = bars.iter().map(|b| b.0).fold(10.0, f64::max) * 2.0;
-    let most = bars.iter().map(|b| b.1).fold(10.0, f64::max) * 2.0;
-    let svg = figure(
-        (900, 300),
-        (Axis::logarithmic(0.5..highest), "lateness, us"),
-        (Axis::logarithmic(0.7..most), "deadlines"),
-        |chart| {
-            let bar = |(upper, n): &(f64, f64)| {
-                Rectangle::new([(upper / 2.0, 0.7), (*upper, *n)], COLOURS[0].mix(0.6).filled())
-            };
-            chart.draw_series(bars.iter().map(bar)).map_err(wrong)?;
-            Ok(())
-        },
-    )?;
-    Ok(format!("<figure>{svg}</figure>"))
-}
-
-/// Errors of passes in standard deviations against one covariate, before and after a cause was added.
-///
-/// # Errors
-/// Only if the drawing library fails.
-pub fn errors_against(
-    name: &str,
-    logarithmic: bool,
-    limit: f64,
-    before: &[(f64, f64)],
-    after: &[(f64, f64)],
-) -> miette::Result<String> {
-    let (low, high) =
-        before.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.0), h.max(p.0)));
-    // Within a decade a logarithmic axis has a single label.
-    let x = if logarithmic && high > 10.0 * low {
-        let margin = (high / low).powf(0.03);
-        Axis::logarithmic(low / margin..high * margin)
-    } else {
-        let margin = 0.03 * (high - low);
-        Axis::linear(low - margin..high + margin)
-    };
-    let svg = figure((430, 240), (x, name), (Axis::linear(-limit..limit), "error, sd"), |chart| {
-        for (points, colour) in [(before, COLOURS[1]), (after, COLOURS[0])] {
-            let dot =
-                |(x, e): &(f64, f64)| Circle::new((*x, e.clamp(-limit, limit)), 2, colour.mix(0.55).filled());
-            chart.draw_series(points.iter().map(dot)).map_err(wrong)?;
+            draw(&mut chart, if size.0 < WIDE.0 { 3 } else { 4 })?;
+            area.present().map_err(wrong)?;
         }
-        Ok(())
-    })?;
-    Ok(format!("<figure>{svg}</figure>"))
+        let svg =
+            svg.replacen("<svg ", &format!("<svg role=\"img\" aria-label=\"{}\" ", escape(frame.alt)), 1);
+        text.push_str(&format!("<div class=\"{class}\">{svg}</div>"));
+    }
+    Ok(text)
+}
+
+/// How many marks there are that are told apart by their shape alone.
+const MARKS: usize = 5;
+
+/// A mark whose shape is the series': disc, square, triangle, diamond, cross; hollow where it is not filled.
+fn mark(series: usize, at: (f64, f64), size: u32, colour: RGBColor, filled: bool) -> Mark {
+    Mark {
+        series: series % MARKS,
+        at,
+        size: size as i32,
+        style: colour.stroke_width(if filled { 2 } else { 1 }),
+        filled,
+    }
+}
+
+struct Mark {
+    series: usize,
+    at: (f64, f64),
+    size: i32,
+    style: ShapeStyle,
+    filled: bool,
+}
+
+impl<'a> PointCollection<'a, (f64, f64)> for &'a Mark {
+    type Point = &'a (f64, f64);
+    type IntoIter = std::iter::Once<&'a (f64, f64)>;
+
+    fn point_iter(self) -> Self::IntoIter {
+        std::iter::once(&self.at)
+    }
+}
+
+impl<DB: DrawingBackend> Drawable<DB> for Mark {
+    fn draw<I: Iterator<Item = BackendCoord>>(
+        &self,
+        mut places: I,
+        backend: &mut DB,
+        _: (u32, u32),
+    ) -> Result<(), DrawingErrorKind<DB::ErrorType>> {
+        let Some((x, y)) = places.next() else { return Ok(()) };
+        let r = self.size;
+        let corners: &[(i32, i32)] = match self.series {
+            0 => return backend.draw_circle((x, y), r as u32, &self.style, self.filled),
+            1 => &[(-r, -r), (r, -r), (r, r), (-r, r), (-r, -r)],
+            2 => &[(0, -r - 1), (r + 1, r), (-r - 1, r), (0, -r - 1)],
+            3 => &[(0, -r - 1), (r + 1, 0), (0, r + 1), (-r - 1, 0), (0, -r - 1)],
+            _ => {
+                backend.draw_line((x - r, y - r), (x + r, y + r), &self.style)?;
+                return backend.draw_line((x - r, y + r), (x + r, y - r), &self.style);
+            }
+        };
+        let outline = corners.iter().map(|(dx, dy)| (x + dx, y + dy));
+        if self.filled {
+            backend.fill_polygon(outline, &self.style)
+        } else {
+            backend.draw_path(outline, &self.style)
+        }
+    }
+}
+
+/// A line, whole or in dashes of so many pixels.
+fn line(
+    chart: &mut Chart<'_>,
+    points: Vec<(f64, f64)>,
+    colour: RGBColor,
+    dash: Option<i32>,
+) -> miette::Result<()> {
+    match dash {
+        None => chart.draw_series(LineSeries::new(points, colour.stroke_width(2))).map_err(wrong)?,
+        Some(dash) => chart
+            .draw_series(DashedLineSeries::new(points, dash, dash, colour.stroke_width(2)))
+            .map_err(wrong)?,
+    };
+    Ok(())
+}
+
+/// A band between two lines of points.
+fn band(
+    chart: &mut Chart<'_>,
+    low: &[(f64, f64)],
+    high: &[(f64, f64)],
+    colour: RGBColor,
+) -> miette::Result<()> {
+    let around: Vec<(f64, f64)> = high.iter().chain(low.iter().rev()).copied().collect();
+    if around.len() > 2 {
+        chart.draw_series([Polygon::new(around, colour.mix(0.16))]).map_err(wrong)?;
+    }
+    Ok(())
+}
+
+/// A mark with its error bar, cut at the ends of the axis.
+fn measured(
+    chart: &mut Chart<'_>,
+    series: usize,
+    size: u32,
+    colour: RGBColor,
+    points: &[(f64, f64, f64)],
+    [low, high]: [f64; 2],
+) -> miette::Result<()> {
+    let bars = points.iter().map(|(x, y, sd)| {
+        let ends = [(y - sd).clamp(low, high), (y + sd).clamp(low, high)];
+        PathElement::new(vec![(*x, ends[0]), (*x, ends[1])], colour.stroke_width(1))
+    });
+    chart.draw_series(bars).map_err(wrong)?;
+    let marks = points.iter().map(|(x, y, _)| mark(series, (*x, y.clamp(low, high)), size, colour, true));
+    chart.draw_series(marks).map_err(wrong)?;
+    Ok(())
+}
+
+/// The shape of a series in a caption, as text.
+pub fn mark_name(series: usize) -> &'static str {
+    ["discs", "squares", "triangles", "diamonds", "crosses"][series % MARKS]
 }

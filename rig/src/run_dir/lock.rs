@@ -39,3 +39,34 @@ pub fn is_held(run: &Path) -> bool {
     let Ok(file) = File::open(run.join(NAME)) else { return false };
     matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
 }
+
+/// The process of this machine that has the lock of a run's folder open; `None` where it is of another machine, or of a user whose
+/// processes cannot be seen. A number that is written in the lock alone could be that of any process by now.
+pub fn holder(run: &Path) -> Option<rustix::process::Pid> {
+    let lock = run.join(NAME);
+    let process = rustix::process::Pid::from_raw(fs::read_to_string(&lock).ok()?.trim().parse().ok()?)?;
+    let whole = lock.canonicalize().ok()?;
+    let open = fs::read_dir(format!("/proc/{}/fd", process.as_raw_nonzero())).ok()?;
+    let has = open.flatten().any(|entry| fs::read_link(entry.path()).is_ok_and(|file| file == whole));
+    (has && is_held(run)).then_some(process)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_holder_is_who_has_the_lock_open_and_nobody_else() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(holder(folder.path()), None);
+        let lock = folder.path().join(NAME);
+        let claimed = claim(&lock).unwrap();
+        assert_eq!(holder(folder.path()), Some(rustix::process::getpid()));
+        // As a lock on a shared folder: the number is that of a process here, which has nothing to do with it.
+        fs::write(&lock, "1").unwrap();
+        assert_eq!(holder(folder.path()), None);
+        drop(claimed);
+        fs::write(&lock, std::process::id().to_string()).unwrap();
+        assert_eq!(holder(folder.path()), None, "it was let go");
+    }
+}

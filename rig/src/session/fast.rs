@@ -1,5 +1,6 @@
 //! A sweep in virtual time: one thread, no clock, the same bytes for the same seed.
 
+use super::glimpse::Glimpses;
 use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary};
 use crate::files::Placed;
@@ -7,7 +8,7 @@ use crate::plan::{Plan, Resolution};
 use crate::run_dir::RunDir;
 use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
 use crate::setup::Setup;
-use crate::supervisor::{self, End, OffReport, VirtualLoop};
+use crate::supervisor::{self, Asked, End, OffReport, VirtualLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::FrictionModel;
 use realtime::compare::Agreement;
@@ -92,14 +93,20 @@ fn sweep(
     let unkept = RefCell::new(None);
     let mut knows = false;
     let mut ask = || {
+        // In virtual time there is nothing to wait for: a pause would only fill the record.
+        let ends = |end| Asked { end, pause: false };
         if !knows && unkept.borrow().is_some() {
             knows = true;
-            return Some(End::NotKept);
+            return ends(Some(End::NotKept));
         }
-        (signals.stops.swap(0, Ordering::Relaxed) > 0).then_some(End::Asked)
+        ends((signals.stops.swap(0, Ordering::Relaxed) > 0).then_some(End::Asked))
     };
+    let mut glimpses = Glimpses::default();
     let mut keep = |row: &Row, sequence: &Sequence, reaction: Reaction| -> miette::Result<()> {
         recorder.row(row).into_diagnostic()?;
+        if let Some(glimpse) = glimpses.take(row) {
+            news(News::State(&glimpse));
+        }
         keeper::record(&mut recorder, row.now, &reaction.events, reaction.pass.as_ref())?;
         kept.keep(&reaction.events, reaction.pass.as_ref(), news)?;
         if reaction.pass.is_some() {
@@ -169,7 +176,7 @@ pub fn rehearse(
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let mut passes = Vec::new();
-    let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut || None, &mut |_, _, reaction| {
+    let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut Asked::default, &mut |_, _, reaction| {
         passes.extend(reaction.pass);
     });
     let agreement = sequence.agreement(outcome == Outcome::Complete);

@@ -79,7 +79,9 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     files.extend(job.model_file.clone());
     files.extend(job.setup.certificates.files.iter().cloned());
     files.extend(job.setup.profiles().into_iter().map(|(name, text)| (format!("profiles/{name}"), text)));
-    let facts = facts.into_iter().map(|(k, v)| (k.to_string(), v)).collect();
+    let notes = [("operator", &job.notes.operator), ("sample", &job.notes.sample)];
+    let notes = notes.into_iter().filter_map(|(k, v)| Some((k, v.clone()?)));
+    let facts = facts.into_iter().chain(notes).map(|(k, v)| (k.to_string(), v)).collect();
     Ok(Preamble { start_unix_ns, facts, files })
 }
 

@@ -6,6 +6,7 @@
 mod writer;
 
 use super::fast::words;
+use super::glimpse::{Glimpse, Glimpses};
 use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary, Unfinished};
 use crate::claim::RigClaim;
@@ -14,7 +15,7 @@ use crate::exposure::Ledger;
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use crate::supervisor::wall::{Ended, Parts};
-use crate::supervisor::{self, End, WallLoop};
+use crate::supervisor::{self, Asked, End, WallLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use realtime::pacing;
 use realtime::ports::Nanos;
@@ -34,6 +35,8 @@ struct Note {
     pass: Option<MeasuredPass>,
     /// Passes made, planned, s to go.
     progress: (usize, usize, f64),
+    /// The cycle, where it is to be told.
+    state: Option<Glimpse>,
 }
 
 /// Runs a job in wall-clock time.
@@ -101,7 +104,7 @@ pub fn run(
         let keeping = keeping.as_ref();
         let following = scope.spawn(move || {
             let (mut stops, mut knows) = (0, false);
-            let mut ask = || {
+            let mut ends = || {
                 let asked = signals.stops.load(Ordering::Relaxed);
                 if asked > stops {
                     stops = asked;
@@ -114,13 +117,16 @@ pub fn run(
                 }
                 None
             };
+            let mut ask = || Asked { end: ends(), pause: signals.paused.load(Ordering::Relaxed) };
+            let mut glimpses = Glimpses::default();
             supervisor::sweep(&mut reins, following_sequence, &mut ask, &mut |row, sequence, reaction| {
-                if !reaction.events.is_empty() || reaction.pass.is_some() {
+                let state = glimpses.take(row);
+                if state.is_some() || !reaction.events.is_empty() || reaction.pass.is_some() {
                     let (done, all) = sequence.progress();
                     let progress = (done, all, sequence.remaining_s());
                     let (events, pass) = (reaction.events, reaction.pass);
                     // The other end lives as long as this one: it reads until this end is dropped.
-                    let _ = note_in.send(Note { at: row.now, events, pass, progress });
+                    let _ = note_in.send(Note { at: row.now, events, pass, progress, state });
                 }
             })
         });
@@ -135,7 +141,12 @@ pub fn run(
                     let (done, all, left_s) = note.progress;
                     news(News::Progress(done, all, left_s));
                 }
-                let _ = to_writer.send((note.at, note.events, note.pass));
+                if let Some(glimpse) = &note.state {
+                    news(News::State(glimpse));
+                }
+                if note.pass.is_some() || !note.events.is_empty() {
+                    let _ = to_writer.send((note.at, note.events, note.pass));
+                }
             }
         };
         // Whoever is told the news is foreign code, and may panic where its terminal is gone: then the rig is stopped before

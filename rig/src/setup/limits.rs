@@ -2,6 +2,7 @@
 //! finger needs.
 
 use super::SetupFile;
+use crate::input::{Problems, unit_meant};
 use drivers::InstrumentSetup;
 use models::quantity::PeakToPeak;
 use realtime::ports::Nanos;
@@ -111,8 +112,64 @@ fn rate(instrument: &InstrumentSetup, name: &'static str, low: f64) -> Result<f6
 const FORCE_RATE_MIN_HZ: f64 = 20.0;
 const STATE_RATE_MIN_HZ: f64 = 10.0;
 
+/// The limits of a setup; every one that cannot be used is told of.
+pub(super) fn all_of(file: &SetupFile, cycle: Nanos, wrong: &mut Problems<'_>) -> Option<Limits> {
+    let mut file = file.clone();
+    let mut told = Vec::new();
+    loop {
+        let error = match of(&file, cycle) {
+            Ok(limits) => return Some(limits),
+            Err(error) => error,
+        };
+        let name = error.name();
+        if told.contains(&name) {
+            return None;
+        }
+        told.push(name);
+        let remedy = match &error {
+            LimitError::OutOfRange { value, low, high, .. } => unit_meant(name, *value, [*low, *high]),
+            LimitError::AboveHard { value, hard, .. } => unit_meant(name, *value, [1e-3 * hard, *hard]),
+            LimitError::Unusable { .. } => None,
+        };
+        let remedy = remedy
+            .or_else(|| Some("docs/setup.md lists the limits with their defaults and hard ranges".into()));
+        // The rate of a channel stands with its instrument, every other limit under [limits].
+        match name {
+            "amplifier" | "stage" | "supply_relay" | "safety_inputs" => {
+                wrong.add(&[name, "rate_hz"], error.to_string(), remedy);
+            }
+            "force" => wrong.add(&["force"], error.to_string(), remedy),
+            // The length of the travel is told by its upper end, and may be the lower one's fault.
+            "travel_max_m" if file.limits.travel_max_m.is_none() => {
+                wrong.add(&["limits", "travel_min_m"], error.to_string(), remedy);
+                file.limits.travel_min_m = None;
+            }
+            name => wrong.add(&["limits", name], error.to_string(), remedy),
+        }
+        forget(&mut file, name);
+    }
+}
+
+/// Takes a value that was told of out of the file, so that the others are looked at.
+fn forget(file: &mut SetupFile, name: &str) {
+    match name {
+        "force" => file.force.iter_mut().for_each(|force| force.rate_hz = None),
+        "amplifier" => file.amplifier.rate_hz = None,
+        "stage" => file.stage.rate_hz = None,
+        "supply_relay" => file.supply_relay.iter_mut().for_each(|relay| relay.rate_hz = None),
+        "safety_inputs" => file.safety_inputs.iter_mut().for_each(|inputs| inputs.rate_hz = None),
+        name => {
+            let Ok(serde_json::Value::Object(mut limits)) = serde_json::to_value(&file.limits) else {
+                return;
+            };
+            limits.remove(name);
+            file.limits = serde_json::from_value(limits.into()).unwrap_or_default();
+        }
+    }
+}
+
 /// Soft limits over the paper's, timing from the instruments' profiles.
-pub(super) fn of(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
+fn of(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     let l = &file.limits;
     let mut limits = Limits::paper(cycle);
     let set = |slot: &mut f64, value: Option<f64>| *slot = value.unwrap_or(*slot);

@@ -23,7 +23,7 @@ pub fn look_in(folder: Option<PathBuf>) {
 }
 
 /// The named folder and the user's own, `~/.config/muprime/profiles`.
-fn library() -> Library {
+pub(crate) fn library() -> Library {
     let home = || std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".config"));
     let config =
         std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).filter(|p| p.is_absolute()).or_else(home);
@@ -34,26 +34,29 @@ fn library() -> Library {
 /// Where a problem stands in the setup, as a path of keys, and what it is.
 type Problem = (Vec<&'static str>, String);
 
-/// Reads the profiles that do not come with the program, and puts each beside its instrument.
-pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Result<(), Problem> {
+/// Reads the profiles that do not come with the program, and puts each beside its instrument. Returns those that cannot be read.
+pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Vec<Problem> {
     let library = library();
     let mut read: BTreeMap<String, Arc<Source>> = BTreeMap::new();
+    let mut problems = Vec::new();
     let mut one = |name: &mut String, source: &mut Option<Arc<Source>>, place: Vec<&'static str>| {
-        let found = library.find(name, folder).map_err(|error| (place.clone(), error.to_string()))?;
-        let Some(found) = found else { return Ok(()) };
+        let found = match library.find(name, folder) {
+            Ok(Some(found)) => found,
+            Ok(None) => return,
+            Err(error) => return problems.push((place, error.to_string())),
+        };
         let kept = read.entry(found.id.clone()).or_insert_with(|| Arc::clone(&found));
         if kept.text != found.text || kept.files != found.files {
             let (a, b) = (kept.origin.display(), found.origin.display());
             let problem =
                 format!("{a} and {b} are two profiles of one id, `{}`: give one another `id`", found.id);
-            return Err((place, problem));
+            return problems.push((place, problem));
         }
         name.clone_from(&kept.id);
         *source = Some(Arc::clone(kept));
-        Ok(())
     };
     for instrument in &mut file.force {
-        one(&mut instrument.profile, &mut instrument.source, vec!["force"])?;
+        one(&mut instrument.profile, &mut instrument.source, vec!["force"]);
     }
     let SetupFile { amplifier, stage, supply_relay, safety_inputs, vibrometer, .. } = file;
     for (table, instrument) in [("amplifier", Some(amplifier)), ("stage", Some(stage))]
@@ -61,42 +64,83 @@ pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Result<(), Problem
         .chain([("supply_relay", supply_relay.as_mut()), ("safety_inputs", safety_inputs.as_mut())])
     {
         if let Some(instrument) = instrument {
-            one(&mut instrument.profile, &mut instrument.source, vec![table, "profile"])?;
+            one(&mut instrument.profile, &mut instrument.source, vec![table, "profile"]);
         }
     }
     if let Some(vibrometer) = vibrometer {
-        one(&mut vibrometer.profile, &mut vibrometer.source, vec!["vibrometer", "profile"])?;
+        one(&mut vibrometer.profile, &mut vibrometer.source, vec!["vibrometer", "profile"]);
     }
-    Ok(())
+    problems
 }
 
-/// Whether every instrument can be what the setup names it for, on the line that the setup states.
-pub(super) fn fit(file: &SetupFile) -> Result<(), Problem> {
+/// The instruments of a setup with the table in which each stands.
+fn all_of(file: &SetupFile) -> Vec<(&'static str, &InstrumentSetup)> {
     let force = file.force.iter().map(|instrument| ("force", instrument));
     let relay = file.supply_relay.iter().map(|instrument| ("supply_relay", instrument));
     let inputs = file.safety_inputs.iter().map(|instrument| ("safety_inputs", instrument));
-    let all =
-        force.chain([("amplifier", &file.amplifier), ("stage", &file.stage)]).chain(relay).chain(inputs);
-    let all: Vec<(&'static str, &InstrumentSetup)> = all.collect();
+    force.chain([("amplifier", &file.amplifier), ("stage", &file.stage)]).chain(relay).chain(inputs).collect()
+}
+
+/// Whether every instrument can be what the setup names it for, on the line that the setup states: all that do not.
+pub(super) fn fit(file: &SetupFile) -> Vec<Problem> {
+    let all = all_of(file);
+    let mut problems = Vec::new();
     for &(table, instrument) in &all {
         let place = |key: &'static str| if table == "force" { vec![table] } else { vec![table, key] };
-        one_fits(table, instrument).map_err(|(key, problem)| {
-            (place(key), format!("instrument `{}` at {}: {problem}", instrument.profile, instrument.address))
-        })?;
+        if let Err((key, problem)) = one_fits(table, instrument) {
+            let problem = format!("instrument `{}` at {}: {problem}", instrument.profile, instrument.address);
+            problems.push((place(key), problem));
+            continue;
+        }
         if file.virtual_rig.is_some() && instrument.address.starts_with("tcp:") {
             let said = "the virtual rig serves a serial line as `pty` or at a path, not over TCP";
-            return Err((place("address"), said.into()));
+            problems.push((place("address"), said.into()));
+            continue;
         }
         if file.virtual_rig.is_some() {
             let served = instrument.description().map_err(|error| error.to_string());
-            served
-                .and_then(|profile| {
-                    sim::wire::device::Device::new(profile).map_err(|error| error.to_string())
-                })
-                .map_err(|problem| (place("profile"), problem))?;
+            let served = served.and_then(|profile| {
+                sim::wire::device::Device::new(profile).map(drop).map_err(|error| error.to_string())
+            });
+            problems.extend(served.err().map(|problem| (place("profile"), problem)));
         }
     }
-    share_lines(&all)
+    if problems.is_empty() {
+        problems.extend(twice(&all));
+        problems.extend(share_lines(&all).err());
+    }
+    problems
+}
+
+/// Instruments of different profiles at one place, where only one of them can be. One board may be named for two things.
+fn twice(all: &[(&'static str, &InstrumentSetup)]) -> Vec<Problem> {
+    let place = |instrument: &InstrumentSetup| {
+        let link = instrument.description().ok()?.description.link;
+        let number = match link.kind {
+            LinkKind::ModbusTcp | LinkKind::ModbusRtu => {
+                format!("unit {}", instrument.unit.or(link.unit).unwrap_or(1))
+            }
+            LinkKind::Canopen => format!("node {}", instrument.base.or(link.node.map(u32::from))?),
+            LinkKind::Scpi if !instrument.address.ends_with(":0") => "that port".to_string(),
+            _ => return None,
+        };
+        Some((instrument.address.clone(), number))
+    };
+    let mut seen: BTreeMap<(String, String), &str> = BTreeMap::new();
+    let mut problems = Vec::new();
+    for (table, instrument) in all {
+        let Some(at) = place(instrument) else { continue };
+        let (address, number) = at.clone();
+        let first = *seen.entry(at).or_insert(&instrument.profile);
+        if first != instrument.profile {
+            let problem = format!(
+                "`{first}` and `{}` are both at {address}, {number}: correct an `address`, or give one another `unit`",
+                instrument.profile
+            );
+            problems.push((if *table == "force" { vec!["force"] } else { vec![*table, "address"] }, problem));
+        }
+    }
+    problems
 }
 
 /// Whether instruments at one serial line can share it: sensors with Modbus RTU can.
@@ -107,7 +151,10 @@ fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> 
         let over_rtu = instrument.address.starts_with("rtu:");
         let serial = over_rtu || matches!(kind, LinkKind::ModbusRtu | LinkKind::Serial);
         // Each `pty` is a line of its own.
-        let path = std::fs::canonicalize(path).ok().filter(|_| serial && path != "pty")?;
+        // A line that is not plugged in is one line all the same.
+        let path =
+            Some(path).filter(|path| serial && *path != "pty" && !instrument.address.starts_with("tcp:"))?;
+        let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
         Some((path, over_rtu || kind == LinkKind::ModbusRtu))
     };
     let mut lines: BTreeMap<PathBuf, Vec<(&'static str, &InstrumentSetup, bool)>> = BTreeMap::new();
@@ -183,6 +230,11 @@ fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static s
 }
 
 impl Setup {
+    /// Its instruments, each with the table in which it stands.
+    pub(crate) fn by_table(&self) -> Vec<(&'static str, &InstrumentSetup)> {
+        all_of(&self.file)
+    }
+
     /// Whether the force instruments together give each axis once, as a run needs it; a look at one instrument does not.
     ///
     /// # Errors

@@ -13,8 +13,21 @@ pub enum Kind {
     Profile,
 }
 
-/// The file.
+/// The file. Its first line names the schema that editors complete by, as `muprime schema KIND` prints it.
 pub fn text(kind: Kind) -> String {
+    let name = match kind {
+        Kind::Plan => "plan",
+        Kind::Setup => "setup",
+        Kind::Fingertip => "fingertip",
+        Kind::Profile => "profile",
+    };
+    format!(
+        "#:schema ./{name}.schema.json\n# The line above lets editors complete and check: `muprime schema {name} > {name}.schema.json` writes that file.\n{}",
+        body(kind)
+    )
+}
+
+fn body(kind: Kind) -> String {
     match kind {
         Kind::Plan => include_str!("init/plan.toml").into(),
         Kind::Setup => include_str!("init/setup.toml").into(),

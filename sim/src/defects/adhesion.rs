@@ -1,5 +1,5 @@
 //! Attraction between skin and plate adds to the load that friction feels; it is there only as far as the surfaces have
-//! been pressed into each other: Fa (1 - exp(-F/F0)).
+//! been pressed into each other, Fa (1 - exp(-F/F0)), and it grows with a power of the speed, as peeling does.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;
@@ -11,11 +11,13 @@ pub(super) static KIND: Kind = Kind {
     in_tables: true,
     imitated: false,
     summary: "attraction adds to the load that friction feels",
-    parameters: &[Parameter::log("attraction_n", 5e-4, 0.2), Parameter::log("development_n", 0.01, 0.1)],
+    parameters: &[Parameter::log("attraction_n", 5e-4, 0.2), Parameter::log("development_n", 0.01, 0.1), Parameter::linear("speed_exponent", 0.1, 0.4)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },
 };
 
+const REFERENCE_M_S: f64 = 0.02;
+
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    contact.limit.adhesion_n = v[0];
+    contact.limit.adhesion_n = v[0] * (contact.speed_m_s / REFERENCE_M_S).powf(v[2]);
     contact.limit.adhesion_scale_n = v[1];
 }

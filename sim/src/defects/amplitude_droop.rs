@@ -12,10 +12,13 @@ pub(super) static KIND: Kind = Kind {
     in_tables: true,
     imitated: false,
     summary: "the plate's amplitude droops under the finger's load",
-    parameters: &[Parameter::log("load_ratio_at_1_n", 0.01, 3.0)],
+    parameters: &[Parameter::log("load_ratio_at_1_n", 0.01, 3.0), Parameter::linear("flight_per_um", 0.1, 0.6)],
     act: Act { setup: None, plate: Some(act), contact: None, forces: None },
 };
 
 fn act(v: &Values, at: &Surroundings, pp_m: f64) -> f64 {
-    pp_m / (1.0 + v[0] * at.normal_force_n.max(0.0).cbrt().powi(2))
+    let area = at.normal_force_n.max(0.0).cbrt().powi(2);
+    // The larger the swing under a load, the smaller the part of the cycle in which the finger touches.
+    let touched = 1.0 / (1.0 + v[1] * pp_m * 1e6 * (1.0 - area).max(0.0));
+    pp_m / (1.0 + v[0] * area * touched)
 }

@@ -119,7 +119,7 @@ impl Defects {
     ///     r#"
     ///     [[defect]]
     ///     name = "amplitude_droop"
-    ///     parameters = { load_ratio_at_1_n = 0.4 }
+    ///     parameters = { load_ratio_at_1_n = 0.4, flight_per_um = 0.3 }
     ///
     ///     [[defect]]
     ///     name = "plate_tilt"

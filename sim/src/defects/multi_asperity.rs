@@ -1,5 +1,5 @@
-//! Ridges of unequal height: seven equal shares of a normal distribution of heights, each its own slider on the one
-//! finger, so that the plate leaves them one after another.
+//! Ridges of unequal height: seven equal shares of a worn surface's heights (a mirrored gamma distribution of shape 2: the
+//! tall ones are cut), each its own slider on the one finger, so that the plate leaves them one after another.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;

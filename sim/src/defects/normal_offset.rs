@@ -10,7 +10,7 @@ pub(super) static KIND: Kind = Kind {
     in_tables: true,
     imitated: false,
     summary: "the zero of the normal force is off",
-    parameters: &[Parameter::signed("offset_n", 1.5e-3, 0.12), Parameter::linear("sinking", 0.0, 0.15)],
+    parameters: &[Parameter::signed("offset_n", 1.5e-3, 0.12), Parameter::linear("sinking", 0.1, 0.5)],
     act: Act { setup: None, plate: None, contact: None, forces: Some(act) },
 };
 

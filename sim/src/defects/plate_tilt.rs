@@ -1,4 +1,4 @@
-//! The plate is tilted against the sensor, and bent: the tilt changes a little along the stroke.
+//! The plate is tilted against the sensor, and bent: the tilt changes along the stroke.
 
 use super::{Act, Forces, Kind, Parameter, Place, Surroundings, Values};
 
@@ -9,12 +9,15 @@ pub(super) static KIND: Kind = Kind {
     in_tables: true,
     imitated: true,
     summary: "the plate is tilted against the sensor",
-    parameters: &[Parameter::signed("tilt_rad", 0.0015, 0.12), Parameter::linear("bend_rad_per_m", -0.3, 0.3)],
+    parameters: &[Parameter::signed("tilt_rad", 0.0015, 0.12), Parameter::linear("bend_over_tilt", -0.6, 0.6)],
     act: Act { setup: None, plate: None, contact: None, forces: Some(act) },
 };
 
+/// Distance from the middle at which the bend is stated (m).
+const HALF_STROKE_M: f64 = 0.015;
+
 fn act(v: &Values, at: &Surroundings, forces: &mut Forces) {
-    let tilt = v[0] * (1.0 + v[1] * at.position_m);
+    let tilt = v[0] * (1.0 + v[1] * at.position_m / HALF_STROKE_M);
     let (sin, cos) = tilt.sin_cos();
     let Forces { lateral_n, normal_n } = *forces;
     forces.lateral_n = lateral_n * cos + normal_n * sin;

@@ -1,5 +1,5 @@
 //! Friction that depends on the sliding speed as a thermally activated process does (Eyring): by asinh(U/U0), which is
-//! linear below U0 and logarithmic above. Unchanged at 20 mm/s.
+//! linear below U0 and logarithmic above, and falls again as fast sliding warms the bonds. Unchanged at 20 mm/s.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;
@@ -11,14 +11,14 @@ pub(super) static KIND: Kind = Kind {
     in_tables: true,
     imitated: false,
     summary: "the coefficient of friction depends on the sliding speed",
-    parameters: &[Parameter::signed("relative_slope", 0.004, 0.3), Parameter::log("knee_m_s", 2e-3, 2e-2)],
+    parameters: &[Parameter::signed("relative_slope", 0.004, 0.3), Parameter::log("knee_m_s", 2e-3, 2e-2), Parameter::linear("fall_per_50_mm_s", 0.0, 0.8)],
     act: Act { setup: None, plate: None, contact: Some(act), forces: None },
 };
 
 const REFERENCE_M_S: f64 = 0.02;
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    let rise = |speed: f64| (speed / v[1]).asinh();
+    let rise = |speed: f64| (speed / v[1]).asinh() - v[2] * speed / 0.05;
     let factor = 1.0 + v[0] * (rise(contact.speed_m_s) - rise(REFERENCE_M_S));
     contact.friction *= factor.clamp(0.2, 3.0);
 }

@@ -440,9 +440,14 @@ mod tests {
     #[test]
     fn a_search_leaves_no_more_than_its_ladder() {
         let mut searched = 0;
-        for (seed, name) in
-            [(3, "adhesion"), (4, "load_dependent_friction"), (5, "subsurface_relaxation"), (6, "mode_shape")]
-        {
+        for (seed, name) in [
+            (3, "adhesion"),
+            (4, "load_dependent_friction"),
+            (5, "subsurface_relaxation"),
+            (6, "mode_shape"),
+            (7, "normal_offset"),
+            (8, "moisture_drift"),
+        ] {
             let mut noise = Noise::new(seed, "ladder");
             let design = Design::draw(&mut noise);
             let planned = design.plan(&mut noise);

@@ -1,6 +1,7 @@
 //! One emulated instrument: registers out of the world, commands into it.
 
 use super::{Command, Plant, Quantity};
+use instruments::profile::FrameKind;
 use instruments::schema::Table;
 use instruments::{FrameId, Profile, SetId, SignalId, Values};
 use realtime::ports::Nanos;
@@ -9,17 +10,21 @@ use realtime::ports::Nanos;
 #[derive(Debug, Clone, Copy)]
 enum Source {
     Constant(f64),
-    World { quantity: Quantity, per_si: f64, modulo: f64 },
+    World { quantity: Quantity, per_si: f64, offset: f64, modulo: f64 },
 }
 
 /// An emulator cannot be made from a profile.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("profile `{profile}`: [emulator] names `{quantity}`, which the virtual world does not have")]
+#[error(
+    "profile `{profile}`: [emulator] names `{quantity}`, which the virtual world does not have; there are: {known}"
+)]
 pub struct UnknownQuantity {
     /// Id of the profile.
     pub profile: String,
     /// The name that nothing answers to.
     pub quantity: String,
+    /// Those that there are.
+    pub known: String,
 }
 
 /// Why an instrument refused a request.
@@ -52,15 +57,19 @@ impl Device {
     /// Where the profile names a quantity that the world does not have.
     pub fn new(profile: Profile) -> Result<Self, UnknownQuantity> {
         let d = &profile.description;
-        let unknown =
-            |quantity: &str| UnknownQuantity { profile: profile.id().into(), quantity: quantity.into() };
+        let unknown = |quantity: &str, known: Vec<&str>| UnknownQuantity {
+            profile: profile.id().into(),
+            quantity: quantity.into(),
+            known: known.join(", "),
+        };
         let mut sources = Vec::with_capacity(d.signal.len());
         for signal in &d.signal {
             let name = signal.name.as_ref();
             sources.push(if let Some(raw) = d.emulator.constant.get(name) {
                 Some(Source::Constant(*raw))
             } else if let Some(quantity) = d.emulator.measure.get(name) {
-                let quantity = Quantity::from_name(quantity).ok_or_else(|| unknown(quantity))?;
+                let quantity = Quantity::from_name(quantity)
+                    .ok_or_else(|| unknown(quantity, Quantity::ALL.iter().map(|q| q.name()).collect()))?;
                 // Counters and clocks run round at the width of their register.
                 let index = SignalId(sources.len());
                 let (counts, _) = profile.turn(index);
@@ -77,7 +86,7 @@ impl Device {
                         | Quantity::Heartbeat
                 );
                 let modulo = if wraps { counts * signal.scale } else { f64::INFINITY };
-                Some(Source::World { quantity, per_si: 1.0 / signal.si.factor, modulo })
+                Some(Source::World { quantity, per_si: 1.0 / signal.si.factor, offset: 0.0, modulo })
             } else {
                 None
             });
@@ -85,7 +94,11 @@ impl Device {
         let mut commands = Vec::with_capacity(d.set.len());
         for set in &d.set {
             commands.push(match d.emulator.command.get(set.name.as_ref()) {
-                Some(name) => Some((Command::from_name(name).ok_or_else(|| unknown(name))?, set.si.factor)),
+                Some(name) => {
+                    let known = || Command::ALL.iter().map(|c| c.name()).collect();
+                    let command = Command::from_name(name).ok_or_else(|| unknown(name, known()))?;
+                    Some((command, set.si.factor))
+                }
                 None => None,
             });
         }
@@ -103,6 +116,16 @@ impl Device {
         Ok(Self { sources, commands, blocks, constants, reads: 0, profile })
     }
 
+    /// Mounts a force sensor: `signal` shows the force of an axis by `force = gain * signal - offset_n`, all in SI units. What
+    /// the profile's emulator does not show otherwise stays as it is.
+    pub fn mount(&mut self, signal: &str, axis: Quantity, gain: f64, offset_n: f64) {
+        let Some(signal) = self.profile.signal(signal) else { return };
+        if let Some(Source::World { quantity, per_si, offset, .. }) = &mut self.sources[signal.0] {
+            let unit_per_si = 1.0 / self.profile.description.signal[signal.0].si.factor;
+            (*quantity, *per_si, *offset) = (axis, unit_per_si / gain, unit_per_si * offset_n / gain);
+        }
+    }
+
     /// The profile.
     #[must_use]
     pub fn profile(&self) -> &Profile {
@@ -115,13 +138,14 @@ impl Device {
         let (sources, reads) = (&self.sources, self.reads);
         let mut shown = |signal: SignalId| match sources[signal.0]? {
             Source::Constant(raw) => Some(raw),
-            Source::World { quantity, per_si, modulo } => {
-                let value = per_si
-                    * match quantity {
-                        Quantity::DeviceTime => now.seconds(),
-                        Quantity::DeviceReads => f64::from(reads),
-                        _ => plant.measure(quantity),
-                    };
+            Source::World { quantity, per_si, offset, modulo } => {
+                let value = offset
+                    + per_si
+                        * match quantity {
+                            Quantity::DeviceTime => now.seconds(),
+                            Quantity::DeviceReads => f64::from(reads),
+                            _ => plant.measure(quantity),
+                        };
                 Some(if modulo.is_finite() { value.rem_euclid(modulo) } else { value })
             }
         };
@@ -173,12 +197,19 @@ impl Device {
         let overlaps = |start: u16, length: u16| {
             usize::from(start) < to && usize::from(start) + usize::from(length) > from
         };
-        for index in 0..self.profile.description.poll.len() {
-            let poll = &self.profile.description.poll[index];
-            if poll.table == table && overlaps(poll.address, poll.count) {
-                let start = poll.address;
+        for index in 0..self.profile.frames().len() {
+            let FrameKind::Poll(poll) = self.profile.frames()[index].kind else { continue };
+            let spans = self.profile.frames()[index].spans.clone();
+            let asked = self.profile.description.poll[poll].table == table
+                && spans.iter().any(|span| overlaps(span.address, span.count));
+            if asked {
                 let bytes = self.frame(FrameId(index), plant, now);
-                put(start, &bytes);
+                let mut rest = bytes.as_slice();
+                for span in spans {
+                    let (own, others) = rest.split_at(2 * usize::from(span.count));
+                    put(span.address, own);
+                    rest = others;
+                }
             }
         }
         for (block, bytes) in self.profile.description.write.iter().zip(&self.blocks) {

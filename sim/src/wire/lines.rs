@@ -27,7 +27,8 @@ pub struct LineInstrument {
     device: Device,
     plant: SharedPlant,
     error: bool,
-    feeds_watchdog: bool,
+    /// Heartbeats of the world that the profile knows none of.
+    feeds: Vec<Command>,
 }
 
 impl LineInstrument {
@@ -35,16 +36,20 @@ impl LineInstrument {
     #[must_use]
     pub fn new(device: Device, plant: SharedPlant) -> Self {
         let commands = &device.profile().description.emulator.command;
-        let feeds_watchdog = commands.contains_key("enable") && !commands.contains_key("heartbeat");
-        Self { device, plant, error: false, feeds_watchdog }
+        let has = |command: Command| commands.values().any(|name| name == command.name());
+        let watched =
+            [(Command::Enable, Command::DriveHeartbeat), (Command::Velocity, Command::StageHeartbeat)];
+        let feeds = watched.into_iter().filter(|(drives, beat)| has(*drives) && !has(*beat));
+        let feeds = feeds.map(|(_, beat)| beat).collect();
+        Self { device, plant, error: false, feeds }
     }
 
-    /// An amplifier without a heartbeat has no watchdog: the world's is kept fed for it.
+    /// An amplifier or a stage without a heartbeat has no watchdog: the world's is kept fed for it.
     pub fn live(&mut self) {
-        if self.feeds_watchdog {
+        for beat in &self.feeds {
             let (mut plant, now) = self.plant.now();
             // only change counts
-            plant.command(&[(Command::DriveHeartbeat, (now.0 / 1_000_000 % 65_536) as f64)]);
+            plant.command(&[(*beat, (now.0 / 1_000_000 % 65_536) as f64)]);
         }
     }
 

@@ -87,7 +87,7 @@ impl SerialEmulator {
         Self::start(port, move |_| {
             let (sent, next) = frames(&mut device, &stream, &plant, due);
             due = next;
-            sent
+            sent.concat()
         })
     }
 }
@@ -219,12 +219,17 @@ impl RtuLine {
         }
         let (sent, due) = frames(device, &stream, &self.plant, due);
         self.streaming = Some((unit, due));
-        sent
+        sent.concat()
     }
 }
 
 /// The frames of a stream that are due, and when the next is.
-fn frames(device: &mut Device, stream: &Stream, plant: &SharedPlant, due: Nanos) -> (Vec<u8>, Nanos) {
+pub(super) fn frames(
+    device: &mut Device,
+    stream: &Stream,
+    plant: &SharedPlant,
+    due: Nanos,
+) -> (Vec<Vec<u8>>, Nanos) {
     let (mut plant, now) = plant.as_left();
     let Some(frame) = device.profile().frame("stream") else { return (Vec::new(), due) };
     let end = device.profile().description.link.rx_terminator.clone().unwrap_or_else(|| "\n".into());
@@ -236,10 +241,10 @@ fn frames(device: &mut Device, stream: &Stream, plant: &SharedPlant, due: Nanos)
         plant.advance(due);
         let mut bytes = device.frame(frame, &mut *plant, due);
         match device.profile().frames()[frame.0].write_line(&bytes, 1.0) {
-            Some(line) => sent.extend([line, end.clone()].concat().into_bytes()),
+            Some(line) => sent.push([line, end.clone()].concat().into_bytes()),
             None => {
                 close(stream, &mut bytes);
-                sent.extend(bytes);
+                sent.push(bytes);
             }
         }
         due = Nanos(due.0 + period);
@@ -249,8 +254,8 @@ fn frames(device: &mut Device, stream: &Stream, plant: &SharedPlant, due: Nanos)
 
 /// Puts sync bytes and check into a stream's frame.
 fn close(stream: &Stream, bytes: &mut [u8]) {
+    bytes[..stream.sync.len()].copy_from_slice(&stream.sync);
     let Some(shape) = stream.shape() else { return };
-    bytes[..shape.sync.len()].copy_from_slice(&shape.sync);
     let body = bytes.len() - shape.check.length();
     let check = shape.check.of(&bytes[shape.check_from..body], shape.check_high_first);
     bytes[body..].copy_from_slice(&check);

@@ -117,6 +117,29 @@ fn a_refused_command_is_dropped_and_off_is_owed_for_it() {
     assert_eq!(sent(&endpoint, &due, "enable"), Some(0.0), "a part of it may have been taken");
 }
 
+/// Else the loop's next command, a cycle later, switches on again what the refusal switched off, and the run goes on.
+#[test]
+fn a_refused_command_shows_as_a_fault() {
+    let (mut endpoint, mut port) = amplifier();
+    show(&mut endpoint, 1, false, 10);
+    assert!(!port.state(Nanos(10)).unwrap().fault);
+    // An 'off' that is refused is no fault of this kind: it is owed.
+    endpoint.hand_out_off(Nanos(11));
+    endpoint.refused();
+    show(&mut endpoint, 2, false, 12);
+    assert!(!port.state(Nanos(12)).unwrap().fault);
+    port.push(on(1, 1000));
+    endpoint.due(Nanos(20));
+    endpoint.refused();
+    port.push(on(2, 1000));
+    endpoint.due(Nanos(21));
+    show(&mut endpoint, 3, true, 30);
+    assert!(port.state(Nanos(30)).unwrap().fault);
+    let long_after = 12 + ALARM_HOLDS.0 + 1;
+    show(&mut endpoint, 4, false, long_after);
+    assert!(!port.state(Nanos(long_after)).unwrap().fault);
+}
+
 #[test]
 fn a_repeated_command_that_has_left_does_not_leave_again() {
     let (mut endpoint, mut port) = amplifier();
@@ -292,4 +315,24 @@ fn dropping_what_waits_keeps_a_noted_off() {
     port.push(on(3, 1000));
     let due = endpoint.due(Nanos(20));
     assert_eq!(sent(&endpoint, &due, "enable"), Some(0.0));
+}
+
+/// A stage with an enable of its own is on while it is to move or to load, and off at rest and at the end.
+#[test]
+fn a_stage_is_enabled_while_it_is_to_move_or_to_load() {
+    let text = include_str!("../../../profiles/muprime-stage.toml")
+        .replace("count = 5\nrate_hz = 500", "count = 6\nrate_hz = 500");
+    let more = "\n[[set]]\nname = \"enable\"\nregister = 5\ntype = \"u16\"\nrange = [0.0, 1.0]\nsafe = 0.0\n";
+    let profile = instruments::Profile::parse(&format!("{text}{more}")).unwrap();
+    let setup = InstrumentSetup::new("muprime-stage", "");
+    let (mut endpoint, _port) = Endpoint::stage(profile, &setup).unwrap();
+    for (velocity_m_s, normal_force_n, enabled) in
+        [(0.0, 0.0, 0.0), (0.02, 0.0, 1.0), (0.0, 0.25, 1.0), (0.0, 0.0, 0.0)]
+    {
+        ask(&endpoint, velocity_m_s, normal_force_n);
+        let due = endpoint.due(Nanos(10));
+        assert_eq!(sent(&endpoint, &due, "enable"), Some(enabled), "{velocity_m_s} m/s, {normal_force_n} N");
+    }
+    let enable = endpoint.profile().set("enable").unwrap();
+    assert!(endpoint.safe_set_points().contains(&(enable, 0.0)));
 }

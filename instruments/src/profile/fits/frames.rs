@@ -3,20 +3,30 @@
 use super::FASTEST_HZ;
 use crate::error::ProfileError;
 use crate::profile::compile::Compiler;
-use crate::profile::{CompiledSignal, Frame, FrameKind, Place};
+use crate::profile::{CompiledSignal, Frame, FrameKind, MOST_REGISTERS, Place};
 use crate::schema::{LinkKind, Table};
 
 impl Compiler<'_> {
     pub(super) fn check_poll(&self, poll: &crate::schema::Poll) -> Result<(), ProfileError> {
         let name = poll.name.as_ref();
-        if !(1..=125).contains(&poll.count) {
-            return Err(self.at(
-                poll.name.span(),
-                format!("poll `{name}` has {} registers; one read takes 1 to 125", poll.count),
-            ));
-        }
-        if u32::from(poll.address) + u32::from(poll.count) > 65536 {
-            return Err(self.at(poll.name.span(), format!("poll `{name}` runs past register 65535")));
+        match (poll.address, poll.count) {
+            (Some(_), Some(count)) if !(1..=MOST_REGISTERS).contains(&count) => {
+                let said =
+                    format!("poll `{name}` has {count} registers; one read takes 1 to {MOST_REGISTERS}");
+                return Err(self.at(poll.name.span(), said));
+            }
+            (Some(address), Some(count)) if u32::from(address) + u32::from(count) > 65536 => {
+                return Err(self.at(poll.name.span(), format!("poll `{name}` runs past register 65535")));
+            }
+            (Some(_), Some(_)) if poll.gap != 0 => {
+                let said = format!("poll `{name}`: `gap` is for signals with an `address` of their own");
+                return Err(self.at(poll.name.span(), said));
+            }
+            (Some(_), None) | (None, Some(_)) => {
+                let said = format!("poll `{name}` needs both `address` and `count`, or neither");
+                return Err(self.at(poll.name.span(), said));
+            }
+            _ => {}
         }
         match (poll.once, poll.rate_hz) {
             (true, None) => {}
@@ -66,12 +76,23 @@ impl Compiler<'_> {
         let d = self.description;
         let Some(stream) = &d.stream else { return Ok(()) };
         let wrong = |said: &str| Err(self.at_section("[stream]", format!("[stream]: {said}")));
-        let serial = d.link.kind == LinkKind::Serial;
+        let free = matches!(d.link.kind, LinkKind::Serial | LinkKind::Tcp | LinkKind::Udp);
+        let datagrams = d.link.kind == LinkKind::Udp;
         let starts = stream.start_register.is_some() || stream.start_function.is_some();
         match (stream.line.is_some(), stream.length, stream.check) {
-            (true, None, None) if serial && stream.sync.is_empty() => {}
+            (true, None, None) if free && stream.sync.is_empty() => {}
             (true, ..) => {
-                return wrong("`line` is for a link of kind Serial, and goes without length, check and sync");
+                return wrong(
+                    "`line` is for links of kind Serial, Tcp and Udp, and goes without length, check and sync",
+                );
+            }
+            (false, Some(length), None) if datagrams => {
+                if usize::from(length) <= stream.sync.len() {
+                    return wrong("`length` leaves no byte after sync");
+                }
+                if stream.check_from != 0 || stream.check_order.is_some() || stream.believed_after != 1 {
+                    return wrong("`check_from`, `check_order` and `believed_after` belong to a `check`");
+                }
             }
             (false, Some(length), Some(check)) => {
                 let around = usize::from(stream.check_from).max(stream.sync.len()) + check.length();
@@ -88,18 +109,20 @@ impl Compiler<'_> {
         if !(stream.rate_hz > 0.0 && stream.rate_hz <= FASTEST_HZ) {
             return wrong("a `rate_hz` is above 0 and at most 20000");
         }
-        if serial && (starts || stream.stop.is_some() || stream.stop_before_open) {
-            return wrong("on a link of kind Serial it runs by itself; [[init]] `send` may start it");
+        if free && (starts || stream.stop.is_some() || stream.stop_before_open) {
+            return wrong(
+                "on a link of kind Serial, Tcp or Udp it runs by itself; [[init]] `send` may start it",
+            );
         }
-        if serial && !(d.query.is_empty() && d.set.is_empty()) {
+        if free && !(d.query.is_empty() && d.set.is_empty()) {
             return wrong("it leaves no room for [[query]] and [[set]] on its line");
         }
-        if !serial && starts && stream.stop.is_none() {
+        if !free && starts && stream.stop.is_none() {
             return wrong("what is started needs `stop`");
         }
-        if !serial && !starts {
+        if !free && !starts {
             return wrong(
-                "needs `start_register` or `start_function`; one that runs by itself is of kind `serial`",
+                "needs `start_register` or `start_function`; one that runs by itself is of kind `serial`, `tcp` or `udp`",
             );
         }
         if stream.stop_before_open && stream.stop.is_none() {

@@ -3,9 +3,10 @@
 //! Semantics of finite recovery (section 5.3 of the paper, as its figures show it): in contact the stretch
 //! grows with the plate; where the spring's force passes the limit the slider slips and the force is the
 //! limit, while the stretch follows the limit down no faster than the recovery allows; out of contact the
-//! force is zero and the stretch recovers; the next contact starts from what is left.
+//! force is zero and the stretch recovers; the next contact starts from what is left. The other two ways of
+//! [`SlipBack`] change what the stretch does while it slips, not the force.
 
-use crate::contact::{Contact, half_contact_angle};
+use crate::contact::{Contact, SlipBack, half_contact_angle};
 use std::f64::consts::PI;
 
 /// Points over the contact. The mean force is then within 1e-3 of the converged sweep (tested).
@@ -65,7 +66,8 @@ pub fn mean_friction(c: &Contact) -> f64 {
     let (mut mean, mut left) = lateral.cycle(limits, 0.0);
     let (mut x0, mut gap0) = (0.0, left);
     if left > 0.0 {
-        let top = limits.iter().fold(0.0f64, |a, &b| a.max(b)) + c.speed * dt;
+        let beyond = if lateral.drawn > 0.0 { c.speed * c.lateral_relaxation_time } else { 0.0 };
+        let top = limits.iter().fold(0.0f64, |a, &b| a.max(b)) + c.speed * dt + beyond;
         let (mut x1, mut gap1) = (top, lateral.cycle(limits, top).1 - top);
         for _ in 0..40 {
             if (x1 - x0).abs() < 1e-7 * top || gap0 == gap1 {
@@ -114,6 +116,7 @@ struct Lateral {
     advance: f64,
     rate_step: f64,
     keep_step: f64,
+    drawn: f64,
     rate_airborne: f64,
     keep_airborne: f64,
     knee: f64,
@@ -139,12 +142,18 @@ impl Lateral {
                 0.0
             }
         };
+        let instant = c.slip_back == SlipBack::Instant;
         let fall = |time: f64| if rate.is_finite() { rate * time } else { 0.0 };
         Self {
             stiffness: c.lateral_stiffness,
             advance: c.speed * dt,
-            rate_step: if c.instant_slip_back { f64::INFINITY } else { fall(dt) },
-            keep_step: if c.instant_slip_back { 0.0 } else { keep(dt) },
+            rate_step: if instant { f64::INFINITY } else { fall(dt) },
+            keep_step: if instant { 0.0 } else { keep(dt) },
+            // Of what a step adds evenly, this much is still there at its end.
+            drawn: match (c.slip_back, c.lateral_relaxation_time) {
+                (SlipBack::Drawn, t) if t > 0.0 => -(-dt / t).exp_m1() * t / dt,
+                _ => 0.0,
+            },
             rate_airborne: fall(airborne),
             keep_airborne: keep(airborne),
             knee: c.recovery_knee,
@@ -170,7 +179,15 @@ impl Lateral {
                     let corner = x + part * self.advance;
                     sum += 0.5 * (corner - part * limit - (1.0 - part) * x.min(before));
                 }
-                x = if x <= limit { limit } else { self.recover(x, limit, self.rate_step, self.keep_step) };
+                x = if self.drawn > 0.0 {
+                    let excess = (x - before).max(0.0);
+                    let added = self.advance - (limit - before) + (x - before).min(0.0);
+                    (limit + excess * self.keep_step + added * self.drawn).max(limit)
+                } else if x <= limit {
+                    limit
+                } else {
+                    self.recover(x, limit, self.rate_step, self.keep_step)
+                };
                 held = limit;
             }
             before = limit;

@@ -1,6 +1,7 @@
 //! The skin's lateral stretch does not vanish at lift-off but recovers at a finite rate.
 
 use super::prelude::*;
+use crate::contact::SlipBack;
 
 /// See the module.
 pub struct LateralRecovery;
@@ -11,7 +12,7 @@ const LIMITS: [Parameter; 2] = [
     Parameter::shape("stretch_of_half_speed", "m", 1e-7, 1.3).bending(),
 ];
 
-static LAWS: [Law; 4] = [
+static LAWS: [Law; 5] = [
     Law::new("rate limit, slower near rest", &LIMITS),
     Law::new("exponential", &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)]),
     Law::new(
@@ -22,6 +23,7 @@ static LAWS: [Law; 4] = [
         ],
     ),
     Law::new("rate limit, slower near rest, in flight", &LIMITS),
+    Law::new("slip against viscosity", &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)]),
 ];
 
 impl Effect for LateralRecovery {
@@ -44,9 +46,13 @@ impl Effect for LateralRecovery {
         &[Need::Vibration]
     }
     fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
-        c.instant_slip_back = law >= 2;
+        c.slip_back = match law {
+            0 | 1 => SlipBack::Recovering,
+            4 => SlipBack::Drawn,
+            _ => SlipBack::Instant,
+        };
         match law {
-            1 => c.lateral_relaxation_time = theta[0],
+            1 | 4 => c.lateral_relaxation_time = theta[0],
             2 => {
                 c.lateral_relaxation_time = theta[0];
                 c.lateral_relaxation_exponent = theta[1];

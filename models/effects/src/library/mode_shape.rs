@@ -25,6 +25,8 @@ static LAWS: [Law; 3] = [
             Parameter::shape("sharpness", "1", 0.5, 0.5).bending(),
             // The amplitude was calibrated at one place, which need not be an antinode.
             Parameter::signed("antinode_over_calibrated_e_folds", "1", 0.3, -1.0, 1.0).bending(),
+            // Waves of all frequencies are in step at an edge of the plate, which need not be where positions are counted from.
+            Parameter::signed("edge_to_origin_over_node_spacing", "1", 1.0, -4.0, 4.0).bending(),
         ],
     )
     .seen_by(CHECK, 0.03),
@@ -63,7 +65,7 @@ impl Effect for ModeShape {
         c.amplitude_pp *= match law {
             0 => {
                 let shorter = (pass.frequency_hz / design.reference_frequency_hz).powf(theta[3]);
-                let s = (PI * (x * shorter / theta[1] + theta[2])).sin();
+                let s = (PI * (x * shorter / theta[1] + theta[2] + theta[6] * (shorter - 1.0))).sin();
                 // Depth one is |cos|; the mean over a stroke through nodes is shallower.
                 let depth = theta[0].min(1.0);
                 (1.0 - depth * s * s).max(LEAST_SQUARE).powf(theta[4]) * (depth * theta[5]).exp()

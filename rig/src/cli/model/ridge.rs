@@ -2,6 +2,7 @@
 
 use super::conditions::ConditionArgs;
 use super::refused;
+use crate::progress::Study;
 use crate::{out, say};
 use clap::{Args, ValueEnum};
 use miette::IntoDiagnostic;
@@ -78,6 +79,9 @@ impl RidgeArgs {
     }
 }
 
+/// Cycles that the mean of a case is over where it is ended before it is steady, at most.
+const LAST_CYCLES: usize = 10;
+
 #[derive(Serialize)]
 struct Answer<'a> {
     #[serde(flatten)]
@@ -85,6 +89,25 @@ struct Answer<'a> {
     wall_seconds: f64,
     element_updates_per_second: f64,
     case: &'a RidgeCase,
+}
+
+/// What there is where Ctrl-C ends a case: the cycles so far, which need not be steady.
+fn partial(mu: &[f64], cycles: u64, json: bool) {
+    let last = &mu[mu.len() - (mu.len() / 2).min(LAST_CYCLES)..];
+    let mean = (!last.is_empty()).then(|| last.iter().sum::<f64>() / last.len() as f64);
+    if json {
+        out!(
+            "{}",
+            serde_json::json!({ "partial": true, "cycles": cycles, "mu_relative": mean, "steady": false })
+        );
+        return;
+    }
+    match mean {
+        Some(mean) => {
+            out!("partial: {cycles} cycles, NOT steady; mu' = {mean:.4} over the last {}", last.len())
+        }
+        None => out!("partial: {cycles} cycles; too few for a mean"),
+    }
 }
 
 /// Runs the case; refuses bad input, and fails with a reason where the run diverged.
@@ -96,7 +119,14 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
         return refused(format!("--tolerance {}: above 0 and below 1", args.tolerance));
     }
     let start = Instant::now();
-    let run = match ridge::run(&case, &settings) {
+    // It ends where the cycles are steady: the time to go is the longest.
+    let most = settings.steady.at_most;
+    let study = Study::begin(most as u64, "cycles at most", move |mu: Vec<f64>, cycles| {
+        partial(&mu, cycles, json);
+    })?;
+    let run = ridge::run_watched(&case, &settings, &mut |mu_relative| study.done(Some(mu_relative)));
+    drop(study);
+    let run = match run {
         Ok(run) => run,
         Err(why @ RidgeError::Diverged) => {
             say!("{why}");

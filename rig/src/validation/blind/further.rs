@@ -73,10 +73,14 @@ pub struct Race {
 ///
 /// # Errors
 /// A set that the diagnosis refuses.
-pub fn run(seed: u64, count: usize, each: &(dyn Fn(&Race) + Sync)) -> miette::Result<Vec<Race>> {
+pub fn run(seed: u64, count: usize, each: &(dyn Fn(Option<&Race>) + Sync)) -> miette::Result<Vec<Race>> {
     let all: miette::Result<Vec<Option<Race>>> = (0..count as u64)
         .into_par_iter()
-        .map(|k| Ok(one(seed.wrapping_mul(1_000_003).wrapping_add(k))?.inspect(each)))
+        .map(|k| {
+            let race = one(seed.wrapping_mul(1_000_003).wrapping_add(k))?;
+            each(race.as_ref());
+            Ok(race)
+        })
         .collect();
     Ok(all?.into_iter().flatten().collect())
 }

@@ -42,6 +42,44 @@ pub struct Answers {
 }
 
 impl Answers {
+    /// The answer on one set.
+    fn of(noise: &str, truth: &str, set: &RoughSet, report: &Report) -> Self {
+        let mut one = Answers { noise: noise.into(), truth: truth.into(), ..Answers::default() };
+        one.count(set, report);
+        one
+    }
+
+    /// With those on further sets of the same kind.
+    fn with(mut self, more: &Self) -> Self {
+        let sums = [
+            (&mut self.sets, more.sets),
+            (&mut self.right, more.right),
+            (&mut self.wrong, more.wrong),
+            (&mut self.ambiguous, more.ambiguous),
+            (&mut self.unknown, more.unknown),
+            (&mut self.missed, more.missed),
+            (&mut self.bad, more.bad),
+            (&mut self.found, more.found),
+            (&mut self.good, more.good),
+            (&mut self.falsely, more.falsely),
+        ];
+        sums.into_iter().for_each(|(sum, more)| *sum += more);
+        self
+    }
+
+    /// Answers on single sets, added up by their kind and truth, in the order in which these come first.
+    #[must_use]
+    pub fn summed(all: &[Self]) -> Vec<Self> {
+        let mut rows: Vec<Self> = Vec::new();
+        for one in all {
+            match rows.iter_mut().find(|row| (&row.noise, &row.truth) == (&one.noise, &one.truth)) {
+                Some(row) => *row = row.clone().with(one),
+                None => rows.push(one.clone()),
+            }
+        }
+        rows
+    }
+
     fn count(&mut self, set: &RoughSet, report: &Report) {
         let leads = &report.hypotheses[0].effects;
         let none = self.truth == "none";
@@ -73,7 +111,7 @@ pub fn run(
     (name, roughness): (&str, Roughness),
     truths: &[&str],
     options: &Options,
-    progress: impl Fn(u64, &RoughSet, &Report) + Sync,
+    progress: impl Fn(u64, &RoughSet, &Report, &Answers) + Sync,
 ) -> miette::Result<Vec<Answers>> {
     truths
         .iter()
@@ -84,20 +122,19 @@ pub fn run(
                     Some(Kind::named(cause).ok_or_else(|| miette::miette!("no cause is named '{cause}'"))?)
                 }
             };
-            let all: Vec<(RoughSet, Report)> = (0..count as u64)
+            let all: Vec<Answers> = (0..count as u64)
                 .into_par_iter()
                 .map(|k| {
                     let own = seed.wrapping_mul(1_000_003).wrapping_add(k);
                     let set = rough(own, kind, roughness);
                     let report = answer(&set, options)?;
-                    progress(own, &set, &report);
-                    Ok((set, report))
+                    let one = Answers::of(name, truth, &set, &report);
+                    progress(own, &set, &report, &one);
+                    Ok(one)
                 })
                 .collect::<miette::Result<_>>()?;
-            let mut answers =
-                Answers { noise: name.to_string(), truth: (*truth).to_string(), ..Answers::default() };
-            all.iter().for_each(|(set, report)| answers.count(set, report));
-            Ok(answers)
+            let none = Answers { noise: name.into(), truth: (*truth).into(), ..Answers::default() };
+            Ok(all.iter().fold(none, Answers::with))
         })
         .collect()
 }

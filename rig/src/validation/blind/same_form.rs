@@ -32,8 +32,9 @@ pub struct Covered {
 ///
 /// # Errors
 /// A set that the diagnosis refuses.
-pub fn run(seed: u64, count: usize) -> miette::Result<Vec<Covered>> {
-    (0..count as u64).into_par_iter().map(|k| one(seed.wrapping_mul(1_000_003).wrapping_add(k))).collect()
+pub fn run(seed: u64, count: usize, each: &(dyn Fn(&Covered) + Sync)) -> miette::Result<Vec<Covered>> {
+    let own = |k| seed.wrapping_mul(1_000_003).wrapping_add(k);
+    (0..count as u64).into_par_iter().map(|k| Ok(one(own(k))?).inspect(each)).collect()
 }
 
 fn one(seed: u64) -> miette::Result<Covered> {

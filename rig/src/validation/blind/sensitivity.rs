@@ -11,7 +11,7 @@ use diagnosis::hypotheses::{Fitted, Options, fit_all};
 use rayon::prelude::*;
 use serde::Serialize;
 use sim::sealed::{Set, Stratum};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Factors by which each constant is changed.
 const FACTORS: [f64; 2] = [0.5, 2.0];
@@ -97,45 +97,76 @@ fn tried(
     Ok(list)
 }
 
-/// The study on `count` sets from a seed, of the constants that `asked` picks.
-///
-/// # Errors
-/// A set that the diagnosis refuses.
-pub fn run(
-    seed: u64,
-    count: usize,
-    stratum: Option<Stratum>,
-    options: &Options,
-    asked: &dyn Fn(&constants::Row) -> bool,
-) -> miette::Result<Vec<Row>> {
-    let base = &*options.constants;
-    let mut labels = vec![("as it is", 1.0)];
-    let mut changes = Vec::new();
-    for row in base.rows().iter().filter(|r| r.stage != Stage::Report && asked(r)) {
-        for factor in FACTORS {
-            let mut constants = base.clone();
-            constants.scale(row.name, factor).map_err(|e| miette::miette!("{e}"))?;
-            labels.push((row.name, factor));
-            changes.push((row.stage, constants));
+/// The study: what is changed, and what the sets have said so far.
+pub struct Study {
+    labels: Vec<(&'static str, f64)>,
+    changes: Vec<(Stage, Constants)>,
+    base: Constants,
+    pairs: bool,
+    said: Mutex<Vec<Vec<Said>>>,
+}
+
+impl Study {
+    /// Of the constants that `asked` picks.
+    ///
+    /// # Errors
+    /// A constant that cannot be scaled.
+    pub fn new(options: &Options, asked: &dyn Fn(&constants::Row) -> bool) -> miette::Result<Self> {
+        let base = (*options.constants).clone();
+        let mut labels = vec![("as it is", 1.0)];
+        let mut changes = Vec::new();
+        for row in base.rows().iter().filter(|r| r.stage != Stage::Report && asked(r)) {
+            for factor in FACTORS {
+                let mut constants = base.clone();
+                constants.scale(row.name, factor).map_err(|e| miette::miette!("{e}"))?;
+                labels.push((row.name, factor));
+                changes.push((row.stage, constants));
+            }
         }
+        Ok(Study { labels, changes, base, pairs: options.pairs, said: Mutex::default() })
     }
-    let sets: Vec<Set> = super::sets(seed, count, stratum).collect();
-    let all: miette::Result<Vec<Vec<Said>>> =
-        sets.par_iter().map(|set| tried(set, base, &changes, options.pairs)).collect();
-    let all = all?;
-    let row = |(i, (constant, factor)): (usize, (&'static str, f64))| {
-        let of = |test: &dyn Fn(&Said, &Said) -> bool| all.iter().filter(|s| test(&s[i], &s[0])).count();
-        Row {
-            constant,
-            factor,
-            sets: all.len(),
-            right: of(&|s, _| s.right),
-            misnamed: of(&|s, _| s.verdict == Verdict::Named && !s.right),
-            changed: of(&|s, base| {
-                s.verdict != base.verdict || s.verdict == Verdict::Named && s.leader != base.leader
-            }),
-            probability: all.iter().map(|s| s[i].probability).sum::<f64>() / all.len().max(1) as f64,
-        }
-    };
-    Ok(labels.into_iter().enumerate().map(row).collect())
+
+    /// Tries `count` sets from a seed; `each` is called after each.
+    ///
+    /// # Errors
+    /// A set that the diagnosis refuses.
+    pub fn run(
+        &self,
+        seed: u64,
+        count: usize,
+        stratum: Option<Stratum>,
+        each: &(dyn Fn() + Sync),
+    ) -> miette::Result<()> {
+        let sets: Vec<Set> = super::sets(seed, count, stratum).collect();
+        sets.par_iter().try_for_each(|set| {
+            let said = tried(set, &self.base, &self.changes, self.pairs)?;
+            self.said.lock().unwrap_or_else(PoisonError::into_inner).push(said);
+            each();
+            Ok(())
+        })
+    }
+
+    /// A row for each change, from the sets so far.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Row> {
+        let all = self.said.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let row = |(i, &(constant, factor)): (usize, &(&'static str, f64))| {
+            let of = |test: &dyn Fn(&Said, &Said) -> bool| all.iter().filter(|s| test(&s[i], &s[0])).count();
+            // In the order of size: the sum does not depend on which set was done first.
+            let mut probabilities: Vec<f64> = all.iter().map(|s| s[i].probability).collect();
+            probabilities.sort_by(f64::total_cmp);
+            Row {
+                constant,
+                factor,
+                sets: all.len(),
+                right: of(&|s, _| s.right),
+                misnamed: of(&|s, _| s.verdict == Verdict::Named && !s.right),
+                changed: of(&|s, base| {
+                    s.verdict != base.verdict || s.verdict == Verdict::Named && s.leader != base.leader
+                }),
+                probability: probabilities.iter().fold(0.0, |sum, p| sum + p) / all.len().max(1) as f64,
+            }
+        };
+        self.labels.iter().enumerate().map(row).collect()
+    }
 }

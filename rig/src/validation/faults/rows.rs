@@ -435,17 +435,21 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)], &str)] = &[
     (42, "certificates that do not hold", &[("tests/fuzz.rs", "certificates")], ""),
     (43, "slow model", &[("tests/realtime.rs", "what_is_decided_leaves_before_the_model_is_asked")], ""),
     (44, "two controllers", &[("tests/session.rs", "two_controllers_never_share_a_run")], ""),
-    (45, "cross-site requests", &[], "no dashboard is served"),
+    (45, "cross-site requests", &[("tests/dashboard.rs", "an_attacker_gets_nothing")], ""),
     (
         46,
         "floods",
-        &[("tests/wire/modbus_tcp.rs", "more_clients_than_allowed_are_turned_away_and_a_place_is_freed")],
+        &[
+            ("tests/wire/modbus_tcp.rs", "more_clients_than_allowed_are_turned_away_and_a_place_is_freed"),
+            ("tests/dashboard.rs", "an_attacker_gets_nothing"),
+            ("tests/dashboard.rs", "viewers_that_do_not_read_hold_nobody_up"),
+        ],
         "",
     ),
     (
         49,
         "markup in names",
-        &[("rig/src/report/page.rs", "markup_and_terminal_escapes_in_names_are_harmless")],
+        &[("rig/src/report/html.rs", "markup_and_terminal_escapes_in_names_are_harmless")],
         "",
     ),
     (

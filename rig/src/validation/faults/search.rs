@@ -102,8 +102,8 @@ fn compatible(a: usize, b: usize) -> bool {
     share && apart
 }
 
-/// Runs the seeds.
-pub fn search(what: Search) -> Tally {
+/// Runs the seeds; whoever waits is told of each part.
+pub fn search(what: Search, told: impl Fn(&Tally) + Sync) -> Tally {
     let seeds: Vec<u64> = (what.first..what.first.saturating_add(what.seeds)).collect();
     seeds
         .par_chunks(64)
@@ -112,6 +112,7 @@ pub fn search(what: Search) -> Tally {
             for seed in chunk {
                 tally.take(&scene_of(*seed, what.pairs, what.pace), what.twice);
             }
+            told(&tally);
             tally
         })
         .reduce(Tally::default, Tally::with)
@@ -144,7 +145,8 @@ impl Tally {
         }
     }
 
-    fn with(mut self, other: Tally) -> Tally {
+    /// Both together.
+    pub fn with(mut self, other: Tally) -> Tally {
         self.scenes += other.scenes;
         self.cycles += other.cycles;
         self.failed += other.failed;

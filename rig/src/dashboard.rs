@@ -1,0 +1,55 @@
+//! The rig in a browser: live pages, the catalogue, reports and comparisons, served on this machine.
+//!
+//! The server is one more viewer of [`crate::live`]: it runs on threads of its own and reads what every other viewer reads, so
+//! nothing that a browser does reaches the loop. All it serves is embedded; its pages ask nothing of anybody else.
+//!
+//! Who may do what:
+//!
+//! | what | needs |
+//! |---|---|
+//! | the empty page and its script | a `Host` that is on the list |
+//! | data, live messages | that, an `Origin` on the list where there is one, and the token |
+//! | stop a run | the same |
+//! | pause, go on | the same, and a server that was started with `--allow-control` |
+//!
+//! The token is new at every start, is told in the address's fragment (which no browser sends), and is compared in constant time.
+//! Nothing that is asked for can arm a rig, begin a run or change a limit.
+
+#[cfg(feature = "dashboard")]
+mod api;
+#[cfg(feature = "dashboard")]
+mod guard;
+#[cfg(feature = "dashboard")]
+mod pages;
+#[cfg(feature = "dashboard")]
+mod serve;
+#[cfg(feature = "dashboard")]
+mod server;
+#[cfg(feature = "dashboard")]
+mod stream;
+#[cfg(not(feature = "dashboard"))]
+mod without;
+
+#[cfg(feature = "dashboard")]
+pub use server::Dashboard;
+#[cfg(not(feature = "dashboard"))]
+pub use without::Dashboard;
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+/// Where a dashboard listens where nothing else is said.
+pub const LISTEN: &str = "127.0.0.1:8417";
+
+/// What a dashboard is to serve.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Folder of the runs.
+    pub runs: PathBuf,
+    /// Where to listen; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// Further names by which browsers may ask for it, as `rig-1.lab:8417`.
+    pub hosts: Vec<String>,
+    /// Whether runs may be paused and told to go on. A stop may always be asked for.
+    pub control: bool,
+}

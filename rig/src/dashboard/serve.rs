@@ -1,0 +1,47 @@
+//! The server's door: so many connections at once, so long for a request's head, and no more.
+
+use axum::Router;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::Semaphore;
+
+/// Connections at once, live streams among them.
+const CONNECTIONS: usize = 64;
+/// Time that the head of a request may take, also that of the next one on a connection that is kept.
+const HEAD_WITHIN: Duration = Duration::from_secs(10);
+/// Largest head of a request in bytes.
+const HEAD_BYTES: usize = 16 * 1024;
+/// Time from one try to the next where the system has no descriptor to give.
+const AGAIN: Duration = Duration::from_millis(100);
+
+/// Serves until the process ends.
+pub async fn serve(listener: TcpListener, routes: Router) {
+    let listener =
+        tokio::net::TcpListener::from_std(listener).expect("a listener that does not block, in a runtime");
+    let free = Arc::new(Semaphore::new(CONNECTIONS));
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            tokio::time::sleep(AGAIN).await;
+            continue;
+        };
+        // Whoever finds no place is not kept waiting: a browser comes again by itself.
+        let Ok(place) = Arc::clone(&free).try_acquire_owned() else { continue };
+        let routes = routes.clone();
+        tokio::spawn(async move {
+            let _place = place;
+            let _ = stream.set_nodelay(true);
+            let service = TowerToHyperService::new(routes);
+            // An error is that of the other end.
+            let _ = hyper::server::conn::http1::Builder::new()
+                .timer(TokioTimer::new())
+                .header_read_timeout(HEAD_WITHIN)
+                .max_buf_size(HEAD_BYTES)
+                .serve_connection(TokioIo::new(stream), service)
+                .with_upgrades()
+                .await;
+        });
+    }
+}

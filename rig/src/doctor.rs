@@ -1,0 +1,277 @@
+//! The instruments of a setup, looked at together as a run's loop would, and judged by what a run needs. Nothing is commanded but
+//! the safe set-points with which every link begins and ends.
+
+#![allow(clippy::disallowed_methods, reason = "instruments are looked at in wall-clock time; no loop runs")]
+
+mod follow;
+mod judge;
+mod ports;
+
+pub use follow::{ChannelReport, Follow, Seen};
+pub(crate) use judge::THERMOMETER;
+pub use judge::{Asked, Finding, judge};
+
+use crate::setup::Setup;
+use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, OpenError};
+use ports::Opened;
+use realtime::cycle::{COMMANDS_PER_CYCLE, Config, CycleState, Inputs, decide};
+use realtime::ports::{AmplifierState, Channel, Contacts, Nanos, NoData, StageState, SupplyState};
+use realtime::safety::{Cause, ChannelTiming, Observation, Timing};
+use serde::Serialize;
+use std::time::{Duration, Instant};
+
+/// How long the instruments are looked at: a rule about the load needs two seconds.
+const LOOK: Duration = Duration::from_millis(3000);
+/// What of that the links may take to run evenly.
+const SETTLING: Duration = Duration::from_millis(400);
+
+/// What an instrument is to the rig, in the words of the setup.
+pub type Role = &'static str;
+
+/// What a link counted in a second, on the whole look.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Answers {
+    /// Samples a second.
+    pub samples_per_s: f64,
+    /// Share of the answers that were none: corrupt, refused, or too late.
+    pub bad_share: f64,
+    /// Of an instrument that sends by itself: share of its samples that never came. An instrument that is asked takes more samples
+    /// than are wanted of it, and loses none.
+    pub lost_share: f64,
+    /// Times that the link was made anew.
+    pub reconnected: u64,
+    /// The latest problem in words; empty where there was none.
+    pub last_problem: String,
+}
+
+/// One instrument as it was found.
+pub struct Found {
+    /// What it is to the rig.
+    pub role: Role,
+    /// Its profile's id.
+    pub id: String,
+    /// Its address.
+    pub address: String,
+    /// What its link counted, or why there is none.
+    pub answers: Result<Answers, OpenError>,
+    /// Its channels.
+    pub channels: Vec<ChannelReport>,
+}
+
+/// Everything that was found.
+pub struct Look {
+    /// Each instrument, in the order of the setup.
+    pub found: Vec<Found>,
+    /// The last state of the amplifier, where it could be opened.
+    pub amplifier: Option<Result<AmplifierState, NoData>>,
+    /// The last state of the stage.
+    pub stage: Option<Result<StageState, NoData>>,
+    /// The last state of the second switch-off channel.
+    pub supply: Option<Result<SupplyState, NoData>>,
+    /// The last readings of the safety contacts.
+    pub contacts: Option<Contacts>,
+    /// The rule that kept the loop from being armed most often, with the share of cycles in which any did; only where everything could be opened.
+    pub blocking: Option<(Cause, f64)>,
+}
+
+/// The channels that are followed.
+#[derive(Default)]
+struct Followed {
+    lateral: Follow,
+    normal: Follow,
+    amplifier: Follow,
+    amplitude: Follow,
+    temperature: Follow,
+    position: Follow,
+    velocity: Follow,
+    supply: Follow,
+    contacts: Follow,
+}
+
+fn of_channel(channel: Channel) -> Result<Seen, NoData> {
+    channel.map(|r| Seen {
+        value: r.value,
+        raw: Some(r.raw),
+        taken_at: r.taken_at,
+        sequence: r.sequence,
+        quality: r.quality,
+    })
+}
+
+fn of_state(value: f64, taken_at: Nanos, sequence: u32) -> Seen {
+    Seen { value, raw: None, taken_at, sequence, quality: realtime::ports::Quality::Good }
+}
+
+impl Followed {
+    fn look(&mut self, seen: &Observation, now: Nanos) {
+        self.lateral.look(of_channel(seen.forces.lateral), now);
+        self.normal.look(of_channel(seen.forces.normal), now);
+        let a = seen.amplifier;
+        self.amplifier.look(a.map(|a| of_state(f64::from(a.output_on), a.taken_at, a.sequence)), now);
+        self.amplitude.look(a.and_then(|a| of_channel(a.amplitude)), now);
+        self.temperature.look(a.and_then(|a| of_channel(a.temperature_c)), now);
+        let s = seen.stage;
+        self.position.look(s.map(|s| of_state(s.position_m, s.taken_at, s.sequence)), now);
+        self.velocity.look(s.map(|s| of_state(s.velocity_m_s, s.taken_at, s.sequence)), now);
+        self.supply.look(seen.supply.map(|s| of_state(f64::from(!s.cut), s.taken_at, s.sequence)), now);
+        let c = seen.contacts;
+        let fitted = [c.emergency_stop, c.interlock, c.dead_man];
+        let fitted = fitted.into_iter().find(|c| *c != Err(NoData::NotFitted));
+        let fitted = fitted.unwrap_or(Err(NoData::NotFitted));
+        self.contacts.look(fitted.map(|c| of_state(f64::from(c.closed), c.taken_at, c.sequence)), now);
+    }
+
+    /// The channels of one instrument; each is told once.
+    fn reports(
+        &mut self,
+        of: &Opened<'_>,
+        last: Option<&Observation>,
+        timing: &Timing,
+        seconds: f64,
+    ) -> Vec<ChannelReport> {
+        let mut all = Vec::new();
+        let mut take = |follow: &mut Follow, name, unit, timing: &ChannelTiming| {
+            all.push(std::mem::take(follow).report(name, unit, timing, seconds));
+        };
+        match of.role {
+            "force" => {
+                if of.axes.0 {
+                    take(&mut self.lateral, "lateral", "N", &timing.lateral);
+                }
+                if of.axes.1 {
+                    take(&mut self.normal, "normal", "N", &timing.normal);
+                }
+            }
+            "amplifier" => {
+                take(&mut self.amplifier, "output", "1", &timing.amplifier);
+                let amplifier = last.and_then(|l| l.amplifier.ok());
+                let fitted = |c: fn(&AmplifierState) -> Channel| {
+                    amplifier.is_some_and(|a| c(&a) != Err(NoData::NotFitted))
+                };
+                if fitted(|a| a.amplitude) {
+                    take(&mut self.amplitude, "amplitude", "m", &timing.amplifier);
+                }
+                if fitted(|a| a.temperature_c) {
+                    take(&mut self.temperature, "temperature", "degC", &timing.amplifier);
+                }
+            }
+            "stage" => {
+                take(&mut self.position, "position", "m", &timing.stage);
+                take(&mut self.velocity, "velocity", "m/s", &timing.stage);
+            }
+            "supply_relay" => take(&mut self.supply, "closed", "1", &timing.supply),
+            _ => take(&mut self.contacts, "contacts", "1", &timing.contacts),
+        }
+        all
+    }
+}
+
+/// The rules of the loop over what is seen, without a hand at the dead-man device and without a relay that nobody closes: those are
+/// judged apart.
+struct Rules {
+    config: Config,
+    state: CycleState,
+    cycles: u32,
+    blocked: Vec<(Cause, u32)>,
+}
+
+impl Rules {
+    fn of(setup: &Setup, relay: bool) -> Self {
+        let mut config = setup.config;
+        config.limits.human_contact = false;
+        config.limits.supply_required = false;
+        config.limits.amplifier_watchdog |= relay;
+        Rules { config, state: CycleState::default(), cycles: 0, blocked: Vec::new() }
+    }
+
+    fn step(&mut self, seen: &Observation, now: Nanos, counts: bool) {
+        let mut judged = Observation { supply: Err(NoData::NotFitted), ..*seen };
+        judged.contacts.dead_man = Err(NoData::NotFitted);
+        let inputs = Inputs { commands: [None; COMMANDS_PER_CYCLE], seen: judged };
+        let blocking = decide(&self.config, &mut self.state, &inputs, now).blocking;
+        if !counts {
+            return;
+        }
+        self.cycles += 1;
+        let Some(cause) = blocking else { return };
+        match self.blocked.iter_mut().find(|(c, _)| *c == cause) {
+            Some((_, n)) => *n += 1,
+            None => self.blocked.push((cause, 1)),
+        }
+    }
+
+    /// The rule that kept the loop from being armed most often, with the share of cycles in which any did.
+    fn worst(&self) -> Option<(Cause, f64)> {
+        let all: u32 = self.blocked.iter().map(|(_, n)| n).sum();
+        let (cause, _) = self.blocked.iter().max_by_key(|(_, n)| *n)?;
+        Some((*cause, f64::from(all) / f64::from(self.cycles.max(1))))
+    }
+}
+
+/// Looks at every instrument that can be opened; one that fails keeps none of the others from being looked at.
+pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
+    let epoch = Instant::now();
+    let (all, mut bench) = ports::open(setup, instruments, epoch);
+    let mut rules = Rules::of(setup, bench.supply.is_some());
+    let mut followed = Followed::default();
+    let counted = || -> Vec<HealthReport> { all.iter().map(Opened::health).collect() };
+    let (opened, cycle) = (Instant::now(), Duration::from_nanos(setup.config.limits.timing.cycle.0));
+    let (mut before, mut last, mut deadline) = (None, None, opened);
+    while opened.elapsed() < LOOK {
+        deadline = (deadline + cycle).max(Instant::now());
+        std::thread::sleep(deadline.saturating_duration_since(Instant::now()));
+        let now = Nanos(u64::try_from(epoch.elapsed().as_nanos()).unwrap_or(u64::MAX));
+        let seen = bench.look(now);
+        rules.step(&seen, now, opened.elapsed() > LOOK / 2);
+        if opened.elapsed() > SETTLING {
+            before.get_or_insert_with(|| (counted(), Instant::now()));
+            followed.look(&seen, now);
+            last = Some(seen);
+        }
+    }
+    let after = counted();
+    let (before, began) = before.unwrap_or_else(|| (after.clone(), opened));
+    let seconds = began.elapsed().as_secs_f64();
+    let whole = all.iter().all(|o| o.link.is_ok());
+    let found = all.into_iter().zip(before.iter().zip(&after)).map(|(o, (before, after))| Found {
+        role: o.role,
+        id: o.instrument.profile.clone(),
+        address: o.instrument.address.clone(),
+        channels: match &o.link {
+            Ok(_) => followed.reports(&o, last.as_ref(), &setup.config.limits.timing, seconds),
+            Err(_) => Vec::new(),
+        },
+        answers: o.link.map(|_link| answers(o.instrument, before, after, seconds)),
+    });
+    Look {
+        found: found.collect(),
+        amplifier: bench.amplifier.and(last.map(|l| l.amplifier)),
+        stage: bench.stage.and(last.map(|l| l.stage)),
+        supply: bench.supply.and(last.map(|l| l.supply)),
+        contacts: bench.contacts.and(last.map(|l| l.contacts)),
+        blocking: rules.worst().filter(|_| whole),
+    }
+}
+
+fn answers(
+    instrument: &InstrumentSetup,
+    before: &HealthReport,
+    after: &HealthReport,
+    seconds: f64,
+) -> Answers {
+    let bad = |h: &HealthReport| h.corrupt_frames + h.timeouts + h.exceptions;
+    let (samples, repeats) = (after.samples - before.samples, after.repeats - before.repeats);
+    let wrong = bad(after) - bad(before);
+    let unasked = instrument
+        .description()
+        .is_ok_and(|p| p.description.poll.is_empty() && p.description.query.is_empty());
+    let lost = if unasked { after.lost_samples - before.lost_samples } else { 0 };
+    let share = |n: u64, of: u64| if of == 0 { 0.0 } else { n as f64 / of as f64 };
+    Answers {
+        samples_per_s: samples as f64 / seconds,
+        bad_share: share(wrong, wrong + samples + repeats),
+        lost_share: share(lost, lost + samples),
+        reconnected: after.connections - before.connections,
+        last_problem: after.last_problem.clone(),
+    }
+}

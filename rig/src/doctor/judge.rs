@@ -1,0 +1,368 @@
+//! What was found, against what a run needs.
+
+use super::{ChannelReport, Found, Look};
+use crate::plan::Plan;
+use crate::setup::Setup;
+use drivers::OpenError;
+use realtime::ports::{AmplifierState, Contact, NoData, StageState};
+use realtime::safety::RULES;
+use serde::Serialize;
+
+/// What is said of one subject.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Finding {
+    /// Of what.
+    pub subject: String,
+    /// Whether a sweep would run with it.
+    pub good: bool,
+    /// What was found.
+    pub found: String,
+    /// What to do, where it is not good.
+    pub advice: String,
+    /// Of an instrument: its channels.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub channels: Vec<ChannelReport>,
+    /// Of an instrument: share of its answers that were none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bad_answers_share: Option<f64>,
+}
+
+impl Finding {
+    /// A finding without channels.
+    pub fn new(
+        subject: impl Into<String>,
+        good: bool,
+        found: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        Finding {
+            subject: subject.into(),
+            good,
+            found: found.into(),
+            advice: advice.into(),
+            ..Finding::default()
+        }
+    }
+}
+
+/// What the look is judged for.
+pub struct Asked<'a> {
+    /// The rig.
+    pub setup: &'a Setup,
+    /// The plan that is to run, where one is named.
+    pub plan: Option<&'a Plan>,
+}
+
+/// More answers than this that are none are a fault of the link: a run goes on over single ones.
+const BAD_SHARE: f64 = 0.01;
+/// A channel that shows fewer of its samples than this is remarked in a run, and trips it at half of that.
+const CAME_SHARE: f64 = 0.5;
+/// Looks that may find nothing valid, and samples at the range's ends.
+const INVALID_SHARE: f64 = 0.01;
+/// Samples that must have been seen before a channel is said to stand still.
+const SAMPLES_MIN: u64 = 20;
+/// Noise so many times what profile and setup state is not that channel's noise.
+const NOISE_TIMES: f64 = 10.0;
+/// N that may stand on the normal axis of a lifted finger (SR-43), and below zero.
+const LOAD_ZERO_N: f64 = 0.3;
+/// m/s and m that a rig at rest may show.
+const AT_REST_M_S: f64 = 0.5e-3;
+const OFF_AMPLITUDE_PP_M: f64 = 0.3e-6;
+
+/// A problem and what to do about it.
+type Problem = (String, &'static str);
+
+/// What to do about an amplifier that shows no temperature.
+pub(crate) const THERMOMETER: &str =
+    "state `temperature_fitted = false` in [limits] where nobody touches the plate, or take one that is read";
+const LINK: &str = "look at cable and power, and at what else talks on this line";
+const UNIT: &str = "look at unit, factor, type and byte order of the signal in its profile, and at `gain`";
+
+/// Judges what was found: one finding an instrument, one of the sweep, one of the plan.
+pub fn judge(look: &Look, asked: &Asked<'_>) -> Vec<Finding> {
+    let mut findings: Vec<Finding> = look.found.iter().map(|found| instrument(found, look, asked)).collect();
+    let mended = findings.iter().all(|f| f.good);
+    if look.found.iter().all(|f| f.answers.is_ok()) {
+        findings.push(arming(look));
+    }
+    if let Some(plan) = asked.plan {
+        findings.push(planned(look, asked.setup, plan, mended));
+    }
+    findings
+}
+
+fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
+    let subject = format!("{} `{}` at {}", found.role, found.id, found.address);
+    let answers = match &found.answers {
+        Ok(answers) => answers,
+        Err(error) => {
+            let said = match error {
+                // The subject names the instrument already.
+                OpenError::Mismatch { problem, .. } | OpenError::Link { problem, .. } => problem.clone(),
+                other => other.to_string(),
+            };
+            let advice = "check address, wiring, power, and that no other program holds the link";
+            return Finding::new(subject, false, said, advice);
+        }
+    };
+    let mut problems: Vec<Problem> = Vec::new();
+    let mut states = Vec::new();
+    for channel in &found.channels {
+        timely(channel, &mut problems);
+        if found.role == "force" {
+            states.push(match (channel.mean, channel.missing) {
+                (Some(mean), None) => format!("{} {mean:+.4} N", channel.name),
+                (_, why) => format!(
+                    "{} missing: {}",
+                    channel.name,
+                    why.map_or("nothing came".into(), |why| why.to_string())
+                ),
+            });
+            force(channel, asked, &mut problems);
+        }
+    }
+    match (found.role, look.amplifier, look.stage) {
+        ("amplifier", Some(state), _) => states.push(amplifier(state, asked.setup, &mut problems)),
+        ("stage", _, Some(state)) => states.push(stage(state, asked.setup, &mut problems)),
+        ("supply_relay", ..) => {
+            let closed = look.supply.and_then(Result::ok).map(|s| !s.cut);
+            states.push(closed.map_or("no state".into(), |c| if c { "closed" } else { "open" }.to_string()));
+        }
+        ("safety_inputs", ..) => contacts(look, &mut states, &mut problems),
+        _ => {}
+    }
+    if answers.bad_share > BAD_SHARE {
+        problems.push((format!("{:.0} % of its answers are none", answers.bad_share * 1e2), LINK));
+    }
+    if answers.lost_share > 1.0 - CAME_SHARE {
+        problems.push((format!("{:.0} % of its samples never came", answers.lost_share * 1e2), LINK));
+    }
+    if answers.reconnected > 0 {
+        problems.push((format!("its link broke {} times", answers.reconnected), LINK));
+    }
+    if !answers.last_problem.is_empty() {
+        problems.push((answers.last_problem.clone(), LINK));
+    }
+    let mut said = vec![states.join(", "), format!("{:.0} samples a second", answers.samples_per_s)];
+    said.retain(|part| !part.is_empty());
+    said.extend(problems.iter().map(|(problem, _)| problem.clone()));
+    let mut advice: Vec<&str> = problems.iter().map(|(_, advice)| *advice).collect();
+    advice.dedup();
+    Finding {
+        channels: found.channels.clone(),
+        bad_answers_share: Some(answers.bad_share),
+        ..Finding::new(subject, problems.is_empty(), said.join("; "), advice.join("; "))
+    }
+}
+
+/// Rate, ages, and whether anything valid came.
+fn timely(c: &ChannelReport, problems: &mut Vec<Problem>) {
+    let name = c.name;
+    if c.invalid_share > INVALID_SHARE {
+        let why = c.missing.map_or("the instrument declared samples invalid".into(), |why| why.to_string());
+        let said =
+            format!("{name}: {:.0} % of the looks found no valid sample ({why})", c.invalid_share * 1e2);
+        let advice = match c.missing {
+            Some(NoData::Invalid | NoData::Corrupt) | None => {
+                "the instrument sends what is no number, or says itself that it is not valid: look at its status, and at type and byte order in its profile"
+            }
+            _ => LINK,
+        };
+        problems.push((said, advice));
+        if c.invalid_share > 0.5 {
+            return;
+        }
+    }
+    if let Some([_, most, _]) = c.age_ms.filter(|[_, most, _]| *most > c.age_limit_ms) {
+        let said =
+            format!("{name}: samples are {most:.0} ms old, and stale from {:.0} ms on", c.age_limit_ms);
+        problems.push((said, "find what holds its samples up; state its true rate as `rate_hz`"));
+    }
+    if c.rate_hz < CAME_SHARE * c.due_hz {
+        let said = format!("{name}: {:.1} new samples a second, {:.0} are due", c.rate_hz, c.due_hz);
+        problems.push((said, "set the instrument to that rate, or state its true rate as `rate_hz`"));
+    }
+    if c.saturated_share > INVALID_SHARE {
+        let said =
+            format!("{name}: {:.0} % of its samples are at the end of its range", c.saturated_share * 1e2);
+        problems.push((said, "unload and zero it, or use one of a larger range; a range in the profile that is too narrow does the same"));
+    }
+}
+
+/// Values of an axis of force at rest.
+fn force(c: &ChannelReport, asked: &Asked<'_>, problems: &mut Vec<Problem>) {
+    let (limits, name) = (&asked.setup.config.limits, c.name);
+    let most = if name == "normal" { limits.normal_force_max_n } else { limits.lateral_force_max_n };
+    let frozen_after = limits.frozen_after;
+    let still = c.samples >= SAMPLES_MIN
+        && (c.equal_in_a_row >= frozen_after || u64::from(c.equal_in_a_row) >= c.samples);
+    if still {
+        let said = format!("{name}: frozen, one value {} times in a row", c.equal_in_a_row);
+        problems.push((
+            said,
+            "switch the sensor off and on; if its noise is below one count, raise `frozen_after`",
+        ));
+    }
+    let Some(mean) = c.mean else { return };
+    if mean.abs() > most {
+        let said = format!("{name}: {mean:.4e} N at rest, and the limit is {most} N");
+        problems.push((said, UNIT));
+    } else if name == "normal" && mean < -LOAD_ZERO_N {
+        let said = format!("normal: {mean:.3} N at rest, and compression is positive");
+        problems.push((said, "zero the sensor; if it is loaded, turn the axis round with `gain = -1`"));
+    } else if name == "normal" && mean > LOAD_ZERO_N {
+        let said = format!("normal: {mean:.3} N at rest: a run trips over a load that it did not ask for");
+        problems.push((said, "lift the finger off and zero the sensor"));
+    }
+    let stated = [Some(asked.setup.config.estimate.sample_sd_n), stated_noise(asked.setup, name)];
+    let stated = stated.into_iter().flatten().fold(0.0, f64::max);
+    if let Some(noise) = c.noise_sd.filter(|sd| *sd > NOISE_TIMES * stated && mean.abs() <= most) {
+        let said =
+            format!("{name}: its noise is {:.1} mN, and {:.1} mN are stated", noise * 1e3, stated * 1e3);
+        problems.push((
+            said,
+            "look at cable, shield and ground, at the unit in its profile, and that nothing moves",
+        ));
+    }
+}
+
+/// Noise of an axis by its profile, in N.
+fn stated_noise(setup: &Setup, axis: &str) -> Option<f64> {
+    setup.file.force.iter().find_map(|instrument| {
+        let own = if axis == "normal" { &instrument.normal } else { &instrument.lateral };
+        let profile = instrument.description().ok()?;
+        let (signal, gain) = own.as_ref().map_or((axis, 1.0), |a| (a.signal.as_str(), a.gain));
+        let signal = profile.signal(signal)?;
+        let described = &profile.description.signal[signal.0];
+        let count = profile.lsb_si(signal, &profile.values());
+        let noise = described.noise.map_or(count, |noise| noise * described.si.factor);
+        Some(noise.abs() * gain.abs()).filter(|noise| noise.is_finite())
+    })
+}
+
+fn amplifier(state: Result<AmplifierState, NoData>, setup: &Setup, problems: &mut Vec<Problem>) -> String {
+    let s = match state {
+        Ok(s) => s,
+        Err(why) => return format!("no state: {why}"),
+    };
+    if s.output_on {
+        problems.push(("its output is ON at rest".into(), "find who drives it, and switch it off"));
+    }
+    if s.fault {
+        problems.push(("it reports a FAULT".into(), "read the fault on the amplifier, and reset it there"));
+    }
+    if setup.config.limits.temperature_fitted && s.temperature_c == Err(NoData::NotFitted) {
+        problems.push(("it has no thermometer, and a run waits for one".into(), THERMOMETER));
+    }
+    if let Ok(w) = s.amplitude
+        && !s.output_on
+        && w.value.abs() > OFF_AMPLITUDE_PP_M
+    {
+        let said = format!("it is off, and its plate is read at {:.2} um peak-to-peak", w.value * 1e6);
+        problems.push((said, "look at the amplitude's zero, unit and `measured_m_per_unit`"));
+    }
+    format!(
+        "output {}, set to {:.2} um peak-to-peak at {:.1} Hz",
+        if s.output_on { "ON" } else { "off" },
+        s.echoed_amplitude.metres() * 1e6,
+        s.echoed_frequency_hz
+    )
+}
+
+fn stage(state: Result<StageState, NoData>, setup: &Setup, problems: &mut Vec<Problem>) -> String {
+    let s = match state {
+        Ok(s) => s,
+        Err(why) => return format!("no state: {why}"),
+    };
+    let (left, right) = setup.config.limits.travel_m;
+    if s.fault {
+        problems.push(("it reports a FAULT".into(), "read the fault on the stage, and reset it there"));
+    }
+    if !(s.position_m >= left && s.position_m <= right) || s.at_limit {
+        let said = format!("outside its travel, {left} to {right} m");
+        problems.push((said, "move it between its ends by hand; look at `travel_min_m`, `travel_max_m` and at the unit of its position"));
+    }
+    if s.velocity_m_s.is_nan() || s.velocity_m_s.abs() > AT_REST_M_S {
+        problems.push(("it moves at rest".into(), "find who moves it; look at the unit of its velocity"));
+    }
+    format!("at {:.3} mm, {:.2} mm/s", s.position_m * 1e3, s.velocity_m_s * 1e3)
+}
+
+fn contacts(look: &Look, states: &mut Vec<String>, problems: &mut Vec<Problem>) {
+    let Some(c) = look.contacts else { return };
+    let mut one = |name: &str, contact: Result<Contact, NoData>, needed: bool| match contact {
+        Err(NoData::NotFitted) => {}
+        Err(why) => problems.push((format!("{name}: {why}"), LINK)),
+        Ok(contact) => {
+            states.push(format!("{name} {}", if contact.closed { "closed" } else { "open" }));
+            if needed && !contact.closed {
+                let advice = "release the emergency stop and close the guard; else look at wire and input";
+                problems.push((format!("{name} is open: nothing is armed so"), advice));
+            }
+        }
+    };
+    one("emergency stop", c.emergency_stop, true);
+    one("interlock", c.interlock, true);
+    one("dead-man device", c.dead_man, false);
+}
+
+/// Whether the loop's own rules would let a sweep begin.
+fn arming(look: &Look) -> Finding {
+    match look.blocking.filter(|(_, share)| *share > INVALID_SHARE) {
+        None => Finding::new("a sweep", true, "the rules of the loop would let it begin", ""),
+        Some((cause, share)) => {
+            let rule = RULES.iter().find(|rule| rule.cause == cause);
+            let (id, text) = rule.map_or(("", ""), |rule| (rule.id, rule.text));
+            let found = format!("would not be armed in {:.0} % of the cycles: {id}, {text}", share * 1e2);
+            Finding::new("a sweep", false, found, cause.remedy())
+        }
+    }
+}
+
+/// Whether a normal force at rest is one that spoils the `least` load, in N. A dead weight may stand on the finger: nothing but a
+/// hand lifts it.
+fn is_loaded(rest_n: f64, weight_n: f64, least_n: f64) -> bool {
+    rest_n.abs().min((rest_n - weight_n).abs()) > 0.5 * least_n
+}
+
+/// The plan on this rig, with the noise that was found.
+fn planned(look: &Look, setup: &Setup, plan: &Plan, mended: bool) -> Finding {
+    let subject = format!("the plan {}", plan.file.name);
+    let channel = |name: &str| {
+        let mut all = look.found.iter().flat_map(|f| &f.channels);
+        all.find(|c| c.name == name).filter(|c| c.missing.is_none())
+    };
+    let noise = channel("lateral").and_then(|c| c.noise_sd);
+    let passes = match crate::check::preflight(setup, plan.clone(), None, noise) {
+        Ok(passes) => passes,
+        Err(why) => {
+            let advice = why.help().map_or("change plan or setup".into(), |h| h.to_string());
+            return Finding::new(subject, false, format!("{why}"), advice);
+        }
+    };
+    let loads = plan.file.series.iter().flat_map(|s| s.normal_force_n.iter().copied());
+    let least = loads.chain([plan.file.base.normal_force_n]).fold(f64::INFINITY, f64::min);
+    let weight = setup.file.stage.dead_weight_n.unwrap_or(0.0);
+    let loaded = |rest: &f64| is_loaded(*rest, weight, least);
+    if let Some(rest) = channel("normal").and_then(|c| c.mean).filter(loaded) {
+        let found =
+            format!("{rest:+.3} N stand on the normal axis at rest, and its smallest load is {least} N");
+        let advice = "lift the finger off and zero the sensor; look at sign, unit and factor of its signal";
+        return Finding::new(subject, false, found, advice);
+    }
+    let found = if mended { "" } else { ", once what is said above is mended" };
+    Finding::new(subject, true, format!("{passes} passes can be made and seen{found}"), "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dead_weight_on_the_finger_is_no_zero_that_is_off() {
+        assert!(is_loaded(0.25, 0.0, 0.25), "a stage that loads: the finger is not lifted");
+        assert!(!is_loaded(0.249, 0.25, 0.25), "the weight stands on it");
+        assert!(!is_loaded(-0.001, 0.25, 0.25), "a hand holds it");
+        assert!(is_loaded(0.5, 0.25, 0.25) && is_loaded(-0.25, 0.25, 0.25), "zero, sign or unit is wrong");
+    }
+}

@@ -1,0 +1,128 @@
+#![allow(clippy::disallowed_methods, reason = "waits for threads of the system")]
+
+use super::*;
+use crate::sequence::{Event, MeasuredPass};
+use crate::session::{News, Signals};
+use models::condition::Condition;
+use models::record::Pass;
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+const SOON: Duration = Duration::from_secs(10);
+
+fn run(folder: &Path) -> Run {
+    Run {
+        folder: folder.into(),
+        plan: "p".into(),
+        setup: "s".into(),
+        model: "m".into(),
+        operator: None,
+        sample: None,
+        started_unix_s: 0.0,
+        fast: false,
+        process: 1,
+        planned: 9,
+        made_before: 2,
+    }
+}
+
+fn pass(point: u64) -> MeasuredPass {
+    let pass = Pass::at(point, &Condition::paper(), Some(-0.05));
+    MeasuredPass {
+        pass,
+        reference: false,
+        comparison: None,
+        regime: None,
+        psi_eq17: None,
+        temperature_flags: Vec::new(),
+    }
+}
+
+/// A viewer's picture, once it is that of `done`.
+fn seen(viewer: &mut Viewer, view: &mut View, done: impl Fn(&View) -> bool) {
+    let began = Instant::now();
+    while !done(view) {
+        assert!(began.elapsed() < SOON, "{view:?}");
+        match viewer.hear(Duration::from_millis(20)) {
+            Heard::Message(message) => view.take(*message),
+            Heard::Nothing => {}
+            Heard::Gone => panic!("the feed is gone: {view:?}"),
+        }
+    }
+}
+
+#[test]
+fn whoever_comes_late_has_the_same_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut feed = Feed::new(run(folder.path()), vec![pass(1), pass(2)], &Signals::default());
+    assert!(Viewer::connect(folder.path()).is_err(), "nothing was told yet");
+    feed.news(&News::Event(&Event::Armed));
+    let (mut early, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
+    seen(&mut early, &mut view, |view| view.events.len() == 1);
+    feed.news(&News::Pass(&pass(3)));
+    feed.news(&News::Progress(1, 7, 5.0));
+    feed.news(&News::Event(&Event::Paused { point: 4 }));
+    seen(&mut early, &mut view, |view| view.paused);
+    let (mut late, mut same) = (Viewer::connect(folder.path()).unwrap(), View::default());
+    seen(&mut late, &mut same, |view| view.progress.made == 3);
+    assert_eq!(view, same);
+    assert_eq!(view.passes.iter().map(|p| p.pass.point).collect::<Vec<_>>(), [1, 2, 3]);
+    feed.end(Ended { outcome: None, remedy: None, error: Some("x".into()), off: None, agreement: None });
+    seen(&mut late, &mut same, |view| view.ended.is_some());
+    assert_eq!(late.hear(SOON), Heard::Gone);
+    assert!(Viewer::connect(folder.path()).is_err(), "it is over");
+}
+
+#[test]
+fn what_viewers_ask_is_heard_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let signals = Signals::default();
+    let mut feed = Feed::new(run(folder.path()), Vec::new(), &signals);
+    feed.news(&News::Event(&Event::Armed));
+    let heard = |what: &dyn Fn() -> bool| {
+        let began = Instant::now();
+        while !what() {
+            assert!(began.elapsed() < SOON);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    };
+    let mut ask = Viewer::connect(folder.path()).unwrap().asking().unwrap();
+    ask(Ask::Pause).unwrap();
+    heard(&|| signals.paused.load(Ordering::Relaxed));
+    ask(Ask::Resume).unwrap();
+    heard(&|| !signals.paused.load(Ordering::Relaxed));
+    for wrong in ["arm", "stop now", "STOP", &"x".repeat(1000)] {
+        let mut stream = UnixStream::connect_addr(&place(folder.path()).unwrap()).unwrap();
+        // It may be cut off in the middle.
+        let _ = writeln!(stream, "{wrong}\npause");
+    }
+    std::thread::sleep(Duration::from_millis(200));
+    assert!(!signals.paused.load(Ordering::Relaxed), "a viewer that says anything else is not heard again");
+    assert_eq!(signals.stops.load(Ordering::Relaxed), 0);
+    ask(Ask::Stop).unwrap();
+    heard(&|| signals.stops.load(Ordering::Relaxed) == 1);
+}
+
+#[test]
+fn a_viewer_that_reads_nothing_holds_nobody_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut feed = Feed::new(run(folder.path()), Vec::new(), &Signals::default());
+    feed.news(&News::Event(&Event::Armed));
+    let mut deaf = UnixStream::connect_addr(&place(folder.path()).unwrap()).unwrap();
+    let (mut viewer, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
+    seen(&mut viewer, &mut view, |view| view.events.len() == 1);
+    for point in 0..4000 {
+        feed.news(&News::Pass(&pass(point)));
+        while view.passes.len() + 500 < point as usize {
+            seen(&mut viewer, &mut view, |view| view.passes.len() + 500 >= point as usize);
+        }
+    }
+    seen(&mut viewer, &mut view, |view| view.passes.len() == 4000);
+    // It was let go: what the kernel holds for it comes, and then the end.
+    deaf.set_read_timeout(Some(SOON)).unwrap();
+    let mut held = Vec::new();
+    deaf.read_to_end(&mut held).unwrap();
+    assert!(held.len() < 2_000_000, "{} bytes were kept for it", held.len());
+}

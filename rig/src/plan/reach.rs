@@ -1,0 +1,97 @@
+//! What the instruments themselves can do and see, by their profiles: a plan beyond it would trip in the middle of its sweep.
+
+use super::{PassTimes, Plan};
+use crate::input::{Problems, place_of};
+use models::covariate::Covariate;
+
+/// The values of one setting that an instrument takes or sees.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reach {
+    /// Column of the setting.
+    pub column: &'static str,
+    /// Smallest and largest value in SI units.
+    pub range: [f64; 2],
+    /// Who says so, for messages: as in '`id` takes'.
+    pub by: String,
+}
+
+impl Plan {
+    /// Refuses values beyond what an instrument takes or sees.
+    ///
+    /// # Errors
+    /// Every such value, with its place.
+    pub fn check_reach(&self, reaches: &[Reach]) -> miette::Result<()> {
+        let mut wrong = Problems::of(&self.origin, &self.text);
+        for reach in reaches {
+            let allows = |c: &Covariate| (c.name == reach.column).then(|| (reach.range, reach.by.clone()));
+            for index in 0..self.file.series.len() {
+                self.check_series(index, &allows, &mut wrong);
+            }
+        }
+        let speed = self.file.pass.approach_speed_m_s;
+        if let (Some(place), Some(taken)) =
+            (place_of(&self.text, &["pass", "approach_speed_m_s"]), of_speed(reaches))
+            && speed > taken.range[1] * (1.0 + ROUNDING)
+        {
+            let problem =
+                format!("the travel's speed is {speed} m/s; {} at most {:e} m/s", taken.by, taken.range[1]);
+            let remedy = "leave the key out, or change the `range` of the set-point in a profile of your own";
+            wrong.add_at(Some(place), problem, remedy.to_string());
+        }
+        wrong.end()
+    }
+}
+
+/// Relative rounding of a range that is counted in the instrument's units.
+const ROUNDING: f64 = 1e-9;
+
+fn of_speed(reaches: &[Reach]) -> Option<&Reach> {
+    reaches.iter().find(|reach| reach.column == "speed_m_s")
+}
+
+/// The times of a pass with a travel to its start that is no faster than the stage. A speed that the plan states was refused
+/// where it is ([`Plan::check_reach`]).
+pub fn times(reaches: &[Reach], times: PassTimes) -> PassTimes {
+    let most = of_speed(reaches).map_or(f64::INFINITY, |taken| taken.range[1]);
+    PassTimes { approach_speed_m_s: times.approach_speed_m_s.min(most), ..times }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_an_instrument_does_not_take_is_refused_with_its_name_and_all_at_once() {
+        let plan = Plan::parse("first-sweep", super::super::bundled_text("first-sweep").unwrap()).unwrap();
+        let reach = |column, range, by: &str| Reach { column, range, by: by.into() };
+        plan.check_reach(&[reach("frequency_hz", [15e3, 80e3], "`a` takes")]).unwrap();
+        let refused = plan
+            .check_reach(&[
+                reach("frequency_hz", [30e3, 80e3], "`a` takes"),
+                reach("normal_force_n", [0.0, 0.2], "`s` sees"),
+            ])
+            .unwrap_err();
+        let said = format!("{refused:?}");
+        assert!(said.contains("`a` takes") && said.contains("`s` sees"), "{said}");
+    }
+    /// A stage that does less than the travel's usual speed: every sweep was refused at the wire, and told as a stage that does
+    /// not follow.
+    #[test]
+    fn a_travel_is_no_faster_than_the_stage() {
+        let reach = [Reach { column: "speed_m_s", range: [0.0, 0.1], by: "`s` takes".into() }];
+        let text = "name = \"r\"\n[pass]\nsettle_s = 0.05\nmeasure_s = 0.05\n[base]\namplitude_pp_m = 2e-6\n\
+             frequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\namplitude_pp_m = [0, 2e-6]\n";
+        let plan = Plan::parse("r", text).unwrap();
+        plan.check_reach(&reach).unwrap();
+        assert!(plan.file.pass.approach_speed_m_s > 0.1);
+        assert_eq!(times(&reach, plan.file.pass).approach_speed_m_s, 0.1);
+        for (from, to) in [
+            ("speed_m_s = 0.02", "speed_m_s = 0.12"),
+            ("settle_s = 0.05", "settle_s = 0.05\napproach_speed_m_s = 0.15"),
+        ] {
+            let plan = Plan::parse("r", &text.replacen(from, to, 1)).unwrap();
+            let said = format!("{:?}", plan.check_reach(&reach).unwrap_err());
+            assert!(said.contains("`s` takes"), "{to}: {said}");
+        }
+    }
+}

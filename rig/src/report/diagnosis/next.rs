@@ -1,0 +1,72 @@
+//! What to measure next, in physical words, with the plan beside it.
+
+use crate::report::html::{escape, table};
+use crate::report::human::number;
+use diagnosis::next::Experiment;
+use diagnosis::verdict::Diagnosis;
+use models::covariate::{self, Covariate};
+
+/// Nats from which odds are no longer told apart: a million to one.
+const BEYOND: f64 = 13.8;
+
+/// The section.
+pub fn section(result: &Diagnosis) -> String {
+    let experiments = &result.report.next_experiment;
+    if experiments.is_empty() {
+        return "<h2>What to do next</h2><p>Nothing on this list would tell more.</p>".into();
+    }
+    let all: String = experiments.iter().map(one).collect();
+    format!("<h2>What to do next</h2>{all}")
+}
+
+/// What an experiment is expected to be worth.
+fn worth(e: &Experiment) -> String {
+    let [a, b] = &e.separates;
+    if e.expected_nats > BEYOND {
+        format!("If {a} is true, odds of more than a million to one against {b} are expected.")
+    } else {
+        format!("If {a} is true, odds of {} to 1 against {b} are expected.", number(e.expected_nats.exp()))
+    }
+}
+
+fn one(e: &Experiment) -> String {
+    let worth = escape(&worth(e));
+    if e.conditions.is_empty() {
+        return format!(
+            "<div class=\"card\"><p><strong>{}</strong></p><p>{worth}</p></div>",
+            escape(&e.text)
+        );
+    }
+    let told: Vec<&Covariate> =
+        covariate::planned().filter(|c| e.conditions.iter().any(|k| c.of(k).is_some())).collect();
+    let heads: String = told
+        .iter()
+        .map(|c| {
+            let (_, unit) = c.shown;
+            let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
+            format!("<th scope=\"col\" class=\"n\">{}{}</th>", escape(c.words), escape(&unit))
+        })
+        .collect();
+    let rows: String = e
+        .conditions
+        .iter()
+        .map(|k| {
+            let cells: String = told
+                .iter()
+                .map(|c| {
+                    c.of(k).map_or("<td class=\"n\">&ndash;</td>".into(), |v| {
+                        format!("<td class=\"n\">{}</td>", number(c.shown.0 * v))
+                    })
+                })
+                .collect();
+            format!("<tr>{cells}</tr>")
+        })
+        .collect();
+    format!(
+        "<div class=\"card\"><p><strong>Measure these {} passes</strong>, those that tell most first. {worth}</p>{}\
+         <p class=\"note\"><code>muprime diagnose ... --save-plan next.toml</code> writes them as a plan, \
+         <code>muprime run next.toml</code> makes them.</p></div>",
+        e.conditions.len(),
+        table("Passes of the next experiment", &heads, &rows)
+    )
+}

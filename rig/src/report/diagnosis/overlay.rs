@@ -1,0 +1,183 @@
+//! What was measured, and what the models say of it.
+
+use crate::report::html::note;
+use crate::report::human::number;
+use crate::report::plots::Span;
+use crate::report::plots::verdict::{Seen, overlay, parity};
+use diagnosis::data::Table;
+use diagnosis::predict::Forecast;
+use diagnosis::verdict::Diagnosis;
+use models::condition::Condition;
+use models::covariate::{self, Covariate};
+use std::collections::BTreeMap;
+
+/// Panels that stand side by side.
+const PANELS: usize = 4;
+/// Share of the passes with vibration that must lie in the panels: below it curves at one base would show too little.
+const COVERED: f64 = 0.4;
+/// Places of a curve.
+const PLACES: u32 = 60;
+
+/// The table as the figures need it: `mu'` of every pass, measured and under both models, and who is suspect.
+pub struct Overlay<'a> {
+    result: &'a Diagnosis,
+    table: &'a Table,
+    forecasts: &'a [Forecast],
+    mu0: f64,
+    suspects: Vec<usize>,
+}
+
+impl<'a> Overlay<'a> {
+    /// Over a diagnosed table with its forecasts. Every `mu'` is over one `mu_0`, that of the recalibrated baseline.
+    pub fn new(result: &'a Diagnosis, table: &'a Table, forecasts: &'a [Forecast]) -> Self {
+        let mu0 = result.fitted.problem.baseline(&result.fitted.none.u).mu0;
+        let suspects = result.report.scatter.suspects.iter().map(|s| s.row).collect();
+        Overlay { result, table, forecasts, mu0, suspects }
+    }
+
+    /// Full friction of a pass along its motion, N, with the sign of the direction.
+    fn full(&self, pass: &Condition) -> f64 {
+        pass.direction.sign() * self.mu0 * pass.normal_force_n
+    }
+
+    /// Measured less predicted over full friction, of every pass: by the recalibrated baseline and by the verdict's model.
+    pub fn errors(&self) -> Vec<(f64, f64)> {
+        let of = |(i, f): (usize, &Forecast)| {
+            let (measured, full) = (self.table.lateral[i], self.full(&self.table.passes[i]));
+            ((measured - f.recalibrated) / full, (measured - f.corrected) / full)
+        };
+        self.forecasts.iter().enumerate().map(of).collect()
+    }
+
+    /// The section: panels where enough passes share a base, else every pass against its predictions.
+    ///
+    /// # Errors
+    /// Only if the drawing library fails.
+    pub fn section(&self) -> miette::Result<String> {
+        let figures = match self.panels()? {
+            Some(panels) => panels,
+            None => self.parity()?,
+        };
+        Ok(format!("<h2>Measured, and what the models say</h2>{figures}"))
+    }
+
+    fn parity(&self) -> miette::Result<String> {
+        let points: Vec<(f64, f64, f64, bool)> = (0..self.table.len())
+            .map(|i| {
+                let (full, f) = (self.full(&self.table.passes[i]), &self.forecasts[i]);
+                let [m, a, b] = [self.table.lateral[i], f.recalibrated, f.corrected].map(|n| n / full);
+                (m, a, b, self.suspects.contains(&i))
+            })
+            .collect();
+        let text = note(
+            "Each mark is a pass: on the line the model says what was measured. Left the recalibrated baseline, right the verdict's \
+             model. Suspect passes are ringed.",
+        );
+        Ok(parity(&points)? + &text)
+    }
+
+    /// Panels by the setting that varies most besides the amplitude, at the levels of the others that are most common.
+    fn panels(&self) -> miette::Result<Option<String>> {
+        let driven: Vec<usize> =
+            (0..self.table.len()).filter(|&i| self.table.passes[i].amplitude.metres() > 0.0).collect();
+        let abscissa = &covariate::AMPLITUDE;
+        if levels(self.table, &driven, abscissa).len() < 3 {
+            return Ok(None);
+        }
+        let others = [&covariate::SPEED, &covariate::FREQUENCY, &covariate::NORMAL_FORCE];
+        let Some(by) = others.iter().max_by_key(|c| levels(self.table, &driven, c).len()) else {
+            return Ok(None);
+        };
+        let mut base = driven.clone();
+        for c in others.iter().filter(|c| c.name != by.name) {
+            let counts = levels(self.table, &base, c);
+            let Some((level, _)) = counts.iter().max_by_key(|(_, rows)| rows.len()) else { return Ok(None) };
+            base.retain(|i| neighbourhood(c, &self.table.passes[*i]) == Some(*level));
+        }
+        let mut panels: Vec<Vec<usize>> = levels(self.table, &base, by).into_values().collect();
+        panels.sort_by_key(|rows| std::cmp::Reverse(rows.len()));
+        panels.truncate(PANELS);
+        panels.retain(|rows| rows.len() >= 3);
+        let shown: usize = panels.iter().map(Vec::len).sum();
+        if (shown as f64) < COVERED * driven.len() as f64 {
+            return Ok(None);
+        }
+        panels.sort_by(|a, b| {
+            let of = |rows: &[usize]| by.of(&self.table.passes[rows[0]]).unwrap_or(0.0);
+            of(a).total_cmp(&of(b))
+        });
+        let top = driven.iter().map(|&i| self.table.lateral[i] / self.full(&self.table.passes[i]));
+        let top = top.fold(1.0, f64::max).min(2.0) * 1.1;
+        let figures: miette::Result<Vec<String>> =
+            panels.iter().map(|rows| self.panel(rows, abscissa, &others, top)).collect();
+        let text = note(&format!(
+            "{shown} of {} passes with vibration, those at the conditions that are most common. Discs with bars: measured, with the standard \
+             deviation of a pass. Dashes: the recalibrated baseline. Line and band: the verdict's model with twice its standard deviation. \
+             Suspect passes are ringed. Both directions are shown alike.",
+            driven.len()
+        ));
+        Ok(Some(format!("<div class=\"panels\">{}</div>{text}", figures?.concat())))
+    }
+
+    fn panel(
+        &self,
+        rows: &[usize],
+        x: &Covariate,
+        others: &[&Covariate],
+        top: f64,
+    ) -> miette::Result<String> {
+        let passes = &self.table.passes;
+        let shown = |i: usize| x.shown.0 * x.of(&passes[i]).unwrap_or(0.0);
+        let span = Span::from_zero(rows.iter().map(|&i| shown(i)));
+        let typical = passes[rows[rows.len() / 2]];
+        let places: Vec<f64> = span.places(PLACES).collect();
+        let at = |place: &f64| {
+            let mut condition = typical;
+            x.put(&mut condition, place / x.shown.0);
+            condition
+        };
+        let curve = self.result.curve(&places.iter().map(at).collect::<Vec<_>>());
+        let full = self.full(&typical);
+        let of = |value: fn(&Forecast) -> f64| {
+            let values = curve.iter().map(|f| (value(f) / full, f.corrected_sd / full.abs()));
+            places.iter().zip(values).map(|(x, (v, sd))| (*x, v, sd)).collect()
+        };
+        let points: Vec<Seen> = rows
+            .iter()
+            .map(|&i| Seen {
+                x: shown(i),
+                before: self.table.lateral[i] / self.full(&passes[i]),
+                after: self.result.fitted.problem.whole_variance(i).sqrt() / self.full(&passes[i]).abs(),
+                suspect: self.suspects.contains(&i),
+            })
+            .collect();
+        let base: Vec<String> = others
+            .iter()
+            .filter_map(|c| Some(format!("{} {}", number(c.shown.0 * c.of(&typical)?), c.shown.1)))
+            .collect();
+        let title = base.join(", ");
+        overlay(
+            &title,
+            (&format!("{} {}", x.words, x.shown.1), span),
+            &points,
+            &of(|f| f.recalibrated),
+            &of(|f| f.corrected),
+            top,
+        )
+    }
+}
+
+fn neighbourhood(c: &Covariate, pass: &Condition) -> Option<i64> {
+    c.neighbourhood.zip(c.of(pass)).map(|(near, v)| near(v))
+}
+
+/// Rows by the level of a covariate.
+fn levels(table: &Table, rows: &[usize], c: &Covariate) -> BTreeMap<i64, Vec<usize>> {
+    let mut all = BTreeMap::<i64, Vec<usize>>::new();
+    for &i in rows {
+        if let Some(level) = neighbourhood(c, &table.passes[i]) {
+            all.entry(level).or_default().push(i);
+        }
+    }
+    all
+}

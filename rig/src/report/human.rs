@@ -1,0 +1,97 @@
+//! Quantities as people read them: three digits, and the prefix that keeps the number near one.
+
+/// Units of an SI unit in which people read it: factor and name, in the order of preference.
+const SHOWN: [(&str, &[(f64, &str)]); 11] = [
+    ("m", &[(1e6, "um"), (1e3, "mm"), (1.0, "m"), (1e9, "nm")]),
+    ("1/m", &[(1e-6, "1/um"), (1e-3, "1/mm"), (1.0, "1/m")]),
+    ("1/m^2", &[(1e-12, "1/um\u{b2}"), (1e-6, "1/mm\u{b2}"), (1.0, "1/m\u{b2}")]),
+    ("s", &[(1.0, "s"), (1e3, "ms"), (1e6, "us")]),
+    ("N", &[(1.0, "N"), (1e3, "mN"), (1e6, "uN")]),
+    ("m/s", &[(1e3, "mm/s"), (1e6, "um/s"), (1.0, "m/s")]),
+    ("s/m", &[(1.0, "s/m"), (1e-3, "s/mm"), (1e3, "ms/m"), (1e-6, "s/um")]),
+    ("kg", &[(1e6, "mg"), (1e3, "g"), (1.0, "kg"), (1e9, "ug")]),
+    ("rad", &[(1e3, "mrad"), (1.0, "rad"), (1e6, "urad")]),
+    ("N/K", &[(1e3, "mN/K"), (1.0, "N/K")]),
+    ("Hz", &[(1e-3, "kHz"), (1.0, "Hz")]),
+];
+
+/// Superscripts of an exponent.
+fn raised(exponent: i32) -> String {
+    let digits = exponent.abs().to_string();
+    let up = |c: char| {
+        c.to_digit(10).and_then(|d| {
+            "\u{2070}\u{b9}\u{b2}\u{b3}\u{2074}\u{2075}\u{2076}\u{2077}\u{2078}\u{2079}"
+                .chars()
+                .nth(d as usize)
+        })
+    };
+    let sign = if exponent < 0 { "\u{207b}" } else { "" };
+    format!("{sign}{}", digits.chars().filter_map(up).collect::<String>())
+}
+
+/// A number with three significant digits; by powers of ten below a thousandth and from a hundred thousand on.
+pub fn number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 { "0".into() } else { value.to_string() };
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if !(-3..5).contains(&exponent) {
+        return format!("{:.2}\u{d7}10{}", value / 10f64.powi(exponent), raised(exponent));
+    }
+    let digits = (2 - exponent).max(0) as usize;
+    let text = format!("{value:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
+/// A value with its interval and unit, in one scale: `0.0766 [0.05, 0.11] 1/um²`. Units that are not listed stay as they are, and a
+/// pure number has none.
+pub fn with_interval(value: f64, [low, high]: [f64; 2], unit: &str) -> String {
+    let largest = value.abs().max(low.abs()).max(high.abs());
+    // Beside its interval a value below a thousandth of it is zero.
+    let seen = |x: f64| if x.abs() < 1e-3 * largest { 0.0 } else { x };
+    let (factor, shown) = scale(if seen(value) == 0.0 { largest } else { value.abs() }, unit);
+    let [v, l, h] = [value, low, high].map(|x| number(seen(x) * factor));
+    let unit = if shown.is_empty() { String::new() } else { format!(" {shown}") };
+    format!("{v} [{l}, {h}]{unit}")
+}
+
+/// The scale in which a size is read: the first listed that puts it between a tenth and a thousand, else the nearest to one.
+fn scale(size: f64, unit: &str) -> (f64, &str) {
+    if unit == "1" {
+        return (1.0, "");
+    }
+    let Some((_, all)) = SHOWN.iter().find(|(si, _)| *si == unit) else { return (1.0, unit) };
+    let fits = all.iter().find(|(factor, _)| (0.1..1000.0).contains(&(size * factor)));
+    let away = |factor: f64| if size > 0.0 { (size * factor).log10().abs() } else { 0.0 };
+    let nearest = all.iter().min_by(|a, b| away(a.0).total_cmp(&away(b.0)));
+    fits.or(nearest).map_or((1.0, unit), |(factor, name)| (*factor, *name))
+}
+
+/// A p-value as it is read: what lies below one in a million is not told apart.
+pub fn p_value(p: f64) -> String {
+    if p < 1e-6 { "p < 1e-6".into() } else { format!("p = {}", number(p)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{number, p_value, with_interval};
+
+    #[test]
+    fn quantities_are_read_near_one() {
+        for (value, ci, unit, shown) in [
+            (7.657e10, [5e10, 1.1e11], "1/m^2", "0.0766 [0.05, 0.11] 1/um\u{b2}"),
+            (1.762e-15, [0.0, 294.0], "s/m", "0 [0, 294] s/m"),
+            (2.5e-6, [1e-6, 3.25e-6], "m", "2.5 [1, 3.25] um"),
+            (0.0, [0.0, 0.004], "N", "0 [0, 4] mN"),
+            (1.1252, [0.92549, 1.5148], "1", "1.13 [0.925, 1.51]"),
+            (-0.02, [-0.03, 0.01], "1/K", "-0.02 [-0.03, 0.01] 1/K"),
+        ] {
+            assert_eq!(with_interval(value, ci, unit), shown);
+        }
+        assert_eq!(
+            [number(123_456.0), number(99_999.0), number(0.012345)],
+            ["1.23\u{d7}10\u{2075}", "99999", "0.0123"]
+        );
+        assert_eq!([p_value(0.0), p_value(0.0213)], ["p < 1e-6", "p = 0.0213"]);
+    }
+}

@@ -1,0 +1,135 @@
+//! The figures of a verdict.
+
+use super::{COLOURS, Frame, GREY, NARROW, PANEL, Span, band, figure, line, mark, wrong};
+use models::covariate::{Covariate, Scale};
+use plotters::prelude::*;
+
+/// A pass in a figure of the verdict.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// Abscissa.
+    pub x: f64,
+    /// Measured, or the error before.
+    pub before: f64,
+    /// Standard deviation of a pass, or the error after.
+    pub after: f64,
+    /// Whether the pass is a suspect.
+    pub suspect: bool,
+}
+
+/// A model's curve: abscissa, value, standard deviation.
+pub type Curve = Vec<(f64, f64, f64)>;
+
+/// One panel of measured `mu'` under the two models: points (with the standard deviation of a pass), the recalibrated baseline in
+/// dashes, the verdict's model with its band of two standard deviations; suspects are ringed.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn overlay(
+    title: &str,
+    (x_name, span): (&str, Span),
+    points: &[Seen],
+    baseline: &Curve,
+    corrected: &Curve,
+    top: f64,
+) -> miette::Result<String> {
+    let alt = format!(
+        "{title}: {} measured passes, the recalibrated baseline and the verdict's model.",
+        points.len()
+    );
+    let frame = Frame {
+        sizes: [PANEL, NARROW],
+        x: (span, x_name),
+        y: (Span::linear(0.0..top), "relative friction \u{3bc}'"),
+        alt: &alt,
+    };
+    let svg = figure(&frame, |chart, size| {
+        let edge = |k: f64| -> Vec<(f64, f64)> {
+            corrected.iter().map(|(x, m, s)| (*x, (m + k * s).clamp(0.0, top))).collect()
+        };
+        band(chart, &edge(-2.0), &edge(2.0), COLOURS[0])?;
+        line(chart, baseline.iter().map(|(x, m, _)| (*x, m.clamp(0.0, top))).collect(), COLOURS[1], Some(6))?;
+        line(chart, edge(0.0), COLOURS[0], None)?;
+        let cut = |v: f64| v.clamp(0.0, top);
+        let bars = points.iter().map(|p| {
+            let ends = [(p.x, cut(p.before - p.after)), (p.x, cut(p.before + p.after))];
+            PathElement::new(ends.to_vec(), BLACK.stroke_width(1))
+        });
+        chart.draw_series(bars).map_err(wrong)?;
+        chart
+            .draw_series(points.iter().map(|p| mark(0, (p.x, cut(p.before)), size - 1, BLACK, true)))
+            .map_err(wrong)?;
+        rings(chart, points.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.before))), size)
+    })?;
+    Ok(format!("<figure>{svg}<figcaption>{}</figcaption></figure>", crate::report::html::escape(title)))
+}
+
+/// Rings around suspects.
+fn rings(
+    chart: &mut super::Chart<'_>,
+    at: impl Iterator<Item = (f64, f64)>,
+    size: u32,
+) -> miette::Result<()> {
+    chart.draw_series(at.map(|p| Circle::new(p, size + 4, COLOURS[3].stroke_width(2)))).map_err(wrong)?;
+    Ok(())
+}
+
+/// Measured against predicted `mu'` of every pass: left the recalibrated baseline, right the verdict's model.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
+    let top = points.iter().flat_map(|(m, a, b, _)| [*m, *a, *b]).fold(1.0, f64::max).min(3.0) * 1.05;
+    let bottom = points.iter().flat_map(|(m, a, b, _)| [*m, *a, *b]).fold(0.0, f64::min).max(-1.0) * 1.05;
+    let panels = [("recalibrated baseline", 0), ("verdict's model", 1)].map(|(name, which)| {
+        let alt =
+            format!("Measured relative friction of {} passes against that of the {name}.", points.len());
+        let x_name = format!("\u{3bc}' of the {name}");
+        let frame = Frame {
+            sizes: [PANEL, NARROW],
+            x: (Span::linear(bottom..top), &x_name),
+            y: (Span::linear(bottom..top), "measured \u{3bc}'"),
+            alt: &alt,
+        };
+        let cut = |v: f64| v.clamp(bottom, top);
+        let place = |p: &(f64, f64, f64, bool)| (cut(if which == 0 { p.1 } else { p.2 }), cut(p.0));
+        let svg = figure(&frame, |chart, size| {
+            line(chart, vec![(bottom, bottom), (top, top)], GREY, None)?;
+            let marks =
+                points.iter().map(|p| mark(which, place(p), size - 1, COLOURS[1 - which], which == 1));
+            chart.draw_series(marks).map_err(wrong)?;
+            rings(chart, points.iter().filter(|p| p.3).map(place), size)
+        })?;
+        Ok(format!("<figure>{svg}</figure>"))
+    });
+    let panels: miette::Result<Vec<String>> = panels.into_iter().collect();
+    Ok(format!("<div class=\"panels\">{}</div>", panels?.concat()))
+}
+
+/// Errors of passes in standard deviations against one covariate: hollow before a cause was added, filled after.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Result<String> {
+    let unit = c.shown.1;
+    // A direction has no unit.
+    let name = if unit.is_empty() { c.words.to_string() } else { format!("{}, {unit}", c.words) };
+    let alt = format!("Errors of {} passes against {}, before and after.", points.len(), c.words);
+    let frame = Frame {
+        sizes: [PANEL, NARROW],
+        x: (Span::over(points.iter().map(|p| p.x), c.scale == Scale::Log), &name),
+        y: (Span::linear(-limit..limit), "error, sd"),
+        alt: &alt,
+    };
+    let svg = figure(&frame, |chart, size| {
+        let cut = |e: f64| e.clamp(-limit, limit);
+        chart
+            .draw_series(points.iter().map(|p| mark(1, (p.x, cut(p.before)), size - 1, COLOURS[1], false)))
+            .map_err(wrong)?;
+        chart
+            .draw_series(points.iter().map(|p| mark(0, (p.x, cut(p.after)), size - 1, COLOURS[0], true)))
+            .map_err(wrong)?;
+        rings(chart, points.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.after))), size)
+    })?;
+    Ok(format!("<figure>{svg}</figure>"))
+}

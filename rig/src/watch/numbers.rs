@@ -1,0 +1,136 @@
+//! What is seen of a run in words and numbers. Missing data is 'none', never 0.
+
+use crate::live::{State, View};
+use crate::print::clean;
+use crate::report::human::number;
+use crate::sequence::{MeasuredPass, Outcome};
+use realtime::cycle::Phase;
+
+/// States of the last second.
+const SECOND: usize = 10;
+
+/// A number in so many decimals and its unit, or `none`.
+pub fn value(value: Option<f64>, scale: f64, decimals: usize, unit: &str) -> String {
+    match value.filter(|v| v.is_finite()) {
+        Some(v) => format!("{:.decimals$}{unit}", v * scale),
+        None => "none".into(),
+    }
+}
+
+/// The same with its sign.
+fn signed(value: Option<f64>, decimals: usize, unit: &str) -> String {
+    value.filter(|v| v.is_finite()).map_or_else(|| "none".into(), |v| format!("{v:+.decimals$}{unit}"))
+}
+
+fn band(mu: Option<f64>, sd: Option<f64>) -> String {
+    match (value(mu, 1.0, 3, ""), sd.filter(|sd| sd.is_finite())) {
+        (mu, Some(sd)) if mu != "none" => format!("{mu} +- {sd:.3}"),
+        (mu, _) => mu,
+    }
+}
+
+/// A span of seconds as people say it.
+pub fn duration(seconds: f64) -> String {
+    let whole = seconds.max(0.0).round() as u64;
+    match (whole / 3600, whole / 60 % 60, whole % 60) {
+        (0, 0, s) => format!("{s} s"),
+        (0, m, s) => format!("{m} min {s:02} s"),
+        (h, m, _) => format!("{h} h {m:02} min"),
+    }
+}
+
+/// What the loop does, in a word.
+pub fn phase(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Idle => "at rest",
+        Phase::Approach => "approaching",
+        Phase::Settle => "settling",
+        Phase::Measure => "measuring",
+        Phase::Zero => "reading zeros",
+    }
+}
+
+/// How a sweep ended, in words.
+pub fn outcome(outcome: &Outcome) -> String {
+    match outcome {
+        Outcome::Complete => "complete".into(),
+        Outcome::Stopped => "stopped on request".into(),
+        Outcome::Tripped(_) => "a safety rule tripped".into(),
+        Outcome::WouldNotArm { blocking: Some(cause) } => {
+            format!("the rig would not arm: {cause:?} stands in the way")
+        }
+        Outcome::WouldNotArm { blocking: None } => "the rig would not arm".into(),
+        Outcome::NoContact { point } => format!("no contact at point {point}"),
+        Outcome::LoopLost => "nothing was heard of the loop".into(),
+        Outcome::RecordLost => "the record could not be kept".into(),
+    }
+}
+
+/// The numbers of the last cycle, most needed first.
+pub fn of_state(view: &View) -> Vec<(&'static str, String)> {
+    // What the last cycle showed is no state of a rig that nobody leads any more.
+    if view.ended.is_some() {
+        return vec![("rig", "none: the run is over".into()), ("last pass", last_pass(view))];
+    }
+    let Some(s) = view.states.back() else {
+        return vec![("rig", "none: no cycle was told".into()), ("last pass", last_pass(view))];
+    };
+    // A running mu' is there while a pass slides only.
+    let slides = matches!(s.phase, Phase::Settle | Phase::Measure);
+    let sliding = |text: String| if text == "none" && !slides { "none: nothing slides".into() } else { text };
+    vec![
+        ("lateral force", signed(s.lateral_force_n, 4, " N (sensor frame)")),
+        ("normal force", signed(s.normal_force_n, 4, " N (compression +)")),
+        ("mu' measured", sliding(band(s.mu_relative, s.mu_relative_sd))),
+        ("mu' predicted", sliding(band(s.predicted, s.predicted_sd))),
+        ("residual", sliding(residual(s))),
+        ("amplitude w", value(s.amplitude_pp_m, 1e6, 3, " um")),
+        ("frequency", value(s.frequency_hz, 1e-3, 3, " kHz")),
+        ("output", output(s)),
+        ("lateness", lateness(view)),
+        ("last pass", last_pass(view)),
+    ]
+}
+
+fn residual(s: &State) -> String {
+    match signed(s.residual, 3, "") {
+        none if none == "none" => none,
+        residual => format!("{residual}, z {}", signed(s.z, 1, "")),
+    }
+}
+
+fn output(s: &State) -> String {
+    let on = match s.output_on {
+        Some(true) => "ON",
+        Some(false) => "off",
+        None => "none",
+    };
+    format!("{on}, {}", value(s.temperature_c, 1.0, 1, " degC"))
+}
+
+/// The latest beginning of a cycle in the last second.
+fn lateness(view: &View) -> String {
+    let last = view.states.iter().rev().take(SECOND);
+    let worst = last.map(|s| s.extremes.lateness_s).fold(0.0, f64::max);
+    format!("{} ms, worst of 1 s", number(worst * 1e3))
+}
+
+fn last_pass(view: &View) -> String {
+    view.passes.last().map_or_else(|| "none".into(), of_pass)
+}
+
+fn of_pass(pass: &MeasuredPass) -> String {
+    let c = pass.comparison;
+    format!(
+        "{}: mu' {}, z {}",
+        pass.pass.point,
+        value(c.and_then(|c| c.mu_relative), 1.0, 3, ""),
+        signed(c.map(|c| c.z), 1, "")
+    )
+}
+
+/// Text from a file or an instrument, on one line and without control characters.
+pub fn plain(text: &str) -> String {
+    // Colours too: what is shown has the view's own.
+    clean(text).chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}

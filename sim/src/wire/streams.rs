@@ -1,0 +1,108 @@
+//! Emulated instruments that send by themselves over a network: a stream over TCP to whoever connects, or in datagrams.
+
+use super::SharedPlant;
+use super::device::Device;
+use super::serial::frames;
+use instruments::schema::{LinkKind, Stream};
+use std::io::{self, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// How often what is due is sent.
+const TURN: Duration = Duration::from_micros(500);
+/// More clients than this are turned away.
+const MOST_CLIENTS: usize = 8;
+
+/// A running emulator; dropping it stops it.
+pub struct NetworkStream {
+    address: SocketAddr,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Those who are sent to.
+enum Ears {
+    Tcp(TcpListener, Vec<TcpStream>),
+    /// Whoever asked last, or the port that the profile states.
+    Udp(UdpSocket, Option<SocketAddr>),
+}
+
+impl NetworkStream {
+    /// Serves an instrument's stream at `address` (port 0 for any free one): over TCP to whoever connects, in datagrams to
+    /// whoever has sent one, or to the profile's `local_port` on this machine.
+    ///
+    /// # Errors
+    /// Where the address cannot be bound, or the profile has no stream.
+    pub fn start(address: SocketAddr, device: Device, plant: SharedPlant) -> io::Result<Self> {
+        let link = &device.profile().description.link;
+        let stream = device.profile().description.stream.clone();
+        let stream = stream.ok_or_else(|| io::Error::other("the profile has no stream"))?;
+        let (ears, address) = if link.kind == LinkKind::Udp {
+            let socket = UdpSocket::bind(address)?;
+            socket.set_nonblocking(true)?;
+            let address = socket.local_addr()?;
+            let to = link.local_port.map(|port| SocketAddr::from(([127, 0, 0, 1], port)));
+            (Ears::Udp(socket, to), address)
+        } else {
+            let listener = TcpListener::bind(address)?;
+            listener.set_nonblocking(true)?;
+            let address = listener.local_addr()?;
+            (Ears::Tcp(listener, Vec::new()), address)
+        };
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::Builder::new()
+            .name("stream-emulator".into())
+            .spawn(move || serve(ears, device, &stream, &plant, &stopped))?;
+        Ok(Self { address, stop, thread: Some(thread) })
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+}
+
+impl Drop for NetworkStream {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn serve(mut ears: Ears, mut device: Device, stream: &Stream, plant: &SharedPlant, stopped: &AtomicBool) {
+    let mut due = plant.now().1;
+    while !stopped.load(Ordering::Acquire) {
+        let (sent, next) = frames(&mut device, stream, plant, due);
+        due = next;
+        match &mut ears {
+            Ears::Tcp(listener, clients) => {
+                if let (Ok((client, _)), true) = (listener.accept(), clients.len() < MOST_CLIENTS) {
+                    // One that does not read is let go rather than waited for.
+                    let ready = client.set_nodelay(true).and_then(|()| client.set_nonblocking(true));
+                    clients.extend(ready.is_ok().then_some(client));
+                }
+                clients.retain_mut(|client| sent.iter().all(|frame| client.write_all(frame).is_ok()));
+            }
+            Ears::Udp(socket, to) => {
+                let mut asked = [0; 1500];
+                while let Ok((_, from)) = socket.recv_from(&mut asked) {
+                    if device.profile().description.link.local_port.is_none() {
+                        *to = Some(from);
+                    }
+                }
+                if let Some(to) = *to {
+                    // Nobody there is no trouble of a sender's.
+                    sent.iter().for_each(|frame| drop(socket.send_to(frame, to)));
+                }
+            }
+        }
+        std::thread::sleep(TURN);
+    }
+}

@@ -1,0 +1,78 @@
+//! An emulated device of the kernel's: a folder with a file for each attribute.
+
+use super::SharedPlant;
+use super::device::Device;
+use instruments::FrameId;
+use instruments::profile::FrameKind;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// How often the attributes are written anew.
+const TURN: Duration = Duration::from_millis(2);
+
+/// A running emulator; dropping it stops it, and its folder goes.
+pub struct SysfsFolder {
+    path: PathBuf,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl SysfsFolder {
+    /// Serves an instrument's attributes in a folder of its own among the temporary files.
+    ///
+    /// # Errors
+    /// Where the folder cannot be made.
+    pub fn start(mut device: Device, plant: SharedPlant) -> io::Result<Self> {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let name = format!("muprime-sysfs-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let path = std::env::temp_dir().join(name);
+        std::fs::create_dir(&path)?;
+        write(&mut device, &plant, &path)?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let (stopped, folder) = (Arc::clone(&stop), path.clone());
+        let thread = std::thread::Builder::new().name("sysfs-emulator".into()).spawn(move || {
+            while !stopped.load(Ordering::Acquire) {
+                if let Err(error) = write(&mut device, &plant, &folder) {
+                    tracing::debug!(%error, "the emulated attributes");
+                }
+                std::thread::sleep(TURN);
+            }
+        })?;
+        Ok(Self { path, stop, thread: Some(thread) })
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for SysfsFolder {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+        let _ = std::fs::remove_dir_all(&self.path);
+    }
+}
+
+/// Writes every attribute, each whole.
+fn write(device: &mut Device, plant: &SharedPlant, folder: &Path) -> io::Result<()> {
+    let (mut plant, now) = plant.now();
+    for index in 0..device.profile().frames().len() {
+        let FrameKind::Query(query) = device.profile().frames()[index].kind else { continue };
+        let bytes = device.frame(FrameId(index), &mut *plant, now);
+        let line = device.profile().frames()[index].write_line(&bytes, 1.0).unwrap_or_default();
+        let name = &device.profile().description.query[query].send;
+        let whole = folder.join(format!(".{name}"));
+        std::fs::write(&whole, line + "\n")?;
+        std::fs::rename(&whole, folder.join(name))?;
+    }
+    Ok(())
+}

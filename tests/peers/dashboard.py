@@ -1,0 +1,113 @@
+"""Opens a dashboard in a real Chromium at three widths, light and dark, and does with it what a person does.
+
+    dashboard.py views|keys FOLDER LINK LIVE OTHER
+
+`views` looks at every page, `keys` pauses and stops LIVE by the keyboard. LINK is the address with its token; LIVE a run that goes on, OTHER one that is over. Looks for: requests to anywhere else, scripts of a
+name that ran, a page wider than its window, what axe-core calls serious or critical, plots that stay empty, keys that do nothing.
+Writes pictures into FOLDER. Prints one JSON document; every list in it should be empty but for `pictures`.
+"""
+import json
+import shutil
+import sys
+from pathlib import Path
+from urllib.parse import quote, urlsplit
+
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import sync_playwright
+
+what, out, (link, live, other) = sys.argv[1], Path(sys.argv[2]), sys.argv[3:6]
+base = f"{urlsplit(link).scheme}://{urlsplit(link).netloc}"
+chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+if not chromium:
+    sys.exit("chromium is missing: tests/venv installs it")
+faults, asked, ran, pictures = [], [], [], []
+# Colours in a figure's canvas: a few of them mean that something is drawn.
+DRAWN = "() => [...document.querySelectorAll('figure:not([hidden]) canvas')].map(c => { const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; return new Set(new Uint32Array(d.buffer)).size; })"
+WIDER = "() => document.documentElement.scrollWidth - document.documentElement.clientWidth"
+
+
+def settled(page, where):
+    page.goto(f"{base}/#/{where}")
+    page.wait_for_selector("h1")
+    if where.startswith(("page/", "compare/")):
+        kind = "Two runs" if where.startswith("compare/") else "report.html"
+        page.frame_locator(f"iframe[title='{kind}']").locator("h1").wait_for(timeout=20000)
+    if where.startswith("run/"):
+        page.wait_for_selector("dl.now dd", state="attached")
+        page.wait_for_function("() => !document.querySelector('dl.now dd').textContent.startsWith('0 of 0')", timeout=20000)
+        page.wait_for_timeout(1500)
+
+
+def views(browser):
+    for width in [360, 800, 1600]:
+        for scheme in ["light", "dark"]:
+            page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+            page.on("request", lambda r: asked.append(r.url) if not r.url.startswith((base, base.replace("http", "ws"), "data:", "about:")) else None)
+            page.on("dialog", lambda d: (ran.append(d.message), d.dismiss()))
+            page.on("console", lambda m: ran.append(m.text) if m.type == "error" else None)
+            page.on("pageerror", lambda e: ran.append(str(e)))
+            page.goto(link)
+            page.wait_for_selector("table")
+            places = {"runs": "", "live": f"run/{quote(live)}", "over": f"run/{quote(other)}", "report": f"page/{quote(other)}/report.html", "compare": f"compare/{quote(live)}/{quote(other)}"}
+            for name, where in places.items():
+                view = f"{name}-{width}-{scheme}"
+                settled(page, where)
+                if name in ("live", "over"):
+                    drawn, words = page.evaluate(DRAWN), page.inner_text("main")
+                    if len(drawn) != (6 if name == "live" else 3) or min(drawn) < 8:
+                        faults.append(f"{view}: plots {drawn}")
+                    faults.extend(f"{view}: {bad}" for bad in ["NaN", "undefined", "No pass", "[object"] if bad in words)
+                over = page.evaluate(WIDER)
+                if over > 0:
+                    faults.append(f"{view}: {over} px wider than the window")
+                # A frame without scripts cannot be looked into; its page is looked at as a file, by pages.py.
+                found = Axe().run(page, options={"iframes": False}).response["violations"]
+                faults.extend([f"{view}: {v['id']}: {v['help']} ({v['nodes'][0]['target']})" for v in found if v["impact"] in ("serious", "critical")])
+                page.screenshot(path=out / f"{view}.png", full_page=True)
+                pictures.append(view)
+                if view == "live-1600-light":
+                    page.emulate_media(media="print")
+                    page.pdf(path=out / "live.pdf", format="A4")
+                    page.emulate_media(media="screen")
+            page.close()
+
+
+def keys(browser):
+    # The whole way by the keyboard: to the run, and its stop.
+    page = browser.new_page()
+    page.goto(link)
+    page.wait_for_selector("table a")
+    seen = []
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        seen.append(page.evaluate("() => document.activeElement.textContent || document.activeElement.id"))
+        if seen[-1] == live:
+            break
+    else:
+        faults.append(f"the keyboard does not reach the run: {seen}")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("button.stop:not([disabled])", timeout=20000)
+    for _ in range(20):
+        page.keyboard.press("Tab")
+        if page.evaluate("() => document.activeElement.textContent") == "Pause":
+            break
+    else:
+        faults.append("the keyboard does not reach the pause")
+    page.keyboard.press("Enter")
+    try:
+        page.wait_for_function("() => document.querySelector('.state').textContent === 'paused'", timeout=20000)
+        page.keyboard.press("Enter")
+        page.wait_for_function("() => document.querySelector('.state').textContent === 'armed'", timeout=20000)
+        page.keyboard.press("Shift+Tab")
+        page.keyboard.press("Enter")
+        page.wait_for_function("() => document.querySelector('.state').textContent === 'stopped'", timeout=20000)
+    except Exception as why:
+        faults.append(f"keys: {why}; {page.inner_text('main')[:600]}")
+    page.screenshot(path=out / "stopped.png", full_page=True)
+
+
+with sync_playwright() as p:
+    browser = p.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+    (views if what == "views" else keys)(browser)
+    browser.close()
+print(json.dumps({"faults": faults, "asked": asked, "ran": ran, "pictures": pictures}))

@@ -1,0 +1,74 @@
+"""Opens pages in a real Chromium at three widths, light, dark and in print, and says what is wrong with them.
+
+    pages.py FOLDER PAGE...
+
+Looks for: requests to anywhere, scripts that ran, a page wider than its window, figures without words, letters too small to read, what
+axe-core calls serious or critical, what the keyboard does not reach. Writes pictures and a PDF into FOLDER. Prints one JSON document.
+"""
+import json
+import shutil
+import sys
+from pathlib import Path
+
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import sync_playwright
+
+WIDTHS = [360, 800, 1600]
+# What a page says about itself in the browser: its overflow, its figures and the smallest letter that is shown, in CSS pixels.
+LOOK = """() => {
+  const shown = e => e.getClientRects().length > 0;
+  const figures = [...document.querySelectorAll('svg')].filter(shown);
+  const letters = figures.flatMap(svg => {
+    const k = svg.getBoundingClientRect().width / svg.viewBox.baseVal.width;
+    return [...svg.querySelectorAll('text')].map(t => k * parseFloat(t.getAttribute('font-size')));
+  });
+  return {
+    overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
+    figures: figures.length,
+    nameless: figures.filter(s => !(s.getAttribute('aria-label') || '').trim()).length,
+    smallest: letters.length ? Math.min(...letters) : null,
+  };
+}"""
+
+out, pages = Path(sys.argv[1]), [Path(p).resolve() for p in sys.argv[2:]]
+chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+if not chromium:
+    sys.exit("chromium is missing: tests/venv installs it")
+axe, seen = Axe(), []
+with sync_playwright() as p:
+    browser = p.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+    for path in pages:
+        for width in WIDTHS:
+            for scheme in ["light", "dark"]:
+                page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+                asked, ran = [], []
+                page.on("request", lambda r: asked.append(r.url))
+                page.on("dialog", lambda d: (ran.append(d.message), d.dismiss()))
+                page.on("console", lambda m: ran.append(m.text) if m.type == "error" else None)
+                page.goto(path.as_uri())
+                faults = [
+                    f"{v['id']}: {v['help']} ({len(v['nodes'])} places, first {v['nodes'][0]['target']})"
+                    for v in axe.run(page).response["violations"]
+                    if v["impact"] in ("serious", "critical")
+                ]
+                look = page.evaluate(LOOK)
+                page.screenshot(path=out / f"{path.stem}-{width}-{scheme}.png", full_page=True)
+                asked = [url for url in asked if url != path.as_uri() and not url.startswith("data:")]
+                # By the keyboard alone: what folds opens, what scrolls has the focus.
+                opened = page.evaluate("() => [...document.querySelectorAll('details')].length")
+                for _ in range(40):
+                    page.keyboard.press("Tab")
+                    if page.evaluate("() => document.activeElement.matches('details:not([open]) > summary')"):
+                        page.keyboard.press("Enter")
+                folded = page.evaluate("() => [...document.querySelectorAll('details:not([open])')].length")
+                seen.append(
+                    dict(page=path.name, width=width, scheme=scheme, axe=faults, asked=asked, ran=ran,
+                         details=opened, folded=folded, **look)
+                )
+                page.close()
+        page = browser.new_page()
+        page.goto(path.as_uri())
+        page.pdf(path=out / f"{path.stem}.pdf", format="A4", prefer_css_page_size=True)
+        page.close()
+    browser.close()
+print(json.dumps(seen))
