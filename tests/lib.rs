@@ -67,3 +67,28 @@ pub fn documents(output: &Output) -> Vec<serde_json::Value> {
         .map(|line| serde_json::from_str(line).unwrap_or_else(|e| panic!("not JSON: {line}: {e}")))
         .collect()
 }
+
+/// A plan of a few seconds.
+pub const SHORT: &str = r#"
+name = "short"
+seed = 7
+reference_every = 4
+[pass]
+settle_s = 0.08
+measure_s = 0.1
+[base]
+amplitude_pp_m = 2e-6
+frequency_hz = 27500
+speed_m_s = 0.02
+normal_force_n = 0.25
+[[series]]
+amplitude_pp_m = [0.5e-6, 1e-6, 2e-6, 3e-6]
+speed_m_s = [0.01, 0.04]
+"#;
+
+/// A plan of 22 passes of a quarter of a second, written into a folder; its path.
+pub fn short_plan(folder: &Path) -> String {
+    let path = folder.join("short.toml");
+    std::fs::write(&path, SHORT).expect("a folder that can be written");
+    path.display().to_string()
+}

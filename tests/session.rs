@@ -5,31 +5,10 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
-use tests::{cut_by_a_stall, documents, file, muprime, python, sweep_unless_the_machine_stalls, texts};
-
-/// A plan of a few seconds.
-const SHORT: &str = r#"
-name = "short"
-seed = 7
-reference_every = 4
-[pass]
-settle_s = 0.08
-measure_s = 0.1
-[base]
-amplitude_pp_m = 2e-6
-frequency_hz = 27500
-speed_m_s = 0.02
-normal_force_n = 0.25
-[[series]]
-amplitude_pp_m = [0.5e-6, 1e-6, 2e-6, 3e-6]
-speed_m_s = [0.01, 0.04]
-"#;
-
-fn short_plan(folder: &Path) -> String {
-    let path = folder.join("short.toml");
-    std::fs::write(&path, SHORT).unwrap();
-    path.display().to_string()
-}
+use tests::{
+    SHORT, cut_by_a_stall, documents, file, muprime, python, short_plan, sweep_unless_the_machine_stalls,
+    texts,
+};
 
 /// Point numbers in a run's table.
 fn points(run: &Path) -> Vec<u64> {
@@ -366,29 +345,6 @@ fn everything_bundled_passes_its_own_check() {
     let output = muprime().args(["--json", "check"]).args(&files).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", texts(&output).0);
     assert_eq!(documents(&output).len(), files.len());
-}
-
-#[test]
-fn exports_are_read_by_others() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
-    let plan = short_plan(folder.path());
-    let status = muprime().args(["run", &plan, "--fast", "--out"]).arg(&out).output().unwrap();
-    assert_eq!(status.status.code(), Some(0));
-    for format in ["csv", "parquet", "arrow"] {
-        let status = muprime().args(["export", "--to", format]).arg(&out).output().unwrap();
-        assert_eq!(status.status.code(), Some(0), "{}", texts(&status).1);
-    }
-    let script = "import sys, csv, pyarrow.parquet as p, pyarrow.ipc as i\n\
-                  r = sys.argv[1]; rows = list(csv.DictReader(open(r + '/passes.csv')))\n\
-                  a = p.read_table(r + '/passes.parquet'); b = i.open_file(r + '/passes.arrow').read_all()\n\
-                  want = [float(x['lateral_force_n']) for x in rows]\n\
-                  assert a['lateral_force_n'].to_pylist() == want == b['lateral_force_n'].to_pylist()\n\
-                  assert a.column_names == b.column_names == list(rows[0].keys())\n\
-                  assert a['ambient_pressure_pa'].null_count == len(rows)\n\
-                  print(len(rows))";
-    let read = python().args(["-c", script]).arg(&out).output().unwrap();
-    assert_eq!(texts(&read).0.trim(), "22", "{}", texts(&read).1);
 }
 
 /// A program that ends with the test.

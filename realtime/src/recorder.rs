@@ -14,6 +14,7 @@
 mod integrity;
 mod read;
 mod recover;
+mod schema;
 mod sink;
 mod summary;
 
@@ -59,16 +60,8 @@ pub struct Preamble {
 const TOPICS: [&str; 3] = [CYCLES, PASSES, EVENTS];
 /// Facts of the last words: how many messages of each topic were written.
 const WRITTEN: [&str; 3] = ["cycles_written", "passes_written", "events_written"];
-/// How the schemas are written.
-const ENCODING: &str = "jsonschema";
-/// All of them: any object.
-const SCHEMA: &[u8] = b"{\"type\":\"object\"}";
 /// A chunk is closed once its messages are longer than this, in bytes.
 const CHUNK: usize = 64 * 1024;
-
-fn schema_name(topic: &str) -> String {
-    format!("muprime{}", topic.replace('/', "."))
-}
 
 /// Writes a record.
 pub struct Recorder<W> {

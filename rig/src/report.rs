@@ -28,6 +28,8 @@ pub struct RunData {
     pub about: Vec<(&'static str, String)>,
     /// Facts of the record's first words.
     pub facts: BTreeMap<String, String>,
+    /// Files that the record holds, by name: setup, plan, rig.toml, certificates, model, profiles.
+    pub files: BTreeMap<String, Vec<u8>>,
     /// The passes with their comparisons.
     pub passes: Vec<MeasuredPass>,
     /// Events with loop time in s.
@@ -47,6 +49,7 @@ pub struct RunData {
 pub fn read(folder: &Path) -> miette::Result<RunData> {
     let passes = passes_in(folder).wrap_err_with(|| format!("{} holds no run", folder.display()))?;
     let mut facts = BTreeMap::new();
+    let mut files = BTreeMap::new();
     let mut events = Vec::new();
     let mut damage = missing_records(folder)?;
     for path in records_in(folder)? {
@@ -65,7 +68,8 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
                         events.push((log_time.saturating_sub(start) as f64 * 1e-9, event));
                     }
                 }
-                Entry::Facts { .. } | Entry::File { .. } => {}
+                Entry::File { name, bytes, .. } => drop(files.insert(name, bytes)),
+                Entry::Facts { .. } => {}
             }
         }
         damage.extend(reader.integrity().sentences().iter().map(|s| of_file(&path, s)));
@@ -75,7 +79,7 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
         std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
     let rig = crate::input::rig_file(&folder.join("rig.toml"))?;
     let about = about::of_run(folder, &facts, Some(&rig));
-    Ok(RunData { about, facts, passes, events, summary, finger: rig.finger, damage })
+    Ok(RunData { about, facts, files, passes, events, summary, finger: rig.finger, damage })
 }
 
 /// The report of a run as HTML.

@@ -270,10 +270,17 @@ pub fn records_in(path: &Path) -> miette::Result<Vec<PathBuf>> {
         .into_diagnostic()
         .wrap_err_with(|| path.display().to_string())?
         .filter_map(|entry| entry.ok().map(|e| e.path()))
-        .filter(|p| p.extension().is_some_and(|e| e == "mcap"))
+        .filter(|p| is_record(p))
         .collect();
     found.sort_by_key(|p| (p.as_os_str().len(), p.clone()));
     Ok(found)
+}
+
+/// Whether it is named as a session's record: `run-NUMBER.mcap`. What else ends so was exported into the folder.
+fn is_record(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let number = name.strip_prefix("run-").and_then(|rest| rest.strip_suffix(".mcap"));
+    number.is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// The sessions of a run's folder, oldest first; none where the first has not begun.

@@ -58,6 +58,8 @@ pub struct Notes {
     pub operator: Option<String>,
     /// What is measured: the fingertip, its preparation, the plate.
     pub sample: Option<String>,
+    /// Licence of the data: an SPDX identifier or an address.
+    pub licence: Option<String>,
 }
 
 /// What happened, for whoever watches.

@@ -1,6 +1,6 @@
 //! Records of the format, in the order in which they go into a file, with their checksums.
 
-use super::{CHECKSUM, CHUNK, ENCODING, SCHEMA, TOPICS, schema_name, summary};
+use super::{CHECKSUM, CHUNK, TOPICS, schema, summary};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use std::borrow::Cow;
@@ -44,6 +44,8 @@ pub(super) struct Sink<W> {
     checksum: crc32fast::Hasher,
     /// Length of what every piece begins with.
     head: usize,
+    /// Length of what the piece of every chunk begins with: that, and the chunk that names the topics.
+    named: usize,
     chunk: Option<Piece>,
     /// Bytes of the messages in the present chunk.
     filled: usize,
@@ -53,14 +55,13 @@ impl<W: Write> Sink<W> {
     pub fn begin(to: W) -> Result<Self, McapError> {
         let head = bytes_of(piece()?);
         let checksum = crc32fast::Hasher::new();
-        let mut sink = Sink { to, checksum, head: 0, chunk: None, filled: 0 };
-        sink.put(&head)?;
-        sink.head = head.len();
+        let named = bytes_of(open_chunk()?);
+        let mut sink = Sink { to, checksum, head: head.len(), named: named.len(), chunk: None, filled: 0 };
+        sink.put(&named)?;
         Ok(sink)
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<(), McapError> {
-        let bytes = &bytes[self.head..];
         self.checksum.update(bytes);
         Ok(self.to.write_all(bytes)?)
     }
@@ -70,7 +71,7 @@ impl<W: Write> Sink<W> {
         facts.insert(CHECKSUM.into(), checksum_of(name, &facts));
         let mut piece = piece()?;
         piece.write_metadata(&Metadata { name: name.into(), metadata: facts })?;
-        self.put(&bytes_of(piece))
+        self.put(&bytes_of(piece)[self.head..])
     }
 
     pub fn attach(&mut self, time_ns: u64, name: &str, bytes: &[u8]) -> Result<(), McapError> {
@@ -83,7 +84,7 @@ impl<W: Write> Sink<W> {
             media_type: "text/plain".into(),
             data: Cow::Borrowed(bytes),
         })?;
-        self.put(&bytes_of(piece))
+        self.put(&bytes_of(piece)[self.head..])
     }
 
     /// A message of the `kind`-th topic.
@@ -110,7 +111,7 @@ impl<W: Write> Sink<W> {
         self.filled = 0;
         let Some(mut chunk) = self.chunk.take() else { return Ok(()) };
         chunk.flush()?;
-        self.put(&bytes_of(chunk))
+        self.put(&bytes_of(chunk)[self.named..])
     }
 
     pub fn flush(&mut self) -> Result<(), McapError> {
@@ -126,11 +127,14 @@ impl<W: Read + Write + Seek> Sink<W> {
     }
 }
 
+/// A piece that begins with a chunk of its own for schemas and channels. It goes into the file once, at the beginning: a reader
+/// knows the topics from there, or from the index, and no later chunk repeats what is as long as some of its messages.
 fn open_chunk() -> Result<Piece, McapError> {
     let mut chunk = piece()?;
-    for topic in TOPICS {
-        let schema = chunk.add_schema(&schema_name(topic), ENCODING, SCHEMA)?;
+    for (kind, topic) in TOPICS.into_iter().enumerate() {
+        let schema = chunk.add_schema(&schema::name_of(topic), schema::ENCODING, schema::of(kind))?;
         chunk.add_channel(schema, topic, "json", &BTreeMap::new())?;
     }
+    chunk.flush()?;
     Ok(chunk)
 }

@@ -3,7 +3,7 @@
 //! They are read back from the file itself, a few thousand at a time: a writer that kept one entry a chunk in memory would
 //! grow for as long as the run lasts. Format: MCAP specification 0, "Summary section" (<https://mcap.dev/spec>).
 
-use super::{ENCODING, SCHEMA, TOPICS, schema_name};
+use super::{TOPICS, schema};
 use mcap::McapError;
 use mcap::records::{Record, op};
 use std::collections::BTreeMap;
@@ -251,12 +251,13 @@ pub(super) fn end(file: &mut (impl Read + Write + Seek), data_crc: u32) -> Resul
     let checksum = crc32fast::Hasher::new();
     let mut summary = Summary { file, start, at: start, checksum, offsets: Vec::new() };
     let (mut schemas, mut channels) = (Vec::new(), Vec::new());
-    for (id, topic) in (1..).zip(TOPICS) {
+    for (kind, topic) in TOPICS.into_iter().enumerate() {
+        let id = kind as u16 + 1;
         Bytes::default()
             .u16(id)
-            .text(schema_name(topic).as_bytes())
-            .text(ENCODING.as_bytes())
-            .text(SCHEMA)
+            .text(schema::name_of(topic).as_bytes())
+            .text(schema::ENCODING.as_bytes())
+            .text(schema::of(kind))
             .record(op::SCHEMA, &mut schemas);
         let channel = Bytes::default().u16(id).u16(id).text(topic.as_bytes()).text(b"json");
         channel.u32(0).record(op::CHANNEL, &mut channels);

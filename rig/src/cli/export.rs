@@ -1,5 +1,6 @@
-//! `muprime export RUN --to csv|parquet|arrow`.
+//! `muprime export RUN --to csv|parquet|arrow|hdf5|mcap|ro-crate`.
 
+use crate::export::facts::Stated;
 use crate::export::{Format, export};
 use crate::{out, say};
 use std::path::PathBuf;
@@ -16,6 +17,8 @@ pub struct Args {
     /// Where to write it [default: passes.csv and the like, in the run's folder]
     #[arg(long)]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    stated: Stated,
 }
 
 /// Converts.
@@ -24,8 +27,7 @@ pub struct Args {
 /// A folder that holds no run, or a place that cannot be written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let run = crate::report::read(&args.run)?;
-    let out = args.out.unwrap_or_else(|| args.run.join(format!("passes.{}", args.to.ending())));
-    export(&run, args.to, &out)?;
+    let out = export(&args.run, &run, args.to, &args.stated, args.out.as_deref())?;
     if json {
         out!("{}", serde_json::json!({ "file": out, "passes": run.passes.len(), "damage": run.damage }));
     } else {

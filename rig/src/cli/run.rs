@@ -64,6 +64,9 @@ pub struct Args {
     /// What is measured, for its record and report: the fingertip, its preparation, the plate
     #[arg(long, value_name = "WORDS")]
     sample: Option<String>,
+    /// Licence of the data, for its record and exports: an SPDX identifier (CC-BY-4.0) or an address
+    #[arg(long, value_name = "ID")]
+    licence: Option<String>,
     /// Show the run live on the whole terminal, as 'muprime watch' does
     #[arg(long)]
     tui: bool,
@@ -241,7 +244,7 @@ fn job(args: Args) -> miette::Result<Job> {
     };
     let seed = args.seed.unwrap_or(plan.file.seed);
     let out = args.out.unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
-    let notes = Notes { operator: args.operator, sample: args.sample };
+    let notes = Notes { operator: args.operator, sample: args.sample, licence: args.licence };
     Ok(Job { setup, plan, seed, model, model_file, defects, out, fast: args.fast, notes })
 }
 

@@ -1,71 +1,36 @@
 //! Parquet: written as one row group, and read for the diagnosis.
 
 use super::columns::{Column, Table};
+use super::facts::Facts;
 use miette::IntoDiagnostic;
-use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
-use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
+use parquet::arrow::ArrowWriter;
+use parquet::basic::Compression;
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use parquet::file::writer::SerializedFileWriter;
 use parquet::record::Field;
-use parquet::schema::types::Type;
 use std::path::Path;
-use std::sync::Arc;
 
-pub fn bytes(table: &Table) -> miette::Result<Vec<u8>> {
-    let field = |(name, column): &(&'static str, Column)| {
-        let (kind, logical) = match column {
-            Column::Numbers(_) => (Physical::DOUBLE, None),
-            Column::Counts(_) => (Physical::INT64, None),
-            Column::Texts(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
-        };
-        let builder = Type::primitive_type_builder(name, kind).with_repetition(Repetition::OPTIONAL);
-        builder.with_logical_type(logical).build().map(Arc::new)
-    };
-    let fields = table.iter().map(field).collect::<Result<Vec<_>, _>>().into_diagnostic()?;
-    let schema = Type::group_type_builder("passes").with_fields(fields).build().into_diagnostic()?;
-    let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
+/// The table of [`super::arrow`], whose schema goes along (`ARROW:schema`): readers that know Arrow see units and facts where
+/// Arrow has them. For those that do not, the file's own metadata hold the facts, and `muprime.columns`: name, unit and meaning
+/// of every column as JSON.
+pub fn bytes(table: &Table, facts: &Facts) -> miette::Result<Vec<u8>> {
+    let batch = super::arrow::batch(table, facts)?;
+    let about = |column: &Column| serde_json::json!({ "name": column.name, "unit": column.unit(), "description": column.words });
+    let columns = serde_json::Value::Array(table.iter().map(about).collect()).to_string();
+    let fact = |(name, fact): (&String, &String)| KeyValue::new(format!("muprime.{name}"), fact.clone());
+    let columns = KeyValue::new("muprime.columns".to_string(), columns);
+    let told = facts.iter().map(fact).chain(std::iter::once(columns));
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::SNAPPY)
+        .set_created_by(format!("muprime {}", env!("CARGO_PKG_VERSION")))
+        .set_key_value_metadata(Some(told.collect()))
+        .build();
     let mut bytes = Vec::new();
-    let mut file =
-        SerializedFileWriter::new(&mut bytes, Arc::new(schema), Arc::new(properties)).into_diagnostic()?;
-    let mut group = file.next_row_group().into_diagnostic()?;
-    for (_, column) in table {
-        let Some(mut writer) = group.next_column().into_diagnostic()? else { break };
-        match column {
-            Column::Numbers(v) => {
-                let (values, levels) = present(v.iter().copied());
-                writer.typed::<DoubleType>().write_batch(&values, Some(&levels), None).into_diagnostic()?;
-            }
-            Column::Counts(v) => {
-                let (values, levels) = present(v.iter().map(|v| v.map(|v| v as i64)));
-                writer.typed::<Int64Type>().write_batch(&values, Some(&levels), None).into_diagnostic()?;
-            }
-            Column::Texts(v) => {
-                let (values, levels) = present(v.iter().map(|v| v.as_deref().map(ByteArray::from)));
-                writer
-                    .typed::<ByteArrayType>()
-                    .write_batch(&values, Some(&levels), None)
-                    .into_diagnostic()?;
-            }
-        }
-        writer.close().into_diagnostic()?;
-    }
-    group.close().into_diagnostic()?;
-    file.close().into_diagnostic()?;
+    let mut writer = ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties)).into_diagnostic()?;
+    writer.write(&batch).into_diagnostic()?;
+    writer.close().into_diagnostic()?;
     Ok(bytes)
-}
-
-/// Parquet's way with missing values: those that are there, and a level for each row.
-fn present<T>(values: impl Iterator<Item = Option<T>>) -> (Vec<T>, Vec<i16>) {
-    let mut there = Vec::new();
-    let levels = values
-        .map(|value| {
-            let level = i16::from(value.is_some());
-            there.extend(value);
-            level
-        })
-        .collect();
-    (there, levels)
 }
 
 /// The columns of a Parquet point table as CSV text: one reader judges both formats.

@@ -1,7 +1,7 @@
 //! Keeps what a sweep yields: record, point table, catalogue. It runs beside the loop and may touch files.
 #![allow(clippy::disallowed_methods, reason = "a run says when it began")]
 
-use super::{Job, News, Summary, Unfinished};
+use super::{Job, News, Notes, Summary, Unfinished};
 use crate::catalogue::{Catalogue, RunEntry};
 use crate::files::Placed;
 use crate::run_dir::RunDir;
@@ -79,7 +79,8 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     files.extend(job.model_file.clone());
     files.extend(job.setup.certificates.files.iter().cloned());
     files.extend(job.setup.profiles().into_iter().map(|(name, text)| (format!("profiles/{name}"), text)));
-    let notes = [("operator", &job.notes.operator), ("sample", &job.notes.sample)];
+    let Notes { operator, sample, licence } = &job.notes;
+    let notes = [("operator", operator), ("sample", sample), ("licence", licence)];
     let notes = notes.into_iter().filter_map(|(k, v)| Some((k, v.clone()?)));
     let facts = facts.into_iter().chain(notes).map(|(k, v)| (k.to_string(), v)).collect();
     Ok(Preamble { start_unix_ns, facts, files })

@@ -40,7 +40,8 @@ pub(super) fn messages(
         .with_record_length_limit(LONGEST as usize);
     let mut linear = LinearReader::new_with_options(options);
     let mut bytes = &framed[..];
-    let mut kinds: BTreeMap<u16, usize> = BTreeMap::new();
+    // The number of a channel is its topic's place, unless the chunk says otherwise: the chunk that names them may be damaged.
+    let mut kinds: BTreeMap<u16, usize> = (1..).zip(0..TOPICS.len()).collect();
     let mut messages = VecDeque::new();
     while let Some(event) = linear.next_event() {
         match event.map_err(|e| e.to_string())? {
