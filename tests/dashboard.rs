@@ -1,7 +1,7 @@
 //! The dashboard, with the real program, a real Chromium, and an attacker.
 //!
 //! Where only what is shown matters, the run is one in virtual time whose news are held back to the pace of a clock: no busy machine trips it.
-//! `MUPRIME_PAGES=FOLDER` keeps the pictures there; `MUPRIME_DASHBOARD_SOAK_S=450` makes the soak
+//! `MUPRIME_PAGES=FOLDER` keeps the pictures there; `MUPRIME_DASHBOARD_SOAK_S=449` makes the soak
 //! as long as that; the run takes some eight minutes.
 
 use rig::live::{Ended, Feed, Run};
@@ -269,7 +269,7 @@ fn viewers_that_do_not_read_hold_nobody_up() {
     let served = Served::start(&runs, &[]);
     let reader = |stream| read_all(stream, 1 << 16, Duration::ZERO);
     let readers: Vec<_> = (0..6).map(|_| reader(served.stream("live"))).collect();
-    let slow = read_all(without_room(served.stream("live")), 1 << 11, CLOCK / 2);
+    let slow = read_all(without_room(served.stream("live")), 1 << 9, CLOCK / 2);
     let mut deaf = without_room(served.stream("live"));
     std::thread::sleep(Duration::from_secs(seconds / 4));
     let before = resident_bytes(served.process.id()).unwrap();

@@ -190,10 +190,11 @@ fn a_run_is_seen_paused_and_resumed_from_two_terminals() {
     });
 }
 
-/// One key stops, from the run's own view and from another process's; a SIGTERM gives the terminal back.
+/// One key stops, from the run's own view and from another process's; SIGTERM and SIGHUP give the terminal back; a terminal whose window
+/// is closed, which sends a SIGHUP and takes nothing any more, ends the run as a stop does: drive off, passes kept.
 #[test]
 fn one_key_stops_and_signals_give_the_terminal_back() {
-    for how in ["own s", "own Ctrl-C", "other s", "SIGTERM"] {
+    for how in ["own s", "own Ctrl-C", "other s", "SIGTERM", "SIGHUP", "closed"] {
         let folder = tempfile::tempdir().unwrap();
         let rig = ServedRig::start(3, None);
         let (plan, file) = files(folder.path(), &rig);
@@ -216,12 +217,23 @@ fn one_key_stops_and_signals_give_the_terminal_back() {
                 other.keys("s");
                 other.shows(&["ENDED: "]);
             }
-            _ => {
+            "closed" => assert!(own.say(&["kill-server"]).0),
+            signal => {
                 let lock = std::fs::read_to_string(out.join(".lock")).unwrap();
-                assert!(Command::new("kill").args(["-TERM", &lock]).status().unwrap().success());
+                let signal = signal.replace("SIG", "-");
+                assert!(Command::new("kill").args([&signal, &lock]).status().unwrap().success());
             }
         }
-        own.given_back(1);
+        if how == "closed" {
+            let began = Instant::now();
+            while !out.join("summary.json").exists() {
+                assert!(began.elapsed().as_secs() < 60, "the run outlives its terminal");
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            wait_until(&mut AmplifierWatch::connect(rig.address), false);
+        } else {
+            own.given_back(1);
+        }
         let summary = std::fs::read_to_string(out.join("summary.json")).unwrap();
         // A machine that stalls may have tripped it first: off it is either way.
         assert!(summary.contains("\"stopped\"") || cut_by_a_stall(&out).is_some(), "{how}: {summary}");

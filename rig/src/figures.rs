@@ -1,6 +1,8 @@
 //! The paper's figures recomputed, each with a line on how it compares with the paper. Here those of the finite element model;
-//! those of the spring-slider in [`slider`], their charts in [`plot`], what was already computed in [`store`].
+//! those of the spring-slider in [`slider`], their charts in [`plot`] and, as a journal prints them, in [`paper`]; what was already computed in [`store`].
 
+pub mod paper;
+mod pdf;
 pub mod plot;
 pub mod slider;
 pub mod store;
@@ -10,7 +12,7 @@ use models::psi::{PSI_STAR, PSI_STAR_UNCERTAINTY, PsiEq17, relative_friction};
 use models::psi_fit;
 use models::ridge::study::{Panel, StudyPoint, content_key, fig_9};
 use models::ridge::{self, Cycle, RidgeCase, RidgeRun, RunSettings};
-use plot::{Chart, Series};
+use plot::{Chart, Series, Stated};
 use std::path::Path;
 
 /// What a figure gives: its charts, and how it compares with the paper.
@@ -72,8 +74,12 @@ pub fn phase_shift(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
         let passing = points.windows(2).rev().find(|p| p[0].1 < level && p[1].1 >= level);
         passing.map_or(f64::NAN, |p| p[0].0 + (p[1].0 - p[0].0) * (level - p[0].1) / (p[1].1 - p[0].1))
     };
-    let chart = |name: &str, title: &str, moduli: [f64; 4]| Chart {
+    let chart = |name: &str, title: &str, moduli: [f64; 4], transition: [f64; 2]| Chart {
         name: name.into(),
+        stated: vec![
+            Stated::Span { range: transition, words: "transition (paper)".into() },
+            Stated::Level { value: 90.0, words: "plateau (paper)".into() },
+        ],
         title: title.into(),
         x: "amplitude_pp_um".into(),
         y: "phase_shift_deg".into(),
@@ -94,8 +100,8 @@ pub fn phase_shift(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
         lines.push(format!("{failed} cases failed and are missing"));
     }
     let charts = vec![
-        chart("fig4_moist", "Phase shift, moist skin (Fig. 4a)", MOIST_PA),
-        chart("fig4_dry", "Phase shift, dry skin (Fig. 4a)", DRY_PA),
+        chart("fig4_moist", "Phase shift, moist skin (Fig. 4a)", MOIST_PA, [0.8, 1.3]),
+        chart("fig4_dry", "Phase shift, dry skin (Fig. 4a)", DRY_PA, [0.4, 0.8]),
     ];
     Ok(Reproduced { charts, lines })
 }
@@ -126,6 +132,7 @@ pub fn velocities(base: RidgeCase) -> miette::Result<Reproduced> {
         )],
         charts: vec![Chart {
             name: "fig5".into(),
+            stated: Vec::new(),
             title: "Velocity of skin and plate, dry, 1.35 um (Fig. 5)".into(),
             x: "time_periods".into(),
             y: "velocity_m_s".into(),
@@ -150,6 +157,7 @@ pub fn loading(base: RidgeCase) -> miette::Result<Reproduced> {
         )],
         charts: vec![Chart {
             name: "fig6".into(),
+            stated: Vec::new(),
             title: "Loading (Fig. 6), relative to its final value".into(),
             x: "time_us".into(),
             y: "share".into(),
@@ -181,6 +189,7 @@ pub fn reaction_force(base: RidgeCase) -> miette::Result<Reproduced> {
     lines.push("paper: always positive at 0.1 um, zero for a significant time at 1 um and longer at 2 um, the greatest force growing, the mean equal to the applied 0.25 N".into());
     let chart = Chart {
         name: "fig7".into(),
+        stated: vec![Stated::Level { value: base.normal_force_n, words: "applied (paper)".into() }],
         title: "Reaction force of the finger (Fig. 7)".into(),
         x: "time_periods".into(),
         y: "reaction_force_n".into(),
@@ -207,6 +216,7 @@ pub fn lateral_force(base: RidgeCase) -> miette::Result<Reproduced> {
         )],
         charts: vec![Chart {
             name: "fig8".into(),
+            stated: Vec::new(),
             title: "Forces in one period, 1.35 um (Fig. 8)".into(),
             x: "time_periods".into(),
             y: "force_n".into(),
@@ -255,6 +265,7 @@ pub fn parametric_study(base: RidgeCase, out: &Path) -> miette::Result<Reproduce
         let values = panel.values();
         charts.push(Chart {
             name: format!("fig9{letter}"),
+            stated: Vec::new(),
             title: format!("Relative friction (Fig. 9{letter})"),
             x: "amplitude_pp_um".into(),
             y: "mu_relative".into(),
@@ -326,8 +337,15 @@ pub fn collapse(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
         (0..=200).map(|k| 0.06 * f64::from(k)).map(move |p| (p, relative_friction(PsiEq17(p), star)))
     };
     series.iter_mut().for_each(|s| s.points.retain(|p| p.0 <= 12.0));
-    series.push(Series::line(format!("Psi* {:.2} (refit)", fit.psi_star), curve(fit.psi_star).collect()));
-    series.push(Series::line("Psi* 2.38 (paper)", curve(PSI_STAR).collect()));
+    let law = |name: String, star: f64, sd: f64| {
+        let within = curve(star - sd).zip(curve(star + sd));
+        let band = within.map(|((psi, a), (_, b))| (psi, a.min(b), a.max(b))).collect();
+        Series { band, ..Series::line(name, curve(star).collect()) }
+    };
+    let refit = format!("\u{3a8}* {:.2} \u{b1} {:.2} (refit)", fit.psi_star, fit.psi_star_sd);
+    series.push(law(refit, fit.psi_star, fit.psi_star_sd));
+    let stated = format!("\u{3a8}* {PSI_STAR} \u{b1} {PSI_STAR_UNCERTAINTY} (paper)");
+    series.push(law(stated, PSI_STAR, PSI_STAR_UNCERTAINTY));
     let mut lines = vec![
         format!(
             "refit on the paper's choice of data: Psi* = {:.2} +- {:.2} (jackknife over curves), rmse {:.3}, {} points; paper: {PSI_STAR} +- {PSI_STAR_UNCERTAINTY}",
@@ -347,6 +365,7 @@ pub fn collapse(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
     }
     let chart = Chart {
         name: "fig12".into(),
+        stated: Vec::new(),
         title: "Relative friction against Psi of Eq. 17 (Fig. 12)".into(),
         x: "psi_eq17".into(),
         y: "mu_relative".into(),

@@ -17,6 +17,8 @@ from playwright.sync_api import sync_playwright
 
 what, out, (link, live, other) = sys.argv[1], Path(sys.argv[2]), sys.argv[3:6]
 base = f"{urlsplit(link).scheme}://{urlsplit(link).netloc}"
+# A busy machine draws a page slowly: this is for one that never does.
+WITHIN_MS = 180_000
 chromium = shutil.which("chromium") or shutil.which("chromium-browser")
 if not chromium:
     sys.exit("chromium is missing: tests/venv installs it")
@@ -31,10 +33,10 @@ def settled(page, where):
     page.wait_for_selector("h1")
     if where.startswith(("page/", "compare/")):
         kind = "Two runs" if where.startswith("compare/") else "report.html"
-        page.frame_locator(f"iframe[title='{kind}']").locator("h1").wait_for(timeout=20000)
+        page.frame_locator(f"iframe[title='{kind}']").locator("h1").wait_for(timeout=WITHIN_MS)
     if where.startswith("run/"):
         page.wait_for_selector("dl.now dd", state="attached")
-        page.wait_for_function("() => !document.querySelector('dl.now dd').textContent.startsWith('0 of 0')", timeout=20000)
+        page.wait_for_function("() => !document.querySelector('dl.now dd').textContent.startsWith('0 of 0')", timeout=WITHIN_MS)
         page.wait_for_timeout(1500)
 
 
@@ -42,6 +44,7 @@ def views(browser):
     for width in [360, 800, 1600]:
         for scheme in ["light", "dark"]:
             page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+            page.set_default_timeout(WITHIN_MS)
             page.on("request", lambda r: asked.append(r.url) if not r.url.startswith((base, base.replace("http", "ws"), "data:", "about:")) else None)
             page.on("dialog", lambda d: (ran.append(d.message), d.dismiss()))
             page.on("console", lambda m: ran.append(m.text) if m.type == "error" else None)
@@ -75,6 +78,7 @@ def views(browser):
 def keys(browser):
     # The whole way by the keyboard: to the run, and its stop.
     page = browser.new_page()
+    page.set_default_timeout(WITHIN_MS)
     page.goto(link)
     page.wait_for_selector("table a")
     seen = []
@@ -86,7 +90,7 @@ def keys(browser):
     else:
         faults.append(f"the keyboard does not reach the run: {seen}")
     page.keyboard.press("Enter")
-    page.wait_for_selector("button.stop:not([disabled])", timeout=20000)
+    page.wait_for_selector("button.stop:not([disabled])", timeout=WITHIN_MS)
     for _ in range(20):
         page.keyboard.press("Tab")
         if page.evaluate("() => document.activeElement.textContent") == "Pause":
@@ -95,19 +99,19 @@ def keys(browser):
         faults.append("the keyboard does not reach the pause")
     page.keyboard.press("Enter")
     try:
-        page.wait_for_function("() => document.querySelector('.state').textContent === 'paused'", timeout=20000)
+        page.wait_for_function("() => document.querySelector('.state').textContent === 'paused'", timeout=WITHIN_MS)
         page.keyboard.press("Enter")
-        page.wait_for_function("() => document.querySelector('.state').textContent === 'armed'", timeout=20000)
+        page.wait_for_function("() => document.querySelector('.state').textContent === 'armed'", timeout=WITHIN_MS)
         page.keyboard.press("Shift+Tab")
         page.keyboard.press("Enter")
-        page.wait_for_function("() => document.querySelector('.state').textContent === 'stopped'", timeout=20000)
+        page.wait_for_function("() => document.querySelector('.state').textContent === 'stopped'", timeout=WITHIN_MS)
     except Exception as why:
         faults.append(f"keys: {why}; {page.inner_text('main')[:600]}")
     page.screenshot(path=out / "stopped.png", full_page=True)
 
 
 with sync_playwright() as p:
-    browser = p.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+    browser = p.chromium.launch(executable_path=chromium, timeout=WITHIN_MS, args=["--no-sandbox", "--disable-gpu"])
     (views if what == "views" else keys)(browser)
     browser.close()
 print(json.dumps({"faults": faults, "asked": asked, "ran": ran, "pictures": pictures}))

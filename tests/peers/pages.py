@@ -31,16 +31,19 @@ LOOK = """() => {
 }"""
 
 out, pages = Path(sys.argv[1]), [Path(p).resolve() for p in sys.argv[2:]]
+# A busy machine draws a page slowly: this is for one that never does.
+WITHIN_MS = 180_000
 chromium = shutil.which("chromium") or shutil.which("chromium-browser")
 if not chromium:
     sys.exit("chromium is missing: tests/venv installs it")
 axe, seen = Axe(), []
 with sync_playwright() as p:
-    browser = p.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+    browser = p.chromium.launch(executable_path=chromium, timeout=WITHIN_MS, args=["--no-sandbox", "--disable-gpu"])
     for path in pages:
         for width in WIDTHS:
             for scheme in ["light", "dark"]:
                 page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+                page.set_default_timeout(WITHIN_MS)
                 asked, ran = [], []
                 page.on("request", lambda r: asked.append(r.url))
                 page.on("dialog", lambda d: (ran.append(d.message), d.dismiss()))
@@ -67,6 +70,7 @@ with sync_playwright() as p:
                 )
                 page.close()
         page = browser.new_page()
+        page.set_default_timeout(WITHIN_MS)
         page.goto(path.as_uri())
         page.pdf(path=out / f"{path.stem}.pdf", format="A4", prefer_css_page_size=True)
         page.close()

@@ -14,6 +14,9 @@ const CONNECTIONS: usize = 64;
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
 /// Largest head of a request in bytes.
 const HEAD_BYTES: usize = 16 * 1024;
+/// What the system may hold for one that reads slowly, in bytes (it takes twice as much): with its own bound of some megabytes a slow
+/// page would show what was minutes ago, and states could not be left out for it.
+const HELD_BYTES: usize = 32 * 1024;
 /// Time from one try to the next where the system has no descriptor to give.
 const AGAIN: Duration = Duration::from_millis(100);
 
@@ -33,6 +36,7 @@ pub async fn serve(listener: TcpListener, routes: Router) {
         tokio::spawn(async move {
             let _place = place;
             let _ = stream.set_nodelay(true);
+            let _ = rustix::net::sockopt::set_socket_send_buffer_size(&stream, HELD_BYTES);
             let service = TowerToHyperService::new(routes);
             // An error is that of the other end.
             let _ = hyper::server::conn::http1::Builder::new()

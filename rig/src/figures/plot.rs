@@ -15,17 +15,46 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
     /// Marks instead of a line.
     pub marks: bool,
+    /// Uncertainty of the curve, where it has one: x, low, high.
+    pub band: Vec<(f64, f64, f64)>,
+}
+
+/// What the paper states of a figure without a curve for it.
+pub enum Stated {
+    /// Something happens between two values of x.
+    Span {
+        /// From where to where.
+        range: [f64; 2],
+        /// What the paper says.
+        words: String,
+    },
+    /// A value of y.
+    Level {
+        /// The value.
+        value: f64,
+        /// What the paper says.
+        words: String,
+    },
+}
+
+impl Stated {
+    /// What the paper says.
+    pub fn words(&self) -> &str {
+        match self {
+            Stated::Span { words, .. } | Stated::Level { words, .. } => words,
+        }
+    }
 }
 
 impl Series {
     /// A line.
     pub fn line(name: impl Into<String>, points: Vec<(f64, f64)>) -> Series {
-        Series { name: name.into(), points, marks: false }
+        Series { name: name.into(), points, marks: false, band: Vec::new() }
     }
 
     /// Marks.
     pub fn marks(name: impl Into<String>, points: Vec<(f64, f64)>) -> Series {
-        Series { name: name.into(), points, marks: true }
+        Series { name: name.into(), points, marks: true, band: Vec::new() }
     }
 }
 
@@ -41,11 +70,16 @@ pub struct Chart {
     pub y: String,
     /// Curves.
     pub series: Vec<Series>,
+    /// What the paper states.
+    pub stated: Vec<Stated>,
 }
 
 impl Chart {
-    /// Writes `NAME.csv` and `NAME.svg` into `out`.
-    pub fn write(&self, out: &Path) -> miette::Result<()> {
+    /// Writes `NAME.csv` into `out`.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn write_table(&self, out: &Path) -> miette::Result<()> {
         let mut csv = csv::Writer::from_path(out.join(format!("{}.csv", self.name)))
             .into_diagnostic()
             .wrap_err_with(|| format!("cannot write into {}", out.display()))?;
@@ -55,7 +89,14 @@ impl Chart {
                 csv.write_record([&series.name, &format!("{x:e}"), &format!("{y:e}")]).into_diagnostic()?;
             }
         }
-        csv.flush().into_diagnostic()?;
+        csv.flush().into_diagnostic()
+    }
+
+    /// Writes `NAME.svg` into `out`, for a screen.
+    ///
+    /// # Errors
+    /// Whatever the drawing library says.
+    pub fn write_picture(&self, out: &Path) -> miette::Result<()> {
         self.draw(&out.join(format!("{}.svg", self.name))).map_err(|why| miette!("{}: {why}", self.name))
     }
 

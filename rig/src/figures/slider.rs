@@ -32,6 +32,7 @@ pub fn forces() -> miette::Result<Reproduced> {
         )],
         charts: vec![Chart {
             name: "fig10".into(),
+            stated: Vec::new(),
             title: "Spring-slider: forces from touch-down, 2 um (Fig. 10)".into(),
             x: "time_periods".into(),
             y: "force_n".into(),
@@ -63,6 +64,7 @@ pub fn phase_shift() -> miette::Result<Reproduced> {
         }
         charts.push(Chart {
             name: name.into(),
+            stated: Vec::new(),
             title: "Spring-slider: phase shift at 0.5 N (Fig. 11)".into(),
             x: "amplitude_pp_um".into(),
             y: "phase_shift_deg".into(),
@@ -97,6 +99,7 @@ pub fn slow_recovery() -> miette::Result<Reproduced> {
         )],
         charts: vec![Chart {
             name: "fig13".into(),
+            stated: Vec::new(),
             title: "Spring-slider: slow lateral recovery (Fig. 13)".into(),
             x: "cycle".into(),
             y: "mu_relative".into(),
@@ -125,6 +128,7 @@ pub fn steady_recovery() -> miette::Result<Reproduced> {
         )],
         charts: vec![Chart {
             name: "fig14".into(),
+            stated: Vec::new(),
             title: "Spring-slider: slow recovery, steady (Fig. 14)".into(),
             x: "amplitude_pp_um".into(),
             y: "mu_relative".into(),

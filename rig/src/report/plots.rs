@@ -183,7 +183,7 @@ fn figure(
 const MARKS: usize = 5;
 
 /// A mark whose shape is the series': disc, square, triangle, diamond, cross; hollow where it is not filled.
-fn mark(series: usize, at: (f64, f64), size: u32, colour: RGBColor, filled: bool) -> Mark {
+pub(crate) fn mark<C>(series: usize, at: C, size: u32, colour: RGBColor, filled: bool) -> Mark<C> {
     Mark {
         series: series % MARKS,
         at,
@@ -193,24 +193,24 @@ fn mark(series: usize, at: (f64, f64), size: u32, colour: RGBColor, filled: bool
     }
 }
 
-struct Mark {
+pub(crate) struct Mark<C> {
     series: usize,
-    at: (f64, f64),
+    at: C,
     size: i32,
     style: ShapeStyle,
     filled: bool,
 }
 
-impl<'a> PointCollection<'a, (f64, f64)> for &'a Mark {
-    type Point = &'a (f64, f64);
-    type IntoIter = std::iter::Once<&'a (f64, f64)>;
+impl<'a, C> PointCollection<'a, C> for &'a Mark<C> {
+    type Point = &'a C;
+    type IntoIter = std::iter::Once<&'a C>;
 
     fn point_iter(self) -> Self::IntoIter {
         std::iter::once(&self.at)
     }
 }
 
-impl<DB: DrawingBackend> Drawable<DB> for Mark {
+impl<C, DB: DrawingBackend> Drawable<DB> for Mark<C> {
     fn draw<I: Iterator<Item = BackendCoord>>(
         &self,
         mut places: I,

@@ -1,7 +1,7 @@
 //! `muprime model reproduce`: the paper's figures.
 
 use super::refused;
-use crate::figures::{self, store};
+use crate::figures::{self, paper, store};
 use crate::out;
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, WrapErr};
@@ -39,6 +39,15 @@ pub enum Figure {
     All,
 }
 
+/// How figures are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Style {
+    /// Each chart by itself, with a title and a grid.
+    Screen,
+    /// As a journal prints them.
+    Paper,
+}
+
 /// Arguments of `muprime model reproduce`.
 #[derive(Args)]
 pub struct ReproduceArgs {
@@ -48,6 +57,9 @@ pub struct ReproduceArgs {
     /// Folder for CSV and SVG files, and for the study that they come from
     #[arg(long, default_value = "studies")]
     out: PathBuf,
+    /// For a screen, each chart by itself, or as a journal prints it: assembled panels of 85 or 174 mm, as SVG and PDF
+    #[arg(long, value_enum, default_value_t = Style::Screen)]
+    style: Style,
     /// Elements of each mesh, about
     #[arg(long, default_value_t = case::ELEMENTS)]
     elements: usize,
@@ -83,12 +95,21 @@ pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
         };
         let name = figure.to_possible_value().map_or(String::new(), |v| v.get_name().to_string());
         for chart in &reproduced.charts {
-            chart.write(&args.out)?;
+            chart.write_table(&args.out)?;
+            if args.style == Style::Screen {
+                chart.write_picture(&args.out)?;
+            }
+        }
+        let mut files: Vec<String> = reproduced.charts.iter().map(|c| format!("{}.csv", c.name)).collect();
+        if args.style == Style::Paper {
+            paper::write(&name, &reproduced.charts, &args.out)?;
+            files.extend(["svg", "pdf"].map(|end| format!("{name}.{end}")));
+        } else {
+            files.extend(reproduced.charts.iter().map(|c| format!("{}.svg", c.name)));
         }
         let text = reproduced.lines.join("\n");
         crate::files::write_whole(&args.out.join(format!("{name}.txt")), format!("{text}\n"))?;
         if json {
-            let files: Vec<String> = reproduced.charts.iter().map(|c| format!("{}.csv", c.name)).collect();
             out!("{}", serde_json::json!({"figure": name, "files": files, "comparison": reproduced.lines}));
         } else {
             out!("{name}\n  {}", text.replace('\n', "\n  "));
