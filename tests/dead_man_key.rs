@@ -208,7 +208,7 @@ fn carried_over(run: &Path) -> [f64; 2] {
 fn a_held_key_drives_and_a_hand_that_lets_go_switches_off() {
     let folder = tempfile::tempdir().unwrap();
     unless_the_machine_stalls(|n| {
-        // A new rig each time: the amplifier of one that a stall cut keeps its fault.
+        // A new rig each time: nothing is left of an attempt that a stall cut.
         let rig = ServedRig::of("virtual-relay", 1, None);
         let _ledger = Ledger::of(&rig);
         let_go(&rig, folder.path(), n).err()

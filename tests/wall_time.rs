@@ -94,7 +94,11 @@ pub fn cut_by_a_stall(out: &Path) -> Option<String> {
     let trip = match summary.outcome {
         rig::sequence::Outcome::Tripped(trip) => trip,
         // The proof of the second channel has its own bounds in time, and ten seconds to go through.
-        rig::sequence::Outcome::WouldNotArm { blocking } if stalls.worst.0 >= KEEPS_FROM_ARMING.0 => {
+        // An amplifier whose supply was cut for a stall has no fault: that cause is never forgiven.
+        rig::sequence::Outcome::WouldNotArm { blocking }
+            if stalls.worst.0 >= KEEPS_FROM_ARMING.0
+                && blocking != Some(realtime::safety::Cause::AmplifierFault) =>
+        {
             return Some(format!(
                 "would not arm, {blocking:?}, the machine stalled for {} ms",
                 stalls.worst.0 / 1_000_000

@@ -145,6 +145,8 @@ pub struct Outputs {
     pub tripped: Option<Trip>,
     /// The first rule that is broken now, latched or not.
     pub blocking: Option<Cause>,
+    /// What stands in the way of arming; see [`Decision::waits_for`].
+    pub waits_for: Option<Cause>,
     /// Whether the rig is armed after this cycle.
     pub armed: bool,
     /// Whether the second switch-off channel is being proved.
@@ -221,13 +223,14 @@ pub fn judge(
     };
     let online = mu_relative.ok().and_then(|mu| compare(config, model, state, seen, &mu, now));
 
-    let Decision { drive, stage, supply, tripped, blocking, remark, .. } = *decision;
+    let Decision { drive, stage, supply, tripped, blocking, waits_for, remark, .. } = *decision;
     Outputs {
         drive,
         stage,
         supply,
         tripped,
         blocking,
+        waits_for,
         armed: state.safety.is_armed(),
         proving: state.safety.is_proving(),
         marker: state.marker,

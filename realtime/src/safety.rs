@@ -231,8 +231,11 @@ pub struct Decision {
     pub tripped: Option<Trip>,
     /// Whether the rig was armed in this cycle.
     pub armed_now: bool,
-    /// The first rule that is broken now, latched or not: what a reset would have to wait for.
+    /// The first rule that is broken now, latched or not.
     pub blocking: Option<Cause>,
+    /// What stands in the way of arming: as `blocking`, save what follows from a supply that was cut on purpose (its amplifier may
+    /// show a fault, or nothing), and what only a person may put right before a program asks for a reset, or what would trip at once.
+    pub waits_for: Option<Cause>,
     /// Lateral force fit for use: valid, fresh, no spike.
     pub lateral_usable: bool,
     /// Normal force fit for use.
@@ -263,8 +266,8 @@ pub struct Safety {
     reset_before: bool,
     /// A request came since the rig was armed.
     asked: bool,
-    /// The second channel was cut for cause, and has not been proved since.
-    supply_cut: bool,
+    /// What the second channel was cut for, where it has not been proved since.
+    supply_cut: Option<arming::CutFor>,
 }
 
 impl Default for Safety {
@@ -285,7 +288,7 @@ impl Safety {
             sequence: 0,
             reset_before: false,
             asked: false,
-            supply_cut: false,
+            supply_cut: None,
         }
     }
 
@@ -353,6 +356,7 @@ impl Safety {
             tripped: None,
             armed_now: false,
             blocking: broken.map(|b| b.cause),
+            waits_for: None,
             lateral_usable: self.watch.lateral.usable,
             normal_usable: self.watch.normal.usable,
             remark: rules::remark(&context),
@@ -361,11 +365,13 @@ impl Safety {
             besides_the_cut: rules::first_broken_but(&context, self.excused(seen.supply)),
             broken,
             cuts_the_supply: rules::cuts_the_supply(&context),
+            is_late: rules::is_late(&context),
             supply: seen.supply,
             reset_edge,
             cycle: self.cycle,
             now,
         };
+        said.waits_for = self.waits_for(&step);
         self.advance(&step, &mut said);
 
         let expires_at = now.plus(limits.timing.command_expiry);

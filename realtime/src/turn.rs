@@ -72,6 +72,9 @@ pub struct Row {
     pub tripped: Option<Trip>,
     /// The first rule that is broken now, latched or not.
     pub blocking: Option<Cause>,
+    /// What stands in the way of arming: for whoever asks for a reset. It follows from the inputs, and is not recorded.
+    #[serde(skip)]
+    pub waits_for: Option<Cause>,
     /// Running `mu'`, or why there is none.
     pub mu_relative: Result<MuRelative, NoMu>,
     /// Comparison with the model.
@@ -100,6 +103,7 @@ impl Row {
             supply_cut: out.supply == SupplyCommand::Cut,
             tripped: out.tripped,
             blocking: out.blocking,
+            waits_for: out.waits_for,
             mu_relative: out.mu_relative,
             online: out.online,
             usable: out.usable,

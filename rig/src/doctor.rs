@@ -166,6 +166,13 @@ impl Followed {
     }
 }
 
+impl Look {
+    /// Whether a relay is fitted in the amplifier's supply and reads open.
+    fn supply_is_open(&self) -> bool {
+        self.supply.is_some_and(|supply| supply.is_ok_and(|supply| supply.cut))
+    }
+}
+
 /// The rules of the loop over what is seen, without a hand at the dead-man device and without a relay that nobody closes: those are
 /// judged apart.
 struct Rules {
@@ -187,13 +194,19 @@ impl Rules {
     fn step(&mut self, seen: &Observation, now: Nanos, counts: bool) {
         let mut judged = Observation { supply: Err(NoData::NotFitted), ..*seen };
         judged.contacts.dead_man = Err(NoData::NotFitted);
+        // An amplifier without supply has no fault of its own.
+        let open = seen.supply.is_ok_and(|supply| supply.cut);
+        if let (true, Ok(amplifier)) = (open, &mut judged.amplifier) {
+            amplifier.fault = false;
+        }
         let inputs = Inputs { commands: [None; COMMANDS_PER_CYCLE], seen: judged };
         let blocking = decide(&self.config, &mut self.state, &inputs, now).blocking;
         if !counts {
             return;
         }
         self.cycles += 1;
-        let Some(cause) = blocking else { return };
+        let explained = |cause: &Cause| open && cause.may_be_an_open_supply();
+        let Some(cause) = blocking.filter(|cause| !explained(cause)) else { return };
         match self.blocked.iter_mut().find(|(c, _)| *c == cause) {
             Some((_, n)) => *n += 1,
             None => self.blocked.push((cause, 1)),

@@ -7,12 +7,14 @@
 //!  before a pass: Paused, by request, until it is to go on
 //! ```
 
+mod arming;
 mod told;
 
 pub use told::{Event, MeasuredPass, Outcome};
 
 use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
 use crate::plan::{PassTimes, Point};
+use arming::{Arming, Next};
 use models::condition::{Ambient, Condition};
 use models::prediction::FrictionModel;
 use models::psi::PsiEq17;
@@ -42,7 +44,7 @@ pub struct Reaction {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
-    Arm { since: Option<Nanos>, clear_since: Option<Nanos>, asked: Option<Nanos>, asks: u32 },
+    Arm,
     Zero { since: Option<Nanos>, after: bool },
     Paused,
     Approach { since: Nanos },
@@ -51,14 +53,6 @@ enum Stage {
     Over,
 }
 
-/// Time to wait for the rig to arm.
-const ARM_WITHIN: Nanos = Nanos(10_000_000_000);
-/// Nothing may have stood in the way for this long before a reset is asked for.
-const CLEAR_FOR: Nanos = Nanos(50_000_000);
-/// A reset that found something in its way is asked for again, so often in all. Each waits until nothing stands in the way.
-const ASKS: u32 = 3;
-/// Time that the loop has to answer a reset.
-const ANSWER_WITHIN: Nanos = Nanos(200_000_000);
 /// Length of a zero reading.
 const ZERO_FOR: Nanos = Nanos(200_000_000);
 /// Time that a plate may ring on after the zero began: left out of the zero.
@@ -109,6 +103,7 @@ pub struct Sequence {
     next: usize,
     times: PassTimes,
     stage: Stage,
+    arming: Arming,
     sums: Sums,
     tries: u32,
     model: Arc<dyn FrictionModel>,
@@ -145,7 +140,8 @@ impl Sequence {
             points,
             next: 0,
             times,
-            stage: Stage::Arm { since: None, clear_since: None, asked: None, asks: 0 },
+            stage: Stage::Arm,
+            arming: Arming::new(),
             sums: Sums::default(),
             tries: 0,
             model,
@@ -186,6 +182,7 @@ impl Sequence {
     pub fn guarded_by(self, limits: &Limits) -> Self {
         Sequence {
             has_watchdog: limits.amplifier_watchdog,
+            arming: self.arming.guarded_by(limits),
             approach: Approach::at(limits.timing.cycle, &limits.timing.stage),
             ..self
         }
@@ -235,9 +232,9 @@ impl Sequence {
         if self.stage == Stage::Over {
             return out;
         }
-        if let Some(trip) = row.tripped {
+        let stopped = row.tripped.is_some_and(|trip| trip.cause == Cause::Stopped);
+        if let Some(trip) = row.tripped.filter(|_| stopped || self.stage != Stage::Arm) {
             out.events.push(Event::Tripped(trip));
-            let stopped = trip.cause == Cause::Stopped;
             self.finish(&mut out, if stopped { Outcome::Stopped } else { Outcome::Tripped(trip) });
             return out;
         }
@@ -251,7 +248,7 @@ impl Sequence {
             return out;
         }
         match self.stage {
-            Stage::Arm { .. } => self.arm(row, &mut out),
+            Stage::Arm => self.arm(row, &mut out),
             Stage::Zero { since, after } => self.zero(row, since, after, &mut out),
             Stage::Paused => self.rest(row, &mut out),
             Stage::Approach { .. } if self.paused => self.begin_next(row, &mut out),
@@ -270,25 +267,21 @@ impl Sequence {
 
     /// Arming is one act: a reset once nothing stands in the way, and the proof of the second channel after it.
     fn arm(&mut self, row: &Row, out: &mut Reaction) {
-        let Stage::Arm { since, clear_since, asked, asks } = self.stage else { return };
-        let since = since.unwrap_or(row.now);
-        if row.armed {
-            self.armed(row, out);
-            return;
+        match self.arming.row(row) {
+            Next::Wait => {}
+            Next::Ask(event) => {
+                out.events.extend(event);
+                out.commands.push(Command::Reset);
+            }
+            Next::Again(event) => out.events.push(event),
+            Next::Armed => self.armed(row, out),
+            Next::GiveUp(outcome) => {
+                if let Outcome::Tripped(trip) = outcome {
+                    out.events.push(Event::Tripped(trip));
+                }
+                self.finish(out, outcome);
+            }
         }
-        if row.now.since(since) > ARM_WITHIN {
-            self.finish(out, Outcome::WouldNotArm { blocking: row.blocking });
-            return;
-        }
-        let clear_since = if row.blocking.is_none() { clear_since.or(Some(row.now)) } else { None };
-        let clear = clear_since.is_some_and(|at| row.now.since(at) >= CLEAR_FOR);
-        let unanswered = asked.is_none_or(|at| row.now.since(at) > ANSWER_WITHIN) && !row.proving;
-        let ask = clear && unanswered && asks < ASKS;
-        if ask {
-            out.commands.push(Command::Reset);
-        }
-        let asked = if ask { Some(row.now) } else { asked };
-        self.stage = Stage::Arm { since: Some(since), clear_since, asked, asks: asks + u32::from(ask) };
     }
 
     /// Armed: says what guards are missing, and reads the zeros.

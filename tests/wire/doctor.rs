@@ -128,7 +128,7 @@ fn the_doctor_tells_a_healthy_sensor_by_its_figures() {
 #[test]
 fn the_doctor_approves_the_bundled_rigs() {
     tests::in_wall_clock_time(|| {
-        for name in ["virtual", "virtual-rtu"] {
+        for name in ["virtual", "virtual-rtu", "virtual-relay"] {
             let output = tests::muprime()
                 .args(["doctor", "--instruments-only", "--json", "--setup", name, "--plan", "first-sweep"])
                 .output()

@@ -23,6 +23,28 @@ pub enum Proof {
     Closes,
 }
 
+/// Why the second channel was cut for cause, the gravest last: it stays until the channel is proved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum CutFor {
+    /// Nothing was heard of the emergency stop: no person has done anything, and none has to undo it.
+    Silence,
+    /// The emergency stop was pressed.
+    Pressed,
+    /// The amplifier stayed on when it was told to be off.
+    Refusal,
+}
+
+impl CutFor {
+    /// What a person must look at before anything is armed again; none where nothing but a link or the machine fell silent.
+    const fn needs_a_person(self) -> Option<Cause> {
+        match self {
+            Self::Silence => None,
+            Self::Pressed => Some(Cause::EmergencyStop),
+            Self::Refusal => Some(Cause::RefusesOff),
+        }
+    }
+}
+
 /// Causes that a supply cut on purpose brings about by itself.
 const WITH_THE_CUT: &[Cause] = &[
     Cause::RefusesOff,
@@ -33,16 +55,31 @@ const WITH_THE_CUT: &[Cause] = &[
     Cause::OverTemperature,
 ];
 
+impl Cause {
+    /// Whether an amplifier shows this by itself where its supply is open: then it says nothing of the amplifier.
+    pub fn may_be_an_open_supply(self) -> bool {
+        WITH_THE_CUT[1..].contains(&self)
+    }
+}
+
 /// What a cycle of arming looks at.
 pub(super) struct Step {
     /// The first broken rule, and the first one that [`Safety::excused`] does not excuse.
     pub broken: Option<Breach>,
     pub besides_the_cut: Option<Breach>,
-    pub cuts_the_supply: bool,
+    pub cuts_the_supply: Option<CutFor>,
+    pub is_late: bool,
     pub supply: Result<SupplyState, NoData>,
     pub reset_edge: bool,
     pub cycle: u64,
     pub now: Nanos,
+}
+
+impl Step {
+    /// Whether the second channel reads cut, or closed, by a sample taken since then.
+    fn shows(&self, since: Nanos, cut: bool) -> bool {
+        self.supply.is_ok_and(|s| s.taken_at > since && s.taken_at <= self.now && s.cut == cut)
+    }
 }
 
 impl Safety {
@@ -55,8 +92,33 @@ impl Safety {
             State::Proving { proof: Proof::Opens, .. } => WITH_THE_CUT,
             // Once it is closed again an amplifier that comes back on by itself is no longer excused.
             State::Proving { proof: Proof::Closes, .. } => &WITH_THE_CUT[1..],
-            State::Faulted(_) if self.supply_cut => WITH_THE_CUT,
+            State::Faulted(_) if self.supply_cut.is_some() => WITH_THE_CUT,
             State::Faulted(_) | State::Armed { .. } => &[],
+        }
+    }
+
+    /// What a reset that nobody but a program asks for would have to wait for: what is broken now, save what follows from a
+    /// supply that was cut on purpose, and what only a person may put right; and missed deadlines that would trip the rig once armed.
+    pub(super) fn waits_for(&self, step: &Step) -> Option<Cause> {
+        let besides = step.besides_the_cut.map(|breach| breach.cause);
+        let fitted = step.supply != Err(NoData::NotFitted);
+        match self.state {
+            State::Faulted(_) => {
+                // An amplifier without supply has no fault of its own.
+                let open = step.supply.is_ok_and(|s| s.cut);
+                let besides = besides.map(|cause| match open && cause.may_be_an_open_supply() {
+                    true => Cause::SupplySwitch,
+                    false => cause,
+                });
+                let cut = self.supply_cut.max(step.cuts_the_supply).filter(|_| fitted);
+                let late = step.is_late.then_some(Cause::Overrun);
+                besides.or(cut.and_then(CutFor::needs_a_person)).or(late)
+            }
+            // Closed again, the amplifier is waited for.
+            State::Proving { proof: Proof::Closes, since } if step.shows(since, false) => {
+                step.broken.map(|breach| breach.cause)
+            }
+            State::Proving { .. } | State::Armed { .. } => besides,
         }
     }
 
@@ -75,7 +137,9 @@ impl Safety {
             State::Faulted(_) => {}
             State::Proving { proof, since } => self.prove(step, proof, since, said),
         }
-        self.supply_cut |= step.cuts_the_supply && !self.is_proving();
+        if !self.is_proving() {
+            self.supply_cut = self.supply_cut.max(step.cuts_the_supply);
+        }
     }
 
     fn prove(&mut self, step: &Step, proof: Proof, since: Nanos, said: &mut Decision) {
@@ -83,15 +147,14 @@ impl Safety {
         if let Some(breach) = step.besides_the_cut {
             return self.trip(breach, step, said);
         }
-        let fresh = step.supply.ok().filter(|s| s.taken_at > since && s.taken_at <= now);
         match proof {
-            Proof::Opens if fresh.is_some_and(|s| s.cut) => {
+            Proof::Opens if step.shows(since, true) => {
                 self.state = State::Proving { proof: Proof::Closes, since: now };
                 self.watch.supply_is_cut();
             }
-            Proof::Closes if fresh.is_some_and(|s| !s.cut) && step.broken.is_none() => self.arm(now, said),
+            Proof::Closes if step.shows(since, false) && step.broken.is_none() => self.arm(now, said),
             _ => {
-                let closed = fresh.is_some_and(|s| !s.cut);
+                let closed = step.shows(since, false);
                 let within = if proof == Proof::Closes && closed { RESTART } else { SUPPLY_ACTS };
                 let waited = now.since(since);
                 if waited > within {
@@ -106,7 +169,7 @@ impl Safety {
 
     fn arm(&mut self, now: Nanos, said: &mut Decision) {
         self.state = State::Armed { since: now };
-        (self.supply_cut, self.asked) = (false, false);
+        (self.supply_cut, self.asked) = (None, false);
         self.watch.lateral.forget_losses();
         self.watch.normal.forget_losses();
         said.armed_now = true;
@@ -126,7 +189,7 @@ impl Safety {
         match self.state {
             State::Proving { proof: Proof::Opens, .. } => SupplyCommand::Cut,
             State::Proving { proof: Proof::Closes, .. } => SupplyCommand::Restore,
-            _ if self.supply_cut => SupplyCommand::Cut,
+            _ if self.supply_cut.is_some() => SupplyCommand::Cut,
             _ => SupplyCommand::Restore,
         }
     }

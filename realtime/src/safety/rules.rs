@@ -1,6 +1,6 @@
 //! The rules, each with its requirement identifier. Add a rule: one variant, one line in [`RULES`], one function.
 
-use super::arming::SUPPLY_ACTS;
+use super::arming::{CutFor, SUPPLY_ACTS};
 use super::cause::{Cause, Unit};
 use super::watch::{ForceWatch, STAGE_RESPONSE, Watch};
 use super::{Controls, HARD, Limits, Observation, Remark, Request};
@@ -58,9 +58,13 @@ pub(super) fn first_broken_but(context: &Context<'_>, excused: &[Cause]) -> Opti
     })
 }
 
-/// Whether the second channel must act: the amplifier stays on, or somebody has pressed the emergency stop.
-pub(super) fn cuts_the_supply(c: &Context<'_>) -> bool {
-    c.watch.refuses_off(c.limits, c.now) || contact_open(c, &c.seen.contacts.emergency_stop).is_some()
+/// What the second channel must act for: the amplifier stays on, or the emergency stop is pressed, or nothing is known of it.
+pub(super) fn cuts_the_supply(c: &Context<'_>) -> Option<CutFor> {
+    let stop = contact_open(c, &c.seen.contacts.emergency_stop).map(|(.., unit)| match unit {
+        Unit::Flag => CutFor::Pressed,
+        _ => CutFor::Silence,
+    });
+    c.watch.refuses_off(c.limits, c.now).then_some(CutFor::Refusal).max(stop)
 }
 
 macro_rules! rules {
@@ -395,7 +399,12 @@ fn overrun(c: &Context<'_>) -> Option<(f64, f64)> {
     }
     // In the last thousand cycles, the first second after arming included.
     let (late, most) = (c.watch.late_in_window(), c.limits.late_cycles_max);
-    broken(late > most && c.armed_since.is_some(), f64::from(late), f64::from(most))
+    broken(is_late(c) && c.armed_since.is_some(), f64::from(late), f64::from(most))
+}
+
+/// Whether so many deadlines were missed of late that an armed rig trips: armed now, it would do so in its first cycle.
+pub(super) fn is_late(c: &Context<'_>) -> bool {
+    c.watch.late_in_window() > c.limits.late_cycles_max
 }
 
 fn request(c: &Context<'_>) -> Option<(f64, f64, Unit)> {

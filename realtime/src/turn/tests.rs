@@ -96,6 +96,7 @@ fn a_row_is_what_the_cycle_said() {
             supply,
             tripped: None,
             blocking: Some(Cause::Stopped),
+            waits_for: Some(Cause::EmergencyStop),
             armed: !cut,
             proving: cut,
             marker: Marker { point: 9, ..Marker::default() },
@@ -109,6 +110,7 @@ fn a_row_is_what_the_cycle_said() {
         assert_eq!((row.drive_pp_m, row.drive_hz, row.velocity_m_s, row.load_n), (0.0, 0.0, 0.0, 0.0));
         assert_eq!((row.supply_cut, row.proving, row.armed, row.usable), (cut, cut, !cut, !cut));
         assert_eq!((row.marker, row.tripped, row.blocking), (out.marker, out.tripped, out.blocking));
+        assert_eq!(row.waits_for, out.waits_for);
         assert_eq!((row.mu_relative, row.online, row.remark), (out.mu_relative, out.online, out.remark));
     }
 }

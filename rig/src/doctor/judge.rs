@@ -108,7 +108,11 @@ fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
     let mut problems: Vec<Problem> = Vec::new();
     let mut states = Vec::new();
     for channel in &found.channels {
-        timely(channel, &mut problems);
+        // What an amplifier says without its supply is not valid by its own word.
+        let unsupplied = found.role == "amplifier" && look.supply_is_open();
+        if !(unsupplied && channel.missing == Some(NoData::Invalid)) {
+            timely(channel, &mut problems);
+        }
         if found.role == "force" {
             states.push(match (channel.mean, channel.missing) {
                 (Some(mean), None) => format!("{} {mean:+.4} N", channel.name),
@@ -122,7 +126,10 @@ fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
         }
     }
     match (found.role, look.amplifier, look.stage) {
-        ("amplifier", Some(state), _) => states.push(amplifier(state, asked.setup, &mut problems)),
+        ("amplifier", Some(state), _) => {
+            let open = look.supply_is_open();
+            states.push(amplifier(state, asked.setup, open, &mut problems));
+        }
         ("stage", _, Some(state)) => states.push(stage(state, asked.setup, &mut problems)),
         ("supply_relay", ..) => {
             let closed = look.supply.and_then(Result::ok).map(|s| !s.cut);
@@ -240,7 +247,12 @@ fn stated_noise(setup: &Setup, axis: &str) -> Option<f64> {
     })
 }
 
-fn amplifier(state: Result<AmplifierState, NoData>, setup: &Setup, problems: &mut Vec<Problem>) -> String {
+fn amplifier(
+    state: Result<AmplifierState, NoData>,
+    setup: &Setup,
+    supply_is_open: bool,
+    problems: &mut Vec<Problem>,
+) -> String {
     let s = match state {
         Ok(s) => s,
         Err(why) => return format!("no state: {why}"),
@@ -248,7 +260,8 @@ fn amplifier(state: Result<AmplifierState, NoData>, setup: &Setup, problems: &mu
     if s.output_on {
         problems.push(("its output is ON at rest".into(), "find who drives it, and switch it off"));
     }
-    if s.fault {
+    // Without its supply every amplifier that can shows a fault: it is not its own.
+    if s.fault && !supply_is_open {
         problems.push(("it reports a FAULT".into(), "read the fault on the amplifier, and reset it there"));
     }
     if setup.config.limits.temperature_fitted && s.temperature_c == Err(NoData::NotFitted) {
@@ -309,6 +322,11 @@ fn contacts(look: &Look, states: &mut Vec<String>, problems: &mut Vec<Problem>) 
 /// Whether the loop's own rules would let a sweep begin.
 fn arming(look: &Look) -> Finding {
     match look.blocking.filter(|(_, share)| *share > INVALID_SHARE) {
+        None if look.supply_is_open() => {
+            let found = "the rules of the loop would let it begin; whether the amplifier has a fault of its own shows when arming \
+                         closes its supply";
+            Finding::new("a sweep", true, found, "")
+        }
         None => Finding::new("a sweep", true, "the rules of the loop would let it begin", ""),
         Some((cause, share)) => {
             let rule = RULES.iter().find(|rule| rule.cause == cause);

@@ -112,7 +112,7 @@ pub struct State {
     pub residual: Option<f64>,
     /// The same in standard deviations of the difference.
     pub z: Option<f64>,
-    /// The first rule that is broken now.
+    /// What stands in the way of arming; while armed, the first rule that is broken now.
     pub blocking: Option<Cause>,
     /// Of all cycles since the last state.
     #[serde(default)]
@@ -145,7 +145,7 @@ impl State {
             predicted_sd: row.online.map(|o| o.predicted_sd),
             residual: row.online.zip(row.mu_relative.ok()).map(|(o, mu)| mu.value - o.predicted),
             z: row.online.map(|o| o.z),
-            blocking: row.blocking,
+            blocking: row.waits_for,
             extremes: glimpse.extremes,
         }
     }

@@ -3,6 +3,7 @@
 use super::html::{escape, table};
 use super::human::number;
 use crate::sequence::Event;
+use realtime::safety::Cause;
 
 /// An event in words.
 pub fn describe(event: &Event) -> String {
@@ -13,6 +14,21 @@ pub fn describe(event: &Event) -> String {
                 .into()
         }
         Event::NoWatchdog => "the amplifier has no watchdog: the second channel stands for it".into(),
+        Event::ArmingDisturbed { cause, held_up } => {
+            let what = match cause {
+                Cause::EmergencyStop => {
+                    "nothing was heard of the emergency stop, and the supply was cut for it".into()
+                }
+                cause => format!("the proof of the second channel was broken off ({cause:?})"),
+            };
+            let why = match held_up.seconds() * 1e3 {
+                ms if ms < 1.0 => String::new(),
+                ms => format!("; the loop was held up for {ms:.0} ms"),
+            };
+            format!(
+                "before arming {what}{why}: nothing was driven; the second channel is proved from the beginning"
+            )
+        }
         Event::Zeros { lateral_n, normal_n, after } => {
             let mn = |v: &Option<f64>| v.map_or("none".into(), |v| format!("{:+.2} mN", v * 1e3));
             let when = if *after { "after" } else { "before" };

@@ -4,6 +4,7 @@ use crate::certificates::temperature::TemperatureFlag;
 use models::prediction::Regime;
 use models::record::Pass;
 use realtime::compare::PassComparison;
+use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip};
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +37,14 @@ pub enum Event {
     /// It was armed with an amplifier that has no watchdog of its own: if this program dies, the second channel is what
     /// switches off.
     NoWatchdog,
+    /// Before the rig was armed, with nothing driven, this rule was broken for want of time; what it left behind (a cut supply, a proof
+    /// broken off) is cleared by proving the second channel, from the beginning.
+    ArmingDisturbed {
+        /// The rule.
+        cause: Cause,
+        /// Longest lateness of a cycle of the loop before that; zero where only a link fell silent.
+        held_up: Nanos,
+    },
     /// Force zeros, lifted off, in N: mean of each axis. They are recorded, never taken off silently.
     Zeros {
         /// Lateral.

@@ -204,3 +204,127 @@ fn an_amplifier_without_watchdog_needs_the_second_channel() {
     rig.bench.limits.amplifier_watchdog = false;
     assert_eq!(rig.arm(100), (None, true));
 }
+
+/// An amplifier that shows a fault for as long as its supply is open, as one with a guard of its own supply does.
+fn faulted_without_supply(s: &mut Observation) {
+    if s.supply.is_ok_and(|supply| supply.cut) {
+        s.amplifier = healthy(0, &DriveCommand::off(0, T)).amplifier;
+        let taken_at = s.supply.unwrap().taken_at;
+        let state = s.amplifier.as_mut().unwrap();
+        (state.fault, state.taken_at) = (true, taken_at);
+    }
+}
+
+/// A board that is heard again: the supply that was cut for its silence is what makes the amplifier show a fault. Nothing stands in
+/// the way of the proof, which closes it; and until that proof it stays cut.
+#[test]
+fn a_supply_cut_for_a_silent_board_before_arming_is_proved_and_the_fault_it_explains_is_not_waited_for() {
+    let closed = |s: &mut Observation, at: u64| {
+        let contact = Contact { closed: true, taken_at: Nanos(at * T.0), sequence: at as u32 };
+        s.contacts.emergency_stop = Ok(contact);
+    };
+    let mut rig = Relayed::new(3, None);
+    let heard = |rig: &mut Relayed, controls: Controls| {
+        let at = u64::from(rig.bench.n) + 1;
+        rig.cycle(|s| (closed(s, at), faulted_without_supply(s)).1, controls)
+    };
+    for _ in 0..20 {
+        assert_eq!(heard(&mut rig, Controls::default()).waits_for, None);
+    }
+    let last = u64::from(rig.bench.n);
+    for n in 1..=100 {
+        let decision = rig.cycle(|s| (closed(s, last), faulted_without_supply(s)).1, Controls::default());
+        // 80 ms is its age limit.
+        assert_eq!(decision.waits_for, (n > 80).then_some(Cause::EmergencyStop), "{n}");
+        assert_eq!(is_cut(&decision), n > 80);
+    }
+    for _ in 0..1000 {
+        let decision = heard(&mut rig, Controls::default());
+        assert!(is_cut(&decision) && !decision.armed_now);
+        assert_eq!((decision.blocking, decision.waits_for), (Some(Cause::AmplifierFault), None));
+    }
+    heard(&mut rig, RESET);
+    assert!((0..100).any(|_| heard(&mut rig, Controls::default()).armed_now));
+    // A fault that the supply does not explain is waited for, before the reset and in the proof.
+    let mut rig = Relayed::new(3, None);
+    let faulted = |s: &mut Observation| s.amplifier.as_mut().unwrap().fault = true;
+    assert_eq!(rig.cycle(faulted, Controls::default()).waits_for, Some(Cause::AmplifierFault));
+    assert_eq!(rig.cycle(faulted, RESET).waits_for, Some(Cause::AmplifierFault));
+    assert!(!rig.bench.safety.is_proving());
+}
+
+/// What a person did, or must look at, keeps a program from asking for a reset: pressed and released, or refused and cut.
+#[test]
+fn a_supply_cut_for_a_pressed_stop_or_a_refusal_waits_for_a_person() {
+    for pressed in [true, false] {
+        let mut rig = Relayed::new(1, None);
+        let seen = |s: &mut Observation, is_closed: bool, on: bool| {
+            let taken_at = s.supply.unwrap().taken_at;
+            s.contacts.emergency_stop = Ok(Contact { closed: is_closed, taken_at, sequence: 1 });
+            faulted_without_supply(s);
+            s.amplifier.as_mut().unwrap().output_on = on;
+        };
+        let cause = if pressed { Cause::EmergencyStop } else { Cause::RefusesOff };
+        let cut = (0..100).find(|_| {
+            let decision = rig.cycle(|s| seen(s, !pressed, !pressed), Controls::default());
+            assert!(!is_cut(&decision) || decision.waits_for == Some(cause));
+            is_cut(&decision)
+        });
+        assert!(cut.is_some());
+        for _ in 0..200 {
+            let decision = rig.cycle(|s| seen(s, true, false), Controls::default());
+            assert!(is_cut(&decision) && decision.waits_for == Some(cause), "{:?}", decision.waits_for);
+        }
+        // A silence afterwards does not make it less.
+        rig.cycle(|s| s.contacts.emergency_stop = Err(NoData::Disconnected), Controls::default());
+        let decision = rig.cycle(|s| seen(s, true, false), Controls::default());
+        assert_eq!(decision.waits_for, Some(cause));
+        // The operator's own reset proves the channel, as ever.
+        rig.cycle(|s| seen(s, true, false), RESET);
+        let armed = (0..100).any(|_| rig.cycle(|s| seen(s, true, false), Controls::default()).armed_now);
+        assert!(armed);
+        assert_eq!(rig.cycle(|s| seen(s, true, false), Controls::default()).waits_for, None);
+    }
+}
+
+/// A relay that does not close is not told as its amplifier's fault, in the proof and before it.
+#[test]
+fn an_open_supply_is_told_as_the_relay_and_not_as_the_amplifier() {
+    let mut rig = Relayed::new(0, Some(true));
+    for _ in 0..600 {
+        let decision = rig.cycle(faulted_without_supply, Controls::default());
+        assert_eq!(decision.blocking, Some(Cause::AmplifierFault));
+        assert_eq!(decision.waits_for, Some(Cause::SupplySwitch));
+    }
+    // Closed again in the proof, the amplifier is what is waited for.
+    let mut rig = Relayed::new(2, None);
+    rig.cycle(|_| {}, Controls::default());
+    rig.cycle(|_| {}, RESET);
+    let faulted = |s: &mut Observation| {
+        s.amplifier = healthy(0, &DriveCommand::off(0, T)).amplifier;
+        let taken_at = s.supply.unwrap().taken_at;
+        let state = s.amplifier.as_mut().unwrap();
+        (state.fault, state.taken_at) = (true, taken_at);
+    };
+    let waits: Vec<_> = (0..12).map(|_| rig.cycle(faulted, Controls::default()).waits_for).collect();
+    assert_eq!((waits[0], waits[11]), (None, Some(Cause::AmplifierFault)), "{waits:?}");
+    assert!(rig.bench.safety.is_proving());
+}
+
+/// Deadlines that were missed before arming count after it as well: a reset before they are forgotten would arm a rig that trips.
+#[test]
+fn missed_deadlines_that_would_trip_the_armed_rig_are_waited_for() {
+    let mut bench = Bench::new();
+    let late = |s: &mut Observation| s.lateness = Nanos(11 * T.0);
+    bench.cycle(late, Controls::default());
+    let waited =
+        (1..2000).find(|_| bench.cycle(|_| {}, Controls::default()).waits_for != Some(Cause::Overrun));
+    // A thousand cycles in buckets of a hundred, the first of which holds the stall.
+    assert_eq!(waited, Some(1000));
+    bench.cycle(|_| {}, RESET);
+    assert!((0..50).all(|_| bench.cycle(|_| {}, Controls::default()).tripped.is_none()));
+    // As many as are allowed keep nothing from being armed.
+    let mut bench = Bench::new();
+    bench.cycle(|s| s.lateness = Nanos(10 * T.0), Controls::default());
+    assert_eq!(bench.cycle(|_| {}, Controls::default()).waits_for, None);
+}

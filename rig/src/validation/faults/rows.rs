@@ -458,4 +458,24 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)], &str)] = &[
         &[("tests/crash.rs", "a_crash_at_every_step_of_a_sweep_loses_and_doubles_nothing")],
         "",
     ),
+    (
+        53,
+        "a stall before or during arming",
+        &[
+            (
+                "rig/src/sequence/arming/tests.rs",
+                "a_stall_before_arming_is_told_and_the_second_channel_proved",
+            ),
+            ("rig/src/sequence/arming/tests.rs", "a_proof_that_a_stall_broke_off_is_made_again_and_told"),
+            (
+                "rig/src/sequence/arming/tests.rs",
+                "a_stop_that_was_pressed_before_arming_is_not_cleared_by_the_sweep",
+            ),
+            (
+                "rig/src/sequence/arming/tests.rs",
+                "a_fault_of_the_amplifiers_own_is_its_own_beside_a_stall_too",
+            ),
+        ],
+        "",
+    ),
 ];

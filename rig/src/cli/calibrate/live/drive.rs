@@ -9,7 +9,7 @@ use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
 use realtime::cycle::{Command, Marker};
 use realtime::pacing;
-use realtime::safety::{Request, Trip};
+use realtime::safety::{Cause, Request, Trip};
 use realtime::turn::{Ports, Row};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -108,8 +108,13 @@ impl Drive {
         while !self.seen().row.is_some_and(|row| row.armed) {
             self.go_on()?;
             if began.elapsed().as_secs_f64() > ARM_WITHIN_S {
-                let blocking = self.seen().row.and_then(|row| row.blocking);
-                miette::bail!("the rig does not arm within {ARM_WITHIN_S} s: {blocking:?}");
+                let waits_for = self.seen().row.and_then(|row| row.waits_for);
+                let cause =
+                    waits_for.or(self.seen().tripped.map(|trip| trip.cause)).unwrap_or(Cause::SupplySwitch);
+                miette::bail!(
+                    help = cause.remedy(),
+                    "the rig does not arm within {ARM_WITHIN_S} s: {cause:?}"
+                );
             }
             self.rig.send(Command::Set(Request::default(), Marker::default()));
             self.rig.send(Command::Reset);
@@ -133,7 +138,7 @@ impl Drive {
         }
         self.rig.send(Command::Set(Request::default(), Marker::default()));
         let seen = self.seen();
-        let why = seen.tripped.map(|trip| trip.cause).or(seen.row.and_then(|row| row.blocking));
+        let why = seen.tripped.map(|trip| trip.cause).or(seen.row.and_then(|row| row.waits_for));
         Err(match why {
             Some(cause) => format!("the rig has tripped ({cause:?})"),
             None => format!("{:.3} um are not reached in {REACH_WITHIN_S} s", amplitude.micrometres()),
