@@ -129,3 +129,59 @@ impl Outcome {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use realtime::safety::Unit;
+
+    /// One of every kind; a new one does not compile until it stands here.
+    fn every_kind() -> Vec<Event> {
+        let flag = TemperatureFlag {
+            certificate: "c".into(),
+            range_c: [20.0, 25.0],
+            found_c: None,
+            missing: Some(realtime::ports::NoData::NotFitted),
+        };
+        let (cause, at) = (Cause::Stopped, Nanos(1));
+        let trip = Trip { cause, value: f64::INFINITY, bound: 1.0, unit: Unit::Newton, cycle: 1, at };
+        let all = vec![
+            Event::Armed,
+            Event::NoSecondChannel,
+            Event::NoWatchdog,
+            Event::ArmingDisturbed { cause, held_up: at },
+            Event::Zeros { lateral_n: None, normal_n: Some(0.0), after: true },
+            Event::Tripped(trip),
+            Event::ModelDeparted { point: 1, log_evidence: 7.0 },
+            Event::StopRequested,
+            Event::Paused { point: 1 },
+            Event::Resumed,
+            Event::PassRepeated { point: 1 },
+            Event::TemperatureBeyondCertificate { point: 1, flag },
+            Event::TemperatureUnwatched { certificate: "c".into() },
+        ];
+        for event in &all {
+            match event {
+                Event::Armed | Event::NoSecondChannel | Event::NoWatchdog | Event::StopRequested => {}
+                Event::ArmingDisturbed { .. } | Event::Zeros { .. } | Event::Tripped(_) => {}
+                Event::ModelDeparted { .. } | Event::Paused { .. } | Event::Resumed => {}
+                Event::PassRepeated { .. } | Event::TemperatureBeyondCertificate { .. } => {}
+                Event::TemperatureUnwatched { .. } => {}
+            }
+        }
+        all
+    }
+
+    /// The schema that every record carries knows each key of each event.
+    #[test]
+    fn the_records_schema_describes_every_event() {
+        let text = include_str!("../../../realtime/src/recorder/schemas/event.json");
+        let schema: serde_json::Value = serde_json::from_str(text).unwrap();
+        for event in every_kind() {
+            let told = serde_json::to_value(&event).unwrap();
+            for key in told.as_object().unwrap().keys() {
+                assert!(schema["properties"].get(key).is_some(), "'{key}' of {told}");
+            }
+        }
+    }
+}
