@@ -222,12 +222,11 @@ fn an_attacker_gets_nothing() {
     assert!(live.passes() > 3, "it went on");
 }
 
-/// Leaves the other end hardly any room: what is not read waits there, and not in this machine's buffers.
-fn without_room(stream: TcpStream) -> TcpStream {
-    let least: libc::c_int = 1;
+/// Leaves the other end so little room: what is not read waits there, and not in this machine's buffers.
+fn with_room(stream: TcpStream, bytes: libc::c_int) -> TcpStream {
     // SAFETY: a socket that is open, and a value of the size that is said.
     let set = unsafe {
-        let value = (&raw const least).cast();
+        let value = (&raw const bytes).cast();
         let size = size_of::<libc::c_int>() as libc::socklen_t;
         libc::setsockopt(stream.as_raw_fd(), libc::SOL_SOCKET, libc::SO_RCVBUF, value, size)
     };
@@ -269,8 +268,8 @@ fn viewers_that_do_not_read_hold_nobody_up() {
     let served = Served::start(&runs, &[]);
     let reader = |stream| read_all(stream, 1 << 16, Duration::ZERO);
     let readers: Vec<_> = (0..6).map(|_| reader(served.stream("live"))).collect();
-    let slow = read_all(without_room(served.stream("live")), 1 << 9, CLOCK / 2);
-    let mut deaf = without_room(served.stream("live"));
+    let slow = read_all(with_room(served.stream("live"), 1 << 15), 1 << 10, CLOCK / 2);
+    let mut deaf = with_room(served.stream("live"), 1);
     std::thread::sleep(Duration::from_secs(seconds / 4));
     let before = resident_bytes(served.process.id()).unwrap();
     std::thread::sleep(Duration::from_secs(seconds - seconds / 4));

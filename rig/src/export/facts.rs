@@ -13,7 +13,7 @@ pub struct Stated {
     /// Licence of the data: an SPDX identifier (CC-BY-4.0) or an address [default: the run's]
     #[arg(long, value_name = "ID")]
     pub licence: Option<String>,
-    /// Who publishes the data, and where the operator works: NAME or 'NAME <ADDRESS>'
+    /// Who publishes the data, and where the operator works: NAME, or NAME with an address in angle brackets
     #[arg(long, value_name = "NAME")]
     pub organisation: Option<String>,
 }

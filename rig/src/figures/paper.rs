@@ -1,6 +1,6 @@
 //! A figure as a journal prints it: the charts as lettered panels of one sheet of 85 or 174 mm (one or two columns), letters of 7 to 8
 //! points, axis titles with units, no title and no grid within; series told apart by dash and mark as well as by colour. As SVG, and
-//! as PDF through [`super::pdf`]; both are drawn by the same strokes.
+//! as PDF; both are drawn by the same strokes.
 
 use super::pdf::PdfBackend;
 use super::plot::{Chart, Series, Stated};
