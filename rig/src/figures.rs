@@ -1,18 +1,20 @@
 //! The paper's figures recomputed, each with a line on how it compares with the paper. Here those of the finite element model;
 //! those of the spring-slider in [`slider`], their charts in [`plot`] and, as a journal prints them, in [`paper`]; what was already computed in [`store`].
 
+mod collapse;
 pub mod paper;
 mod pdf;
 pub mod plot;
+pub mod reading;
 pub mod slider;
 pub mod store;
 
+pub use collapse::collapse;
 use miette::{IntoDiagnostic, miette};
-use models::psi::{PSI_STAR, PSI_STAR_UNCERTAINTY, PsiEq17, relative_friction};
-use models::psi_fit;
 use models::ridge::study::{Panel, StudyPoint, content_key, fig_9};
 use models::ridge::{self, Cycle, RidgeCase, RidgeRun, RunSettings};
 use plot::{Chart, Series, Stated};
+use reading::Reading;
 use std::path::Path;
 
 /// What a figure gives: its charts, and how it compares with the paper.
@@ -23,10 +25,23 @@ pub struct Reproduced {
     pub lines: Vec<String>,
 }
 
+/// The study of Fig. 9 under a reading of w.
+pub fn fig_9_read(base: RidgeCase, reading: Reading) -> Vec<StudyPoint> {
+    let read = |p: StudyPoint| StudyPoint { case: reading.at(p.case, p.case.amplitude.metres()), ..p };
+    fig_9(base).into_iter().map(read).collect()
+}
+
 /// Results of the study of Fig. 9, running what is missing in `out`.
-pub fn fig_9_results(out: &Path, elements: usize) -> miette::Result<(store::Results, usize)> {
+///
+/// # Errors
+/// Whatever the file system says.
+pub fn fig_9_results(
+    out: &Path,
+    elements: usize,
+    reading: Reading,
+) -> miette::Result<(store::Results, usize)> {
     let base = RidgeCase { elements, ..RidgeCase::paper() };
-    let cases = fig_9(base).into_iter().map(|p| p.case);
+    let cases = fig_9_read(base, reading).into_iter().map(|p| p.case);
     store::complete(&out.join("ridge.jsonl"), cases, &settings())
 }
 
@@ -53,10 +68,9 @@ fn trace(values: &[f64], turns: usize, scale: f64) -> Vec<(f64, f64)> {
 }
 
 /// Fig. 4: phase shift against amplitude, at rest as measured.
-pub fn phase_shift(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
-    let at = |young_modulus_pa: f64, w: f64| {
-        RidgeCase { young_modulus_pa, speed_m_s: 0.0, ..base }.with_amplitude_pp_m(w)
-    };
+pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Result<Reproduced> {
+    let at =
+        |young_modulus_pa: f64, w: f64| reading.at(RidgeCase { young_modulus_pa, speed_m_s: 0.0, ..base }, w);
     let moduli = || MOIST_PA.into_iter().chain(DRY_PA);
     let cases = moduli().flat_map(|e| FIG_4_AMPLITUDES_M.map(|w| at(e, w)));
     let (results, failed) = store::complete(&out.join("ridge.jsonl"), cases, &settings())?;
@@ -75,13 +89,13 @@ pub fn phase_shift(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
         passing.map_or(f64::NAN, |p| p[0].0 + (p[1].0 - p[0].0) * (level - p[0].1) / (p[1].1 - p[0].1))
     };
     let chart = |name: &str, title: &str, moduli: [f64; 4], transition: [f64; 2]| Chart {
-        name: name.into(),
+        name: reading.file(name),
         stated: vec![
             Stated::Span { range: transition, words: "transition (paper)".into() },
             Stated::Level { value: 90.0, words: "plateau (paper)".into() },
         ],
         title: title.into(),
-        x: "amplitude_pp_um".into(),
+        x: reading.column().into(),
         y: "phase_shift_deg".into(),
         series: moduli.map(|e| Series::line(format!("E_sc {} MPa", e / 1e6), curve(e))).into(),
     };
@@ -107,8 +121,8 @@ pub fn phase_shift(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
 }
 
 /// Fig. 5: velocities of plate and skin, dry, 1.35 um, at rest.
-pub fn velocities(base: RidgeCase) -> miette::Result<Reproduced> {
-    let case = RidgeCase { young_modulus_pa: 202.4e6, speed_m_s: 0.0, ..base }.with_amplitude_pp_m(1.35e-6);
+pub fn velocities(base: RidgeCase, reading: Reading) -> miette::Result<Reproduced> {
+    let case = reading.at(RidgeCase { young_modulus_pa: 202.4e6, speed_m_s: 0.0, ..base }, 1.35e-6);
     let result = run(&case)?;
     let skin = &result.mean_cycle.skin_velocity;
     let n = skin.len();
@@ -131,7 +145,7 @@ pub fn velocities(base: RidgeCase) -> miette::Result<Reproduced> {
             100.0 * (1.0 - falling)
         )],
         charts: vec![Chart {
-            name: "fig5".into(),
+            name: reading.file("fig5"),
             stated: Vec::new(),
             title: "Velocity of skin and plate, dry, 1.35 um (Fig. 5)".into(),
             x: "time_periods".into(),
@@ -171,10 +185,10 @@ pub fn loading(base: RidgeCase) -> miette::Result<Reproduced> {
 }
 
 /// Fig. 7: reaction force at 0.1, 1 and 2 um.
-pub fn reaction_force(base: RidgeCase) -> miette::Result<Reproduced> {
+pub fn reaction_force(base: RidgeCase, reading: Reading) -> miette::Result<Reproduced> {
     let (mut series, mut lines) = (Vec::new(), Vec::new());
     for w in [0.1, 1.0, 2.0] {
-        let case = base.with_amplitude_pp_m(w * 1e-6);
+        let case = reading.at(base, w * 1e-6);
         let result = run(&case)?;
         let scale = case.finger_per_ridge_m();
         series.push(Series::line(format!("{w} um"), trace(&result.mean_cycle.normal, 3, scale)));
@@ -188,7 +202,7 @@ pub fn reaction_force(base: RidgeCase) -> miette::Result<Reproduced> {
     }
     lines.push("paper: always positive at 0.1 um, zero for a significant time at 1 um and longer at 2 um, the greatest force growing, the mean equal to the applied 0.25 N".into());
     let chart = Chart {
-        name: "fig7".into(),
+        name: reading.file("fig7"),
         stated: vec![Stated::Level { value: base.normal_force_n, words: "applied (paper)".into() }],
         title: "Reaction force of the finger (Fig. 7)".into(),
         x: "time_periods".into(),
@@ -199,8 +213,8 @@ pub fn reaction_force(base: RidgeCase) -> miette::Result<Reproduced> {
 }
 
 /// Fig. 8: reaction, Coulomb's limit and lateral force at 1.35 um.
-pub fn lateral_force(base: RidgeCase) -> miette::Result<Reproduced> {
-    let case = base.with_amplitude_pp_m(1.35e-6);
+pub fn lateral_force(base: RidgeCase, reading: Reading) -> miette::Result<Reproduced> {
+    let case = reading.at(base, 1.35e-6);
     let result = run(&case)?;
     let scale = case.finger_per_ridge_m();
     let Cycle { normal, lateral, .. } = &result.mean_cycle;
@@ -215,7 +229,7 @@ pub fn lateral_force(base: RidgeCase) -> miette::Result<Reproduced> {
             100.0 * result.contact_fraction
         )],
         charts: vec![Chart {
-            name: "fig8".into(),
+            name: reading.file("fig8"),
             stated: Vec::new(),
             title: "Forces in one period, 1.35 um (Fig. 8)".into(),
             x: "time_periods".into(),
@@ -230,9 +244,9 @@ pub fn lateral_force(base: RidgeCase) -> miette::Result<Reproduced> {
 }
 
 /// mu' of every point of the study that is there.
-fn study(base: RidgeCase, out: &Path) -> miette::Result<Vec<(StudyPoint, store::Kept)>> {
-    let (results, failed) = fig_9_results(out, base.elements)?;
-    let points = fig_9(base);
+fn study(base: RidgeCase, out: &Path, reading: Reading) -> miette::Result<Vec<(StudyPoint, store::Kept)>> {
+    let (results, failed) = fig_9_results(out, base.elements, reading)?;
+    let points = fig_9_read(base, reading);
     let found: Vec<_> = points
         .iter()
         .filter_map(|p| results.get(&content_key(&p.case, &settings())).map(|k| (*p, k.clone())))
@@ -248,11 +262,11 @@ fn study(base: RidgeCase, out: &Path) -> miette::Result<Vec<(StudyPoint, store::
 }
 
 /// Fig. 9: the five panels.
-pub fn parametric_study(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
-    let found = study(base, out)?;
+pub fn parametric_study(base: RidgeCase, out: &Path, reading: Reading) -> miette::Result<Reproduced> {
+    let found = study(base, out, reading)?;
     let at = |panel: Panel, value: f64, w: f64| {
         let hit = found.iter().find(|(p, _)| {
-            p.panel == panel && p.value == value && (p.case.amplitude.metres() - w).abs() < 1e-12
+            p.panel == panel && p.value == value && (reading.w_m(p.case.amplitude) - w).abs() < 1e-12
         });
         hit.map_or(f64::NAN, |(_, k)| k.mu_relative)
     };
@@ -260,14 +274,14 @@ pub fn parametric_study(base: RidgeCase, out: &Path) -> miette::Result<Reproduce
     for (panel, letter) in Panel::ALL.into_iter().zip('a'..) {
         let curve = |value: f64| -> Vec<(f64, f64)> {
             let of = found.iter().filter(|(p, _)| p.panel == panel && p.value == value);
-            of.map(|(p, k)| (p.case.amplitude.metres() * 1e6, k.mu_relative)).collect()
+            of.map(|(p, k)| (reading.w_m(p.case.amplitude) * 1e6, k.mu_relative)).collect()
         };
         let values = panel.values();
         charts.push(Chart {
-            name: format!("fig9{letter}"),
+            name: reading.file(&format!("fig9{letter}")),
             stated: Vec::new(),
             title: format!("Relative friction (Fig. 9{letter})"),
-            x: "amplitude_pp_um".into(),
+            x: reading.column().into(),
             y: "mu_relative".into(),
             series: values.map(|v| Series::line(format!("{} {v}", panel.variable()), curve(v))).into(),
         });
@@ -300,76 +314,4 @@ pub fn parametric_study(base: RidgeCase, out: &Path) -> miette::Result<Reproduce
         found.iter().map(|f| f.1.reaction_over_load).fold(0.0, f64::max)
     ));
     Ok(Reproduced { charts, lines })
-}
-
-/// Fig. 12: mu' against Psi, and the refit of Psi*.
-pub fn collapse(base: RidgeCase, out: &Path) -> miette::Result<Reproduced> {
-    let found = study(base, out)?;
-    let mut series: Vec<Series> = Vec::new();
-    let (mut paper_points, mut developed) = (Vec::new(), Vec::new());
-    for (n, panel) in Panel::ALL.into_iter().enumerate() {
-        let mut marks = Vec::new();
-        for (point, kept) in found.iter().filter(|(p, _)| p.panel == panel) {
-            let c = &point.case;
-            let w = c.amplitude.metres();
-            let psi = c.speed_m_s / (w * c.frequency_hz * c.mu0 * (1.0 + c.poisson_ratio));
-            // Moduli and normal forces only above 1 um, as the paper has it.
-            if matches!(panel, Panel::YoungModulus | Panel::NormalForce) && w < 1.0e-6 * 1.001 {
-                continue;
-            }
-            let value = panel.values().iter().position(|v| *v == point.value).unwrap_or(0);
-            let entry = (4 * n + value, psi, kept.mu_relative);
-            // The base curve is in every panel: it counts once.
-            let base_curve = panel != Panel::Frequency && panel.set(base, point.value) == base;
-            if !base_curve {
-                paper_points.push(entry);
-                if kept.contact_fraction < 0.7 {
-                    developed.push(entry);
-                }
-            }
-            marks.push((psi, kept.mu_relative));
-        }
-        series.push(Series::marks(panel.variable(), marks));
-    }
-    let fit = psi_fit::fit(&paper_points).ok_or_else(|| miette!("no Psi* fits"))?;
-    let open = psi_fit::fit(&developed).ok_or_else(|| miette!("no Psi* fits"))?;
-    let curve = |star: f64| {
-        (0..=200).map(|k| 0.06 * f64::from(k)).map(move |p| (p, relative_friction(PsiEq17(p), star)))
-    };
-    series.iter_mut().for_each(|s| s.points.retain(|p| p.0 <= 12.0));
-    let law = |name: String, star: f64, sd: f64| {
-        let within = curve(star - sd).zip(curve(star + sd));
-        let band = within.map(|((psi, a), (_, b))| (psi, a.min(b), a.max(b))).collect();
-        Series { band, ..Series::line(name, curve(star).collect()) }
-    };
-    let refit = format!("\u{3a8}* {:.2} \u{b1} {:.2} (refit)", fit.psi_star, fit.psi_star_sd);
-    series.push(law(refit, fit.psi_star, fit.psi_star_sd));
-    let stated = format!("\u{3a8}* {PSI_STAR} \u{b1} {PSI_STAR_UNCERTAINTY} (paper)");
-    series.push(law(stated, PSI_STAR, PSI_STAR_UNCERTAINTY));
-    let mut lines = vec![
-        format!(
-            "refit on the paper's choice of data: Psi* = {:.2} +- {:.2} (jackknife over curves), rmse {:.3}, {} points; paper: {PSI_STAR} +- {PSI_STAR_UNCERTAINTY}",
-            fit.psi_star, fit.psi_star_sd, fit.rmse, fit.points
-        ),
-        format!(
-            "where contact is lost for 30 % of the time or more: Psi* = {:.2} +- {:.2}, rmse {:.3}, {} points",
-            open.psi_star, open.psi_star_sd, open.rmse, open.points
-        ),
-    ];
-    for f in Panel::Frequency.values() {
-        let k = Panel::Frequency.values().iter().position(|v| *v == f).unwrap_or(0);
-        let of: Vec<_> = developed.iter().filter(|p| p.0 == k).copied().collect();
-        if let Some(local) = psi_fit::fit(&of) {
-            lines.push(format!("local Psi* at {} kHz: {:.2}", f / 1e3, local.psi_star));
-        }
-    }
-    let chart = Chart {
-        name: "fig12".into(),
-        stated: Vec::new(),
-        title: "Relative friction against Psi of Eq. 17 (Fig. 12)".into(),
-        x: "psi_eq17".into(),
-        y: "mu_relative".into(),
-        series,
-    };
-    Ok(Reproduced { charts: vec![chart], lines })
 }

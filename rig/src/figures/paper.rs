@@ -31,6 +31,7 @@ fn units(mm: f64) -> i32 {
 pub fn axis_title(column: &str) -> Option<&'static str> {
     Some(match column {
         "amplitude_pp_um" => "Amplitude w, peak-to-peak (\u{b5}m)",
+        "sine_amplitude_um" => "Amplitude w, of the sine (\u{b5}m)",
         "cycle" => "Cycle",
         "force_n" => "Force (N)",
         "mu_relative" => "Relative friction \u{b5}'",

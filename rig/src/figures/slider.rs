@@ -2,14 +2,14 @@
 
 use super::Reproduced;
 use super::plot::{Chart, Series};
+use super::reading::Reading;
 use miette::IntoDiagnostic;
 use models::condition::Condition;
 use models::finger::Finger;
-use models::quantity::PeakToPeak;
 use models::spring_slider;
 
-fn condition(w_m: f64, normal_force_n: f64) -> Condition {
-    Condition { amplitude: PeakToPeak::from_metres(w_m), normal_force_n, ..Condition::paper() }
+fn condition(reading: Reading, w_m: f64, normal_force_n: f64) -> Condition {
+    Condition { amplitude: reading.motion(w_m), normal_force_n, ..Condition::paper() }
 }
 
 fn amplitudes_um(count: usize, last: f64) -> Vec<f64> {
@@ -17,8 +17,8 @@ fn amplitudes_um(count: usize, last: f64) -> Vec<f64> {
 }
 
 /// Fig. 10: forces over one period from touch-down.
-pub fn forces() -> miette::Result<Reproduced> {
-    let c = condition(2e-6, 0.25);
+pub fn forces(reading: Reading) -> miette::Result<Reproduced> {
+    let c = condition(reading, 2e-6, 0.25);
     let cycle = spring_slider::solve(&c, &Finger::paper()).into_diagnostic()?;
     let wave = cycle.waveform(400);
     let force = |pick: fn(&spring_slider::Instant) -> f64| -> Vec<(f64, f64)> {
@@ -31,7 +31,7 @@ pub fn forces() -> miette::Result<Reproduced> {
             cycle.contact_fraction, cycle.mu_relative
         )],
         charts: vec![Chart {
-            name: "fig10".into(),
+            name: reading.file("fig10"),
             stated: Vec::new(),
             title: "Spring-slider: forces from touch-down, 2 um (Fig. 10)".into(),
             x: "time_periods".into(),
@@ -45,7 +45,7 @@ pub fn forces() -> miette::Result<Reproduced> {
 }
 
 /// Fig. 11: phase shift for normal stiffnesses of 0.2 to 4 MN/m at 0.5 N, both readings of section 4.1.
-pub fn phase_shift() -> miette::Result<Reproduced> {
+pub fn phase_shift(reading: Reading) -> miette::Result<Reproduced> {
     let mut charts = Vec::new();
     for (name, touch) in [("fig11", true), ("fig11_acceleration", false)] {
         let mut series = Vec::new();
@@ -57,16 +57,17 @@ pub fn phase_shift() -> miette::Result<Reproduced> {
             };
             let mut points = Vec::new();
             for w in amplitudes_um(100, 5.0) {
-                let cycle = spring_slider::solve(&condition(w * 1e-6, 0.5), &finger).into_diagnostic()?;
+                let cycle =
+                    spring_slider::solve(&condition(reading, w * 1e-6, 0.5), &finger).into_diagnostic()?;
                 points.push((w, if touch { cycle.touch_down_deg } else { cycle.phase_shift_deg }));
             }
             series.push(Series::line(format!("k_n {} MN/m", kn / 1e6), points));
         }
         charts.push(Chart {
-            name: name.into(),
+            name: reading.file(name),
             stated: Vec::new(),
             title: "Spring-slider: phase shift at 0.5 N (Fig. 11)".into(),
-            x: "amplitude_pp_um".into(),
+            x: reading.column().into(),
             y: "phase_shift_deg".into(),
             series,
         });
@@ -82,8 +83,8 @@ fn slow(recovery: Option<f64>) -> Finger {
 }
 
 /// Fig. 13: relative friction cycle by cycle with a recovery of 1.5 mm/s.
-pub fn slow_recovery() -> miette::Result<Reproduced> {
-    let c = condition(5e-6, 0.5);
+pub fn slow_recovery(reading: Reading) -> miette::Result<Reproduced> {
+    let c = condition(reading, 5e-6, 0.5);
     let curve = |recovery| -> miette::Result<Vec<(f64, f64)>> {
         let cycles = spring_slider::transient(&c, &slow(recovery), 60).into_diagnostic()?;
         Ok(cycles.into_iter().enumerate().map(|(n, mu)| (n as f64 + 1.0, mu)).collect())
@@ -92,13 +93,13 @@ pub fn slow_recovery() -> miette::Result<Reproduced> {
     let last = |v: &[(f64, f64)]| v.last().map_or(f64::NAN, |p| p.1);
     Ok(Reproduced {
         lines: vec![format!(
-            "5 um: mu' climbs from {:.3} to {:.3} with 1.5 mm/s, and is {:.3} with instant recovery; paper: climbs to a value slightly less than mu_0 F_reac (5 um read as a sine's amplitude gives its .957)",
+            "5 um: mu' climbs from {:.3} to {:.3} with 1.5 mm/s, and is {:.3} with instant recovery; paper: climbs to a value slightly less than mu_0 F_reac",
             held.first().map_or(f64::NAN, |p| p.1),
             last(&held),
             last(&free)
         )],
         charts: vec![Chart {
-            name: "fig13".into(),
+            name: reading.file("fig13"),
             stated: Vec::new(),
             title: "Spring-slider: slow lateral recovery (Fig. 13)".into(),
             x: "cycle".into(),
@@ -109,12 +110,12 @@ pub fn slow_recovery() -> miette::Result<Reproduced> {
 }
 
 /// Fig. 14: steady relative friction for recoveries of 1.5 to 15 mm/s.
-pub fn steady_recovery() -> miette::Result<Reproduced> {
+pub fn steady_recovery(reading: Reading) -> miette::Result<Reproduced> {
     let (mut series, mut at_five) = (Vec::new(), Vec::new());
     for mm_s in [1.5, 3.0, 5.0, 8.0, 15.0] {
         let mut points = Vec::new();
         for w in amplitudes_um(50, 5.0) {
-            let cycle = spring_slider::solve(&condition(w * 1e-6, 0.5), &slow(Some(mm_s * 1e-3)))
+            let cycle = spring_slider::solve(&condition(reading, w * 1e-6, 0.5), &slow(Some(mm_s * 1e-3)))
                 .into_diagnostic()?;
             points.push((w, cycle.mu_relative));
         }
@@ -127,10 +128,10 @@ pub fn steady_recovery() -> miette::Result<Reproduced> {
             at_five.join(", ")
         )],
         charts: vec![Chart {
-            name: "fig14".into(),
+            name: reading.file("fig14"),
             stated: Vec::new(),
             title: "Spring-slider: slow recovery, steady (Fig. 14)".into(),
-            x: "amplitude_pp_um".into(),
+            x: reading.column().into(),
             y: "mu_relative".into(),
             series,
         }],

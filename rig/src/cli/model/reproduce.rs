@@ -1,6 +1,7 @@
 //! `muprime model reproduce`: the paper's figures.
 
 use super::refused;
+use crate::figures::reading::Reading;
 use crate::figures::{self, paper, store};
 use crate::out;
 use clap::{Args, ValueEnum};
@@ -60,6 +61,9 @@ pub struct ReproduceArgs {
     /// For a screen, each chart by itself, or as a journal prints it: assembled panels of 85 or 174 mm, as SVG and PDF
     #[arg(long, value_enum, default_value_t = Style::Screen)]
     style: Style,
+    /// How the paper's w is read: as its captions say, or as its Eqs. 7 and 14 have it [default: both]
+    #[arg(long, value_enum)]
+    reading: Option<Reading>,
     /// Elements of each mesh, about
     #[arg(long, default_value_t = case::ELEMENTS)]
     elements: usize,
@@ -77,45 +81,63 @@ pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
         Figure::All => Figure::value_variants().iter().copied().filter(|f| *f != Figure::All).collect(),
         one => vec![one],
     };
+    let readings = args.reading.map_or(Reading::ALL.to_vec(), |one| vec![one]);
     for figure in wanted {
-        let base = RidgeCase { elements: args.elements, ..RidgeCase::paper() };
-        let reproduced = match figure {
-            Figure::Fig4 => figures::phase_shift(base, &args.out)?,
-            Figure::Fig5 => figures::velocities(base)?,
-            Figure::Fig6 => figures::loading(base)?,
-            Figure::Fig7 => figures::reaction_force(base)?,
-            Figure::Fig8 => figures::lateral_force(base)?,
-            Figure::Fig9 => figures::parametric_study(base, &args.out)?,
-            Figure::Fig10 => figures::slider::forces()?,
-            Figure::Fig11 => figures::slider::phase_shift()?,
-            Figure::Fig12 => figures::collapse(base, &args.out)?,
-            Figure::Fig13 => figures::slider::slow_recovery()?,
-            Figure::Fig14 => figures::slider::steady_recovery()?,
-            Figure::All => continue,
-        };
         let name = figure.to_possible_value().map_or(String::new(), |v| v.get_name().to_string());
-        for chart in &reproduced.charts {
-            chart.write_table(&args.out)?;
-            if args.style == Style::Screen {
-                chart.write_picture(&args.out)?;
+        for reading in &readings {
+            // Fig. 6 has no amplitude to read.
+            if figure == Figure::Fig6 && *reading != readings[0] {
+                continue;
             }
-        }
-        let mut files: Vec<String> = reproduced.charts.iter().map(|c| format!("{}.csv", c.name)).collect();
-        if args.style == Style::Paper {
-            paper::write(&name, &reproduced.charts, &args.out)?;
-            files.extend(["svg", "pdf"].map(|end| format!("{name}.{end}")));
-        } else {
-            files.extend(reproduced.charts.iter().map(|c| format!("{}.svg", c.name)));
-        }
-        let text = reproduced.lines.join("\n");
-        crate::files::write_whole(&args.out.join(format!("{name}.txt")), format!("{text}\n"))?;
-        if json {
-            out!("{}", serde_json::json!({"figure": name, "files": files, "comparison": reproduced.lines}));
-        } else {
-            out!("{name}\n  {}", text.replace('\n', "\n  "));
+            one(args, figure, &name, *reading, json)?;
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// One figure under one reading: its files, and its lines on standard output.
+fn one(args: &ReproduceArgs, figure: Figure, name: &str, reading: Reading, json: bool) -> miette::Result<()> {
+    let base = RidgeCase { elements: args.elements, ..RidgeCase::paper() };
+    let reproduced = match figure {
+        Figure::Fig4 => figures::phase_shift(base, &args.out, reading)?,
+        Figure::Fig5 => figures::velocities(base, reading)?,
+        Figure::Fig6 => figures::loading(base)?,
+        Figure::Fig7 => figures::reaction_force(base, reading)?,
+        Figure::Fig8 => figures::lateral_force(base, reading)?,
+        Figure::Fig9 => figures::parametric_study(base, &args.out, reading)?,
+        Figure::Fig10 => figures::slider::forces(reading)?,
+        Figure::Fig11 => figures::slider::phase_shift(reading)?,
+        Figure::Fig12 => figures::collapse(base, &args.out, reading)?,
+        Figure::Fig13 => figures::slider::slow_recovery(reading)?,
+        Figure::Fig14 => figures::slider::steady_recovery(reading)?,
+        Figure::All => return Ok(()),
+    };
+    let file = if figure == Figure::Fig6 { name.to_string() } else { reading.file(name) };
+    for chart in &reproduced.charts {
+        chart.write_table(&args.out)?;
+        if args.style == Style::Screen {
+            chart.write_picture(&args.out)?;
+        }
+    }
+    let mut files: Vec<String> = reproduced.charts.iter().map(|c| format!("{}.csv", c.name)).collect();
+    if args.style == Style::Paper {
+        paper::write(&file, &reproduced.charts, &args.out)?;
+        files.extend(["svg", "pdf"].map(|end| format!("{file}.{end}")));
+    } else {
+        files.extend(reproduced.charts.iter().map(|c| format!("{}.svg", c.name)));
+    }
+    let text = reproduced.lines.join("\n");
+    crate::files::write_whole(&args.out.join(format!("{file}.txt")), format!("{text}\n"))?;
+    if json {
+        let lines = &reproduced.lines;
+        let told = serde_json::json!({"figure": name, "reading": reading.name(), "files": files, "comparison": lines});
+        out!("{told}");
+    } else {
+        let read =
+            if figure == Figure::Fig6 { String::new() } else { format!(", w read as {}", reading.name()) };
+        out!("{name}{read}\n  {}", text.replace('\n', "\n  "));
+    }
+    Ok(())
 }
 
 /// The complete study as one table.

@@ -2,6 +2,7 @@
 
 use super::{refused, reproduce};
 use crate::figures::fig_9_results;
+use crate::figures::reading::Reading;
 use crate::figures::store::{self, Kept};
 use crate::{out, say};
 use clap::Args;
@@ -63,7 +64,7 @@ pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
 }
 
 fn fig_9_study(out: &Path, elements: usize) -> miette::Result<(PathBuf, usize, usize)> {
-    let (results, failed) = fig_9_results(out, elements)?;
+    let (results, failed) = fig_9_results(out, elements, Reading::PeakToPeak)?;
     let base = RidgeCase { elements, ..RidgeCase::paper() };
     let file = out.join("fig9.csv");
     reproduce::write_fig_9_table(&file, base, &results)?;
