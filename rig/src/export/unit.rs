@@ -19,7 +19,7 @@ const ENDINGS: [(&str, &str); 12] = [
 /// The unit in SI symbols; `1` for ratios, counts and standard deviations' own scale.
 ///
 /// ```
-/// use rig::export::unit::of;
+/// use muprime_rig::export::unit::of;
 /// assert_eq!(of("lateral_force_n"), "N");
 /// assert_eq!(of("speed_m_s"), "m/s");
 /// assert_eq!(of("mu_relative_sd"), "1");
