@@ -16,6 +16,7 @@
 //! | [`locate`] | which part of the operating space, and of the rig, carries the gap |
 //! | [`shrinkage`], [`predict`] | how far the gap shrinks on held-out passes; the predictive distribution |
 //! | [`next`] | the experiment that would part the leading hypotheses |
+//! | [`reading`] | which reading of the paper's w the passes favour |
 //! | [`verdict`], [`remarks`], [`saved`] | the report; remarks beside it; the corrected model for a run |
 //!
 //! docs/diagnosis/model.md states the whole model once. A small table in, a verdict out:
@@ -62,6 +63,7 @@ pub mod power;
 pub mod predict;
 pub mod progress;
 pub mod pulls;
+pub mod reading;
 pub mod remarks;
 pub mod saved;
 pub mod scatter;

@@ -16,6 +16,7 @@ use crate::scatter::Scatter;
 use crate::shrinkage::{Gap, gap};
 use effects::imitated;
 use models::condition::Condition;
+use models::reading_evidence::ReadingFinding;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -108,6 +109,9 @@ pub struct Report {
     /// Under no gap: the size of each effect from which this table would have shown it, most visible first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub seen_from: Vec<SeenFrom>,
+    /// What the passes say of the two readings of the paper's w; none without passes with and without vibration.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub psi_reading: Option<ReadingFinding>,
     /// What to measure next.
     pub next_experiment: Vec<Experiment>,
     /// Remarks: what is missing from the table, what was assumed.
@@ -167,6 +171,8 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     let seen_from = if decision.verdict == Verdict::NoGap { seen_from(&fitted) } else { Vec::new() };
     remarks.extend(crate::power::remark(&seen_from));
     remarks.extend(stiffness_pulls.iter().filter_map(Pull::remark));
+    let psi_reading = crate::reading::of_table(table, rig, &fitted.scatter);
+    remarks.extend(crate::reading::remark(psi_reading.as_ref(), decision.verdict));
     let report = Report {
         schema: "muprime.verdict/1",
         verdict: decision.verdict,
@@ -194,6 +200,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
             .map(|(e, because)| NotTestable { effect: (*e).to_string(), because: because.clone() })
             .collect(),
         seen_from,
+        psi_reading,
         next_experiment,
         remarks,
         data: DataNote { points: table.len(), sha256 },

@@ -42,6 +42,8 @@ pub mod prediction;
 pub mod psi;
 pub mod psi_fit;
 pub mod quantity;
+pub mod reading;
+pub mod reading_evidence;
 pub mod record;
 pub mod ridge;
 pub mod rig_file;

@@ -3,6 +3,7 @@
 use crate::condition::{Condition, OutOfDomain};
 use crate::finger::Finger;
 use crate::psi::{self, PsiEq17};
+use crate::reading::Reading;
 use crate::spring_slider;
 use serde::{Deserialize, Serialize};
 
@@ -129,22 +130,54 @@ impl FrictionModel for SpringSlider {
     }
 }
 
-/// The empirical law of Eq. 20 with the paper's fit.
+/// The empirical law of Eq. 20 with the paper's fit, under both readings of its `w`: a mixture, until data decide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmpiricalPsi {
     finger: Finger,
-    psi_star: f64,
-    psi_star_sd: f64,
+    /// Weight of each reading, in the order of [`Reading::ALL`].
+    weights: [f64; 2],
 }
 
 impl EmpiricalPsi {
-    /// Eq. 20 with `Psi* = 2.38 +- 0.21`.
+    /// Eq. 20 with `Psi* = 2.38 +- 0.21` for a `w` of which the paper does not say surely what it is: each reading as likely
+    /// as the other.
     ///
     /// # Errors
     /// A finger outside the domain of the model, by name.
     pub fn paper(finger: Finger) -> Result<Self, OutOfDomain> {
         finger.check()?;
-        Ok(EmpiricalPsi { finger, psi_star: psi::PSI_STAR, psi_star_sd: psi::PSI_STAR_UNCERTAINTY })
+        Ok(EmpiricalPsi { finger, weights: [0.5; 2] })
+    }
+
+    /// The same under one reading.
+    ///
+    /// # Errors
+    /// A finger outside the domain of the model, by name.
+    pub fn read(finger: Finger, reading: Reading) -> Result<Self, OutOfDomain> {
+        finger.check()?;
+        Ok(EmpiricalPsi { finger, weights: Reading::ALL.map(|r| f64::from(u8::from(r == reading))) })
+    }
+
+    /// The same where passes favour [`Reading::PeakToPeak`] by so many nats (negative: the other one).
+    #[must_use]
+    pub fn favoured(self, nats: f64) -> Self {
+        let first = 1.0 / (1.0 + (-nats).exp());
+        EmpiricalPsi { weights: [first, 1.0 - first], ..self }
+    }
+
+    /// `mu'` at a condition under one reading, and its standard uncertainty from `Psi*` and the collapse.
+    ///
+    /// # Errors
+    /// A condition outside the domain of the law, by name.
+    pub fn under(&self, condition: &Condition, reading: Reading) -> Result<(f64, f64), OutOfDomain> {
+        condition.check()?;
+        if condition.amplitude.metres() == 0.0 {
+            return Ok((1.0, 0.0));
+        }
+        let group = PsiEq17::at(condition, self.finger.poisson_ratio);
+        let (psi_star, sd) = reading.psi_star();
+        let fit = psi::sensitivity_to_psi_star(group, psi_star) * sd;
+        Ok((psi::relative_friction(group, psi_star), fit.hypot(psi::COLLAPSE_RMSE)))
     }
 }
 
@@ -154,17 +187,18 @@ impl FrictionModel for EmpiricalPsi {
     }
 
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
-        condition.check()?;
-        let still = condition.amplitude.metres() == 0.0;
-        let group = PsiEq17::at(condition, self.finger.poisson_ratio);
-        let mu_relative = if still { 1.0 } else { psi::relative_friction(group, self.psi_star) };
-        let fit = psi::sensitivity_to_psi_star(group, self.psi_star) * self.psi_star_sd;
-        let collapse = if still { 0.0 } else { psi::COLLAPSE_RMSE };
+        let (mut mu_relative, mut square) = (0.0, 0.0);
+        for (reading, weight) in Reading::ALL.into_iter().zip(self.weights) {
+            let (mu, sd) = self.under(condition, reading)?;
+            mu_relative += weight * mu;
+            square += weight * (mu * mu + sd * sd);
+        }
         let cycle = spring_slider::solve_checked(condition, &self.finger);
-        let inside = still || psi::within_fitted_range(condition);
+        let inside = condition.amplitude.metres() == 0.0 || psi::within_fitted_range(condition);
         Ok(Prediction {
             mu_relative,
-            mu_relative_sd: fit.hypot(collapse),
+            // Of the mixture: within the readings and between them.
+            mu_relative_sd: (square - mu_relative * mu_relative).max(0.0).sqrt(),
             lateral_force_n: mu_relative * condition.mu0 * condition.normal_force_n,
             regime: cycle.regime,
             validity: if inside { Validity::Inside } else { Validity::Extrapolated },

@@ -92,6 +92,14 @@ fn absent(feature: &str) -> miette::Report {
     )
 }
 
+/// The passes of a run as an Arrow IPC file in memory, with units and facts.
+///
+/// # Errors
+/// Whatever the format's library says; a build without Arrow.
+pub fn arrow_bytes(run: &RunData) -> miette::Result<Vec<u8>> {
+    arrow::bytes(&columns::of(&run.passes), &facts::of(run, &facts::Stated::default()))
+}
+
 /// Exports the run in `folder` and returns where it stands: `to`, or the format's own name in the folder. A licence
 /// that is stated now stands in place of the one that the run was made with.
 ///

@@ -37,10 +37,9 @@ pub fn fig_9_read(base: RidgeCase, reading: Reading) -> Vec<StudyPoint> {
 /// Whatever the file system says.
 pub fn fig_9_results(
     out: &Path,
-    elements: usize,
+    base: RidgeCase,
     reading: Reading,
 ) -> miette::Result<(store::Results, usize)> {
-    let base = RidgeCase { elements, ..RidgeCase::paper() };
     let cases = fig_9_read(base, reading).into_iter().map(|p| p.case);
     store::complete(&out.join("ridge.jsonl"), cases, &settings())
 }
@@ -89,13 +88,13 @@ pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Res
         passing.map_or(f64::NAN, |p| p[0].0 + (p[1].0 - p[0].0) * (level - p[0].1) / (p[1].1 - p[0].1))
     };
     let chart = |name: &str, title: &str, moduli: [f64; 4], transition: [f64; 2]| Chart {
-        name: reading.file(name),
+        name: reading::file(reading, name),
         stated: vec![
             Stated::Span { range: transition, words: "transition (paper)".into() },
             Stated::Level { value: 90.0, words: "plateau (paper)".into() },
         ],
         title: title.into(),
-        x: reading.column().into(),
+        x: reading::column(reading).into(),
         y: "phase_shift_deg".into(),
         series: moduli.map(|e| Series::line(format!("E_sc {} MPa", e / 1e6), curve(e))).into(),
     };
@@ -145,7 +144,7 @@ pub fn velocities(base: RidgeCase, reading: Reading) -> miette::Result<Reproduce
             100.0 * (1.0 - falling)
         )],
         charts: vec![Chart {
-            name: reading.file("fig5"),
+            name: reading::file(reading, "fig5"),
             stated: Vec::new(),
             title: "Velocity of skin and plate, dry, 1.35 um (Fig. 5)".into(),
             x: "time_periods".into(),
@@ -202,7 +201,7 @@ pub fn reaction_force(base: RidgeCase, reading: Reading) -> miette::Result<Repro
     }
     lines.push("paper: always positive at 0.1 um, zero for a significant time at 1 um and longer at 2 um, the greatest force growing, the mean equal to the applied 0.25 N".into());
     let chart = Chart {
-        name: reading.file("fig7"),
+        name: reading::file(reading, "fig7"),
         stated: vec![Stated::Level { value: base.normal_force_n, words: "applied (paper)".into() }],
         title: "Reaction force of the finger (Fig. 7)".into(),
         x: "time_periods".into(),
@@ -229,7 +228,7 @@ pub fn lateral_force(base: RidgeCase, reading: Reading) -> miette::Result<Reprod
             100.0 * result.contact_fraction
         )],
         charts: vec![Chart {
-            name: reading.file("fig8"),
+            name: reading::file(reading, "fig8"),
             stated: Vec::new(),
             title: "Forces in one period, 1.35 um (Fig. 8)".into(),
             x: "time_periods".into(),
@@ -245,7 +244,7 @@ pub fn lateral_force(base: RidgeCase, reading: Reading) -> miette::Result<Reprod
 
 /// mu' of every point of the study that is there.
 fn study(base: RidgeCase, out: &Path, reading: Reading) -> miette::Result<Vec<(StudyPoint, store::Kept)>> {
-    let (results, failed) = fig_9_results(out, base.elements, reading)?;
+    let (results, failed) = fig_9_results(out, base, reading)?;
     let points = fig_9_read(base, reading);
     let found: Vec<_> = points
         .iter()
@@ -278,10 +277,10 @@ pub fn parametric_study(base: RidgeCase, out: &Path, reading: Reading) -> miette
         };
         let values = panel.values();
         charts.push(Chart {
-            name: reading.file(&format!("fig9{letter}")),
+            name: reading::file(reading, &format!("fig9{letter}")),
             stated: Vec::new(),
             title: format!("Relative friction (Fig. 9{letter})"),
-            x: reading.column().into(),
+            x: reading::column(reading).into(),
             y: "mu_relative".into(),
             series: values.map(|v| Series::line(format!("{} {v}", panel.variable()), curve(v))).into(),
         });

@@ -138,9 +138,22 @@ pub struct VirtualRig {
     pub ideal: bool,
     /// Seed of the finger's true stiffnesses about those that the setup states.
     pub finger_seed: u64,
+    /// Where above zero, the fingertip is the paper's finite element ridge, by its table, on a plate that moves by so many times its stroke: 1 as
+    /// it is, 2 with the paper's w as the sine's amplitude. Zero: a slider on springs.
+    pub ridge_table_strokes: f64,
     /// A hand grips the virtual dead-man device a fifth of a second after the start, and holds it: for trials with a human
     /// finger that is none.
     pub hand_holds: bool,
+}
+
+impl VirtualRig {
+    /// What its world is built from, but for defects that a command names.
+    pub fn world(&self) -> sim::world::WorldConfig {
+        let mut config =
+            if self.ideal { sim::world::WorldConfig::ideal() } else { sim::world::WorldConfig::bundled() };
+        config.finger.ridge_table_strokes = self.ridge_table_strokes;
+        config
+    }
 }
 
 const fn default_estimate() -> EstimateConfig {

@@ -26,6 +26,9 @@ pub struct FingerConfig {
     pub ridge_damping_ratio: f64,
     /// Lateral recovery speed (m/s); 0: at once.
     pub lateral_recovery_m_s: f64,
+    /// Where above zero, the fingertip is no slider on springs but the paper's finite element ridge, by its table, on a plate that moves by so
+    /// many times its stroke (-): 1 is the ridge as it is; 2 makes the paper's w its sine's amplitude.
+    pub ridge_table_strokes: f64,
     /// Lateral stiffness of the pad at the stage's pace (N/m).
     pub pad_stiffness_n_per_m: f64,
     /// Poisson's ratio of the ridges, for rig.toml (-).
@@ -45,6 +48,7 @@ impl Default for FingerConfig {
             ridge_mass_kg: 0.0,
             ridge_damping_ratio: 0.0,
             lateral_recovery_m_s: 0.0,
+            ridge_table_strokes: 0.0,
             pad_stiffness_n_per_m: 1500.0,
             poisson_ratio: paper.poisson_ratio,
             young_modulus_pa: 28.3e6,

@@ -8,11 +8,13 @@
 //! yields its friction, the pad passes it on, the sensor feels and samples, the channels deliver.
 
 mod config;
+mod ridge_table;
 mod steady;
 
 use realtime::ports::Nanos;
 
 pub use config::{ConfigError, ContactMode, RoomConfig, WorldConfig};
+use ridge_table::RidgeTable;
 pub use steady::{Point, steady_contact, steady_forces};
 
 use crate::amplifier::{Amplifier, AmplifierInput, AmplifierStatus};
@@ -88,6 +90,7 @@ pub struct World {
     operator: Operator,
     averager: Averager,
     march: Option<March>,
+    ridge: Option<RidgeTable>,
     noise: Noise,
     strokes: u64,
     pass_factor: f64,
@@ -131,6 +134,7 @@ impl World {
             operator: Operator::default(),
             averager: Averager::default(),
             march: None,
+            ridge: RidgeTable::of(&config)?,
             noise: Noise::new(seed, "world"),
             strokes: 0,
             pass_factor: 1.0,
@@ -250,6 +254,9 @@ impl World {
         let point = Point { at: *at, known_pp_m: known_pp, speed_m_s: speed.max(STILL_M_S) };
         let contact = steady_contact(&self.finger, &self.config.defects, &point);
         let pp = 2.0 * contact.sine_amplitude_m;
+        if let Some(ridge) = &self.ridge {
+            return (pp, ridge.steady(&contact));
+        }
         // Only mass and late recovery carry anything from one cycle to the next; the march knows them for one ridge on a
         // plain sine. Every other contact is periodic from its first cycle: its steady state is its every cycle.
         let remembers = contact.has_inertia() || contact.recovery != Recovery::Instant;

@@ -43,6 +43,9 @@ pub struct RidgeCase {
     pub poisson_ratio: f64,
     /// Contact penalty over the stratum corneum's modulus: a node's spring in Pa (N/m per metre of depth).
     pub penalty_ratio: f64,
+    /// Contact penalty along the plate over that across it: 1 in the paper as it reads, which states one k. Above 0, up to 1.
+    #[serde(default = "one")]
+    pub tangential_penalty_ratio: f64,
     /// Mass damping in 1/s.
     pub mass_damping_per_s: f64,
     /// Elements, about.
@@ -53,6 +56,10 @@ pub struct RidgeCase {
     pub friction: FrictionRule,
     /// How strain is measured.
     pub strain: Strain,
+}
+
+const fn one() -> f64 {
+    1.0
 }
 
 /// Mean pressure in Pa over the contact of a whole finger pressed with `normal_force_n`, growing with the
@@ -75,6 +82,7 @@ impl RidgeCase {
             retardation_time_s: 0.0,
             poisson_ratio: 0.33,
             penalty_ratio: PENALTY_RATIO,
+            tangential_penalty_ratio: one(),
             mass_damping_per_s: MASS_DAMPING_PER_S,
             elements: ELEMENTS,
             geometry: RidgeGeometry::TABLE_1,
@@ -83,9 +91,10 @@ impl RidgeCase {
         }
     }
 
-    /// The same with another normal force and the mean pressure that goes with it.
+    /// The same with another normal force and the mean pressure that goes with it, as its cube root (Hertz).
     pub fn with_normal_force_n(self, normal_force_n: f64) -> Self {
-        RidgeCase { normal_force_n, mean_pressure_pa: hertz_mean_pressure_pa(normal_force_n), ..self }
+        let mean_pressure_pa = self.mean_pressure_pa * (normal_force_n / self.normal_force_n).cbrt();
+        RidgeCase { normal_force_n, mean_pressure_pa, ..self }
     }
 
     /// The same with another amplitude, peak-to-peak in m.
@@ -130,6 +139,7 @@ impl RidgeCase {
         within("young_modulus_pa", self.young_modulus_pa, 1e6, 1e11)?;
         within("retardation_time_s", self.retardation_time_s, 0.0, 1e3)?;
         within("penalty_ratio", self.penalty_ratio, 0.1, 1e4)?;
+        within("tangential_penalty_ratio", self.tangential_penalty_ratio, 1e-3, 1.0)?;
         within("mass_damping_per_s", self.mass_damping_per_s, 0.0, 1e8)?;
         self.materials().iter().try_for_each(|m| m.check("tissue"))
     }

@@ -1,7 +1,7 @@
 //! The rigid plate: penalty contact with Coulomb friction on the surface row.
 //!
 //! Where the surface is below the plate, a spring of the node pushes it back; along the plate a second
-//! spring of the same stiffness stretches with the sliding until Coulomb's limit. Out of contact the
+//! spring of the same stiffness, or a softer one, stretches with the sliding until Coulomb's limit. Out of contact the
 //! stretch is forgotten at once. The springs are free of inertia.
 
 use super::RidgeError;
@@ -35,6 +35,7 @@ pub struct ContactForce {
 #[derive(Clone, Debug)]
 pub struct Plate {
     penalty: Vec<f64>,
+    tangential_ratio: f64,
     stretch: Vec<f64>,
     load: Vec<f64>,
     rule: FrictionRule,
@@ -59,7 +60,16 @@ impl Plate {
             });
         }
         let n = penalty.len();
-        Ok(Plate { penalty, stretch: vec![0.0; n], load: vec![0.0; n], rule, mu0 })
+        Ok(Plate { penalty, tangential_ratio: 1.0, stretch: vec![0.0; n], load: vec![0.0; n], rule, mu0 })
+    }
+
+    /// The same with springs along the plate that are softer than those across it by `ratio`, above 0 and up to 1.
+    pub fn softer_along(self, ratio: f64) -> Result<Plate, RidgeError> {
+        if ratio > 0.0 && ratio <= 1.0 {
+            return Ok(Plate { tangential_ratio: ratio, ..self });
+        }
+        let range = "above 0, up to 1".into();
+        Err(RidgeError::Input { what: "tangential penalty ratio".into(), value: ratio, range })
     }
 
     /// Springs of the surface nodes, N/m per metre of depth.
@@ -75,7 +85,8 @@ impl Plate {
     /// Energy stored in the contact springs, J per metre of depth.
     pub fn stored_energy(&self) -> f64 {
         let each = self.penalty.iter().zip(&self.stretch).zip(&self.load);
-        each.map(|((k, s), f)| if *k > 0.0 { 0.5 * k * s * s + 0.5 * f * f / k } else { 0.0 }).sum()
+        let along = self.tangential_ratio;
+        each.map(|((k, s), f)| if *k > 0.0 { 0.5 * along * k * s * s + 0.5 * f * f / k } else { 0.0 }).sum()
     }
 
     /// Presses and drags the surface: the plate stands at `height` (m) and moves along +x at `speed` (m/s).
@@ -88,14 +99,15 @@ impl Plate {
             if depth > 0.0 && *k > 0.0 {
                 let load = k * depth;
                 let limit = self.mu0 * load;
+                let along = k * self.tangential_ratio;
                 let mut stretch = self.stretch[i] + (speed - surface.vx[i]) * surface.dt;
                 if self.rule == FrictionRule::Local {
-                    stretch = stretch.clamp(-limit / k, limit / k);
+                    stretch = stretch.clamp(-limit / along, limit / along);
                 }
                 self.stretch[i] = stretch;
                 self.load[i] = load;
                 sum.normal += load;
-                sum.lateral += k * stretch;
+                sum.lateral += along * stretch;
                 sum.nodes += 1;
             } else {
                 self.stretch[i] = 0.0;
@@ -114,7 +126,7 @@ impl Plate {
         }
         for (i, k) in self.penalty.iter().enumerate() {
             if self.load[i] > 0.0 {
-                let pull = k * self.stretch[i];
+                let pull = k * self.tangential_ratio * self.stretch[i];
                 surface.fx[i] -= pull;
                 surface.fy[i] -= self.load[i];
                 sum.power += pull * surface.vx[i] + self.load[i] * surface.vy[i];

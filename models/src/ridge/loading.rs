@@ -131,7 +131,8 @@ impl Rig {
         let spring = case.penalty_ratio * case.young_modulus_pa;
         let penalty =
             surface[..mesh.nx].iter().map(|w| spring * (w / built.tip_spacing_m).min(4.0)).collect();
-        let plate = Plate::new(penalty, case.friction, case.mu0)?;
+        let plate =
+            Plate::new(penalty, case.friction, case.mu0)?.softer_along(case.tangential_penalty_ratio)?;
         let spot: Vec<(usize, f64)> =
             (0..mesh.nx).filter(|i| mesh.x_m[*i].abs() <= 0.5 * SPOT_M).map(|i| (i, surface[i])).collect();
         let whole: f64 = spot.iter().map(|s| s.1).sum();

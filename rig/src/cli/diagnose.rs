@@ -17,6 +17,7 @@ use miette::{Context, IntoDiagnostic};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::record::{Pass, read_passes};
+use models::rig_file::RigFile;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -125,27 +126,45 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         };
         write_text(out, &crate::report::diagnosis::page(&result, &table, &about)?)?;
     }
-    let mut report = serde_json::to_value(&result.report).into_diagnostic()?;
-    let faults = certificates::at_fault(&result, &rig);
-    let doubts = certificates::in_doubt(&rig, &result.report.stiffness_pulls);
     if json {
-        if !damage.is_empty() {
-            report["damage"] = serde_json::to_value(&damage).into_diagnostic()?;
-        }
-        if !faults.is_empty() {
-            report["certificates_at_fault"] = serde_json::to_value(&faults).into_diagnostic()?;
-        }
-        if !doubts.is_empty() {
-            report["certificates_in_doubt"] = serde_json::to_value(&doubts).into_diagnostic()?;
-        }
-        out!("{}", serde_json::to_string(&report).into_diagnostic()?);
+        out!("{}", document(&result, &rig, &damage)?);
     } else {
         damage.iter().for_each(|d| say!("{}", folded(&format!("damaged: {d}"), 4)));
-        out!("{}", folded(terminal(&result).trim_end(), 4));
-        faults.iter().for_each(|fault| out!("{}", folded(&fault.text(), 4)));
-        doubts.iter().for_each(|doubt| out!("{}", folded(&doubt.text(), 4)));
+        out!("{}", folded(words(&result, &rig).trim_end(), 4));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The verdict as `--json` prints it: the report, what is damaged in the run's folder, and the certificates that it speaks against.
+///
+/// # Errors
+/// Only if a number cannot be written as JSON.
+pub fn document(result: &Diagnosis, rig: &RigFile, damage: &[String]) -> miette::Result<String> {
+    let mut report = serde_json::to_value(&result.report).into_diagnostic()?;
+    let faults = certificates::at_fault(result, rig);
+    let doubts = certificates::in_doubt(rig, &result.report.stiffness_pulls);
+    if !damage.is_empty() {
+        report["damage"] = serde_json::to_value(damage).into_diagnostic()?;
+    }
+    if !faults.is_empty() {
+        report["certificates_at_fault"] = serde_json::to_value(&faults).into_diagnostic()?;
+    }
+    if !doubts.is_empty() {
+        report["certificates_in_doubt"] = serde_json::to_value(&doubts).into_diagnostic()?;
+    }
+    serde_json::to_string(&report).into_diagnostic()
+}
+
+/// The verdict for a person, certificates included.
+pub fn words(result: &Diagnosis, rig: &RigFile) -> String {
+    let mut text = terminal(result);
+    let faults = certificates::at_fault(result, rig);
+    let doubts = certificates::in_doubt(rig, &result.report.stiffness_pulls);
+    for more in faults.iter().map(|f| f.text()).chain(doubts.iter().map(|d| d.text())) {
+        text.push_str(&more);
+        text.push('\n');
+    }
+    text
 }
 
 /// A bar that follows a diagnosis; on Ctrl-C the effects that lead so far are told.
@@ -199,7 +218,11 @@ fn read_table(path: &Path) -> miette::Result<Vec<Pass>> {
     parse_passes(path, &bytes)
 }
 
-fn parse_passes(path: &Path, bytes: &[u8]) -> miette::Result<Vec<Pass>> {
+/// The passes of a point table, CSV or Parquet.
+///
+/// # Errors
+/// A table that cannot be read, with its row.
+pub fn parse_passes(path: &Path, bytes: &[u8]) -> miette::Result<Vec<Pass>> {
     if bytes.starts_with(b"PAR1") {
         let csv = crate::export::parquet_as_csv(path).wrap_err_with(|| path.display().to_string())?;
         return read_passes(csv.as_bytes()).into_diagnostic().wrap_err_with(|| path.display().to_string());
@@ -207,7 +230,8 @@ fn parse_passes(path: &Path, bytes: &[u8]) -> miette::Result<Vec<Pass>> {
     read_passes(bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())
 }
 
-fn predictions(result: &Diagnosis, conditions: &Table) -> String {
+/// What `--predictions` holds: CSV, a row a condition.
+pub fn predictions(result: &Diagnosis, conditions: &Table) -> String {
     let mut text = String::from(
         "point,lateral_force_baseline_n,lateral_force_corrected_n,lateral_force_corrected_sd_n\n",
     );

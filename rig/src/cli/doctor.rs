@@ -10,7 +10,7 @@ use realtime::pacing;
 use serde::Serialize;
 use sim::wire::SharedPlant;
 use sim::wire::world::WorldPlant;
-use sim::world::{World, WorldConfig};
+use sim::world::World;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -255,8 +255,7 @@ fn talk(setup: &Setup, plan: Option<&Plan>) -> miette::Result<Vec<Finding>> {
 
 /// A virtual rig's instruments, served for the look.
 fn serve(setup: &Setup, instruments: &mut drivers::InstrumentsSetup) -> miette::Result<Embedded> {
-    let ideal = setup.file.virtual_rig.as_ref().is_some_and(|v| v.ideal);
-    let config = if ideal { WorldConfig::ideal() } else { WorldConfig::bundled() };
+    let config = setup.file.virtual_rig.clone().unwrap_or_default().world();
     let world = World::new(&config, 1).map_err(|e| miette::miette!("{e}"))?;
     let plant = SharedPlant::new(WorldPlant::new(world), Instant::now());
     crate::embed::embed(instruments, &plant, false).map_err(|problem| miette::miette!("{problem}"))

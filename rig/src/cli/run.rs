@@ -37,7 +37,7 @@ fn fitted(text: String) -> String {
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Plan: a file, or a bundled name (first-sweep, fig9-artificial, part2-validation)
+    /// Plan: a file, or a bundled name (first-sweep, fig9-artificial, part2-validation, psi-reading)
     #[arg(default_value = "first-sweep")]
     plan: String,
     /// Setup: a file, or a bundled name (virtual, virtual-ideal)
@@ -325,6 +325,9 @@ fn tell(summary: &Summary, json: bool) {
         told!("the same command with --out {} goes on", summary.folder.display());
     }
     told!("{}", summary.agreement);
+    if let Some(reading) = &summary.psi_reading {
+        told!("{reading}");
+    }
     if summary.model_departed {
         told!("'muprime diagnose {}' says where and why", summary.folder.display());
     }

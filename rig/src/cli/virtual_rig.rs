@@ -8,7 +8,7 @@ use miette::{IntoDiagnostic, WrapErr};
 use sim::wire::serial::SerialEmulator;
 use sim::wire::world::{Hands, WorldPlant};
 use sim::wire::{Quantity, SharedPlant};
-use sim::world::{World, WorldConfig};
+use sim::world::World;
 use std::io::BufRead;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -52,8 +52,7 @@ pub struct Args {
 /// A setup, defects file or address that cannot be used.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let setup = Setup::load(&args.setup)?;
-    let ideal = setup.file.virtual_rig.as_ref().is_some_and(|v| v.ideal);
-    let mut config = if ideal { WorldConfig::ideal() } else { WorldConfig::bundled() };
+    let mut config = setup.file.virtual_rig.clone().unwrap_or_default().world();
     if let Some(path) = &args.defects {
         let text = crate::input::text_of(path)?;
         config.defects =

@@ -2,7 +2,7 @@
 //! and curve by curve.
 
 use super::plot::{Chart, Series};
-use super::reading::Reading;
+use super::reading::{self, Reading};
 use super::{Reproduced, store, study};
 use miette::miette;
 use models::psi::{PSI_STAR, PSI_STAR_UNCERTAINTY, PsiEq17, relative_friction};
@@ -113,7 +113,7 @@ pub fn collapse(base: RidgeCase, out: &Path, reading: Reading) -> miette::Result
         lines.push(format!("local Psi* at {} {:?}: {}", panel.variable(), panel.values(), local.join(", ")));
     }
     let chart = Chart {
-        name: reading.file("fig12"),
+        name: reading::file(reading, "fig12"),
         stated: Vec::new(),
         title: "Relative friction against Psi of Eq. 17 (Fig. 12)".into(),
         x: "psi_eq17".into(),

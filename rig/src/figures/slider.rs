@@ -2,7 +2,7 @@
 
 use super::Reproduced;
 use super::plot::{Chart, Series};
-use super::reading::Reading;
+use super::reading::{self, Reading};
 use miette::IntoDiagnostic;
 use models::condition::Condition;
 use models::finger::Finger;
@@ -31,7 +31,7 @@ pub fn forces(reading: Reading) -> miette::Result<Reproduced> {
             cycle.contact_fraction, cycle.mu_relative
         )],
         charts: vec![Chart {
-            name: reading.file("fig10"),
+            name: reading::file(reading, "fig10"),
             stated: Vec::new(),
             title: "Spring-slider: forces from touch-down, 2 um (Fig. 10)".into(),
             x: "time_periods".into(),
@@ -64,10 +64,10 @@ pub fn phase_shift(reading: Reading) -> miette::Result<Reproduced> {
             series.push(Series::line(format!("k_n {} MN/m", kn / 1e6), points));
         }
         charts.push(Chart {
-            name: reading.file(name),
+            name: reading::file(reading, name),
             stated: Vec::new(),
             title: "Spring-slider: phase shift at 0.5 N (Fig. 11)".into(),
-            x: reading.column().into(),
+            x: reading::column(reading).into(),
             y: "phase_shift_deg".into(),
             series,
         });
@@ -99,7 +99,7 @@ pub fn slow_recovery(reading: Reading) -> miette::Result<Reproduced> {
             last(&free)
         )],
         charts: vec![Chart {
-            name: reading.file("fig13"),
+            name: reading::file(reading, "fig13"),
             stated: Vec::new(),
             title: "Spring-slider: slow lateral recovery (Fig. 13)".into(),
             x: "cycle".into(),
@@ -128,10 +128,10 @@ pub fn steady_recovery(reading: Reading) -> miette::Result<Reproduced> {
             at_five.join(", ")
         )],
         charts: vec![Chart {
-            name: reading.file("fig14"),
+            name: reading::file(reading, "fig14"),
             stated: Vec::new(),
             title: "Spring-slider: slow recovery, steady (Fig. 14)".into(),
-            x: reading.column().into(),
+            x: reading::column(reading).into(),
             y: "mu_relative".into(),
             series,
         }],

@@ -25,9 +25,11 @@ pub(super) fn page(run: &RunData) -> miette::Result<String> {
                  too, stands as a short stroke at each pass. w is peak-to-peak."
         ),
         plots::run::mu_against_psi(run)?,
-        note(
-            "&Psi; = U / (w f &mu;<sub>0</sub> (1+&nu;)), Eq. 17. Line: Eq. 20 with &Psi;* = 2.38 &plusmn; 0.21."
-        ),
+        note(&format!(
+            "&Psi; = U / (w f &mu;<sub>0</sub> (1+&nu;)), Eq. 17. Lines and bands: Eq. 20 with the paper's &Psi;* = 2.38 &plusmn; 0.21, \
+             below where its w is the whole stroke, above where it is the sine's amplitude (1.19 of the stroke).{}",
+            reading(run)
+        )),
         plots::run::residuals(run)?,
         note(
             "Measured less predicted lateral force, in standard deviations, in the order of measurement; \
@@ -95,6 +97,17 @@ fn verdict(w: &mut String, run: &RunData) {
             escape(&flag.to_string())
         );
     }
+}
+
+/// What the last pass that could tell says of the two readings.
+fn reading(run: &RunData) -> String {
+    let last = run.passes.iter().rev().find_map(|p| p.psi_reading);
+    last.map_or_else(String::new, |finding| {
+        let text = finding.to_string();
+        let mut letters = text.chars();
+        let first = letters.next().map_or_else(String::new, |c| c.to_uppercase().to_string());
+        format!(" {}{}.", escape(&first), escape(letters.as_str()))
+    })
 }
 
 fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {

@@ -142,6 +142,7 @@ impl WorldConfig {
             ("finger.ridge_mass_kg", self.finger.ridge_mass_kg),
             ("finger.ridge_damping_ratio", self.finger.ridge_damping_ratio),
             ("finger.lateral_recovery_m_s", self.finger.lateral_recovery_m_s),
+            ("finger.ridge_table_strokes", self.finger.ridge_table_strokes),
             ("sensor.latency_s", self.sensor.latency_s),
             ("room.ambient_pressure_pa", self.room.ambient_pressure_pa),
         ];

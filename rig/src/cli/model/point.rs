@@ -2,6 +2,7 @@
 
 use super::conditions::ConditionArgs;
 use super::refused;
+use crate::figures::reading::{self, Reading};
 use crate::out;
 use clap::{Args, ValueEnum};
 use miette::IntoDiagnostic;
@@ -28,6 +29,9 @@ pub struct PointArgs {
     /// Which law
     #[arg(long, value_enum, default_value = "spring-slider")]
     model: Law,
+    /// How the paper's w is read, whose Psi* the law 'psi' takes [default: both, a mixture]
+    #[arg(long, value_parser = reading::parser())]
+    reading: Option<Reading>,
     /// Normal stiffness of the finger in N/m
     #[arg(long, default_value_t = 3.9e6, allow_negative_numbers = true)]
     normal_stiffness_n_per_m: f64,
@@ -42,6 +46,16 @@ pub struct PointArgs {
     young_modulus_pa: f64,
 }
 
+/// The law under one reading.
+#[derive(Serialize)]
+struct Read {
+    reading: Reading,
+    psi_star: f64,
+    psi_star_sd: f64,
+    mu_relative: f64,
+    mu_relative_sd: f64,
+}
+
 #[derive(Serialize)]
 struct Answer {
     model: String,
@@ -54,6 +68,9 @@ struct Answer {
     #[serde(skip_serializing_if = "Option::is_none")]
     touch_down_deg: Option<f64>,
     regime: models::prediction::Regime,
+    /// Of the law 'psi': what each reading of the paper's w says.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    readings: Vec<Read>,
     psi_eq16: f64,
     psi_eq17: f64,
     validity: models::prediction::Validity,
@@ -77,6 +94,7 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
     let surrogate = Surrogate::shipped().into_diagnostic()?.for_finger(&finger);
     let slider;
     let empirical;
+    let mut readings = Vec::new();
     let law: &dyn FrictionModel = match args.model {
         Law::SpringSlider => {
             slider = match models::prediction::SpringSlider::new(finger) {
@@ -86,10 +104,22 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
             &slider
         }
         Law::Psi => {
-            empirical = match EmpiricalPsi::paper(finger) {
+            let law = match args.reading {
+                Some(reading) => EmpiricalPsi::read(finger, reading),
+                None => EmpiricalPsi::paper(finger),
+            };
+            empirical = match law {
                 Ok(law) => law,
                 Err(why) => return refused(why),
             };
+            for reading in Reading::ALL {
+                let (mu_relative, mu_relative_sd) = match empirical.under(&condition, reading) {
+                    Ok(under) => under,
+                    Err(why) => return refused(why),
+                };
+                let (psi_star, psi_star_sd) = reading.psi_star();
+                readings.push(Read { reading, psi_star, psi_star_sd, mu_relative, mu_relative_sd });
+            }
             &empirical
         }
         Law::Surrogate => &surrogate,
@@ -108,6 +138,7 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
         phase_shift_deg: cycle.phase_shift_deg,
         touch_down_deg: Some(cycle.touch_down_deg),
         regime: prediction.regime,
+        readings,
         psi_eq16: PsiEq16::at(&condition, &finger).0,
         psi_eq17: PsiEq17::at(&condition, finger.poisson_ratio).0,
         validity: prediction.validity,
@@ -137,6 +168,14 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
             100.0 * answer.contact_fraction,
             answer.phase_shift_deg
         );
+        for read in &answer.readings {
+            out!(
+                "  where {}: mu' = {:.4} +- {:.4}",
+                read.reading.words(),
+                read.mu_relative,
+                read.mu_relative_sd
+            );
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,7 +1,7 @@
 //! `muprime model reproduce`: the paper's figures.
 
 use super::refused;
-use crate::figures::reading::Reading;
+use crate::figures::reading::{self, Reading};
 use crate::figures::{self, paper, store};
 use crate::out;
 use clap::{Args, ValueEnum};
@@ -62,16 +62,38 @@ pub struct ReproduceArgs {
     #[arg(long, value_enum, default_value_t = Style::Screen)]
     style: Style,
     /// How the paper's w is read: as its captions say, or as its Eqs. 7 and 14 have it [default: both]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = reading::parser())]
     reading: Option<Reading>,
     /// Elements of each mesh, about
     #[arg(long, default_value_t = case::ELEMENTS)]
     elements: usize,
+    /// Mean pressure at 0.25 N in Pa, which the paper leaves open; it grows with the cube root of the force
+    #[arg(long, default_value_t = case::MEAN_PRESSURE_AT_QUARTER_NEWTON_PA)]
+    mean_pressure_pa: f64,
+    /// Mass damping in 1/s, which the paper leaves open
+    #[arg(long, default_value_t = case::MASS_DAMPING_PER_S)]
+    mass_damping_per_s: f64,
+    /// Contact penalty along the plate over that across it, up to 1
+    #[arg(long, default_value_t = 1.0)]
+    tangential_penalty_ratio: f64,
+}
+
+impl ReproduceArgs {
+    /// The paper's nominal case with what is stated of the open quantities.
+    fn base(&self) -> RidgeCase {
+        RidgeCase {
+            elements: self.elements,
+            mean_pressure_pa: self.mean_pressure_pa,
+            mass_damping_per_s: self.mass_damping_per_s,
+            tangential_penalty_ratio: self.tangential_penalty_ratio,
+            ..RidgeCase::paper()
+        }
+    }
 }
 
 /// Recomputes the figure or all of them.
 pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
-    if let Err(why) = (RidgeCase { elements: args.elements, ..RidgeCase::paper() }).check() {
+    if let Err(why) = args.base().check() {
         return refused(why);
     }
     std::fs::create_dir_all(&args.out)
@@ -97,7 +119,7 @@ pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
 
 /// One figure under one reading: its files, and its lines on standard output.
 fn one(args: &ReproduceArgs, figure: Figure, name: &str, reading: Reading, json: bool) -> miette::Result<()> {
-    let base = RidgeCase { elements: args.elements, ..RidgeCase::paper() };
+    let base = args.base();
     let reproduced = match figure {
         Figure::Fig4 => figures::phase_shift(base, &args.out, reading)?,
         Figure::Fig5 => figures::velocities(base, reading)?,
@@ -112,7 +134,7 @@ fn one(args: &ReproduceArgs, figure: Figure, name: &str, reading: Reading, json:
         Figure::Fig14 => figures::slider::steady_recovery(reading)?,
         Figure::All => return Ok(()),
     };
-    let file = if figure == Figure::Fig6 { name.to_string() } else { reading.file(name) };
+    let file = if figure == Figure::Fig6 { name.to_string() } else { reading::file(reading, name) };
     for chart in &reproduced.charts {
         chart.write_table(&args.out)?;
         if args.style == Style::Screen {

@@ -34,6 +34,9 @@ pub struct RidgeArgs {
     /// Contact penalty over the stratum corneum's modulus
     #[arg(long, default_value_t = case::PENALTY_RATIO, allow_negative_numbers = true)]
     penalty_ratio: f64,
+    /// Contact penalty along the plate over that across it, up to 1
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+    tangential_penalty_ratio: f64,
     /// Mean pressure of the gross contact in Pa (from the force, by Hertz, if left out)
     #[arg(long, allow_negative_numbers = true)]
     mean_pressure_pa: Option<f64>,
@@ -66,6 +69,7 @@ impl RidgeArgs {
         case.young_modulus_pa = self.young_modulus_pa;
         case.retardation_time_s = self.retardation_time_s;
         case.penalty_ratio = self.penalty_ratio;
+        case.tangential_penalty_ratio = self.tangential_penalty_ratio;
         case.mass_damping_per_s = self.mass_damping_per_s;
         case.elements = self.elements;
         case.friction = if self.local_friction { FrictionRule::Local } else { FrictionRule::Global };

@@ -64,8 +64,8 @@ pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
 }
 
 fn fig_9_study(out: &Path, elements: usize) -> miette::Result<(PathBuf, usize, usize)> {
-    let (results, failed) = fig_9_results(out, elements, Reading::PeakToPeak)?;
     let base = RidgeCase { elements, ..RidgeCase::paper() };
+    let (results, failed) = fig_9_results(out, base, Reading::PeakToPeak)?;
     let file = out.join("fig9.csv");
     reproduce::write_fig_9_table(&file, base, &results)?;
     Ok((file, fig_9(base).len(), failed))

@@ -9,6 +9,7 @@ use models::condition::Condition;
 use models::prediction::{FrictionModel, SpringSlider};
 use models::psi::{self, PsiEq17};
 use models::quantity::PeakToPeak;
+use models::reading::Reading;
 use plotters::prelude::*;
 use realtime::pacing::LoopReport;
 
@@ -130,7 +131,7 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
     let lowest = points.iter().map(|p| p.0).fold(0.1, f64::min) * 0.8;
     let highest = points.iter().map(|p| p.0).fold(10.0, f64::max) * 1.2;
     let alt = format!(
-        "Relative friction against Psi from {lowest:.2} to {highest:.1}: {} passes and the curve of Eq. 20.",
+        "Relative friction against Psi from {lowest:.2} to {highest:.1}: {} passes and the curves of Eq. 20 under both readings of w.",
         points.len()
     );
     let frame = Frame {
@@ -144,9 +145,11 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
         let law = |star: f64| -> Vec<(f64, f64)> {
             grid().map(|p| (p, psi::relative_friction(PsiEq17(p), star))).collect()
         };
-        let (star, sd) = (psi::PSI_STAR, psi::PSI_STAR_UNCERTAINTY);
-        band(chart, &law(star + sd), &law(star - sd), GREY)?;
-        line(chart, law(star), GREY, None)?;
+        for reading in Reading::ALL {
+            let (star, sd) = reading.psi_star();
+            band(chart, &law(star + sd), &law(star - sd), GREY)?;
+            line(chart, law(star), GREY, None)?;
+        }
         measured(chart, 0, size, COLOURS[0], &points, MU)
     })?;
     Ok(format!("<figure>{svg}</figure>"))

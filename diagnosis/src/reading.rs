@@ -1,0 +1,40 @@
+//! What a table says of the two readings of the paper's `w`: [`models::reading_evidence`] on the passes as they were measured.
+//!
+//! It stands beside the verdict and is no part of it: the baseline is the spring-slider, whatever the empirical law's scale is. A cause
+//! that the verdict names moves `Psi*` too, so what is told then is told of the passes as they are.
+
+use crate::Verdict;
+use crate::data::{RigFile, Table};
+use crate::scatter::Scatter;
+use models::quantity::PeakToPeak;
+use models::reading_evidence::{Decision, ReadingEvidence, ReadingFinding};
+use models::rig_file::PassNoise;
+
+/// The finding of a table: passes without vibration first, since they tell `mu_0`; suspects left out, with the scatter that the table
+/// has. `None` without a pass of each kind.
+pub fn of_table(table: &Table, rig: &RigFile, scatter: &Scatter) -> Option<ReadingFinding> {
+    let noise = PassNoise {
+        pass_relative_sd: rig.noise.pass_relative_sd * scatter.scale,
+        force_sd_n: rig.noise.force_sd_n * scatter.scale,
+    };
+    let mut evidence = ReadingEvidence::new(table.still_coefficient()?, rig.finger.poisson_ratio, noise);
+    let suspect = |row: usize| scatter.suspects.iter().any(|s| s.row == row);
+    for still in [true, false] {
+        for (row, (c, lateral)) in table.passes.iter().zip(&table.lateral).enumerate() {
+            if (c.amplitude == PeakToPeak::ZERO) == still && !suspect(row) {
+                evidence.pass(c, c.direction.sign() * lateral);
+            }
+        }
+    }
+    evidence.finding()
+}
+
+/// The remark of a finding; none where the passes tell too little.
+pub fn remark(finding: Option<&ReadingFinding>, verdict: Verdict) -> Option<String> {
+    let finding = finding.filter(|f| f.decision != Decision::TooLittle)?;
+    let as_measured = match verdict {
+        Verdict::NoGap => "",
+        _ => " (of the passes as measured: what causes the gap moves Psi* too)",
+    };
+    Some(format!("Eq. 20 of the paper: {finding}{as_measured}."))
+}

@@ -1,0 +1,34 @@
+"""muprime in Python: runs, friction laws and the diagnosis, from the same code as the ``muprime`` command.
+
+All quantities are SI; a name ends with its unit. ``amplitude_pp_m`` is peak-to-peak. A refusal is a :class:`MuprimeError`, which
+says what is wrong, where, and what to do.
+
+>>> import muprime
+>>> law = muprime.spring_slider(amplitude_pp_m=[1e-6, 2e-6, 4e-6])
+>>> [round(float(mu), 3) for mu in law.mu_relative]
+[0.461, 0.296, 0.191]
+"""
+
+from ._muprime import MuprimeError, __version__
+from .laws import Finger, Law, psi, ridge, spring_slider, surrogate
+from .runs import Run, load, run
+from .verdict import Hypothesis, Parameter, Region, Verdict, diagnose
+
+__all__ = [
+    "Finger",
+    "Hypothesis",
+    "Law",
+    "MuprimeError",
+    "Parameter",
+    "Region",
+    "Run",
+    "Verdict",
+    "__version__",
+    "diagnose",
+    "load",
+    "psi",
+    "ridge",
+    "run",
+    "spring_slider",
+    "surrogate",
+]

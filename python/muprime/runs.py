@@ -1,0 +1,82 @@
+"""Runs: their folders, and sweeps on the virtual rig in virtual time."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import _muprime
+
+if TYPE_CHECKING:
+    import pandas
+    import polars
+    import pyarrow
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run: its passes, and what is known of it."""
+
+    folder: Path
+    """Where it stands."""
+    facts: dict[str, str]
+    """What the record's first words say: setup, plan, seed, operator, versions."""
+    summary: dict[str, Any] | None
+    """How it ended; none for a run that was killed or still goes on."""
+    damage: list[str]
+    """What is damaged or missing in its folder, in sentences; empty for a whole run."""
+    _arrow: bytes = field(repr=False)
+
+    def arrow(self) -> pyarrow.Table:
+        """The passes as an Arrow table, without copies; units and meanings in the fields' metadata."""
+        import pyarrow
+
+        with pyarrow.ipc.open_file(pyarrow.BufferReader(self._arrow)) as reader:
+            return reader.read_all()
+
+    def polars(self) -> polars.DataFrame:
+        """The passes as a polars data frame."""
+        import polars
+
+        frame = polars.from_arrow(self.arrow())
+        assert isinstance(frame, polars.DataFrame)
+        return frame
+
+    def pandas(self) -> pandas.DataFrame:
+        """The passes as a pandas data frame."""
+        return self.arrow().to_pandas()
+
+    def units(self) -> dict[str, str]:
+        """The unit of each column that has one."""
+        fields = self.arrow().schema
+        return {f.name: f.metadata[b"unit"].decode() for f in fields if f.metadata and b"unit" in f.metadata}
+
+
+def load(run: str | os.PathLike[str]) -> Run:
+    """Reads a run's folder. A folder that holds no run is refused."""
+    passes, about = _muprime.load(run)
+    told = json.loads(about)
+    return Run(Path(run), told["facts"], told["summary"], told["damage"], passes)
+
+
+def run(
+    plan: str | os.PathLike[str] = "first-sweep",
+    *,
+    out: str | os.PathLike[str],
+    setup: str | os.PathLike[str] = "virtual-ideal",
+    seed: int | None = None,
+    defects: str | os.PathLike[str] | None = None,
+    model: str | os.PathLike[str] | None = None,
+    operator: str | None = None,
+    sample: str | None = None,
+    licence: str | None = None,
+) -> Run:
+    """Runs a plan (a file or a bundled name) on the virtual rig of a setup, in virtual time, into the folder ``out``.
+
+    An unfinished run there is taken up again. A real rig is led by ``muprime run`` alone, never from here.
+    """
+    _muprime.run(os.fspath(plan), os.fspath(setup), out, seed, defects, model, operator, sample, licence)
+    return load(out)

@@ -1,0 +1,166 @@
+"""The diagnosis: where simulation and reality part, which effect causes it, how far the gap shrinks."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from . import _muprime
+from .runs import Run, load
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect."""
+
+    name: str
+    value: float
+    unit: str
+    ci95: tuple[float, float] | None
+    """Its interval of 95 %, where the table gives one."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One explanation with its probability."""
+
+    effects: tuple[str, ...]
+    """None of them: no gap. ``unknown``: a cause that is not in the library."""
+    probability: float
+    alias_class: tuple[str, ...]
+    """What the table does not tell from it, itself included."""
+    parameters: tuple[Parameter, ...]
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of the operating space that carries gap."""
+
+    share_of_gap: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A verdict; ``document`` holds every key of ``docs/contract.md``, ``json`` is its text as the command prints it."""
+
+    verdict: str
+    """``no_gap``, ``named``, ``ambiguous`` or ``unknown``."""
+    text: str
+    hypotheses: tuple[Hypothesis, ...]
+    regions: tuple[Region, ...]
+    shrinkage: float | None
+    """Share of the removable gap that the verdict's model closes on held-out passes."""
+    shrinkage_ci95: tuple[float, float] | None
+    remarks: tuple[str, ...]
+    predictions: str | None
+    """CSV of the conditions that were to be predicted."""
+    json: str = field(repr=False)
+    words: str = field(repr=False)
+    """What the command says on a terminal."""
+    page: str = field(repr=False)
+    """The report, one self-contained HTML page."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The whole verdict as a dictionary."""
+        told: dict[str, Any] = json.loads(self.json)
+        return told
+
+    def __str__(self) -> str:
+        return self.words
+
+    def _repr_html_(self) -> str:
+        # The page brings its own style: a frame keeps it from the notebook's.
+        from html import escape
+
+        return f'<iframe srcdoc="{escape(self.page)}" style="width:100%;height:42em;border:1px solid #ccc"></iframe>'
+
+
+def _interval(ends: list[float] | None) -> tuple[float, float] | None:
+    return (ends[0], ends[1]) if ends else None
+
+
+def _csv(table: Any) -> bytes:
+    """A point table from a data frame of pandas or polars, or an Arrow table, at full precision."""
+    if hasattr(table, "write_csv"):
+        text = table.write_csv()
+        return text.encode() if isinstance(text, str) else bytes(text)
+    if hasattr(table, "to_csv"):
+        return table.to_csv(index=False).encode()
+    if hasattr(table, "to_pylist"):
+        import csv
+
+        out = io.StringIO()
+        writer = csv.DictWriter(out, table.column_names, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table.to_pylist())
+        return out.getvalue().encode()
+    raise TypeError(f"a table is a path, a Run, or a data frame of pandas, polars or Arrow, not {type(table).__name__}")
+
+
+def diagnose(
+    table: Any,
+    rig: str | os.PathLike[str] | None = None,
+    *,
+    pairs: bool = True,
+    without: list[str] | tuple[str, ...] = (),
+    predict: Any = None,
+) -> Verdict:
+    """Diagnoses a table of passes.
+
+    ``table``: a point table's path (CSV or Parquet), a run (its folder or a :class:`Run`), or a data frame with the columns of a point
+    table. ``rig``: path of the rig.toml that states what is calibrated; by default the one beside the table. ``pairs=False`` tries
+    single effects only, ``without`` leaves effects out. ``predict``: conditions, a path or a data frame.
+
+    Bad input is a :class:`MuprimeError` with the row and the remedy.
+    """
+    damage: list[str] = []
+    if isinstance(table, Run):
+        table = table.folder
+    if isinstance(table, (str, os.PathLike)):
+        path = Path(table)
+        if path.is_dir():
+            damage = load(path).damage
+            rig = rig or path / "rig.toml"
+            path = path / "points.csv"
+        rig = rig or path.parent / "rig.toml"
+        name, data = os.fspath(path), path.read_bytes()
+    else:
+        name, data = "the data frame", _csv(table)
+        if rig is None:
+            raise _muprime.MuprimeError("a data frame has no rig.toml beside it: name one with rig=")
+    if predict is not None:
+        predict = Path(predict).read_bytes() if isinstance(predict, (str, os.PathLike)) else _csv(predict)
+    rig = Path(rig)
+    text, words, page, predictions = _muprime.diagnose(
+        name, data, os.fspath(rig), rig.read_text(encoding="utf-8"), pairs, list(without), predict, damage
+    )
+    told = json.loads(text)
+    return Verdict(
+        verdict=told["verdict"],
+        text=told["text"],
+        hypotheses=tuple(
+            Hypothesis(
+                effects=tuple(h["effects"]),
+                probability=h["probability"],
+                alias_class=tuple(h["alias_class"]),
+                parameters=tuple(
+                    Parameter(p["name"], p["value"], p["unit"], _interval(p.get("ci95"))) for p in h["parameters"]
+                ),
+            )
+            for h in told["hypotheses"]
+        ),
+        regions=tuple(Region(r["share_of_gap"], r["text"]) for r in told["where"]["regions"]),
+        shrinkage=told["gap"]["shrinkage"],
+        shrinkage_ci95=_interval(told["gap"].get("shrinkage_ci95")),
+        remarks=tuple(told["remarks"]),
+        predictions=predictions,
+        json=text,
+        words=words,
+        page=page,
+    )

@@ -1,0 +1,48 @@
+//! muprime in Python. What people call is `muprime/__init__.py`; here stands what it calls, one file a subject, each a thin door to
+//! the crates that the binary is made of. Long work lets the interpreter go on.
+//!
+//! | file | door to |
+//! |---|---|
+//! | `laws` | friction laws on columns of conditions |
+//! | `ridge` | one case of the finite element ridge |
+//! | `verdict` | the diagnosis of a table |
+//! | `runs` | a run's folder; a sweep on the virtual rig in virtual time |
+
+// Messages of refusals go to Python as they are; nothing is printed from here.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
+mod laws;
+mod ridge;
+mod runs;
+mod verdict;
+
+use pyo3::prelude::*;
+
+pyo3::create_exception!(
+    muprime,
+    MuprimeError,
+    pyo3::exceptions::PyValueError,
+    "A refusal: what is wrong, where, and what to do about it. Nothing was touched."
+);
+
+/// A refusal as Python sees it: the message, its causes, and the remedy.
+fn refused(why: miette::Report) -> PyErr {
+    let mut text = why.chain().map(ToString::to_string).collect::<Vec<_>>().join(": ");
+    if let Some(help) = why.help() {
+        text.push_str(&format!("\n  {help}"));
+    }
+    MuprimeError::new_err(text)
+}
+
+/// The module.
+#[pymodule]
+fn _muprime(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add("MuprimeError", m.py().get_type::<MuprimeError>())?;
+    m.add_function(wrap_pyfunction!(laws::evaluate, m)?)?;
+    m.add_function(wrap_pyfunction!(ridge::ridge, m)?)?;
+    m.add_function(wrap_pyfunction!(verdict::diagnose, m)?)?;
+    m.add_function(wrap_pyfunction!(runs::load, m)?)?;
+    m.add_function(wrap_pyfunction!(runs::run, m)?)?;
+    Ok(())
+}

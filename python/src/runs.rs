@@ -1,0 +1,99 @@
+//! A run's folder, and a sweep on the virtual rig in virtual time.
+
+use crate::{MuprimeError, refused};
+use miette::IntoDiagnostic;
+use models::prediction::{FrictionModel, SpringSlider};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use rig::plan::Plan;
+use rig::session::{Job, Notes, Signals};
+use rig::setup::Setup;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// The run of a folder: its passes as an Arrow IPC file, then as JSON the facts of its record, its summary, its damage.
+#[pyfunction]
+pub fn load(py: Python<'_>, folder: PathBuf) -> PyResult<(Py<PyBytes>, String)> {
+    let told = py.detach(|| -> miette::Result<_> {
+        let run = rig::report::read(&folder)?;
+        let about = serde_json::json!({ "facts": run.facts, "summary": run.summary, "damage": run.damage });
+        Ok((rig::export::arrow_bytes(&run)?, about.to_string()))
+    });
+    let (bytes, about) = told.map_err(refused)?;
+    Ok((PyBytes::new(py, &bytes).unbind(), about))
+}
+
+/// A sweep of a plan on the virtual rig of a setup, in virtual time, into `out`; the summary as JSON.
+#[pyfunction]
+#[pyo3(signature = (plan, setup, out, seed, defects, model, operator, sample, licence))]
+#[allow(clippy::too_many_arguments)]
+pub fn run(
+    py: Python<'_>,
+    plan: &str,
+    setup: &str,
+    out: PathBuf,
+    seed: Option<u64>,
+    defects: Option<PathBuf>,
+    model: Option<PathBuf>,
+    operator: Option<String>,
+    sample: Option<String>,
+    licence: Option<String>,
+) -> PyResult<String> {
+    let notes = Notes { operator, sample, licence };
+    let job = job(plan, setup, out, seed, defects.as_deref(), model.as_deref(), notes).map_err(refused)?;
+    let signals = Signals::default();
+    let stops = Arc::clone(&signals.stops);
+    // A key that interrupts the interpreter ends the sweep as a stop does: asked for at every pass.
+    let mut interrupted = None;
+    let summary = py.detach(|| {
+        job.run(&signals, &mut |_| {
+            if interrupted.is_none() {
+                interrupted = Python::attach(|py| py.check_signals()).err();
+                stops.fetch_add(usize::from(interrupted.is_some()), Ordering::Relaxed);
+            }
+        })
+    });
+    if let Some(why) = interrupted {
+        return Err(why);
+    }
+    let summary = summary.map_err(refused)?;
+    serde_json::to_string(&summary).map_err(|why| MuprimeError::new_err(why.to_string()))
+}
+
+fn job(
+    plan: &str,
+    setup: &str,
+    out: PathBuf,
+    seed: Option<u64>,
+    defects: Option<&Path>,
+    model: Option<&Path>,
+    notes: Notes,
+) -> miette::Result<Job> {
+    let (setup, plan) = (Setup::load(setup)?, Plan::load(plan)?);
+    if setup.file.virtual_rig.is_none() {
+        miette::bail!(
+            help = "`muprime run` leads a real rig: it takes the machine's real-time class and its signals",
+            "'{}' is a real rig: from here only a virtual one can be run, in virtual time",
+            setup.file.name
+        );
+    }
+    let defects = match defects {
+        None => None,
+        Some(path) => {
+            let text = rig::input::text_of(path)?;
+            let read = sim::defects::Defects::parse(&text);
+            Some(read.map_err(|why| miette::miette!("{}: {why}", path.display()))?)
+        }
+    };
+    let model_file = match model {
+        None => None,
+        Some(path) => Some(("model.toml".to_string(), rig::input::text_of(path)?)),
+    };
+    let law: Arc<dyn FrictionModel> = match &model_file {
+        None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
+        Some((name, text)) => rig::model_file::load_for(&setup, name, text)?,
+    };
+    let seed = seed.unwrap_or(plan.file.seed);
+    Ok(Job { setup, plan, seed, model: law, model_file, defects, out, fast: true, notes })
+}

@@ -1,0 +1,67 @@
+//! The diagnosis of a table.
+
+use crate::{MuprimeError, refused};
+use calibration::certificate::sha256_hex;
+use diagnosis::data::Table;
+use diagnosis::hypotheses::Options;
+use miette::{Context, IntoDiagnostic};
+use models::record::read_passes;
+use pyo3::prelude::*;
+use rig::cli::diagnose as command;
+use std::path::Path;
+
+/// What a diagnosis comes to: the JSON document of `muprime diagnose --json`, its words, its page, and predictions as CSV where asked.
+type Told = (String, String, String, Option<String>);
+
+/// Diagnoses a point table in memory (`name` is how messages call it) under a rig.toml in memory.
+#[pyfunction]
+#[pyo3(signature = (name, table, rig_name, rig, pairs, without, predict, damage))]
+#[allow(clippy::too_many_arguments)]
+pub fn diagnose(
+    py: Python<'_>,
+    name: &str,
+    table: Vec<u8>,
+    rig_name: &str,
+    rig: &str,
+    pairs: bool,
+    without: Vec<String>,
+    predict: Option<Vec<u8>>,
+    damage: Vec<String>,
+) -> PyResult<Told> {
+    if let Some(unknown) = without.iter().find(|name| effects::by_name(name).is_none()) {
+        return Err(MuprimeError::new_err(format!("without {unknown:?}: no such effect")));
+    }
+    py.detach(|| told(name, &table, rig_name, rig, pairs, without, predict, &damage)).map_err(refused)
+}
+
+#[allow(clippy::too_many_arguments)]
+fn told(
+    name: &str,
+    bytes: &[u8],
+    rig_name: &str,
+    rig: &str,
+    pairs: bool,
+    without: Vec<String>,
+    predict: Option<Vec<u8>>,
+    damage: &[String],
+) -> miette::Result<Told> {
+    let rig = rig::input::rig_text(rig_name, rig)?;
+    let passes = command::parse_passes(Path::new(name), bytes)?;
+    let table = Table::measured(&passes).into_diagnostic().wrap_err_with(|| name.to_string())?;
+    let conditions = match predict {
+        None => None,
+        Some(bytes) => {
+            let rows = read_passes(&bytes[..]).into_diagnostic().wrap_err("conditions to predict")?;
+            let origin = table.origin(&passes);
+            Some(Table::conditions(&rows, &origin).into_diagnostic().wrap_err("conditions to predict")?)
+        }
+    };
+    let options = Options { pairs, without, ..Options::default() };
+    let result = diagnosis::verdict::diagnose(&table, &rig, &options, sha256_hex(bytes));
+    let about =
+        [vec![("table", name.to_string()), ("rig", rig_name.to_string())], rig::report::about::of_rig(&rig)]
+            .concat();
+    let page = rig::report::diagnosis::page(&result, &table, &about)?;
+    let predictions = conditions.as_ref().map(|conditions| command::predictions(&result, conditions));
+    Ok((command::document(&result, &rig, damage)?, command::words(&result, &rig), page, predictions))
+}
