@@ -1,19 +1,38 @@
-//! The Python package: its wheel is built, installed into a folder of its own, and tried beside the binary, NumPy, pandas, polars,
+//! The Python package, installed into a folder of its own and tried beside the binary, NumPy, pandas, polars,
 //! pyarrow and mypy.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tests::{file, muprime, python, texts};
 
-/// The folder that the wheel is unpacked into.
+/// A folder with the package as a wheel has it: the library that the workspace's build made beside the Python files. `MUPRIME_WHEEL=1` has maturin
+/// build a real wheel and pip install it, which compiles everything once more.
 fn installed(folder: &Path) -> PathBuf {
-    let (wheels, site) = (folder.join("wheels"), folder.join("site"));
+    let site = folder.join("site");
+    if std::env::var_os("MUPRIME_WHEEL").is_some() {
+        wheel(folder, &site);
+        return site;
+    }
+    let package = site.join("muprime");
+    std::fs::create_dir_all(&package).unwrap();
+    for entry in std::fs::read_dir(file("python/muprime")).unwrap().map(Result::unwrap) {
+        if entry.file_type().unwrap().is_file() {
+            std::fs::copy(entry.path(), package.join(entry.file_name())).unwrap();
+        }
+    }
+    let library = PathBuf::from(muprime().get_program()).with_file_name("lib_muprime.so");
+    assert!(library.exists(), "{} is missing: cargo build --release --workspace", library.display());
+    std::fs::copy(library, package.join("_muprime.abi3.so")).unwrap();
+    site
+}
+
+/// Builds the wheel and installs it.
+fn wheel(folder: &Path, site: &Path) {
+    let wheels = folder.join("wheels");
     let maturin = PathBuf::from(python().get_program()).with_file_name("maturin");
     let mut build = Command::new(maturin);
     build.args(["build", "--release", "--quiet", "-m"]).arg(file("python/Cargo.toml")).arg("-i");
     build.arg(python().get_program()).arg("-o").arg(&wheels);
-    // The same profile and folder as everything else: what is built stays built.
-    build.env("CARGO_TARGET_DIR", file("target"));
     let built = build.output().expect("maturin is missing: tests/venv installs it");
     assert!(built.status.success(), "{}", texts(&built).1);
     let found: Vec<PathBuf> = std::fs::read_dir(&wheels).unwrap().map(|e| e.unwrap().path()).collect();
@@ -30,11 +49,9 @@ fn installed(folder: &Path) -> PathBuf {
         "--disable-pip-version-check",
         "--no-deps",
         "--no-index",
-        "--target",
     ]);
-    let done = install.arg(&site).arg(wheel).output().unwrap();
+    let done = install.arg("--target").arg(site).arg(wheel).output().unwrap();
     assert!(done.status.success(), "{}", texts(&done).1);
-    site
 }
 
 #[test]
@@ -55,7 +72,7 @@ fn the_package_says_what_the_command_says() {
 
     // A laboratory's own controller, in pymodbus, tested against the virtual rig by way of the pytest plugin.
     let foreign = python()
-        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
+        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "muprime.testing"])
         .arg(file("tests/python/test_foreign_controller.py"))
         .env("PYTHONPATH", &site)
         .env("MUPRIME_BINARY", muprime().get_program())

@@ -10,6 +10,7 @@
 //! those units and 0.02 to 0.05 a factor of e (Fig. 9's study under both readings, `docs/ridge.md`).
 
 use crate::condition::Condition;
+use crate::psi::PsiEq17;
 use crate::quantity::PeakToPeak;
 use crate::reading::Reading;
 use crate::rig_file::PassNoise;
@@ -20,6 +21,8 @@ use std::fmt;
 const NODES: usize = 72;
 /// The least and the greatest `Psi*` of the grid.
 pub const PSI_STAR_RANGE: [f64; 2] = [0.3, 9.0];
+/// `Psi` of the true stroke at which passes are asked: about one, where the readings differ most.
+pub const PSI_RANGE: [f64; 2] = [0.4, 4.0];
 /// `mu_0`, and the law's error: everywhere, with Psi, w, U and F_n.
 const STATES: usize = 6;
 /// Standard deviation of each coefficient of the law's error (-).
@@ -99,7 +102,7 @@ impl fmt::Display for ReadingFinding {
             }
             Decision::TooLittle => write!(
                 f,
-                "which reading of the paper's w holds (Psi* 2.38 or 1.19) cannot be told from {passes} passes with vibration: {free}; \
+                "which reading of the paper's w holds (Psi* 2.38 or 1.19) cannot be told from {passes} passes with vibration near Psi = 1: {free}; \
                  the plan 'psi-reading' asks for it"
             ),
         }
@@ -152,8 +155,8 @@ impl ReadingEvidence {
     }
 
     /// Takes a pass: its measured condition (whose `mu0` is ignored) and mean friction force in N, positive along the
-    /// sliding direction. Left out are passes that the law says nothing of (no load, no speed, no finite force), and those with
-    /// vibration before the first one without, which alone tells `mu_0`.
+    /// sliding direction. Left out are passes that the law says nothing of (no load, no speed, no finite force), those whose Psi is
+    /// far from one ([`PSI_RANGE`]), and those with vibration before the first one without, which alone tells `mu_0`.
     pub fn pass(&mut self, condition: &Condition, friction_force_n: f64) {
         let usable = |v: f64| v.is_finite() && v > 0.0;
         let still = condition.amplitude == PeakToPeak::ZERO;
@@ -165,8 +168,16 @@ impl ReadingEvidence {
         {
             return;
         }
-        // Without mu_0 the friction under vibration says nothing of Psi*.
+        // Without mu_0 the friction under vibration says nothing of Psi*; far from Psi = 1 the readings hardly differ, and the exponential
+        // is least of all to be trusted.
         let known = self.references > 0;
+        if !still {
+            let c = Condition { mu0: self.nodes[NODES / 2].estimate[0].max(1e-6), ..*condition };
+            let psi = PsiEq17::at(&c, self.poisson_ratio).0;
+            if !(PSI_RANGE[0]..=PSI_RANGE[1]).contains(&psi) {
+                return;
+            }
+        }
         match still {
             true => self.references += 1,
             false if known => self.judged += 1,

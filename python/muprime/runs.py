@@ -13,7 +13,7 @@ from . import _muprime
 if TYPE_CHECKING:
     import pandas
     import polars
-    import pyarrow
+    import pyarrow  # type: ignore[import-untyped]
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,8 @@ class Run:
 
     def pandas(self) -> pandas.DataFrame:
         """The passes as a pandas data frame."""
-        return self.arrow().to_pandas()
+        frame: pandas.DataFrame = self.arrow().to_pandas()
+        return frame
 
     def units(self) -> dict[str, str]:
         """The unit of each column that has one."""

@@ -91,7 +91,7 @@ def _csv(table: Any) -> bytes:
         text = table.write_csv()
         return text.encode() if isinstance(text, str) else bytes(text)
     if hasattr(table, "to_csv"):
-        return table.to_csv(index=False).encode()
+        return bytes(table.to_csv(index=False), "utf-8")
     if hasattr(table, "to_pylist"):
         import csv
 
