@@ -234,6 +234,12 @@ impl Setup {
                 wrong.add(&["noise", name], problem, None);
             }
         }
+        // A world that cannot be is refused here, not by the run that would need it.
+        if let Some(rig) = &file.virtual_rig
+            && let Err(problem) = sim::world::World::new(&rig.world(), rig.finger_seed)
+        {
+            wrong.add(&["virtual", "ridge_table_strokes"], problem.to_string(), None);
+        }
         let air = models::condition::Condition::paper().within(&file.ambient());
         for c in covariate::OPTIONAL {
             if let Some(value) = c.of(&air).filter(|v| !c.admits(*v)) {
