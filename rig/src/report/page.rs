@@ -99,9 +99,10 @@ fn verdict(w: &mut String, run: &RunData) {
     }
 }
 
-/// What the last pass that could tell says of the two readings.
+/// What the run, or so far its last pass that could tell, says of the two readings.
 fn reading(run: &RunData) -> String {
-    let last = run.passes.iter().rev().find_map(|p| p.psi_reading);
+    let whole = run.summary.as_ref().and_then(|summary| summary.psi_reading);
+    let last = whole.or_else(|| run.passes.iter().rev().find_map(|p| p.psi_reading));
     last.map_or_else(String::new, |finding| {
         let text = finding.to_string();
         let mut letters = text.chars();
