@@ -78,6 +78,9 @@ struct Answer {
 
 /// Answers, or refuses a condition outside the law's domain.
 pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
+    if args.reading.is_some() && args.model != Law::Psi {
+        return refused("--reading belongs to --model psi: the other laws know the plate's stroke alone");
+    }
     let condition = args.condition.condition();
     let finger = Finger {
         normal_stiffness_n_per_m: args.normal_stiffness_n_per_m,

@@ -6,6 +6,7 @@ use crate::progress::Study;
 use crate::{out, say};
 use clap::{Args, ValueEnum};
 use miette::IntoDiagnostic;
+use models::reading::Reading;
 use models::ridge::{
     self, FrictionRule, RidgeCase, RidgeError, RidgeProfile, RidgeRun, RunSettings, Strain, case,
 };
@@ -146,11 +147,15 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
         out!("{}", serde_json::to_string(&answer).into_diagnostic()?);
         return Ok(ExitCode::SUCCESS);
     }
+    let law = |reading: Reading| {
+        let psi = models::psi::PsiEq17(run.psi_eq17);
+        models::psi::relative_friction(psi, reading.psi_star().0)
+    };
+    let [stroke, sine] = Reading::ALL.map(law);
     out!(
-        "mu' = {:.4} +- {:.4}   (exponential with 2.38: {:.4})",
+        "mu' = {:.4} +- {:.4}   (Eq. 20: {stroke:.4} with the paper's w as the stroke, {sine:.4} as the sine's amplitude)",
         run.mu_relative,
         run.mu_relative_sd,
-        models::psi::relative_friction(models::psi::PsiEq17(run.psi_eq17), models::psi::PSI_STAR)
     );
     out!(
         "lateral force {:.5} N, mean reaction {:.5} N for {} N applied, greatest {:.4} N",
