@@ -316,7 +316,9 @@ fn the_page_of_the_docs_is_that_of_a_run() {
     let words =
         ["run", "--tui", "--operator", "Ada", "--sample", "silicone tip 3", "--out", out.to_str().unwrap()];
     // A machine that stalls may trip it: what is shown then is another page.
-    let page = (0..6).find_map(|_| {
+    // Stalls come in bursts: a longer rest before each further try.
+    let page = (0..16).find_map(|tries: u64| {
+        std::thread::sleep(std::time::Duration::from_secs(tries.min(8)));
         let _ = std::fs::remove_dir_all(&out);
         let own = Tmux::start(folder.path(), "docs", (80, 24), &[], &words);
         let page = own.shows(&["ARMED: measuring", "60 of 98 passes"]);
@@ -324,7 +326,7 @@ fn the_page_of_the_docs_is_that_of_a_run() {
         own.shows(&["STATUS"]);
         page
     });
-    let page = page.expect("six sweeps in a row were cut");
+    let page = page.expect("sixteen sweeps in a row were cut");
     let page: String = page
         .lines()
         .map(|line| line.trim_end().replace(out.to_str().unwrap(), "runs/monday") + "\n")
