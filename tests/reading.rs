@@ -21,6 +21,7 @@ use rig::session::rehearse;
 use rig::setup::Setup;
 use sim::world::WorldConfig;
 use std::sync::Arc;
+use tests::{documents, muprime};
 
 const SWEEPS: u64 = 200;
 const FIRST_SEED: u64 = 23_000;
@@ -182,6 +183,49 @@ fn the_plan_has_the_fewest_passes_that_decide() {
             assert!(conditions < 3 || told.right * 100 >= 95 * SWEEPS as usize, "{told:?}");
         }
     }
+}
+
+/// What the commands tell: of a sweep, of its folder, of a rig that cannot be.
+#[test]
+fn run_diagnose_check_and_point_tell_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (setup, out) = (folder.path().join("ridge.toml"), folder.path().join("run"));
+    let told = |words: &[&str]| {
+        let ended = muprime().arg("--json").args(words).env("MUPRIME_RUNS", folder.path()).output().unwrap();
+        (ended.status.code(), documents(&ended))
+    };
+    let with = |strokes: f64| {
+        let text = Setup::load("virtual-ideal").unwrap().text;
+        let text = text.replace("ideal = true", &format!("ideal = true\nridge_table_strokes = {strokes:.1}"));
+        std::fs::write(&setup, text).unwrap();
+    };
+    let (setup, out) = (setup.to_str().unwrap(), out.to_str().unwrap());
+    with(-1.0);
+    assert_eq!(told(&["check", setup]).0, Some(2));
+    assert_eq!(told(&["run", "psi-reading", "--setup", setup, "--fast", "--out", out]).0, Some(2));
+    with(1.0);
+    let (status, run) = told(&["run", "psi-reading", "--setup", setup, "--fast", "--out", out]);
+    assert_eq!(status, Some(0), "{run:?}");
+    let reading = &run.last().unwrap()["summary"]["psi_reading"];
+    assert_eq!(
+        (&reading["decision"], &reading["judged"]),
+        (&"sine_amplitude".into(), &6.into()),
+        "{reading}"
+    );
+    let verdict = &told(&["diagnose", out]).1[0];
+    assert_eq!(verdict["psi_reading"]["decision"], "sine_amplitude", "{verdict}");
+    let remarks = verdict["remarks"].as_array().unwrap();
+    assert!(remarks.iter().any(|r| r.as_str().unwrap().starts_with("Eq. 20 of the paper")), "{remarks:?}");
+    assert!(std::fs::read_to_string(format!("{out}/report.html")).unwrap().contains("half of the stroke"));
+
+    let point = &told(&["model", "point", "--model", "psi"]).1[0];
+    let number = |value: &serde_json::Value, key: &str| value[key].as_f64().unwrap();
+    let [stroke, sine] = [0, 1].map(|k| number(&point["readings"][k], "mu_relative"));
+    // Eq. 20 by hand: Psi = 0.02 / (2e-6 * 27500 * 0.5 * 1.33) = 0.5468.
+    assert!((stroke - 0.2053).abs() < 5e-5 && (sine - 0.3684).abs() < 5e-5, "{point}");
+    assert!((number(point, "mu_relative") - 0.5 * (stroke + sine)).abs() < 1e-12);
+    assert!(number(point, "mu_relative_sd") > 0.5 * (sine - stroke), "{point}");
+    assert_eq!(told(&["model", "point", "--reading", "sine-amplitude"]).0, Some(2));
 }
 
 /// A rig that follows neither: far above and below, that is what is said.

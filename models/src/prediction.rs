@@ -158,13 +158,6 @@ impl EmpiricalPsi {
         Ok(EmpiricalPsi { finger, weights: Reading::ALL.map(|r| f64::from(u8::from(r == reading))) })
     }
 
-    /// The same where passes favour [`Reading::PeakToPeak`] by so many nats (negative: the other one).
-    #[must_use]
-    pub fn favoured(self, nats: f64) -> Self {
-        let first = 1.0 / (1.0 + (-nats).exp());
-        EmpiricalPsi { weights: [first, 1.0 - first], ..self }
-    }
-
     /// `mu'` at a condition under one reading, and its standard uncertainty from `Psi*` and the collapse.
     ///
     /// # Errors

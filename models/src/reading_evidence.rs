@@ -10,7 +10,7 @@
 //! those units and 0.02 to 0.05 a factor of e (Fig. 9's study under both readings, `docs/ridge.md`).
 
 use crate::condition::Condition;
-use crate::psi::PsiEq17;
+use crate::psi::{PsiEq17, relative_friction};
 use crate::quantity::PeakToPeak;
 use crate::reading::Reading;
 use crate::rig_file::PassNoise;
@@ -171,17 +171,13 @@ impl ReadingEvidence {
         // Without mu_0 the friction under vibration says nothing of Psi*; far from Psi = 1 the readings hardly differ, and the exponential
         // is least of all to be trusted.
         let known = self.references > 0;
-        if !still {
-            let c = Condition { mu0: self.nodes[NODES / 2].estimate[0].max(1e-6), ..*condition };
-            let psi = PsiEq17::at(&c, self.poisson_ratio).0;
-            if !(PSI_RANGE[0]..=PSI_RANGE[1]).contains(&psi) {
-                return;
-            }
-        }
-        match still {
-            true => self.references += 1,
-            false if known => self.judged += 1,
-            false => return,
+        let psi = PsiEq17::at(&self.nodes[NODES / 2].at_its_mu0(condition), self.poisson_ratio).0;
+        if still {
+            self.references += 1;
+        } else if known && (PSI_RANGE[0]..=PSI_RANGE[1]).contains(&psi) {
+            self.judged += 1;
+        } else {
+            return;
         }
         for node in &mut self.nodes {
             node.pass(condition, self.poisson_ratio, &self.noise, friction_force_n, known);
@@ -264,18 +260,23 @@ impl ReadingEvidence {
 }
 
 impl Node {
+    /// A condition with the `mu_0` that this node has come to.
+    fn at_its_mu0(&self, c: &Condition) -> Condition {
+        Condition { mu0: self.estimate[0].max(1e-6), ..*c }
+    }
+
     fn pass(&mut self, c: &Condition, poisson_ratio: f64, noise: &PassNoise, force_n: f64, known: bool) {
-        let mu0 = self.estimate[0].max(1e-6);
-        let load = c.normal_force_n;
+        let c = &self.at_its_mu0(c);
+        let (mu0, load) = (c.mu0, c.normal_force_n);
         let (mut expected, mut slope) = (mu0 * load, [0.0; STATES]);
         slope[0] = load;
         // What the force does as the load moves: nothing beyond Coulomb's where the plate is still.
         let mut load_slope = mu0;
         let mut rest = 0.0;
         if c.amplitude > PeakToPeak::ZERO {
-            let psi = c.speed_m_s / (c.amplitude.metres() * c.frequency_hz * mu0 * (1.0 + poisson_ratio));
-            let ratio = psi / self.psi_star;
-            let law = -(-ratio).exp_m1();
+            let psi = PsiEq17::at(c, poisson_ratio);
+            let ratio = psi.0 / self.psi_star;
+            let law = relative_friction(psi, self.psi_star);
             let weight = 4.0 * law * (1.0 - law);
             let features = [
                 1.0,

@@ -550,7 +550,7 @@ impl Sequence {
         let psi_eq17 =
             known.map(|m| PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0);
         let temperature_flags = self.temperature_flags.clone();
-        let psi_reading = self.psi_reading().filter(|_| psi_eq17.is_some());
+        let psi_reading = psi_eq17.and_then(|_| self.psi_reading());
         MeasuredPass { pass, reference, comparison, regime, psi_eq17, psi_reading, temperature_flags }
     }
 }
