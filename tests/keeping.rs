@@ -22,8 +22,9 @@ fn plan(folder: &Path, amplitudes: usize) -> PathBuf {
 }
 
 fn sweep(plan: &Path, out: &Path) -> Command {
+    let setup = tests::unhurried("virtual-ideal", plan.parent().unwrap());
     let mut command = muprime();
-    command.args(["--json", "run", "--setup", "virtual-ideal"]).arg(plan).arg("--out").arg(out);
+    command.args(["--json", "run", "--setup", &setup]).arg(plan).arg("--out").arg(out);
     command
 }
 

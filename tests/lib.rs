@@ -4,7 +4,8 @@ pub mod served;
 mod wall_time;
 
 pub use wall_time::{
-    cut_by_a_stall, in_wall_clock_time, sweep_unless_the_machine_stalls, unless_the_machine_stalls,
+    cut_by_a_stall, in_wall_clock_time, sweep_taken_up_again, sweep_unless_the_machine_stalls,
+    unless_the_machine_stalls,
 };
 
 use std::path::{Path, PathBuf};
@@ -34,6 +35,29 @@ pub fn setup(name: &str) -> rig::setup::Setup {
         _ => return rig::setup::Setup::load(name).expect("a bundled setup"),
     };
     rig::setup::Setup::parse(name, &text, Path::new(".")).expect("a setup")
+}
+
+/// A bundled setup at no more than 250 Hz, written into a folder; its path. For sweeps in wall-clock time whose subject is not the loop's
+/// timing: a machine that takes a CPU away for some milliseconds at a time then costs few deadlines.
+pub fn unhurried(setup: &str, folder: &Path) -> String {
+    let path = folder.join(format!("{setup}-250.toml"));
+    let slower = slower(&rig::setup::Setup::load(setup).expect("a bundled setup"));
+    std::fs::write(&path, slower.text).expect("a folder that can be written");
+    path.display().to_string()
+}
+
+/// A setup at no more than 250 Hz.
+pub fn slower(setup: &rig::setup::Setup) -> rig::setup::Setup {
+    let (head, rest) = setup.text.split_once("[loop]\nrate_hz = ").expect("its rate is the loop's first key");
+    let (rate_hz, rest) = rest.split_once('\n').expect("more lines");
+    let rate_hz: u32 = rate_hz.parse().expect("a rate");
+    let text = format!("{head}[loop]\nrate_hz = {}\n{rest}", rate_hz.min(250));
+    rig::setup::Setup::parse("slower", &text, Path::new(".")).expect("a setup")
+}
+
+/// How many rounds of a campaign whose rounds differ by their seeds alone: `few`, or `all` with `MUPRIME_LONG=1` (`tests/run long`).
+pub fn rounds<T>(few: T, all: T) -> T {
+    if std::env::var_os("MUPRIME_LONG").is_some() { all } else { few }
 }
 
 /// The `muprime` that was built beside this test. A missing one fails: build the workspace first.

@@ -75,7 +75,8 @@ const PLAN: &str = "name = \"told\"\nseed = 3\nreference_every = 4\n[pass]\nsett
 fn run(folder: &Path, out: &Path, broker: Option<&str>, fast: bool) -> Command {
     std::fs::write(folder.join("plan.toml"), PLAN).unwrap();
     let mut command = muprime();
-    command.arg("run").arg(folder.join("plan.toml")).args(["--setup", "virtual-ideal", "--out"]).arg(out);
+    let setup = tests::unhurried("virtual-ideal", folder);
+    command.arg("run").arg(folder.join("plan.toml")).args(["--setup", &setup, "--out"]).arg(out);
     command.env("MUPRIME_RUNS", folder);
     if fast {
         command.arg("--fast");

@@ -139,7 +139,7 @@ fn the_loops_thread_allocates_nothing_behind_real_drivers() {
     use rig::supervisor::Loop;
     use rig::supervisor::wall::{Parts, WallLoop};
     use std::sync::atomic::{AtomicU64, Ordering};
-    let setup = Setup::load("virtual-ideal").unwrap();
+    let setup = tests::slower(&Setup::load("virtual-ideal").unwrap());
     let (epoch, origin_ns) = (std::time::Instant::now(), realtime::pacing::monotonic_ns());
     let world = sim::world::World::new(&WorldConfig::ideal(), 1).unwrap();
     let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(world), epoch);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tests::{
     SHORT, cut_by_a_stall, documents, file, muprime, python, short_plan, sweep_unless_the_machine_stalls,
@@ -25,10 +25,17 @@ fn assert_each_once(points: &[u64], planned: u64) {
     assert!(seen.values().all(|n| *n == 1), "{points:?}");
 }
 
-/// A sweep on the ideal virtual rig, in wall-clock time.
-fn started(plan: &str, out: &Path) -> Child {
+/// The command for a sweep on the ideal virtual rig at 250 Hz, in wall-clock time.
+fn unhurried(plan: &str, out: &Path) -> Command {
+    let setup = tests::unhurried("virtual-ideal", Path::new(plan).parent().unwrap());
     let mut sweep = muprime();
-    sweep.args(["--json", "run", plan, "--setup", "virtual-ideal", "--out"]).arg(out);
+    sweep.args(["--json", "run", plan, "--setup", &setup, "--out"]).arg(out);
+    sweep
+}
+
+/// Such a sweep.
+fn started(plan: &str, out: &Path) -> Child {
+    let mut sweep = unhurried(plan, out);
     sweep.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
 }
 
@@ -37,11 +44,7 @@ fn a_sweep_over_real_modbus_tcp_ends_with_table_record_and_report() {
     tests::in_wall_clock_time(|| {
         let folder = tempfile::tempdir().unwrap();
         let plan = short_plan(folder.path());
-        let (out, output) = sweep_unless_the_machine_stalls(folder.path(), |out| {
-            let mut sweep = muprime();
-            sweep.args(["--json", "run", &plan, "--setup", "virtual-ideal", "--out"]).arg(out);
-            sweep
-        });
+        let (out, output) = sweep_unless_the_machine_stalls(folder.path(), |out| unhurried(&plan, out));
         let (_, stderr) = texts(&output);
         assert_eq!(output.status.code(), Some(0), "{stderr}");
         let said = documents(&output);
@@ -387,7 +390,7 @@ fn a_foreign_instrument_replaying_a_measured_trace_is_recorded_as_it_was() {
          [amplifier]\nprofile = \"muprime-amplifier\"\naddress = \"{others}\"\n\
          [stage]\nprofile = \"muprime-stage\"\naddress = \"{others}\"\n\
          [finger]\ntip = \"artificial-silicone\"\n[noise]\npass_relative_sd = 0.015\nforce_sd_n = 0.0008\n\
-         [limits]\nlink_stall_s = 0.045\nlate_cycles_max = 100\nlate_in_a_row_max = 20\n"
+         [limits]\nlink_stall_s = 0.045\nlate_cycles_max = 100\nlate_in_a_row_max = 45\n[loop]\nrate_hz = 250\n"
         );
         std::fs::write(&setup, text).unwrap();
         let plan = folder.path().join("plan.toml");

@@ -155,7 +155,8 @@ fn half_an_hour_over_the_wire_without_a_trip_that_the_machine_did_not_cause() {
             .replace("seed = 3", &format!("seed = 3\nreplicates = {}", 1 + wanted.as_secs() / 10));
         let (plan_file, setup_file) = (folder.path().join("plan.toml"), folder.path().join("setup.toml"));
         std::fs::write(&plan_file, plan).unwrap();
-        std::fs::write(&setup_file, served::setup("soak", rig.address)).unwrap();
+        let setup = served::setup("soak", rig.address).replace("rate_hz = 250", "rate_hz = 1000");
+        std::fs::write(&setup_file, setup).unwrap();
         let rig_warm = resident_bytes(rig.process.id()).unwrap();
         let (begun, mut sessions) = (Instant::now(), Vec::new());
         while begun.elapsed() < wanted {

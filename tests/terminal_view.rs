@@ -90,8 +90,7 @@ fn files(folder: &Path, rig: &ServedRig) -> (String, String) {
     let (plan, file) = (folder.join("plan.toml"), folder.join("rig.toml"));
     std::fs::write(&plan, timed_plan("view", 0, &[2e-6, 0.5e-6, 1e-6, 3e-6, 2.5e-6, 1.5e-6], [0.2, 0.8]))
         .unwrap();
-    let slow = format!("{}[loop]\nrate_hz = 250.0\n", setup("served", rig.address));
-    std::fs::write(&file, slow).unwrap();
+    std::fs::write(&file, setup("served", rig.address)).unwrap();
     (plan.display().to_string(), file.display().to_string())
 }
 

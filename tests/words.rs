@@ -2,6 +2,7 @@
 //!
 //! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test words` writes docs/reference.md anew.
 
+use rayon::prelude::*;
 use rig::words::bundled;
 use rig::words::reference::{objects, page};
 use rig::words::schema::Kind;
@@ -149,26 +150,28 @@ fn every_command_has_a_manual_page() {
 #[test]
 fn check_and_run_say_the_same_of_every_plan_on_every_setup() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut good, mut refused) = (0, 0);
-    for (plan, _) in rig::plan::BUNDLED {
-        for (setup, _) in rig::setup::BUNDLED {
-            let checked =
-                muprime().args(["check", plan, "--setup", setup, "--offline", "--json"]).output().unwrap();
-            let said = &documents(&checked)[0];
-            let run = muprime()
-                .args(["run", plan, "--setup", setup, "--fast", "--out"])
-                .arg(folder.path().join(format!("{plan}-{setup}")))
-                .env("MUPRIME_RUNS", folder.path())
-                .output()
-                .unwrap();
-            println!("{plan} on {setup}: {said}");
-            match said["ok"].as_bool() {
-                Some(true) => assert_eq!(run.status.code(), Some(0), "{plan} on {setup}: {}", texts(&run).1),
-                _ => assert_eq!(run.status.code(), Some(2), "{plan} on {setup}: {}", texts(&run).1),
-            }
-            if said["ok"] == true { good += 1 } else { refused += 1 }
+    let pairs = rig::plan::BUNDLED
+        .iter()
+        .flat_map(|(plan, _)| rig::setup::BUNDLED.iter().map(move |(setup, _)| (plan, setup)));
+    let pairs: Vec<_> = pairs.collect();
+    let approved = pairs.par_iter().map(|(plan, setup)| {
+        let checked =
+            muprime().args(["check", plan, "--setup", setup, "--offline", "--json"]).output().unwrap();
+        let said = &documents(&checked)[0];
+        let run = muprime()
+            .args(["run", plan, "--setup", setup, "--fast", "--out"])
+            .arg(folder.path().join(format!("{plan}-{setup}")))
+            .env("MUPRIME_RUNS", folder.path())
+            .output()
+            .unwrap();
+        println!("{plan} on {setup}: {said}");
+        match said["ok"].as_bool() {
+            Some(true) => assert_eq!(run.status.code(), Some(0), "{plan} on {setup}: {}", texts(&run).1),
+            _ => assert_eq!(run.status.code(), Some(2), "{plan} on {setup}: {}", texts(&run).1),
         }
-    }
-    println!("{good} run, {refused} are refused");
+        said["ok"] == true
+    });
+    let good = approved.filter(|good| *good).count();
+    println!("{good} run, {} are refused", pairs.len() - good);
     assert!(good > 0);
 }

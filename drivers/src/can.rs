@@ -281,7 +281,13 @@ mod tests {
                 normal: axis("fz"),
                 ..InstrumentSetup::new("ati-netft-can", "none")
             };
-            let (endpoint, port) = Endpoint::force(crate::profile(&setup.profile).unwrap(), &setup).unwrap();
+            // A machine that others use holds a thread up for longer than this sensor may be silent.
+            let text = crate::bundled::text(&setup.profile).unwrap();
+            let patient = text.replace("response_timeout_ms = 20\n", "response_timeout_ms = 300\n");
+            assert_ne!(patient, text);
+            let file = |name: &str| crate::bundled::file(name).map(String::from);
+            let profile = instruments::profile::Profile::parse_with(&patient, &file).unwrap();
+            let (endpoint, port) = Endpoint::force(profile, &setup).unwrap();
             let (health, epoch) = (endpoint.health(), Instant::now());
             let (ready, opened) = std::sync::mpsc::sync_channel(1);
             let stop = Arc::new(AtomicBool::new(false));
@@ -344,7 +350,7 @@ mod tests {
         link.bus.answers.store(false, Ordering::Relaxed);
         let silent_from = Instant::now();
         link.until("its end", |link| link.ended.lock().unwrap().iter().any(|why| why.contains("no answer")));
-        assert!(silent_from.elapsed() < Duration::from_secs(2), "{:?}", silent_from.elapsed());
+        assert!(silent_from.elapsed() < Duration::from_secs(10), "{:?}", silent_from.elapsed());
         link.until("told", |link| link.normal() == Err(NoData::Disconnected));
     }
 

@@ -19,19 +19,20 @@ const SEEDS: [u64; 2] = [11, 12];
 /// Sweeps on that setup, inside what `prefix` starts, and returns the passes.
 fn sweep(setup: &str, seed: u64, folder: &Path, prefix: Option<&Path>) -> Passes {
     let binary = tests::muprime().get_program().to_owned();
+    let unhurried = tests::unhurried(setup, folder);
     let attempt = |number: u32| {
         let folder = folder.join(format!("{setup}-{seed}-{number}"));
-        std::fs::create_dir(&folder).unwrap();
-        tests::sweep_unless_the_machine_stalls(&folder, |out| {
+        let output = tests::sweep_taken_up_again(&folder, || {
             let mut command = Command::new(prefix.map_or(binary.as_os_str(), Path::as_os_str));
             if prefix.is_some() {
                 // A sweep needs a clock that other work does not reach: this guest's counts instructions.
                 command.env("CAN_GUEST", "qemu").arg(&binary);
             }
             command.arg("run").arg(file("tests/plans/buses.toml"));
-            command.args(["--setup", setup, "--seed", &seed.to_string(), "--out"]).arg(out);
+            command.args(["--setup", &unhurried, "--seed", &seed.to_string(), "--out"]).arg(&folder);
             command
-        })
+        });
+        (folder, output)
     };
     // The emulators answer within a millisecond or two: a refusal because an answer stayed away while the rig was being
     // opened is the machine's, and there is no record of stalls before there is a loop.
