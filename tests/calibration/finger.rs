@@ -115,7 +115,7 @@ fn the_command_finds_the_skin_in_a_file_of_phases() {
     let calibrate = |out: &str| {
         let mut command = muprime();
         command.args(["--json", "calibrate", "finger", "--operator", "a", "--serial", "index"]);
-        command.args(["--elements", "300", "--modulus-range-pa", "18e6", "45e6", "--out"]);
+        command.args(["--elements", "500", "--modulus-range-pa", "18e6", "45e6", "--out"]);
         command.arg(folder.path().join(out)).arg(&phases).output().unwrap()
     };
     let output = calibrate("finger.toml");
