@@ -18,7 +18,7 @@ fn setup(rig: &ServedRig, limits: &str) -> String {
     let board =
         |table: &str| format!("[{table}]\nprofile = \"muprime-relay\"\naddress = \"{}\"\n", rig.address);
     format!(
-        "{}human_contact = true\ndead_man_key = true\n{limits}\n{}{}wired = [\"emergency_stop\", \"interlock\"]\n[loop]\nrate_hz = 250.0\n",
+        "{}human_contact = true\ndead_man_key = true\n{limits}\n{}{}wired = [\"emergency_stop\", \"interlock\"]\n",
         served::setup("hand", rig.address),
         board("supply_relay"),
         board("safety_inputs"),

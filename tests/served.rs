@@ -27,8 +27,8 @@ pub fn timed_plan(name: &str, reference_every: u32, amplitudes_pp_m: &[f64], tim
 pub fn setup(name: &str, address: SocketAddr) -> String {
     let instrument = |head: &str, id: &str| format!("{head}\nprofile = \"{id}\"\naddress = \"{address}\"\n");
     format!(
-        "name = \"{name}\"\n{}{}{}\n[finger]\ntip = \"artificial-silicone\"\n[noise]\npass_relative_sd = 0.015\n\
-         force_sd_n = 0.0008\n[limits]\nlate_cycles_max = 100\nlate_in_a_row_max = 45\nlink_stall_s = 0.045\n[loop]\nrate_hz = 250\n",
+        "name = \"{name}\"\n[loop]\nrate_hz = 250\n{}{}{}\n[finger]\ntip = \"artificial-silicone\"\n[noise]\npass_relative_sd = 0.015\n\
+         force_sd_n = 0.0008\n[limits]\nlate_cycles_max = 100\nlate_in_a_row_max = 45\nlink_stall_s = 0.045\n",
         instrument("[[force]]", "muprime-force2"),
         instrument("[amplifier]", "muprime-amplifier"),
         instrument("[stage]", "muprime-stage"),
