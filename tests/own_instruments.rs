@@ -15,7 +15,7 @@ use rows::{Fate, ROWS, Row};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 use tests::served::{self, AmplifierWatch, ServedRig};
 use tests::{file, muprime, python, texts};
@@ -140,14 +140,15 @@ fn thirty_passes(own: &[&'static str]) {
         let checked = muprime().arg("check").arg(file(&format!("tests/own/{name}.toml"))).output().unwrap();
         assert_eq!(checked.status.code(), Some(0), "{}", texts(&checked).1);
     }
-    // What Python or the machine holds up looks poor, and is: good once is what the instrument can do.
-    let doctor = || muprime().args(["doctor", "--instruments-only", "--setup"]).arg(&setup).output().unwrap();
-    let mut seen = doctor();
-    for _ in 0..4 {
-        if seen.status.code() != Some(0) {
-            seen = doctor();
-        }
-    }
+    // What the machine holds up looks poor, and is: only beside a recorded stall is it looked at again.
+    let doctor = || {
+        let witnesses = realtime::witness::Witnesses::start(realtime::pacing::monotonic_ns()).unwrap();
+        let seen = muprime().args(["doctor", "--instruments-only", "--setup"]).arg(&setup).output().unwrap();
+        (seen, witnesses.finish().count)
+    };
+    let excused = |(seen, stalls): &(Output, _)| seen.status.code() != Some(0) && *stalls > 0;
+    let looks = std::iter::repeat_with(doctor).take(4).find(|look| !excused(look));
+    let (seen, _) = looks.unwrap_or_else(doctor);
     assert_eq!(seen.status.code(), Some(0), "{own:?}: {:?}", texts(&seen));
     let amplitudes: Vec<f64> = (0..30).map(|n| 0.5e-6 + 0.1e-6 * f64::from(n)).collect();
     let plan = folder.path().join("plan.toml");

@@ -281,8 +281,7 @@ fn a_sweep_with_the_board_as_its_force_sensor() {
         assert!(text.contains(&instrument), "{text}");
         // Python on a busy machine may pause for longer than a board does: at 25 samples a second it may for 165 ms.
         let own = format!("profile = \"bench-board.toml\"\naddress = \"{ours}\"\nrate_hz = 25");
-        let text = text.replacen(&instrument, &own, 1);
-        std::fs::write(at("setup.toml"), text).unwrap();
+        std::fs::write(at("setup.toml"), text.replacen(&instrument, &own, 1)).unwrap();
         std::fs::copy(file("docs/profiles/bench-board.toml"), at("bench-board.toml")).unwrap();
         let plan = tests::served::timed_plan("own", 3, &[0.5e-6, 1e-6, 2e-6, 3e-6], [0.12, 0.2]);
         std::fs::write(at("plan.toml"), plan).unwrap();
