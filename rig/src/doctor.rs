@@ -17,6 +17,7 @@ use ports::Opened;
 use realtime::cycle::{COMMANDS_PER_CYCLE, Config, CycleState, Inputs, decide};
 use realtime::ports::{AmplifierState, Channel, Contacts, Nanos, NoData, StageState, SupplyState};
 use realtime::safety::{Cause, ChannelTiming, Observation, Timing};
+use realtime::witness::{StallReport, Witnesses};
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
@@ -72,6 +73,8 @@ pub struct Look {
     pub contacts: Option<Contacts>,
     /// The rule that kept the loop from being armed most often, with the share of cycles in which any did; only where everything could be opened.
     pub blocking: Option<(Cause, f64)>,
+    /// When this computer kept threads from running while it looked: what the links lost in that time is not theirs.
+    pub stalls: StallReport,
 }
 
 /// The channels that are followed.
@@ -225,6 +228,7 @@ impl Rules {
 pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
     let epoch = Instant::now();
     let (all, mut bench) = ports::open(setup, instruments, epoch);
+    let witnesses = Witnesses::start(realtime::pacing::monotonic_ns());
     let mut rules = Rules::of(setup, bench.supply.is_some());
     let mut followed = Followed::default();
     let counted = || -> Vec<HealthReport> { all.iter().map(Opened::health).collect() };
@@ -242,6 +246,8 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
             last = Some(seen);
         }
     }
+    // Without threads for witnesses nothing is known of stalls, and none is claimed.
+    let stalls = witnesses.map(Witnesses::finish).unwrap_or_default();
     let after = counted();
     let (before, began) = before.unwrap_or_else(|| (after.clone(), opened));
     let seconds = began.elapsed().as_secs_f64();
@@ -263,6 +269,7 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
         supply: bench.supply.and(last.map(|l| l.supply)),
         contacts: bench.contacts.and(last.map(|l| l.contacts)),
         blocking: rules.worst().filter(|_| whole),
+        stalls,
     }
 }
 

@@ -6,6 +6,7 @@ use crate::setup::Setup;
 use drivers::OpenError;
 use realtime::ports::{AmplifierState, Contact, NoData, StageState};
 use realtime::safety::RULES;
+use realtime::witness::StallReport;
 use serde::Serialize;
 
 /// What is said of one subject.
@@ -82,6 +83,8 @@ const UNIT: &str = "look at unit, factor, type and byte order of the signal in i
 pub fn judge(look: &Look, asked: &Asked<'_>) -> Vec<Finding> {
     let mut findings: Vec<Finding> = look.found.iter().map(|found| instrument(found, look, asked)).collect();
     let mended = findings.iter().all(|f| f.good);
+    let wanting = look.found.iter().zip(&findings).any(|(found, f)| found.answers.is_ok() && !f.good);
+    findings.extend(stalled(&look.stalls, wanting));
     if look.found.iter().all(|f| f.answers.is_ok()) {
         findings.push(arming(look));
     }
@@ -89,6 +92,20 @@ pub fn judge(look: &Look, asked: &Asked<'_>) -> Vec<Finding> {
         findings.push(planned(look, asked.setup, plan, mended));
     }
     findings
+}
+
+/// Where an instrument that could be opened was found wanting beside stalls of this computer: whose fault it is cannot be told.
+fn stalled(stalls: &StallReport, wanting: bool) -> Option<Finding> {
+    (wanting && stalls.count > 0).then(|| {
+        let said = format!(
+            "kept its threads from running {} times for 3 ms and more during the look, {:.0} ms at most: what is said \
+             above of rates, ages and missing answers may be its doing",
+            stalls.count,
+            stalls.worst.seconds() * 1e3
+        );
+        let advice = "end what else runs on it and look again; `muprime doctor` judges it";
+        Finding::new("this computer", false, said, advice)
+    })
 }
 
 fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
@@ -382,5 +399,17 @@ mod tests {
         assert!(!is_loaded(0.249, 0.25, 0.25), "the weight stands on it");
         assert!(!is_loaded(-0.001, 0.25, 0.25), "a hand holds it");
         assert!(is_loaded(0.5, 0.25, 0.25) && is_loaded(-0.25, 0.25, 0.25), "zero, sign or unit is wrong");
+    }
+    #[test]
+    fn stalls_of_this_computer_are_told_where_an_instrument_is_found_wanting() {
+        use realtime::ports::Nanos;
+        let stalls = StallReport { count: 7, worst: Nanos(21_400_000), latest: Vec::new() };
+        let said = stalled(&stalls, true).unwrap();
+        assert!(!said.good && said.found.contains("7 times") && said.found.contains("21 ms"), "{said:?}");
+        assert!(stalled(&stalls, false).is_none(), "nothing is explained where nothing is wrong");
+        assert!(
+            stalled(&StallReport::default(), true).is_none(),
+            "and nothing is claimed that no witness saw"
+        );
     }
 }
