@@ -82,6 +82,19 @@ fn the_package_says_what_the_command_says() {
     let (out, err) = texts(&foreign);
     assert!(foreign.status.success() && out.contains("4 passed"), "{out}{err}");
 
+    // The notebooks, with a real kernel; their outputs are held against those that are kept.
+    let notebooks = python()
+        .arg(file("tests/python/notebooks.py"))
+        .arg(file("python/notebooks"))
+        .arg(folder.path().join("notebooks"))
+        .args(std::env::var_os("MUPRIME_UPDATE").map(|_| "--update"))
+        .env("PYTHONPATH", &site)
+        .output()
+        .unwrap();
+    let (out, err) = texts(&notebooks);
+    println!("{out}");
+    assert!(notebooks.status.success() && out.ends_with("ok\n"), "{out}{err}");
+
     // Types: the package itself, and what its users write.
     let checked = python()
         .args(["-m", "mypy", "--strict", "--no-incremental", "--python-executable"])

@@ -1,0 +1,78 @@
+"""Runs the notebooks of python/notebooks with a real kernel and holds their outputs against those that are kept.
+
+    notebooks.py SOURCE FOLDER [--update]
+
+Each runs in a copy under FOLDER. Texts must be equal, their numbers within 1e-6 of each other; a picture must be there. ``--update`` writes the
+outputs into SOURCE instead. Prints seconds and MB for each.
+"""
+
+import re
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import nbformat
+from jupyter_client import AsyncKernelManager
+from nbclient import NotebookClient
+
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+SOURCE, FOLDER = Path(sys.argv[1]), Path(sys.argv[2])
+UPDATE = "--update" in sys.argv
+# What a shared last digit may do to a printed number.
+RELATIVE = 1e-6
+
+
+def said(cell) -> list[tuple[str, str]]:
+    """What a cell puts out, as kind and text; a picture's bytes and an object's address are nobody's to compare."""
+    told: list[tuple[str, str]] = []
+    for output in cell.outputs:
+        if output.output_type == "stream":
+            assert output.name == "stdout", f"a cell complains: {output.text}"
+            told.append(("text", output.text))
+        elif output.output_type == "error":
+            raise AssertionError("\n".join(output.traceback))
+        else:
+            told.append(("picture", "") if "image/png" in output.data else ("text", output.data["text/plain"]))
+    return told
+
+
+def same(kept: str, now: str) -> bool:
+    if NUMBER.sub("#", kept) != NUMBER.sub("#", now):
+        return False
+    pairs = zip(NUMBER.findall(kept), NUMBER.findall(now), strict=True)
+    return all(abs(float(a) - float(b)) <= RELATIVE * max(abs(float(a)), abs(float(b))) for a, b in pairs)
+
+
+notebooks = sorted(SOURCE.glob("*.ipynb"))
+assert notebooks, f"no notebook in {SOURCE}"
+for path in notebooks:
+    work = FOLDER / path.stem
+    shutil.copytree(SOURCE, work)
+    kept = nbformat.read(path, as_version=4)
+    ran = nbformat.from_dict(kept)
+    for cell in ran.cells:
+        if cell.cell_type == "code":
+            cell.outputs, cell.execution_count = [], None
+    began = time.perf_counter()
+    # By way of the file system, under a short name (a socket's may have 107 characters): no port is opened.
+    sockets = tempfile.mkdtemp()
+    kernel = AsyncKernelManager(kernel_name="python3", transport="ipc", ip=f"{sockets}/kernel")
+    NotebookClient(ran, km=kernel, timeout=300, resources={"metadata": {"path": str(work)}}).execute()
+    shutil.rmtree(sockets)
+    took = time.perf_counter() - began
+    cells = [(a, b) for a, b in zip(kept.cells, ran.cells, strict=True) if a.cell_type == "code"]
+    if UPDATE:
+        for _, cell in cells:
+            cell.metadata = {}
+            said(cell)
+        ran.metadata = {"kernelspec": kept.metadata["kernelspec"]}
+        nbformat.write(ran, path)
+    else:
+        for number, (a, b) in enumerate(cells, 1):
+            before, now = said(a), said(b)
+            alike = len(before) == len(now) and all(k == l and same(x, y) for (k, x), (l, y) in zip(before, now, strict=True))
+            assert alike, f"{path.name}, code cell {number}: kept\n{before}\nnow\n{now}"
+    print(f"{path.name}: {len(cells)} cells in {took:.1f} s, {path.stat().st_size / 1e6:.2f} MB")
+print("ok")
