@@ -44,6 +44,17 @@ pub struct Prediction {
     pub validity: Validity,
 }
 
+/// Relative friction alone, without the contact's regime: what a law is asked for on whole columns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelativeFriction {
+    /// `mu'`, as [`Prediction::mu_relative`].
+    pub mu_relative: f64,
+    /// Its standard uncertainty, as [`Prediction::mu_relative_sd`].
+    pub sd: f64,
+    /// Inside or outside the law's range.
+    pub validity: Validity,
+}
+
 /// A law of friction under ultrasonic vibration. `predict` allocates nothing: the real-time loop calls it.
 pub trait FrictionModel: Send + Sync {
     /// A short name for records and reports.
@@ -54,6 +65,18 @@ pub trait FrictionModel: Send + Sync {
     /// # Errors
     /// A condition outside the domain of the law, by name.
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain>;
+
+    /// The same without force and regime. A law that must solve something else for its regime says less here, and sooner.
+    ///
+    /// # Errors
+    /// As [`FrictionModel::predict`].
+    fn relative_friction(&self, condition: &Condition) -> Result<RelativeFriction, OutOfDomain> {
+        self.predict(condition).map(|p| RelativeFriction {
+            mu_relative: p.mu_relative,
+            sd: p.mu_relative_sd,
+            validity: p.validity,
+        })
+    }
 
     /// Relative standard deviations of the two parameters that a calibration leaves uncertain (normal and lateral
     /// stiffness, or what takes their place). Zero: the law has none.
@@ -180,25 +203,35 @@ impl FrictionModel for EmpiricalPsi {
     }
 
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
+        let friction = self.relative_friction(condition)?;
+        // Eq. 20 knows no contact: the spring-slider says how finger and plate meet.
+        let cycle = spring_slider::solve_checked(condition, &self.finger);
+        Ok(Prediction {
+            mu_relative: friction.mu_relative,
+            mu_relative_sd: friction.sd,
+            lateral_force_n: friction.mu_relative * condition.mu0 * condition.normal_force_n,
+            regime: cycle.regime,
+            validity: friction.validity,
+        })
+    }
+
+    fn relative_friction(&self, condition: &Condition) -> Result<RelativeFriction, OutOfDomain> {
         let (mut mu_relative, mut square) = (0.0, 0.0);
         for (reading, weight) in Reading::ALL.into_iter().zip(self.weights) {
             let (mu, sd) = self.under(condition, reading)?;
             mu_relative += weight * mu;
             square += weight * (mu * mu + sd * sd);
         }
-        let cycle = spring_slider::solve_checked(condition, &self.finger);
         let inside = condition.amplitude.metres() == 0.0 || psi::within_fitted_range(condition);
-        Ok(Prediction {
+        Ok(RelativeFriction {
             mu_relative,
             // Of the mixture: within the readings and between them.
-            mu_relative_sd: (square - mu_relative * mu_relative).max(0.0).sqrt(),
-            lateral_force_n: mu_relative * condition.mu0 * condition.normal_force_n,
-            regime: cycle.regime,
+            sd: (square - mu_relative * mu_relative).max(0.0).sqrt(),
             validity: if inside { Validity::Inside } else { Validity::Extrapolated },
         })
     }
 
     fn form_sd(&self, condition: &Condition) -> f64 {
-        self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
+        self.relative_friction(condition).map_or(0.0, |friction| friction.sd)
     }
 }

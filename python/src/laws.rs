@@ -3,7 +3,7 @@
 use crate::MuprimeError;
 use models::condition::Condition;
 use models::finger::Finger;
-use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider, Validity};
+use models::prediction::{EmpiricalPsi, FrictionModel, RelativeFriction, SpringSlider, Validity};
 use models::quantity::PeakToPeak;
 use models::reading::Reading;
 use models::surrogate::Surrogate;
@@ -79,15 +79,14 @@ pub fn evaluate(
                 mu0: mu0[i],
                 ..Condition::paper()
             };
-            law.predict(&condition).map_err(|why| format!("row {i}: {why}"))
+            law.relative_friction(&condition).map_err(|why| format!("row {i}: {why}"))
         };
         (0..w.len()).into_par_iter().with_min_len(SHARE).map(row).collect::<Result<Vec<_>, _>>()
     });
     let answers = answers.map_err(MuprimeError::new_err)?;
-    let column = |value: &dyn Fn(&models::prediction::Prediction) -> f64| -> Vec<f64> {
-        answers.iter().map(value).collect()
-    };
+    let column =
+        |value: &dyn Fn(&RelativeFriction) -> f64| -> Vec<f64> { answers.iter().map(value).collect() };
     out[0].copy_from_slice(py, &column(&|p| p.mu_relative))?;
-    out[1].copy_from_slice(py, &column(&|p| p.mu_relative_sd))?;
+    out[1].copy_from_slice(py, &column(&|p| p.sd))?;
     out[2].copy_from_slice(py, &column(&|p| f64::from(u8::from(p.validity == Validity::Inside))))
 }

@@ -107,7 +107,7 @@ muprime.spring_slider(million)
 slider = time.perf_counter() - began
 over.set()
 thread.join()
-print(f"10^6 conditions: psi {here:.3f} s with its regime and checks, NumPy's Eq. 20 alone {there:.3f} s (ratio {here / there:.1f}); spring-slider {slider:.3f} s, another thread took {ticks[0]} turns meanwhile")
+print(f"10^6 conditions: psi {here:.3f} s with its uncertainty and checks, NumPy's Eq. 20 alone {there:.3f} s (ratio {here / there:.1f}); spring-slider {slider:.3f} s, another thread took {ticks[0]} turns meanwhile")
 assert ticks[0] > 5, "the interpreter was held"
 one = muprime.ridge(elements=200)
 assert math.isclose(one["mu_relative"], json.loads(told("model", "ridge", "--json", "--elements", "200"))["mu_relative"])
