@@ -23,196 +23,175 @@ fn setup(address: SocketAddr) -> InstrumentsSetup {
 
 #[test]
 fn what_stands_in_the_registers_comes_out_of_the_ports() {
-    tests::in_wall_clock_time(|| {
-        let (bench, epoch) = (Bench::default(), Instant::now());
-        for (quantity, value) in [
-            (Quantity::LateralForce, -0.12345),
-            (Quantity::NormalForce, 0.25),
-            // An output that is found on, or a plate that vibrates, is switched off by the link: then the registers would not stand.
-            (Quantity::Amplitude, 99.5e-9),
-            (Quantity::AmplitudeSetPoint, 2e-6),
-            (Quantity::FrequencySetPoint, 27_500.3),
-            (Quantity::Temperature, 31.4),
-            (Quantity::OutputOn, 0.0),
-            (Quantity::Position, 0.012_345_678),
-            (Quantity::Velocity, -0.02),
-        ] {
-            bench.set(quantity, value);
-        }
-        let server = bench::serve_apart(&bench, epoch);
-        let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
-        let forces = eventually("a force", || Some(rig.force.read(now(epoch))).filter(|f| f.lateral.is_ok()));
-        let (lateral, normal) = (forces.lateral.unwrap(), forces.normal.unwrap());
-        assert!((lateral.value - -0.12345).abs() < 1e-12 && lateral.raw == -12345, "{lateral:?}");
-        assert!((normal.value - 0.25).abs() < 1e-12 && normal.raw == 25000, "{normal:?}");
-        assert_eq!(
-            (lateral.sequence, lateral.taken_at),
-            (normal.sequence, normal.taken_at),
-            "one read, one sample"
-        );
-        assert_eq!(lateral.quality, Quality::Good);
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    for (quantity, value) in [
+        (Quantity::LateralForce, -0.12345),
+        (Quantity::NormalForce, 0.25),
+        // An output that is found on, or a plate that vibrates, is switched off by the link: then the registers would not stand.
+        (Quantity::Amplitude, 99.5e-9),
+        (Quantity::AmplitudeSetPoint, 2e-6),
+        (Quantity::FrequencySetPoint, 27_500.3),
+        (Quantity::Temperature, 31.4),
+        (Quantity::OutputOn, 0.0),
+        (Quantity::Position, 0.012_345_678),
+        (Quantity::Velocity, -0.02),
+    ] {
+        bench.set(quantity, value);
+    }
+    let server = bench::serve_apart(&bench, epoch);
+    let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
+    let forces = eventually("a force", || Some(rig.force.read(now(epoch))).filter(|f| f.lateral.is_ok()));
+    let (lateral, normal) = (forces.lateral.unwrap(), forces.normal.unwrap());
+    assert!((lateral.value - -0.12345).abs() < 1e-12 && lateral.raw == -12345, "{lateral:?}");
+    assert!((normal.value - 0.25).abs() < 1e-12 && normal.raw == 25000, "{normal:?}");
+    assert_eq!(
+        (lateral.sequence, lateral.taken_at),
+        (normal.sequence, normal.taken_at),
+        "one read, one sample"
+    );
+    assert_eq!(lateral.quality, Quality::Good);
 
-        let amplifier = eventually("an amplifier state", || rig.amplifier.state(now(epoch)).ok());
-        assert!((amplifier.amplitude.unwrap().value - 99.5e-9).abs() < 1e-15);
-        assert!(
-            (amplifier.echoed_amplitude.metres() - 2e-6).abs() < 1e-15,
-            "{amplifier:?} after {:?}",
-            bench.0.lock().unwrap().commands
-        );
-        assert!((amplifier.echoed_frequency_hz - 27_500.3).abs() < 1e-6);
-        assert!((amplifier.temperature_c.unwrap().value - 31.4).abs() < 1e-9);
-        assert!(!amplifier.output_on && !amplifier.watchdog_tripped && !amplifier.fault);
+    let amplifier = eventually("an amplifier state", || rig.amplifier.state(now(epoch)).ok());
+    assert!((amplifier.amplitude.unwrap().value - 99.5e-9).abs() < 1e-15);
+    assert!(
+        (amplifier.echoed_amplitude.metres() - 2e-6).abs() < 1e-15,
+        "{amplifier:?} after {:?}",
+        bench.0.lock().unwrap().commands
+    );
+    assert!((amplifier.echoed_frequency_hz - 27_500.3).abs() < 1e-6);
+    assert!((amplifier.temperature_c.unwrap().value - 31.4).abs() < 1e-9);
+    assert!(!amplifier.output_on && !amplifier.watchdog_tripped && !amplifier.fault);
 
-        let stage = eventually("a stage state", || rig.stage.state(now(epoch)).ok());
-        assert!(
-            (stage.position_m - 0.012_345_678).abs() < 1e-12 && (stage.velocity_m_s + 0.02).abs() < 1e-12
-        );
-    });
+    let stage = eventually("a stage state", || rig.stage.state(now(epoch)).ok());
+    assert!((stage.position_m - 0.012_345_678).abs() < 1e-12 && (stage.velocity_m_s + 0.02).abs() < 1e-12);
 }
 
 /// The bench samples at 1 kHz and stamps each sample: the age that the loop sees is the true one,
 /// plus the quickest answer's delay, never less.
 #[test]
 fn ages_are_those_of_the_instrument() {
-    tests::in_wall_clock_time(|| {
-        let (bench, epoch) = (Bench::default(), Instant::now());
-        let server = bench::serve_apart(&bench, epoch);
-        let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
-        let mut last = None;
-        for _ in 0..200 {
-            let reading = eventually("a newer sample", || {
-                rig.force
-                    .read(now(epoch))
-                    .normal
-                    .ok()
-                    .filter(|reading| last.is_none_or(|last| reading.sequence > last))
-            });
-            let true_time_s = f64::from(reading.sequence) * 1e-3;
-            let late = reading.taken_at.seconds() - true_time_s;
-            assert!((-1e-6..0.5).contains(&late), "sample {}: {late} s late", reading.sequence);
-            last = Some(reading.sequence);
-        }
-    });
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let server = bench::serve_apart(&bench, epoch);
+    let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
+    let mut last = None;
+    for _ in 0..200 {
+        let reading = eventually("a newer sample", || {
+            rig.force
+                .read(now(epoch))
+                .normal
+                .ok()
+                .filter(|reading| last.is_none_or(|last| reading.sequence > last))
+        });
+        let true_time_s = f64::from(reading.sequence) * 1e-3;
+        let late = reading.taken_at.seconds() - true_time_s;
+        assert!((-1e-6..0.5).contains(&late), "sample {}: {late} s late", reading.sequence);
+        last = Some(reading.sequence);
+    }
 }
 
 #[test]
 fn saturation_and_faults_reach_the_loop() {
-    tests::in_wall_clock_time(|| {
-        let (bench, epoch) = (Bench::default(), Instant::now());
-        let server = bench::serve_apart(&bench, epoch);
-        let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
-        bench.set(Quantity::LateralForce, 25.0);
-        eventually("the lateral axis at its rail", || {
-            rig.force.read(now(epoch)).lateral.ok().filter(|r| r.quality == Quality::Saturated)
-        });
-        assert_eq!(
-            rig.force.read(now(epoch)).normal.unwrap().quality,
-            Quality::Good,
-            "the other axis is not"
-        );
-        bench.set(Quantity::ForceFault, 1.0);
-        eventually("no reading", || {
-            rig.force.read(now(epoch)).normal.err().filter(|&why| why == NoData::Invalid)
-        });
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let server = bench::serve_apart(&bench, epoch);
+    let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
+    bench.set(Quantity::LateralForce, 25.0);
+    eventually("the lateral axis at its rail", || {
+        rig.force.read(now(epoch)).lateral.ok().filter(|r| r.quality == Quality::Saturated)
+    });
+    assert_eq!(rig.force.read(now(epoch)).normal.unwrap().quality, Quality::Good, "the other axis is not");
+    bench.set(Quantity::ForceFault, 1.0);
+    eventually("no reading", || {
+        rig.force.read(now(epoch)).normal.err().filter(|&why| why == NoData::Invalid)
     });
 }
 
 #[test]
 fn another_instrument_is_refused_before_anything_is_commanded() {
-    tests::in_wall_clock_time(|| {
-        let (bench, epoch) = (Bench::default(), Instant::now());
-        let server =
-            bench::serve(&bench, &[(1, "muprime-force2"), (2, "muprime-stage"), (3, "muprime-stage")], epoch);
-        let error = drivers::open(&setup(server.address()), epoch).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains("muprime-amplifier"), "{error}");
-        let mut wrong = setup(server.address());
-        wrong.amplifier.unit = Some(9);
-        let error = drivers::open(&wrong, epoch).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains("refused"), "{error}");
-        assert!(bench.0.lock().unwrap().commands.is_empty());
-    });
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let server =
+        bench::serve(&bench, &[(1, "muprime-force2"), (2, "muprime-stage"), (3, "muprime-stage")], epoch);
+    let error = drivers::open(&setup(server.address()), epoch).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("muprime-amplifier"), "{error}");
+    let mut wrong = setup(server.address());
+    wrong.amplifier.unit = Some(9);
+    let error = drivers::open(&wrong, epoch).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("refused"), "{error}");
+    assert!(bench.0.lock().unwrap().commands.is_empty());
 }
 
 #[test]
 fn a_setup_that_does_not_fit_its_profiles_is_refused_with_a_reason() {
-    tests::in_wall_clock_time(|| {
-        let nowhere: SocketAddr = "127.0.0.1:9".parse().unwrap();
-        let mut wrong = setup(nowhere);
-        wrong.force[0].lateral = Some(AxisSetup { signal: "fx".into(), gain: 1.0, offset_n: 0.0 });
-        let error = drivers::open(&wrong, Instant::now()).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains("no signal `fx`") && error.contains("lateral"), "{error}");
-        wrong.force[0].profile = "nonesuch".into();
-        let error = drivers::open(&wrong, Instant::now()).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains("nonesuch") && error.contains("muprime-force2"), "{error}");
-        let error = drivers::open(&setup(nowhere), Instant::now()).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains("refused") || error.contains("no answer"), "{error}");
-    });
+    let nowhere: SocketAddr = "127.0.0.1:9".parse().unwrap();
+    let mut wrong = setup(nowhere);
+    wrong.force[0].lateral = Some(AxisSetup { signal: "fx".into(), gain: 1.0, offset_n: 0.0 });
+    let error = drivers::open(&wrong, Instant::now()).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("no signal `fx`") && error.contains("lateral"), "{error}");
+    wrong.force[0].profile = "nonesuch".into();
+    let error = drivers::open(&wrong, Instant::now()).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("nonesuch") && error.contains("muprime-force2"), "{error}");
+    let error = drivers::open(&setup(nowhere), Instant::now()).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("refused") || error.contains("no answer"), "{error}");
 }
 
 /// Two weighing terminals, an axis each: kilograms by the device's decimals, and two ages.
 #[test]
 fn two_terminals_give_an_axis_each() {
-    tests::in_wall_clock_time(|| {
-        let (bench, epoch) = (Bench::default(), Instant::now());
-        bench.set(Quantity::NormalForce, 0.25);
-        let server = bench::serve_apart(&bench, epoch);
-        let lateral = bench::serve(&bench, &[(0, "hbk-wtx110")], epoch);
-        let normal = bench::serve(&bench, &[(0, "hbk-wtx110")], epoch);
-        let mut setup = setup(server.address());
-        let axis = |gain: f64| Some(AxisSetup { signal: "fz".into(), gain, offset_n: 0.0 });
-        setup.force = vec![
-            InstrumentSetup {
-                lateral: axis(-1.0),
-                ..InstrumentSetup::new("hbk-wtx110", &lateral.address().to_string())
-            },
-            InstrumentSetup {
-                normal: axis(1.0),
-                ..InstrumentSetup::new("hbk-wtx110", &normal.address().to_string())
-            },
-        ];
-        let mut rig = drivers::open(&setup, epoch).unwrap();
-        let forces = eventually("both", || {
-            // The first samples were taken before the epoch, and show its time.
-            let forces = rig.force.read(now(epoch));
-            let later =
-                |channel: realtime::ports::Channel| channel.is_ok_and(|reading| reading.taken_at.0 > 0);
-            Some(forces).filter(|forces| later(forces.lateral) && later(forces.normal))
-        });
-        let (lateral, normal) = (forces.lateral.unwrap(), forces.normal.unwrap());
-        // Five decimals of a kilogram: 98 uN a count.
-        assert!((normal.value - 0.25).abs() <= 0.5 * 9.80665e-5, "{normal:?}");
-        assert!((lateral.value + 0.25).abs() <= 0.5 * 9.80665e-5, "{lateral:?}");
-        assert_ne!(lateral.taken_at, normal.taken_at, "they do not sample together, and must not look so");
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    bench.set(Quantity::NormalForce, 0.25);
+    let server = bench::serve_apart(&bench, epoch);
+    let lateral = bench::serve(&bench, &[(0, "hbk-wtx110")], epoch);
+    let normal = bench::serve(&bench, &[(0, "hbk-wtx110")], epoch);
+    let mut setup = setup(server.address());
+    let axis = |gain: f64| Some(AxisSetup { signal: "fz".into(), gain, offset_n: 0.0 });
+    setup.force = vec![
+        InstrumentSetup {
+            lateral: axis(-1.0),
+            ..InstrumentSetup::new("hbk-wtx110", &lateral.address().to_string())
+        },
+        InstrumentSetup {
+            normal: axis(1.0),
+            ..InstrumentSetup::new("hbk-wtx110", &normal.address().to_string())
+        },
+    ];
+    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let forces = eventually("both", || {
+        // The first samples were taken before the epoch, and show its time.
+        let forces = rig.force.read(now(epoch));
+        let later = |channel: realtime::ports::Channel| channel.is_ok_and(|reading| reading.taken_at.0 > 0);
+        Some(forces).filter(|forces| later(forces.lateral) && later(forces.normal))
     });
+    let (lateral, normal) = (forces.lateral.unwrap(), forces.normal.unwrap());
+    // Five decimals of a kilogram: 98 uN a count.
+    assert!((normal.value - 0.25).abs() <= 0.5 * 9.80665e-5, "{normal:?}");
+    assert!((lateral.value + 0.25).abs() <= 0.5 * 9.80665e-5, "{lateral:?}");
+    assert_ne!(lateral.taken_at, normal.taken_at, "they do not sample together, and must not look so");
 }
 
 #[test]
 fn only_commands_in_time_leave_and_an_end_makes_safe() {
-    tests::in_wall_clock_time(|| {
-        let (bench, epoch) = (Bench::default(), Instant::now());
-        let server = bench::serve_apart(&bench, epoch);
-        let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
-        // Expired when it is given: it must never leave.
-        rig.amplifier.command(DriveCommand::off(41, realtime::ports::Nanos(0)), now(epoch));
-        std::thread::sleep(Duration::from_millis(30));
-        assert!(bench.0.lock().unwrap().commands.is_empty());
-        let soon = || now(epoch).plus(realtime::ports::Nanos::from_seconds(5.0));
-        rig.amplifier.command(DriveCommand::off(42, soon()), now(epoch));
-        rig.stage.command(StageCommand::stop(43, soon()), now(epoch));
-        eventually("the heartbeat of the command", || {
-            bench.commanded(Command::DriveHeartbeat).filter(|&beat| beat == 42.0)
-        });
-        eventually("the stage's command", || {
-            bench.commanded(Command::StageHeartbeat).filter(|&beat| beat == 43.0)
-        });
-        let expired: u64 = rig.links.health().map(|(_, health)| health.commands_expired).sum();
-        assert_eq!(expired, 1);
-        bench.0.lock().unwrap().commands.clear();
-        drop(rig);
-        assert_eq!(bench.commanded(Command::Enable), Some(0.0), "the end of the links makes safe");
-        assert_eq!(bench.commanded(Command::Velocity), Some(0.0));
-        assert_eq!(bench.commanded(Command::NormalForce), Some(0.0));
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let server = bench::serve_apart(&bench, epoch);
+    let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
+    // Expired when it is given: it must never leave.
+    rig.amplifier.command(DriveCommand::off(41, realtime::ports::Nanos(0)), now(epoch));
+    std::thread::sleep(Duration::from_millis(30));
+    assert!(bench.0.lock().unwrap().commands.is_empty());
+    let soon = || now(epoch).plus(realtime::ports::Nanos::from_seconds(5.0));
+    rig.amplifier.command(DriveCommand::off(42, soon()), now(epoch));
+    rig.stage.command(StageCommand::stop(43, soon()), now(epoch));
+    eventually("the heartbeat of the command", || {
+        bench.commanded(Command::DriveHeartbeat).filter(|&beat| beat == 42.0)
     });
+    eventually("the stage's command", || {
+        bench.commanded(Command::StageHeartbeat).filter(|&beat| beat == 43.0)
+    });
+    let expired: u64 = rig.links.health().map(|(_, health)| health.commands_expired).sum();
+    assert_eq!(expired, 1);
+    bench.0.lock().unwrap().commands.clear();
+    drop(rig);
+    assert_eq!(bench.commanded(Command::Enable), Some(0.0), "the end of the links makes safe");
+    assert_eq!(bench.commanded(Command::Velocity), Some(0.0));
+    assert_eq!(bench.commanded(Command::NormalForce), Some(0.0));
 }
 
 /// How the server below misbehaves.
@@ -316,143 +295,129 @@ fn with_prankster(address: SocketAddr, others: SocketAddr) -> InstrumentsSetup {
 
 #[test]
 fn no_prank_ever_becomes_a_force() {
-    tests::in_wall_clock_time(|| {
-        for prank in [Prank::Late, Prank::Twice, Prank::Short, Prank::Silent, Prank::OtherUnit] {
-            let (bench, epoch) = (Bench::default(), Instant::now());
-            let others = bench::serve_apart(&bench, epoch);
-            let (address, connections, played) = prankster(prank, 20, prank != Prank::Twice);
-            let mut rig = drivers::open(&with_prankster(address, others.address()), epoch).unwrap();
-            let mut wrong = 0;
-            let mut down = false;
-            let mut look = |rig: &mut drivers::Rig| {
-                let lateral = rig.force.read(now(epoch)).lateral;
-                wrong += usize::from(lateral.is_ok_and(|reading| reading.raw == i64::from(WRONG_FORCE)));
-                down |= lateral == Err(NoData::Disconnected);
-                lateral
-            };
-            eventually("the prank", || {
-                let _ = look(&mut rig);
-                played.load(Ordering::SeqCst).then_some(())
-            });
-            // The prank's answer may sit in a socket; whatever comes is watched until good samples flow on
-            // a new connection.
-            eventually("a new connection", || {
-                let _ = look(&mut rig);
-                (prank == Prank::Twice || connections.load(Ordering::SeqCst) >= 2).then_some(())
-            });
-            let until = Instant::now() + Duration::from_millis(300);
-            while Instant::now() < until {
-                let _ = look(&mut rig);
-                std::thread::sleep(Duration::from_micros(200));
-            }
-            if prank != Prank::Twice {
-                let good = eventually("good samples again", || look(&mut rig).ok());
-                assert_eq!(good.raw, 50_000);
-                assert!(down, "{prank:?}: the loop was not told that the link went down");
-            }
-            assert_eq!(wrong, 0, "{prank:?}: a wrong answer became a force");
+    for prank in [Prank::Late, Prank::Twice, Prank::Short, Prank::Silent, Prank::OtherUnit] {
+        let (bench, epoch) = (Bench::default(), Instant::now());
+        let others = bench::serve_apart(&bench, epoch);
+        let (address, connections, played) = prankster(prank, 20, prank != Prank::Twice);
+        let mut rig = drivers::open(&with_prankster(address, others.address()), epoch).unwrap();
+        let mut wrong = 0;
+        let mut down = false;
+        let mut look = |rig: &mut drivers::Rig| {
+            let lateral = rig.force.read(now(epoch)).lateral;
+            wrong += usize::from(lateral.is_ok_and(|reading| reading.raw == i64::from(WRONG_FORCE)));
+            down |= lateral == Err(NoData::Disconnected);
+            lateral
+        };
+        eventually("the prank", || {
+            let _ = look(&mut rig);
+            played.load(Ordering::SeqCst).then_some(())
+        });
+        // The prank's answer may sit in a socket; whatever comes is watched until good samples flow on
+        // a new connection.
+        eventually("a new connection", || {
+            let _ = look(&mut rig);
+            (prank == Prank::Twice || connections.load(Ordering::SeqCst) >= 2).then_some(())
+        });
+        let until = Instant::now() + Duration::from_millis(300);
+        while Instant::now() < until {
+            let _ = look(&mut rig);
+            std::thread::sleep(Duration::from_micros(200));
         }
-    });
+        if prank != Prank::Twice {
+            let good = eventually("good samples again", || look(&mut rig).ok());
+            assert_eq!(good.raw, 50_000);
+            assert!(down, "{prank:?}: the loop was not told that the link went down");
+        }
+        assert_eq!(wrong, 0, "{prank:?}: a wrong answer became a force");
+    }
 }
 
 #[test]
 fn swapped_words_are_refused_at_connection() {
-    tests::in_wall_clock_time(|| {
-        let (bench, epoch) = (Bench::default(), Instant::now());
-        let others = bench::serve_apart(&bench, epoch);
-        let (address, _, _) = prankster(Prank::SwapWords, 0, false);
-        let error = drivers::open(&with_prankster(address, others.address()), epoch)
-            .map(|_| ())
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains("words come in another order"), "{error}");
-        assert!(bench.0.lock().unwrap().commands.is_empty());
-    });
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let others = bench::serve_apart(&bench, epoch);
+    let (address, _, _) = prankster(Prank::SwapWords, 0, false);
+    let error =
+        drivers::open(&with_prankster(address, others.address()), epoch).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("words come in another order"), "{error}");
+    assert!(bench.0.lock().unwrap().commands.is_empty());
 }
 
 #[test]
 fn more_clients_than_allowed_are_turned_away_and_a_place_is_freed() {
-    tests::in_wall_clock_time(|| {
-        let (bench, epoch) = (Bench::default(), Instant::now());
-        let server = bench::serve_apart(&bench, epoch);
-        let ask = |stream: &mut std::net::TcpStream| {
-            let mut byte = [0; 9];
-            stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
-            stream.write_all(&[0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 12]).is_ok()
-                && stream.read_exact(&mut byte).is_ok()
-        };
-        let connect = || std::net::TcpStream::connect(server.address()).unwrap();
-        let mut clients: Vec<_> = (0..sim::wire::modbus_tcp::MOST_CLIENTS).map(|_| connect()).collect();
-        assert!(clients.iter_mut().all(ask));
-        assert!(!ask(&mut connect()), "one too many was served");
-        clients.clear();
-        eventually("a free place", || ask(&mut connect()).then_some(()));
-    });
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let server = bench::serve_apart(&bench, epoch);
+    let ask = |stream: &mut std::net::TcpStream| {
+        let mut byte = [0; 9];
+        stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        stream.write_all(&[0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 12]).is_ok()
+            && stream.read_exact(&mut byte).is_ok()
+    };
+    let connect = || std::net::TcpStream::connect(server.address()).unwrap();
+    let mut clients: Vec<_> = (0..sim::wire::modbus_tcp::MOST_CLIENTS).map(|_| connect()).collect();
+    assert!(clients.iter_mut().all(ask));
+    assert!(!ask(&mut connect()), "one too many was served");
+    clients.clear();
+    eventually("a free place", || ask(&mut connect()).then_some(()));
 }
 
 #[test]
 fn idle_clients_make_room_and_the_world_is_kept_up() {
-    tests::in_wall_clock_time(|| {
-        let (bench, epoch) = (Bench::default(), Instant::now());
-        let server = bench::serve_apart(&bench, epoch);
-        let connect = || std::net::TcpStream::connect(server.address()).unwrap();
-        let ask = |stream: &mut std::net::TcpStream| {
-            let mut byte = [0; 9];
-            stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
-            stream.write_all(&[0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 12]).is_ok()
-                && stream.read_exact(&mut byte).is_ok()
-        };
-        let mut at_work = connect();
-        let _idle: Vec<_> = (1..sim::wire::modbus_tcp::MOST_CLIENTS).map(|_| connect()).collect();
-        let begun = Instant::now();
-        while begun.elapsed() < sim::wire::modbus_tcp::IDLE + Duration::from_millis(200) {
-            assert!(ask(&mut at_work));
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        assert!(ask(&mut connect()), "an idle client makes room");
-        assert!(ask(&mut at_work), "one at work keeps its place");
-    });
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let server = bench::serve_apart(&bench, epoch);
+    let connect = || std::net::TcpStream::connect(server.address()).unwrap();
+    let ask = |stream: &mut std::net::TcpStream| {
+        let mut byte = [0; 9];
+        stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        stream.write_all(&[0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 12]).is_ok()
+            && stream.read_exact(&mut byte).is_ok()
+    };
+    let mut at_work = connect();
+    let _idle: Vec<_> = (1..sim::wire::modbus_tcp::MOST_CLIENTS).map(|_| connect()).collect();
+    let begun = Instant::now();
+    while begun.elapsed() < sim::wire::modbus_tcp::IDLE + Duration::from_millis(200) {
+        assert!(ask(&mut at_work));
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    assert!(ask(&mut connect()), "an idle client makes room");
+    assert!(ask(&mut at_work), "one at work keeps its place");
 }
 
 #[test]
 fn a_relay_and_safety_contacts_behind_coils_and_discrete_inputs() {
-    tests::in_wall_clock_time(|| {
-        use realtime::ports::{SafetyInputs, SupplyCommand, SupplySwitch};
-        let (bench, epoch) = (Bench::default(), Instant::now());
-        let units =
-            [(1, "muprime-force2"), (2, "muprime-amplifier"), (3, "muprime-stage"), (4, "muprime-relay")];
-        let server = bench::serve(&bench, &units, epoch);
-        let mut setup = setup(server.address());
-        let relay = InstrumentSetup::new("muprime-relay", &server.address().to_string());
-        (setup.supply_relay, setup.safety_inputs) = (Some(relay.clone()), Some(relay));
-        bench.set(Quantity::EmergencyStop, 1.0);
-        let mut rig = drivers::open(&setup, epoch).unwrap();
-        let (supply, contacts): (&mut dyn SupplySwitch, &mut dyn SafetyInputs) =
-            (&mut *rig.supply, &mut *rig.contacts);
-        eventually("the relay is open", || supply.state(now(epoch)).ok().filter(|state| state.cut));
-        let seen = eventually("the contacts", || {
-            let seen = contacts.read(now(epoch));
-            seen.emergency_stop.is_ok().then_some(seen)
-        });
-        let closed =
-            [seen.emergency_stop, seen.interlock, seen.dead_man].map(|contact| contact.unwrap().closed);
-        assert_eq!(closed, [true, false, false]);
-        eventually("closed and read back", || {
-            supply.command(SupplyCommand::Restore, now(epoch));
-            supply.state(now(epoch)).ok().filter(|state| !state.cut)
-        });
-        eventually("cut and read back", || {
-            supply.command(SupplyCommand::Cut, now(epoch));
-            supply.state(now(epoch)).ok().filter(|state| state.cut)
-        });
-        eventually("closed again", || {
-            supply.command(SupplyCommand::Restore, now(epoch));
-            supply.state(now(epoch)).ok().filter(|state| !state.cut)
-        });
-        // A loop that says nothing more closes no supply.
-        eventually("open by itself", || supply.state(now(epoch)).ok().filter(|state| state.cut));
-        let ends = rig.links.close();
-        assert!(ends.iter().all(|end| !matches!(end.closed, drivers::Closed::NotReadBack(_))), "{ends:?}");
-        assert_eq!(bench.commanded(Command::CloseSupply), Some(0.0));
+    use realtime::ports::{SafetyInputs, SupplyCommand, SupplySwitch};
+    let (bench, epoch) = (Bench::default(), Instant::now());
+    let units = [(1, "muprime-force2"), (2, "muprime-amplifier"), (3, "muprime-stage"), (4, "muprime-relay")];
+    let server = bench::serve(&bench, &units, epoch);
+    let mut setup = setup(server.address());
+    let relay = InstrumentSetup::new("muprime-relay", &server.address().to_string());
+    (setup.supply_relay, setup.safety_inputs) = (Some(relay.clone()), Some(relay));
+    bench.set(Quantity::EmergencyStop, 1.0);
+    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let (supply, contacts): (&mut dyn SupplySwitch, &mut dyn SafetyInputs) =
+        (&mut *rig.supply, &mut *rig.contacts);
+    eventually("the relay is open", || supply.state(now(epoch)).ok().filter(|state| state.cut));
+    let seen = eventually("the contacts", || {
+        let seen = contacts.read(now(epoch));
+        seen.emergency_stop.is_ok().then_some(seen)
     });
+    let closed = [seen.emergency_stop, seen.interlock, seen.dead_man].map(|contact| contact.unwrap().closed);
+    assert_eq!(closed, [true, false, false]);
+    eventually("closed and read back", || {
+        supply.command(SupplyCommand::Restore, now(epoch));
+        supply.state(now(epoch)).ok().filter(|state| !state.cut)
+    });
+    eventually("cut and read back", || {
+        supply.command(SupplyCommand::Cut, now(epoch));
+        supply.state(now(epoch)).ok().filter(|state| state.cut)
+    });
+    eventually("closed again", || {
+        supply.command(SupplyCommand::Restore, now(epoch));
+        supply.state(now(epoch)).ok().filter(|state| !state.cut)
+    });
+    // A loop that says nothing more closes no supply.
+    eventually("open by itself", || supply.state(now(epoch)).ok().filter(|state| state.cut));
+    let ends = rig.links.close();
+    assert!(ends.iter().all(|end| !matches!(end.closed, drivers::Closed::NotReadBack(_))), "{ends:?}");
+    assert_eq!(bench.commanded(Command::CloseSupply), Some(0.0));
 }

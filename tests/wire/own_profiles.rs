@@ -350,46 +350,44 @@ fn a_float_sensor_is_judged_by_its_stated_resolution_or_not_by_its_count() {
 /// From a folder, by path, or not at all: `check`, `virtual-rig` and their status.
 #[test]
 fn the_program_finds_profiles_where_it_is_told_to_look() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        let (home, shelf) = (at("home"), at("shelf"));
-        std::fs::create_dir_all(home.join("muprime/profiles")).unwrap();
-        std::fs::create_dir_all(&shelf).unwrap();
-        let virtual_one =
-            setup_with("bench-board", "pty").replace("127.0.0.1:1502", "127.0.0.1:0") + "[virtual]\n";
-        std::fs::write(at("setup.toml"), virtual_one).unwrap();
-        let command = |arguments: &[&str]| {
-            let mut command = tests::muprime();
-            command.env("XDG_CONFIG_HOME", &home).args(arguments);
-            command
-        };
-        let check = |more: &[&str]| {
-            let output = command(more).arg("check").arg(at("setup.toml")).output().unwrap();
-            (
-                output.status.code(),
-                tests::texts(&output).1.replace('│', "").split_whitespace().collect::<Vec<_>>().join(" "),
-            )
-        };
-        let (status, said) = check(&[]);
-        assert_eq!(status, Some(2), "{said}");
-        assert!(said.contains("no profile is called `bench-board`") && said.contains("looked in:"), "{said}");
-        let board = file("docs/profiles/bench-board.toml");
-        std::fs::copy(&board, shelf.join("bench-board.toml")).unwrap();
-        let (status, said) = check(&["--profiles", shelf.to_str().unwrap()]);
-        assert_eq!(status, Some(0), "{said}");
-        std::fs::copy(&board, home.join("muprime/profiles/bench-board.toml")).unwrap();
-        let (status, said) = check(&[]);
-        assert_eq!(status, Some(0), "{said}");
-        let setup = at("setup.toml");
-        let mut served = command(&["--json", "virtual-rig", "--modbus-tcp", "127.0.0.1:0", "--setup"]);
-        let (_rig, places) = start(served.arg(&setup).stderr(Stdio::null()));
-        assert!(places.contains("bench-board at /dev/pts"), "{places}");
-        // A profile that is wrong is refused with file and line, by the setup's own check.
-        let wrong = source("bench-board").text.replacen("\"CRC-16/XMODEM\"", "\"CRC-16/XMODEN\"", 1);
-        std::fs::write(home.join("muprime/profiles/bench-board.toml"), wrong).unwrap();
-        let (status, said) = check(&[]);
-        assert_eq!(status, Some(2), "{said}");
-        assert!(said.contains("CRC-16/MODBUS") && said.contains("line "), "{said}");
-    });
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (home, shelf) = (at("home"), at("shelf"));
+    std::fs::create_dir_all(home.join("muprime/profiles")).unwrap();
+    std::fs::create_dir_all(&shelf).unwrap();
+    let virtual_one =
+        setup_with("bench-board", "pty").replace("127.0.0.1:1502", "127.0.0.1:0") + "[virtual]\n";
+    std::fs::write(at("setup.toml"), virtual_one).unwrap();
+    let command = |arguments: &[&str]| {
+        let mut command = tests::muprime();
+        command.env("XDG_CONFIG_HOME", &home).args(arguments);
+        command
+    };
+    let check = |more: &[&str]| {
+        let output = command(more).arg("check").arg(at("setup.toml")).output().unwrap();
+        (
+            output.status.code(),
+            tests::texts(&output).1.replace('│', "").split_whitespace().collect::<Vec<_>>().join(" "),
+        )
+    };
+    let (status, said) = check(&[]);
+    assert_eq!(status, Some(2), "{said}");
+    assert!(said.contains("no profile is called `bench-board`") && said.contains("looked in:"), "{said}");
+    let board = file("docs/profiles/bench-board.toml");
+    std::fs::copy(&board, shelf.join("bench-board.toml")).unwrap();
+    let (status, said) = check(&["--profiles", shelf.to_str().unwrap()]);
+    assert_eq!(status, Some(0), "{said}");
+    std::fs::copy(&board, home.join("muprime/profiles/bench-board.toml")).unwrap();
+    let (status, said) = check(&[]);
+    assert_eq!(status, Some(0), "{said}");
+    let setup = at("setup.toml");
+    let mut served = command(&["--json", "virtual-rig", "--modbus-tcp", "127.0.0.1:0", "--setup"]);
+    let (_rig, places) = start(served.arg(&setup).stderr(Stdio::null()));
+    assert!(places.contains("bench-board at /dev/pts"), "{places}");
+    // A profile that is wrong is refused with file and line, by the setup's own check.
+    let wrong = source("bench-board").text.replacen("\"CRC-16/XMODEM\"", "\"CRC-16/XMODEN\"", 1);
+    std::fs::write(home.join("muprime/profiles/bench-board.toml"), wrong).unwrap();
+    let (status, said) = check(&[]);
+    assert_eq!(status, Some(2), "{said}");
+    assert!(said.contains("CRC-16/MODBUS") && said.contains("line "), "{said}");
 }

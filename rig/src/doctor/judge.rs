@@ -1,6 +1,6 @@
 //! What was found, against what a run needs.
 
-use super::{ChannelReport, Found, Look};
+use super::{Answers, ChannelReport, Found, Look};
 use crate::plan::Plan;
 use crate::setup::Setup;
 use drivers::OpenError;
@@ -83,8 +83,7 @@ const UNIT: &str = "look at unit, factor, type and byte order of the signal in i
 pub fn judge(look: &Look, asked: &Asked<'_>) -> Vec<Finding> {
     let mut findings: Vec<Finding> = look.found.iter().map(|found| instrument(found, look, asked)).collect();
     let mended = findings.iter().all(|f| f.good);
-    let wanting = look.found.iter().zip(&findings).any(|(found, f)| found.answers.is_ok() && !f.good);
-    findings.extend(stalled(&look.stalls, wanting));
+    findings.extend(stalled(look));
     if look.found.iter().all(|f| f.answers.is_ok()) {
         findings.push(arming(look));
     }
@@ -94,12 +93,19 @@ pub fn judge(look: &Look, asked: &Asked<'_>) -> Vec<Finding> {
     findings
 }
 
-/// Where an instrument that could be opened was found wanting beside stalls of this computer: whose fault it is cannot be told.
-fn stalled(stalls: &StallReport, wanting: bool) -> Option<Finding> {
-    (wanting && stalls.count > 0).then(|| {
+/// Where samples came late or not at all beside stalls of this computer: whose fault that is cannot be told.
+fn stalled(look: &Look) -> Option<Finding> {
+    let late = |found: &Found| {
+        let mut problems = Vec::new();
+        found.channels.iter().for_each(|channel| timely(channel, &mut problems));
+        found.answers.iter().for_each(|answers| linked(answers, &mut problems));
+        !problems.is_empty()
+    };
+    let stalls = &look.stalls;
+    (stalls.count > 0 && look.found.iter().any(late)).then(|| {
         let said = format!(
-            "kept its threads from running {} times for 3 ms and more during the look, {:.0} ms at most: what is said \
-             above of rates, ages and missing answers may be its doing",
+            "kept its threads from running {} times for 3 ms and more during the look, {:.0} ms at most: low rates, old samples and \
+             missing answers may be its doing",
             stalls.count,
             stalls.worst.seconds() * 1e3
         );
@@ -129,6 +135,7 @@ fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
         let unsupplied = found.role == "amplifier" && look.supply_is_open();
         if !(unsupplied && channel.missing == Some(NoData::Invalid)) {
             timely(channel, &mut problems);
+            saturated(channel, &mut problems);
         }
         if found.role == "force" {
             states.push(match (channel.mean, channel.missing) {
@@ -155,18 +162,7 @@ fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
         ("safety_inputs", ..) => contacts(look, &mut states, &mut problems),
         _ => {}
     }
-    if answers.bad_share > BAD_SHARE {
-        problems.push((format!("{:.0} % of its answers are none", answers.bad_share * 1e2), LINK));
-    }
-    if answers.lost_share > 1.0 - CAME_SHARE {
-        problems.push((format!("{:.0} % of its samples never came", answers.lost_share * 1e2), LINK));
-    }
-    if answers.reconnected > 0 {
-        problems.push((format!("its link broke {} times", answers.reconnected), LINK));
-    }
-    if !answers.last_problem.is_empty() {
-        problems.push((answers.last_problem.clone(), LINK));
-    }
+    linked(answers, &mut problems);
     let mut said = vec![states.join(", "), format!("{:.0} samples a second", answers.samples_per_s)];
     said.retain(|part| !part.is_empty());
     said.extend(problems.iter().map(|(problem, _)| problem.clone()));
@@ -206,10 +202,33 @@ fn timely(c: &ChannelReport, problems: &mut Vec<Problem>) {
         let said = format!("{name}: {:.1} new samples a second, {:.0} are due", c.rate_hz, c.due_hz);
         problems.push((said, "set the instrument to that rate, or state its true rate as `rate_hz`"));
     }
+}
+
+/// Samples at the ends of the range.
+fn saturated(c: &ChannelReport, problems: &mut Vec<Problem>) {
     if c.saturated_share > INVALID_SHARE {
-        let said =
-            format!("{name}: {:.0} % of its samples are at the end of its range", c.saturated_share * 1e2);
+        let said = format!(
+            "{}: {:.0} % of its samples are at the end of its range",
+            c.name,
+            c.saturated_share * 1e2
+        );
         problems.push((said, "unload and zero it, or use one of a larger range; a range in the profile that is too narrow does the same"));
+    }
+}
+
+/// What the link lost.
+fn linked(answers: &Answers, problems: &mut Vec<Problem>) {
+    if answers.bad_share > BAD_SHARE {
+        problems.push((format!("{:.0} % of its answers are none", answers.bad_share * 1e2), LINK));
+    }
+    if answers.lost_share > 1.0 - CAME_SHARE {
+        problems.push((format!("{:.0} % of its samples never came", answers.lost_share * 1e2), LINK));
+    }
+    if answers.reconnected > 0 {
+        problems.push((format!("its link broke {} times", answers.reconnected), LINK));
+    }
+    if !answers.last_problem.is_empty() {
+        problems.push((answers.last_problem.clone(), LINK));
     }
 }
 
@@ -392,6 +411,7 @@ fn planned(look: &Look, setup: &Setup, plan: &Plan, mended: bool) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use realtime::ports::Nanos;
 
     #[test]
     fn a_dead_weight_on_the_finger_is_no_zero_that_is_off() {
@@ -400,16 +420,57 @@ mod tests {
         assert!(!is_loaded(-0.001, 0.25, 0.25), "a hand holds it");
         assert!(is_loaded(0.5, 0.25, 0.25) && is_loaded(-0.25, 0.25, 0.25), "zero, sign or unit is wrong");
     }
+
+    /// One channel whose samples came at a share of its rate, beside so many stalls.
+    fn looked(came: f64, mean: f64, stalls: u64) -> Look {
+        let channel = ChannelReport {
+            name: "lateral",
+            unit: "N",
+            rate_hz: came * 1e3,
+            due_hz: 1e3,
+            age_ms: Some([1.0, 2.0, 3.0]),
+            age_limit_ms: 48.0,
+            mean: Some(mean),
+            noise_sd: Some(1e-3),
+            saturated_share: 0.0,
+            invalid_share: 0.0,
+            equal_in_a_row: 1,
+            samples: 1000,
+            missing: None,
+        };
+        let found = Found {
+            role: "force",
+            id: "muprime-force2".into(),
+            address: "127.0.0.1:1".into(),
+            answers: Ok(Answers::default()),
+            channels: vec![channel],
+        };
+        let stalls = StallReport { count: stalls, worst: Nanos(21_400_000), latest: Vec::new() };
+        let nothing = (None, None, None, None, None);
+        let (amplifier, stage, supply, contacts, blocking) = nothing;
+        Look { found: vec![found], amplifier, stage, supply, contacts, blocking, stalls }
+    }
+
     #[test]
-    fn stalls_of_this_computer_are_told_where_an_instrument_is_found_wanting() {
-        use realtime::ports::Nanos;
-        let stalls = StallReport { count: 7, worst: Nanos(21_400_000), latest: Vec::new() };
-        let said = stalled(&stalls, true).unwrap();
-        assert!(!said.good && said.found.contains("7 times") && said.found.contains("21 ms"), "{said:?}");
-        assert!(stalled(&stalls, false).is_none(), "nothing is explained where nothing is wrong");
-        assert!(
-            stalled(&StallReport::default(), true).is_none(),
-            "and nothing is claimed that no witness saw"
-        );
+    fn stalls_of_this_computer_are_told_where_samples_came_late() {
+        let setup = Setup::load("virtual-ideal").unwrap();
+        let of_computer = |look: &Look| {
+            let findings = judge(look, &Asked { setup: &setup, plan: None });
+            assert!(findings[0].subject.starts_with("force"), "{findings:?}");
+            let said = findings.iter().find(|f| f.subject == "this computer").cloned();
+            (findings[0].good, said)
+        };
+        let (good, said) = of_computer(&looked(0.48, 0.0, 7));
+        let said = said.unwrap();
+        assert!(!good && !said.good, "{said:?}");
+        assert!(said.found.contains("7 times") && said.found.contains("21 ms"), "{said:?}");
+        for (look, good, why) in [
+            (looked(0.48, 0.0, 0), false, "nothing is claimed that no witness saw"),
+            (looked(1.0, 0.0, 7), true, "nothing is explained where nothing is wrong"),
+            (looked(1.0, 1e3, 7), false, "no stall makes a wrong force"),
+        ] {
+            let (found_good, said) = of_computer(&look);
+            assert_eq!((found_good, said.is_none()), (good, true), "{why}: {said:?}");
+        }
     }
 }
