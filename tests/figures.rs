@@ -106,3 +106,28 @@ fn one_reading_of_the_amplitude_gives_the_papers_psi_star() {
         assert!(folder.path().join(name).exists(), "{name}");
     }
 }
+
+/// Every figure from 4 to 14 has its comparison under both readings: a number of ours, and what the paper states, marked as the paper's.
+#[test]
+fn every_figure_is_compared_with_the_paper_by_a_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = muprime();
+    command.args(["--json", "model", "reproduce", "all", "--elements", "128", "--out"]).arg(folder.path());
+    let made = command.output().unwrap();
+    assert_eq!(made.status.code(), Some(0), "{}", texts(&made).1);
+    let told = documents(&made);
+    for figure in 4..=14 {
+        let name = format!("fig{figure}");
+        let readings: Vec<&Value> = told.iter().filter(|t| t["figure"] == name.as_str()).collect();
+        assert_eq!(readings.len(), if figure == 6 { 1 } else { 2 }, "{name}");
+        for one in readings {
+            let lines: Vec<&str> =
+                one["comparison"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+            let all = lines.join("\n");
+            // Ours stands before the paper's or in a line of its own.
+            let ours = lines.iter().map(|l| l.split("paper:").next().unwrap());
+            assert!(ours.into_iter().any(|l| l.chars().any(|c| c.is_ascii_digit())), "{name}: {all}");
+            assert!(all.contains("paper:") && !all.contains("NaN"), "{name}: {all}");
+        }
+    }
+}

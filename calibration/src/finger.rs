@@ -4,6 +4,7 @@
 //! is a room of its own.
 
 pub mod friction;
+pub mod springs;
 pub mod stiffness;
 
 use crate::amplitude::apply::block_diagonal;
@@ -13,6 +14,7 @@ use crate::identify::skin::{IdentifiedSkin, Profile};
 use crate::regression::FitError;
 use friction::FrictionFit;
 use nalgebra::DMatrix;
+use springs::Springs;
 use std::collections::BTreeMap;
 use stiffness::Stiffness;
 
@@ -69,6 +71,8 @@ pub struct FingerFit {
     pub stiffness: Vec<(String, Stiffness)>,
     /// Friction without vibration.
     pub friction: Option<FrictionFit>,
+    /// Both stiffnesses and their ratio from passes with vibration.
+    pub springs: Option<Springs>,
     /// Modulus of the stratum corneum from a phase table (Eq. 2).
     pub modulus: Option<Identified>,
     /// The same with penalty and retardation time free.
@@ -119,6 +123,48 @@ impl FingerFit {
             (sd, largest, unit) = (f.fit.residual_sd(), f.fit.residuals.amax(), "1 (of ln mu0)".into());
             range.extend(f.range());
             remarks.extend(f.remarks());
+        }
+        if let Some(s) = &self.springs {
+            let fits = [
+                (
+                    "sweep.normal_stiffness",
+                    "N/m",
+                    s.normal_stiffness_n_per_m,
+                    s.normal_ci95_n_per_m,
+                    s.normal_closed,
+                ),
+                (
+                    "sweep.lateral_over_normal_stiffness",
+                    "1",
+                    s.lateral_over_normal,
+                    s.ratio_ci95,
+                    s.ratio_closed,
+                ),
+            ];
+            for (name, unit, value, ci95, closed) in fits {
+                if closed == [true; 2] {
+                    names.push((name.into(), unit));
+                    values.push(value);
+                    dofs.push((s.passes as f64 - 3.0).max(1.0));
+                    ends.push(Ends::Both(ci95));
+                    let sd = 0.5 * (ci95[1] - ci95[0]) / 1.96;
+                    blocks.push(DMatrix::from_element(1, 1, sd * sd));
+                } else {
+                    remarks.push(format!(
+                        "{name}: {value:.3e} {unit}, but the passes leave its interval open: {:.3e}{} to {:.3e}{}",
+                        ci95[0],
+                        if closed[0] { "" } else { " (end of the range searched)" },
+                        ci95[1],
+                        if closed[1] { "" } else { " (end of the range searched)" }
+                    ));
+                }
+            }
+            remarks.push(format!(
+                "the sweep's stiffnesses are those of the spring-slider that fits {} passes best, chi-square {:.2} a degree of freedom",
+                s.passes, s.reduced_chi2
+            ));
+            count += s.passes as u64;
+            (sd, largest, unit) = (s.residual_rms_n, s.residual_rms_n, "N".into());
         }
         if let Some(m) = &self.modulus {
             let fit = ModulusFit::of(m, self.skin.as_ref());

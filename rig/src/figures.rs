@@ -11,7 +11,7 @@ pub mod store;
 
 pub use collapse::collapse;
 use miette::{IntoDiagnostic, miette};
-use models::ridge::study::{Panel, StudyPoint, content_key, fig_9};
+use models::ridge::study::{Panel, StudyPoint, content_key, fig_9_at};
 use models::ridge::{self, Cycle, RidgeCase, RidgeRun, RunSettings};
 use plot::{Chart, Series, Stated};
 use reading::Reading;
@@ -25,23 +25,56 @@ pub struct Reproduced {
     pub lines: Vec<String>,
 }
 
-/// The study of Fig. 9 under a reading of w.
-pub fn fig_9_read(base: RidgeCase, reading: Reading) -> Vec<StudyPoint> {
-    let read = |p: StudyPoint| StudyPoint { case: reading.at(p.case, p.case.amplitude.metres()), ..p };
-    fig_9(base).into_iter().map(read).collect()
+/// A study of Fig. 9.
+#[derive(Clone, Copy)]
+pub struct Study {
+    /// The nominal case; at rest, where its speed is zero.
+    pub base: RidgeCase,
+    /// How w is read.
+    pub reading: Reading,
+    /// The values of w, m.
+    pub w_m: &'static [f64],
 }
 
-/// Results of the study of Fig. 9, running what is missing in `out`.
-///
-/// # Errors
-/// Whatever the file system says.
-pub fn fig_9_results(
-    out: &Path,
-    base: RidgeCase,
-    reading: Reading,
-) -> miette::Result<(store::Results, usize)> {
-    let cases = fig_9_read(base, reading).into_iter().map(|p| p.case);
-    store::complete(&out.join("ridge.jsonl"), cases, &settings())
+impl Study {
+    /// Its points. At rest neither speed nor friction matter: those panels are left out.
+    pub fn points(&self) -> Vec<StudyPoint> {
+        let at_rest = self.base.speed_m_s == 0.0;
+        fig_9_at(self.base, self.w_m)
+            .into_iter()
+            .filter(|p| !at_rest || !matches!(p.panel, Panel::Speed | Panel::Mu0))
+            .map(|p| StudyPoint { case: self.reading.at(p.case, p.case.amplitude.metres()), ..p })
+            .collect()
+    }
+
+    /// Its results, running what is missing in `out`, and how many failed.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn results(&self, out: &Path) -> miette::Result<(store::Results, usize)> {
+        store::complete(&out.join("ridge.jsonl"), self.points().into_iter().map(|p| p.case), &settings())
+    }
+
+    /// Each point with its result.
+    ///
+    /// # Errors
+    /// A study that is not whole.
+    pub fn whole(&self, out: &Path) -> miette::Result<Vec<(StudyPoint, store::Kept)>> {
+        let (results, failed) = self.results(out)?;
+        let points = self.points();
+        let found: Vec<_> = points
+            .iter()
+            .filter_map(|p| results.get(&content_key(&p.case, &settings())).map(|k| (*p, k.clone())))
+            .collect();
+        if failed > 0 || found.len() < points.len() {
+            return Err(miette!(
+                "{} of {} points of Fig. 9 are missing",
+                points.len() - found.len(),
+                points.len()
+            ));
+        }
+        Ok(found)
+    }
 }
 
 /// How the figures' cases are run.
@@ -66,6 +99,19 @@ fn trace(values: &[f64], turns: usize, scale: f64) -> Vec<(f64, f64)> {
     (0..n * turns).map(|i| ((i as f64 + 0.5) / n as f64, scale * values[i % n])).collect()
 }
 
+/// The last amplitude in um at which a curve of (um, degrees) passes a level upwards, in words.
+pub fn passing(curve: &[(f64, f64)], level: f64) -> String {
+    let passes = curve.windows(2).rev().find(|p| p[0].1 < level && p[1].1 >= level);
+    let last = curve.last().map_or(0.0, |p| p.0);
+    passes.map_or_else(
+        || match curve.first() {
+            Some(first) if first.1 >= level => format!("less than {:.2}", first.0),
+            _ => format!("more than {last:.2}"),
+        },
+        |p| format!("{:.2}", p[0].0 + (p[1].0 - p[0].0) * (level - p[0].1) / (p[1].1 - p[0].1)),
+    )
+}
+
 /// Fig. 4: phase shift against amplitude, at rest as measured.
 pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Result<Reproduced> {
     let at =
@@ -81,12 +127,8 @@ pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Res
         });
         kept.collect()
     };
-    // Where the curve passes 20 and 60 degrees of the way from contact to its plateau near 90.
-    let crossing = |e: f64, level: f64| -> f64 {
-        let points = curve(e);
-        let passing = points.windows(2).rev().find(|p| p[0].1 < level && p[1].1 >= level);
-        passing.map_or(f64::NAN, |p| p[0].0 + (p[1].0 - p[0].0) * (level - p[0].1) / (p[1].1 - p[0].1))
-    };
+    // Where the curve passes levels of the way from contact to its plateau near 90.
+    let crossing = |e: f64, level: f64| passing(&curve(e), level);
     let chart = |name: &str, title: &str, moduli: [f64; 4], transition: [f64; 2]| Chart {
         name: reading::file(reading, name),
         stated: vec![
@@ -101,7 +143,7 @@ pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Res
     let mut lines = Vec::new();
     for (what, e, paper) in [("moist", 28.3e6, "0.8 to 1.3"), ("dry", 202.4e6, "0.4 to 0.8")] {
         lines.push(format!(
-            "{what} ({} MPa): the phase passes 10, 30 and 60 deg at {:.2}, {:.2} and {:.2} um; paper: transition at {paper} um, plateau near 90 deg; here {:.0} deg at 2.5 um",
+            "{what} ({} MPa): the phase passes 10, 30 and 60 deg at {}, {} and {} um; paper: transition at {paper} um, plateau near 90 deg; here {:.0} deg at 2.5 um",
             e / 1e6,
             crossing(e, 10.0),
             crossing(e, 30.0),
@@ -136,7 +178,7 @@ pub fn velocities(base: RidgeCase, reading: Reading) -> miette::Result<Reproduce
     let falling = ((low + n - high) % n) as f64 / n as f64;
     Ok(Reproduced {
         lines: vec![format!(
-            "dry, 1.35 um: skin {:.0} to {:.0} mm/s, plate +-{:.0} mm/s; the fall takes {:.0} % of the period, the rise {:.0} %; paper: the velocity peak is asymmetric, the unloading sloping through inertia",
+            "dry, 1.35 um: skin {:.0} to {:.0} mm/s, plate +-{:.0} mm/s; the fall takes {:.0} % of the period, the rise {:.0} %; paper: the velocity peak is asymmetric, the unloading sloping through inertia (drawn; no number is stated)",
             1e3 * trough(skin),
             1e3 * peak(skin),
             1e3 * top,
@@ -166,7 +208,7 @@ pub fn loading(base: RidgeCase) -> miette::Result<Reproduced> {
     let step = |from: f64| vec![(0.0, 0.0), (from, 0.0), (from, 1.0), (end, 1.0)];
     Ok(Reproduced {
         lines: vec![format!(
-            "press at once and settle for {press:.0} us, slide in the quasi-static slip state for {press:.0} us, then vibrate, growing over two periods; the paper's order, without its waiting for the soft tissue"
+            "press at once and settle for {press:.0} us, slide in the quasi-static slip state for {press:.0} us, then vibrate, growing over two periods; paper: this order, with waits whose lengths are not stated"
         )],
         charts: vec![Chart {
             name: "fig6".into(),
@@ -192,9 +234,10 @@ pub fn reaction_force(base: RidgeCase, reading: Reading) -> miette::Result<Repro
         let scale = case.finger_per_ridge_m();
         series.push(Series::line(format!("{w} um"), trace(&result.mean_cycle.normal, 3, scale)));
         lines.push(format!(
-            "{w} um: mean {:.4} N for {} N applied, greatest {:.3} N, contact {:.0} % of the time",
+            "{w} um: mean {:.4} N for {} N applied, N/N0 {:.3} (paper: 1, Eq. 4), greatest {:.3} N, contact {:.0} % of the time",
             result.mean_reaction_force_n,
             case.normal_force_n,
+            result.mean_reaction_force_n / case.normal_force_n,
             result.peak_reaction_force_n,
             100.0 * result.contact_fraction
         ));
@@ -222,7 +265,7 @@ pub fn lateral_force(base: RidgeCase, reading: Reading) -> miette::Result<Reprod
     let sticks = (0..n).filter(|i| normal[*i] > 0.0 && lateral[*i] < 0.99 * case.mu0 * normal[*i]).count();
     Ok(Reproduced {
         lines: vec![format!(
-            "1.35 um, 20 mm/s: mu' = {:.3}; below Coulomb's limit for {:.0} % of the period, contact for {:.0} %; paper: after touch-down the ridge first deforms laterally, slips once mu_0 F_reac is reached, and the force then falls with it to zero",
+            "1.35 um, 20 mm/s: mu' = {:.3}; below Coulomb's limit for {:.0} % of the period, contact for {:.0} %; paper: after touch-down the ridge first deforms laterally, slips once mu_0 F_reac is reached, and the force then falls with it to zero (drawn; no number is stated)",
             result.mu_relative,
             100.0 * sticks as f64 / n as f64,
             100.0 * result.contact_fraction
@@ -242,27 +285,12 @@ pub fn lateral_force(base: RidgeCase, reading: Reading) -> miette::Result<Reprod
     })
 }
 
-/// mu' of every point of the study that is there.
-fn study(base: RidgeCase, out: &Path, reading: Reading) -> miette::Result<Vec<(StudyPoint, store::Kept)>> {
-    let (results, failed) = fig_9_results(out, base, reading)?;
-    let points = fig_9_read(base, reading);
-    let found: Vec<_> = points
-        .iter()
-        .filter_map(|p| results.get(&content_key(&p.case, &settings())).map(|k| (*p, k.clone())))
-        .collect();
-    if failed > 0 || found.len() < points.len() {
-        return Err(miette!(
-            "{} of {} points of Fig. 9 are missing",
-            points.len() - found.len(),
-            points.len()
-        ));
-    }
-    Ok(found)
-}
-
 /// Fig. 9: the five panels.
-pub fn parametric_study(base: RidgeCase, out: &Path, reading: Reading) -> miette::Result<Reproduced> {
-    let found = study(base, out, reading)?;
+///
+/// # Errors
+/// A study that is not whole.
+pub fn parametric_study(study: Study, out: &Path) -> miette::Result<Reproduced> {
+    let (found, reading) = (study.whole(out)?, study.reading);
     let at = |panel: Panel, value: f64, w: f64| {
         let hit = found.iter().find(|(p, _)| {
             p.panel == panel && p.value == value && (reading.w_m(p.case.amplitude) - w).abs() < 1e-12
@@ -308,7 +336,7 @@ pub fn parametric_study(base: RidgeCase, out: &Path, reading: Reading) -> miette
         spread(Panel::YoungModulus), spread(Panel::NormalForce)
     ));
     lines.push(format!(
-        "mean reaction over load: {:.3} to {:.3} over the study (Eq. 4)",
+        "mean reaction over load: {:.3} to {:.3} over the study (paper: 1, Eq. 4)",
         found.iter().map(|f| f.1.reaction_over_load).fold(f64::INFINITY, f64::min),
         found.iter().map(|f| f.1.reaction_over_load).fold(0.0, f64::max)
     ));

@@ -146,6 +146,7 @@ pub struct Body {
     pub(super) work: Work,
     strain: Strain,
     viscous: bool,
+    stiffness_damping_s: f64,
     count_energy: bool,
     mesh: Mesh,
 }
@@ -236,6 +237,7 @@ impl Body {
             work: Work::default(),
             strain,
             viscous,
+            stiffness_damping_s: 0.0,
             count_energy: false,
             mesh,
         }
@@ -303,7 +305,7 @@ impl Body {
     pub fn stress_pa(&self, i: usize, j: usize) -> [f64; 3] {
         let e = j * self.nx + i;
         let mut s = [self.mean[e], self.difference[e], self.shear[e]];
-        if self.viscous {
+        if self.viscous && self.stiffness_damping_s == 0.0 {
             s[0] += self.arm.mean[e];
             s[1] += self.arm.difference[e];
             s[2] += self.arm.shear[e];
@@ -367,6 +369,24 @@ impl Body {
         }
     }
 
+    /// Stiffness-proportional damping of an elastic body: from now on its stress is that of the strain and `beta_s` seconds times its
+    /// rate. It stands in the place of the viscous arms, as an arm that forgets everything within a step. The hourglass control has none.
+    pub fn damp_stiffness(&mut self, beta_s: f64) {
+        if self.mesh.row_material.iter().any(|m| m.arm().is_some()) || beta_s <= 0.0 {
+            return;
+        }
+        self.stiffness_damping_s = beta_s;
+        self.viscous = true;
+        for field in [&mut self.arm.mean, &mut self.arm.difference, &mut self.arm.shear] {
+            *field = vec![0.0; self.mean.len()];
+        }
+    }
+
+    /// Stiffness-proportional damping in s.
+    pub fn stiffness_damping_s(&self) -> f64 {
+        self.stiffness_damping_s
+    }
+
     /// Advances `count` steps of `dt` seconds. `contact` sees the surface in each.
     /// Nothing is checked here: see [`super::stability`] for the step and [`Body::is_finite`].
     pub fn advance(
@@ -380,6 +400,8 @@ impl Body {
             if let Some(arm) = material.arm() {
                 law.arm_decay = (-dt / arm.relaxation_time_s).exp();
                 law.arm_gain = arm.ratio * (-0.5 * dt / arm.relaxation_time_s).exp();
+            } else if self.stiffness_damping_s > 0.0 {
+                law.arm_gain = self.stiffness_damping_s / dt;
             }
         }
         let features = Features {

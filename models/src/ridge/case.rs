@@ -1,7 +1,7 @@
 //! One case: a ridge, its tissue, its plate and its loading, with the declared defaults for what the
 //! paper leaves open.
 
-use super::{FrictionRule, Material, RidgeError, RidgeGeometry, Strain};
+use super::{FrictionRule, Material, Plate, RidgeError, RidgeGeometry, RidgeMesh, Strain};
 use crate::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 
@@ -46,8 +46,16 @@ pub struct RidgeCase {
     /// Contact penalty along the plate over that across it: 1 in the paper as it reads, which states one k. Above 0, up to 1.
     #[serde(default = "one")]
     pub tangential_penalty_ratio: f64,
+    /// A layer between skin and plate that yields along it, in series with the penalty: shear traction over slip in Pa/m. None in
+    /// the paper. Unlike the penalty, which is a node's, it is the same contact on every mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tangential_stiffness_pa_m: Option<f64>,
     /// Mass damping in 1/s.
     pub mass_damping_per_s: f64,
+    /// Stiffness-proportional damping in s: stress is that of the strain and so much times its rate. 0 by default. It divides the
+    /// stable step by its ratio at the mesh's highest frequency: hundreds, where it is critical at the plate's.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub stiffness_damping_s: f64,
     /// Elements, about.
     pub elements: usize,
     /// Sizes of the ridge.
@@ -60,6 +68,11 @@ pub struct RidgeCase {
 
 const fn one() -> f64 {
     1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// Mean pressure in Pa over the contact of a whole finger pressed with `normal_force_n`, growing with the
@@ -83,7 +96,9 @@ impl RidgeCase {
             poisson_ratio: 0.33,
             penalty_ratio: PENALTY_RATIO,
             tangential_penalty_ratio: one(),
+            tangential_stiffness_pa_m: None,
             mass_damping_per_s: MASS_DAMPING_PER_S,
+            stiffness_damping_s: 0.0,
             elements: ELEMENTS,
             geometry: RidgeGeometry::TABLE_1,
             friction: FrictionRule::Global,
@@ -122,6 +137,24 @@ impl RidgeCase {
         })
     }
 
+    /// The plate that the case's ridge meets. A node far from the tip, which stands for more than four spacings of it, has no
+    /// stiffer spring than four.
+    ///
+    /// # Errors
+    /// What [`Plate`] refuses.
+    pub fn plate(&self, built: &RidgeMesh) -> Result<Plate, RidgeError> {
+        let width = built.mesh.tributary_width_m(0);
+        let spring = self.penalty_ratio * self.young_modulus_pa;
+        let penalty =
+            width[..built.mesh.nx].iter().map(|w| spring * (w / built.tip_spacing_m).min(4.0)).collect();
+        let plate =
+            Plate::new(penalty, self.friction, self.mu0)?.softer_along(self.tangential_penalty_ratio)?;
+        match self.tangential_stiffness_pa_m {
+            Some(pa_per_m) => plate.layered(pa_per_m, &width),
+            None => Ok(plate),
+        }
+    }
+
     /// Refuses what makes no sense, naming the value.
     pub fn check(&self) -> Result<(), RidgeError> {
         let within = |what: &str, value: f64, low: f64, high: f64| {
@@ -140,7 +173,10 @@ impl RidgeCase {
         within("retardation_time_s", self.retardation_time_s, 0.0, 1e3)?;
         within("penalty_ratio", self.penalty_ratio, 0.1, 1e4)?;
         within("tangential_penalty_ratio", self.tangential_penalty_ratio, 1e-3, 1.0)?;
+        within("tangential_stiffness_pa_m", self.tangential_stiffness_pa_m.unwrap_or(1e12), 1e8, 1e20)?;
         within("mass_damping_per_s", self.mass_damping_per_s, 0.0, 1e8)?;
+        let damped = if self.retardation_time_s > 0.0 { 0.0 } else { 1e-3 };
+        within("stiffness_damping_s (0 where the tissue relaxes)", self.stiffness_damping_s, 0.0, damped)?;
         self.materials().iter().try_for_each(|m| m.check("tissue"))
     }
 }

@@ -35,7 +35,8 @@ pub struct ContactForce {
 #[derive(Clone, Debug)]
 pub struct Plate {
     penalty: Vec<f64>,
-    tangential_ratio: f64,
+    /// Springs along the plate, N/m per metre of depth.
+    along: Vec<f64>,
     stretch: Vec<f64>,
     load: Vec<f64>,
     rule: FrictionRule,
@@ -60,21 +61,45 @@ impl Plate {
             });
         }
         let n = penalty.len();
-        Ok(Plate { penalty, tangential_ratio: 1.0, stretch: vec![0.0; n], load: vec![0.0; n], rule, mu0 })
+        let along = penalty.clone();
+        Ok(Plate { penalty, along, stretch: vec![0.0; n], load: vec![0.0; n], rule, mu0 })
     }
 
     /// The same with springs along the plate that are softer than those across it by `ratio`, above 0 and up to 1.
     pub fn softer_along(self, ratio: f64) -> Result<Plate, RidgeError> {
         if ratio > 0.0 && ratio <= 1.0 {
-            return Ok(Plate { tangential_ratio: ratio, ..self });
+            let along = self.penalty.iter().map(|k| k * ratio).collect();
+            return Ok(Plate { along, ..self });
         }
         let range = "above 0, up to 1".into();
         Err(RidgeError::Input { what: "tangential penalty ratio".into(), value: ratio, range })
     }
 
+    /// The same with a layer on the plate, in series with the springs along it: of shear traction over slip `pa_per_m` (Pa/m, above 0),
+    /// at nodes that stand for `width_m` each. Unlike a node's spring it is the same contact on every mesh.
+    pub fn layered(self, pa_per_m: f64, width_m: &[f64]) -> Result<Plate, RidgeError> {
+        if !(pa_per_m > 0.0 && pa_per_m.is_finite()) || width_m.len() < self.along.len() {
+            let range = "above 0 and finite, with a width for each node".into();
+            return Err(RidgeError::Input {
+                what: "tangential stiffness in Pa/m".into(),
+                value: pa_per_m,
+                range,
+            });
+        }
+        let series =
+            |(k, w): (&f64, &f64)| if *k > 0.0 { 1.0 / (1.0 / k + 1.0 / (pa_per_m * w)) } else { 0.0 };
+        let along = self.along.iter().zip(width_m).map(series).collect();
+        Ok(Plate { along, ..self })
+    }
+
     /// Springs of the surface nodes, N/m per metre of depth.
     pub fn penalty(&self) -> &[f64] {
         &self.penalty
+    }
+
+    /// The same along the plate.
+    pub fn along(&self) -> &[f64] {
+        &self.along
     }
 
     /// Normal force on each surface node in the last step, N per metre of depth.
@@ -84,9 +109,9 @@ impl Plate {
 
     /// Energy stored in the contact springs, J per metre of depth.
     pub fn stored_energy(&self) -> f64 {
-        let each = self.penalty.iter().zip(&self.stretch).zip(&self.load);
-        let along = self.tangential_ratio;
-        each.map(|((k, s), f)| if *k > 0.0 { 0.5 * along * k * s * s + 0.5 * f * f / k } else { 0.0 }).sum()
+        let each = self.penalty.iter().zip(&self.along).zip(&self.stretch).zip(&self.load);
+        each.map(|(((k, along), s), f)| if *k > 0.0 { 0.5 * along * s * s + 0.5 * f * f / k } else { 0.0 })
+            .sum()
     }
 
     /// Presses and drags the surface: the plate stands at `height` (m) and moves along +x at `speed` (m/s).
@@ -99,7 +124,7 @@ impl Plate {
             if depth > 0.0 && *k > 0.0 {
                 let load = k * depth;
                 let limit = self.mu0 * load;
-                let along = k * self.tangential_ratio;
+                let along = self.along[i];
                 let mut stretch = self.stretch[i] + (speed - surface.vx[i]) * surface.dt;
                 if self.rule == FrictionRule::Local {
                     stretch = stretch.clamp(-limit / along, limit / along);
@@ -124,9 +149,9 @@ impl Plate {
             self.stretch.iter_mut().for_each(|s| *s *= share);
             sum.lateral *= share;
         }
-        for (i, k) in self.penalty.iter().enumerate() {
+        for (i, along) in self.along.iter().enumerate() {
             if self.load[i] > 0.0 {
-                let pull = k * self.tangential_ratio * self.stretch[i];
+                let pull = along * self.stretch[i];
                 surface.fx[i] -= pull;
                 surface.fy[i] -= self.load[i];
                 sum.power += pull * surface.vx[i] + self.load[i] * surface.vy[i];

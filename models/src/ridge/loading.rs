@@ -34,13 +34,19 @@ pub struct RunSettings {
     pub step_s: Option<f64>,
     /// Whether to count work and energy.
     pub energy: bool,
+    /// Amplitude from which the run comes, over the case's: 1 grows to it from rest, with contact kept as long as can be; more
+    /// comes down to it, from contact that is lost or doubled. From 1 to 10.
+    pub overshoot: f64,
 }
 
 impl Default for RunSettings {
     fn default() -> Self {
-        RunSettings { steady: Steady::default(), step_s: None, energy: true }
+        RunSettings { steady: Steady::default(), step_s: None, energy: true, overshoot: 1.0 }
     }
 }
+
+/// Cycles at the greater amplitude, where the run comes down to the case's.
+const OVERSHOOT_CYCLES: usize = 20;
 
 /// Work over the averaged cycles, J per metre of depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -126,13 +132,9 @@ impl Rig {
         case.check()?;
         let [corneum, dermis, soft] = case.materials();
         let built = case.geometry.mesh(corneum, dermis, soft, case.elements)?;
+        let plate = case.plate(&built)?;
         let mesh = built.mesh;
         let surface = mesh.tributary_width_m(0);
-        let spring = case.penalty_ratio * case.young_modulus_pa;
-        let penalty =
-            surface[..mesh.nx].iter().map(|w| spring * (w / built.tip_spacing_m).min(4.0)).collect();
-        let plate =
-            Plate::new(penalty, case.friction, case.mu0)?.softer_along(case.tangential_penalty_ratio)?;
         let spot: Vec<(usize, f64)> =
             (0..mesh.nx).filter(|i| mesh.x_m[*i].abs() <= 0.5 * SPOT_M).map(|i| (i, surface[i])).collect();
         let whole: f64 = spot.iter().map(|s| s.1).sum();
@@ -142,6 +144,7 @@ impl Rig {
         let base = (0..mesh.nx).map(|i| (start + i, width[i] / mesh.width_m())).collect();
         let mut body = Body::new(mesh, case.strain);
         body.hold_top();
+        body.damp_stiffness(case.stiffness_damping_s);
         body.count_energy(settings.energy);
         let stable = stability::contact_step_s(&body, plate.penalty());
         if let Some(asked_s) = settings.step_s
@@ -280,9 +283,24 @@ pub fn run_watched(
 
     let amplitude = case.amplitude.sine_amplitude_m();
     let mut history = Vec::new();
+    if !(1.0..=10.0).contains(&settings.overshoot) {
+        let range = "1 to 10".into();
+        return Err(RidgeError::Input { what: "overshoot".into(), value: settings.overshoot, range });
+    }
+    let first = amplitude * settings.overshoot;
     for ramp in 0..RAMP_CYCLES {
-        let share = |k: usize| amplitude * k as f64 / RAMP_CYCLES as f64;
+        let share = |k: usize| first * k as f64 / RAMP_CYCLES as f64;
         history.push(rig.cycle(per_bin, case.speed_m_s, share(ramp), share(ramp + 1)));
+    }
+    if settings.overshoot > 1.0 {
+        let down = |k: usize| first + (amplitude - first) * k as f64 / RAMP_CYCLES as f64;
+        let high = std::iter::repeat_n((first, first), OVERSHOOT_CYCLES);
+        for (from, to) in high.chain((0..RAMP_CYCLES).map(|k| (down(k), down(k + 1)))) {
+            let cycle = rig.cycle(per_bin, case.speed_m_s, from, to);
+            pull += FOLLOW * (cycle.mean_lateral() - pull);
+            rig.load(load, pull);
+            history.push(cycle);
+        }
     }
     let mut values: Vec<[f64; 2]> = Vec::new();
     let mut marks = Vec::new();

@@ -8,9 +8,12 @@
 //! | `body.rs` | the fields the kernel works on, energies |
 //! | `contact.rs` | the rigid plate, penalty and friction |
 //! | `stability.rs` | the stable time step |
+//! | `static_stiffness.rs` | `k_n`, `k_l` and their ratio, statically |
 //! | `case.rs` | one case and the declared defaults |
 //! | `loading.rs` | press, slide, vibrate (Fig. 6), and what is read from it |
+//! | `patch.rs` | several ridges, and a ridge of finite length |
 //! | `phase_curves.rs` | phase shift over a grid of skins, for the inverse analysis |
+//! | `short_study.rs` | Psi* from a part of Fig. 12, for surveys |
 //! | `study.rs` | parametric studies (Fig. 9), content keys |
 //! | `cycle.rs` | one vibration cycle, steadiness, phase, period doubling |
 //!
@@ -26,8 +29,11 @@ mod lanes;
 pub mod loading;
 pub mod material;
 pub mod mesh;
+pub mod patch;
 pub mod phase_curves;
+pub mod short_study;
 pub mod stability;
+pub mod static_stiffness;
 pub mod study;
 
 pub use body::{Body, Energy, Strain, Work};

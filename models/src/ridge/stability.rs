@@ -90,11 +90,22 @@ pub fn stable_step_s(highest_frequency_rad_s: f64) -> f64 {
     STEP_SAFETY * 2.0 / highest_frequency_rad_s * ((1.0 + xi * xi).sqrt() - xi)
 }
 
+/// The same with stiffness-proportional damping of `beta_s` seconds: half of it times the frequency adds to the damping ratio.
+pub fn damped_step_s(highest_frequency_rad_s: f64, beta_s: f64) -> f64 {
+    let xi = LINEAR_BULK_VISCOSITY + 0.5 * beta_s * highest_frequency_rad_s;
+    // The form that keeps its digits where the ratio is large.
+    STEP_SAFETY * 2.0 / highest_frequency_rad_s / ((1.0 + xi * xi).sqrt() + xi)
+}
+
 /// Stable time step in s of a body that meets a plate with these springs. Contact springs much stiffer than
 /// the elements gain energy each time they open or close near the limit: there the step is halved.
 pub fn contact_step_s(body: &Body, penalty: &[f64]) -> f64 {
     let bare = highest_frequency_rad_s(body, &[]);
     let closed = highest_frequency_rad_s(body, penalty);
     let stiffer = ((closed / bare - 2.0) / 1.0).clamp(0.0, 1.0);
-    stable_step_s(closed.max(bare)) * (1.0 - 0.5 * stiffer)
+    let step = match body.stiffness_damping_s() {
+        0.0 => stable_step_s(closed.max(bare)),
+        beta => damped_step_s(closed.max(bare), beta),
+    };
+    step * (1.0 - 0.5 * stiffer)
 }

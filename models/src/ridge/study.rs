@@ -7,9 +7,16 @@ pub const MODEL_VERSION: u32 = 1;
 
 /// The key of a case's result: a hash of the model's version and of everything that defines the run.
 pub fn content_key(case: &RidgeCase, settings: &RunSettings) -> String {
-    // One spring both ways is what every result had before there could be two: those stay what they are.
-    let inputs = format!("{case:?}").replace(" tangential_penalty_ratio: 1.0,", "");
-    format!("{:016x}", fnv1a(format!("{MODEL_VERSION} {inputs} {:?}", settings.steady).as_bytes()))
+    // What every result had before there was a choice: those stay what they are.
+    let unsaid = [
+        " tangential_penalty_ratio: 1.0,",
+        " tangential_stiffness_pa_m: None,",
+        " stiffness_damping_s: 0.0,",
+    ];
+    let inputs = unsaid.iter().fold(format!("{case:?}"), |all, one| all.replace(one, ""));
+    let start =
+        if settings.overshoot > 1.0 { format!(" from {}", settings.overshoot) } else { String::new() };
+    format!("{:016x}", fnv1a(format!("{MODEL_VERSION} {inputs} {:?}{start}", settings.steady).as_bytes()))
 }
 
 /// FNV-1a, 64 bits: a fingerprint of inputs, not a defence.
@@ -76,6 +83,12 @@ impl Panel {
 pub const FIG_9_AMPLITUDES_PP_M: [f64; 12] =
     [0.1e-6, 0.3e-6, 0.5e-6, 0.75e-6, 1.0e-6, 1.25e-6, 1.5e-6, 2.0e-6, 2.5e-6, 3.0e-6, 4.0e-6, 5.0e-6];
 
+/// A finer ladder: 20 amplitudes from 0.3 to 5 um, those of Fig. 12's caption among them.
+pub const FINE_AMPLITUDES_PP_M: [f64; 20] = [
+    0.3e-6, 0.4e-6, 0.5e-6, 0.6e-6, 0.7e-6, 0.8e-6, 0.9e-6, 1.0e-6, 1.15e-6, 1.3e-6, 1.5e-6, 1.75e-6, 2.0e-6,
+    2.25e-6, 2.5e-6, 2.75e-6, 3.0e-6, 3.5e-6, 4.0e-6, 5.0e-6,
+];
+
 /// One point of Fig. 9.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StudyPoint {
@@ -90,14 +103,19 @@ pub struct StudyPoint {
 /// The complete study of Fig. 9 about `base`: 5 panels of 4 curves of 12 amplitudes. The base curve is in
 /// every panel and has one content key, so it is run once.
 pub fn fig_9(base: RidgeCase) -> Vec<StudyPoint> {
+    fig_9_at(base, &FIG_9_AMPLITUDES_PP_M)
+}
+
+/// The same on another ladder of amplitudes, peak-to-peak in m.
+pub fn fig_9_at(base: RidgeCase, amplitudes_pp_m: &[f64]) -> Vec<StudyPoint> {
     let mut points = Vec::new();
     for panel in Panel::ALL {
         for value in panel.values() {
-            for amplitude in FIG_9_AMPLITUDES_PP_M {
+            for amplitude in amplitudes_pp_m {
                 points.push(StudyPoint {
                     panel,
                     value,
-                    case: panel.set(base, value).with_amplitude_pp_m(amplitude),
+                    case: panel.set(base, value).with_amplitude_pp_m(*amplitude),
                 });
             }
         }

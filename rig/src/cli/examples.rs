@@ -22,7 +22,11 @@ pub const EXAMPLES: &[(&str, &str)] = &[
         "calibrate phase",
         "muprime calibrate phase w1.csv w2.csv --rate-hz 1e6 --operator 'A. Smith' --serial tip-3",
     ),
-    ("calibrate finger", "muprime calibrate finger PHASES.csv --operator 'A. Smith' --serial tip-3"),
+    (
+        "calibrate finger",
+        "muprime calibrate finger PHASES.csv --operator 'A. Smith' --serial tip-3\n\
+        muprime calibrate finger --passes runs/monday/points.csv --operator 'A. Smith' --serial tip-3",
+    ),
     ("calibrate creep", "muprime calibrate creep creep.csv --operator 'A. Smith' --serial SN1"),
     ("calibrate gravity", "muprime calibrate gravity tilts.csv --operator 'A. Smith' --serial SN1"),
     ("calibrate noise", "muprime calibrate noise rest.csv --rate-hz 1000 --operator 'A. Smith' --serial SN1"),
@@ -56,6 +60,8 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("model ridge", "muprime model ridge --amplitude-pp-m 2e-6 --elements 200"),
     ("model table", "muprime model table --out study --threads 2"),
     ("model reproduce", "muprime model reproduce fig14 --out figures"),
+    ("model stiffness", "muprime model stiffness\nmuprime model stiffness --survey --elements 200"),
+    ("model patch", "muprime model patch --elements 200"),
     ("model effects", "muprime model effects squeeze_film"),
     ("model amplitude-for", "muprime model amplitude-for --mu-relative 0.4 --speed-m-s 0.02"),
     ("report", "muprime report runs/monday"),

@@ -3,9 +3,11 @@
 mod amplitude_for;
 mod conditions;
 mod effects;
+mod patch;
 mod point;
 mod reproduce;
 mod ridge;
+mod stiffness;
 mod table;
 
 use crate::say;
@@ -25,6 +27,10 @@ enum ModelVerb {
     Point(point::PointArgs),
     /// One case of the finite element ridge, to its steady state.
     Ridge(ridge::RidgeArgs),
+    /// What one ridge in plane strain leaves out: several ridges, and one of finite length.
+    Patch(patch::PatchArgs),
+    /// Static stiffnesses of the ridge across and along the plate, and their ratio.
+    Stiffness(stiffness::StiffnessArgs),
     /// A parametric study on all cores: Fig. 9, or the surrogate's table. Stop it and start it again at will.
     Table(table::TableArgs),
     /// The paper's figures recomputed, as CSV and SVG with a line of comparison each.
@@ -43,6 +49,8 @@ pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
     match args.verb {
         ModelVerb::Point(args) => point::run(&args, json),
         ModelVerb::Ridge(args) => ridge::run(&args, json),
+        ModelVerb::Patch(args) => patch::run(&args, json),
+        ModelVerb::Stiffness(args) => stiffness::run(&args, json),
         ModelVerb::Table(args) => table::run(&args, json),
         ModelVerb::Reproduce(args) => reproduce::run(&args, json),
         ModelVerb::Effects(args) => effects::run(&args, json),

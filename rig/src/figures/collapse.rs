@@ -3,11 +3,10 @@
 
 use super::plot::{Chart, Series};
 use super::reading::{self, Reading};
-use super::{Reproduced, store, study};
+use super::{Reproduced, Study, store};
 use miette::miette;
 use models::psi::{PSI_STAR, PSI_STAR_UNCERTAINTY, PsiEq17, relative_friction};
 use models::psi_fit;
-use models::ridge::RidgeCase;
 use models::ridge::study::{Panel, StudyPoint};
 use std::path::Path;
 
@@ -59,8 +58,9 @@ fn fitted<'a>(chosen: impl Iterator<Item = &'a Plotted>) -> Option<psi_fit::PsiF
 ///
 /// # Errors
 /// A study that is not whole.
-pub fn collapse(base: RidgeCase, out: &Path, reading: Reading) -> miette::Result<Reproduced> {
-    let found = study(base, out, reading)?;
+pub fn collapse(study: Study, out: &Path) -> miette::Result<Reproduced> {
+    let Study { base, reading, .. } = study;
+    let found = study.whole(out)?;
     let all: Vec<Plotted> = found.iter().map(|(point, kept)| Plotted::of(point, kept, reading)).collect();
     let drawn: Vec<&Plotted> = all.iter().filter(|p| p.is_drawn()).collect();
     let mut series: Vec<Series> = Vec::new();

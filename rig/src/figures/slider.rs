@@ -27,7 +27,7 @@ pub fn forces(reading: Reading) -> miette::Result<Reproduced> {
     let slip = cycle.slip_onset_s.map_or("none".into(), |t| format!("{:.3}", t * c.frequency_hz));
     Ok(Reproduced {
         lines: vec![format!(
-            "2 um: t_s* = {slip}, t_c* = {:.3}, mu' = {:.3}; paper: the force rises linearly to mu_0 F_reac, then follows it to zero",
+            "2 um: t_s* = {slip}, t_c* = {:.3}, mu' = {:.3}; paper: the force rises linearly to mu_0 F_reac, then follows it to zero (drawn; no number is stated)",
             cycle.contact_fraction, cycle.mu_relative
         )],
         charts: vec![Chart {
@@ -47,6 +47,26 @@ pub fn forces(reading: Reading) -> miette::Result<Reproduced> {
 /// Fig. 11: phase shift for normal stiffnesses of 0.2 to 4 MN/m at 0.5 N, both readings of section 4.1.
 pub fn phase_shift(reading: Reading) -> miette::Result<Reproduced> {
     let mut charts = Vec::new();
+    let mut told = Vec::new();
+    for kn in [0.2e6, 4e6] {
+        // Eq. 7 at 0.5 N: the sine's amplitude is F_n / k_n there.
+        let first = spring_slider::critical_amplitude(0.5, kn);
+        let finger =
+            Finger { normal_stiffness_n_per_m: kn, lateral_stiffness_n_per_m: kn / 2.6, ..Finger::paper() };
+        let touch = |w_um: f64| -> miette::Result<String> {
+            let cycle =
+                spring_slider::solve(&condition(reading, w_um * 1e-6, 0.5), &finger).into_diagnostic()?;
+            Ok(format!("{:.0}", cycle.touch_down_deg))
+        };
+        told.push(format!(
+            "k_n {} MN/m: contact is lost from {:.2} um, touch-down at {} deg at 1.35 um, {} at 2.5 um and {} at 5 um",
+            kn / 1e6,
+            1e6 * reading.w_m(first),
+            touch(1.35)?,
+            touch(2.5)?,
+            touch(5.0)?
+        ));
+    }
     for (name, touch) in [("fig11", true), ("fig11_acceleration", false)] {
         let mut series = Vec::new();
         for kn in [0.2e6, 0.5e6, 1e6, 2e6, 4e6] {
@@ -74,7 +94,7 @@ pub fn phase_shift(reading: Reading) -> miette::Result<Reproduced> {
     }
     Ok(Reproduced {
         charts,
-        lines: vec!["paper: the phase rises from zero at the loss of contact, the later the softer the spring; so here with the time of touch-down, while the acceleration's peak (just before separation) starts from 360 deg".into()],
+        lines: told.into_iter().chain(["paper: 0.2 to 4 MN/m give phases like the measured ones (transition at 0.4 to 1.3 um, about 90 deg beyond), rising from zero at the loss of contact, the later the softer the spring; so here with the time of touch-down, while the acceleration's peak (just before separation) starts from 360 deg".into()]).collect(),
     })
 }
 
@@ -93,10 +113,11 @@ pub fn slow_recovery(reading: Reading) -> miette::Result<Reproduced> {
     let last = |v: &[(f64, f64)]| v.last().map_or(f64::NAN, |p| p.1);
     Ok(Reproduced {
         lines: vec![format!(
-            "5 um: mu' climbs from {:.3} to {:.3} with 1.5 mm/s, and is {:.3} with instant recovery; paper: climbs to a value slightly less than mu_0 F_reac",
+            "5 um: mu' climbs from {:.3} to {:.3} with 1.5 mm/s, and is {:.3} with instant recovery; that is {:.3} of mu_0 F_reac in the end; paper: climbs to a value slightly less than mu_0 F_reac",
             held.first().map_or(f64::NAN, |p| p.1),
             last(&held),
-            last(&free)
+            last(&free),
+            last(&held)
         )],
         charts: vec![Chart {
             name: reading::file(reading, "fig13"),
@@ -124,7 +145,7 @@ pub fn steady_recovery(reading: Reading) -> miette::Result<Reproduced> {
     }
     Ok(Reproduced {
         lines: vec![format!(
-            "steady mu' at 5 um for recovery speeds in mm/s: {}; paper: falls as the recovery gets faster",
+            "steady mu' at 5 um for recovery speeds in mm/s: {}; paper: falls as the recovery gets faster, 1.5 to 15 mm/s (drawn; no value is stated)",
             at_five.join(", ")
         )],
         charts: vec![Chart {

@@ -4,9 +4,11 @@ use super::Common;
 use super::inverse;
 use super::tables::{Sources, columns};
 use calibration::finger::friction;
+use calibration::finger::springs;
 use calibration::finger::stiffness::{Stiffness, UltrasonicPoint, quasi_static, ultrasonic};
 use calibration::finger::{FingerError, FingerFit};
 use calibration::phase::table::read_phases;
+use models::rig_file::PassNoise;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -48,6 +50,15 @@ pub struct Args {
     /// Passes without vibration as CSV: normal_force_n, speed_m_s, lateral_force_n, optional contact_time_s
     #[arg(long)]
     friction: Option<PathBuf>,
+    /// A run's point table as CSV (points.csv): both stiffnesses and their ratio from its passes with vibration, by the spring-slider
+    #[arg(long)]
+    passes: Option<PathBuf>,
+    /// What the rig repeats to from pass to pass, relative (for --passes)
+    #[arg(long, default_value_t = models::rig_file::PassNoise::default().pass_relative_sd)]
+    pass_relative_sd: f64,
+    /// Standard deviation of a pass's mean force in N (for --passes)
+    #[arg(long, default_value_t = models::rig_file::PassNoise::default().force_sd_n)]
+    pass_force_sd_n: f64,
     /// Relative standard uncertainty of force over displacement (from their certificates)
     #[arg(long, default_value_t = 0.02)]
     scale_relative_sd: f64,
@@ -97,6 +108,16 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         let points = friction::read(bytes.as_slice()).map_err(|e| said(path, e))?;
         found.friction = Some(friction::friction(&points).map_err(|e| said(path, e))?);
     }
+    if let Some(path) = &args.passes {
+        let noise = PassNoise { pass_relative_sd: args.pass_relative_sd, force_sd_n: args.pass_force_sd_n };
+        if !(noise.pass_relative_sd >= 0.0 && noise.force_sd_n > 0.0) {
+            miette::bail!("--pass-relative-sd must be zero or more, and --pass-force-sd-n above zero");
+        }
+        let bytes = sources.read(path)?;
+        let passes = models::record::read_passes(bytes.as_slice())
+            .map_err(|e| miette::miette!("{}: {e}", path.display()))?;
+        found.springs = Some(springs::springs(&passes, &noise).map_err(|e| said(path, e))?);
+    }
     if let Some(path) = &args.phases {
         let bytes = sources.read(path)?;
         let points = read_phases(bytes.as_slice()).map_err(|e| miette::miette!("{}: {e}", path.display()))?;
@@ -111,11 +132,21 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
             inverse::analyse(&options, &points).map_err(|e| e.wrap_err(path.display().to_string()))?;
         (found.modulus, found.skin) = (Some(modulus), skin);
     }
-    if found.stiffness.is_empty() && found.friction.is_none() && found.modulus.is_none() {
+    if found.stiffness.is_empty()
+        && found.friction.is_none()
+        && found.modulus.is_none()
+        && found.springs.is_none()
+    {
         miette::bail!(
-            "nothing to calibrate: give a phase table, a loop, ultrasonic data, or friction passes"
+            "nothing to calibrate: give a phase table, a loop, ultrasonic data, friction passes, or a run's passes"
         );
     }
     let identified = serde_json::json!({ "elastic": found.modulus, "all_free": found.skin });
-    args.common.issue_with(found.outcome(), sources.raw_data(), json, [("skin", identified)])
+    let springs = serde_json::json!(found.springs);
+    args.common.issue_with(
+        found.outcome(),
+        sources.raw_data(),
+        json,
+        [("skin", identified), ("springs", springs)],
+    )
 }

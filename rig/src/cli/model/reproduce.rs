@@ -2,11 +2,11 @@
 
 use super::refused;
 use crate::figures::reading::{self, Reading};
-use crate::figures::{self, paper, store};
+use crate::figures::{self, Study, paper, store};
 use crate::out;
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, WrapErr};
-use models::ridge::study::{content_key, fig_9};
+use models::ridge::study::{FIG_9_AMPLITUDES_PP_M, FINE_AMPLITUDES_PP_M, content_key};
 use models::ridge::{RidgeCase, case};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -64,6 +64,9 @@ pub struct ReproduceArgs {
     /// How the paper's w is read: as its captions say, or as its Eqs. 7 and 14 have it [default: both]
     #[arg(long, value_parser = reading::parser())]
     reading: Option<Reading>,
+    /// Figs. 9 and 12 at 20 amplitudes from 0.3 to 5 um instead of 12 from 0.1
+    #[arg(long)]
+    fine: bool,
     /// Elements of each mesh, about
     #[arg(long, default_value_t = case::ELEMENTS)]
     elements: usize,
@@ -76,6 +79,9 @@ pub struct ReproduceArgs {
     /// Contact penalty along the plate over that across it, up to 1
     #[arg(long, default_value_t = 1.0)]
     tangential_penalty_ratio: f64,
+    /// A layer that yields along the plate, in series with the penalty: traction over slip in Pa/m
+    #[arg(long, allow_negative_numbers = true)]
+    tangential_stiffness_pa_m: Option<f64>,
 }
 
 impl ReproduceArgs {
@@ -86,6 +92,7 @@ impl ReproduceArgs {
             mean_pressure_pa: self.mean_pressure_pa,
             mass_damping_per_s: self.mass_damping_per_s,
             tangential_penalty_ratio: self.tangential_penalty_ratio,
+            tangential_stiffness_pa_m: self.tangential_stiffness_pa_m,
             ..RidgeCase::paper()
         }
     }
@@ -120,16 +127,17 @@ pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
 /// One figure under one reading: its files, and its lines on standard output.
 fn one(args: &ReproduceArgs, figure: Figure, name: &str, reading: Reading, json: bool) -> miette::Result<()> {
     let base = args.base();
+    let study = Study { base, reading, w_m: ladder(args.fine) };
     let reproduced = match figure {
         Figure::Fig4 => figures::phase_shift(base, &args.out, reading)?,
         Figure::Fig5 => figures::velocities(base, reading)?,
         Figure::Fig6 => figures::loading(base)?,
         Figure::Fig7 => figures::reaction_force(base, reading)?,
         Figure::Fig8 => figures::lateral_force(base, reading)?,
-        Figure::Fig9 => figures::parametric_study(base, &args.out, reading)?,
+        Figure::Fig9 => figures::parametric_study(study, &args.out)?,
         Figure::Fig10 => figures::slider::forces(reading)?,
         Figure::Fig11 => figures::slider::phase_shift(reading)?,
-        Figure::Fig12 => figures::collapse(base, &args.out, reading)?,
+        Figure::Fig12 => figures::collapse(study, &args.out)?,
         Figure::Fig13 => figures::slider::slow_recovery(reading)?,
         Figure::Fig14 => figures::slider::steady_recovery(reading)?,
         Figure::All => return Ok(()),
@@ -162,8 +170,13 @@ fn one(args: &ReproduceArgs, figure: Figure, name: &str, reading: Reading, json:
     Ok(())
 }
 
+/// The amplitudes of Fig. 9, or the finer ladder.
+pub fn ladder(fine: bool) -> &'static [f64] {
+    if fine { &FINE_AMPLITUDES_PP_M } else { &FIG_9_AMPLITUDES_PP_M }
+}
+
 /// The complete study as one table.
-pub fn write_fig_9_table(file: &Path, base: RidgeCase, results: &store::Results) -> miette::Result<()> {
+pub fn write_fig_9_table(file: &Path, study: Study, results: &store::Results) -> miette::Result<()> {
     let mut csv = csv::Writer::from_path(file)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot write {}", file.display()))?;
@@ -188,7 +201,7 @@ pub fn write_fig_9_table(file: &Path, base: RidgeCase, results: &store::Results)
         "key",
     ])
     .into_diagnostic()?;
-    for point in fig_9(base) {
+    for point in study.points() {
         let c = &point.case;
         let key = content_key(c, &figures::settings());
         let Some(kept) = results.get(&key) else { continue };

@@ -1,5 +1,7 @@
 //! `muprime model ridge`: one case of the finite element model.
 
+mod start;
+
 use super::conditions::ConditionArgs;
 use super::refused;
 use crate::progress::Study;
@@ -11,6 +13,7 @@ use models::ridge::{
     self, FrictionRule, RidgeCase, RidgeError, RidgeProfile, RidgeRun, RunSettings, Strain, case,
 };
 use serde::Serialize;
+use start::OtherStart;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -38,12 +41,21 @@ pub struct RidgeArgs {
     /// Contact penalty along the plate over that across it, up to 1
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     tangential_penalty_ratio: f64,
+    /// A layer between skin and plate that yields along it, in series with the penalty: traction over slip in Pa/m
+    #[arg(long, allow_negative_numbers = true)]
+    tangential_stiffness_pa_m: Option<f64>,
     /// Mean pressure of the gross contact in Pa (from the force, by Hertz, if left out)
     #[arg(long, allow_negative_numbers = true)]
     mean_pressure_pa: Option<f64>,
     /// Mass damping in 1/s
     #[arg(long, default_value_t = case::MASS_DAMPING_PER_S, allow_negative_numbers = true)]
     mass_damping_per_s: f64,
+    /// Stiffness-proportional damping in s (needs far smaller steps)
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    stiffness_damping_s: f64,
+    /// Run it a second time, down from twice the amplitude, and say whether the answer depends on the start
+    #[arg(long)]
+    both_starts: bool,
     /// Number of elements, about
     #[arg(long, default_value_t = case::ELEMENTS)]
     elements: usize,
@@ -71,7 +83,9 @@ impl RidgeArgs {
         case.retardation_time_s = self.retardation_time_s;
         case.penalty_ratio = self.penalty_ratio;
         case.tangential_penalty_ratio = self.tangential_penalty_ratio;
+        case.tangential_stiffness_pa_m = self.tangential_stiffness_pa_m;
         case.mass_damping_per_s = self.mass_damping_per_s;
+        case.stiffness_damping_s = self.stiffness_damping_s;
         case.elements = self.elements;
         case.friction = if self.local_friction { FrictionRule::Local } else { FrictionRule::Global };
         case.strain = if self.small_strain { Strain::Small } else { Strain::Objective };
@@ -94,6 +108,9 @@ struct Answer<'a> {
     wall_seconds: f64,
     element_updates_per_second: f64,
     case: &'a RidgeCase,
+    /// Where it was run from both starts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    from_above: Option<&'a OtherStart>,
 }
 
 /// What there is where Ctrl-C ends a case: the cycles so far, which need not be steady.
@@ -123,7 +140,7 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
     if !(args.tolerance > 0.0 && args.tolerance < 1.0) {
         return refused(format!("--tolerance {}: above 0 and below 1", args.tolerance));
     }
-    let start = Instant::now();
+    let clock = Instant::now();
     // It ends where the cycles are steady: the time to go is the longest.
     let most = settings.steady.at_most;
     let study = Study::begin(most as u64, "cycles at most", move |mu: Vec<f64>, cycles| {
@@ -131,18 +148,23 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
     })?;
     let run = ridge::run_watched(&case, &settings, &mut |mu_relative| study.done(Some(mu_relative)));
     drop(study);
-    let run = match run {
-        Ok(run) => run,
+    let wall_seconds = clock.elapsed().as_secs_f64();
+    let other = match (&run, args.both_starts) {
+        (Ok(run), true) => start::from_above(&case, &settings, run).map(Some),
+        _ => Ok(None),
+    };
+    let (run, other) = match run.and_then(|run| other.map(|other| (run, other))) {
+        Ok(both) => both,
         Err(why @ RidgeError::Diverged) => {
             say!("{why}");
             return Ok(ExitCode::from(1));
         }
         Err(why) => return refused(why),
     };
-    let wall_seconds = start.elapsed().as_secs_f64();
     let updates = run.elements as f64 * run.steps as f64;
-    let answer =
-        Answer { run: &run, wall_seconds, element_updates_per_second: updates / wall_seconds, case: &case };
+    let element_updates_per_second = updates / wall_seconds;
+    let from_above = other.as_ref();
+    let answer = Answer { run: &run, wall_seconds, element_updates_per_second, case: &case, from_above };
     if json {
         out!("{}", serde_json::to_string(&answer).into_diagnostic()?);
         return Ok(ExitCode::SUCCESS);
@@ -181,5 +203,13 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
         wall_seconds,
         answer.element_updates_per_second / 1e6
     );
+    if let Some(other) = &other {
+        out!("{}", other.words(&run));
+    } else if start::is_lightly_damped(&case) {
+        out!(
+            "lightly damped: below {:e} /s the answer may depend on how the run began; --both-starts tells",
+            start::LIGHTLY_DAMPED_PER_S
+        );
+    }
     Ok(ExitCode::SUCCESS)
 }

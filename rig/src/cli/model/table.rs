@@ -1,13 +1,15 @@
 //! `muprime model table`: the study of Fig. 9, or the surrogate's table.
 
+mod phases;
+
 use super::{refused, reproduce};
-use crate::figures::fig_9_results;
-use crate::figures::reading::Reading;
+use crate::figures::Study;
+use crate::figures::reading::{self, Reading};
 use crate::figures::store::{self, Kept};
 use crate::{out, say};
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr};
-use models::ridge::study::{content_key, fig_9};
+use models::ridge::study::content_key;
 use models::ridge::{RidgeCase, case};
 use models::surrogate::{Grid, GridPoint, InterpolationError, Surrogate, TableResult};
 use std::path::{Path, PathBuf};
@@ -29,9 +31,38 @@ pub struct TableArgs {
     /// Elements of each mesh in the study of Fig. 9, about
     #[arg(long, default_value_t = case::ELEMENTS)]
     elements: usize,
+    /// How the paper's w is read
+    #[arg(long, value_parser = reading::parser(), default_value = "peak-to-peak")]
+    reading: Reading,
+    /// At rest, for the phase shift: frequencies, moduli and forces
+    #[arg(long)]
+    at_rest: bool,
+    /// 20 amplitudes from 0.3 to 5 um instead of 12 from 0.1
+    #[arg(long)]
+    fine: bool,
+    /// Mean pressure at 0.25 N in Pa
+    #[arg(long, default_value_t = case::MEAN_PRESSURE_AT_QUARTER_NEWTON_PA)]
+    mean_pressure_pa: f64,
+    /// Mass damping in 1/s
+    #[arg(long, default_value_t = case::MASS_DAMPING_PER_S)]
+    mass_damping_per_s: f64,
     /// Threads (all cores if left out)
     #[arg(long)]
     threads: Option<usize>,
+}
+
+impl TableArgs {
+    fn study(&self) -> Study {
+        let paper = RidgeCase::paper();
+        let base = RidgeCase {
+            elements: self.elements,
+            mean_pressure_pa: self.mean_pressure_pa,
+            mass_damping_per_s: self.mass_damping_per_s,
+            speed_m_s: if self.at_rest { 0.0 } else { paper.speed_m_s },
+            ..paper
+        };
+        Study { base, reading: self.reading, w_m: reproduce::ladder(self.fine) }
+    }
 }
 
 /// Runs what is missing of the study and writes its table.
@@ -39,7 +70,7 @@ pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
     if args.threads == Some(0) {
         return refused("--threads 0: at least one is needed");
     }
-    if let Err(why) = (RidgeCase { elements: args.elements, ..RidgeCase::paper() }).check() {
+    if let Err(why) = args.study().base.check() {
         return refused(why);
     }
     std::fs::create_dir_all(&args.out)
@@ -49,7 +80,7 @@ pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
         rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0)).build().into_diagnostic()?;
     let start = Instant::now();
     let (file, cases, failed) = pool.install(|| {
-        if args.surrogate { surrogate(&args.out) } else { fig_9_study(&args.out, args.elements) }
+        if args.surrogate { surrogate(&args.out) } else { fig_9_study(&args.out, args.study()) }
     })?;
     let seconds = start.elapsed().as_secs_f64();
     if json {
@@ -63,12 +94,18 @@ pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
     Ok(ExitCode::from(u8::from(failed > 0)))
 }
 
-fn fig_9_study(out: &Path, elements: usize) -> miette::Result<(PathBuf, usize, usize)> {
-    let base = RidgeCase { elements, ..RidgeCase::paper() };
-    let (results, failed) = fig_9_results(out, base, Reading::PeakToPeak)?;
-    let file = out.join("fig9.csv");
-    reproduce::write_fig_9_table(&file, base, &results)?;
-    Ok((file, fig_9(base).len(), failed))
+fn fig_9_study(out: &Path, study: Study) -> miette::Result<(PathBuf, usize, usize)> {
+    let (results, failed) = study.results(out)?;
+    let name = if study.base.speed_m_s == 0.0 { "fig9_at_rest" } else { "fig9" };
+    let file = out.join(format!("{}.csv", reading::file(study.reading, name)));
+    reproduce::write_fig_9_table(&file, study, &results)?;
+    let points = study.points();
+    if study.base.speed_m_s == 0.0 {
+        for line in phases::lines(study, &results) {
+            say!("{line}");
+        }
+    }
+    Ok((file, points.len(), failed))
 }
 
 fn surrogate(out: &Path) -> miette::Result<(PathBuf, usize, usize)> {

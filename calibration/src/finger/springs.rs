@@ -1,0 +1,229 @@
+//! Both stiffnesses of the spring-slider from passes with and without vibration, and above all their ratio `k_l / k_n`, which decides
+//! the law of friction (Eq. 16).
+//!
+//! Least squares on the forces in `ln k_n`, `ln (k_l / k_n)` and `ln mu_0` with no prior: each pass weighs by what the rig repeats to. The
+//! interval of the ratio is its profile, `k_n` and `mu_0` searched anew at each value. Where the passes scatter more than stated, the
+//! interval is as much wider.
+
+use super::FingerError;
+use models::condition::Condition;
+use models::finger::Finger;
+use models::quantity::PeakToPeak;
+use models::record::{Pass, coulomb_coefficient};
+use models::rig_file::PassNoise;
+use models::spring_slider;
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+/// Range of the ratio that is searched.
+pub const RATIO_RANGE: [f64; 2] = [0.02, 5.0];
+/// Range of the normal stiffness that is searched, N/m.
+const STIFFNESS_RANGE_N_PER_M: [f64; 2] = [2e4, 2e8];
+/// Passes with vibration that it takes: three quantities, and something to judge them by.
+const FEWEST: usize = 6;
+
+/// What passes say of the springs.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Springs {
+    /// `k_n`, N/m.
+    pub normal_stiffness_n_per_m: f64,
+    /// `k_l`, N/m.
+    pub lateral_stiffness_n_per_m: f64,
+    /// `k_l / k_n`.
+    pub lateral_over_normal: f64,
+    /// Its 95 % profile interval.
+    pub ratio_ci95: [f64; 2],
+    /// Whether each end was found within the range searched.
+    pub ratio_closed: [bool; 2],
+    /// The 95 % profile interval of `k_n`, N/m.
+    pub normal_ci95_n_per_m: [f64; 2],
+    /// Whether each of its ends was found.
+    pub normal_closed: [bool; 2],
+    /// Coefficient of friction without vibration.
+    pub mu0: f64,
+    /// Passes with vibration.
+    pub passes: usize,
+    /// Chi-square over its degrees of freedom: 1 where the slider explains the passes to what the rig repeats to.
+    pub reduced_chi2: f64,
+    /// Root mean square of the residuals, N.
+    pub residual_rms_n: f64,
+}
+
+struct Row {
+    condition: Condition,
+    force_n: f64,
+    sd_n: f64,
+}
+
+/// One search: its place in (ln k_n, ln ratio, ln mu_0), and chi-square there.
+#[derive(Clone, Copy)]
+struct Found {
+    at: [f64; 3],
+    chi2: f64,
+}
+
+/// Fits the springs to passes.
+///
+/// # Errors
+/// Fewer than six passes with vibration and a force, or none without vibration.
+pub fn springs(passes: &[Pass], noise: &PassNoise) -> Result<Springs, FingerError> {
+    let mu0 = coulomb_coefficient(passes).filter(|mu0| *mu0 > 0.0).ok_or(FingerError::TooFew {
+        what: "passes without vibration",
+        found: 0,
+        needed: 1,
+    })?;
+    let rows: Vec<Row> = passes
+        .iter()
+        .filter_map(|p| {
+            let force_n = p.friction_force_n()?;
+            let sd_n = (noise.pass_relative_sd * force_n).hypot(noise.force_sd_n);
+            Some(Row { condition: p.condition(mu0), force_n, sd_n })
+        })
+        .filter(|r| r.condition.check().is_ok())
+        .collect();
+    let vibrating = rows.iter().filter(|r| r.condition.amplitude != PeakToPeak::ZERO).count();
+    if vibrating < FEWEST {
+        return Err(FingerError::TooFew { what: "passes with vibration", found: vibrating, needed: FEWEST });
+    }
+    // A coarse look at the whole range, then the best three places.
+    let [ratios, stiffnesses] = [RATIO_RANGE, STIFFNESS_RANGE_N_PER_M].map(|range| range.map(f64::ln));
+    let place = |range: [f64; 2], k: usize, n: usize| range[0] + (range[1] - range[0]) * k as f64 / n as f64;
+    let mut starts: Vec<Found> = Vec::new();
+    for k in 0..=16 {
+        for r in 0..=12 {
+            let at = [place(stiffnesses, k, 16), place(ratios, r, 12), mu0.ln()];
+            starts.push(Found { at, chi2: chi2(&rows, at) });
+        }
+    }
+    starts.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    let searched = starts[..3].iter().map(|s| search(&rows, *s, [true; 3]));
+    let best = searched.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).unwrap_or(starts[0]);
+    let dof = rows.len() as f64 - 3.0;
+    let reduced_chi2 = best.chi2 / dof;
+    // One quantity against the scatter of the passes, which is not believed to be less than stated.
+    let f95 = FisherSnedecor::new(1.0, dof).map_or(3.84, |f| f.inverse_cdf(0.95));
+    let allowed = best.chi2 + f95 * reduced_chi2.max(1.0);
+    let profile = |axis: usize, range: [f64; 2]| -> ([f64; 2], [bool; 2]) {
+        let ends = [range[0], range[1]].map(|end| profile_end(&rows, best, axis, end, allowed));
+        (ends.map(|e| e.0.exp()), ends.map(|e| e.1))
+    };
+    let (ratio_ci95, ratio_closed) = profile(1, ratios);
+    let (normal_ci95_n_per_m, normal_closed) = profile(0, stiffnesses);
+    let [normal, ratio, mu0] = best.at.map(f64::exp);
+    let left: f64 = rows.iter().map(|r| (residual(r, best.at) * r.sd_n).powi(2)).sum();
+    Ok(Springs {
+        normal_stiffness_n_per_m: normal,
+        lateral_stiffness_n_per_m: normal * ratio,
+        lateral_over_normal: ratio,
+        ratio_ci95,
+        ratio_closed,
+        normal_ci95_n_per_m,
+        normal_closed,
+        mu0,
+        passes: vibrating,
+        reduced_chi2,
+        residual_rms_n: (left / rows.len() as f64).sqrt(),
+    })
+}
+
+/// Residual of a pass in its standard deviations.
+fn residual(row: &Row, at: [f64; 3]) -> f64 {
+    let [normal, ratio, mu0] = at.map(f64::exp);
+    let condition = Condition { mu0, ..row.condition };
+    let finger = Finger {
+        normal_stiffness_n_per_m: normal,
+        lateral_stiffness_n_per_m: normal * ratio,
+        ..Finger::paper()
+    };
+    let mu_relative = if condition.amplitude == PeakToPeak::ZERO {
+        1.0
+    } else {
+        spring_slider::solve(&condition, &finger).map_or(f64::NAN, |cycle| cycle.mu_relative)
+    };
+    (mu_relative * mu0 * condition.normal_force_n - row.force_n) / row.sd_n
+}
+
+fn chi2(rows: &[Row], at: [f64; 3]) -> f64 {
+    let sum: f64 = rows.iter().map(|r| residual(r, at).powi(2)).sum();
+    if sum.is_finite() { sum } else { f64::INFINITY }
+}
+
+/// Levenberg's search from a start in the quantities that are free.
+fn search(rows: &[Row], start: Found, free: [bool; 3]) -> Found {
+    let axes: Vec<usize> = (0..3).filter(|k| free[*k]).collect();
+    let (mut here, mut damping) = (start, 1e-3);
+    for _ in 0..60 {
+        let base = DVector::from_iterator(rows.len(), rows.iter().map(|r| residual(r, here.at)));
+        let mut slope = DMatrix::zeros(rows.len(), axes.len());
+        for (column, axis) in axes.iter().enumerate() {
+            const H: f64 = 1e-5;
+            let (mut up, mut down) = (here.at, here.at);
+            up[*axis] += H;
+            down[*axis] -= H;
+            for (i, row) in rows.iter().enumerate() {
+                slope[(i, column)] = (residual(row, up) - residual(row, down)) / (2.0 * H);
+            }
+        }
+        let (square, pull) = (slope.transpose() * &slope, slope.transpose() * &base);
+        let mut gained = None;
+        while damping < 1e9 {
+            let mut matrix = square.clone();
+            for k in 0..axes.len() {
+                matrix[(k, k)] += damping * square[(k, k)].max(1e-12);
+            }
+            let mut next = here;
+            if let Some(step) = matrix.cholesky().map(|c| c.solve(&pull)) {
+                for (k, axis) in axes.iter().enumerate() {
+                    next.at[*axis] -= step[k].clamp(-0.7, 0.7);
+                }
+                next.chi2 = chi2(rows, next.at);
+                if next.chi2 < here.chi2 {
+                    gained = Some(next);
+                    break;
+                }
+            }
+            damping *= 5.0;
+        }
+        let Some(next) = gained else { break };
+        let small = here.chi2 - next.chi2 < 1e-8 * (1.0 + here.chi2);
+        (here, damping) = (next, (damping / 10.0).max(1e-12));
+        if small {
+            break;
+        }
+    }
+    here
+}
+
+/// Where the profile along an axis passes what is allowed, towards `end`; and whether it does.
+fn profile_end(rows: &[Row], best: Found, axis: usize, end: f64, allowed: f64) -> (f64, bool) {
+    let mut free = [true; 3];
+    free[axis] = false;
+    let at = |value: f64, from: Found| {
+        let mut start = from;
+        start.at[axis] = value;
+        start.chi2 = chi2(rows, start.at);
+        search(rows, start, free)
+    };
+    let outwards = (end - best.at[axis]).signum();
+    let (mut inside, mut step) = (best, 0.01);
+    loop {
+        let next = inside.at[axis] + outwards * step;
+        if (end - next) * outwards <= 0.0 {
+            let last = at(end, inside);
+            if last.chi2 <= allowed {
+                return (end, false);
+            }
+        }
+        let place = if (end - next) * outwards <= 0.0 { end } else { next };
+        let there = at(place, inside);
+        if there.chi2 > allowed {
+            let (mut low, mut high) = (inside, there.at[axis]);
+            for _ in 0..20 {
+                let middle = at(0.5 * (low.at[axis] + high), low);
+                if middle.chi2 > allowed { high = middle.at[axis] } else { low = middle }
+            }
+            return (0.5 * (low.at[axis] + high), true);
+        }
+        (inside, step) = (there, 1.6 * step);
+    }
+}
