@@ -1,6 +1,7 @@
 //! The moving body: its nodes, stresses and constants, field by field (SoA), row by row.
 
 use super::kernel::{self, Features, Step, Surface};
+use super::lanes::Instructions;
 use super::{Mesh, RidgeError};
 
 /// Stiffness of the hourglass control: K = c (lambda + 2G) A sum(b_i b_i). 0.05 to 0.1 is usual.
@@ -147,6 +148,7 @@ pub struct Body {
     strain: Strain,
     viscous: bool,
     count_energy: bool,
+    pub(super) instructions: Instructions,
     mesh: Mesh,
 }
 
@@ -237,6 +239,7 @@ impl Body {
             strain,
             viscous,
             count_energy: false,
+            instructions: Instructions::Widest,
             mesh,
         }
     }
@@ -249,6 +252,12 @@ impl Body {
     /// Whether to count work from now on (slower by about a tenth).
     pub fn count_energy(&mut self, on: bool) {
         self.count_energy = on;
+    }
+
+    /// Chooses the instructions of the kernel, for comparisons; what this machine lacks gives the widest it has
+    /// (ask [`Instructions::here`] first).
+    pub fn use_instructions(&mut self, instructions: Instructions) {
+        self.instructions = instructions;
     }
 
     /// Index of the node in column `i` of row `j`.

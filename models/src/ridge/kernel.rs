@@ -94,7 +94,7 @@ pub(super) fn run(
             }
         }
     }
-    let arch = pulp::Arch::new();
+    let arch = body.instructions.arch().unwrap_or_default();
     macro_rules! dispatch {
         ($objective:literal, $viscous:literal, $energy:literal) => {
             arch.dispatch(Steps::<_, $objective, $viscous, $energy> { body, step, count, contact })

@@ -35,6 +35,7 @@ pub use case::RidgeCase;
 pub use contact::{ContactForce, FrictionRule, Plate};
 pub use cycle::{Cycle, Steady};
 pub use kernel::Surface;
+pub use lanes::Instructions;
 pub use loading::{RidgeRun, RunSettings, run, run_watched};
 pub use material::Material;
 pub use mesh::{Mesh, RidgeGeometry, RidgeMesh, RidgeProfile};
