@@ -2,7 +2,7 @@
 
 use crate::quantity::PeakToPeak;
 use crate::ridge::study::{content_key, fnv1a};
-use crate::ridge::{RidgeCase, RunSettings, Steady};
+use crate::ridge::{RidgeCase, RunSettings};
 
 /// A logarithmic axis with equal ratios.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,7 +84,7 @@ impl Grid {
 
     /// How the table's cases are run.
     pub fn settings() -> RunSettings {
-        RunSettings { steady: Steady::default(), step_s: None, energy: false }
+        RunSettings { energy: false, ..RunSettings::default() }
     }
 
     /// The case at a place (see [`GridPoint::place`]).
