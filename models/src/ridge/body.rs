@@ -1,6 +1,9 @@
 //! The moving body: its nodes, stresses and constants, field by field (SoA), row by row.
 
+use super::field::Field;
 use super::kernel::{self, Features, Step, Surface};
+use super::lanes::Instructions;
+use super::layers::Layer;
 use super::{Mesh, RidgeError};
 
 /// Stiffness of the hourglass control: K = c (lambda + 2G) A sum(b_i b_i). 0.05 to 0.1 is usual.
@@ -40,40 +43,40 @@ pub(super) struct RowLaw {
 /// First geometry of the elements, for small strain.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shape {
-    pub dx13: Vec<f64>,
-    pub dy13: Vec<f64>,
-    pub dx24: Vec<f64>,
-    pub dy24: Vec<f64>,
-    pub half_over_area: Vec<f64>,
-    pub hx: Vec<f64>,
-    pub hy: Vec<f64>,
+    pub dx13: Field,
+    pub dy13: Field,
+    pub dx24: Field,
+    pub dy24: Field,
+    pub half_over_area: Field,
+    pub hx: Field,
+    pub hy: Field,
 }
 
 /// Stress of the viscous arms, Pa.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ArmStress {
-    pub mean: Vec<f64>,
-    pub difference: Vec<f64>,
-    pub shear: Vec<f64>,
+    pub mean: Field,
+    pub difference: Field,
+    pub shear: Field,
 }
 
 /// Forces under way between an element row and the node rows beside it, N/m.
 #[derive(Clone, Debug)]
 pub(super) struct ForceRows {
-    pub left_x: Vec<f64>,
-    pub left_y: Vec<f64>,
-    pub right_x: Vec<f64>,
-    pub right_y: Vec<f64>,
-    pub owed3_x: Vec<f64>,
-    pub owed3_y: Vec<f64>,
-    pub owed4_x: Vec<f64>,
-    pub owed4_y: Vec<f64>,
+    pub left_x: Field,
+    pub left_y: Field,
+    pub right_x: Field,
+    pub right_y: Field,
+    pub owed3_x: Field,
+    pub owed3_y: Field,
+    pub owed4_x: Field,
+    pub owed4_y: Field,
 }
 
 impl ForceRows {
     fn new(nx: usize, stride: usize) -> Self {
-        let row = || vec![0.0; stride];
-        let owed = || vec![0.0; nx];
+        let row = || Field::zeros(stride);
+        let owed = || Field::zeros(nx);
         ForceRows {
             left_x: row(),
             left_y: row(),
@@ -124,21 +127,21 @@ pub struct Body {
     pub(super) stride: usize,
     pub(super) periodic: bool,
     pub(super) width: f64,
-    pub(super) x: Vec<f64>,
-    pub(super) y: Vec<f64>,
-    pub(super) vx: Vec<f64>,
-    pub(super) vy: Vec<f64>,
-    pub(super) mass: Vec<f64>,
-    pub(super) inverse_mass: Vec<f64>,
-    pub(super) load_x: Vec<f64>,
-    pub(super) load_y: Vec<f64>,
-    pub(super) mean: Vec<f64>,
-    pub(super) difference: Vec<f64>,
-    pub(super) shear: Vec<f64>,
-    pub(super) hourglass_x: Vec<f64>,
-    pub(super) hourglass_y: Vec<f64>,
-    pub(super) hourglass_stiffness: Vec<f64>,
-    pub(super) length: Vec<f64>,
+    pub(super) x: Field,
+    pub(super) y: Field,
+    pub(super) vx: Field,
+    pub(super) vy: Field,
+    pub(super) mass: Field,
+    pub(super) inverse_mass: Field,
+    pub(super) load_x: Field,
+    pub(super) load_y: Field,
+    pub(super) mean: Field,
+    pub(super) difference: Field,
+    pub(super) shear: Field,
+    pub(super) hourglass_x: Field,
+    pub(super) hourglass_y: Field,
+    pub(super) hourglass_stiffness: Field,
+    pub(super) length: Field,
     pub(super) shape: Shape,
     pub(super) arm: ArmStress,
     pub(super) laws: Vec<RowLaw>,
@@ -148,6 +151,10 @@ pub struct Body {
     viscous: bool,
     stiffness_damping_s: f64,
     count_energy: bool,
+    pub(super) instructions: Instructions,
+    pub(super) layers: Vec<Layer>,
+    /// Steps of the surface so far.
+    pub(super) clock: usize,
     mesh: Mesh,
 }
 
@@ -156,7 +163,7 @@ impl Body {
     pub fn new(mesh: Mesh, strain: Strain) -> Body {
         let (nx, ny, stride) = (mesh.nx, mesh.ny, mesh.stride());
         let (nodes, elements) = (stride * (ny + 1), nx * ny);
-        let mut shape = Shape::default();
+        let mut shape: [Vec<f64>; 7] = Default::default();
         let mut hourglass_stiffness = Vec::with_capacity(elements);
         let mut length = Vec::with_capacity(elements);
         let mut laws = Vec::with_capacity(ny);
@@ -179,13 +186,16 @@ impl Body {
                 let (r1, r2, r3, r4) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
                 let (dx13, dy13, dx24, dy24) = (r1.0 - r3.0, r1.1 - r3.1, r2.0 - r4.0, r2.1 - r4.1);
                 let area = mesh.area_m2(i, j);
-                shape.dx13.push(dx13);
-                shape.dy13.push(dy13);
-                shape.dx24.push(dx24);
-                shape.dy24.push(dy24);
-                shape.half_over_area.push(0.5 / area);
-                shape.hx.push(r1.0 - r2.0 + r3.0 - r4.0);
-                shape.hy.push(r1.1 - r2.1 + r3.1 - r4.1);
+                let of = [
+                    dx13,
+                    dy13,
+                    dx24,
+                    dy24,
+                    0.5 / area,
+                    r1.0 - r2.0 + r3.0 - r4.0,
+                    r1.1 - r2.1 + r3.1 - r4.1,
+                ];
+                shape.iter_mut().zip(of).for_each(|(field, value)| field.push(value));
                 // sum over corners of b_i b_i, b the gradient of the shape functions.
                 let gradients = (dx13 * dx13 + dy13 * dy13 + dx24 * dx24 + dy24 * dy24) / (2.0 * area * area);
                 hourglass_stiffness.push(
@@ -198,13 +208,16 @@ impl Body {
                 length.push((1.0 / gradients).sqrt());
             }
         }
-        let mass = mesh.lumped_mass_kg_m();
+        let [dx13, dy13, dx24, dy24, half_over_area, hx, hy] = shape.map(|field| Field::from(&field[..]));
+        let shape = Shape { dx13, dy13, dx24, dy24, half_over_area, hx, hy };
+        let mass = Field::from(&mesh.lumped_mass_kg_m()[..]);
+        let inverse: Vec<f64> = mass.iter().map(|m| if *m > 0.0 { 1.0 / m } else { 0.0 }).collect();
         let viscous = mesh.row_material.iter().any(|m| m.arm().is_some());
         let arm = if viscous {
             ArmStress {
-                mean: vec![0.0; elements],
-                difference: vec![0.0; elements],
-                shear: vec![0.0; elements],
+                mean: Field::zeros(elements),
+                difference: Field::zeros(elements),
+                shear: Field::zeros(elements),
             }
         } else {
             ArmStress::default()
@@ -215,21 +228,21 @@ impl Body {
             stride,
             periodic: mesh.periodic,
             width: mesh.width_m(),
-            x: mesh.x_m.clone(),
-            y: mesh.y_m.clone(),
-            vx: vec![0.0; nodes],
-            vy: vec![0.0; nodes],
-            inverse_mass: mass.iter().map(|m| if *m > 0.0 { 1.0 / m } else { 0.0 }).collect(),
+            x: Field::from(&mesh.x_m[..]),
+            y: Field::from(&mesh.y_m[..]),
+            vx: Field::zeros(nodes),
+            vy: Field::zeros(nodes),
+            inverse_mass: Field::from(&inverse[..]),
             mass,
-            load_x: vec![0.0; nodes],
-            load_y: vec![0.0; nodes],
-            mean: vec![0.0; elements],
-            difference: vec![0.0; elements],
-            shear: vec![0.0; elements],
-            hourglass_x: vec![0.0; elements],
-            hourglass_y: vec![0.0; elements],
-            hourglass_stiffness,
-            length,
+            load_x: Field::zeros(nodes),
+            load_y: Field::zeros(nodes),
+            mean: Field::zeros(elements),
+            difference: Field::zeros(elements),
+            shear: Field::zeros(elements),
+            hourglass_x: Field::zeros(elements),
+            hourglass_y: Field::zeros(elements),
+            hourglass_stiffness: Field::from(&hourglass_stiffness[..]),
+            length: Field::from(&length[..]),
             shape,
             arm,
             laws,
@@ -239,6 +252,9 @@ impl Body {
             viscous,
             stiffness_damping_s: 0.0,
             count_energy: false,
+            instructions: Instructions::Widest,
+            layers: Vec::new(),
+            clock: 0,
             mesh,
         }
     }
@@ -251,6 +267,12 @@ impl Body {
     /// Whether to count work from now on (slower by about a tenth).
     pub fn count_energy(&mut self, on: bool) {
         self.count_energy = on;
+    }
+
+    /// Chooses the instructions of the kernel, for comparisons; what this machine lacks gives the widest it has
+    /// (ask [`Instructions::here`] first).
+    pub fn use_instructions(&mut self, instructions: Instructions) {
+        self.instructions = instructions;
     }
 
     /// Index of the node in column `i` of row `j`.
@@ -378,7 +400,7 @@ impl Body {
         self.stiffness_damping_s = beta_s;
         self.viscous = true;
         for field in [&mut self.arm.mean, &mut self.arm.difference, &mut self.arm.shear] {
-            *field = vec![0.0; self.mean.len()];
+            *field = Field::zeros(self.mean.len());
         }
     }
 
@@ -387,7 +409,7 @@ impl Body {
         self.stiffness_damping_s
     }
 
-    /// Advances `count` steps of `dt` seconds. `contact` sees the surface in each.
+    /// Advances `count` steps of `dt` seconds (of the surface, see [`Body::move_in_longer_steps`]). `contact` sees the surface in each.
     /// Nothing is checked here: see [`super::stability`] for the step and [`Body::is_finite`].
     pub fn advance(
         &mut self,
@@ -396,8 +418,10 @@ impl Body {
         count: usize,
         contact: &mut impl FnMut(Surface<'_>),
     ) {
-        for (law, material) in self.laws.iter_mut().zip(&self.mesh.row_material) {
-            if let Some(arm) = material.arm() {
+        for j in 0..self.ny {
+            let dt = dt * self.every(j) as f64;
+            let law = &mut self.laws[j];
+            if let Some(arm) = self.mesh.row_material[j].arm() {
                 law.arm_decay = (-dt / arm.relaxation_time_s).exp();
                 law.arm_gain = arm.ratio * (-0.5 * dt / arm.relaxation_time_s).exp();
             } else if self.stiffness_damping_s > 0.0 {

@@ -77,9 +77,12 @@ pub(super) fn run(
     count: usize,
     contact: &mut impl FnMut(Surface<'_>),
 ) {
+    // One step for the rows at the surface, then one for each layer that moves in longer ones.
+    let slower = body.layers.iter().map(|layer| Step::new(layer.every as f64 * step.dt, step.damping));
+    let steps: Vec<Step> = std::iter::once(step).chain(slower).collect();
     struct Steps<'a, C, const OBJECTIVE: bool, const VISCOUS: bool, const ENERGY: bool> {
         body: &'a mut Body,
-        step: Step,
+        steps: Vec<Step>,
         count: usize,
         contact: &'a mut C,
     }
@@ -90,14 +93,14 @@ pub(super) fn run(
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) {
             for _ in 0..self.count {
-                sweep::<S, C, OBJECTIVE, VISCOUS, ENERGY>(simd, self.body, &self.step, self.contact);
+                sweep::<S, C, OBJECTIVE, VISCOUS, ENERGY>(simd, self.body, &self.steps, self.contact);
             }
         }
     }
-    let arch = pulp::Arch::new();
+    let arch = body.instructions.arch().unwrap_or_default();
     macro_rules! dispatch {
         ($objective:literal, $viscous:literal, $energy:literal) => {
-            arch.dispatch(Steps::<_, $objective, $viscous, $energy> { body, step, count, contact })
+            arch.dispatch(Steps::<_, $objective, $viscous, $energy> { body, steps, count, contact })
         };
     }
     match (features.objective, features.viscous, features.energy) {
@@ -112,17 +115,29 @@ pub(super) fn run(
     }
 }
 
+/// One step of the surface, and of every layer whose own longer step ends with it (see [`super::layers`]).
 #[inline(always)]
 fn sweep<S: Simd, C: FnMut(Surface<'_>), const OBJECTIVE: bool, const VISCOUS: bool, const ENERGY: bool>(
     simd: S,
     body: &mut Body,
-    step: &Step,
+    steps: &[Step],
     contact: &mut C,
 ) {
     let (nx, ny, stride) = (body.nx, body.ny, body.stride);
+    body.clock += 1;
+    let moving = body.layers.iter().take_while(|layer| body.clock.is_multiple_of(layer.every)).count();
+    let end = body.layers.get(moving).map_or(ny, |layer| layer.first);
     body.rows.clear_owed();
-    for j in 0..ny {
-        element_row::<S, OBJECTIVE, VISCOUS>(simd, body, j, step);
+    let mut level = 0;
+    for j in 0..end {
+        let interface = body.layers.get(level).is_some_and(|layer| layer.first == j);
+        if interface {
+            body.enter_layer(level);
+        }
+        element_row::<S, OBJECTIVE, VISCOUS>(simd, body, j, &steps[level + usize::from(interface)]);
+        if interface {
+            body.leave_interface(level);
+        }
         join_sides(body);
         if j == 0 {
             body.complete_surface_force();
@@ -133,10 +148,11 @@ fn sweep<S: Simd, C: FnMut(Surface<'_>), const OBJECTIVE: bool, const VISCOUS: b
                 vy: &body.vy[..stride],
                 fx: &mut body.rows.left_x,
                 fy: &mut body.rows.left_y,
-                dt: step.dt,
+                dt: steps[0].dt,
             });
         }
-        node_row::<S, ENERGY>(simd, body, j, step);
+        node_row::<S, ENERGY>(simd, body, j, &steps[level]);
+        level += usize::from(interface);
         if j == 0 {
             // The closing node's force was completed in `left`, where later rows have nothing.
             (body.rows.left_x[nx], body.rows.left_y[nx]) = (0.0, 0.0);
@@ -147,7 +163,10 @@ fn sweep<S: Simd, C: FnMut(Surface<'_>), const OBJECTIVE: bool, const VISCOUS: b
     body.rows.right_x[1..=nx].copy_from_slice(&body.rows.owed3_x);
     body.rows.right_y[1..=nx].copy_from_slice(&body.rows.owed3_y);
     join_sides(body);
-    node_row::<S, ENERGY>(simd, body, ny, step);
+    if moving < body.layers.len() {
+        body.note_interface(moving);
+    }
+    node_row::<S, ENERGY>(simd, body, end, &steps[level]);
 }
 
 /// The force that the last column gives to the closing node belongs to the first node of a periodic row.

@@ -3,8 +3,43 @@
 //! pulp chooses the instruction set when the program runs. Every operation here works lane by lane, so
 //! AVX2 and AVX-512 give the same bits; a machine without fused multiply-add rounds differently.
 
-use pulp::Simd;
+use pulp::{Arch, Simd};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+/// Which instructions the kernel uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Instructions {
+    /// The widest vectors that this machine has.
+    #[default]
+    Widest,
+    /// Vectors of 512 bits.
+    Avx512,
+    /// Vectors of 256 bits, with no instruction of AVX-512.
+    Avx2,
+    /// One number at a time.
+    Scalar,
+}
+
+impl Instructions {
+    /// None where this machine does not have them.
+    pub(super) fn arch(self) -> Option<Arch> {
+        match self {
+            Instructions::Widest => Some(Arch::new()),
+            Instructions::Scalar => Some(Arch::Scalar),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512 => pulp::x86::V4::try_new().map(Arch::V4),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 => pulp::x86::V3::try_new().map(Arch::V3),
+            #[cfg(not(target_arch = "x86_64"))]
+            Instructions::Avx512 | Instructions::Avx2 => None,
+        }
+    }
+
+    /// Whether this machine has them.
+    pub fn here(self) -> bool {
+        self.arch().is_some()
+    }
+}
 
 /// One vector of f64 in the instruction set `S`.
 #[derive(Clone, Copy)]

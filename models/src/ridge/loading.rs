@@ -24,6 +24,8 @@ const FULL_CONTACT: f64 = 0.999;
 const RAMP_CYCLES: usize = 2;
 /// Share of the gap to the mean friction that the lateral load takes after each cycle.
 const FOLLOW: f64 = 0.5;
+/// Mass added about the tip by default, as a share of the stratum corneum's: see 'Performance' in `docs/ridge.md`.
+pub const ADDED_MASS: f64 = 0.002;
 
 /// How to run a case.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,11 +39,22 @@ pub struct RunSettings {
     /// Amplitude from which the run comes, over the case's: 1 grows to it from rest, with contact kept as long as can be; more
     /// comes down to it, from contact that is lost or doubled. From 1 to 10.
     pub overshoot: f64,
+    /// Whether all layers move in the surface's step; otherwise the soft ones in longer ones (`stability::longer_steps`).
+    pub one_step: bool,
+    /// Mass added about the tip for a longer step (`stability::add_mass`), as a share of the stratum corneum's.
+    pub added_mass: f64,
 }
 
 impl Default for RunSettings {
     fn default() -> Self {
-        RunSettings { steady: Steady::default(), step_s: None, energy: true, overshoot: 1.0 }
+        RunSettings {
+            steady: Steady::default(),
+            step_s: None,
+            energy: true,
+            one_step: false,
+            added_mass: ADDED_MASS,
+            overshoot: 1.0,
+        }
     }
 }
 
@@ -146,6 +159,7 @@ impl Rig {
         body.hold_top();
         body.damp_stiffness(case.stiffness_damping_s);
         body.count_energy(settings.energy);
+        stability::add_mass(&mut body, plate.penalty(), settings.added_mass);
         let stable = stability::contact_step_s(&body, plate.penalty());
         if let Some(asked_s) = settings.step_s
             && !(asked_s > 0.0 && asked_s <= stable)
@@ -155,6 +169,10 @@ impl Rig {
         let bin = 1.0 / (case.frequency_hz * BINS as f64);
         let per_bin = (bin / settings.step_s.unwrap_or(stable)).ceil().max(1.0) as usize;
         let dt = bin / per_bin as f64;
+        // Stiffness-proportional damping holds the step of every layer down: they all move in the surface's.
+        if !settings.one_step && case.stiffness_damping_s <= 0.0 {
+            body.move_in_longer_steps(&stability::longer_steps(&body, dt));
+        }
         let rig =
             Rig { body, plate, spot, base, dt, damping: case.mass_damping_per_s, steps: 0, plate_work: 0.0 };
         Ok((rig, per_bin))

@@ -4,7 +4,9 @@
 //! |---|---|
 //! | `mesh.rs` | the structured mesh and the ridge's sizes (Table 1) |
 //! | `material.rs` | elastic and viscoelastic tissue |
+//! | `field.rs` | numbers that start on a cache line |
 //! | `lanes.rs`, `kernel.rs` | one step of all elements and nodes in SIMD |
+//! | `layers.rs` | soft layers that move in longer steps |
 //! | `body.rs` | the fields the kernel works on, energies |
 //! | `contact.rs` | the rigid plate, penalty and friction |
 //! | `stability.rs` | the stable time step |
@@ -24,8 +26,10 @@ pub mod body;
 pub mod case;
 pub mod contact;
 pub mod cycle;
+mod field;
 mod kernel;
 mod lanes;
+mod layers;
 pub mod loading;
 pub mod material;
 pub mod mesh;
@@ -41,6 +45,7 @@ pub use case::RidgeCase;
 pub use contact::{ContactForce, FrictionRule, Plate};
 pub use cycle::{Cycle, Steady};
 pub use kernel::Surface;
+pub use lanes::Instructions;
 pub use loading::{RidgeRun, RunSettings, run, run_watched};
 pub use material::Material;
 pub use mesh::{Mesh, RidgeGeometry, RidgeMesh, RidgeProfile};
