@@ -26,9 +26,10 @@ fn swept(plan: &str, sweeps: u64, world: &WorldConfig) -> Vec<(Springs, f64)> {
             let seed = FIRST_SEED + i;
             let run = rehearse(&setup, &plan, seed, world, Arc::clone(&model) as _).unwrap();
             assert_eq!(run.outcome, Outcome::Complete);
+            let passes: Vec<_> = run.passes.iter().map(|p| p.pass.clone()).collect();
             let finger = Finger::new(&world.finger, seed);
             let truth = finger.lateral_stiffness_n_per_m / finger.normal_stiffness_n_per_m;
-            (springs(&run.passes, &setup.file.noise).unwrap(), truth)
+            (springs(&passes, &setup.file.noise).unwrap(), truth)
         })
         .collect()
 }
