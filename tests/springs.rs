@@ -2,6 +2,8 @@
 
 use calibration::finger::springs::{Springs, springs};
 use models::prediction::SpringSlider;
+use models::quantity::PeakToPeak;
+use models::record::Pass;
 use rayon::prelude::*;
 use rig::plan::Plan;
 use rig::sequence::Outcome;
@@ -15,10 +17,10 @@ use tests::{documents, muprime, rounds, texts};
 /// Fixed before the first of them was run.
 const FIRST_SEED: u64 = 61_000;
 
-/// Sweeps of a plan on the virtual rig, with what the springs come out as and the true ratio.
-fn swept(plan: &str, sweeps: u64, world: &WorldConfig) -> Vec<(Springs, f64)> {
+/// Sweeps of the bundled plan 'first-sweep' on the virtual rig: the passes of each, and the true ratio of its finger.
+fn swept(sweeps: u64, world: &WorldConfig) -> Vec<(Vec<Pass>, f64)> {
     let setup = Setup::load("virtual-ideal").unwrap();
-    let plan = Plan::load(plan).unwrap();
+    let plan = Plan::load("first-sweep").unwrap();
     let model = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     (0..sweeps)
         .into_par_iter()
@@ -28,7 +30,21 @@ fn swept(plan: &str, sweeps: u64, world: &WorldConfig) -> Vec<(Springs, f64)> {
             assert_eq!(run.outcome, Outcome::Complete);
             let finger = Finger::new(&world.finger, seed);
             let truth = finger.lateral_stiffness_n_per_m / finger.normal_stiffness_n_per_m;
-            (springs(&run.passes, &setup.file.noise).unwrap(), truth)
+            (run.passes.into_iter().map(|p| p.pass).collect(), truth)
+        })
+        .collect()
+}
+
+/// The springs from the first `count` passes with vibration of each sweep, and what stands before them without.
+fn fitted(sweeps: &[(Vec<Pass>, f64)], count: usize) -> Vec<(Springs, f64)> {
+    let noise = Setup::load("virtual-ideal").unwrap().file.noise;
+    let vibrates = |p: &Pass| p.amplitude != PeakToPeak::ZERO;
+    sweeps
+        .par_iter()
+        .map(|(passes, truth)| {
+            let last = passes.iter().enumerate().filter(|(_, p)| vibrates(p)).nth(count - 1);
+            let taken = last.map_or(passes.as_slice(), |(at, _)| &passes[..=at]);
+            (springs(taken, &noise).unwrap(), *truth)
         })
         .collect()
 }
@@ -41,33 +57,34 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// Every finger of the virtual rig has stiffnesses of its own, 5 % about the nominal ones; nobody tells the fit.
 #[test]
 fn the_interval_of_the_ratio_holds_the_truth() {
-    for (plan, sweeps) in [("first-sweep", rounds(100, 400)), ("psi-reading", rounds(100, 400))] {
-        let told = swept(plan, sweeps, &WorldConfig::ideal());
+    let sweeps = rounds(100, 400);
+    let swept = swept(sweeps, &WorldConfig::ideal());
+    for count in [10, 20, 40, 82] {
+        let told = fitted(&swept, count);
         let held = told.iter().filter(|(s, t)| s.ratio_ci95[0] <= *t && *t <= s.ratio_ci95[1]).count();
         let closed = told.iter().filter(|(s, _)| s.ratio_closed == [true; 2]).count();
         let error = median(told.iter().map(|(s, t)| (s.lateral_over_normal / t).ln().abs()).collect());
         let half = median(told.iter().map(|(s, _)| 0.5 * (s.ratio_ci95[1] / s.ratio_ci95[0]).ln()).collect());
         println!(
-            "{plan}: {} passes with vibration; the 95 % interval holds the true k_l/k_n in {held} of {sweeps}, closed in {closed}; half of it {:.1} %, error {:.1} % (medians)",
+            "{} passes with vibration: the 95 % interval holds the true k_l/k_n in {held} of {sweeps}, closed in {closed}; half of it {:.1} %, error {:.1} % (medians)",
             told[0].0.passes,
             100.0 * half,
             100.0 * error
         );
-        // Two standard deviations of the count below 95 %.
+        // Three standard deviations of the count below 95 %, for four counts.
         let n = sweeps as f64;
-        assert!(held as f64 >= 0.95 * n - 2.0 * (0.95 * 0.05 * n).sqrt(), "{held}");
-        if plan == "first-sweep" {
-            assert!(half < 0.1 && closed as u64 == sweeps, "{half} {closed}");
-        }
+        assert!(held as f64 >= 0.95 * n - 3.0 * (0.95 * 0.05 * n).sqrt(), "{held}");
+        assert!(count < 82 || (half < 0.05 && closed as u64 == sweeps), "{half} {closed}");
     }
 }
 
-/// Where the finger is the finite element ridge, the springs that fit its passes have the ratio that its static solve gives, 0.53 (docs/ridge.md).
+/// Where the finger is the finite element ridge, the slider is not the law: the springs that fit it best have a ratio a fifth above that of the ridge's
+/// static solve, 0.53 (docs/ridge.md), and the misfit tells.
 #[test]
 fn the_ridges_ratio_comes_out_of_its_own_passes() {
     let mut world = WorldConfig::ideal();
     world.finger.ridge_table_strokes = 1.0;
-    let told = swept("first-sweep", 12, &world);
+    let told = fitted(&swept(6, &world), 82);
     let ratio = median(told.iter().map(|(s, _)| s.lateral_over_normal).collect());
     let normal = median(told.iter().map(|(s, _)| s.normal_stiffness_n_per_m).collect());
     let chi2 = median(told.iter().map(|(s, _)| s.reduced_chi2).collect());
@@ -77,7 +94,7 @@ fn the_ridges_ratio_comes_out_of_its_own_passes() {
         "finite element ridge: k_l/k_n {ratio:.3} ({low:.3} to {high:.3}), k_n {:.2} MN/m, chi-square {chi2:.1} a degree of freedom (medians)",
         1e-6 * normal
     );
-    assert!((0.35..0.8).contains(&ratio), "{ratio}");
+    assert!((0.5..0.8).contains(&ratio) && chi2 > 3.0, "{ratio} {chi2}");
 }
 
 /// The command, on a run's own table; too few passes are refused.

@@ -73,7 +73,7 @@ fn the_damped_step_is_stable_and_sharp() {
         "damping divides the step by {:.1}; energy {start:.2e} to {below:.2e} at 0.95 of it, {above:.2e} at 1.15",
         undamped / limit
     );
-    assert!(limit < 0.5 * undamped && below < start && !(above < 1e3 * start));
+    assert!(limit < 0.5 * undamped && below < start && (above.is_nan() || above > 1e3 * start));
 }
 
 /// A run with stiffness damping balances its energy; with relaxing tissue it is refused.
@@ -97,4 +97,28 @@ fn a_damped_ridge_runs_and_nonsense_is_refused() {
     ] {
         assert!(matches!(run(&bad, &RunSettings::default()), Err(RidgeError::Input { .. })));
     }
+}
+
+/// One lightly damped case ends in two states: contact kept, where it comes from rest, and lost for most of the time, where it comes down from twice
+/// the amplitude. With the default damping both starts end alike.
+#[test]
+fn a_lightly_damped_case_has_two_states() {
+    let base = RidgeCase { elements: 200, ..RidgeCase::paper() }.with_amplitude_pp_m(1e-6);
+    let both = |case: &RidgeCase| {
+        [1.0, 2.0].map(|overshoot| {
+            let settings = RunSettings { energy: false, overshoot, ..RunSettings::default() };
+            let found = run(case, &settings).expect("runs");
+            println!(
+                "{:e} /s from {overshoot} times the amplitude: mu' {:.3}, contact {:.2}",
+                case.mass_damping_per_s, found.mu_relative, found.contact_fraction
+            );
+            (found.mu_relative, found.contact_fraction)
+        })
+    };
+    let [kept, lost] = both(&RidgeCase { mass_damping_per_s: 6e3, ..base });
+    assert!(kept.0 > 0.95 && kept.1 > 0.999 && lost.0 < 0.3 && lost.1 < 0.5, "{kept:?} {lost:?}");
+    let [rest, above] = both(&base);
+    assert!((rest.0 - above.0).abs() < 0.01, "{rest:?} {above:?}");
+    let wild = RunSettings { overshoot: 0.5, ..RunSettings::default() };
+    assert!(matches!(run(&base, &wild), Err(RidgeError::Input { .. })));
 }

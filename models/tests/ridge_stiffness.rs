@@ -1,7 +1,10 @@
 //! Static stiffnesses of the ridge against closed forms; and what its ratio says of Psi*. Each test prints the numbers that it judges.
 
+use muprime_models::reading::Reading;
+use muprime_models::ridge::patch::{Patch, plane_stress};
+use muprime_models::ridge::short_study;
 use muprime_models::ridge::static_stiffness::{HeldAt, Springs, of_case, of_mesh};
-use muprime_models::ridge::{Material, Mesh, RidgeCase, RidgeGeometry, RidgeProfile};
+use muprime_models::ridge::{Material, Mesh, RidgeCase, RidgeGeometry, RidgeProfile, RunSettings, run};
 use std::f64::consts::PI;
 
 const SKIN: Material = Material::elastic(28.3e6, 0.33, 750.0);
@@ -133,4 +136,40 @@ fn ratio_of_the_papers_ridge() {
         "five times the load, 1e12 Pa/m along the plate: k_l/k_n {coarse:.3} on 800 elements, {fine:.3} on 2000"
     );
     assert!((coarse / fine - 1.0).abs() < 0.05 && fine < 0.9 * ridge);
+}
+
+/// The ratio decides the law: the massless slider with the ridge's own static springs has the ridge's Psi*, with and without a layer along the plate
+/// that halves the ratio.
+#[test]
+fn static_springs_give_the_ridges_law() {
+    let base = RidgeCase { elements: 200, ..RidgeCase::paper() };
+    for layer in [None, Some(5e11)] {
+        let case = RidgeCase { tangential_stiffness_pa_m: layer, ..base };
+        let of = |fit: Option<muprime_models::psi_fit::PsiFit>| fit.expect("a Psi*").psi_star;
+        let ridge = of(short_study::psi_star(case, Reading::PeakToPeak).expect("runs"));
+        let slider = of(short_study::slider_psi_star(case, Reading::PeakToPeak).expect("solves"));
+        let ratio = of_case(&case, 3.0 * case.line_load_n_m(), HeldAt::CorneumBase).expect("stiffness");
+        let eq16 = ridge * 1.33 * ratio.lateral_over_normal;
+        println!(
+            "layer {layer:?}: Psi* of the ridge {ridge:.3}, of the slider with its springs {slider:.3}; Eq. 16's {eq16:.3}"
+        );
+        assert!((slider / ridge - 1.0).abs() < 0.08 && (0.8..1.1).contains(&eq16));
+    }
+}
+
+/// What one ridge in plane strain leaves out is no factor of two: the ends of what ridges of two heights and of finite length can do.
+#[test]
+fn neither_a_patch_nor_a_short_ridge_moves_psi_star_by_a_factor() {
+    let base = RidgeCase { elements: 200, ..RidgeCase::paper() };
+    let settings = RunSettings { energy: false, ..RunSettings::default() };
+    let psi_star = |mu: &(dyn Fn(&RidgeCase) -> f64 + Sync)| {
+        let fit = short_study::psi_star_with(base, Reading::PeakToPeak, |case| Ok(mu(case)));
+        fit.expect("runs").expect("a Psi*").psi_star
+    };
+    let one = psi_star(&|case| run(case, &settings).expect("runs").mu_relative);
+    let uneven = Patch::TwoHeights { uneven: 1.0 };
+    let patch = psi_star(&|case| uneven.mu_relative(case, &settings).expect("runs"));
+    let short = psi_star(&|case| run(&plane_stress(*case), &settings).expect("runs").mu_relative);
+    println!("Psi* of one ridge {one:.3}; half of the ridges carry all {patch:.3}; plane stress {short:.3}");
+    assert!((patch / one - 1.0).abs() < 0.15 && (short / one - 1.0).abs() < 0.05);
 }

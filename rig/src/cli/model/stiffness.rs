@@ -7,7 +7,7 @@ use miette::IntoDiagnostic;
 use models::reading::Reading;
 use models::ridge::short_study;
 use models::ridge::static_stiffness::{HeldAt, StaticStiffness, of_case};
-use models::ridge::{RidgeCase, RidgeError, RidgeProfile, case};
+use models::ridge::{FrictionRule, RidgeCase, RidgeError, RidgeProfile, Strain, case};
 use serde::Serialize;
 use std::process::ExitCode;
 
@@ -106,6 +106,16 @@ fn table(base: RidgeCase) -> Vec<Row> {
     ]
 }
 
+/// What statics do not know: the kernel's other measure of strain, the other friction rule, less damping.
+fn dynamic(base: RidgeCase) -> Vec<Row> {
+    let row = |what: &str, case: RidgeCase| Row { what: what.into(), case };
+    vec![
+        row("small strain", RidgeCase { strain: Strain::Small, ..base }),
+        row("local friction", RidgeCase { friction: FrictionRule::Local, ..base }),
+        row("damping 3.5e5 /s", RidgeCase { mass_damping_per_s: 3.5e5, ..base }),
+    ]
+}
+
 #[derive(Serialize)]
 struct Answer {
     what: String,
@@ -173,7 +183,7 @@ fn survey(args: &StiffnessArgs) -> Result<Vec<Surveyed>, RidgeError> {
             psi_star_eq16: fit.map(|f| f.psi_star * (1.0 + row.case.poisson_ratio) * at_3),
         })
     };
-    table(args.base()).into_iter().map(of).collect()
+    table(args.base()).into_iter().chain(dynamic(args.base())).map(of).collect()
 }
 
 /// Runs the solve or the survey; refuses bad input.
