@@ -69,38 +69,39 @@ pub struct Surface<'a> {
     pub dt: f64,
 }
 
-/// Runs `count` steps of `body`; `contact` is called in each with the surface.
+/// Runs `count` steps of `body`; `contact` is called in each with the surface (through a pointer, so that the kernel is compiled once
+/// and not for each contact).
 pub(super) fn run(
     body: &mut Body,
     features: Features,
     step: Step,
     count: usize,
-    contact: &mut impl FnMut(Surface<'_>),
+    contact: &mut dyn FnMut(Surface<'_>),
 ) {
     // One step for the rows at the surface, then one for each layer that moves in longer ones.
     let slower = body.layers.iter().map(|layer| Step::new(layer.every as f64 * step.dt, step.damping));
     let steps: Vec<Step> = std::iter::once(step).chain(slower).collect();
-    struct Steps<'a, C, const OBJECTIVE: bool, const VISCOUS: bool, const ENERGY: bool> {
+    struct Steps<'a, const OBJECTIVE: bool, const VISCOUS: bool, const ENERGY: bool> {
         body: &'a mut Body,
         steps: Vec<Step>,
         count: usize,
-        contact: &'a mut C,
+        contact: &'a mut dyn FnMut(Surface<'_>),
     }
-    impl<C: FnMut(Surface<'_>), const OBJECTIVE: bool, const VISCOUS: bool, const ENERGY: bool> WithSimd
-        for Steps<'_, C, OBJECTIVE, VISCOUS, ENERGY>
+    impl<const OBJECTIVE: bool, const VISCOUS: bool, const ENERGY: bool> WithSimd
+        for Steps<'_, OBJECTIVE, VISCOUS, ENERGY>
     {
         type Output = ();
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) {
             for _ in 0..self.count {
-                sweep::<S, C, OBJECTIVE, VISCOUS, ENERGY>(simd, self.body, &self.steps, self.contact);
+                sweep::<S, OBJECTIVE, VISCOUS, ENERGY>(simd, self.body, &self.steps, self.contact);
             }
         }
     }
     let arch = body.instructions.arch().unwrap_or_default();
     macro_rules! dispatch {
         ($objective:literal, $viscous:literal, $energy:literal) => {
-            arch.dispatch(Steps::<_, $objective, $viscous, $energy> { body, steps, count, contact })
+            arch.dispatch(Steps::<$objective, $viscous, $energy> { body, steps, count, contact })
         };
     }
     match (features.objective, features.viscous, features.energy) {
@@ -117,11 +118,11 @@ pub(super) fn run(
 
 /// One step of the surface, and of every layer whose own longer step ends with it (see [`super::layers`]).
 #[inline(always)]
-fn sweep<S: Simd, C: FnMut(Surface<'_>), const OBJECTIVE: bool, const VISCOUS: bool, const ENERGY: bool>(
+fn sweep<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool, const ENERGY: bool>(
     simd: S,
     body: &mut Body,
     steps: &[Step],
-    contact: &mut C,
+    contact: &mut dyn FnMut(Surface<'_>),
 ) {
     let (nx, ny, stride) = (body.nx, body.ny, body.stride);
     body.clock += 1;
@@ -245,12 +246,13 @@ fn element_row<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool>(
 
     let law: &RowLaw = &body.laws[j];
     let constant = |value| Lanes::splat(simd, value);
-    let (bulk, rigidity) = (constant(law.bulk), constant(law.shear));
-    let viscosity1 = constant(law.linear_viscosity / step.dt);
-    let viscosity2 = constant(law.quadratic_viscosity / (step.dt * step.dt));
+    let (bulk, rigidity) = (constant(law.bulk * step.dt), constant(law.shear * step.dt));
+    // Strains are rates here: the step is in the constants, so that fewer multiplications are left to the elements.
+    let viscosity1 = constant(law.linear_viscosity);
+    let viscosity2 = constant(law.quadratic_viscosity);
     let (decay, gain) = (constant(law.arm_decay), constant(law.arm_gain));
-    let (zero, half, quarter, two) = (constant(0.0), constant(0.5), constant(0.25), constant(2.0));
-    let dt = constant(step.dt);
+    let (zero, half, one, two) = (constant(0.0), constant(0.5), constant(1.0), constant(2.0));
+    let (dt, half_dt) = (constant(step.dt), constant(0.5 * step.dt));
 
     for k in 0..nx / S::F64_LANES {
         let at = |field: &[&[S::f64s]; 4], corner: usize| Lanes::of(simd, field[corner][k]);
@@ -261,43 +263,42 @@ fn element_row<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool>(
             let (x1, x2, x3, x4) = (at(&x, 0), at(&x, 1), at(&x, 2), at(&x, 3));
             let (y1, y2, y3, y4) = (at(&y, 0), at(&y, 1), at(&y, 2), at(&y, 3));
             let (dx13, dy13, dx24, dy24) = (x1 - x3, y1 - y3, x2 - x4, y2 - y4);
-            let half_over_area = constant(1.0).over(dx13.cross(dy24, dx24, dy13));
+            let half_over_area = one.over(dx13.cross(dy24, dx24, dy13));
             [dx13, dy13, dx24, dy24, half_over_area, (x1 + x3) - (x2 + x4), (y1 + y3) - (y2 + y4)]
         } else {
             let [a, b, c, d, e, f, g] = fixed;
             [pick(a), pick(b), pick(c), pick(d), pick(e), pick(f), pick(g)]
         };
-        // Increments of the displacement gradient over the step.
+        // Rates of the displacement gradient.
         let (vx13, vx24, vy13, vy24) = (vx1 - vx3, vx2 - vx4, vy1 - vy3, vy2 - vy4);
-        let scale = half_over_area * dt;
-        let xx = scale * dy24.cross(vx13, dy13, vx24);
-        let xy = scale * dx13.cross(vx24, dx24, vx13);
-        let yx = scale * dy24.cross(vy13, dy13, vy24);
-        let yy = scale * dx13.cross(vy24, dx24, vy13);
-        // Hourglass increments: what remains of the corner velocities beside the linear field.
-        let beside = |h: Lanes<S>, gx: Lanes<S>, gy: Lanes<S>| {
-            quarter * hy.neg_mul_add(gy, hx.neg_mul_add(gx, h * dt))
-        };
+        let xx = half_over_area * dy24.cross(vx13, dy13, vx24);
+        let xy = half_over_area * dx13.cross(vx24, dx24, vx13);
+        let yx = half_over_area * dy24.cross(vy13, dy13, vy24);
+        let yy = half_over_area * dx13.cross(vy24, dx24, vy13);
+        // Hourglass rates, four times: what remains of the corner velocities beside the linear field.
+        let beside = |h: Lanes<S>, gx: Lanes<S>, gy: Lanes<S>| hy.neg_mul_add(gy, hx.neg_mul_add(gx, h));
         let warp_x = beside((vx1 + vx3) - (vx2 + vx4), xx, xy);
         let warp_y = beside((vy1 + vy3) - (vy2 + vy4), yx, yy);
 
         let (mut d, mut s) = (pick(difference), pick(shear));
         let (mut qx, mut qy) = (pick(hourglass_x), pick(hourglass_y));
-        let turn = half * (yx - xy);
-        let turned = |a: Lanes<S>, b: Lanes<S>, angle: Lanes<S>| {
-            let bent = (half * angle).neg_mul_add(angle, constant(1.0));
+        // Cosine and sine of the spin's angle and of twice that, to second order.
+        let turn = half_dt * (yx - xy);
+        let (square, twice) = (turn * turn, turn + turn);
+        let (bent, bent_twice) = (half.neg_mul_add(square, one), two.neg_mul_add(square, one));
+        let turned = |a: Lanes<S>, b: Lanes<S>, bent: Lanes<S>, angle: Lanes<S>| {
             (a.cross(bent, b, angle), b.mul_add(bent, a * angle))
         };
         if OBJECTIVE {
-            (d, s) = turned(d, s, two * turn);
-            (qx, qy) = turned(qx, qy, turn);
+            (d, s) = turned(d, s, bent_twice, twice);
+            (qx, qy) = turned(qx, qy, bent, turn);
         }
         let trace = xx + yy;
         let (mean_step, d_step, s_step) = (bulk * trace, rigidity * (xx - yy), rigidity * (xy + yx));
         let m = pick(mean) + mean_step;
         d += d_step;
         s += s_step;
-        let stiffness = pick(hourglass);
+        let stiffness = dt * pick(hourglass);
         qx = stiffness.mul_add(warp_x, qx);
         qy = stiffness.mul_add(warp_y, qy);
         mean[k] = m.raw();
@@ -314,7 +315,7 @@ fn element_row<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool>(
         if VISCOUS {
             let (mut ad, mut as_) = (pick(arm_difference), pick(arm_shear));
             if OBJECTIVE {
-                (ad, as_) = turned(ad, as_, two * turn);
+                (ad, as_) = turned(ad, as_, bent_twice, twice);
             }
             let am = decay.mul_add(pick(arm_mean), gain * mean_step);
             ad = decay.mul_add(ad, gain * d_step);
@@ -327,7 +328,6 @@ fn element_row<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool>(
             s += as_;
         }
         // Forces: the hourglass force works along the corners' signs, less its linear part.
-        let (qx, qy) = (quarter * qx, quarter * qy);
         let (hqx, hqy) = (half_over_area * hx, half_over_area * hy);
         let sxx = hqx.neg_mul_add(qx, half * (m + d));
         let syy = hqy.neg_mul_add(qy, half * (m - d));

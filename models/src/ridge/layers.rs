@@ -50,7 +50,7 @@ impl Body {
     }
 
     /// Adds the present state of the node row in front of layer `level` to its sums, before it moves.
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn note_interface(&mut self, level: usize) {
         let layer = &mut self.layers[level];
         let start = layer.first * self.stride;
@@ -62,7 +62,7 @@ impl Body {
 
     /// Puts the node row in front of the layer where it was in the mean, and lays aside what it is owed, so that the element row
     /// behind it gives its own forces alone.
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn enter_layer(&mut self, level: usize) {
         self.note_interface(level);
         let layer = &mut self.layers[level];
@@ -83,7 +83,7 @@ impl Body {
     }
 
     /// The end of [`Body::enter_layer`]: the row is back where it is, with the force of both layers on it.
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn leave_interface(&mut self, level: usize) {
         let layer = &mut self.layers[level];
         let range = layer.first * self.stride..(layer.first + 1) * self.stride;

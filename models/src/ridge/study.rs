@@ -3,7 +3,7 @@
 use super::{RidgeCase, RunSettings};
 
 /// Changes whenever the model itself changes its results, so that kept results are not mistaken for new ones.
-pub const MODEL_VERSION: u32 = 1;
+pub const MODEL_VERSION: u32 = 2;
 
 /// The key of a case's result: a hash of the model's version and of everything that defines the run.
 pub fn content_key(case: &RidgeCase, settings: &RunSettings) -> String {
