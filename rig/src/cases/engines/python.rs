@@ -1,4 +1,4 @@
-//! HyperQueue and Dask, spoken to in Python by their own packages, with the script `queue.py` beside this file: it hands the tasks
+//! HyperQueue and Dask, spoken to in Python by their own packages, with the script `hand_over.py` beside this file: it hands the tasks
 //! over and stays until they have ended. HyperQueue goes on without it; a Dask scheduler drops what waits when its client leaves.
 
 use super::{Engine, Handed, Job};
@@ -13,10 +13,10 @@ pub const HYPERQUEUE: Engine = Engine { name: "hq", submit, again, alive, cancel
 pub const DASK: Engine = Engine { name: "dask", submit, again: gone, alive, cancel };
 
 /// What speaks to them.
-const SCRIPT: &str = include_str!("queue.py");
+const SCRIPT: &str = include_str!("hand_over.py");
 
 fn submit(folder: &Path, job: &Job) -> miette::Result<Handed> {
-    crate::files::write_whole(&folder.join("queue.py"), SCRIPT)?;
+    crate::files::write_whole(&folder.join("hand_over.py"), SCRIPT)?;
     job.write(folder)?;
     begun(folder, job, &[])
 }
@@ -37,9 +37,11 @@ fn begun(folder: &Path, job: &Job, ids: &[String]) -> miette::Result<Handed> {
         .open(folder.join("log.txt"))
         .into_diagnostic()?;
     let mut child = Command::new(&job.python)
-        .arg(folder.join("queue.py"))
+        .arg(folder.join("hand_over.py"))
         .arg(folder)
         .args(ids)
+        // What it says of an error is for people: no frames of other programs.
+        .env("RUST_BACKTRACE", "0")
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(log)
@@ -55,7 +57,7 @@ fn begun(folder: &Path, job: &Job, ids: &[String]) -> miette::Result<Handed> {
         let _ = child.kill();
         let _ = child.wait();
         let log = std::fs::read_to_string(folder.join("log.txt")).unwrap_or_default();
-        let last = log.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("it said nothing").to_string();
+        let last = log.lines().rev().find(|l| l.contains("Error")).unwrap_or("it said nothing").to_string();
         return Err(miette!(
             "{} takes no tasks: {last} (all of it: {})",
             job.engine,

@@ -2,6 +2,7 @@
 
 use super::{Case, Cell, Column, Kind, count, flag, number};
 use crate::cases::file::Header;
+use miette::IntoDiagnostic;
 use models::quantity::PeakToPeak;
 use models::ridge::{self, RidgeCase, RunSettings, Steady, case, study};
 use serde::{Deserialize, Serialize};
@@ -171,6 +172,9 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
     if header.listed != settings.spans.is_empty() {
         miette::bail!("ridge cases are either listed or drawn from `spans`");
     }
+    let [corneum, dermis, soft] = base.materials();
+    base.check().into_diagnostic()?;
+    base.geometry.mesh(corneum, dermis, soft, base.elements).into_diagnostic()?;
     for (name, span) in &settings.spans {
         if !(span.low < span.high && (!span.log || span.low > 0.0)) {
             miette::bail!(

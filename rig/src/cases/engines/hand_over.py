@@ -1,6 +1,6 @@
 """Hands the tasks of a job of muprime to HyperQueue or to Dask, and stays until they have ended.
 
-usage: queue.py JOB_FOLDER [ID...]    (with the ids of a HyperQueue job: waits for it)
+usage: hand_over.py JOB_FOLDER [ID...]    (with the ids of a HyperQueue job: waits for it)
 
 The folder holds job.json, as `muprime submit` writes it. The first line on standard output is a JSON list with the names of the job.
 """
