@@ -3,6 +3,10 @@
 
 pub mod blind;
 pub mod calibrate;
+#[cfg(feature = "parquet")]
+pub mod case;
+#[cfg(feature = "parquet")]
+pub mod cases;
 pub mod check;
 pub mod compare;
 pub mod completions;
@@ -13,6 +17,8 @@ pub mod doctor;
 pub mod examples;
 pub mod export;
 pub mod faults;
+#[cfg(feature = "parquet")]
+pub mod gather;
 pub mod import;
 pub mod init;
 pub mod man;
@@ -24,6 +30,8 @@ pub mod run;
 pub mod runs;
 pub mod schema;
 pub mod show;
+#[cfg(feature = "parquet")]
+pub mod submit;
 pub mod virtual_rig;
 pub mod watch;
 

@@ -20,6 +20,7 @@
 //! | [`live`] | a run while it goes on: one feed, and viewers that read it |
 //! | [`terminal`], [`watch`] | the terminal taken and given back; the live view on it |
 //! | [`publish`] | what happens at a rig, by MQTT, read only |
+//! | `cases` | studies past one machine: cases, an idempotent worker, engines, one table (feature `parquet`) |
 //! | [`progress`] | long computations at a terminal: bars, and what there is so far on Ctrl-C |
 //! | [`compare`] | two runs side by side: whether they differ, and in what |
 //! | [`report`], [`export`] | what people look at and take elsewhere |
@@ -44,6 +45,8 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+#[cfg(feature = "parquet")]
+pub mod cases;
 pub mod catalogue;
 pub mod certificates;
 pub mod check;

@@ -44,6 +44,18 @@ enum Verb {
     Blind(cli::blind::Args),
     /// Strike the virtual rig with every fault of the list, in virtual time, from seeds
     Faults(cli::faults::Args),
+    /// Write a file of cases: a study for one machine or for many
+    #[cfg(feature = "parquet")]
+    Cases(cli::cases::Args),
+    /// Run one case of a study, or a range of them, once
+    #[cfg(feature = "parquet")]
+    Case(cli::case::Args),
+    /// Run what is missing of a study: here, or on Slurm, HyperQueue, Dask
+    #[cfg(feature = "parquet")]
+    Submit(cli::submit::Args),
+    /// Make one table of a study's results
+    #[cfg(feature = "parquet")]
+    Gather(cli::gather::Args),
     /// Evaluate the models: a point, a finite element case, a study, the paper's figures
     Model(cli::model::ModelArgs),
     /// Make a point table of a foreign one: any delimiter, Excel, Parquet, NumPy, time series
@@ -138,6 +150,14 @@ fn run(verb: Verb, json: bool) -> ExitCode {
         Verb::Diagnose(args) => cli::diagnose::run(args, json),
         Verb::Blind(args) => cli::blind::run(args, json),
         Verb::Faults(args) => cli::faults::run(args, json),
+        #[cfg(feature = "parquet")]
+        Verb::Cases(args) => cli::cases::run(args, json),
+        #[cfg(feature = "parquet")]
+        Verb::Case(args) => cli::case::run(args, json),
+        #[cfg(feature = "parquet")]
+        Verb::Submit(args) => cli::submit::run(args, json),
+        #[cfg(feature = "parquet")]
+        Verb::Gather(args) => cli::gather::run(args, json),
         Verb::Model(args) => cli::model::run(args, json),
         Verb::Import(args) => cli::import::run(args, json),
         Verb::Report(args) => cli::report::run(args, json),

@@ -7,7 +7,7 @@ mod finger;
 mod force;
 mod gravity;
 mod guided;
-mod inverse;
+pub mod inverse;
 mod latency;
 mod live;
 mod noise;

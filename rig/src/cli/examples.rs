@@ -44,6 +44,38 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ),
     ("blind", "muprime blind --sets 20"),
     ("faults", "muprime faults --seeds 500"),
+    #[cfg(feature = "parquet")]
+    (
+        "cases ridge",
+        "muprime cases ridge --draw 2000 --elements 200 --span amplitude_pp_m=0.3e-6..5e-6:log --span mu0=0.2..1 -o ridge.jsonl\nmuprime cases ridge --from conditions.csv -o ridge.jsonl",
+    ),
+    #[cfg(feature = "parquet")]
+    ("cases table", "muprime cases table -o table.jsonl"),
+    #[cfg(feature = "parquet")]
+    ("cases faults", "muprime cases faults --seeds 1000000 --pairs -o faults.jsonl"),
+    #[cfg(feature = "parquet")]
+    ("cases blind", "muprime cases blind --sets 100000 --seed 7 -o blind.jsonl"),
+    #[cfg(feature = "parquet")]
+    (
+        "cases diagnose",
+        "muprime cases diagnose runs/monday runs/tuesday -o archive.jsonl\nmuprime cases diagnose --list tables.txt --rig rig.toml -o archive.jsonl",
+    ),
+    #[cfg(feature = "parquet")]
+    ("cases finger", "muprime cases finger finger-1.csv finger-2.csv --modulus-only -o fingers.jsonl"),
+    #[cfg(feature = "parquet")]
+    ("cases noop", "muprime cases noop --cases 100000 -o noop.jsonl"),
+    #[cfg(feature = "parquet")]
+    (
+        "case",
+        "muprime case --cases ridge.jsonl --index 17 --out study\nmuprime case --cases ridge.jsonl --range 0..100 --out study --threads 1",
+    ),
+    #[cfg(feature = "parquet")]
+    (
+        "submit",
+        "muprime submit ridge.jsonl --out study\nmuprime submit ridge.jsonl --out study --engine slurm --option=--partition=short\nmuprime submit --cancel --out study",
+    ),
+    #[cfg(feature = "parquet")]
+    ("gather", "muprime gather study -o study.parquet"),
     (
         "import",
         "muprime import sweep.csv -o sweep\n\

@@ -208,7 +208,8 @@ pub fn sets(seed: u64, count: usize, stratum: Option<Stratum>) -> impl Iterator<
     (0..count as u64).map(move |k| set(seed, k, stratum))
 }
 
-fn set(seed: u64, k: u64, stratum: Option<Stratum>) -> Set {
+/// The `k`th of them, from 0.
+pub fn set(seed: u64, k: u64, stratum: Option<Stratum>) -> Set {
     let own = seed.wrapping_mul(1_000_003).wrapping_add(k);
     let stratum = stratum.unwrap_or_else(|| Stratum::draw(own));
     let ask = match stratum {

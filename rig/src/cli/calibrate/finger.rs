@@ -127,6 +127,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
             modulus_range_pa: (args.modulus_range_pa[0], args.modulus_range_pa[1]),
             elements: args.elements,
             modulus_only: args.modulus_only,
+            quiet: false,
         };
         let (modulus, skin) =
             inverse::analyse(&options, &points).map_err(|e| e.wrap_err(path.display().to_string()))?;

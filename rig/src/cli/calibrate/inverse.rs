@@ -31,9 +31,14 @@ pub struct Options {
     pub elements: usize,
     /// Leave penalty and time alone.
     pub modulus_only: bool,
+    /// Say nothing and show no bar: one of many.
+    pub quiet: bool,
 }
 
 /// The modulus of elastic skin, and all three quantities unless only the modulus is wanted.
+///
+/// # Errors
+/// A table of several conditions, a ridge that cannot be run, phases that tell nothing.
 pub fn analyse(
     options: &Options,
     points: &[PhasePoint],
@@ -66,7 +71,8 @@ pub fn analyse(
     let base = RidgeCase { frequency_hz, elements: options.elements, ..RidgeCase::paper() };
     let base = base.with_normal_force_n(force);
     let search = Search { lowest_pa: low, highest_pa: high, model_sd_deg: MODEL_SD_DEG };
-    let curves = compute("the modulus", base, &amplitudes, SkinGrid::elastic((low, high), MODULI[0]))?;
+    let compute = |what, base, grid| compute(what, base, &amplitudes, grid, options.quiet);
+    let curves = compute("the modulus", base, SkinGrid::elastic((low, high), MODULI[0]))?;
     let elastic = identify(&points, &search, |e, w| curves.at(&Skin::elastic(e), w)).into_diagnostic()?;
     if options.modulus_only {
         return Ok((elastic, None));
@@ -74,7 +80,7 @@ pub fn analyse(
     let about = (ABOUT.0 * elastic.young_modulus_pa, ABOUT.1 * elastic.young_modulus_pa);
     let grid = SkinGrid::free(about, MODULI[1]);
     let half = RidgeCase { elements: options.elements / 2, ..base };
-    let curves = compute("penalty and retardation time", half, &amplitudes, grid.clone())?;
+    let curves = compute("penalty and retardation time", half, grid.clone())?;
     let skin = identify_skin(&points, &grid, &search, &elastic, |skin, w| curves.at(skin, w));
     Ok((elastic, Some(skin.into_diagnostic()?)))
 }
@@ -84,8 +90,12 @@ fn compute(
     base: RidgeCase,
     amplitudes: &[PeakToPeak],
     grid: SkinGrid,
+    quiet: bool,
 ) -> miette::Result<PhaseCurves> {
     let runs = (amplitudes.len() * grid.len()) as u64;
+    if quiet {
+        return PhaseCurves::compute(base, amplitudes, grid, || ()).into_diagnostic();
+    }
     say!("{what}: running the ridge {runs} times ({} amplitudes)", amplitudes.len());
     let bar = ProgressBar::with_draw_target(Some(runs), ProgressDrawTarget::stderr());
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} gone, {eta} to go");

@@ -1,0 +1,84 @@
+//! One sealed set a case, made, diagnosed and scored: case `i` is the `i`th set that `muprime blind --seed SEED` scores.
+
+use super::{Case, Kind, flag, joined, no_lines, number, settings, text};
+use crate::cases::file::Header;
+use crate::validation::blind::{score, set};
+use diagnosis::hypotheses::Options;
+use serde::{Deserialize, Serialize};
+use sim::sealed::Stratum;
+
+/// The kind.
+pub const KIND: Kind = Kind {
+    name: "blind",
+    words: "a sealed set of the independent simulation, diagnosed and scored, as `muprime blind` does",
+    model: 1,
+    columns: &[
+        text("stratum", "kind of truth"),
+        text("truth", "true causes, joined by +"),
+        text("verdict", "the verdict"),
+        text("named", "effects of the first hypothesis, joined by +"),
+        number("probability_of_truth", "stated probability of the truth"),
+        number("top_probability", "stated probability of the first hypothesis"),
+        flag("top_right", "whether the first hypothesis is the truth"),
+        number("claimed_shrinkage", "claimed shrinkage of the gap"),
+        number("achieved_shrinkage", "achieved on the hidden passes"),
+        number("covered", "share of hidden passes inside their intervals"),
+        text("document", "the scored set as `muprime blind --json` has it"),
+    ],
+    prepare,
+};
+
+/// What all cases share.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Seed of the benchmark.
+    pub seed: u64,
+    /// One stratum only.
+    pub stratum: Option<Stratum>,
+    /// Try single effects only.
+    pub no_pairs: bool,
+    /// Effects that are left out of the library.
+    pub without: Vec<String>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings { seed: 1, stratum: None, no_pairs: false, without: Vec::new() }
+    }
+}
+
+fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {
+    no_lines(header)?;
+    let settings: Settings = settings(header)?;
+    let inputs = serde_json::to_string(&settings).unwrap_or_default();
+    Ok(Box::new(move |index, _| {
+        let settings = settings.clone();
+        let run = move || {
+            let options = Options {
+                pairs: !settings.no_pairs,
+                without: settings.without.clone(),
+                ..Options::default()
+            };
+            let scored = score(&set(settings.seed, index, settings.stratum), &options)
+                .map_err(|why| format!("{why:#}"))?;
+            let word = |v: serde_json::Result<serde_json::Value>| {
+                v.map(|v| v.as_str().unwrap_or_default().to_string()).map_err(|e| e.to_string())
+            };
+            Ok(vec![
+                word(serde_json::to_value(scored.stratum))?.into(),
+                joined(&scored.truth).into(),
+                word(serde_json::to_value(scored.verdict))?.into(),
+                joined(&scored.named).into(),
+                scored.probability_of_truth.into(),
+                scored.top_probability.into(),
+                scored.top_right.into(),
+                scored.claimed.into(),
+                scored.achieved.into(),
+                scored.covered.into(),
+                serde_json::to_string(&scored).map_err(|e| e.to_string())?.into(),
+            ])
+        };
+        Ok(Case { inputs: format!("{index} {inputs}"), run: Box::new(run) })
+    }))
+}

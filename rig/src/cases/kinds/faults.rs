@@ -1,0 +1,72 @@
+//! One scene of the fault bench a case: case `i` is the seed `first + i`.
+
+use super::{Case, Cell, Kind, count, no_lines, settings, text};
+use crate::cases::file::Header;
+use crate::validation::faults::search::scene_of;
+use crate::validation::faults::{Pace, ROWS, run};
+use serde::{Deserialize, Serialize};
+
+/// The kind.
+pub const KIND: Kind = Kind {
+    name: "faults",
+    words: "a scene of the fault bench a seed, as `muprime faults` runs them",
+    model: 1,
+    columns: &[
+        count("seed", "seed of the scene"),
+        text("phase", "what the rig did"),
+        text("faults", "the faults that struck, joined by +"),
+        text("trip", "the cause of the trip; none where there was none"),
+        count("cycles", "cycles simulated"),
+        count("command_off_cycles", "worst number of cycles until the drive was commanded off"),
+        count("measured_off_cycles", "cycles from the command until the plate was quiet"),
+        count("wrong", "how much was not as it must be: 0 is good"),
+        text("what", "what was wrong"),
+    ],
+    prepare,
+};
+
+/// What all cases share.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Seed of case 0.
+    pub first: u64,
+    /// Two faults in each scene.
+    pub pairs: bool,
+    /// The limits that the scenes run at.
+    pub pace: Pace,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings { first: 1, pairs: false, pace: Pace::Fast }
+    }
+}
+
+fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {
+    no_lines(header)?;
+    let Settings { first, pairs, pace } = settings(header)?;
+    Ok(Box::new(move |index, _| {
+        let seed = first.wrapping_add(index);
+        let run = move || {
+            let scene = scene_of(seed, pairs, pace);
+            let found = run(&scene, false);
+            let struck: Vec<String> = scene.strikes.iter().map(|s| ROWS[s.row].name.to_string()).collect();
+            let moment = serde_json::to_value(scene.moment).map_err(|e| e.to_string())?;
+            let trip = found.trip.map(|trip| serde_json::to_value(trip.cause).map_err(|e| e.to_string()));
+            let plain = |v: serde_json::Value| v.as_str().map_or_else(|| v.to_string(), str::to_string);
+            Ok(vec![
+                seed.into(),
+                plain(moment).into(),
+                super::joined(&struck).into(),
+                trip.transpose()?.map(plain).into(),
+                found.cycles.into(),
+                found.command_off.iter().flatten().max().copied().into(),
+                found.measured_off.into(),
+                (found.wrong.len() as u64).into(),
+                if found.wrong.is_empty() { Cell::Missing } else { found.wrong.join("; ").into() },
+            ])
+        };
+        Ok(Case { inputs: format!("{seed} {pairs} {pace:?}"), run: Box::new(run) })
+    }))
+}

@@ -1,0 +1,57 @@
+//! One node of the shipped surrogate's table a case, then those held out to judge it.
+
+use super::{Case, Kind, flag, no_lines, number};
+use crate::cases::file::Header;
+use miette::bail;
+use models::ridge::{self, study};
+use models::surrogate::{Grid, GridPoint};
+
+/// The kind.
+pub const KIND: Kind = Kind {
+    name: "table",
+    words: "a node of the surrogate's table, as `muprime model table --surrogate` computes it",
+    model: study::MODEL_VERSION,
+    columns: &[
+        flag("at_rest", "a case at rest, for phase and contact"),
+        number("mu_relative", "mu'"),
+        number("phase_shift_deg", "phase shift of Eq. 1"),
+        number("contact_fraction", "share of the time in contact"),
+        flag("steady", "whether the cycles became steady"),
+    ],
+    prepare,
+};
+
+/// Cases that are not in the table, on which it is judged.
+pub const HELD_OUT: usize = 200;
+
+/// The nodes, and after them those that are held out.
+pub fn points() -> Vec<GridPoint> {
+    let grid = Grid::SHIPPED;
+    let mut points = grid.points();
+    points.extend(grid.held_out(HELD_OUT));
+    points
+}
+
+fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {
+    no_lines(header)?;
+    let points = points();
+    if header.cases > points.len() as u64 {
+        bail!("{} cases: the table has {} nodes, held-out ones included", header.cases, points.len());
+    }
+    let settings = Grid::settings();
+    Ok(Box::new(move |index, _| {
+        let GridPoint { case, at_rest, .. } = points[index as usize].clone();
+        let run = move || {
+            let run = ridge::run(&case, &settings).map_err(|why| why.to_string())?;
+            Ok(vec![
+                at_rest.into(),
+                run.mu_relative.into(),
+                run.phase_shift_deg.into(),
+                run.contact_fraction.into(),
+                run.steady.into(),
+            ])
+        };
+        let inputs = format!("{at_rest} {}", super::ridge::inputs_of(&case, &settings));
+        Ok(Case { inputs, run: Box::new(run) })
+    }))
+}

@@ -1,0 +1,129 @@
+//! What is missing, how long a case takes, and the ranges that an engine's tasks get. Times size the ranges and bound the tasks; no
+//! result depends on them.
+#![allow(clippy::disallowed_methods, reason = "a pilot measures wall-clock time")]
+
+use super::study::Study;
+use super::worker::entry;
+use serde::Serialize;
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+/// Cases that a shard has at most: what is lost where its worker is killed, and held by who reads it.
+const MOST: u64 = 100_000;
+/// Tasks for each worker at least, so that none waits long for the last.
+const TASKS_A_WORKER: u64 = 4;
+
+/// How long a case takes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Pilot {
+    /// Cases that were run.
+    pub cases: usize,
+    /// Mean time of one, s.
+    pub mean_s: f64,
+    /// The longest, s.
+    pub longest_s: f64,
+}
+
+/// Ranges for an engine.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Plan {
+    /// One a task.
+    pub ranges: Vec<Range<u64>>,
+    /// Cases of a task.
+    pub cases_a_task: u64,
+    /// Time that a task is expected to take, s.
+    pub task_s: f64,
+    /// Time that a task may take, s.
+    pub limit_s: f64,
+}
+
+/// Runs cases spread over what is missing, one at a time, for `budget` at most; what comes of them is not kept.
+///
+/// # Errors
+/// A case that cannot be made.
+pub fn measure(study: &Study, holes: &[Range<u64>], cases: usize, budget: Duration) -> miette::Result<Pilot> {
+    let missing: u64 = holes.iter().map(|h| h.end - h.start).sum();
+    let count = (cases.max(1) as u64).min(missing);
+    let (begun, mut times) = (Instant::now(), Vec::new());
+    for i in 0..count {
+        if !times.is_empty() && begun.elapsed() >= budget {
+            break;
+        }
+        // In an order that is spread however early it ends: the golden ratio's multiples.
+        let place = (0.5 + i as f64 * 0.618_033_988_749_895).fract();
+        let index = nth(holes, (place * missing as f64) as u64);
+        for line in study.file.lines(index..index + 1)? {
+            let (index, line) = line?;
+            let case = study.case(index, line.as_ref())?;
+            let start = Instant::now();
+            std::hint::black_box(entry(study, index, case));
+            times.push(start.elapsed().as_secs_f64());
+        }
+    }
+    let mean_s = times.iter().sum::<f64>() / times.len().max(1) as f64;
+    Ok(Pilot { cases: times.len(), mean_s, longest_s: times.iter().fold(0.0, |a, b| a.max(*b)) })
+}
+
+/// The `n`th index of what is missing.
+fn nth(holes: &[Range<u64>], mut n: u64) -> u64 {
+    for hole in holes {
+        let length = hole.end - hole.start;
+        if n < length {
+            return hole.start + n;
+        }
+        n -= length;
+    }
+    holes.last().map_or(0, |hole| hole.end - 1)
+}
+
+/// Cuts what is missing into tasks of about `task_s` seconds; none is over a third of `limit_s` where that is given.
+pub fn cut(holes: &[Range<u64>], pilot: &Pilot, workers: u64, task_s: f64, limit_s: Option<f64>) -> Plan {
+    let missing: u64 = holes.iter().map(|h| h.end - h.start).sum();
+    let wanted = limit_s.map_or(task_s, |limit| task_s.min(limit / 3.0));
+    let by_time = (wanted / pilot.mean_s.max(1e-6)) as u64;
+    let by_share = missing.div_ceil(TASKS_A_WORKER * workers.max(1));
+    let cases_a_task = by_time.min(by_share).clamp(1, MOST);
+    let mut ranges = Vec::new();
+    for hole in holes {
+        let mut start = hole.start;
+        while start < hole.end {
+            let end = (start + cases_a_task).min(hole.end);
+            ranges.push(start..end);
+            start = end;
+        }
+    }
+    let expected = cases_a_task as f64 * pilot.mean_s;
+    Plan {
+        ranges,
+        cases_a_task,
+        task_s: expected,
+        limit_s: limit_s.unwrap_or(60.0 + 3.0 * expected + 5.0 * pilot.longest_s),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tasks_cover_what_is_missing_once_and_fit_their_limit() {
+        let pilot = Pilot { cases: 5, mean_s: 0.5, longest_s: 2.0 };
+        for (holes, workers, limit) in [
+            (vec![0..1000], 2, None),
+            (vec![3..4, 10..5000], 8, Some(60.0)),
+            (vec![0..1], 1, Some(1.0)),
+            (vec![0..2_000_000], 4, None),
+        ] {
+            let plan = cut(&holes, &pilot, workers, 300.0, limit);
+            let flat = |ranges: &[Range<u64>]| ranges.iter().flat_map(|r| r.clone()).collect::<Vec<u64>>();
+            assert_eq!(flat(&plan.ranges), flat(&holes));
+            assert!(
+                plan.cases_a_task == 1 || plan.task_s <= 300.0_f64.min(limit.unwrap_or(900.0) / 3.0),
+                "{plan:?}"
+            );
+            assert!(plan.limit_s >= plan.task_s || plan.cases_a_task == 1);
+        }
+        assert_eq!(nth(&[3..4, 10..12], 0), 3);
+        assert_eq!(nth(&[3..4, 10..12], 2), 11);
+    }
+}
