@@ -14,16 +14,25 @@ BLOCK = re.compile(r"^```math\n(.*?)\n```$", re.M | re.S)
 INLINE = re.compile(r"\$`([^`]+)`\$")
 TAG = re.compile(r"\\tag\{(\w+)\}")
 OUTSIDE = re.compile(r"\[([^\]]*)\]\((?:\.\./)+((?!docs/)[^)#]+)(?:#[^)]*)?\)")
+CONSOLE = re.compile(r"^( *)```console$", re.M)
 FENCE = re.compile(r"^( *)```(\w+) [^\n`]*$", re.M)
+
+
+PRIME = re.compile(r"<msup>(<mi>[^<]*</mi>)<mi>&#x02032;</mi></msup>")
+
+
+def drawn(latex, display="inline"):
+    """MathML. Upright letters as text: one alone would come out slanted. A prime is a sign of its own and no exponent."""
+    return PRIME.sub(r'<mrow>\1<mo lspace="0" rspace="0">&#x02032;</mo></mrow>', convert(latex.replace("\\mathrm{", "\\text{"), display=display))
 
 
 def block(found):
     latex = found[1]
     tag = TAG.search(latex)
     number = tag[1] if tag else ""
-    drawn = convert(TAG.sub("", latex).replace("\n", " ").strip(), display="block")
+    mathml = drawn(TAG.sub("", latex).replace("\n", " ").strip(), "block")
     name = f' id="eq-{number}"' if number else ""
-    return f'<div class="equation"{name}>{drawn}<span class="number">{f"({number})" if number else ""}</span></div>\n'
+    return f'<div class="equation"{name}>{mathml}<span class="number">{f"({number})" if number else ""}</span></div>\n'
 
 
 def outside(depth):
@@ -43,10 +52,10 @@ def chapter(item):
     page = item["Chapter"]
     text = page["content"]
     text = BLOCK.sub(block, text)
-    text = INLINE.sub(lambda found: convert(found[1]), text)
+    text = INLINE.sub(lambda found: drawn(found[1]), text)
     if page["path"]:
         text = OUTSIDE.sub(outside(page["path"].count("/")), text)
-    page["content"] = FENCE.sub(r"\1```\2", text)
+    page["content"] = CONSOLE.sub(r"\1```text,console", FENCE.sub(r"\1```\2", text))
     for below in page["sub_items"]:
         chapter(below)
 
