@@ -25,6 +25,7 @@ pub fn page() -> String {
             page.push_str("\n| key | type | default | meaning |\n|---|---|---|---|\n");
             rows(&mut page, kind, &object);
         }
+        choices(&mut page, kind, &schema);
     }
     page.push_str(&targets());
     page
@@ -49,6 +50,31 @@ fn push(all: &mut Vec<(String, Value)>, name: String, schema: &Value) {
         for (k, variant) in schema.get(list).and_then(Value::as_array).into_iter().flatten().enumerate() {
             if variant.get("properties").is_some() {
                 push(all, format!("{name}.{}", tag(variant).unwrap_or_else(|| (k + 1).to_string())), variant);
+            }
+        }
+    }
+}
+
+/// The definitions that are no table of keys: words to choose from, and values that may be written in more than one way. The tables'
+/// types link to them.
+fn choices(page: &mut String, kind: Kind, schema: &Value) {
+    let told: Vec<String> = objects(schema).into_iter().map(|(name, _)| name).collect();
+    let definitions = schema.get("$defs").and_then(Value::as_object);
+    for (name, definition) in definitions.into_iter().flatten().filter(|(name, _)| !told.contains(name)) {
+        let words =
+            |of: &Value| of.get("description").and_then(Value::as_str).map(one_line).unwrap_or_default();
+        let _ = write!(page, "\n### {} `{name}`\n\n{}\n\n", kind.name(), words(definition));
+        let variants = definition.get("oneOf").or(definition.get("anyOf")).and_then(Value::as_array);
+        match variants {
+            None => {
+                let _ = writeln!(page, "{}", type_of(kind, definition));
+            }
+            Some(variants) => {
+                page.push_str("| one of | meaning |\n|---|---|\n");
+                for variant in variants {
+                    let title = tag(variant).map_or_else(|| type_of(kind, variant), |tag| format!("`{tag}`"));
+                    let _ = writeln!(page, "| {title} | {} |", words(variant));
+                }
             }
         }
     }
