@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from os import PathLike
 
-from numpy import float64
+from numpy import float64, uint8
 from numpy.typing import NDArray
 
 __version__: str
@@ -17,6 +17,7 @@ def evaluate(
     finger: tuple[float, float, float, float, float, float | None],
     reading: str | None,
     out: Sequence[NDArray[float64]],
+    inside: NDArray[uint8],
 ) -> None: ...
 def psi_curve(
     columns: Sequence[NDArray[float64]], poisson_ratio: float, psi_star: float, out: NDArray[float64]

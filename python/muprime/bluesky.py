@@ -22,13 +22,13 @@ import signal
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import bluesky.plan_stubs as bps
 import bluesky.preprocessors as bpp
-from bluesky.protocols import PartialEvent, Reading
+from bluesky.protocols import Reading
 from bluesky.utils import MsgGenerator
-from event_model import DataKey
+from event_model import DataKey, PartialEvent
 from ophyd_async.core import AsyncStatus, Device
 
 COLUMNS: dict[str, tuple[str, str, str]] = {
@@ -201,9 +201,8 @@ class Sweep(Device):
 def fly_sweep(sweep: Sweep, md: dict[str, Any] | None = None, flush_period_s: float = 0.5) -> MsgGenerator[Any]:
     """A plan of bluesky: the sweep from beginning to end, with an event a pass in the stream ``passes`` while it goes on."""
 
-    @bpp.run_decorator(md={"plan_name": "fly_sweep", "muprime_folder": os.fspath(sweep.out), **(md or {})})
     def inner() -> MsgGenerator[Any]:
-        yield from bps.declare_stream(sweep, name="passes", collect=True)
+        yield from bps.declare_stream(cast(Any, sweep), name="passes", collect=True)
         # A sweep cannot be taken up in its middle: an engine that is asked to pause ends the plan, and the run with it.
         yield from bps.clear_checkpoint()
         yield from bps.kickoff(sweep, wait=True)
@@ -212,4 +211,5 @@ def fly_sweep(sweep: Sweep, md: dict[str, Any] | None = None, flush_period_s: fl
         finally:
             yield from bps.wait_for([sweep.stop_run])
 
-    return (yield from inner())
+    about = {"plan_name": "fly_sweep", "muprime_folder": os.fspath(sweep.out), **(md or {})}
+    return (yield from cast(Any, bpp.run_wrapper)(inner(), md=about))

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
+from scipy.optimize import least_squares  # type: ignore[import-untyped]
+from sklearn.base import BaseEstimator, RegressorMixin  # type: ignore[import-untyped]
+from sklearn.utils.validation import check_is_fitted, validate_data  # type: ignore[import-untyped]
 
 from . import _muprime
 from .laws import Finger, spring_slider
@@ -45,7 +45,8 @@ class _Law(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     def _table(self, X: Any) -> NDArray[np.float64]:
         """Of a prediction."""
         check_is_fitted(self)
-        return self._conditions(validate_data(self, X, reset=False, dtype=np.float64))
+        table: Any = validate_data(self, X, reset=False, dtype=np.float64)
+        return self._conditions(table)
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()

@@ -52,12 +52,20 @@ class Law(NamedTuple):
 def _columns(given: tuple[ArrayLike, ...]) -> tuple[list[NDArray[np.float64]], tuple[int, ...]]:
     """Columns of one length, and their common shape."""
     arrays = np.broadcast_arrays(*(np.asarray(column, dtype=np.float64) for column in given))
-    return [np.ascontiguousarray(array).reshape(-1) for array in arrays], arrays[0].shape
+    return [_flat(array) for array in arrays], arrays[0].shape
+
+
+def _flat(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.ascontiguousarray(array).reshape(-1)
 
 
 def _evaluate(name: str, finger: Finger | None, reading: str | None, columns: tuple[ArrayLike, ...]) -> Law:
-    flat, shape = _columns(columns)
-    out = [np.empty(flat[0].size) for _ in range(3)]
+    arrays = [np.asarray(column, dtype=np.float64) for column in columns]
+    shape = np.broadcast_shapes(*(array.shape for array in arrays))
+    # A number stays one number: only columns are laid out.
+    flat = [array.reshape(-1) if array.size == 1 else _flat(np.broadcast_to(array, shape)) for array in arrays]
+    size = int(np.prod(shape))
+    out, inside = [np.empty(size), np.empty(size)], np.empty(size, dtype=np.uint8)
     f = finger or Finger()
     told = (
         f.normal_stiffness_n_per_m,
@@ -67,10 +75,9 @@ def _evaluate(name: str, finger: Finger | None, reading: str | None, columns: tu
         f.young_modulus_pa,
         f.lateral_recovery_m_per_s,
     )
-    if flat[0].size:
-        _muprime.evaluate(name, flat, told, reading, out)
-    mu, sd, inside = (column.reshape(shape) for column in out)
-    return Law(mu, sd, inside > 0.5)
+    if size:
+        _muprime.evaluate(name, flat, told, reading, out, inside)
+    return Law(out[0].reshape(shape), out[1].reshape(shape), inside.view(np.bool_).reshape(shape))
 
 
 def spring_slider(

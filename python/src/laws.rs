@@ -41,11 +41,35 @@ fn law(name: &str, finger: Finger, reading: Option<&str>) -> Result<Box<dyn Fric
     })
 }
 
-/// `columns`: amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0, all of one length. `finger`: normal and lateral
+/// A column of conditions, or the one value that holds in every row: a number that was given once is not copied a million times.
+enum Column {
+    Same(f64),
+    Each(Vec<f64>),
+}
+
+impl Column {
+    fn of(py: Python<'_>, given: &PyBuffer<f64>, rows: usize) -> PyResult<Self> {
+        let values = given.to_vec(py)?;
+        match values.len() {
+            1 => Ok(Column::Same(values[0])),
+            length if length == rows => Ok(Column::Each(values)),
+            _ => Err(MuprimeError::new_err("columns of one length are needed")),
+        }
+    }
+
+    fn at(&self, row: usize) -> f64 {
+        match self {
+            Column::Same(value) => *value,
+            Column::Each(values) => values[row],
+        }
+    }
+}
+
+/// `columns`: amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0, each as long as `out` or a single value. `finger`: normal and lateral
 /// stiffness in N/m, their relative standard deviation, Poisson's ratio, Young's modulus in Pa, lateral recovery in m/s or None. `out`:
-/// mu', its standard uncertainty, and 1.0 inside the law's range.
+/// mu' and its standard uncertainty; `inside`: 1 inside the law's range.
 #[pyfunction]
-#[pyo3(signature = (name, columns, finger, reading, out))]
+#[pyo3(signature = (name, columns, finger, reading, out, inside))]
 #[allow(clippy::type_complexity)]
 pub fn evaluate(
     py: Python<'_>,
@@ -53,7 +77,8 @@ pub fn evaluate(
     columns: [PyBuffer<f64>; 5],
     finger: (f64, f64, f64, f64, f64, Option<f64>),
     reading: Option<&str>,
-    out: [PyBuffer<f64>; 3],
+    out: [PyBuffer<f64>; 2],
+    inside: PyBuffer<u8>,
 ) -> PyResult<()> {
     let finger = Finger {
         normal_stiffness_n_per_m: finger.0,
@@ -64,40 +89,35 @@ pub fn evaluate(
         lateral_recovery_m_per_s: finger.5,
     };
     let law = law(name, finger, reading).map_err(MuprimeError::new_err)?;
-    let told = columns.iter().map(|column| column.to_vec(py)).collect::<PyResult<Vec<_>>>()?;
-    let [w, f, u, n, mu0] = &told[..] else { return Err(MuprimeError::new_err("five columns are needed")) };
-    let rows = w.len();
-    if told.iter().any(|column| column.len() != rows) || out.iter().any(|column| column.item_count() != rows)
-    {
-        return Err(MuprimeError::new_err("columns of one length are needed"));
-    }
-    let [mut mu, mut sd, mut inside] = [(); 3].map(|()| vec![0.0; rows]);
+    let rows = inside.item_count();
+    let told = columns.iter().map(|given| Column::of(py, given, rows)).collect::<PyResult<Vec<_>>>()?;
+    let [mut mu, mut sd] = [(); 2].map(|()| vec![0.0; rows]);
+    let mut within = vec![0_u8; rows];
     let answered = py.detach(|| {
-        let share = |(nth, ((mu, sd), inside)): (usize, ((&mut [f64], &mut [f64]), &mut [f64]))| {
+        let share = |(nth, ((mu, sd), within)): (usize, ((&mut [f64], &mut [f64]), &mut [u8]))| {
             let mut condition = Condition::paper();
-            for (k, ((mu, sd), inside)) in mu.iter_mut().zip(sd).zip(inside).enumerate() {
-                let i = nth * SHARE + k;
-                condition.amplitude = PeakToPeak::from_metres(w[i]);
-                condition.frequency_hz = f[i];
-                condition.speed_m_s = u[i];
-                condition.normal_force_n = n[i];
-                condition.mu0 = mu0[i];
-                let answer = law.relative_friction(&condition).map_err(|why| format!("row {i}: {why}"))?;
+            for (k, ((mu, sd), within)) in mu.iter_mut().zip(sd).zip(within).enumerate() {
+                let row = nth * SHARE + k;
+                condition.amplitude = PeakToPeak::from_metres(told[0].at(row));
+                condition.frequency_hz = told[1].at(row);
+                condition.speed_m_s = told[2].at(row);
+                condition.normal_force_n = told[3].at(row);
+                condition.mu0 = told[4].at(row);
+                let answer = law.relative_friction(&condition).map_err(|why| format!("row {row}: {why}"))?;
                 (*mu, *sd) = (answer.mu_relative, answer.sd);
-                *inside = f64::from(u8::from(answer.validity == Validity::Inside));
+                *within = u8::from(answer.validity == Validity::Inside);
             }
             Ok::<(), String>(())
         };
         let columns = mu.par_chunks_mut(SHARE).zip(sd.par_chunks_mut(SHARE));
         // Of several rows that are refused, the first share's is told, whatever the number of threads.
-        let all: Vec<_> = columns.zip(inside.par_chunks_mut(SHARE)).enumerate().map(share).collect();
+        let all: Vec<_> = columns.zip(within.par_chunks_mut(SHARE)).enumerate().map(share).collect();
         all.into_iter().find(Result::is_err).unwrap_or(Ok(()))
     });
     answered.map_err(MuprimeError::new_err)?;
-    for (column, values) in out.iter().zip([&mu, &sd, &inside]) {
-        column.copy_from_slice(py, values)?;
-    }
-    Ok(())
+    out[0].copy_from_slice(py, &mu)?;
+    out[1].copy_from_slice(py, &sd)?;
+    inside.copy_from_slice(py, &within)
 }
 
 /// Psi of Eq. 17 of columns: amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0.
