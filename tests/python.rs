@@ -95,7 +95,20 @@ fn the_package_says_what_the_command_says() {
     println!("{out}");
     assert!(notebooks.status.success() && out.ends_with("ok\n"), "{out}{err}");
 
-    // Types: the package itself, and what its users write.
+    // bluesky's RunEngine, and scikit-learn's own checks.
+    let ecosystem = python()
+        .arg(file("tests/python/ecosystem.py"))
+        .arg(folder.path())
+        .env("PYTHONPATH", &site)
+        .env("MUPRIME_BINARY", muprime().get_program())
+        .env("MUPRIME_RUNS", folder.path())
+        .output()
+        .unwrap();
+    let (out, err) = texts(&ecosystem);
+    println!("{out}");
+    assert!(ecosystem.status.success() && out.ends_with("ok\n"), "{out}{err}");
+
+    // Types, by two checkers: the package itself, and what its users write.
     let checked = python()
         .args(["-m", "mypy", "--strict", "--no-incremental", "--python-executable"])
         .arg(python().get_program())
@@ -106,4 +119,15 @@ fn the_package_says_what_the_command_says() {
         .output()
         .unwrap();
     assert!(checked.status.success(), "{}{}", texts(&checked).0, texts(&checked).1);
+    let config = r#"{"typeCheckingMode": "standard", "extraPaths": ["site"], "include": ["site/muprime", "typed.py"]}"#;
+    std::fs::write(folder.path().join("pyrightconfig.json"), config).unwrap();
+    std::fs::copy(file("tests/python/typed.py"), folder.path().join("typed.py")).unwrap();
+    let checked = python()
+        .args(["-m", "basedpyright", "--level", "error", "--pythonpath"])
+        .arg(python().get_program())
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let (out, err) = texts(&checked);
+    assert!(checked.status.success() && out.contains("0 errors"), "{out}{err}");
 }

@@ -187,13 +187,17 @@ impl EmpiricalPsi {
     /// A condition outside the domain of the law, by name.
     pub fn under(&self, condition: &Condition, reading: Reading) -> Result<(f64, f64), OutOfDomain> {
         condition.check()?;
+        Ok(self.under_checked(condition, reading))
+    }
+
+    fn under_checked(&self, condition: &Condition, reading: Reading) -> (f64, f64) {
         if condition.amplitude.metres() == 0.0 {
-            return Ok((1.0, 0.0));
+            return (1.0, 0.0);
         }
         let group = PsiEq17::at(condition, self.finger.poisson_ratio);
         let (psi_star, sd) = reading.psi_star();
         let fit = psi::sensitivity_to_psi_star(group, psi_star) * sd;
-        Ok((psi::relative_friction(group, psi_star), fit.hypot(psi::COLLAPSE_RMSE)))
+        (psi::relative_friction(group, psi_star), fit.hypot(psi::COLLAPSE_RMSE))
     }
 }
 
@@ -217,8 +221,11 @@ impl FrictionModel for EmpiricalPsi {
 
     fn relative_friction(&self, condition: &Condition) -> Result<RelativeFriction, OutOfDomain> {
         let (mut mu_relative, mut square) = (0.0, 0.0);
-        for (reading, weight) in Reading::ALL.into_iter().zip(self.weights) {
-            let (mu, sd) = self.under(condition, reading)?;
+        condition.check()?;
+        for (reading, weight) in
+            Reading::ALL.into_iter().zip(self.weights).filter(|(_, weight)| *weight > 0.0)
+        {
+            let (mu, sd) = self.under_checked(condition, reading);
             mu_relative += weight * mu;
             square += weight * (mu * mu + sd * sd);
         }

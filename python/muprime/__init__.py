@@ -10,22 +10,33 @@ says what is wrong, where, and what to do.
 """
 
 from ._muprime import MuprimeError, __version__
-from .laws import Finger, Law, psi, ridge, spring_slider, surrogate
+from .calibration import Certificate, CertifiedParameter, Estimate, Skin, calibrate, fit_finger, load_certificate
+from .laws import Finger, Law, models, psi, ridge, spring_slider, surrogate
+from .plans import Plan
 from .runs import Run, load, run
 from .verdict import Hypothesis, Parameter, Region, Verdict, diagnose
 
 __all__ = [
+    "Certificate",
+    "CertifiedParameter",
+    "Estimate",
     "Finger",
     "Hypothesis",
     "Law",
     "MuprimeError",
     "Parameter",
+    "Plan",
     "Region",
     "Run",
+    "Skin",
     "Verdict",
     "__version__",
+    "calibrate",
     "diagnose",
+    "fit_finger",
     "load",
+    "load_certificate",
+    "models",
     "psi",
     "ridge",
     "run",

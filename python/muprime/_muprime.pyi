@@ -3,30 +3,43 @@
 from collections.abc import Sequence
 from os import PathLike
 
-from numpy import float64
+from numpy import float64, uint8
 from numpy.typing import NDArray
 
 __version__: str
 
 class MuprimeError(ValueError): ...
 
+def models_json() -> str: ...
 def evaluate(
     name: str,
     columns: Sequence[NDArray[float64]],
     finger: tuple[float, float, float, float, float, float | None],
     reading: str | None,
     out: Sequence[NDArray[float64]],
+    inside: NDArray[uint8],
 ) -> None: ...
-def ridge(
-    amplitude_pp_m: float,
-    frequency_hz: float,
-    speed_m_s: float,
-    normal_force_n: float,
-    mu0: float,
-    young_modulus_pa: float,
-    poisson_ratio: float,
+def psi_curve(
+    columns: Sequence[NDArray[float64]], poisson_ratio: float, psi_star: float, out: NDArray[float64]
+) -> None: ...
+def fit_psi(
+    columns: Sequence[NDArray[float64]], mu_relative: NDArray[float64], curves: list[int], poisson_ratio: float
+) -> tuple[float, float, float]: ...
+def ridge(columns: Sequence[NDArray[float64]], elements: int) -> str: ...
+def calibrate(words: list[str]) -> tuple[str, str]: ...
+def certificate(name: str, text: str) -> str: ...
+def fit_finger(
+    phases: bytes,
+    frequency_hz: float | None,
+    normal_force_n: float | None,
+    modulus_range_pa: tuple[float, float],
     elements: int,
+    modulus_only: bool,
 ) -> str: ...
+def plan_load(name: str) -> tuple[str, str, str]: ...
+def plan_parse(name: str, text: str) -> tuple[str, str, str]: ...
+def plan_made(document: str) -> tuple[str, str, str]: ...
+def plan_passes(name: str, text: str, setup: str, seed: int | None) -> str: ...
 def diagnose(
     name: str,
     table: bytes,
@@ -40,6 +53,7 @@ def diagnose(
 def load(folder: str | PathLike[str]) -> tuple[bytes, str]: ...
 def run(
     plan: str,
+    text: str,
     setup: str,
     out: str | PathLike[str],
     seed: int | None,

@@ -12,6 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from . import _muprime
 
 
+def models() -> dict[str, Any]:
+    """What the answers come from: version of the ridge, hashes of the surrogate's table and of the library of effects, as ``muprime --version --json``
+    says them under ``models``. Two results of the same hashes come from the same models.
+    """
+    told: dict[str, Any] = json.loads(_muprime.models_json())
+    return told
+
+
 @dataclass(frozen=True)
 class Finger:
     """A fingertip as the laws see it. Defaults: Vezzoli et al., Figs. 13 and 14, Table 2 (moist)."""
@@ -41,11 +49,23 @@ class Law(NamedTuple):
     """Inside the range that the law was fitted on or derived for; outside it extrapolates."""
 
 
+def _columns(given: tuple[ArrayLike, ...]) -> tuple[list[NDArray[np.float64]], tuple[int, ...]]:
+    """Columns of one length, and their common shape."""
+    arrays = np.broadcast_arrays(*(np.asarray(column, dtype=np.float64) for column in given))
+    return [_flat(array) for array in arrays], arrays[0].shape
+
+
+def _flat(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.ascontiguousarray(array).reshape(-1)
+
+
 def _evaluate(name: str, finger: Finger | None, reading: str | None, columns: tuple[ArrayLike, ...]) -> Law:
-    arrays = np.broadcast_arrays(*(np.asarray(column, dtype=np.float64) for column in columns))
-    shape = arrays[0].shape
-    flat = [np.ascontiguousarray(array).reshape(-1) for array in arrays]
-    out = [np.empty(flat[0].size) for _ in range(3)]
+    arrays = [np.asarray(column, dtype=np.float64) for column in columns]
+    shape = np.broadcast_shapes(*(array.shape for array in arrays))
+    # A number stays one number: only columns are laid out.
+    flat = [array.reshape(-1) if array.size == 1 else _flat(np.broadcast_to(array, shape)) for array in arrays]
+    size = int(np.prod(shape))
+    out, inside = [np.empty(size), np.empty(size)], np.empty(size, dtype=np.uint8)
     f = finger or Finger()
     told = (
         f.normal_stiffness_n_per_m,
@@ -55,10 +75,9 @@ def _evaluate(name: str, finger: Finger | None, reading: str | None, columns: tu
         f.young_modulus_pa,
         f.lateral_recovery_m_per_s,
     )
-    if flat[0].size:
-        _muprime.evaluate(name, flat, told, reading, out)
-    mu, sd, inside = (column.reshape(shape) for column in out)
-    return Law(mu, sd, inside > 0.5)
+    if size:
+        _muprime.evaluate(name, flat, told, reading, out, inside)
+    return Law(out[0].reshape(shape), out[1].reshape(shape), inside.view(np.bool_).reshape(shape))
 
 
 def spring_slider(
@@ -111,22 +130,25 @@ def surrogate(
 
 
 def ridge(
-    amplitude_pp_m: float = 2e-6,
-    frequency_hz: float = 27.5e3,
-    speed_m_s: float = 0.02,
-    normal_force_n: float = 0.25,
-    mu0: float = 0.5,
+    amplitude_pp_m: ArrayLike = 2e-6,
+    frequency_hz: ArrayLike = 27.5e3,
+    speed_m_s: ArrayLike = 0.02,
+    normal_force_n: ArrayLike = 0.25,
+    mu0: ArrayLike = 0.5,
     *,
-    young_modulus_pa: float = 28.3e6,
-    poisson_ratio: float = 0.33,
+    young_modulus_pa: ArrayLike = 28.3e6,
+    poisson_ratio: ArrayLike = 0.33,
     elements: int = 800,
 ) -> dict[str, Any]:
-    """One case of the finite element ridge, run to its steady state: about a second on 800 elements.
+    """The finite element ridge (section 3), run to its steady state: about a second a case and core on 800 elements.
 
-    Answers with the keys of ``muprime model ridge --json``: ``mu_relative``, ``contact_fraction``, ``phase_shift_deg`` and so on.
+    Arguments as of :func:`spring_slider`, and Young's modulus of the stratum corneum in Pa and Poisson's ratio; they broadcast. Answers with the
+    keys of ``muprime model ridge --json``: ``mu_relative``, ``contact_fraction``, ``phase_shift_deg`` and so on; each is a number where
+    all arguments are numbers, otherwise an array of their common shape. All cores work, with the interpreter free.
     """
-    text = _muprime.ridge(
-        amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0, young_modulus_pa, poisson_ratio, elements
-    )
-    answer: dict[str, Any] = json.loads(text)
-    return answer
+    given = (amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0, young_modulus_pa, poisson_ratio)
+    flat, shape = _columns(given)
+    runs: list[dict[str, Any]] = json.loads(_muprime.ridge(flat, elements)) if flat[0].size else []
+    if shape == ():
+        return runs[0]
+    return {key: np.array([run[key] for run in runs]).reshape(shape) for key in (runs[0] if runs else {})}

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _muprime
+from .plans import Plan
 
 if TYPE_CHECKING:
     import pandas
@@ -64,7 +65,7 @@ def load(run: str | os.PathLike[str]) -> Run:
 
 
 def run(
-    plan: str | os.PathLike[str] = "first-sweep",
+    plan: str | os.PathLike[str] | Plan = "first-sweep",
     *,
     out: str | os.PathLike[str],
     setup: str | os.PathLike[str] = "virtual-ideal",
@@ -75,9 +76,10 @@ def run(
     sample: str | None = None,
     licence: str | None = None,
 ) -> Run:
-    """Runs a plan (a file or a bundled name) on the virtual rig of a setup, in virtual time, into the folder ``out``.
+    """Runs a plan (a :class:`Plan`, a file or a bundled name) on the virtual rig of a setup, in virtual time, into the folder ``out``.
 
     An unfinished run there is taken up again. A real rig is led by ``muprime run`` alone, never from here.
     """
-    _muprime.run(os.fspath(plan), os.fspath(setup), out, seed, defects, model, operator, sample, licence)
+    plan = plan if isinstance(plan, Plan) else Plan.load(plan)
+    _muprime.run(plan.name, plan.toml, os.fspath(setup), out, seed, defects, model, operator, sample, licence)
     return load(out)

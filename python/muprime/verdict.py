@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 from dataclasses import dataclass, field
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _muprime
+from ._tables import csv_bytes
 from .runs import Run, load
 
 
@@ -85,24 +85,6 @@ def _interval(ends: list[float] | None) -> tuple[float, float] | None:
     return (ends[0], ends[1]) if ends else None
 
 
-def _csv(table: Any) -> bytes:
-    """A point table from a data frame of pandas or polars, or an Arrow table, at full precision."""
-    if hasattr(table, "write_csv"):
-        text = table.write_csv()
-        return text.encode() if isinstance(text, str) else bytes(text)
-    if hasattr(table, "to_csv"):
-        return bytes(table.to_csv(index=False), "utf-8")
-    if hasattr(table, "to_pylist"):
-        import csv
-
-        out = io.StringIO()
-        writer = csv.DictWriter(out, table.column_names, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(table.to_pylist())
-        return out.getvalue().encode()
-    raise TypeError(f"a table is a path, a Run, or a data frame of pandas, polars or Arrow, not {type(table).__name__}")
-
-
 def diagnose(
     table: Any,
     rig: str | os.PathLike[str] | None = None,
@@ -131,11 +113,11 @@ def diagnose(
         rig = rig or path.parent / "rig.toml"
         name, data = os.fspath(path), path.read_bytes()
     else:
-        name, data = "the data frame", _csv(table)
+        name, data = "the data frame", csv_bytes(table)
         if rig is None:
             raise _muprime.MuprimeError("a data frame has no rig.toml beside it: name one with rig=")
     if predict is not None:
-        predict = Path(predict).read_bytes() if isinstance(predict, (str, os.PathLike)) else _csv(predict)
+        predict = Path(predict).read_bytes() if isinstance(predict, (str, os.PathLike)) else csv_bytes(predict)
     rig = Path(rig)
     text, words, page, predictions = _muprime.diagnose(
         name, data, os.fspath(rig), rig.read_text(encoding="utf-8"), pairs, list(without), predict, damage

@@ -3,7 +3,9 @@
 use crate::MuprimeError;
 use models::condition::Condition;
 use models::finger::Finger;
-use models::prediction::{EmpiricalPsi, FrictionModel, RelativeFriction, SpringSlider, Validity};
+use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider, Validity};
+use models::psi::{self, PsiEq17};
+use models::psi_fit;
 use models::quantity::PeakToPeak;
 use models::reading::Reading;
 use models::surrogate::Surrogate;
@@ -39,11 +41,35 @@ fn law(name: &str, finger: Finger, reading: Option<&str>) -> Result<Box<dyn Fric
     })
 }
 
-/// `columns`: amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0, all of one length. `finger`: normal and lateral
+/// A column of conditions, or the one value that holds in every row: a number that was given once is not copied a million times.
+enum Column {
+    Same(f64),
+    Each(Vec<f64>),
+}
+
+impl Column {
+    fn of(py: Python<'_>, given: &PyBuffer<f64>, rows: usize) -> PyResult<Self> {
+        let values = given.to_vec(py)?;
+        match values.len() {
+            1 => Ok(Column::Same(values[0])),
+            length if length == rows => Ok(Column::Each(values)),
+            _ => Err(MuprimeError::new_err("columns of one length are needed")),
+        }
+    }
+
+    fn at(&self, row: usize) -> f64 {
+        match self {
+            Column::Same(value) => *value,
+            Column::Each(values) => values[row],
+        }
+    }
+}
+
+/// `columns`: amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0, each as long as `out` or a single value. `finger`: normal and lateral
 /// stiffness in N/m, their relative standard deviation, Poisson's ratio, Young's modulus in Pa, lateral recovery in m/s or None. `out`:
-/// mu', its standard uncertainty, and 1.0 inside the law's range.
+/// mu' and its standard uncertainty; `inside`: 1 inside the law's range.
 #[pyfunction]
-#[pyo3(signature = (name, columns, finger, reading, out))]
+#[pyo3(signature = (name, columns, finger, reading, out, inside))]
 #[allow(clippy::type_complexity)]
 pub fn evaluate(
     py: Python<'_>,
@@ -51,7 +77,8 @@ pub fn evaluate(
     columns: [PyBuffer<f64>; 5],
     finger: (f64, f64, f64, f64, f64, Option<f64>),
     reading: Option<&str>,
-    out: [PyBuffer<f64>; 3],
+    out: [PyBuffer<f64>; 2],
+    inside: PyBuffer<u8>,
 ) -> PyResult<()> {
     let finger = Finger {
         normal_stiffness_n_per_m: finger.0,
@@ -62,31 +89,109 @@ pub fn evaluate(
         lateral_recovery_m_per_s: finger.5,
     };
     let law = law(name, finger, reading).map_err(MuprimeError::new_err)?;
-    let [w, f, u, n, mu0] = {
-        let mut told = Vec::with_capacity(5);
-        for column in &columns {
-            told.push(column.to_vec(py)?);
-        }
-        <[Vec<f64>; 5]>::try_from(told).map_err(|_| MuprimeError::new_err("five columns"))?
-    };
-    let answers = py.detach(|| {
-        let row = |i: usize| {
-            let condition = Condition {
-                amplitude: PeakToPeak::from_metres(w[i]),
-                frequency_hz: f[i],
-                speed_m_s: u[i],
-                normal_force_n: n[i],
-                mu0: mu0[i],
-                ..Condition::paper()
-            };
-            law.relative_friction(&condition).map_err(|why| format!("row {i}: {why}"))
+    let rows = inside.item_count();
+    let told = columns.iter().map(|given| Column::of(py, given, rows)).collect::<PyResult<Vec<_>>>()?;
+    let [mut mu, mut sd] = [(); 2].map(|()| vec![0.0; rows]);
+    let mut within = vec![0_u8; rows];
+    let answered = py.detach(|| {
+        let share = |(nth, ((mu, sd), within)): (usize, ((&mut [f64], &mut [f64]), &mut [u8]))| {
+            let mut condition = Condition::paper();
+            for (k, ((mu, sd), within)) in mu.iter_mut().zip(sd).zip(within).enumerate() {
+                let row = nth * SHARE + k;
+                condition.amplitude = PeakToPeak::from_metres(told[0].at(row));
+                condition.frequency_hz = told[1].at(row);
+                condition.speed_m_s = told[2].at(row);
+                condition.normal_force_n = told[3].at(row);
+                condition.mu0 = told[4].at(row);
+                let answer = law.relative_friction(&condition).map_err(|why| format!("row {row}: {why}"))?;
+                (*mu, *sd) = (answer.mu_relative, answer.sd);
+                *within = u8::from(answer.validity == Validity::Inside);
+            }
+            Ok::<(), String>(())
         };
-        (0..w.len()).into_par_iter().with_min_len(SHARE).map(row).collect::<Result<Vec<_>, _>>()
+        let columns = mu.par_chunks_mut(SHARE).zip(sd.par_chunks_mut(SHARE));
+        // Of several rows that are refused, the first share's is told, whatever the number of threads.
+        let all: Vec<_> = columns.zip(within.par_chunks_mut(SHARE)).enumerate().map(share).collect();
+        all.into_iter().find(Result::is_err).unwrap_or(Ok(()))
     });
-    let answers = answers.map_err(MuprimeError::new_err)?;
-    let column =
-        |value: &dyn Fn(&RelativeFriction) -> f64| -> Vec<f64> { answers.iter().map(value).collect() };
-    out[0].copy_from_slice(py, &column(&|p| p.mu_relative))?;
-    out[1].copy_from_slice(py, &column(&|p| p.sd))?;
-    out[2].copy_from_slice(py, &column(&|p| f64::from(u8::from(p.validity == Validity::Inside))))
+    answered.map_err(MuprimeError::new_err)?;
+    out[0].copy_from_slice(py, &mu)?;
+    out[1].copy_from_slice(py, &sd)?;
+    inside.copy_from_slice(py, &within)
+}
+
+/// Psi of Eq. 17 of columns: amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0.
+fn groups(columns: &[Vec<f64>], poisson_ratio: f64) -> Result<Vec<PsiEq17>, String> {
+    let of = |i: usize| {
+        let condition = Condition {
+            amplitude: PeakToPeak::from_metres(columns[0][i]),
+            frequency_hz: columns[1][i],
+            speed_m_s: columns[2][i],
+            normal_force_n: columns[3][i],
+            mu0: columns[4][i],
+            ..Condition::paper()
+        };
+        condition.check().map_err(|why| format!("row {i}: {why}"))?;
+        Ok(PsiEq17::at(&condition, poisson_ratio))
+    };
+    (0..columns[0].len()).map(of).collect()
+}
+
+fn columns_of(py: Python<'_>, columns: &[PyBuffer<f64>; 5]) -> PyResult<Vec<Vec<f64>>> {
+    let told = columns.iter().map(|column| column.to_vec(py)).collect::<PyResult<Vec<_>>>()?;
+    if told.iter().any(|column| column.len() != told[0].len()) {
+        return Err(MuprimeError::new_err("columns of one length are needed"));
+    }
+    Ok(told)
+}
+
+/// Eq. 20 with a Psi* of one's own on columns (as of [`evaluate`]): mu'.
+#[pyfunction]
+#[pyo3(signature = (columns, poisson_ratio, psi_star, out))]
+pub fn psi_curve(
+    py: Python<'_>,
+    columns: [PyBuffer<f64>; 5],
+    poisson_ratio: f64,
+    psi_star: f64,
+    out: PyBuffer<f64>,
+) -> PyResult<()> {
+    let groups = groups(&columns_of(py, &columns)?, poisson_ratio).map_err(MuprimeError::new_err)?;
+    // Without vibration Psi is infinite and mu' is one.
+    let mu: Vec<f64> = groups.into_iter().map(|group| psi::relative_friction(group, psi_star)).collect();
+    out.copy_from_slice(py, &mu)
+}
+
+/// Least-squares Psi* of columns and their mu': its value, its standard uncertainty by leaving out one curve (`curves` numbers them) at a time,
+/// and the root mean square residual.
+#[pyfunction]
+#[pyo3(signature = (columns, mu_relative, curves, poisson_ratio))]
+pub fn fit_psi(
+    py: Python<'_>,
+    columns: [PyBuffer<f64>; 5],
+    mu_relative: PyBuffer<f64>,
+    curves: Vec<usize>,
+    poisson_ratio: f64,
+) -> PyResult<(f64, f64, f64)> {
+    let told = columns_of(py, &columns)?;
+    let mu = mu_relative.to_vec(py)?;
+    if mu.len() != told[0].len() || curves.len() != mu.len() {
+        return Err(MuprimeError::new_err("columns of one length are needed"));
+    }
+    let found = py.detach(|| {
+        let groups = groups(&told, poisson_ratio)?;
+        let points: Vec<(usize, f64, f64)> = curves
+            .iter()
+            .zip(groups.iter().zip(&mu))
+            .filter(|(_, (group, _))| group.0.is_finite())
+            .map(|(curve, (group, mu))| (*curve, group.0, *mu))
+            .collect();
+        psi_fit::fit(&points).ok_or_else(|| {
+            format!(
+                "{} rows with vibration: no Psi* between 0.01 and 100 fits better than its neighbours",
+                points.len()
+            )
+        })
+    });
+    let found = found.map_err(MuprimeError::new_err)?;
+    Ok((found.psi_star, found.psi_star_sd, found.rmse))
 }

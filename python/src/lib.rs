@@ -4,14 +4,18 @@
 //! | file | door to |
 //! |---|---|
 //! | `laws` | friction laws on columns of conditions |
-//! | `ridge` | one case of the finite element ridge |
+//! | `ridge` | cases of the finite element ridge |
+//! | `calibrate` | certificates from files; the skin of a finger from a phase table |
+//! | `plans` | plans: read, made, judged on a setup |
 //! | `verdict` | the diagnosis of a table |
 //! | `runs` | a run's folder; a sweep on the virtual rig in virtual time |
 
 // Messages of refusals go to Python as they are; nothing is printed from here.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+mod calibrate;
 mod laws;
+mod plans;
 mod ridge;
 mod runs;
 mod verdict;
@@ -34,14 +38,30 @@ fn refused(why: miette::Report) -> PyErr {
     MuprimeError::new_err(text)
 }
 
+/// What the models' answers come from, as JSON: `models` of `muprime --version --json`.
+#[pyfunction]
+fn models_json() -> PyResult<String> {
+    serde_json::to_string(&rig::version::models()).map_err(|why| MuprimeError::new_err(why.to_string()))
+}
+
 /// The module.
 #[pymodule]
 fn _muprime(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("MuprimeError", m.py().get_type::<MuprimeError>())?;
+    m.add_function(wrap_pyfunction!(models_json, m)?)?;
     m.add_function(wrap_pyfunction!(laws::evaluate, m)?)?;
+    m.add_function(wrap_pyfunction!(laws::psi_curve, m)?)?;
+    m.add_function(wrap_pyfunction!(laws::fit_psi, m)?)?;
     m.add_function(wrap_pyfunction!(ridge::ridge, m)?)?;
     m.add_function(wrap_pyfunction!(verdict::diagnose, m)?)?;
+    m.add_function(wrap_pyfunction!(calibrate::calibrate, m)?)?;
+    m.add_function(wrap_pyfunction!(calibrate::certificate, m)?)?;
+    m.add_function(wrap_pyfunction!(calibrate::fit_finger, m)?)?;
+    m.add_function(wrap_pyfunction!(plans::plan_load, m)?)?;
+    m.add_function(wrap_pyfunction!(plans::plan_parse, m)?)?;
+    m.add_function(wrap_pyfunction!(plans::plan_made, m)?)?;
+    m.add_function(wrap_pyfunction!(plans::plan_passes, m)?)?;
     m.add_function(wrap_pyfunction!(runs::load, m)?)?;
     m.add_function(wrap_pyfunction!(runs::run, m)?)?;
     Ok(())

@@ -1,38 +1,38 @@
-//! One case of the finite element ridge.
+//! Cases of the finite element ridge, on all cores.
 
 use crate::MuprimeError;
 use models::quantity::PeakToPeak;
 use models::ridge::{RidgeCase, RunSettings, case, run as solve};
+use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
-/// Runs a case to its steady state and answers with the document of `muprime model ridge --json`, without its times.
+/// Runs cases to their steady states. `columns`: amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0, young_modulus_pa,
+/// poisson_ratio, all of one length. Answers with a document of `muprime model ridge --json` for each, as one JSON list.
 #[pyfunction]
-#[pyo3(signature = (amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0, young_modulus_pa, poisson_ratio, elements))]
-#[allow(clippy::too_many_arguments)]
-pub fn ridge(
-    py: Python<'_>,
-    amplitude_pp_m: f64,
-    frequency_hz: f64,
-    speed_m_s: f64,
-    normal_force_n: f64,
-    mu0: f64,
-    young_modulus_pa: f64,
-    poisson_ratio: f64,
-    elements: usize,
-) -> PyResult<String> {
-    let case = RidgeCase {
-        amplitude: PeakToPeak::from_metres(amplitude_pp_m),
-        frequency_hz,
-        speed_m_s,
-        normal_force_n,
-        mu0,
-        young_modulus_pa,
-        poisson_ratio,
-        elements,
-        mean_pressure_pa: case::hertz_mean_pressure_pa(normal_force_n),
-        ..RidgeCase::paper()
+#[pyo3(signature = (columns, elements))]
+pub fn ridge(py: Python<'_>, columns: [PyBuffer<f64>; 7], elements: usize) -> PyResult<String> {
+    let told = columns.iter().map(|column| column.to_vec(py)).collect::<PyResult<Vec<_>>>()?;
+    if told.iter().any(|column| column.len() != told[0].len()) {
+        return Err(MuprimeError::new_err("columns of one length are needed"));
+    }
+    let one = |row: usize| {
+        let at = |column: usize| told[column][row];
+        let case = RidgeCase {
+            amplitude: PeakToPeak::from_metres(at(0)),
+            frequency_hz: at(1),
+            speed_m_s: at(2),
+            normal_force_n: at(3),
+            mu0: at(4),
+            young_modulus_pa: at(5),
+            poisson_ratio: at(6),
+            elements,
+            mean_pressure_pa: case::hertz_mean_pressure_pa(at(3)),
+            ..RidgeCase::paper()
+        };
+        solve(&case, &RunSettings::default()).map_err(|why| format!("row {row}: {why}"))
     };
-    let run = py.detach(|| solve(&case, &RunSettings::default()));
-    let run = run.map_err(|why| MuprimeError::new_err(why.to_string()))?;
-    serde_json::to_string(&run).map_err(|why| MuprimeError::new_err(why.to_string()))
+    let runs = py.detach(|| (0..told[0].len()).into_par_iter().map(one).collect::<Result<Vec<_>, _>>());
+    let runs = runs.map_err(MuprimeError::new_err)?;
+    serde_json::to_string(&runs).map_err(|why| MuprimeError::new_err(why.to_string()))
 }

@@ -24,13 +24,14 @@ pub fn load(py: Python<'_>, folder: PathBuf) -> PyResult<(Py<PyBytes>, String)> 
     Ok((PyBytes::new(py, &bytes).unbind(), about))
 }
 
-/// A sweep of a plan on the virtual rig of a setup, in virtual time, into `out`; the summary as JSON.
+/// A sweep of a plan (its name and its text) on the virtual rig of a setup, in virtual time, into `out`; the summary as JSON.
 #[pyfunction]
-#[pyo3(signature = (plan, setup, out, seed, defects, model, operator, sample, licence))]
+#[pyo3(signature = (plan, text, setup, out, seed, defects, model, operator, sample, licence))]
 #[allow(clippy::too_many_arguments)]
 pub fn run(
     py: Python<'_>,
     plan: &str,
+    text: &str,
     setup: &str,
     out: PathBuf,
     seed: Option<u64>,
@@ -41,6 +42,7 @@ pub fn run(
     licence: Option<String>,
 ) -> PyResult<String> {
     let notes = Notes { operator, sample, licence };
+    let plan = Plan::parse(plan, text).map_err(refused)?;
     let job = job(plan, setup, out, seed, defects.as_deref(), model.as_deref(), notes).map_err(refused)?;
     let signals = Signals::default();
     let stops = Arc::clone(&signals.stops);
@@ -62,7 +64,7 @@ pub fn run(
 }
 
 fn job(
-    plan: &str,
+    plan: Plan,
     setup: &str,
     out: PathBuf,
     seed: Option<u64>,
@@ -70,7 +72,7 @@ fn job(
     model: Option<&Path>,
     notes: Notes,
 ) -> miette::Result<Job> {
-    let (setup, plan) = (Setup::load(setup)?, Plan::load(plan)?);
+    let setup = Setup::load(setup)?;
     if setup.file.virtual_rig.is_none() {
         miette::bail!(
             help = "`muprime run` leads a real rig: it takes the machine's real-time class and its signals",

@@ -28,6 +28,7 @@
 //! | [`model_file`] | a corrected model from its file to the loop |
 //! | [`input`] | files that people wrote, refused with the place |
 //! | [`validation`] | the blind score of the diagnosis, and the fault bench of the controller |
+//! | [`version`] | what this program is: the build, and the models that it holds |
 //! | [`words`] | schemas, the reference of all keys, commented beginnings, what is bundled |
 //! | [`cli`] | one file a subcommand |
 //!
@@ -79,5 +80,6 @@ pub mod setup;
 pub mod supervisor;
 pub mod terminal;
 pub mod validation;
+pub mod version;
 pub mod watch;
 pub mod words;

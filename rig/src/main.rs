@@ -2,9 +2,10 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use muprime_rig::cli;
 use muprime_rig::print::Remarks;
+use muprime_rig::{cli, version};
 use muprime_rig::{out, say};
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -99,6 +100,19 @@ fn parsed(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Cli
     Cli::from_arg_matches(&command().try_get_matches_from(arguments)?)
 }
 
+/// `-V` is a line, `--version` says which build and which models, with `--json` as a document.
+fn say_version() -> ExitCode {
+    let asked = |flag: &str| std::env::args().any(|a| a == flag);
+    if asked("--json") {
+        out!("{}", serde_json::json!(version::of_this_program()));
+    } else if asked("--version") {
+        out!("{}", version::of_this_program().words());
+    } else {
+        out!("muprime {}", env!("CARGO_PKG_VERSION"));
+    }
+    ExitCode::from(cli::DONE)
+}
+
 fn main() -> ExitCode {
     // Places are named in records, catalogues and JSON, all of which are text.
     let unreadable =
@@ -110,6 +124,9 @@ fn main() -> ExitCode {
     let cli = match parsed(std::env::args_os()) {
         Ok(cli) => cli,
         Err(error) => {
+            if error.kind() == ErrorKind::DisplayVersion {
+                return say_version();
+            }
             if error.use_stderr() && std::env::args().any(|a| a == "--json") {
                 let said = error.to_string();
                 out!(

@@ -5,6 +5,7 @@
 Prints what was measured; ends with an error where something is not so.
 """
 
+import hashlib
 import json
 import math
 import subprocess
@@ -14,6 +15,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pandas
 import polars
 import pyarrow.csv
 
@@ -85,12 +87,6 @@ assert grid.mu_relative.shape == (7, 2) and np.allclose(grid.mu_relative, numpys
 both = [muprime.psi(w, reading=r).mu_relative for r in ("peak-to-peak", "sine-amplitude")]
 assert np.allclose(muprime.psi(w).mu_relative, np.mean(both, axis=0))
 million = np.random.default_rng(1).uniform(0.5e-6, 5e-6, 1_000_000)
-began = time.perf_counter()
-muprime.psi(million, reading="peak-to-peak")
-here = time.perf_counter() - began
-began = time.perf_counter()
-1 - np.exp(-0.02 / (million * 27.5e3 * 0.5 * 1.33) / 2.38)
-there = time.perf_counter() - began
 ticks, over = [0], threading.Event()
 
 
@@ -107,10 +103,73 @@ muprime.spring_slider(million)
 slider = time.perf_counter() - began
 over.set()
 thread.join()
-print(f"10^6 conditions: psi {here:.3f} s with its uncertainty and checks, NumPy's Eq. 20 alone {there:.3f} s (ratio {here / there:.1f}); spring-slider {slider:.3f} s, another thread took {ticks[0]} turns meanwhile")
+print(f"10^6 conditions of the spring-slider: {slider:.3f} s, another thread took {ticks[0]} turns meanwhile")
 assert ticks[0] > 5, "the interpreter was held"
 one = muprime.ridge(elements=200)
+many = muprime.ridge([[2e-6], [3e-6]], speed_m_s=[0.02, 0.04], elements=200)
+assert many["mu_relative"].shape == (2, 2) and many["mu_relative"][0, 0] == one["mu_relative"] and many["regime"][0, 0] == one["regime"]
+assert many["mu_relative"][1, 1] == muprime.ridge(3e-6, speed_m_s=0.04, elements=200)["mu_relative"]
+refusal(lambda: muprime.ridge([2e-6, -1.0], elements=200), "row 1")
 assert math.isclose(one["mu_relative"], json.loads(told("model", "ridge", "--json", "--elements", "200"))["mu_relative"])
+
+# Which models these are, as the command says it.
+version = json.loads(told("--version", "--json"))
+assert version["models"] == muprime.models() and version["version"] == muprime.__version__
+own = hashlib.sha256(Path(MUPRIME).read_bytes()).hexdigest()
+assert version["build"]["program_sha256"] == own and own in told("--version") and told("-V") == f"muprime {muprime.__version__}\n"
+
+# Plans: read, made, judged on a setup, run; a made one is what the command runs from its file.
+bundled = muprime.Plan.load("first-sweep")
+assert bundled.toml == told("show", "first-sweep") and len(bundled.passes("virtual")["speed_m_s"]) == 98
+made = muprime.Plan.make("mine", {"amplitude_pp_m": [1e-6, 3e-6], "speed_m_s": [0.01, 0.03]}, replicates=2, reference_every=4, seed=5)
+made.save(FOLDER / "mine.toml")
+checked = json.loads(told("check", "--json", "--offline", str(FOLDER / "mine.toml"), "--setup", "virtual-ideal"))
+order = made.passes("virtual-ideal")
+assert checked["ok"] and checked["passes"] == len(order["amplitude_pp_m"]) == 16 + 3 * 2, checked
+mine = muprime.run(made, out=FOLDER / "mine", seed=5)
+told("run", str(FOLDER / "mine.toml"), "--fast", "--setup", "virtual-ideal", "--seed", "5", "--out", str(FOLDER / "theirs"))
+assert (FOLDER / "mine/points.csv").read_bytes() == (FOLDER / "theirs/points.csv").read_bytes()
+assert np.allclose(mine.pandas()["amplitude_pp_m"], order["amplitude_pp_m"], atol=1e-9) and np.array_equal(mine.pandas()["direction"], order["direction"])
+assert muprime.Plan.load(FOLDER / "mine.toml").document == made.document == muprime.Plan.parse(made.toml).document
+refusal(lambda: muprime.Plan.make("none"), "[[series]]")
+refusal(lambda: muprime.Plan.make("typo", {"amplitude_m": [1e-6]}), "amplitude_m")
+refusal(lambda: muprime.Plan.make("far", {"amplitude_pp_m": [1e-3]}).passes(), "amplitude_pp_m = 1e-3", "outside")
+refusal(lambda: muprime.Plan.load("no-such-plan"), "bundled plans")
+
+# Certificates: the same parameters as the command's from the same files; the date and so the hash are each one's own.
+turn = np.linspace(0.0, 1.0, 41)
+rows = [f"{x:.6e},{0.2 + 1200 * x + up * 0.01:.6e},{up}" for up, way in ((1, turn), (0, turn[::-1])) for x in way * 2e-4]
+(FOLDER / "loop.csv").write_text("displacement_m,force_n,up\n" + "\n".join(rows) + "\n")
+words = {"operator": "A. Nother", "serial": "tip 7", "date": "2026-03-01T12:00:00Z"}
+certificate = muprime.calibrate("finger", normal_loop=FOLDER / "loop.csv", about_m=1e-4, valid_days=400, **words)
+flags = [f"--{key}={value}" for key, value in words.items()]
+out = FOLDER / "tip.toml"
+said = json.loads(told("calibrate", "finger", "--json", "--normal-loop", str(FOLDER / "loop.csv"), "--about-m=1e-4", "--valid-days=400", f"--out={out}", *flags))
+assert certificate.toml == out.read_text() and certificate.content_sha256 == said["content_sha256"]
+assert [p.name for p in certificate.parameters] == [p["name"] for p in said["parameters"]]
+stiffness = certificate.parameters[0]
+assert abs(stiffness.value / 1200 - 1) < 0.02 and stiffness.unit == "N/m" and certificate[stiffness.name] is stiffness, certificate
+assert muprime.load_certificate(out) == certificate
+refusal(lambda: muprime.load_certificate(FOLDER / "mine.toml"), "mine.toml")
+(FOLDER / "forged.toml").write_text(certificate.toml.replace("tip 7", "tip 8"))
+refusal(lambda: muprime.load_certificate(FOLDER / "forged.toml"), "forged.toml")
+refusal(lambda: muprime.calibrate("finger", operator="x", serial="y"), "nothing to calibrate")
+refusal(lambda: muprime.calibrate("force", operator="x", serial="y"), "from files alone")
+refusal(lambda: muprime.calibrate("finger", operator="x", serial="y", no_such=1), "--no-such")
+
+# The skin of a finger: the ridge's own phases give back the modulus that made them, from a frame as from the command's file.
+w = np.array([0.6e-6, 1e-6, 1.5e-6, 2e-6, 2.6e-6])
+phases = muprime.ridge(w, young_modulus_pa=40e6, elements=128)["phase_shift_deg"]
+frame = pandas.DataFrame({"amplitude_pp_m": w, "phase_shift_deg": phases, "phase_shift_sd_deg": 5.0})
+frame.to_csv(FOLDER / "phases.csv", index=False)
+search = {"elements": 128, "modulus_only": True, "modulus_range_pa": (15e6, 120e6)}
+skin = muprime.fit_finger(frame, **search)
+print(f"modulus from phases made with 40 MPa: {skin.young_modulus_pa.value / 1e6:.1f} MPa {skin.young_modulus_pa.ci95}, residual {skin.residual_rms_deg:.1f} deg")
+assert skin.young_modulus_pa.ci95[0] < 40e6 < skin.young_modulus_pa.ci95[1] and abs(skin.young_modulus_pa.value / 40e6 - 1) < 0.2
+assert skin.penalty_ratio is None and muprime.fit_finger(frame[::-1], **search).young_modulus_pa == skin.young_modulus_pa
+same = muprime.calibrate("finger", FOLDER / "phases.csv", **words, **search)
+assert same.skin == skin.document and any(p.name.endswith("modulus") or "modulus" in p.name for p in same.parameters)
+refusal(lambda: muprime.fit_finger(frame.assign(phase_shift_deg=400.0)), "line 2", "400")
 
 # Refusals say where and what to do.
 refusal(lambda: muprime.spring_slider([2e-6, -1e-6]), "row 1", "amplitude")

@@ -12,3 +12,9 @@ name: str = verdict.hypotheses[0].effects[0]
 run: muprime.Run = muprime.load("runs/x")
 muprime.run("first-sweep")  # type: ignore[call-arg]
 muprime.psi(frequency=1.0)  # type: ignore[call-arg]
+plan: muprime.Plan = muprime.Plan.make("p", {"amplitude_pp_m": [1e-6, 2e-6]}, replicates=2)
+passes: dict[str, NDArray[np.float64]] = plan.passes("virtual-ideal")
+again: muprime.Run = muprime.run(plan, out="runs/y")
+certificate: muprime.Certificate = muprime.calibrate("finger", "phases.csv", operator="x", serial="y", modulus_only=True)
+modulus: float = muprime.fit_finger("phases.csv").young_modulus_pa.value
+muprime.calibrate("finger", operator="x")  # type: ignore[call-arg]

@@ -93,18 +93,115 @@ struct PriorsArgs {
 /// # Errors
 /// Data that is unfit for a certificate, with the reason; files that cannot be read or written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    match args.what {
-        What::Force(args) => force::run(args, json),
-        What::Amplitude(args) => amplitude::run(&args, json),
-        What::Latency(args) => latency::run(&args, json),
-        What::Phase(args) => phase::run(&args, json),
-        What::Finger(args) => finger::run(&args, json),
-        What::Creep(args) => creep::run(&args, json),
-        What::Gravity(args) => gravity::run(&args, json),
-        What::Noise(args) => noise::run(&args, json),
-        What::Step(args) => dynamics::step(&args, json),
-        What::Tap(args) => dynamics::tap(&args, json),
-        What::Priors(args) => priors(&args, json),
+    if let What::Priors(args) = &args.what {
+        return priors(args, json);
+    }
+    certified(&args.what)?.write(json)
+}
+
+fn certified(what: &What) -> miette::Result<Issued> {
+    match what {
+        What::Force(args) => force::certified(args),
+        What::Amplitude(args) => amplitude::certified(args),
+        What::Latency(args) => latency::certified(args),
+        What::Phase(args) => phase::certified(args),
+        What::Finger(args) => finger::certified(args),
+        What::Creep(args) => creep::certified(args),
+        What::Gravity(args) => gravity::certified(args),
+        What::Noise(args) => noise::certified(args),
+        What::Step(args) => dynamics::step(args),
+        What::Tap(args) => dynamics::tap(args),
+        What::Priors(_) => miette::bail!("priors are printed, they are no certificate"),
+    }
+}
+
+/// The certificate that a command line of `muprime calibrate` comes to (`words` begin after `calibrate`), from files alone: what would
+/// open instruments is refused. Nothing is written but what the words name (phase table, spectrum). `--out` is not looked at.
+///
+/// # Errors
+/// As [`run`]; words that the command does not take, in its own words.
+pub fn from_files(words: &[String]) -> miette::Result<Issued> {
+    #[derive(clap::Parser)]
+    #[command(name = "calibrate", no_binary_name = true, disable_help_flag = true)]
+    struct Line {
+        #[command(subcommand)]
+        what: What,
+    }
+    let line = <Line as clap::Parser>::try_parse_from(words).map_err(|e| {
+        let said = e.to_string();
+        let first = said.lines().take_while(|l| !l.is_empty() && !l.starts_with("Usage")).collect::<Vec<_>>();
+        miette::miette!("{}", first.join(" ").trim_start_matches("error: "))
+    })?;
+    let instruments = match &line.what {
+        What::Force(args) => args.asks_instruments(),
+        What::Amplitude(args) => args.asks_instruments(),
+        What::Phase(args) => args.asks_instruments(),
+        _ => false,
+    };
+    if instruments {
+        miette::bail!(
+            help = "`muprime calibrate` does that, with the operator at the bench",
+            "from files alone: a series, a table or waveforms are needed, and no setup whose instruments would be opened"
+        );
+    }
+    certified(&line.what)
+}
+
+/// What `--json` says of a certificate.
+pub fn document(certificate: &Certificate) -> serde_json::Value {
+    let parameters: Vec<serde_json::Value> = certificate
+        .parameters
+        .iter()
+        .map(|p| {
+            serde_json::json!({
+                "name": p.name, "value": p.value, "unit": p.unit,
+                "standard_uncertainty": p.standard_uncertainty, "ci95": p.ci95,
+            })
+        })
+        .collect();
+    serde_json::json!({
+        "kind": certificate.kind, "serial": certificate.instrument.serial,
+        "content_sha256": certificate.content_sha256, "valid_until": certificate.validity.until,
+        "parameters": parameters, "remarks": certificate.remarks,
+    })
+}
+
+/// A certificate that was made and not yet written.
+#[derive(Debug)]
+pub struct Issued {
+    /// The certificate.
+    pub certificate: Certificate,
+    /// What the fit says beyond it: keys of the JSON document, and their values.
+    pub more: Vec<(&'static str, serde_json::Value)>,
+    out: PathBuf,
+    overwrite: bool,
+}
+
+impl Issued {
+    /// The document of `--json` without its key `certificate` (the file).
+    pub fn document(&self) -> serde_json::Value {
+        let mut document = document(&self.certificate);
+        for (key, value) in &self.more {
+            document[*key] = value.clone();
+        }
+        document
+    }
+
+    /// Writes the certificate and says what it says.
+    fn write(&self, json: bool) -> miette::Result<ExitCode> {
+        let out = &self.out;
+        if out.exists() && !self.overwrite {
+            miette::bail!("{} exists: give another --out, or --overwrite", out.display());
+        }
+        crate::files::write_whole(out, self.certificate.to_toml())?;
+        if json {
+            let mut document = self.document();
+            document["certificate"] = serde_json::json!(out);
+            out!("{document}");
+        } else {
+            show(&self.certificate, out);
+        }
+        super::exit(super::DONE)
     }
 }
 
@@ -182,50 +279,24 @@ impl Common {
         })
     }
 
-    /// Writes the certificate and says what it says.
-    fn issue(&self, outcome: Outcome, raw: RawData, json: bool) -> miette::Result<ExitCode> {
-        self.issue_with(outcome, raw, json, [])
+    /// Makes the certificate.
+    fn certify(&self, outcome: Outcome, raw: RawData) -> miette::Result<Issued> {
+        self.certify_with(outcome, raw, [])
     }
 
     /// The same with more to say in JSON.
-    fn issue_with<const N: usize>(
+    fn certify_with(
         &self,
         outcome: Outcome,
         raw: RawData,
-        json: bool,
-        more: [(&str, serde_json::Value); N],
-    ) -> miette::Result<ExitCode> {
+        more: impl IntoIterator<Item = (&'static str, serde_json::Value)>,
+    ) -> miette::Result<Issued> {
         let certificate = outcome.certify(&self.occasion(raw)?);
         let safe: String =
             self.serial.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
         let out =
             self.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}-{safe}.toml", certificate.kind)));
-        if out.exists() && !self.overwrite {
-            miette::bail!("{} exists: give another --out, or --overwrite", out.display());
-        }
-        crate::files::write_whole(&out, certificate.to_toml())?;
-        if json {
-            let parameters: Vec<serde_json::Value> = certificate
-                .parameters
-                .iter()
-                .map(|p| {
-                    serde_json::json!({
-                        "name": p.name, "value": p.value, "unit": p.unit,
-                        "standard_uncertainty": p.standard_uncertainty, "ci95": p.ci95,
-                    })
-                })
-                .collect();
-            let mut document = serde_json::json!({
-                    "certificate": out, "kind": certificate.kind, "serial": self.serial,
-                    "content_sha256": certificate.content_sha256, "valid_until": certificate.validity.until,
-                    "parameters": parameters, "remarks": certificate.remarks,
-            });
-            more.into_iter().for_each(|(key, value)| document[key] = value);
-            out!("{document}");
-        } else {
-            show(&certificate, &out);
-        }
-        super::exit(super::DONE)
+        Ok(Issued { certificate, more: more.into_iter().collect(), out, overwrite: self.overwrite })
     }
 }
 

@@ -78,7 +78,7 @@ fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
             modulus_range_pa: (low, high),
             elements: settings.elements,
             modulus_only: settings.modulus_only,
-            quiet: true,
+            told: false,
         };
         let run = move || {
             let points = read_phases(bytes.as_slice()).map_err(|e| e.to_string())?;

@@ -1,7 +1,7 @@
 //! `muprime calibrate amplitude`.
 
 use super::tables::{Sources, columns};
-use super::{Common, live};
+use super::{Common, Issued, live};
 use crate::say;
 use crate::setup::Setup;
 use calibration::amplitude::apply::AmplitudeFit;
@@ -11,7 +11,6 @@ use calibration::amplitude::map::mode_shape;
 use calibration::amplitude::resonance::sweep;
 use calibration::amplitude::{AmplitudeError, AmplitudePoint};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -80,8 +79,15 @@ enum FormChoice {
     Bent,
 }
 
+impl Args {
+    /// Whether instruments would be opened, to read or to drive them.
+    pub fn asks_instruments(&self) -> bool {
+        self.table.is_none() || self.setup.is_some()
+    }
+}
+
 /// Calibrates.
-pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+pub fn certified(args: &Args) -> miette::Result<Issued> {
     let unit = match args.set_point.as_str() {
         "set_point_pp_m" => "m",
         "current_a" => "A",
@@ -153,7 +159,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         Some([low, high]) if low < high => Some([*low, *high]),
         Some(other) => miette::bail!("--temperature-c {other:?}: two temperatures, the lower one first"),
     };
-    args.common.issue(outcome, sources.raw_data(), json)
+    args.common.certify(outcome, sources.raw_data())
 }
 
 fn points_of(sources: &mut Sources, path: &Path, at: &str) -> miette::Result<Vec<AmplitudePoint>> {

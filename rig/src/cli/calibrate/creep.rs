@@ -1,12 +1,11 @@
 //! `muprime calibrate creep`: how a reading goes on changing under a load that does not.
 
-use super::Common;
 use super::tables::{Sources, columns};
+use super::{Common, Issued};
 use calibration::certificate::Residuals;
 use calibration::force::characteristics::{Finding, outcome};
 use calibration::force::creep::Creep;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -18,7 +17,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+pub fn certified(args: &Args) -> miette::Result<Issued> {
     let mut sources = Sources::default();
     let rows = columns(&mut sources, &args.readings, ["time_s", "net_counts"], &[])?;
     let shown = args.readings.display();
@@ -56,5 +55,5 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         lack_of_fit_p: None,
     };
     let model = "counts(t) = c0 (1 + relative (1 - exp(-t / time_constant)))";
-    args.common.issue(outcome(model, &findings, residuals, remarks), sources.raw_data(), json)
+    args.common.certify(outcome(model, &findings, residuals, remarks), sources.raw_data())
 }

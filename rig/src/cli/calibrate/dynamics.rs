@@ -1,13 +1,12 @@
 //! `muprime calibrate step` and `muprime calibrate tap`: bandwidth and dead time of a channel, resonance of its mount.
 
-use super::Common;
 use super::tables::{Sources, columns};
+use super::{Common, Issued};
 use calibration::certificate::Residuals;
 use calibration::force::characteristics::{Finding, outcome};
 use calibration::force::dynamics::{Estimate, ring_down, step_response};
 use calibration::uncertainty::Input;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -27,7 +26,7 @@ struct Event {
 }
 
 /// A step of force: second-order low-pass with dead time.
-pub fn step(args: &Args, json: bool) -> miette::Result<ExitCode> {
+pub fn step(args: &Args) -> miette::Result<Issued> {
     const NAMES: [(&str, &str); 4] = [
         ("step.delay", "s"),
         ("step.natural_frequency", "Hz"),
@@ -36,7 +35,7 @@ pub fn step(args: &Args, json: bool) -> miette::Result<ExitCode> {
     ];
     let model =
         "value = base + height step(t - delay) of a second-order low-pass; bandwidth where it is 3 dB down";
-    run(args, json, &NAMES, model, |time, value| {
+    run(args, &NAMES, model, |time, value| {
         let found = step_response(time, value, 0.0)?;
         Ok(Event {
             found: vec![found.delay_s, found.natural_frequency_hz, found.damping_ratio, found.bandwidth_hz],
@@ -47,10 +46,10 @@ pub fn step(args: &Args, json: bool) -> miette::Result<ExitCode> {
 }
 
 /// A tap: the free decay of the mount.
-pub fn tap(args: &Args, json: bool) -> miette::Result<ExitCode> {
+pub fn tap(args: &Args) -> miette::Result<Issued> {
     const NAMES: [(&str, &str); 2] = [("mount.resonance", "Hz"), ("mount.damping_ratio", "1")];
     let model = "value = c + exp(-zeta omega t) (p cos(omega_d t) + q sin(omega_d t))";
-    run(args, json, &NAMES, model, |time, value| {
+    run(args, &NAMES, model, |time, value| {
         let found = ring_down(time, value)?;
         Ok(Event {
             found: vec![found.frequency_hz, found.damping_ratio],
@@ -62,11 +61,10 @@ pub fn tap(args: &Args, json: bool) -> miette::Result<ExitCode> {
 
 fn run(
     args: &Args,
-    json: bool,
     names: &[(&str, &'static str)],
     model: &str,
     fit: impl Fn(&[f64], &[f64]) -> Result<Event, calibration::regression::FitError>,
-) -> miette::Result<ExitCode> {
+) -> miette::Result<Issued> {
     let mut sources = Sources::default();
     let rows = columns(&mut sources, &args.samples, ["event", "time_s", "value"], &[])?;
     let shown = args.samples.display();
@@ -112,5 +110,5 @@ fn run(
         unit: "as the values".into(),
         lack_of_fit_p: None,
     };
-    args.common.issue(outcome(model, &findings, residuals, remarks), sources.raw_data(), json)
+    args.common.certify(outcome(model, &findings, residuals, remarks), sources.raw_data())
 }

@@ -1,8 +1,8 @@
 //! `muprime calibrate finger`.
 
-use super::Common;
 use super::inverse;
 use super::tables::{Sources, columns};
+use super::{Common, Issued};
 use calibration::finger::friction;
 use calibration::finger::springs;
 use calibration::finger::stiffness::{Stiffness, UltrasonicPoint, quasi_static, ultrasonic};
@@ -10,7 +10,6 @@ use calibration::finger::{FingerError, FingerFit};
 use calibration::phase::table::read_phases;
 use models::rig_file::PassNoise;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -67,7 +66,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+pub fn certified(args: &Args) -> miette::Result<Issued> {
     let mut sources = Sources::default();
     let mut found = FingerFit::default();
     let said = |path: &PathBuf, e: FingerError| miette::miette!("{}: no certificate: {e}", path.display());
@@ -127,7 +126,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
             modulus_range_pa: (args.modulus_range_pa[0], args.modulus_range_pa[1]),
             elements: args.elements,
             modulus_only: args.modulus_only,
-            quiet: false,
+            told: true,
         };
         let (modulus, skin) =
             inverse::analyse(&options, &points).map_err(|e| e.wrap_err(path.display().to_string()))?;
@@ -144,10 +143,6 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     }
     let identified = serde_json::json!({ "elastic": found.modulus, "all_free": found.skin });
     let springs = serde_json::json!(found.springs);
-    args.common.issue_with(
-        found.outcome(),
-        sources.raw_data(),
-        json,
-        [("skin", identified), ("springs", springs)],
-    )
+    let more = [("skin", identified), ("springs", springs)];
+    args.common.certify_with(found.outcome(), sources.raw_data(), more)
 }

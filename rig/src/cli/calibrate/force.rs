@@ -1,12 +1,11 @@
 //! `muprime calibrate force`.
 
 use super::tables::Sources;
-use super::{Common, guided};
+use super::{Common, Issued, guided};
 use crate::say;
 use calibration::force::matrix::{Linearity, Options, fit};
 use calibration::force::series::{self, Weighing};
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -54,8 +53,15 @@ pub struct Args {
     zero_drift_limit: f64,
 }
 
+impl Args {
+    /// Whether instruments would be opened, to read or to drive them.
+    pub fn asks_instruments(&self) -> bool {
+        self.series.is_none()
+    }
+}
+
 /// Calibrates.
-pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+pub fn certified(args: &Args) -> miette::Result<Issued> {
     let weighing = Weighing {
         gravity_m_s2: args.gravity_m_s2,
         gravity_relative_sd: args.gravity_relative_sd,
@@ -94,5 +100,5 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     };
     let found =
         fit(&readings, &weighing, &options).map_err(|e| miette::miette!("{name}: no certificate: {e}"))?;
-    args.common.issue(found.outcome(&weighing), sources.raw_data(), json)
+    args.common.certify(found.outcome(&weighing), sources.raw_data())
 }

@@ -1,12 +1,11 @@
 //! `muprime calibrate gravity`: where the sensor's axes point, by its own weight at known tilts.
 
-use super::Common;
 use super::tables::{Sources, columns};
+use super::{Common, Issued};
 use calibration::certificate::Residuals;
 use calibration::force::characteristics::{Finding, outcome};
 use calibration::force::gravity::{TiltReading, orientation};
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -19,7 +18,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+pub fn certified(args: &Args) -> miette::Result<Issued> {
     let mut sources = Sources::default();
     let rows = columns(&mut sources, &args.tilts, ["tilt_rad", "lateral_force_n", "normal_force_n"], &[])?;
     let shown = args.tilts.display();
@@ -56,5 +55,5 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         lack_of_fit_p: None,
     };
     let model = "F_lateral = W sin(tilt + angle) + o_lateral, F_normal = W cos(tilt + angle) + o_normal";
-    args.common.issue(outcome(model, &findings, residuals, remarks), sources.raw_data(), json)
+    args.common.certify(outcome(model, &findings, residuals, remarks), sources.raw_data())
 }

@@ -20,6 +20,7 @@ const MODULI: [usize; 2] = [14, 7];
 const ABOUT: (f64, f64) = (0.4, 2.4);
 
 /// What the command was asked.
+#[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Frequency for a table without that column, Hz.
     pub frequency_hz: Option<f64>,
@@ -31,14 +32,14 @@ pub struct Options {
     pub elements: usize,
     /// Leave penalty and time alone.
     pub modulus_only: bool,
-    /// Say nothing and show no bar: one of many.
-    pub quiet: bool,
+    /// Say on standard error how far it is.
+    pub told: bool,
 }
 
 /// The modulus of elastic skin, and all three quantities unless only the modulus is wanted.
 ///
 /// # Errors
-/// A table of several conditions, a ridge that cannot be run, phases that tell nothing.
+/// Rows or options that contradict each other or make no sense, by name; a model that gives no number.
 pub fn analyse(
     options: &Options,
     points: &[PhasePoint],
@@ -71,8 +72,8 @@ pub fn analyse(
     let base = RidgeCase { frequency_hz, elements: options.elements, ..RidgeCase::paper() };
     let base = base.with_normal_force_n(force);
     let search = Search { lowest_pa: low, highest_pa: high, model_sd_deg: MODEL_SD_DEG };
-    let compute = |what, base, grid| compute(what, base, &amplitudes, grid, options.quiet);
-    let curves = compute("the modulus", base, SkinGrid::elastic((low, high), MODULI[0]))?;
+    let curves =
+        compute("the modulus", options.told, base, &amplitudes, SkinGrid::elastic((low, high), MODULI[0]))?;
     let elastic = identify(&points, &search, |e, w| curves.at(&Skin::elastic(e), w)).into_diagnostic()?;
     if options.modulus_only {
         return Ok((elastic, None));
@@ -80,24 +81,24 @@ pub fn analyse(
     let about = (ABOUT.0 * elastic.young_modulus_pa, ABOUT.1 * elastic.young_modulus_pa);
     let grid = SkinGrid::free(about, MODULI[1]);
     let half = RidgeCase { elements: options.elements / 2, ..base };
-    let curves = compute("penalty and retardation time", half, grid.clone())?;
+    let curves = compute("penalty and retardation time", options.told, half, &amplitudes, grid.clone())?;
     let skin = identify_skin(&points, &grid, &search, &elastic, |skin, w| curves.at(skin, w));
     Ok((elastic, Some(skin.into_diagnostic()?)))
 }
 
 fn compute(
     what: &str,
+    told: bool,
     base: RidgeCase,
     amplitudes: &[PeakToPeak],
     grid: SkinGrid,
-    quiet: bool,
 ) -> miette::Result<PhaseCurves> {
     let runs = (amplitudes.len() * grid.len()) as u64;
-    if quiet {
-        return PhaseCurves::compute(base, amplitudes, grid, || ()).into_diagnostic();
+    if told {
+        say!("{what}: running the ridge {runs} times ({} amplitudes)", amplitudes.len());
     }
-    say!("{what}: running the ridge {runs} times ({} amplitudes)", amplitudes.len());
-    let bar = ProgressBar::with_draw_target(Some(runs), ProgressDrawTarget::stderr());
+    let target = if told { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let bar = ProgressBar::with_draw_target(Some(runs), target);
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} gone, {eta} to go");
     bar.set_style(style.into_diagnostic()?);
     let curves = PhaseCurves::compute(base, amplitudes, grid, || bar.inc(1)).into_diagnostic();

@@ -1,11 +1,10 @@
 //! `muprime calibrate latency`.
 
-use super::Common;
 use super::tables::{Sources, columns};
+use super::{Common, Issued};
 use calibration::force::dynamics::step_response;
 use calibration::latency::{channel_delay, clock, outcome};
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Arguments. Each file is given as CHANNEL=FILE and may be repeated.
 #[derive(Debug, clap::Args)]
@@ -27,7 +26,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+pub fn certified(args: &Args) -> miette::Result<Issued> {
     if args.edges.is_empty() && args.steps.is_empty() && args.clock.is_empty() {
         miette::bail!("give --edges, --steps or --clock at least once, as CHANNEL=FILE");
     }
@@ -77,7 +76,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     }
     let mut found = outcome(&channels, &clocks);
     found.remarks.extend(remarks);
-    args.common.issue(found, sources.raw_data(), json)
+    args.common.certify(found, sources.raw_data())
 }
 
 fn split(given: &str) -> miette::Result<(&str, PathBuf)> {

@@ -1,7 +1,7 @@
 //! `muprime calibrate noise`: spectrum, lines, quantisation of a sensor at rest, and the rule for a frozen value.
 
-use super::Common;
 use super::tables::{Sources, columns};
+use super::{Common, Issued};
 use calibration::certificate::Residuals;
 use calibration::force::characteristics::{Finding, outcome};
 use calibration::force::noise::{
@@ -10,7 +10,6 @@ use calibration::force::noise::{
 };
 use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -34,7 +33,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+pub fn certified(args: &Args) -> miette::Result<Issued> {
     if !(args.rate_hz > 0.0 && args.rate_hz.is_finite()) {
         miette::bail!("--rate-hz {}: above zero", args.rate_hz);
     }
@@ -131,5 +130,5 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(n) = frozen_after {
         found.settings.insert("frozen_after".into(), n.to_string());
     }
-    args.common.issue(found, sources.raw_data(), json)
+    args.common.certify(found, sources.raw_data())
 }

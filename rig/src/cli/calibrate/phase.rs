@@ -1,7 +1,7 @@
 //! `muprime calibrate phase`: the paper's section 2 from recorded waveforms.
 
-use super::Common;
 use super::tables::{Sources, columns};
+use super::{Common, Issued};
 use crate::say;
 use crate::setup::Setup;
 use calibration::amplitude::vibrometer::{Decoder, sine};
@@ -10,7 +10,6 @@ use calibration::phase::{
 };
 use models::quantity::PeakToPeak;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -60,8 +59,15 @@ pub struct Args {
     common: Common,
 }
 
+impl Args {
+    /// Whether instruments would be opened, to read or to drive them.
+    pub fn asks_instruments(&self) -> bool {
+        self.setup.is_some()
+    }
+}
+
 /// Calibrates.
-pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+pub fn certified(args: &Args) -> miette::Result<Issued> {
     let settings = match &args.setup {
         None => None,
         Some(name) => {
@@ -142,5 +148,5 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         skin.delay_s * 1e6,
         settings.map_or(String::new(), |s| format!("; read back from the vibrometer: {s}"))
     ));
-    args.common.issue(outcome, sources.raw_data(), json)
+    args.common.certify(outcome, sources.raw_data())
 }
