@@ -184,7 +184,7 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
             );
         }
     }
-    let run_settings = RunSettings { steady: settings.steady, step_s: None, energy: false };
+    let run_settings = RunSettings { steady: settings.steady, energy: false, ..RunSettings::default() };
     Ok(Box::new(move |index, given| {
         let changed: BTreeMap<String, f64> = match given {
             Some(_) => super::line(index, given)?,
