@@ -166,7 +166,7 @@ impl Rig {
         let per_bin = (bin / settings.step_s.unwrap_or(stable)).ceil().max(1.0) as usize;
         let dt = bin / per_bin as f64;
         if !settings.one_step {
-            body.move_in_longer_steps(&stability::longer_steps(&body, dt));
+            body.move_in_longer_steps(&stability::longer_steps(&body, dt, case.mass_damping_per_s));
         }
         let rig =
             Rig { body, plate, spot, base, dt, damping: case.mass_damping_per_s, steps: 0, plate_work: 0.0 };
