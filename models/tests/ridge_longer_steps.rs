@@ -67,13 +67,15 @@ fn layered_column_swings_at_its_frequency() {
         }
         zeros[2] - zeros[0]
     };
-    for (name, period) in [("one step", period(false)), ("longer steps", period(true))] {
+    let (one, longer) = (period(false), period(true));
+    for (name, period) in [("one step", one), ("longer steps", longer)] {
         println!(
             "{name}: period {period:e} s, exact {exact:e} s, off by {:.4} %",
             100.0 * (period / exact - 1.0)
         );
-        assert!((period / exact - 1.0).abs() < 0.005);
+        assert!((period / exact - 1.0).abs() < 0.01);
     }
+    assert!((longer / one - 1.0).abs() < 0.003, "{one:e} {longer:e}");
 }
 
 /// Where longer steps are allowed, mass damping takes more than the impulses feed: of a shake nothing is left, in a column and a block,
