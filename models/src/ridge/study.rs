@@ -9,7 +9,13 @@ pub const MODEL_VERSION: u32 = 2;
 pub fn content_key(case: &RidgeCase, settings: &RunSettings) -> String {
     // One spring both ways is what every result had before there could be two: those stay what they are.
     let inputs = format!("{case:?}").replace(" tangential_penalty_ratio: 1.0,", "");
-    format!("{:016x}", fnv1a(format!("{MODEL_VERSION} {inputs} {:?}", settings.steady).as_bytes()))
+    // One step for all layers and no mass added is what version 1 was.
+    let version = match (settings.one_step, settings.added_mass) {
+        (true, 0.0) => "1".to_owned(),
+        (false, super::loading::ADDED_MASS) => MODEL_VERSION.to_string(),
+        (one_step, added_mass) => format!("{MODEL_VERSION} {one_step} {added_mass}"),
+    };
+    format!("{:016x}", fnv1a(format!("{version} {inputs} {:?}", settings.steady).as_bytes()))
 }
 
 /// FNV-1a, 64 bits: a fingerprint of inputs, not a defence.
