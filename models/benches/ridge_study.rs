@@ -1,25 +1,34 @@
 //! The study of Fig. 9 in CPU seconds, and what its faster ways change in its results.
 //!
-//! `cargo bench -p muprime-models --bench ridge_study`: every sixteenth case, the soft layers in longer steps beside all layers in
-//! one step. `-- all`: the whole study (two minutes of CPU). `-- single`: the twin in C in single precision beside double, both
-//! through the whole loading, a dozen cases (a minute). CPU time of one thread; the machine may be shared.
+//! `cargo bench -p muprime-models --bench ridge_study`: every sixteenth case, by default (soft layers in longer steps, mass added
+//! about the tip) beside all layers in one step and no mass added. `-- all`: the whole study (two minutes of CPU).
+//! `mass=0.001`: with that share. `half`: half the step instead, to see what the step itself is worth. `like=TEXT`: only cases with this in their name. CPU time of one thread; the machine may be shared.
 #![allow(clippy::disallowed_methods, reason = "it reads its arguments")]
 
 #[path = "peers/turns.rs"]
 mod turns;
 
 use muprime_models::ridge::study::{content_key, fig_9};
-use muprime_models::ridge::{RidgeCase, RunSettings, run};
+use muprime_models::ridge::{RidgeCase, RidgeRun, RunSettings, run};
 use std::collections::BTreeSet;
 use turns::{spread, timed};
 
+fn asked(word: &str) -> bool {
+    std::env::args().any(|a| a == word)
+}
+
 fn main() {
-    let asked = |word: &str| std::env::args().any(|a| a == word);
     let one_in = if asked("all") { 1 } else { 16 };
     let new = RunSettings { energy: false, ..RunSettings::default() };
     let old = RunSettings { one_step: true, added_mass: 0.0, ..new };
     let share = std::env::args().find_map(|a| a.strip_prefix("mass=").map(|v| v.parse().expect("a number")));
-    beside(one_in, &old, &RunSettings { added_mass: share.unwrap_or(new.added_mass), ..new });
+    let like = std::env::args().find_map(|a| a.strip_prefix("like=").map(str::to_owned));
+    beside(
+        one_in,
+        &like.unwrap_or_default(),
+        &old,
+        &RunSettings { added_mass: share.unwrap_or(new.added_mass), ..new },
+    );
 }
 
 /// Cases with their panel and value.
@@ -28,20 +37,28 @@ fn cases(one_in: usize) -> Vec<(String, RidgeCase)> {
     let distinct = fig_9(RidgeCase::paper())
         .into_iter()
         .filter(|p| seen.insert(content_key(&p.case, &RunSettings::default())))
-        .map(|p| (format!("{} {}", p.panel.variable(), p.value), p.case));
+        .map(|p| {
+            let um = p.case.amplitude.micrometres();
+            (format!("{} {}, {um:.2} um", p.panel.variable(), p.value), p.case)
+        });
     distinct.step_by(one_in).collect()
 }
 
 /// The study under both settings.
-fn beside(one_in: usize, old: &RunSettings, new: &RunSettings) {
-    let cases = cases(one_in);
+fn beside(one_in: usize, like: &str, old: &RunSettings, new: &RunSettings) {
+    let mut cases = cases(one_in);
+    cases.retain(|(name, _)| name.contains(like));
     let (mut seconds, mut cycles, mut steps) = ([0.0; 2], [0; 2], [0; 2]);
     let (mut mu, mut phase) = (Vec::new(), Vec::new());
     for (name, case) in &cases {
         let mut results = Vec::new();
-        for (k, settings) in [old, new].into_iter().enumerate() {
+        for (k, mut settings) in [*old, *new].into_iter().enumerate() {
+            if let (Some((first, _)), true) = (results.first(), asked("half")) {
+                let first: &RidgeRun = first;
+                settings = RunSettings { step_s: Some(0.5 * first.step_s), ..*old };
+            }
             let mut result = None;
-            let own = timed(|| result = Some(run(case, settings).expect("runs")));
+            let own = timed(|| result = Some(run(case, &settings).expect("runs")));
             seconds[k] += own;
             let result = result.expect("ran");
             cycles[k] += result.cycles;
@@ -54,8 +71,7 @@ fn beside(one_in: usize, old: &RunSettings, new: &RunSettings) {
         let turned = longer.phase_shift_deg.unwrap_or(0.0) - one.phase_shift_deg.unwrap_or(0.0);
         phase.push((turned + 180.0).rem_euclid(360.0) - 180.0);
         println!(
-            "{name}, {:.2} um: mu' {:.4} {off:+.4} (sd {:.4}), phase {:.1} deg {:+.1}, {} and {} cycles, {before:.2} and {after:.2} s",
-            case.amplitude.micrometres(),
+            "{name}: mu' {:.4} {off:+.4} (sd {:.4}), phase {:.1} deg {:+.1}, {} and {} cycles, {before:.2} and {after:.2} s",
             one.mu_relative,
             one.mu_relative_sd,
             one.phase_shift_deg.unwrap_or(0.0),

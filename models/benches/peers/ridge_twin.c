@@ -2,7 +2,7 @@
  * gradients of the shape functions, hourglass vectors, four corner forces an element. It is the peer of the kernel's
  * benchmark and a check of its numbers. Compiled and driven by `peers/twin.rs`.
  *
- *   cc -O3 -march=native -ffp-contract=fast -DREAL=double -DLANES=1 -DOBJECTIVE=1 ridge_twin.c -o twin -lm
+ *   cc -O3 -march=native -ffp-contract=fast -fno-math-errno -fno-trapping-math -DREAL=double -DLANES=1 -DOBJECTIVE=1 ridge_twin.c -o twin -lm
  *
  * REAL: double or float. LANES: cases side by side, each with its own material, load, friction and plate (1: one case along
  * its rows). OBJECTIVE: velocity strain on the moving geometry with the stress turned by the spin, or 0: small strain.
@@ -115,7 +115,7 @@ static inline __attribute__((always_inline)) void element_row(int j, real *restr
         HX += kh[k] * qx;
         HY += kh[k] * qy;
         a[k] = A; b[k] = B; c[k] = C; hx[k] = HX; hy[k] = HY;
-        const real ell = ln[k], closing = tr < zero ? tr * ell : zero;
+        const real ell = ln[k], closing = (tr < zero ? tr : zero) * ell;
         const real q = q1 * ell * tr - q2 * closing * closing;
         const real P = A + q, Q = B + q;
         /* Internal force at corner c: area gradient . stress + hourglass force times gamma_c. */

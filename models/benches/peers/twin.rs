@@ -43,7 +43,7 @@ impl Variant {
         );
         let program = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
         let status = Command::new("cc")
-            .args(["-O3", "-march=native", "-ffp-contract=fast"])
+            .args(["-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"])
             .args(width)
             .args([
                 format!("-DREAL={real}"),

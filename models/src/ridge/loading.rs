@@ -171,7 +171,7 @@ impl Rig {
         let dt = bin / per_bin as f64;
         // Stiffness-proportional damping holds the step of every layer down: they all move in the surface's.
         if !settings.one_step && case.stiffness_damping_s <= 0.0 {
-            body.move_in_longer_steps(&stability::longer_steps(&body, dt));
+            body.move_in_longer_steps(&stability::longer_steps(&body, dt, case.mass_damping_per_s));
         }
         let rig =
             Rig { body, plate, spot, base, dt, damping: case.mass_damping_per_s, steps: 0, plate_work: 0.0 };

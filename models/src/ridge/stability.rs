@@ -15,6 +15,8 @@ const OMEGA_MARGIN: f64 = 1.02;
 const ITERATIONS: usize = 200;
 /// Share of a soft layer's stable step that is used.
 const LONGER_STEP_SHARE: f64 = 0.7;
+/// Least mass damping in one of a soft layer's steps, `tests/ridge_longer_steps.rs`.
+pub const DAMPING_IN_A_LONGER_STEP: f64 = 0.02;
 /// Most steps of the surface in one of a layer: it divides the steps of a cycle.
 const MOST_STEPS_IN_ONE: usize = 32;
 
@@ -170,7 +172,10 @@ pub fn add_mass(body: &mut Body, penalty: &[f64], share: f64) -> f64 {
 /// Longer steps of the softer layers, for [`Body::move_in_longer_steps`]: each layer behind the first, with all that lies behind
 /// it, in the greatest power of two of steps `dt` that is within `LONGER_STEP_SHARE` of its own stable step and no more than
 /// `MOST_STEPS_IN_ONE`. The layer is taken alone, free where it is held by the stiffer one: a bound from above on its frequency.
-pub fn longer_steps(body: &Body, dt: f64) -> Vec<(usize, usize)> {
+///
+/// Impulses feed a fast motion whose half period is the longer step; mass damping must take more. A layer therefore moves in longer
+/// steps only where the damping of one of them, `mass_damping_per_s` times its length, is at least `DAMPING_IN_A_LONGER_STEP`.
+pub fn longer_steps(body: &Body, dt: f64, mass_damping_per_s: f64) -> Vec<(usize, usize)> {
     let mesh = body.mesh();
     let mut layers: Vec<(usize, usize)> = Vec::new();
     for first in (1..mesh.ny).filter(|j| mesh.row_material[*j] != mesh.row_material[*j - 1]) {
@@ -188,6 +193,7 @@ pub fn longer_steps(body: &Body, dt: f64) -> Vec<(usize, usize)> {
         let before = layers.last().map_or(1, |layer| layer.1);
         layers.push((first, every.clamp(before, MOST_STEPS_IN_ONE)));
     }
+    layers.retain(|(_, every)| mass_damping_per_s * *every as f64 * dt >= DAMPING_IN_A_LONGER_STEP);
     let mut before = 1;
     layers.retain(|(_, every)| std::mem::replace(&mut before, *every) < *every);
     layers

@@ -14,9 +14,15 @@ pub fn content_key(case: &RidgeCase, settings: &RunSettings) -> String {
         " stiffness_damping_s: 0.0,",
     ];
     let inputs = unsaid.iter().fold(format!("{case:?}"), |all, one| all.replace(one, ""));
+    // One step for all layers and no mass added is what version 1 was.
+    let version = match (settings.one_step, settings.added_mass) {
+        (true, 0.0) => "1".to_owned(),
+        (false, super::loading::ADDED_MASS) => MODEL_VERSION.to_string(),
+        (one_step, added_mass) => format!("{MODEL_VERSION} {one_step} {added_mass}"),
+    };
     let start =
         if settings.overshoot > 1.0 { format!(" from {}", settings.overshoot) } else { String::new() };
-    format!("{:016x}", fnv1a(format!("{MODEL_VERSION} {inputs} {:?}{start}", settings.steady).as_bytes()))
+    format!("{:016x}", fnv1a(format!("{version} {inputs} {:?}{start}", settings.steady).as_bytes()))
 }
 
 /// FNV-1a, 64 bits: a fingerprint of inputs, not a defence.

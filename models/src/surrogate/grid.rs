@@ -84,7 +84,7 @@ impl Grid {
 
     /// How the table's cases are run.
     pub fn settings() -> RunSettings {
-        RunSettings { energy: false, ..RunSettings::default() }
+        RunSettings { energy: false, one_step: true, added_mass: 0.0, ..RunSettings::default() }
     }
 
     /// The case at a place (see [`GridPoint::place`]).
