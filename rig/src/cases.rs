@@ -12,8 +12,10 @@
 //! | [`plan`] | what is missing, measured and cut into ranges |
 //! | [`submit`] | hands ranges to an engine, follows what comes into the folder, goes on, cancels |
 //! | [`engines`] | one file an engine |
+//! | [`adaptive`] | a surrogate whose nodes are chosen where the error is |
 //! | [`dies`] | the fault points at which a test kills the worker |
 
+pub mod adaptive;
 pub mod dies;
 pub mod engines;
 pub mod file;

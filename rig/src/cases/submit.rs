@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 const LOOK: Duration = Duration::from_millis(500);
 /// How often the engine is asked whether it is still at work: schedulers do not like to be asked.
 const ASK: Duration = Duration::from_secs(5);
-/// How often what an engine left undone is handed over again, as long as something came of the last time.
+/// How often what an engine left undone is handed over again, where something came of the last time, or of the one before.
 const ROUNDS: usize = 4;
 
 /// How to submit.
@@ -94,12 +94,19 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     let bar = progress::bar(cases, "cases");
     bar.set_position(cases - first);
     let (out, asked) = (study.out.display().to_string(), options.engine.clone());
-    progress::on_interrupt(&bar, move |done| {
+    // Once: several studies may be submitted by one command.
+    static ASKED: std::sync::Once = std::sync::Once::new();
+    let first_time = !ASKED.is_completed();
+    ASKED.call_once(|| ());
+    let told = move |done| {
         let goes_on =
             if asked == "local" || asked == "dask" { "is over" } else { "goes on without this command" };
         say!("{done} of {cases} cases are in {out}; what was at work {goes_on}");
         say!("the same command goes on from there; `muprime submit --cancel --out {out}` ends what runs");
-    })?;
+    };
+    if first_time {
+        progress::on_interrupt(&bar, told)?;
+    }
     let mut said = Submitted {
         out: study.out.clone(),
         engine: options.engine.clone(),
@@ -119,11 +126,12 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
             follow(study, engine, &folder, handed, &bar)?;
         }
     }
-    let mut before = length(&missing()?) + 1;
+    let (mut before, mut in_vain) = (u64::MAX, 0);
     for _ in 0..ROUNDS {
         let holes = missing()?;
         said.missing = length(&holes);
-        if holes.is_empty() || said.missing >= before {
+        in_vain += u32::from(said.missing >= before);
+        if holes.is_empty() || in_vain > 1 {
             break;
         }
         before = said.missing;

@@ -190,7 +190,8 @@ fn named(given: &[PathBuf], list: Option<&Path>) -> miette::Result<Vec<PathBuf>>
     all.into_iter().map(absolute).collect()
 }
 
-fn values(list: &[String]) -> miette::Result<BTreeMap<String, f64>> {
+/// The settings of `--set`.
+pub(crate) fn values(list: &[String]) -> miette::Result<BTreeMap<String, f64>> {
     let parsed = |text: &String| {
         let (name, value) = text.split_once('=')?;
         Some((name.trim().to_string(), value.trim().parse().ok()?))
@@ -200,7 +201,8 @@ fn values(list: &[String]) -> miette::Result<BTreeMap<String, f64>> {
         .collect()
 }
 
-fn spans(list: &[String]) -> miette::Result<BTreeMap<String, ridge::Span>> {
+/// The spans of `--span`.
+pub(crate) fn spans(list: &[String]) -> miette::Result<BTreeMap<String, ridge::Span>> {
     let parsed = |text: &String| {
         let (name, rest) = text.split_once('=')?;
         let (ends, log) = rest.strip_suffix(":log").map_or((rest, false), |ends| (ends, true));

@@ -91,6 +91,11 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("model point", "muprime model point --amplitude-pp-m 3e-6 --speed-m-s 0.01 --json"),
     ("model ridge", "muprime model ridge --amplitude-pp-m 2e-6 --elements 200"),
     ("model table", "muprime model table --out study --threads 2"),
+    #[cfg(feature = "parquet")]
+    (
+        "model adapt",
+        "muprime model adapt --out surrogate --span amplitude_pp_m=0.3e-6..5e-6:log --span mu0=0.2..1 --nodes 2000",
+    ),
     ("model reproduce", "muprime model reproduce fig14 --out figures"),
     ("model stiffness", "muprime model stiffness\nmuprime model stiffness --survey --elements 200"),
     ("model patch", "muprime model patch --elements 200"),

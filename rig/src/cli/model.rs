@@ -1,5 +1,7 @@
 //! `muprime model`: evaluates the models.
 
+#[cfg(feature = "parquet")]
+mod adapt;
 mod amplitude_for;
 mod conditions;
 mod effects;
@@ -33,6 +35,9 @@ enum ModelVerb {
     Stiffness(stiffness::StiffnessArgs),
     /// A parametric study on all cores: Fig. 9, or the surrogate's table. Stop it and start it again at will.
     Table(table::TableArgs),
+    /// A surrogate over up to ten variables, its nodes chosen in rounds where the error is.
+    #[cfg(feature = "parquet")]
+    Adapt(Box<adapt::AdaptArgs>),
     /// The paper's figures recomputed, as CSV and SVG with a line of comparison each.
     Reproduce(reproduce::ReproduceArgs),
     /// The candidate effects: place, parameters, units, zero, prior, source, covariates needed.
@@ -52,6 +57,8 @@ pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
         ModelVerb::Patch(args) => patch::run(&args, json),
         ModelVerb::Stiffness(args) => stiffness::run(&args, json),
         ModelVerb::Table(args) => table::run(&args, json),
+        #[cfg(feature = "parquet")]
+        ModelVerb::Adapt(args) => adapt::run(&args, json),
         ModelVerb::Reproduce(args) => reproduce::run(&args, json),
         ModelVerb::Effects(args) => effects::run(&args, json),
         ModelVerb::AmplitudeFor(args) => amplitude_for::run(&args, json),

@@ -49,7 +49,7 @@ def dask(folder, job, ids):
     """One future a range; Dask runs those of a worker that was lost again."""
     from distributed import Client, as_completed
 
-    with Client(job["server"], set_as_default=False) as client:
+    with Client(job["server"]) as client:
         futures = client.map(run, commands(job), pure=False, retries=2)
         told([str(client.id)])
         good = True

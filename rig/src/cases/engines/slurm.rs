@@ -68,14 +68,25 @@ fn again(_: &Path, job: &Job) -> miette::Result<Handed> {
     Ok(Handed { ids: job.ids.clone(), child: None })
 }
 
-/// A controller that does not answer says nothing about its jobs: they may go on.
+/// A controller that does not answer says nothing about its jobs: they may go on. Tasks that Slurm holds (it does so where it
+/// could not start them, as after a controller that died) never start by themselves: where nothing else is left they are taken
+/// back, and what is missing is handed over anew.
 fn alive(handed: &mut Handed) -> bool {
     let asked = Command::new("squeue")
-        .args(["--noheader", "--format=%i", "--jobs"])
+        .args(["--noheader", "--format=%t %r", "--jobs"])
         .arg(handed.ids.join(","))
         .output();
     match asked {
-        Ok(said) if said.status.success() => !said.stdout.trim_ascii().is_empty(),
+        Ok(said) if said.status.success() => {
+            let told = String::from_utf8_lossy(&said.stdout).into_owned();
+            let all_held = told
+                .lines()
+                .all(|line| line.starts_with("PD") && (line.contains("JobHeld") || line.contains("held")));
+            if all_held && !told.trim().is_empty() {
+                let _ = Command::new("scancel").args(&handed.ids).output();
+            }
+            !all_held
+        }
         Ok(said) => !String::from_utf8_lossy(&said.stderr).contains("Invalid job id"),
         Err(_) => true,
     }
