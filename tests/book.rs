@@ -36,8 +36,8 @@ fn followed() -> Vec<Page> {
     let chapter = |path: &PathBuf| CHAPTERS.iter().any(|c| path.starts_with(file("docs").join(c)));
     let mut pages: Vec<Page> =
         listed().iter().filter(|path| chapter(path)).map(|path| Page::read(path, true)).collect();
-    pages.push(Page::read(&file("README.md"), false));
-    pages.push(Page::read(&file("python/README.md"), false));
+    // Their console blocks too; those of docs/diagnosis/example.md are run by `tests/real_tables.rs`.
+    pages.extend(["README.md", "docs/viewers.md"].map(|path| Page::read(&file(path), false)));
     pages
 }
 
