@@ -532,6 +532,43 @@ fn slurm_gathers_the_bytes_of_this_machine_though_controller_and_node_die() {
     assert!(refusal(&["gather", text(&out)]).contains("cases have no result"));
 }
 
+#[test]
+fn a_surrogate_grows_in_rounds_until_held_out_cases_are_met() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("surrogate");
+    let words = [
+        "model",
+        "adapt",
+        "--out",
+        text(&out),
+        "--elements",
+        "128",
+        "--at-most",
+        "14",
+        "--tolerance",
+        "0.05",
+    ];
+    let spans = ["--span", "amplitude_pp_m=0.3e-6..5e-6:log", "--span", "mu0=0.2..1"];
+    let ends = ["--round", "15", "--held-out", "20", "--wanted", "0.03", "--nodes", "80"];
+    let words = [&words[..], &spans, &ends].concat();
+    let found = said(&words);
+    let rounds = found["rounds"].as_array().unwrap();
+    let rms = |n: usize| rounds[n]["rms"].as_f64().unwrap();
+    assert!(
+        rounds.len() > 1 && rms(rounds.len() - 1) < 0.03 && rms(rounds.len() - 1) < 0.5 * rms(0),
+        "{found}"
+    );
+    // The same command goes on from what is there: it runs no case, and comes to the same bytes.
+    let surrogate = out.join("surrogate.json");
+    let (kept, shards) = (std::fs::read(&surrogate).unwrap(), out.join("round-000/shards"));
+    let made = || {
+        std::fs::read_dir(&shards).unwrap().map(|e| e.unwrap().metadata().unwrap().modified().unwrap()).max()
+    };
+    let before = made();
+    assert_eq!(said(&words), found);
+    assert_eq!((std::fs::read(&surrogate).unwrap(), made()), (kept, before));
+}
+
 /// Whether a job of the study has not been seen to end.
 fn submit_goes_on(out: &Path) -> bool {
     !out.join("jobs/0001/ended").exists()

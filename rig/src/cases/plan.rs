@@ -109,11 +109,12 @@ mod tests {
     fn tasks_cover_what_is_missing_once_and_fit_their_limit() {
         let pilot = Pilot { cases: 5, mean_s: 0.5, longest_s: 2.0 };
         for (holes, workers, limit) in [
-            (vec![0..1000], 2, None),
-            (vec![3..4, 10..5000], 8, Some(60.0)),
-            (vec![0..1], 1, Some(1.0)),
-            (vec![0..2_000_000], 4, None),
+            (Vec::from([(0, 1000)]), 2, None),
+            (Vec::from([(3, 4), (10, 5000)]), 8, Some(60.0)),
+            (Vec::from([(0, 1)]), 1, Some(1.0)),
+            (Vec::from([(0, 2_000_000)]), 4, None),
         ] {
+            let holes: Vec<Range<u64>> = holes.into_iter().map(|(a, b)| a..b).collect();
             let plan = cut(&holes, &pilot, workers, 300.0, limit);
             let flat = |ranges: &[Range<u64>]| ranges.iter().flat_map(|r| r.clone()).collect::<Vec<u64>>();
             assert_eq!(flat(&plan.ranges), flat(&holes));

@@ -132,7 +132,7 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
         })
     };
     // Looked at before anything is written.
-    (ridge::KIND.prepare)(&header(spans.clone(), args.held_out)?, Path::new("/"))?;
+    drop((ridge::KIND.prepare)(&header(spans.clone(), args.held_out)?, Path::new("/"))?);
     crate::files::make_folder(&args.out)?;
     let held_out = run_study(args, "held-out", header(spans.clone(), args.held_out)?, None)?;
     let places: Vec<Vec<f64>> =
