@@ -215,8 +215,11 @@ fn column(grid: &Grid, entry: &str) -> Result<Taken, String> {
     let (target, unit, unit_text) = target_of(rest)?;
     let numbered = header.strip_prefix('#').and_then(|n| n.parse::<usize>().ok());
     let exact: Vec<usize> = (0..grid.header.len()).filter(|k| grid.header[*k] == header).collect();
+    // A map that was copied from a terminal may be broken over lines within a header.
+    let squeezed = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let wanted = squeezed(header);
     let alike: Vec<usize> =
-        (0..grid.header.len()).filter(|k| grid.header[*k].eq_ignore_ascii_case(header)).collect();
+        (0..grid.header.len()).filter(|k| squeezed(&grid.header[*k]).eq_ignore_ascii_case(&wanted)).collect();
     let index = match (&exact[..], &alike[..], numbered) {
         ([one], ..) | ([], [one], _) => *one,
         ([], [], Some(n)) if (1..=grid.header.len()).contains(&n) => n - 1,
@@ -373,6 +376,9 @@ mod tests {
         let taken = Map::stated(&grid, &["\"F, raw\"=lateral_force:-mN, #2=speed_m_s".into()]).unwrap();
         assert_eq!((taken[0].index, taken[1].index), (0, 1));
         assert_eq!(taken[0].unit.apply("5"), Some(-0.005));
+        // As a terminal breaks it.
+        let broken = Map::stated(&grid, &["\"F,\n        raw\"=lateral_force:mN,\n  b=speed_m_s".into()]);
+        assert_eq!(broken.unwrap().iter().map(|t| t.index).collect::<Vec<_>>(), [0, 1]);
         let wrong = Map::stated(&grid, &["c=speed:mm/s, b=speed, b=pace:s, b=speed:N".into()]).unwrap_err();
         assert_eq!(wrong.len(), 4, "{wrong:?}");
     }
