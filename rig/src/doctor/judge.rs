@@ -6,7 +6,6 @@ use crate::setup::Setup;
 use drivers::OpenError;
 use realtime::ports::{AmplifierState, Contact, NoData, StageState};
 use realtime::safety::RULES;
-use realtime::witness::StallReport;
 use serde::Serialize;
 
 /// What is said of one subject.
@@ -412,6 +411,7 @@ fn planned(look: &Look, setup: &Setup, plan: &Plan, mended: bool) -> Finding {
 mod tests {
     use super::*;
     use realtime::ports::Nanos;
+    use realtime::witness::StallReport;
 
     #[test]
     fn a_dead_weight_on_the_finger_is_no_zero_that_is_off() {
