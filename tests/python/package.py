@@ -158,11 +158,12 @@ refusal(lambda: muprime.calibrate("force", operator="x", serial="y"), "from file
 refusal(lambda: muprime.calibrate("finger", operator="x", serial="y", no_such=1), "--no-such")
 
 # The skin of a finger: the ridge's own phases give back the modulus that made them, from a frame as from the command's file.
+# On 128 elements, with two or three nodes in contact, phases jump with the modulus by more than the fit allows for.
 w = np.array([0.6e-6, 1e-6, 1.5e-6, 2e-6, 2.6e-6])
-phases = muprime.ridge(w, young_modulus_pa=40e6, elements=128)["phase_shift_deg"]
+phases = muprime.ridge(w, young_modulus_pa=40e6, elements=300)["phase_shift_deg"]
 frame = pandas.DataFrame({"amplitude_pp_m": w, "phase_shift_deg": phases, "phase_shift_sd_deg": 5.0})
 frame.to_csv(FOLDER / "phases.csv", index=False)
-search = {"elements": 128, "modulus_only": True, "modulus_range_pa": (15e6, 120e6)}
+search = {"elements": 300, "modulus_only": True, "modulus_range_pa": (15e6, 120e6)}
 skin = muprime.fit_finger(frame, **search)
 print(f"modulus from phases made with 40 MPa: {skin.young_modulus_pa.value / 1e6:.1f} MPa {skin.young_modulus_pa.ci95}, residual {skin.residual_rms_deg:.1f} deg")
 assert skin.young_modulus_pa.ci95[0] < 40e6 < skin.young_modulus_pa.ci95[1] and abs(skin.young_modulus_pa.value / 40e6 - 1) < 0.2
