@@ -51,10 +51,16 @@ fn numbers_agree(said: &str, came: &str, near: Near) -> bool {
 pub fn line_agrees(said: &str, came: &str, near: Near) -> bool {
     let squeeze = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
     let (said, came) = (squeeze(said), squeeze(came));
-    if let Some((head, tail)) = said.split_once('\u{2026}') {
-        return came.starts_with(head) && came[head.len()..].ends_with(tail);
-    }
-    let (a, b) = (pieces(&said), pieces(&came));
+    let Some((head, tail)) = said.split_once('\u{2026}') else { return whole(&said, &came, near) };
+    let places = || came.char_indices().map(|(n, _)| n).chain([came.len()]);
+    // What the ellipsis stands for begins after some start that agrees with the head, and ends before some end that agrees with the tail.
+    let begins = places().find(|n| whole(head, &came[..*n], near));
+    begins.is_some_and(|begins| places().any(|ends| ends >= begins && whole(tail, &came[ends..], near)))
+}
+
+/// Whether text is equal and numbers agree.
+fn whole(said: &str, came: &str, near: Near) -> bool {
+    let (a, b) = (pieces(said), pieces(came));
     a.len() == b.len()
         && a.iter()
             .zip(&b)
@@ -89,6 +95,11 @@ mod tests {
         assert!(!exact("98 passes", "88 passes"));
         assert!(exact("took … s of all", "took 12.3 s of all"));
         assert!(!exact("took … s of all", "took 12.3 s of some"));
+        assert!(
+            exact("a 1.50 mm, …", "a 1.51 mm, 3 of them") && !exact("a 1.50 mm, …", "a 1.53 mm, 3 of them")
+        );
+        assert!(exact("muprime 0.…", "muprime 0.1.0") && !exact("muprime 0.…", "muprime 2.1.0"));
+        assert!(exact("… 12 of 40 s", "took 12 of 40 s") && !exact("… 12 of 40 s", "took 12 of 90 s"));
         assert!(line_agrees("in 10 s", "in 13 s", Near::Share(0.3)));
         assert!(!line_agrees("in 10 s", "in 23 s", Near::Share(0.3)));
         assert!(exact("p < 1e-6", "p < 1e-6") && !exact("p < 1e-6", "p < 1e-2"));
