@@ -164,7 +164,13 @@ impl FingerFit {
                 s.passes, s.reduced_chi2
             ));
             count += s.passes as u64;
-            (sd, largest, unit) = (s.residual_rms_n, s.residual_rms_n, "N".into());
+            if s.left_out > 0 {
+                remarks.push(format!(
+                    "{} passes were left out: without a force, or at a condition that the slider does not take",
+                    s.left_out
+                ));
+            }
+            (sd, largest, unit) = (s.residual_rms_n, s.residual_largest_n, "N".into());
         }
         if let Some(m) = &self.modulus {
             let fit = ModulusFit::of(m, self.skin.as_ref());

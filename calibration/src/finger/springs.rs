@@ -43,10 +43,14 @@ pub struct Springs {
     pub mu0: f64,
     /// Passes with vibration.
     pub passes: usize,
+    /// Passes that were left out: without a force, or at a condition that the slider does not take.
+    pub left_out: usize,
     /// Chi-square over its degrees of freedom: 1 where the slider explains the passes to what the rig repeats to.
     pub reduced_chi2: f64,
     /// Root mean square of the residuals, N.
     pub residual_rms_n: f64,
+    /// Largest residual without its sign, N.
+    pub residual_largest_n: f64,
 }
 
 struct Row {
@@ -79,7 +83,8 @@ pub fn springs(passes: &[Pass], noise: &PassNoise) -> Result<Springs, FingerErro
             let sd_n = (noise.pass_relative_sd * force_n).hypot(noise.force_sd_n);
             Some(Row { condition: p.condition(mu0), force_n, sd_n })
         })
-        .filter(|r| r.condition.check().is_ok())
+        // A reference needs no frequency.
+        .filter(|r| r.condition.amplitude == PeakToPeak::ZERO || r.condition.check().is_ok())
         .collect();
     let vibrating = rows.iter().filter(|r| r.condition.amplitude != PeakToPeak::ZERO).count();
     if vibrating < FEWEST {
@@ -104,13 +109,14 @@ pub fn springs(passes: &[Pass], noise: &PassNoise) -> Result<Springs, FingerErro
     let f95 = FisherSnedecor::new(1.0, dof).map_or(3.84, |f| f.inverse_cdf(0.95));
     let allowed = best.chi2 + f95 * reduced_chi2.max(1.0);
     let profile = |axis: usize, range: [f64; 2]| -> ([f64; 2], [bool; 2]) {
-        let ends = [range[0], range[1]].map(|end| profile_end(&rows, best, axis, end, allowed));
+        let ends = [(range[0], -1.0), (range[1], 1.0)];
+        let ends = ends.map(|(end, outwards)| profile_end(&rows, best, axis, end, outwards, allowed));
         (ends.map(|e| e.0.exp()), ends.map(|e| e.1))
     };
     let (ratio_ci95, ratio_closed) = profile(1, ratios);
     let (normal_ci95_n_per_m, normal_closed) = profile(0, stiffnesses);
     let [normal, ratio, mu0] = best.at.map(f64::exp);
-    let left: f64 = rows.iter().map(|r| (residual(r, best.at) * r.sd_n).powi(2)).sum();
+    let left: Vec<f64> = rows.iter().map(|r| (residual(r, best.at) * r.sd_n).abs()).collect();
     Ok(Springs {
         normal_stiffness_n_per_m: normal,
         lateral_stiffness_n_per_m: normal * ratio,
@@ -121,8 +127,10 @@ pub fn springs(passes: &[Pass], noise: &PassNoise) -> Result<Springs, FingerErro
         normal_closed,
         mu0,
         passes: vibrating,
+        left_out: passes.len() - rows.len(),
         reduced_chi2,
-        residual_rms_n: (left / rows.len() as f64).sqrt(),
+        residual_rms_n: (left.iter().map(|r| r * r).sum::<f64>() / rows.len() as f64).sqrt(),
+        residual_largest_n: left.iter().fold(0.0, |a: f64, b| a.max(*b)),
     })
 }
 
@@ -194,8 +202,12 @@ fn search(rows: &[Row], start: Found, free: [bool; 3]) -> Found {
     here
 }
 
-/// Where the profile along an axis passes what is allowed, towards `end`; and whether it does.
-fn profile_end(rows: &[Row], best: Found, axis: usize, end: f64, allowed: f64) -> (f64, bool) {
+/// Where the profile along an axis passes what is allowed, towards `end` (`outwards` is 1 for the upper one, -1 for the lower); and
+/// whether it does. A best value beyond the range has no end there.
+fn profile_end(rows: &[Row], best: Found, axis: usize, end: f64, outwards: f64, allowed: f64) -> (f64, bool) {
+    if (end - best.at[axis]) * outwards <= 0.0 {
+        return (best.at[axis], false);
+    }
     let mut free = [true; 3];
     free[axis] = false;
     let at = |value: f64, from: Found| {
@@ -204,7 +216,6 @@ fn profile_end(rows: &[Row], best: Found, axis: usize, end: f64, allowed: f64) -
         start.chi2 = chi2(rows, start.at);
         search(rows, start, free)
     };
-    let outwards = (end - best.at[axis]).signum();
     let (mut inside, mut step) = (best, 0.01);
     loop {
         let next = inside.at[axis] + outwards * step;
@@ -225,5 +236,53 @@ fn profile_end(rows: &[Row], best: Found, axis: usize, end: f64, allowed: f64) -
             return (0.5 * (low.at[axis] + high), true);
         }
         (inside, step) = (there, 1.6 * step);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Passes of a finger, as the slider has them, with 1 % up and down by turns.
+    fn passes(finger: &Finger) -> Vec<Pass> {
+        let amplitudes = [0.0, 0.5e-6, 1e-6, 1.5e-6, 2e-6, 2.5e-6, 3e-6, 4e-6, 5e-6];
+        let one = |(n, w): (usize, &f64)| {
+            let condition = Condition { amplitude: PeakToPeak::from_metres(*w), ..Condition::paper() };
+            let mu_relative = if *w == 0.0 {
+                1.0
+            } else {
+                spring_slider::solve(&condition, finger).expect("a condition").mu_relative
+            };
+            let wobble = if n % 2 == 0 { 1.01 } else { 0.99 };
+            Pass::at(
+                n as u64,
+                &condition,
+                Some(wobble * mu_relative * condition.mu0 * condition.normal_force_n),
+            )
+        };
+        amplitudes.iter().enumerate().map(one).collect()
+    }
+
+    #[test]
+    fn what_is_left_out_is_counted_and_the_largest_residual_is_the_largest() {
+        let mut passes = passes(&Finger::paper());
+        let noise = PassNoise { pass_relative_sd: 0.01, force_sd_n: 1e-4 };
+        let whole = springs(&passes, &noise).expect("springs");
+        assert_eq!(whole.left_out, 0);
+        assert!(whole.residual_largest_n > 1.05 * whole.residual_rms_n, "{whole:?}");
+        // A reference without a frequency is a reference; a pass with vibration and none, or without a force, is neither.
+        passes[0].frequency_hz = 0.0;
+        passes[3].frequency_hz = 0.0;
+        passes[5].lateral_force_n = None;
+        let fewer = springs(&passes, &noise).expect("springs");
+        assert_eq!((fewer.left_out, fewer.passes), (2, whole.passes - 2));
+    }
+
+    #[test]
+    fn a_best_value_beyond_the_range_has_no_end_there() {
+        let rows: Vec<Row> = Vec::new();
+        let best = Found { at: [0.0, 2.0, 0.0], chi2: 0.0 };
+        assert_eq!(profile_end(&rows, best, 1, 1.0, 1.0, 4.0), (2.0, false));
+        assert_eq!(profile_end(&rows, best, 1, 3.0, -1.0, 4.0), (2.0, false));
     }
 }

@@ -2,6 +2,7 @@
 //! paper leaves open.
 
 use super::{FrictionRule, Material, Plate, RidgeError, RidgeGeometry, RidgeMesh, Strain};
+use crate::condition::Condition;
 use crate::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 
@@ -120,6 +121,18 @@ impl RidgeCase {
     /// Line load on the ridge in N per metre of depth.
     pub fn line_load_n_m(&self) -> f64 {
         self.mean_pressure_pa * self.geometry.ridge_width_m
+    }
+
+    /// The operating point of the whole finger, as the laws and the spring-slider take it.
+    pub fn condition(&self) -> Condition {
+        Condition {
+            amplitude: self.amplitude,
+            frequency_hz: self.frequency_hz,
+            speed_m_s: self.speed_m_s,
+            normal_force_n: self.normal_force_n,
+            mu0: self.mu0,
+            ..Condition::paper()
+        }
     }
 
     /// Newtons on the whole finger for each N/m on the ridge.

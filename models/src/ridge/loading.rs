@@ -8,7 +8,6 @@
 
 use super::cycle::{self, BINS, Cycle, Steady, mean};
 use super::{Body, ContactForce, Plate, RidgeCase, RidgeError, stability};
-use crate::condition::Condition;
 use crate::prediction::Regime;
 use crate::psi::PsiEq17;
 use serde::Serialize;
@@ -354,15 +353,7 @@ pub fn run_watched(
     let variance =
         pairs.iter().map(|v| (v - mean(&pairs)).powi(2)).sum::<f64>() / (pairs.len() as f64 - 1.0).max(1.0);
     let vibrates = amplitude > 0.0;
-    let condition = Condition {
-        amplitude: case.amplitude,
-        frequency_hz: case.frequency_hz,
-        speed_m_s: case.speed_m_s,
-        normal_force_n: case.normal_force_n,
-        mu0: case.mu0,
-        ..Condition::paper()
-    };
-    let psi = PsiEq17::at(&condition, case.poisson_ratio).0;
+    let psi = PsiEq17::at(&case.condition(), case.poisson_ratio).0;
     let touch_down_deg = mean_cycle.touch_down_deg();
     Ok(RidgeRun {
         mu_relative,

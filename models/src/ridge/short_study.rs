@@ -3,7 +3,6 @@
 use super::static_stiffness::{HeldAt, of_case};
 use super::study::{Panel, fig_9};
 use super::{RidgeCase, RidgeError, RunSettings, run};
-use crate::condition::Condition;
 use crate::finger::Finger;
 use crate::psi_fit::{PsiFit, fit};
 use crate::reading::Reading;
@@ -96,19 +95,11 @@ pub fn springs(case: &RidgeCase) -> Result<Finger, RidgeError> {
 pub fn slider_psi_star(base: RidgeCase, reading: Reading) -> Result<Option<PsiFit>, RidgeError> {
     let finger = springs(&base)?;
     psi_star_with(base, reading, |case| {
-        let condition = Condition {
-            amplitude: case.amplitude,
-            frequency_hz: case.frequency_hz,
-            speed_m_s: case.speed_m_s,
-            normal_force_n: case.normal_force_n,
-            mu0: case.mu0,
-            ..Condition::paper()
-        };
         let outside = |_| RidgeError::Input {
             what: "condition of the slider".into(),
             value: case.amplitude.metres(),
             range: "within its domain".into(),
         };
-        spring_slider::solve(&condition, &finger).map(|cycle| cycle.mu_relative).map_err(outside)
+        spring_slider::solve(&case.condition(), &finger).map(|cycle| cycle.mu_relative).map_err(outside)
     })
 }
