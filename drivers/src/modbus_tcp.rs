@@ -115,6 +115,19 @@ impl<'a> Tcp<'a> {
         };
         Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect())
     }
+
+    /// Writes neighbouring registers.
+    ///
+    /// # Errors
+    /// See [`Trouble`].
+    pub fn write_registers(&mut self, table: Table, address: u16, registers: &[u16]) -> Result<(), Trouble> {
+        let (runtime, limit) = (self.runtime, self.answer_ms);
+        if table.is_bits() {
+            let coils: Vec<bool> = registers.iter().map(|register| *register != 0).collect();
+            return part(within(runtime, limit, self.context.write_multiple_coils(address, &coils)));
+        }
+        part(within(runtime, limit, self.context.write_multiple_registers(address, registers)))
+    }
 }
 
 /// Parts what tokio-modbus parts: an exception of the instrument, and trouble on the way.
@@ -145,12 +158,7 @@ impl Registers for Tcp<'_> {
         address: u16,
         registers: &[u16],
     ) -> Result<(), Trouble> {
-        let (runtime, limit) = (self.runtime, self.answer_ms);
-        if table.is_bits() {
-            let coils: Vec<bool> = registers.iter().map(|register| *register != 0).collect();
-            return part(within(runtime, limit, self.context.write_multiple_coils(address, &coils)));
-        }
-        part(within(runtime, limit, self.context.write_multiple_registers(address, registers)))
+        self.write_registers(table, address, registers)
     }
 
     fn wait_up_to(&mut self, answer_ms: u32) {

@@ -47,6 +47,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 #[cfg(feature = "parquet")]
+pub mod ambient;
 pub mod cases;
 pub mod catalogue;
 pub mod certificates;

@@ -12,6 +12,7 @@ pub use fast::{Rehearsal, rehearse};
 pub use glimpse::{Extremes, Glimpse};
 pub use keeper::{REPLAYABLE, Replayable, unix_ns};
 
+use crate::ambient::LevelsFound;
 use crate::plan::{Plan, Point, Resolution};
 use crate::run_dir::{Identity, RunDir};
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
@@ -50,17 +51,36 @@ pub struct Job {
     pub fast: bool,
     /// Who runs it, and on what: for the record.
     pub notes: Notes,
+    /// A file with the answers of the person at the rig.
+    pub answers: Option<PathBuf>,
 }
 
 /// What a person says of a run. It stands in the record and on the report, and changes nothing.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Notes {
     /// Who leads the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub operator: Option<String>,
     /// What is measured: the fingertip, its preparation, the plate.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub sample: Option<String>,
     /// Licence of the data: an SPDX identifier or an address.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub licence: Option<String>,
+}
+
+impl Notes {
+    /// These, and where they say nothing those of an earlier session.
+    #[must_use]
+    pub fn or(self, before: &Notes) -> Notes {
+        let or = |now: Option<String>, before: &Option<String>| now.or_else(|| before.clone());
+        Notes {
+            operator: or(self.operator, &before.operator),
+            sample: or(self.sample, &before.sample),
+            licence: or(self.licence, &before.licence),
+        }
+    }
 }
 
 /// What happened, for whoever watches.
@@ -113,6 +133,15 @@ pub struct Summary {
     /// Whether the rig was read back off in the end.
     #[serde(default)]
     pub off: OffReport,
+    /// Who ran it, and on what.
+    #[serde(default)]
+    pub notes: Notes,
+    /// The plan's `[protocol]`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub protocol: BTreeMap<String, toml::Value>,
+    /// What was found of the air, and typed at the rig.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<LevelsFound>,
     /// Every pass had been made before: nothing was driven.
     #[serde(default)]
     pub finished_before: bool,
@@ -162,6 +191,8 @@ impl Job {
             plan_sha256: sha256_hex(self.plan.text.as_bytes()),
             seed: self.seed,
             model,
+            notes: self.notes.clone(),
+            protocol: self.plan.protocol(),
         }
     }
 
@@ -181,6 +212,7 @@ impl Job {
     pub fn points_seen(&self, noise_n: Option<f64>) -> miette::Result<Vec<Point>> {
         let resolution = self.resolution()?;
         let points = self.plan.points(self.seed, &self.setup.config.limits, &resolution)?;
+        self.plan.check_ambient(&self.setup)?;
         self.plan.check_reach(&self.setup.reaches()?)?;
         if let Some(mut channel) = self.setup.lateral_channel()? {
             channel.noise_n = noise_n.or(channel.noise_n);
@@ -208,10 +240,12 @@ impl Job {
     ///
     /// # Errors
     /// Whatever prevents it before anything was commanded (a refusal), or a fault of this program.
-    pub fn run(self, signals: &Signals, news: &mut dyn FnMut(News<'_>)) -> miette::Result<Summary> {
+    pub fn run(mut self, signals: &Signals, news: &mut dyn FnMut(News<'_>)) -> miette::Result<Summary> {
         let points = self.points()?;
         let planned = points.len();
+        let answers = self.setup.answers(self.answers.as_deref(), self.asks_a_person())?;
         let mut dir = RunDir::open(&self.out, &self.identity())?;
+        self.notes = dir.notes().clone();
         let left = dir.left_of(points);
         let session = dir.plan_session(keeper::unix_ns(), self.plan.file.pass.measure_s, self.fast);
         let mut sequence = Sequence::new(
@@ -223,6 +257,7 @@ impl Job {
         )
         .watching(&self.setup.certificates.temperature_ranges)
         .in_air(self.setup.ambient())
+        .at_rig(&self.plan, &self.setup)
         .guarded_by(&self.setup.config.limits)
         // In virtual time the loop's own time goes on from session to session.
         .in_session(session.session, if self.fast { 0.0 } else { session.start_s });
@@ -233,16 +268,30 @@ impl Job {
             return Keeper::finish(&self, dir, planned, sequence.findings(true));
         }
         if self.fast {
-            fast::run(self, dir, session.start_s, sequence, planned, signals, news)
+            fast::run(self, dir, session.start_s, sequence, answers, planned, signals, news)
         } else {
-            live::run(self, dir, sequence, planned, signals, news)
+            live::run(self, dir, sequence, answers, planned, signals, news)
         }
+    }
+
+    /// Whether the run waits for a person at the rig.
+    pub fn asks_a_person(&self) -> bool {
+        let means = self.setup.file.means();
+        let air = self.plan.sets_air().into_iter().zip(means);
+        let sets = air.into_iter().any(|(sets, by)| sets && by.is_some_and(|by| by.needs_a_person()));
+        sets || !self.plan.file.step.is_empty()
     }
 
     /// The world of the virtual rig.
     fn world(&self) -> miette::Result<sim::world::World> {
         let virtual_rig = self.setup.file.virtual_rig.clone().unwrap_or_default();
         let mut config = virtual_rig.world();
+        // What the setup states of the air is so in its world.
+        let air = self.setup.ambient();
+        config.room.ambient_pressure_pa = air.ambient_pressure_pa.unwrap_or(config.room.ambient_pressure_pa);
+        config.room.temperature_c = air.temperature_c.unwrap_or(config.room.temperature_c);
+        config.room.relative_humidity_pct =
+            air.relative_humidity_pct.unwrap_or(config.room.relative_humidity_pct);
         if let Some(defects) = &self.defects {
             config.defects = defects.clone();
         }

@@ -67,6 +67,9 @@ pub struct Args {
     /// Licence of the data, for its record and exports: an SPDX identifier (CC-BY-4.0) or an address
     #[arg(long, value_name = "ID")]
     licence: Option<String>,
+    /// Answers of the person at the rig, one a line, for a machine without a person
+    #[arg(long, value_name = "FILE")]
+    answers: Option<PathBuf>,
     /// Show the run live on the whole terminal, as 'muprime watch' does
     #[arg(long)]
     tui: bool,
@@ -245,7 +248,8 @@ fn job(args: Args) -> miette::Result<Job> {
     let seed = args.seed.unwrap_or(plan.file.seed);
     let out = args.out.unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
     let notes = Notes { operator: args.operator, sample: args.sample, licence: args.licence };
-    Ok(Job { setup, plan, seed, model, model_file, defects, out, fast: args.fast, notes })
+    let (fast, answers) = (args.fast, args.answers);
+    Ok(Job { setup, plan, seed, model, model_file, defects, out, fast, notes, answers })
 }
 
 /// Name of a new run: UTC date and time, and the plan.

@@ -38,6 +38,7 @@ fn pass(point: u64) -> MeasuredPass {
         psi_eq17: None,
         psi_reading: None,
         temperature_flags: Vec::new(),
+        levels: Vec::new(),
     }
 }
 

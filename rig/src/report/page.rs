@@ -2,7 +2,9 @@
 
 use super::RunData;
 use super::html::{escape, glossary, head, note, shell, table};
+use super::human::number;
 use super::{events, plots};
+use crate::ambient::{AIR, LevelsFound, levels_of};
 use crate::sequence::Outcome;
 use std::fmt::Write;
 
@@ -36,6 +38,7 @@ pub(super) fn page(run: &RunData) -> miette::Result<String> {
                  independent from pass to pass as long as the model holds. Dashed: &plusmn;1.96."
         ),
     );
+    w.push_str(&levels(run));
     timing(w, run)?;
     w.push_str(&events::section(&run.events));
     passes(w, run);
@@ -62,6 +65,12 @@ fn verdict(w: &mut String, run: &RunData) {
                 Outcome::WouldNotArm { blocking: Some(cause) } => format!(
                     "The rig would not arm: {cause:?} stood in the way.<br>{}",
                     escape(cause.remedy())
+                ),
+                Outcome::LevelNotReached { quantity, wanted, found } => format!(
+                    "Ended early after {made} of {planned} passes: {} {} was not reached, {}.",
+                    escape(&quantity.replace('_', " ")),
+                    number(*wanted),
+                    found.map_or("nothing was read".into(), |found| format!("last {}", number(found)))
                 ),
                 _ => format!("Ended early after {made} of {planned} passes: {}", escape(&word)),
             }
@@ -109,6 +118,38 @@ fn reading(run: &RunData) -> String {
         let first = letters.next().map_or_else(String::new, |c| c.to_uppercase().to_string());
         format!(" {}{}.", escape(&first), escape(letters.as_str()))
     })
+}
+
+/// What was found of the air and typed at the rig; nothing where the plan asks for nothing.
+fn levels(run: &RunData) -> String {
+    let found = levels_of(&run.passes);
+    if found.is_empty() {
+        return String::new();
+    }
+    let row = |f: &LevelsFound| {
+        let known = AIR.iter().find(|(covariate, _)| covariate.name == f.quantity);
+        let (name, (factor, unit)) =
+            known.map_or((f.quantity.as_str(), (1.0, "")), |(c, _)| (c.words, c.shown));
+        let value = |v: f64| number(v * factor);
+        format!(
+            "<tr><td>{}</td><td>{unit}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
+             <td class=\"n\">{} to {}</td><td>{}</td><td class=\"n\">{:.0}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>\n",
+            escape(name),
+            f.planned.map_or("&ndash;".into(), value),
+            value(f.mean),
+            value(f.range[0]),
+            value(f.range[1]),
+            f.source,
+            f.oldest_s,
+            f.passes,
+            f.lost
+        )
+    };
+    let rows: String = found.iter().map(row).collect();
+    let head = "<th scope=\"col\">quantity</th><th scope=\"col\">unit</th><th scope=\"col\">planned</th>\
+        <th scope=\"col\">found</th><th scope=\"col\">range</th><th scope=\"col\">how</th>\
+        <th scope=\"col\">oldest reading, s</th><th scope=\"col\">passes</th><th scope=\"col\">level lost</th>";
+    format!("<h2>Air and protocol</h2>{}", table("Air and protocol", head, &rows))
 }
 
 fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {

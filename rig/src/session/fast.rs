@@ -3,6 +3,7 @@
 use super::glimpse::Glimpses;
 use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary};
+use crate::ambient::{Answers, Bench, World};
 use crate::files::Placed;
 use crate::plan::{Plan, Resolution};
 use crate::run_dir::RunDir;
@@ -14,7 +15,7 @@ use models::prediction::FrictionModel;
 use realtime::ports::Nanos;
 use realtime::recorder::Recorder;
 use realtime::turn::{Ports, Row};
-use sim::virtual_rig::VirtualRig;
+use sim::virtual_rig::{SharedRig, VirtualRig};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,6 +32,7 @@ pub fn run(
     dir: RunDir,
     start_s: f64,
     mut sequence: Sequence,
+    answers: Answers,
     planned: usize,
     signals: &Signals,
     news: &mut dyn FnMut(News<'_>),
@@ -42,7 +44,10 @@ pub fn run(
             job.setup.file.name
         );
     }
-    let ports = ports_of(&job, VirtualRig::of(job.world()?));
+    let world = VirtualRig::of(job.world()?).split();
+    let air = World::Virtual(world[0].clone());
+    let mut bench = Bench::open(&sequence, None, Some(air), answers)?;
+    let ports = ports_of(&job, world);
     let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
     let mut kept = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
     let rig =
@@ -52,7 +57,7 @@ pub fn run(
         Ok((Recorder::begin(file, preamble).into_diagnostic()?, disk))
     });
     let (swept, off) = match record {
-        Ok(record) => sweep(rig, record, &mut kept, &mut sequence, signals, news),
+        Ok(record) => sweep(rig, record, &mut kept, (&mut sequence, &mut bench), signals, news),
         // Before the first row nothing has been driven.
         Err(why) => (Err(why), OffReport::off()),
     };
@@ -65,8 +70,7 @@ pub fn run(
 }
 
 /// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
-fn ports_of(job: &Job, rig: VirtualRig) -> Ports {
-    let [force, amplifier, stage] = rig.split();
+fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> Ports {
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
     let mut ports = Ports::new(force, amplifier, Box::new(stage.clone()));
@@ -84,7 +88,7 @@ fn sweep(
     mut rig: VirtualLoop,
     (mut recorder, disk): (Recorder<Placed>, Placed),
     kept: &mut Keeper,
-    sequence: &mut Sequence,
+    (sequence, bench): (&mut Sequence, &mut Bench),
     signals: &Signals,
     news: &mut dyn FnMut(News<'_>),
 ) -> (miette::Result<Outcome>, OffReport) {
@@ -119,6 +123,7 @@ fn sweep(
         Ok(())
     };
     let outcome = supervisor::sweep(&mut rig, sequence, &mut ask, &mut |row, sequence, reaction| {
+        bench.serve(row.now, sequence, &reaction);
         if unkept.borrow().is_none() {
             *unkept.borrow_mut() = keep(row, sequence, reaction).err();
         }
@@ -169,15 +174,20 @@ pub fn rehearse(
     let points = plan.points(seed, &setup.config.limits, &resolution)?;
     let mut sequence =
         Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
-            .in_air(setup.ambient());
+            .in_air(setup.ambient())
+            .at_rig(plan, setup);
     let [force, amplifier, stage] =
         VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
+    let air = World::Virtual(force.clone());
+    let mut bench = Bench::open(&sequence, None, Some(air), Answers::Simulated)?;
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let mut passes = Vec::new();
-    let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut Asked::default, &mut |_, _, reaction| {
-        passes.extend(reaction.pass);
-    });
+    let outcome =
+        supervisor::sweep(&mut rig, &mut sequence, &mut Asked::default, &mut |row, sequence, reaction| {
+            bench.serve(row.now, sequence, &reaction);
+            passes.extend(reaction.pass);
+        });
     let findings = sequence.findings(outcome == Outcome::Complete);
     Ok(Rehearsal { passes, outcome, findings, cycles: rig.cycles() })
 }

@@ -2,6 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "a run says when it began")]
 
 use super::{Job, News, Notes, Summary, Unfinished};
+use crate::ambient::levels_of;
 use crate::catalogue::{Catalogue, RunEntry};
 use crate::files::Placed;
 use crate::run_dir::RunDir;
@@ -42,6 +43,7 @@ pub struct Keeper {
     folder: String,
     passes: usize,
     planned: usize,
+    protocol: BTreeMap<String, toml::Value>,
     departed: bool,
     /// The catalogue could not be written: it is left alone until the end.
     unnoted: bool,
@@ -82,7 +84,10 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     let Notes { operator, sample, licence } = &job.notes;
     let notes = [("operator", operator), ("sample", sample), ("licence", licence)];
     let notes = notes.into_iter().filter_map(|(k, v)| Some((k, v.clone()?)));
-    let facts = facts.into_iter().chain(notes).map(|(k, v)| (k.to_string(), v)).collect();
+    let mut facts: BTreeMap<String, String> =
+        facts.into_iter().chain(notes).map(|(k, v)| (k.to_string(), v)).collect();
+    let words = |value: &toml::Value| value.as_str().map_or_else(|| value.to_string(), String::from);
+    facts.extend(identity.protocol.iter().map(|(key, value)| (format!("protocol.{key}"), words(value))));
     Ok(Preamble { start_unix_ns, facts, files })
 }
 
@@ -146,7 +151,8 @@ impl Keeper {
             planned: planned as i64,
             departed: false,
         })?;
-        Ok(Keeper { dir, catalogue, folder, passes, planned, departed: false, unnoted: false })
+        let (protocol, departed, unnoted) = (job.plan.protocol(), false, false);
+        Ok(Keeper { dir, catalogue, folder, passes, planned, protocol, departed, unnoted })
     }
 
     /// Keeps what a row led to and passes it on. Returns the pass, once it is safe.
@@ -206,6 +212,10 @@ impl Keeper {
             record_lost,
             links,
             off,
+            notes: self.dir.notes().clone(),
+            protocol: self.protocol.clone(),
+            // As far as it can be read: a table that cannot is said below.
+            levels: crate::run_dir::passes_in(self.dir.path()).map_or_else(|_| Vec::new(), |p| levels_of(&p)),
             finished_before: false,
         };
         self.departed |= summary.model_departed;

@@ -9,6 +9,7 @@ use super::fast::words;
 use super::glimpse::{Glimpse, Glimpses};
 use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary, Unfinished};
+use crate::ambient::{Answers, Bench, World};
 use crate::claim::RigClaim;
 use crate::dead_man_key::DeadManKey;
 use crate::exposure::Ledger;
@@ -44,6 +45,7 @@ pub fn run(
     mut job: Job,
     dir: RunDir,
     mut sequence: Sequence,
+    answers: Answers,
     planned: usize,
     signals: &Signals,
     news: &mut dyn FnMut(News<'_>),
@@ -56,10 +58,12 @@ pub fn run(
     let origin_ns = pacing::monotonic_ns();
     let start_unix_ns = keeper::unix_ns();
     let mut instruments = job.setup.instruments();
-    let _embedded = match &job.setup.file.virtual_rig {
+    let embedded = match &job.setup.file.virtual_rig {
         Some(_) => Some(embed(&job, &mut instruments, epoch)?),
         None => None,
     };
+    let air = embedded.as_ref().map(|(_, plant)| World::Served(plant.clone()));
+    let mut bench = Bench::open(&sequence, instruments.chamber.as_ref(), air, answers)?;
     let rig = drivers::open(&instruments, epoch).map_err(|e| {
         miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
     })?;
@@ -120,6 +124,7 @@ pub fn run(
             let mut ask = || Asked { end: ends(), pause: signals.paused.load(Ordering::Relaxed) };
             let mut glimpses = Glimpses::default();
             supervisor::sweep(&mut reins, following_sequence, &mut ask, &mut |row, sequence, reaction| {
+                bench.serve(row.now, sequence, &reaction);
                 let state = glimpses.take(row);
                 if state.is_some() || !reaction.events.is_empty() || reaction.pass.is_some() {
                     let (done, all) = sequence.progress();
@@ -225,7 +230,8 @@ fn embed(
     job: &Job,
     instruments: &mut drivers::InstrumentsSetup,
     epoch: Instant,
-) -> miette::Result<crate::embed::Embedded> {
+) -> miette::Result<(crate::embed::Embedded, sim::wire::SharedPlant)> {
     let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), epoch);
-    crate::embed::embed(instruments, &plant, false).map_err(|problem| miette::miette!("{problem}"))
+    let embedded = crate::embed::embed(instruments, &plant, false);
+    Ok((embedded.map_err(|problem| miette::miette!("{problem}"))?, plant))
 }

@@ -61,6 +61,10 @@ pub fn outcome(outcome: &Outcome) -> String {
         }
         Outcome::WouldNotArm { blocking: None } => "the rig would not arm".into(),
         Outcome::NoContact { point } => format!("no contact at point {point}"),
+        Outcome::LevelNotReached { quantity, wanted, found } => {
+            let last = found.map_or_else(|| "nothing was read".into(), |found| format!("last {found:.6}"));
+            format!("{quantity} = {wanted:.6} was not reached: {last}")
+        }
         Outcome::LoopLost => "nothing was heard of the loop".into(),
         Outcome::RecordLost => "the record could not be kept".into(),
     }
