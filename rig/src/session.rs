@@ -282,6 +282,11 @@ impl Job {
         sets || !self.plan.file.step.is_empty()
     }
 
+    /// Whether that person answers at the terminal.
+    pub fn asks_at_the_terminal(&self) -> bool {
+        self.asks_a_person() && self.answers.is_none() && self.setup.file.virtual_rig.is_none()
+    }
+
     /// The world of the virtual rig.
     fn world(&self) -> miette::Result<sim::world::World> {
         let virtual_rig = self.setup.file.virtual_rig.clone().unwrap_or_default();

@@ -136,7 +136,7 @@ impl Bench {
         world: Option<World>,
         answers: Answers,
     ) -> miette::Result<Self> {
-        let used = chamber.filter(|_| sequence.reads_air().contains(&true));
+        let used = chamber.filter(|_| sequence.sets_air());
         let chamber = used.map(Chamber::open).transpose().map_err(|why| {
             miette::miette!(help = "check its address and power", "the chamber does not answer: {why}")
         })?;

@@ -110,6 +110,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             "dead-man key: let go of it, then hold the space bar down to arm and to go on; let go, or press any other key, and the drive is off"
         );
     }
+    if job.asks_at_the_terminal() && (tui || job.setup.hand_at_key()) {
+        let taken = if tui { "--tui" } else { "the dead-man key" };
+        miette::bail!(
+            help = "give the answers beforehand with --answers FILE (one a line)",
+            "the plan asks a person for answers at the terminal, and {taken} takes its keys"
+        );
+    }
     let signals = Signals::default();
     watch_signals(&signals)?;
     let planned = job.points()?.len();

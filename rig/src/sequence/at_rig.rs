@@ -9,7 +9,7 @@
 //! ([`crate::ambient::Bench`]); this file only decides, so it runs in virtual time as in wall-clock time.
 
 use super::{Event, Outcome, Reaction, Sequence, Stage};
-use crate::ambient::{AIR, Found, Level, Means, OfAir, Source, Tolerances};
+use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, Tolerances};
 use crate::plan::{Step, When};
 use models::condition::{Ambient, Condition};
 use realtime::cycle::{Command, Phase};
@@ -23,6 +23,8 @@ use std::collections::{BTreeMap, VecDeque};
 const HOLDS_FOR: Nanos = Nanos(1_000_000_000);
 /// Time within which a disarmed rig must be read back off.
 const OFF_WITHIN: Nanos = Nanos(5_000_000_000);
+/// Time in which the finger leaves the plate, and the plate rings down: no person is asked and no zero is read before.
+const LIFTED_AFTER: Nanos = Nanos(1_000_000_000);
 /// A stage slower than this stands still, m/s.
 const STILL_M_S: f64 = 1e-3;
 /// An operator who types a value beyond the tolerance is asked again so often.
@@ -136,7 +138,7 @@ impl AtRig {
     /// A reading that is fresh enough; what a person confirmed holds until another level is asked for.
     fn reading(&self, at: usize, now: Nanos) -> Option<Found> {
         let typed = |found: &Found| matches!(found.source, Source::Operator | Source::AnswersFile);
-        let by_hand = self.means[at].is_some_and(|means| means.reads == crate::ambient::By::Operator);
+        let by_hand = self.means[at].is_some_and(|means| means.reads == By::Operator);
         self.found[at].filter(|f| by_hand || typed(f) || now.since(f.at).seconds() <= STALE_S)
     }
 
@@ -208,7 +210,9 @@ impl AtRig {
             let (Some(found), Some(value)) = (self.found[at], span.moments.mean()) else { continue };
             covariate.put(condition, value);
             let range = span.range.unwrap_or([value; 2]);
-            let off = |w: f64| range.iter().any(|v| (v - w).abs() > self.tolerance[at]);
+            // A gauge that fell silent does not say that the level is still there.
+            let silent = self.reading(at, now).is_none();
+            let off = |w: f64| silent || range.iter().any(|v| (v - w).abs() > self.tolerance[at]);
             levels.push(Level {
                 quantity: covariate.name.into(),
                 planned: wanted,
@@ -251,9 +255,14 @@ impl Sequence {
         Sequence { at_rig, ..self }
     }
 
-    /// Which quantities somebody has to read for this sweep.
+    /// Which quantities something has to read for this sweep: those that no person types.
     pub fn reads_air(&self) -> OfAir<bool> {
-        self.at_rig.means.map(|means| means.is_some())
+        self.at_rig.means.map(|means| means.is_some_and(|means| means.reads != By::Operator))
+    }
+
+    /// Whether the sweep sets any quantity of the air.
+    pub fn sets_air(&self) -> bool {
+        self.at_rig.means.iter().any(Option::is_some)
     }
 
     /// Takes in what was found of a quantity, by its place in [`AIR`].
@@ -317,7 +326,7 @@ impl Sequence {
         match self.at_rig.wait {
             None | Some(Wait::Begin) => self.next_task(row, out),
             Some(Wait::Off { since }) => {
-                if is_off(row) {
+                if is_off(row) && row.now.since(since) >= LIFTED_AFTER {
                     out.events.push(Event::Disarmed {
                         supply_open: row.inputs.seen.supply.is_ok_and(|supply| supply.cut),
                     });
@@ -355,7 +364,7 @@ impl Sequence {
                 if means.is_some_and(|means| means.needs_a_person()) {
                     self.ask(row, Some(at), format!("set {}", shown(at, wanted)), Some(wanted), out);
                 }
-                if means.is_some_and(|means| means.sets != crate::ambient::By::Operator) {
+                if means.is_some_and(|means| means.sets != By::Operator) {
                     out.set_level = Some((at, wanted));
                     out.events.push(Event::LevelSet { quantity, wanted });
                 }
@@ -379,7 +388,7 @@ impl Sequence {
     fn ask(&mut self, row: &Row, at: Option<usize>, step: String, usual: Option<f64>, out: &mut Reaction) {
         let types = match (at, self.at_rig.tasks.front()) {
             (Some(at), _) => {
-                let by_hand = |means: Means| means.reads == crate::ambient::By::Operator;
+                let by_hand = |means: Means| means.reads == By::Operator;
                 self.at_rig.means[at].is_some_and(by_hand).then(|| AIR[at].0.name.to_string())
             }
             (None, Some(Task::Step(step))) => step.number_name().map(String::from),
@@ -399,7 +408,7 @@ impl Sequence {
         let number = typed.parse::<f64>().ok().filter(|v| v.is_finite());
         let (step, needs) = match &task {
             Task::Level(at, wanted) => {
-                let by_hand = self.at_rig.means[*at].is_some_and(|m| m.reads == crate::ambient::By::Operator);
+                let by_hand = self.at_rig.means[*at].is_some_and(|m| m.reads == By::Operator);
                 (format!("set {}", shown(*at, *wanted)), by_hand)
             }
             Task::Step(step) => (step.instruction().to_string(), step.number_name().is_some()),
@@ -440,7 +449,7 @@ impl Sequence {
     fn look_at_level(&mut self, row: &Row, since: Nanos, within: Option<Nanos>, out: &mut Reaction) {
         let Some(Task::Level(at, wanted)) = self.at_rig.tasks.front().cloned() else { return };
         let quantity = AIR[at].0.name.to_string();
-        let by_hand = self.at_rig.means[at].is_some_and(|m| m.reads == crate::ambient::By::Operator);
+        let by_hand = self.at_rig.means[at].is_some_and(|m| m.reads == By::Operator);
         let after_s = row.now.since(since).seconds();
         let now = self.at_rig.within(at, wanted, row.now).then(|| within.unwrap_or(row.now));
         let found = self.at_rig.reading(at, row.now);
