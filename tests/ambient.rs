@@ -288,6 +288,25 @@ fn every_step_of_a_person_finds_the_rig_disarmed() {
     assert!(passes.iter().all(moisture));
 }
 
+/// 'again' has the step before done once more, and nothing is lost of what was said.
+#[test]
+fn a_step_can_be_repeated() {
+    let steps =
+        "[[step]]\nwhen = \"before\"\naction = \"clean\"\n[[step]]\nwhen = \"before\"\naction = \"wash\"\n";
+    let plan = PLAN.replace("ambient_pressure_pa = [101325, 50000]\n", steps);
+    let ran = run("virtual-ideal", "", &plan, None, Some("done\nagain\ndone\ndone\n"));
+    assert_eq!(ran.outcome, Outcome::Complete, "{:?}", ran.events);
+    let asked: Vec<&str> = ran
+        .events
+        .iter()
+        .filter_map(|e| match e {
+            Event::Asked { step, .. } => step.split(' ').next(),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(asked, ["clean", "wash", "clean", "wash"]);
+}
+
 fn at_rest(row: &Row) {
     let seen = &row.inputs.seen;
     assert!(!row.armed && !row.proving && row.supply_cut, "{row:?}");

@@ -29,6 +29,8 @@ const LIFTED_AFTER: Nanos = Nanos(1_000_000_000);
 const STILL_M_S: f64 = 1e-3;
 /// An operator who types a value beyond the tolerance is asked again so often.
 const ASKS: u32 = 5;
+/// The answer that has the step before done once more.
+const AGAIN: &str = "again";
 /// A reading older than this is none.
 const STALE_S: f64 = 10.0;
 
@@ -77,6 +79,7 @@ pub(super) struct AtRig {
     typed: BTreeMap<String, Found>,
     answer: Option<(String, Source)>,
     tasks: VecDeque<Task>,
+    previous: Option<Task>,
     wait: Option<Wait>,
     then: Option<Then>,
     disarmed: bool,
@@ -349,7 +352,7 @@ impl Sequence {
     }
 
     fn done(&mut self, row: &Row, out: &mut Reaction) {
-        self.at_rig.tasks.pop_front();
+        self.at_rig.previous = self.at_rig.tasks.pop_front();
         self.next_task(row, out);
     }
 
@@ -415,6 +418,13 @@ impl Sequence {
         };
         let after_s = row.now.since(since).seconds();
         out.events.push(Event::Answered { step, answer: text, number, answered_by: source, after_s });
+        if typed.eq_ignore_ascii_case(AGAIN) {
+            // The step before comes once more, and then this one.
+            if let Some(previous) = self.at_rig.previous.take() {
+                self.at_rig.tasks.push_front(previous);
+            }
+            return self.next_task(row, out);
+        }
         let fits = match (&task, number) {
             (Task::Level(at, _), Some(v)) if needs => AIR[*at].0.admits(v),
             (_, number) => !needs || number.is_some(),
