@@ -116,6 +116,11 @@ impl Plan {
                 states.push(state);
             }
         }
+        // What leaves the air as it is comes before anything is set.
+        let sets = |s: &Ambient| {
+            [s.ambient_pressure_pa, s.temperature_c, s.relative_humidity_pct].map(|v| v.is_some())
+        };
+        states.sort_by_key(|state| sets(state).contains(&true));
         let mut points = Vec::new();
         for state in states {
             let here = conditions.iter().filter(|(c, _)| Ambient::of(c) == state);
@@ -249,5 +254,9 @@ mod tests {
         assert_eq!(points.len(), 16);
         let pressures: Vec<_> = points.iter().map(|p| p.condition.ambient_pressure_pa.unwrap()).collect();
         assert_eq!(pressures.windows(2).filter(|w| w[0] != w[1]).count(), 1, "{pressures:?}");
+        // A series that leaves the pressure as it is is measured before a chamber was ever set.
+        let plan = Plan::parse("p", &format!("{text}[[series]]\namplitude_pp_m = [3e-6]\n")).unwrap();
+        let points = plan.points(1, &limits, &Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 }).unwrap();
+        assert!(points[..2].iter().all(|p| p.condition.ambient_pressure_pa.is_none()), "{points:?}");
     }
 }

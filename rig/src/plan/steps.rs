@@ -75,6 +75,11 @@ impl Step {
         }
     }
 
+    /// What a virtual rig answers: the paper's moist skin where nothing else is said.
+    pub fn usual_number(&self) -> Option<f64> {
+        self.number_name().map(|_| self.usual.unwrap_or(35.0))
+    }
+
     /// Name of the number that is typed in answer.
     pub fn number_name(&self) -> Option<&str> {
         self.number.as_deref().or((self.action == Action::MeasureMoisture).then_some("skin_moisture_au"))
@@ -88,6 +93,10 @@ impl Step {
         if self.action == Action::Confirm && self.words.is_empty() {
             let remedy = "add words = \"what to do and confirm\"".to_string();
             wrong.add(&["step"], "a step 'confirm' says in `words` what is confirmed", remedy);
+        }
+        if self.number.is_some() && self.usual.is_none() {
+            let remedy = "add usual = VALUE: what a virtual rig answers".to_string();
+            wrong.add(&["step"], "a step with a `number` has its usual value", remedy);
         }
         if self.usual.is_some_and(|usual| !usual.is_finite()) {
             wrong.add(&["step"], "usual is a finite number", None);

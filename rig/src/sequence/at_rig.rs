@@ -376,14 +376,7 @@ impl Sequence {
                 }
             }
             Task::Step(step) => {
-                let usual = step.usual.or(step.number_name().map(|_| 35.0));
-                self.ask(
-                    row,
-                    None,
-                    step.instruction().to_string(),
-                    usual.filter(|_| step.number_name().is_some()),
-                    out,
-                );
+                self.ask(row, None, step.instruction().to_string(), step.usual_number(), out);
             }
         }
     }
