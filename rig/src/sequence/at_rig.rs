@@ -8,7 +8,7 @@
 //! Nothing vibrates and nothing moves while it waits. Answers and readings come from whoever serves the sweep
 //! ([`crate::ambient::Bench`]); this file only decides, so it runs in virtual time as in wall-clock time.
 
-use super::{Event, Outcome, Reaction, Sequence, Stage};
+use super::{Event, Outcome, Reaction, Sequence, Stage, Sums};
 use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, Tolerances};
 use crate::plan::{Step, When};
 use models::condition::{Ambient, Condition};
@@ -312,14 +312,15 @@ impl Sequence {
 
     fn wait_for(&mut self, tasks: VecDeque<Task>, then: Then, row: &Row, out: &mut Reaction) {
         let person = tasks.iter().any(|task| self.at_rig.needs_a_person(task));
-        let marker = self.marker(Phase::Idle);
+        // Neither a cycle nor a sample from here on belongs to the pass before.
+        out.commands.push(Command::Set(Request::default(), self.marker(Phase::Idle)));
+        self.sums = Sums::default();
         let a = &mut self.at_rig;
         (a.tasks, a.then, a.disarmed, a.answer) = (tasks, Some(then), person, None);
         if person {
             out.commands.push(Command::Disarm);
             a.wait = Some(Wait::Off { since: row.now });
         } else {
-            out.commands.push(Command::Set(Request::default(), marker));
             a.wait = Some(Wait::Begin);
         }
         self.stage = Stage::AtRig;
