@@ -2,6 +2,7 @@
 
 use crate::sequence::{Event, MeasuredPass, Outcome};
 use crate::session::{Extremes, Glimpse, Job, unix_ns};
+use crate::setup::Guards;
 use realtime::cycle::Phase;
 use realtime::ports::Channel;
 use realtime::safety::Cause;
@@ -51,6 +52,9 @@ pub struct Run {
     pub planned: usize,
     /// Passes that earlier sessions have made.
     pub made_before: usize,
+    /// What is to be known of the rig's guards.
+    #[serde(default)]
+    pub guards: Guards,
 }
 
 impl Run {
@@ -68,6 +72,7 @@ impl Run {
             process: std::process::id(),
             planned,
             made_before,
+            guards: job.setup.guards(),
         }
     }
 }

@@ -11,7 +11,7 @@ use super::keeper::{self, Keeper};
 use super::{Job, News, Signals, Summary, Unfinished};
 use crate::claim::RigClaim;
 use crate::dead_man_key::DeadManKey;
-use crate::exposure::Ledger;
+use crate::exposure::{Ledger, Left};
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use crate::supervisor::wall::{Ended, Parts};
@@ -50,8 +50,11 @@ pub fn run(
 ) -> miette::Result<Summary> {
     let key = if job.setup.hand_at_key() { Some(DeadManKey::open()?) } else { None };
     let _claim = RigClaim::take(&job.setup)?;
-    let ledger = Ledger::open(&job.setup)?;
-    job.setup.config.exposed = ledger.as_ref().map(Ledger::exposed).unwrap_or_default();
+    let ledger = Ledger::open(&job.setup, &job.notes)?;
+    if let Some(ledger) = &ledger {
+        job.setup.config.exposed = ledger.exposed();
+        sequence.exposure_left(Left::of(&job.setup.config.limits, &job.setup.config.exposed));
+    }
     let epoch = Instant::now();
     let origin_ns = pacing::monotonic_ns();
     let start_unix_ns = keeper::unix_ns();

@@ -26,6 +26,7 @@ fn run() -> Run {
         process: 1,
         planned: 9,
         made_before: 0,
+        guards: Default::default(),
     }
 }
 

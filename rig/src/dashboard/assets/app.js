@@ -256,7 +256,7 @@ function runPage(name, control) {
     const run = picture.run;
     if (run) {
       title.textContent = `${run.plan} on ${run.setup}`;
-      about.textContent = `${name}; operator ${run.operator ?? "not stated"}; sample ${run.sample ?? "not stated"}; compared with ${run.model}${run.fast ? "; in virtual time" : ""}`;
+      about.textContent = `${run.guards?.nobody_touches_the_plate ? "NOBODY TOUCHES THE PLATE: the guards for a finger are off; " : ""}${name}; operator ${run.operator ?? "not stated"}; sample ${run.sample ?? "not stated"}; compared with ${run.model}${run.fast ? "; in virtual time" : ""}`;
     }
     const { made, planned, remaining_s } = picture.progress;
     cells.passes.textContent = `${made} of ${planned}`;
