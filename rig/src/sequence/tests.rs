@@ -60,7 +60,7 @@ fn a_pause_rests_without_drive_and_lifted_off_and_loses_no_pass() {
     // Each amplitude in both directions.
     assert_eq!((plain.len(), outcome), (10, Outcome::Complete));
     // Before the first pass; in the midst of one, for longer than any time that a rule waits for; and between two.
-    let (passes, events, rows, outcome) = swept(&[[0.0, 3.0], [4.6, 42.0], [44.0, 44.1]]);
+    let (passes, events, rows, outcome) = swept(&[[0.0, 2.0], [2.65, 40.3], [41.0, 41.1]]);
     assert_eq!(outcome, Outcome::Complete, "{events:?}");
     let points = |passes: &[MeasuredPass]| passes.iter().map(|p| p.pass.point).collect::<Vec<_>>();
     assert_eq!(points(&passes), points(&plain));
@@ -106,7 +106,7 @@ fn a_pause_rests_without_drive_and_lifted_off_and_loses_no_pass() {
 #[test]
 fn a_pause_has_an_end() {
     let world = sim::world::WorldConfig::ideal();
-    let (passes, events, rows, outcome) = swept_on(&world, 5.0, |row| row.now.seconds() > 4.0);
+    let (passes, events, rows, outcome) = swept_on(&world, 5.0, |row| row.now.seconds() > 0.9);
     assert_eq!(outcome, Outcome::Stopped);
     assert_eq!(events.last(), Some(&Event::PauseTooLong { bound: 5.0 }));
     assert!(!passes.is_empty() && rows.iter().any(|(_, rests)| *rests));
