@@ -71,7 +71,7 @@ fn a_rig_in_another_process_is_never_held() {
 #[test]
 fn one_foreign_instrument_lets_the_clock_of_the_whole_rig_run() {
     let world = || WorldPlant::new(World::new(&WorldConfig::ideal(), 1).unwrap());
-    let setup = rig::setup::Setup::load("virtual-ideal").unwrap();
+    let setup = runs::setup::Setup::load("virtual-ideal").unwrap();
     let (mut own, mut foreign) = (setup.instruments(), setup.instruments());
     let epoch = Instant::now();
     let clock = Clock::holdable(epoch);
