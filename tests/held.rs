@@ -14,7 +14,8 @@ fn summary(run: &Path) -> serde_json::Value {
     serde_json::from_str(&std::fs::read_to_string(run.join("summary.json")).unwrap()).unwrap()
 }
 
-/// Stopped in the middle of a pass for much longer than any rule allows (SR-31: fifty periods), again and again.
+/// Stopped in the middle of a pass for much longer than any rule allows (SR-31: fifty periods), again and
+/// again.
 #[test]
 fn a_run_whose_process_is_stopped_ends_with_every_pass() {
     let folder = tempfile::tempdir().unwrap();
@@ -52,7 +53,8 @@ fn a_run_whose_process_is_stopped_ends_with_every_pass() {
     assert!(page.contains("The clock of the virtual rig was held back for"), "the report says so");
 }
 
-/// The rig of `muprime virtual-rig` is an instrument to a run, on loopback and on this machine too: however its run ends, nothing is held.
+/// The rig of `muprime virtual-rig` is an instrument to a run, on loopback and on this machine too: however
+/// its run ends, nothing is held.
 #[test]
 fn a_rig_in_another_process_is_never_held() {
     let folder = tempfile::tempdir().unwrap();
@@ -67,7 +69,8 @@ fn a_rig_in_another_process_is_never_held() {
     assert!(summary["stalls"].is_object() && summary.get("held").is_none(), "{said:?} {summary}");
 }
 
-/// The same within a process: one instrument that another emulator serves, and the clock of the whole rig runs.
+/// The same within a process: one instrument that another emulator serves, and the clock of the whole rig
+/// runs.
 #[test]
 fn one_foreign_instrument_lets_the_clock_of_the_whole_rig_run() {
     let world = || WorldPlant::new(World::new(&WorldConfig::ideal(), 1).unwrap());

@@ -15,8 +15,8 @@ use std::time::Duration;
 /// A thread looks at least this often whether it is to stop.
 pub const LONGEST_SLEEP: Duration = Duration::from_millis(20);
 
-/// How far a held clock may pass the time at which a driver's thread was to look at it again: a turn of requests and answers, as a
-/// machine with time to spare makes it.
+/// How far a held clock may pass the time at which a driver's thread was to look at it again: a turn of
+/// requests and answers on a machine with time to spare.
 const SLACK: Nanos = Nanos(2_000_000);
 
 /// So many bad answers in a row end a connection.

@@ -1,16 +1,19 @@
 //! Time as the drivers, the loop and a virtual world read it.
 //!
-//! [`Clock`] runs with the machine. That of a virtual rig whose every instrument this process serves itself may be *held*: it stands
-//! still while a thread of the run is kept from running, so that a pause of the computer ages no sample and delays no cycle.
+//! [`Clock`] runs with the machine. That of a virtual rig whose every instrument this process serves itself
+//! may be *held*: it stands still while a thread of the run is kept from running, so that a pause of the
+//! computer ages no sample and delays no cycle.
 //!
-//! Each thread of the run is a [`Participant`]. Before it waits it promises when it looks at the clock again; the clock passes no
-//! promise by more than the participant's slack. Whoever is kept from running (the loop, a driver, an emulator that owes a driver
-//! its answer) so finds the time that it waited for, at most its slack later, whatever the machine did meanwhile. A thread that idles
-//! beside them could not tell: the one that is starved need not be the one that watches. A participant that is silent for
-//! [`PATIENCE`] while others run is waited for no longer: a fault of the program still ages samples, and trips.
+//! Each thread of the run is a [`Participant`]. Before it waits it promises when it looks at the clock again;
+//! the clock passes no promise by more than the participant's slack. Whoever is kept from running (the loop,
+//! a driver, an emulator that owes a driver its answer) so finds the time that it waited for, at most its
+//! slack later, whatever the machine did meanwhile. A thread that idles beside them could not tell: the one
+//! that is starved need not be the one that watches. A participant that is silent for [`PATIENCE`] while
+//! others run is waited for no longer: a fault of the program still ages samples, and trips.
 //!
-//! What may be held is proved, not stated: [`Clock::serves`] takes the listening socket itself, and [`Clock::hold_for`] compares
-//! addresses with the proofs. An address where another process listens, on this machine too, has none:
+//! What may be held is proved, not stated: [`Clock::serves`] takes the listening socket itself, and
+//! [`Clock::hold_for`] compares addresses with the proofs. An address where another process listens, on this
+//! machine too, has none:
 //!
 //! ```compile_fail
 //! let clock = muprime_realtime::clock::Clock::holdable(std::time::Instant::now());
@@ -72,7 +75,8 @@ impl From<Instant> for Clock {
 }
 
 impl Clock {
-    /// A clock for a virtual rig. It runs with the machine until [`Clock::hold_for`] finds that it may be held.
+    /// A clock for a virtual rig. It runs with the machine until [`Clock::hold_for`] finds that it may be
+    /// held.
     #[must_use]
     pub fn holdable(epoch: Instant) -> Self {
         Clock { epoch, held: Some(Arc::default()) }
@@ -94,8 +98,8 @@ impl Clock {
         }
     }
 
-    /// Lets the clock be held from now on, where this process serves every one of these instruments itself. One that it does not serve
-    /// lets it run for ever.
+    /// Lets the clock be held from now on, where this process serves every one of these instruments itself.
+    /// One that it does not serve lets it run for ever.
     pub fn hold_for<'a>(&self, addresses: impl IntoIterator<Item = &'a str>) {
         let Some(held) = &self.held else { return };
         let mut places = lock(&held.places);
@@ -105,7 +109,8 @@ impl Clock {
         held.holds.store(!places.foreign, Ordering::Release);
     }
 
-    /// A thread of the run: where it may be held the clock waits for it, from now on, and passes what it promises by `slack` at most.
+    /// A thread of the run: where it may be held the clock waits for it, from now on, and passes what it
+    /// promises by `slack` at most.
     #[must_use]
     pub fn join(&self, slack: Nanos) -> Participant {
         let slot = self.held.as_ref().and_then(|held| held.take_slot());

@@ -105,8 +105,8 @@ pub struct Summary {
     /// When the machine kept ordinary threads from running; `None` in virtual time.
     #[serde(default)]
     pub stalls: Option<StallReport>,
-    /// Time that the clock of a virtual rig was held back while the computer kept threads of the run from running; `None` where the
-    /// clock cannot be held.
+    /// Time that the clock of a virtual rig was held back while the computer kept threads of the run from
+    /// running; `None` where the clock cannot be held.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held: Option<HeldBack>,
     /// Rows that the record lost.

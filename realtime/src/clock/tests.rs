@@ -1,4 +1,5 @@
-//! The clock against recorded stalls: the machine's time is a number here, so that no machine can break a test.
+//! The clock against recorded stalls: the machine's time is a number here, so that no machine can break a
+//! test.
 
 use super::*;
 use crate::ports::Reading;
@@ -33,11 +34,12 @@ impl Bench {
     }
 }
 
-/// Milliseconds for which each turn of a driver was held up: a busy afternoon on a shared machine, with one pause of seconds.
+/// Milliseconds for which each turn of a driver was held up: a busy afternoon on a shared machine, with one
+/// pause of seconds.
 const STALLS_MS: [u64; 16] = [0, 0, 4, 0, 48, 0, 0, 130, 1, 0, 700, 0, 3, 9_000, 0, 20];
 
-/// A loop of 1 kHz and a driver that polls as often, each stalled in turn: age of the last sample at every cycle, and how late the
-/// cycle was, both in ms of the clock.
+/// A loop of 1 kHz and a driver that polls as often, each stalled in turn: age of the last sample at every
+/// cycle, and how late the cycle was, both in ms of the clock.
 fn ages_and_lateness(bench: &mut Bench) -> Vec<(u64, u64)> {
     let (cycle, driver) = (bench.slot(), bench.slot());
     let mut seen = Vec::new();
@@ -84,7 +86,8 @@ fn a_recorded_series_of_stalls_ages_nothing_and_makes_no_cycle_late() {
     assert!(hand.held > 100_000 * MS, "the stalls were held back: {hand:?}");
 }
 
-/// The same stalls where the clock may not be held, as beside an instrument: ages and lateness are those of the machine.
+/// The same stalls where the clock may not be held, as beside an instrument: ages and lateness are those of
+/// the machine.
 #[test]
 fn the_same_stalls_trip_where_the_clock_is_not_held() {
     let seen = ages_and_lateness(&mut Bench::new(false));
@@ -117,7 +120,8 @@ fn a_stopped_process_finds_the_time_that_it_left() {
     assert_eq!(bench.now(), 5 * MS + MS / 2);
 }
 
-/// A thread that hangs holds the clock for ten seconds in which others ran, and no longer: its samples age then, and trip.
+/// A thread that hangs holds the clock for ten seconds in which others ran, and no longer: its samples age
+/// then, and trip.
 #[test]
 fn whoever_never_comes_back_is_given_up() {
     let mut bench = Bench::new(true);
@@ -165,7 +169,8 @@ fn participants_that_leave_are_not_waited_for() {
     assert!(held.take_slot().is_some());
 }
 
-/// Negative control: a foreign address, loopback or not, is an instrument, and so is every rig that holds one.
+/// Negative control: a foreign address, loopback or not, is an instrument, and so is every rig that holds
+/// one.
 #[test]
 fn an_instrument_that_this_process_does_not_serve_lets_the_clock_run() {
     let holds = |clock: &Clock| clock.held_back().is_some();
