@@ -78,8 +78,8 @@ fn one_foreign_instrument_lets_the_clock_of_the_whole_rig_run() {
     let (mut own, mut foreign) = (setup.instruments(), setup.instruments());
     let epoch = Instant::now();
     let clock = Clock::holdable(epoch);
-    let _embedded = rig::embed::embed(&mut own, &SharedPlant::new(world(), clock.clone()), false).unwrap();
-    let _elsewhere = rig::embed::embed(&mut foreign, &SharedPlant::new(world(), epoch), false).unwrap();
+    let _embedded = rig::emulators::embed(&mut own, &SharedPlant::new(world(), clock.clone()), false).unwrap();
+    let _elsewhere = rig::emulators::embed(&mut foreign, &SharedPlant::new(world(), epoch), false).unwrap();
     let rig = drivers::open(&own, clock.clone()).unwrap();
     assert!(rig.links.clock().held_back().is_some(), "all its instruments are served here");
     drop(rig);
