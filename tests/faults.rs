@@ -1,8 +1,8 @@
 //! The fault list in virtual time: each fault in each phase, its worst reaction beside its bound, and its cause.
 
-use rig::validation::faults::bench::STEADY_AT;
-use rig::validation::faults::rows::What;
-use rig::validation::faults::{
+use studies::validation::faults::bench::STEADY_AT;
+use studies::validation::faults::rows::What;
+use studies::validation::faults::{
     Core, Expect, Moment, Pace, ROWS, Scene, Search, Strike, Tally, run, run_with, search,
 };
 use tests::rounds;
@@ -10,7 +10,7 @@ use tests::rounds;
 const PACES: [Pace; 2] = [Pace::Fast, Pace::Default];
 
 fn assert_clean(tally: &Tally) {
-    rig::cli::faults::table(tally);
+    studies::validation::faults::table(tally);
     let failures: Vec<_> = tally.failures.iter().map(|f| (f.seed, &f.smallest, &f.wrong)).collect();
     assert_eq!(tally.failed, 0, "{failures:#?}");
 }

@@ -84,13 +84,13 @@ fn a_sweep_that_is_killed_resumes_without_a_lost_or_doubled_pass() {
         child.wait().unwrap();
         sessions += 1;
         assert_eq!(complete, kill_after == usize::MAX, "session {sessions}");
-        let kept: Vec<u64> = rig::run_dir::passes_in(&out).unwrap().iter().map(|p| p.pass.point).collect();
+        let kept: Vec<u64> = runs::run_dir::passes_in(&out).unwrap().iter().map(|p| p.pass.point).collect();
         let unique: BTreeSet<u64> = kept.iter().copied().collect();
         assert_eq!(unique.len(), kept.len(), "session {sessions}: a pass is there twice");
         assert!(acknowledged.is_subset(&unique), "session {sessions}: {acknowledged:?} {unique:?}");
         assert!(!complete || unique == (0..400).collect(), "{unique:?}");
     }
-    assert_eq!(rig::run_dir::records_in(&out).unwrap().len(), sessions);
+    assert_eq!(runs::run_dir::records_in(&out).unwrap().len(), sessions);
 }
 
 /// What a trip means and what to do about it: on the terminal, in the summary and in the report.
@@ -98,7 +98,7 @@ fn a_sweep_that_is_killed_resumes_without_a_lost_or_doubled_pass() {
 fn a_trip_is_told_with_its_unit_and_its_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let plan = short_plan(folder.path());
-    let ideal = rig::setup::Setup::load("virtual-ideal").unwrap().text;
+    let ideal = runs::setup::Setup::load("virtual-ideal").unwrap().text;
     // The load of the plan, and no more: its noise breaks the limit.
     let tight = ideal.replace("[limits]\n", "[limits]\nnormal_force_max_n = 0.25\n");
     let setup = folder.path().join("tight.toml");
@@ -159,7 +159,7 @@ fn bad_input_is_refused_with_its_place_and_nothing_is_touched() {
 #[test]
 fn everything_bundled_passes_its_own_check() {
     let mut files = Vec::new();
-    for folder in ["rig/plans", "rig/setups", "drivers/profiles"] {
+    for folder in ["runs/plans", "runs/setups", "drivers/profiles"] {
         let entries = std::fs::read_dir(file(folder)).unwrap();
         files.extend(
             entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "toml")),

@@ -1,6 +1,6 @@
 //! The passes that every foreign table holds, and how an import is compared with them.
 
-use models::record::{Pass, read_passes};
+use models::pass::{Pass, read_passes};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;

@@ -8,7 +8,7 @@ use tests::{documents, muprime, served, texts};
 use wall::sweep_unless_the_machine_stalls;
 
 fn points(run: &Path) -> Vec<u64> {
-    rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
+    runs::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What is kept of a run in wall-clock time: files that vanish or lock in the middle, disks that fill at the end.
 
-use rig::session::Summary;
+use runs::session::Summary;
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ fn sweep(plan: &Path, out: &Path) -> Command {
 }
 
 fn points(run: &Path) -> BTreeSet<u64> {
-    rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
+    runs::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
 }
 
 /// A sweep in wall-clock time, struck by `strike` after its second pass.

@@ -12,7 +12,7 @@ use wall::{cut_by_a_stall, sweep_unless_the_machine_stalls};
 /// Point numbers in a run's table.
 fn points(run: &Path) -> Vec<u64> {
     let table = std::fs::File::open(run.join("points.csv")).unwrap();
-    models::record::read_passes(table).unwrap().iter().map(|p| p.point).collect()
+    models::pass::read_passes(table).unwrap().iter().map(|p| p.point).collect()
 }
 
 fn assert_each_once(points: &[u64], planned: u64) {
