@@ -1,14 +1,14 @@
 //! Studies of many cases: the worker killed at each step and at random, what gathering refuses, and the same bytes
 //! whatever the order, the ranges and the threads. From clusters and on a full disk: tests/peers/cases.rs.
 
-use studies::cases::crash_points::{STEPS, VARIABLE};
-use studies::cases::kinds::Cell;
-use studies::cases::shard::{Reader, Writer};
-use studies::cases::study::Study;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
+use studies::cases::crash_points::{STEPS, VARIABLE};
+use studies::cases::kinds::Cell;
+use studies::cases::shard::{Reader, Writer};
+use studies::cases::study::Study;
 use tests::study::{gathered, here, noop, refusal, ridge_cases, run, said, text, worker};
 use tests::waiting::pause;
 use tests::{muprime, rounds, texts};

@@ -2,7 +2,7 @@
 //! that go away, runs that are taken up again or were finished before, refusals that leave nothing behind.
 
 use runs::plan::Plan;
-use runs::session::{Job, Update, Signals};
+use runs::session::{Job, Signals, Update};
 use runs::setup::Setup;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -4,8 +4,8 @@ use models::prediction::SpringSlider;
 use realtime::cycle::Command;
 use realtime::ports::Nanos;
 use realtime::turn::Ports;
-use runs::setup::Setup;
 use ringbuf::traits::Consumer;
+use runs::setup::Setup;
 use sim::world::WorldConfig;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -65,8 +65,8 @@ impl realtime::ports::ForceSensor for Counted {
 #[test]
 fn the_loops_thread_allocates_nothing_behind_real_drivers() {
     use realtime::safety::Request;
-    use runs::supervisor::Loop;
     use rig::wall_loop::{Parts, WallLoop};
+    use runs::supervisor::Loop;
     use std::sync::atomic::{AtomicU64, Ordering};
     let setup = tests::slower(&Setup::load("virtual-ideal").unwrap());
     let (epoch, origin_ns) = (std::time::Instant::now(), realtime::pacing::monotonic_ns());
