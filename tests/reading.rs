@@ -1,4 +1,4 @@
-//! Which reading of the paper's w holds: the bundled plan 'psi-reading' on rigs whose Psi* is known, and decided 200 times for each.
+//! Which reading of the paper's w holds: the bundled plan 'psi-reading' on rigs whose Psi* is known, and decided 50 times for each (200 in `tests/run long`).
 //!
 //! Two natures: the paper's finite element ridge, by its table, at a multiple of the stroke, on the virtual rig in virtual time and at once with
 //! many mu_0; and Eq. 20 itself.
@@ -21,10 +21,14 @@ use runs::session::rehearse;
 use runs::setup::Setup;
 use sim::world::WorldConfig;
 use std::sync::Arc;
-use tests::{documents, muprime};
+use tests::{documents, muprime, rounds};
 
-const SWEEPS: u64 = 200;
 const FIRST_SEED: u64 = 23_000;
+
+/// Sweeps of each nature.
+fn sweeps() -> u64 {
+    rounds(50, 200)
+}
 
 /// Psi* of each nature, and what should be said of it.
 const NATURES: [(f64, Decision); 3] =
@@ -73,8 +77,13 @@ const ASKED: usize = 95;
 
 fn show(nature: &str, psi_star: f64, told: &Tally) {
     println!(
-        "{nature:<44} Psi* {psi_star:.2}: right {:>3}, undecided {:>3}, wrong {:>3} of {SWEEPS}; mean {:+.1} nats, Psi* found {:.2}",
-        told.right, told.other, told.wrong, told.nats, told.psi_star
+        "{nature:<44} Psi* {psi_star:.2}: right {:>3}, undecided {:>3}, wrong {:>3} of {}; mean {:+.1} nats, Psi* found {:.2}",
+        told.right,
+        told.other,
+        told.wrong,
+        sweeps(),
+        told.nats,
+        told.psi_star
     );
 }
 
@@ -83,7 +92,7 @@ fn the_plan_decides_on_a_virtual_rig_built_under_either_reading() {
     for (strokes, expected) in RIDGES {
         let told = tally(expected, &on_the_virtual_rig(strokes));
         show("virtual rig, finite element ridge", RIDGES_PSI_STAR * strokes, &told);
-        assert!(told.right * 100 >= ASKED * SWEEPS as usize, "{told:?}");
+        assert!(told.right * 100 >= ASKED * sweeps() as usize, "{told:?}");
     }
 }
 
@@ -93,7 +102,7 @@ fn the_plan_decides_on_a_virtual_rig_built_under_either_reading() {
 fn the_spring_slider_lies_between() {
     let told = tally(Decision::Between, &on_the_virtual_rig(0.0));
     show("virtual rig, slider on springs", told.psi_star, &told);
-    assert!(told.right * 100 >= 80 * SWEEPS as usize, "{told:?}");
+    assert!(told.right * 100 >= 80 * sweeps() as usize, "{told:?}");
 }
 
 /// The plan's sweeps in virtual time; no strokes: the slider.
@@ -103,7 +112,7 @@ fn on_the_virtual_rig(strokes: f64) -> Vec<ReadingFinding> {
     let model = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     let mut world = WorldConfig::ideal();
     world.finger.ridge_table_strokes = strokes;
-    (0..SWEEPS)
+    (0..sweeps())
         .into_par_iter()
         .map(|i| {
             let run = rehearse(&setup, &plan, FIRST_SEED + i, &world, Arc::clone(&model) as _).unwrap();
@@ -128,7 +137,7 @@ fn swept(mu_relative: impl Fn(&Condition) -> f64 + Sync, conditions: usize) -> V
     plan.file.series.truncate(conditions);
     let noise: PassNoise = setup.file.noise;
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
-    (0..SWEEPS)
+    (0..sweeps())
         .into_par_iter()
         .map(|i| {
             let mut draw = Draw(ChaCha8Rng::seed_from_u64(FIRST_SEED + i));
@@ -164,7 +173,7 @@ fn the_plan_decides_where_the_finite_element_ridge_is_the_truth() {
                 RIDGES_PSI_STAR * strokes,
                 &told,
             );
-            assert!(conditions < 3 || told.right * 100 >= ASKED * SWEEPS as usize, "{told:?}");
+            assert!(conditions < 3 || told.right * 100 >= ASKED * sweeps() as usize, "{told:?}");
         }
     }
 }
@@ -180,7 +189,7 @@ fn the_plan_has_the_fewest_passes_that_decide() {
             let told = tally(expected, &swept(law(psi_star), conditions));
             show(&format!("Eq. 20, {conditions} conditions, {} passes", 2 * conditions), psi_star, &told);
             assert_eq!(told.wrong, 0, "{told:?}");
-            assert!(conditions < 3 || told.right * 100 >= 95 * SWEEPS as usize, "{told:?}");
+            assert!(conditions < 3 || told.right * 100 >= 95 * sweeps() as usize, "{told:?}");
         }
     }
 }
@@ -235,7 +244,7 @@ fn what_neither_reading_explains_is_given_to_neither() {
         let law = |c: &Condition| relative_friction(PsiEq17::at(c, Finger::paper().poisson_ratio), psi_star);
         let told = tally(Decision::Neither, &swept(law, 3));
         show("Eq. 20, far from both", psi_star, &told);
-        assert!(told.right * 100 >= 95 * SWEEPS as usize, "{told:?}");
+        assert!(told.right * 100 >= 95 * sweeps() as usize, "{told:?}");
     }
 }
 
