@@ -11,7 +11,7 @@ mod signals;
 use super::columns::{self, Cells, Column};
 use super::facts::Facts;
 use super::unit;
-use crate::files::{beside, sync_folder_of};
+use crate::files::{beside, fresh, sync_folder_of};
 use crate::report::RunData;
 use crate::run_dir::records_in;
 use crate::sequence::MeasuredPass;
@@ -34,7 +34,7 @@ use std::path::Path;
 /// Whatever the file system or the format's library says. Nothing is left behind then.
 pub fn write(folder: &Path, run: &RunData, facts: &Facts, to: &Path) -> miette::Result<()> {
     let part = beside(to);
-    let written = File::create(&part).into_diagnostic().and_then(|file| {
+    let written = fresh(&part).into_diagnostic().and_then(|file| {
         let mut flat = Flat::begin(BufWriter::new(file), run, facts).into_diagnostic()?;
         for path in records_in(folder)? {
             let file = File::open(&path).into_diagnostic()?;
