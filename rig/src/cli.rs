@@ -77,7 +77,27 @@ pub fn until_the_end(subcommand: impl FnOnce() -> ExitCode + Send + 'static) -> 
     };
     // Whoever leaves at once leaves others no time for it.
     crate::terminal::give_back();
+    let unread = crate::print::end();
+    // A folder that was refused stays as it is.
+    if let Some(run) = RUN.get().filter(|run| !unread.is_empty() && crate::run_dir::has_begun(run)) {
+        let _ = crate::files::write_plain(&run.join(UNREAD), unread);
+    }
     code
+}
+
+/// Name of the file in a run's folder with what its readers did not take.
+pub const UNREAD: &str = "unread.txt";
+/// The folder of the run that this process leads.
+static RUN: OnceLock<std::path::PathBuf> = OnceLock::new();
+
+/// A rig is driven from now on: nobody waits for a reader of standard output or standard error, and what they do not take stands in
+/// the run's folder afterwards.
+///
+/// # Errors
+/// The system gives no thread.
+pub fn tell_beside(run: &std::path::Path) -> miette::Result<()> {
+    let _ = RUN.set(run.into());
+    miette::IntoDiagnostic::into_diagnostic(crate::print::beside())
 }
 
 /// Asks the main thread to end the process with that status, whatever the subcommand does.

@@ -73,6 +73,8 @@ pub enum News<'a> {
     Progress(usize, usize, f64),
     /// A cycle ten times a second, and the extremes of all cycles since the last one.
     State(&'a Glimpse),
+    /// The rig was switched off for the last time; comes before anything else is done, in wall-clock time.
+    Off(&'a OffReport),
 }
 
 /// What a run comes to. Its JSON form is what `muprime run --json` ends with.
@@ -204,7 +206,7 @@ impl Job {
         Ok(Resolution { amplitude_pp_m: step("amplitude"), frequency_hz: step("frequency") })
     }
 
-    /// Runs the job.
+    /// Runs the job. In wall-clock time `news` must wait for nothing: whoever keeps the passes calls it.
     ///
     /// # Errors
     /// Whatever prevents it before anything was commanded (a refusal), or a fault of this program.
