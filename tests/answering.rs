@@ -51,7 +51,7 @@ fn a_stop_that_nobody_heard_goes_to_the_process() {
     let mut run = begun(folder.path(), &out);
     let answer = rig::live::stop(&out).unwrap();
     assert!(answer.contains("SIGINT"), "{answer}");
-    assert!(!rig::run_dir::is_held(&out), "answered as done while the run went on");
+    assert!(!runs::run_dir::is_held(&out), "answered as done while the run went on");
     until("it ends", || run.0.try_wait().unwrap().is_some());
     assert!(rig::live::stop(&out).is_err(), "nothing is stopped twice");
 }

@@ -91,7 +91,7 @@ fn ended(child: &mut Child, what: &str) -> Option<i32> {
 
 /// Every pass of the plan is kept, in table, journal and record, and the rig was read back off.
 fn is_whole(out: &Path, what: &str) {
-    let passes = models::record::read_passes(&std::fs::read(out.join("points.csv")).unwrap()[..]).unwrap();
+    let passes = models::pass::read_passes(&std::fs::read(out.join("points.csv")).unwrap()[..]).unwrap();
     let summary: serde_json::Value =
         serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
     assert_eq!(summary["outcome"], "complete", "{what}: {summary}");

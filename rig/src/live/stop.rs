@@ -2,9 +2,9 @@
 #![allow(clippy::disallowed_methods, reason = "somebody waits for a run to stop")]
 
 use super::{Ask, Heard, Message, Viewer};
-use crate::run_dir;
-use crate::sequence::Event;
-use rustix::process::{Signal, kill_process};
+use runs::run_dir;
+use runs::sequence::Event;
+use rustix::process::{Pid, Signal, kill_process};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -17,7 +17,7 @@ const BY_SIGNAL: Duration = Duration::from_secs(15);
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// Processes that were sent a SIGINT from here, each for a run: a second one would end them before their drive is read back off.
-static SIGNALLED: Mutex<BTreeSet<(i32, PathBuf)>> = Mutex::new(BTreeSet::new());
+static SIGNALLED: Mutex<BTreeSet<(u32, PathBuf)>> = Mutex::new(BTreeSet::new());
 
 /// Stops the run in a folder: by its feed, and by SIGINT to the process that holds its lock where the run does not show it. Returns
 /// what shows it.
@@ -32,12 +32,11 @@ pub fn stop(folder: &Path) -> Result<String, String> {
     if viewer.as_mut().is_some_and(|viewer| by_feed(viewer, folder)) {
         return Ok("it stops: the rig goes to its safe state first".into());
     }
-    let Some(process) = run_dir::holder(folder) else {
+    let Some(number) = run_dir::holder(folder) else {
         return Err("NOT STOPPED: another machine or user leads this run; stop it there".into());
     };
-    let number = process.as_raw_nonzero().get();
     let again = !SIGNALLED.lock().unwrap_or_else(PoisonError::into_inner).insert((number, folder.into()));
-    if !again && let Err(why) = kill_process(process, Signal::INT) {
+    if !again && let Err(why) = interrupt(number) {
         return Err(format!("NOT STOPPED: process {number}: {why}"));
     }
     if shows(viewer.as_mut(), folder, BY_SIGNAL) {
@@ -46,6 +45,11 @@ pub fn stop(folder: &Path) -> Result<String, String> {
     Err(format!(
         "asked for by SIGINT to process {number}, and not shown: use the emergency stop if the rig does not obey"
     ))
+}
+
+fn interrupt(number: u32) -> rustix::io::Result<()> {
+    let process = i32::try_from(number).ok().and_then(Pid::from_raw).ok_or(rustix::io::Errno::SRCH)?;
+    kill_process(process, Signal::INT)
 }
 
 fn by_feed(viewer: &mut Viewer, folder: &Path) -> bool {
