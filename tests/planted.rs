@@ -29,6 +29,7 @@ fn a_run_destroys_nothing_that_a_planted_link_leads_to() {
         "run/report.html.new",
         "catalogue.sqlite",
         "catalogue.sqlite-journal",
+        "catalogue.sqlite-wal",
     ];
     for name in names {
         for (kind, plant) in [("symbolic", symbolic as fn(&Path, &Path)), ("hard", hard)] {

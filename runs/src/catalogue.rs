@@ -44,10 +44,16 @@ impl Catalogue {
     /// Whatever SQLite says.
     pub fn open(runs: &Path) -> miette::Result<Self> {
         files::make_folder(runs)?;
-        let path = runs.join(FILE);
+        // A folder may be reached through links; the catalogue itself may not.
+        let whole = runs.canonicalize().into_diagnostic().wrap_err_with(|| runs.display().to_string())?;
+        let path = whole.join(FILE);
         // Looked at before SQLite opens it by its name, which follows a link and does not mind a second name.
         let mut options = std::fs::OpenOptions::new();
         let file = Placed::open(&path, options.read(true).write(true).create(true).truncate(false))?;
+        // By their names alone: SQLite's locks on a file end when this process closes it anywhere.
+        for suffix in ["-journal", "-wal", "-shm"] {
+            files::refuse_planted(&whole.join(format!("{FILE}{suffix}")))?;
+        }
         let flags = OpenFlags::default() | OpenFlags::SQLITE_OPEN_NOFOLLOW;
         let db = Connection::open_with_flags(&path, flags)
             .into_diagnostic()

@@ -116,7 +116,9 @@ impl Outlet {
         }
         if self.lost > 0 && !first {
             // It stands where the lines that were left out would have stood.
-            self.waiting.push_back(Piece::Text(left_out(output, std::mem::take(&mut self.lost))));
+            let marker = left_out(output, std::mem::take(&mut self.lost));
+            self.bytes += marker.len();
+            self.waiting.push_back(Piece::Text(marker));
         }
         self.bytes += bytes;
         if first { self.waiting.push_front(piece) } else { self.waiting.push_back(piece) }
@@ -125,11 +127,13 @@ impl Outlet {
     /// The next piece; what was left out is said where it would have stood.
     fn next(&mut self, output: usize) -> Option<Piece> {
         let piece = match self.waiting.pop_front() {
-            Some(piece) => piece,
+            Some(piece) => {
+                self.bytes -= piece.bytes();
+                piece
+            }
             None if self.lost > 0 => Piece::Text(left_out(output, std::mem::take(&mut self.lost))),
             None => return None,
         };
-        self.bytes = self.bytes.saturating_sub(piece.bytes());
         self.taken = Some(if let Piece::Text(text) = &piece { text.clone() } else { String::new() });
         Some(piece)
     }
@@ -414,6 +418,33 @@ mod tests {
             ["0\n", "... 7 remarks are left out ...\n", "107\n"]
         );
         assert_eq!(all.last().unwrap(), "1006\n");
+    }
+
+    #[test]
+    fn a_reader_that_takes_nothing_costs_lines_and_hears_how_many() {
+        let text = |outlet: &mut Outlet| match outlet.next(OUT) {
+            Some(Piece::Text(text)) => Some(text),
+            _ => None,
+        };
+        let mut outlet = Outlet::default();
+        for n in 0..PIECES + 7 {
+            outlet.put(OUT, Piece::Text(format!("{n}\n")), false);
+        }
+        outlet.put(OUT, Piece::Text("the output may still be on\n".into()), true);
+        assert_eq!(text(&mut outlet).as_deref(), Some("the output may still be on\n"));
+        for n in 0..3 {
+            assert_eq!(text(&mut outlet), Some(format!("{n}\n")));
+        }
+        outlet.put(OUT, Piece::Text("later\n".into()), false);
+        let rest: Vec<String> = std::iter::from_fn(|| text(&mut outlet)).collect();
+        assert_eq!(rest.len(), PIECES - 3 + 2);
+        assert_eq!(rest[PIECES - 3..], ["{\"left_out\":7}\n", "later\n"]);
+        assert_eq!((outlet.bytes, outlet.lost_in_all), (0, 7));
+        // Large lines are bounded by their bytes.
+        for _ in 0..100 {
+            outlet.put(OUT, Piece::Text("x".repeat(1 << 20)), false);
+        }
+        assert_eq!((outlet.waiting.len(), outlet.lost), (8, 92));
     }
 
     #[test]

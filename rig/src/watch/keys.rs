@@ -3,7 +3,6 @@
 use super::{Shared, Source};
 use crate::live::{self, Ask};
 use crate::terminal;
-use runs::run_dir;
 use runs::session::Signals;
 use std::io;
 use std::path::Path;
@@ -125,11 +124,4 @@ fn rest(shared: &Shared, ask: Ask) -> String {
         }
         _ => shared.hand.pause(ask),
     }
-}
-
-/// Sends SIGINT to a process.
-fn interrupt(number: u32) -> rustix::io::Result<()> {
-    let process = i32::try_from(number).ok().and_then(rustix::process::Pid::from_raw);
-    let process = process.ok_or(rustix::io::Errno::SRCH)?;
-    rustix::process::kill_process(process, rustix::process::Signal::INT)
 }
