@@ -21,12 +21,6 @@ fn a_run_destroys_nothing_that_a_planted_link_leads_to() {
     let names = [
         "run/.lock",
         "run/run.toml.new",
-        "run/passes.jsonl.new",
-        "run/points.csv.new",
-        "run/sessions.jsonl.new",
-        "run/rig.toml.new",
-        "run/summary.json.new",
-        "run/report.html.new",
         "catalogue.sqlite",
         "catalogue.sqlite-journal",
         "catalogue.sqlite-wal",
@@ -67,14 +61,24 @@ fn a_run_replaces_a_link_in_the_place_of_its_report() {
         run.output().unwrap()
     };
     assert_eq!(run().status.code(), Some(0));
-    std::fs::write(&victim, PRECIOUS).unwrap();
-    for name in ["report.html", "summary.json", "rig.toml"] {
-        std::fs::remove_file(out.join(name)).unwrap();
-        symbolic(&victim, &out.join(name));
+    for (part, plant) in [("", symbolic as fn(&Path, &Path)), ("", hard), (".new", symbolic), (".new", hard)]
+    {
+        std::fs::write(&victim, PRECIOUS).unwrap();
+        for name in ["report.html", "summary.json", "rig.toml"] {
+            std::fs::remove_file(out.join(name)).unwrap();
+            plant(&victim, &out.join(format!("{name}{part}")));
+        }
+        let output = run();
+        assert_eq!(std::fs::read_to_string(&victim).unwrap(), PRECIOUS, "{part}: {:?}", texts(&output));
+        for name in ["report.html", "summary.json", "rig.toml"] {
+            assert!(
+                out.join(name).symlink_metadata().unwrap().is_file(),
+                "{name}{part}: {:?}",
+                texts(&output)
+            );
+            assert!(!out.join(format!("{name}.new")).exists());
+        }
     }
-    let output = run();
-    assert_eq!(std::fs::read_to_string(&victim).unwrap(), PRECIOUS, "{:?}", texts(&output));
-    assert!(!out.join("report.html").symlink_metadata().unwrap().is_symlink(), "{:?}", texts(&output));
 }
 
 /// A name beside a record that leads nowhere is not made into a copy of it somewhere else.
