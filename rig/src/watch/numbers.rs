@@ -63,6 +63,7 @@ pub fn outcome(outcome: &Outcome) -> String {
         Outcome::NoContact { point } => format!("no contact at point {point}"),
         Outcome::LoopLost => "nothing was heard of the loop".into(),
         Outcome::RecordLost => "the record could not be kept".into(),
+        Outcome::ExposureNotKept => "the exposure of the finger could not be written in time".into(),
     }
 }
 

@@ -130,6 +130,8 @@ pub enum Outcome {
     LoopLost,
     /// Record, passes, catalogue, summary or report could not be written: a measurement that is not kept is not made.
     RecordLost,
+    /// What the finger was exposed to could not be written in time: nothing is driven that is not counted. What was measured is kept.
+    ExposureNotKept,
 }
 
 impl Outcome {
