@@ -11,7 +11,7 @@ use clap::Args as ClapArgs;
 use diagnosis::data::Table;
 use diagnosis::hypotheses::Options;
 use diagnosis::progress::{Progress, Stage};
-use diagnosis::verdict::{Diagnosis, diagnose};
+use diagnosis::verdict::{Diagnosis, diagnose, probability};
 use indicatif::ProgressBar;
 use miette::{Context, IntoDiagnostic};
 use models::condition::Condition;
@@ -124,7 +124,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 vec![("table", table_path.display().to_string()), ("rig", rig_path.display().to_string())];
             [named, about::of_rig(&rig)].concat()
         };
-        write_text(out, &crate::report::diagnosis::page(&result, &table, &about)?)?;
+        let page = crate::report::diagnosis::page(&result, &table, &about)?;
+        write_text(out, &page)?;
+        keep_in_run(&args.data, out, &page);
     }
     if json {
         out!("{}", document(&result, &rig, &damage)?);
@@ -274,13 +276,25 @@ fn write_text(path: &Path, text: &str) -> miette::Result<()> {
     crate::files::write_whole(path, text)
 }
 
+/// A run's page that was written elsewhere, once more in the run's folder, where the dashboard lists it. A folder that takes no file, or a
+/// table without a run, keeps nothing.
+fn keep_in_run(run: &Path, page: &Path, text: &str) {
+    let inside = || Some(page.canonicalize().ok()?.parent()? == run.canonicalize().ok()?);
+    if run.is_dir() && inside() == Some(false) {
+        let copy = run.join("diagnosis.html");
+        if let Err(why) = write_text(&copy, text) {
+            say!("the dashboard will not list this page: {why}");
+        }
+    }
+}
+
 /// What a terminal shows.
 pub fn terminal(result: &Diagnosis) -> String {
     let r = &result.report;
     let mut text = format!("{}\n\nHypotheses\n", r.text);
     for h in r.hypotheses.iter().filter(|h| h.probability > 0.005).take(8) {
         let name = if h.effects.is_empty() { "no gap".to_string() } else { h.effects.join(" + ") };
-        text.push_str(&format!("  {:5.3}  {name}", h.probability));
+        text.push_str(&format!("  {:>7}  {name}", probability(h.probability)));
         if h.alias_class.len() > 1 {
             text.push_str(&format!("  (not told from {})", h.alias_class[1..].join(", ")));
         }

@@ -141,6 +141,22 @@ impl Outcome {
             _ => None,
         }
     }
+
+    /// How the sweep ended, in words.
+    pub fn words(&self) -> String {
+        match self {
+            Outcome::Complete => "complete".into(),
+            Outcome::Stopped => "stopped on request".into(),
+            Outcome::Tripped(_) => "a safety rule tripped".into(),
+            Outcome::WouldNotArm { blocking: Some(cause) } => {
+                format!("the rig would not arm: {cause:?} stands in the way")
+            }
+            Outcome::WouldNotArm { blocking: None } => "the rig would not arm".into(),
+            Outcome::NoContact { point } => format!("no contact at point {point}"),
+            Outcome::LoopLost => "nothing was heard of the loop".into(),
+            Outcome::RecordLost => "the record could not be kept".into(),
+        }
+    }
 }
 
 #[cfg(test)]

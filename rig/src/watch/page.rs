@@ -2,7 +2,7 @@
 //! events, less room keeps what is needed first.
 
 use super::look::Look;
-use super::numbers::{duration, of_state, outcome, phase, plain};
+use super::numbers::{duration, of_state, phase, plain};
 use super::plot::{curve, trace};
 use super::{Keys, Source};
 use crate::live::View;
@@ -146,7 +146,7 @@ fn state(page: &Page<'_>) -> (String, Style) {
     let (view, look) = (page.view, page.look);
     if let Some(ended) = &view.ended {
         let how = match (&ended.outcome, &ended.error) {
-            (Some(how), _) => outcome(how),
+            (Some(how), _) => how.words(),
             (None, Some(error)) => plain(error),
             (None, None) => "nothing is known of its end".into(),
         };
