@@ -20,7 +20,6 @@ use crate::supervisor::OffReport;
 use calibration::certificate::sha256_hex;
 use keeper::Keeper;
 use models::prediction::FrictionModel;
-use models::reading_evidence::ReadingFinding;
 use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
 use realtime::witness::StallReport;
@@ -98,9 +97,6 @@ pub struct Summary {
     /// What the comparison of all passes says.
     #[serde(default = "nothing_said")]
     pub agreement: Agreement,
-    /// What they say of the two readings of the paper's w; `None` where none could tell.
-    #[serde(default)]
-    pub psi_reading: Option<ReadingFinding>,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
     /// When the machine kept ordinary threads from running; `None` in virtual time.
@@ -230,7 +226,7 @@ impl Job {
             sequence.remember(pass);
         }
         if sequence.progress().1 == 0 {
-            return Keeper::finish(&self, dir, planned, sequence.findings(true));
+            return Keeper::finish(&self, dir, planned, sequence.agreement(true));
         }
         if self.fast {
             fast::run(self, dir, session.start_s, sequence, planned, signals, news)

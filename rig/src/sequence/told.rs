@@ -2,9 +2,8 @@
 
 use crate::certificates::temperature::TemperatureFlag;
 use models::prediction::Regime;
-use models::reading_evidence::ReadingFinding;
 use models::record::Pass;
-use realtime::compare::{Agreement, PassComparison};
+use realtime::compare::PassComparison;
 use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip};
 use serde::{Deserialize, Serialize};
@@ -22,21 +21,9 @@ pub struct MeasuredPass {
     pub regime: Option<Regime>,
     /// Psi of Eq. 17 at the measured condition; `None` without vibration or without `mu_0`.
     pub psi_eq17: Option<f64>,
-    /// What the passes so far say of the two readings of the paper's w; `None` without vibration or without `mu_0`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub psi_reading: Option<ReadingFinding>,
     /// Certificates that do not hold at the temperature that the pass began with. Nothing was corrected for it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub temperature_flags: Vec<TemperatureFlag>,
-}
-
-/// What the passes of a sweep say in the end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Findings {
-    /// Of the model that they were compared with.
-    pub agreement: Agreement,
-    /// Of the two readings of the paper's w; `None` where none could tell.
-    pub psi_reading: Option<ReadingFinding>,
 }
 
 /// Something worth a line in the record and on the terminal.

@@ -202,8 +202,8 @@ pub fn run(
     let unrecorded = written.problem.is_some() && outcome == Outcome::Complete;
     let outcome = if unrecorded { Outcome::RecordLost } else { outcome };
     let record_lost = written.lost_rows + report.ring_drops;
-    let findings = sequence.findings(outcome == Outcome::Complete);
-    Ok(kept.end(outcome, findings, Some((report, stalls)), record_lost, links, off))
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, Some((report, stalls)), record_lost, links, off))
 }
 
 /// Raises a flag where the thread that holds it panics.

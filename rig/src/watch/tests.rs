@@ -84,7 +84,6 @@ fn pass(point: u64, amplitude_um: f64, measured: Option<f64>, predicted: f64) ->
         comparison: Some(comparison),
         regime: None,
         psi_eq17: None,
-        psi_reading: None,
         temperature_flags: Vec::new(),
     }
 }
