@@ -98,13 +98,13 @@ fn the_plan_decides_on_a_virtual_rig_built_under_either_reading() {
     }
 }
 
-/// The virtual rig's own finger, a slider on springs, is no rig of either reading: its best exponential lies between, with stiffnesses that scatter
-/// by 5 %.
+/// The virtual rig's own finger, a slider on springs, is no rig of either reading: at the plan's conditions its best exponential lies between, nearer
+/// to the second, with stiffnesses that scatter by 5 %.
 #[test]
 fn the_spring_slider_lies_between() {
     let told = tally(Decision::Between, &on_the_virtual_rig(0.0));
     show("virtual rig, slider on springs", told.psi_star, &told);
-    assert!(told.right * 100 >= 80 * sweeps() as usize, "{told:?}");
+    assert!(told.right * 100 >= 50 * sweeps() as usize && (1.3..1.6).contains(&told.psi_star), "{told:?}");
 }
 
 /// The plan's sweeps in virtual time; no strokes: the slider.

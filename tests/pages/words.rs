@@ -125,7 +125,7 @@ fn a_comparison_leads_with_what_decides_it() {
     let html = page(out.clone());
     let of_row = |row: &Vec<String>| row[6].split(' ').next().unwrap().parse::<f64>().unwrap();
     let each: Vec<f64> = rows(&html, 8).iter().map(of_row).collect();
-    let ends = each.iter().fold((0.0f64, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    let ends = each.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     for end in [ends.0, ends.1] {
         assert!(second.contains(&format!("{end:+.3}")), "{end}: {second}");
     }
