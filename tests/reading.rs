@@ -15,10 +15,10 @@ use models::surrogate::Surrogate;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
-use rig::plan::{Plan, Resolution};
-use rig::sequence::Outcome;
-use rig::session::rehearse;
-use rig::setup::Setup;
+use runs::plan::{Plan, Resolution};
+use runs::sequence::Outcome;
+use runs::session::rehearse;
+use runs::setup::Setup;
 use sim::world::WorldConfig;
 use std::sync::Arc;
 

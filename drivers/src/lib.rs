@@ -78,6 +78,10 @@ pub mod serial;
 pub mod session;
 pub mod setup;
 pub mod slcan;
+#[cfg(all(feature = "can", target_os = "linux"))]
+pub mod socketcan;
+#[cfg(not(all(feature = "can", target_os = "linux")))]
+#[path = "without_can.rs"]
 pub mod socketcan;
 pub mod stream;
 pub mod text;

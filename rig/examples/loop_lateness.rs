@@ -5,13 +5,13 @@
 
 use models::finger::Finger;
 use models::prediction::SpringSlider;
-use muprime_rig::setup::Setup;
 use realtime::pacing::{self, Lifeline, LoopParts, Pacing};
 use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Stage, StageState};
 use realtime::safety::{DriveCommand, StageCommand};
 use realtime::turn::Ports;
 use ringbuf::HeapRb;
 use ringbuf::traits::Split;
+use runs::setup::Setup;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 

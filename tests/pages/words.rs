@@ -1,9 +1,9 @@
 //! What pages and the terminal say is so: each of these once said something that its own numbers contradict.
 
-use rig::plan::Plan;
-use rig::sequence::Event;
-use rig::session::{Job, News, Notes, Signals};
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::sequence::Event;
+use runs::session::{Job, Notes, Signals, Update};
+use runs::setup::Setup;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 use std::sync::Arc;
@@ -87,9 +87,9 @@ fn a_stop_on_request_is_told_as_one() {
     let asked = signals.clone();
     let mut events = Vec::new();
     let summary = job
-        .run(&signals, &mut |news| match news {
-            News::Pass(pass) if pass.pass.point >= 9 => asked.stops.store(1, Ordering::Relaxed),
-            News::Event(event @ Event::Tripped(_)) => events.push(rig::report::events::describe(event)),
+        .run_in_virtual_time(&signals, &mut |news| match news {
+            Update::Pass(pass) if pass.pass.point >= 9 => asked.stops.store(1, Ordering::Relaxed),
+            Update::Event(event @ Event::Tripped(_)) => events.push(runs::report::events::describe(event)),
             _ => {}
         })
         .unwrap();

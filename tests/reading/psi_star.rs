@@ -12,10 +12,10 @@ use models::reading_evidence::{PSI_RANGE, ReadingFinding, of_passes};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
-use rig::plan::Plan;
-use rig::sequence::Outcome;
-use rig::session::rehearse;
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::sequence::Outcome;
+use runs::session::rehearse;
+use runs::setup::Setup;
 use sim::defects::Defects;
 use sim::world::WorldConfig;
 use std::collections::BTreeMap;
@@ -167,7 +167,7 @@ fn the_laws_own_number_is_found_where_it_is_the_law() {
     let points = plan.points(
         1,
         &setup.config.limits,
-        &rig::plan::Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 },
+        &runs::plan::Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 },
     );
     let points = points.unwrap();
     for psi_star in [0.8, 1.19, 2.38, 4.0] {
