@@ -51,11 +51,11 @@ fn rig() -> (Setup, Plan, Arc<dyn FrictionModel>) {
 }
 
 fn departed(run: &Rehearsal) -> bool {
-    run.findings.agreement == Agreement::Departed
+    run.agreement == Agreement::Departed
 }
 
 fn agrees(run: &Rehearsal) -> bool {
-    matches!(run.findings.agreement, Agreement::Agrees { .. })
+    matches!(run.agreement, Agreement::Agrees { .. })
 }
 
 fn run_all(world: &WorldConfig, runs: u64) -> Vec<Rehearsal> {
@@ -87,9 +87,7 @@ fn residuals_are_standard_normal_and_the_test_rarely_alarms() {
     println!("{} passes: {:.2} % within 1.96, mean {mean:.3}, rms {sd:.3}", z.len(), 100.0 * inside);
     // The plan is short: how small a departure it shows lies about the 0.1 that agreement asks, above it for some.
     let lacking = |lack: Lack| {
-        runs.iter()
-            .filter(|r| matches!(r.findings.agreement, Agreement::TooLittle { why, .. } if why == lack))
-            .count()
+        runs.iter().filter(|r| matches!(r.agreement, Agreement::TooLittle { why, .. } if why == lack)).count()
     };
     let (power, scatter) = (lacking(Lack::Power), lacking(Lack::Scatter));
     println!(

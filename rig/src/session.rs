@@ -221,8 +221,8 @@ fn over_instruments(
     let unrecorded = written.problem.is_some() && outcome == Outcome::Complete;
     let outcome = if unrecorded { Outcome::RecordLost } else { outcome };
     let record_lost = written.lost_rows + report.ring_drops;
-    let findings = sequence.findings(outcome == Outcome::Complete);
-    Ok(kept.end(outcome, findings, Some((report, stalls, held)), record_lost, links, off))
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, Some((report, stalls, held)), record_lost, links, off))
 }
 
 /// Raises a flag where the thread that holds it panics.

@@ -18,7 +18,6 @@ use crate::setup::Setup;
 use crate::supervisor::OffReport;
 use calibration::certificate::sha256_hex;
 use models::prediction::FrictionModel;
-use models::reading_evidence::ReadingFinding;
 use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
@@ -99,9 +98,6 @@ pub struct Summary {
     /// What the comparison of all passes says.
     #[serde(default = "nothing_said")]
     pub agreement: Agreement,
-    /// What they say of the two readings of the paper's w; `None` where none could tell.
-    #[serde(default)]
-    pub psi_reading: Option<ReadingFinding>,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
     /// When the machine kept ordinary threads from running; `None` in virtual time.
@@ -178,7 +174,7 @@ impl Begun {
     /// # Errors
     /// Whatever file system and SQLite say.
     pub fn finish(self, job: &Job) -> miette::Result<Summary> {
-        Keeper::finish(job, self.dir, self.planned, self.sequence.findings(true))
+        Keeper::finish(job, self.dir, self.planned, self.sequence.agreement(true))
     }
 }
 

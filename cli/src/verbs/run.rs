@@ -344,9 +344,6 @@ fn tell(summary: &Summary, json: bool) {
         told!("the same command with --out {} goes on", summary.folder.display());
     }
     told!("{}", summary.agreement);
-    if let Some(reading) = &summary.psi_reading {
-        told!("{reading}");
-    }
     if summary.model_departed {
         told!("'muprime diagnose {}' says where and why", summary.folder.display());
     }

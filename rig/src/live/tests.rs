@@ -36,7 +36,6 @@ fn pass(point: u64) -> MeasuredPass {
         comparison: None,
         regime: None,
         psi_eq17: None,
-        psi_reading: None,
         temperature_flags: Vec::new(),
     }
 }

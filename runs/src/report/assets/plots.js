@@ -56,8 +56,19 @@ export function traces(plot, yTitle, series, right, fixed) {
   return kept(new uPlot(options, drawn.map(() => []), plot), plot);
 }
 
+// How series differ: by mark, by whether it is filled, and by colour. No two are alike.
+const NAMES = ["discs", "squares", "triangles", "diamonds"];
+const COLOURS = ["--a", "--b", "--c", "--grey"];
+export const SERIES = [false, true].flatMap((hollow) => NAMES.map((name, kind) => ({ name: hollow ? `hollow ${name}` : name, kind, hollow, colour: COLOURS[kind] })))
+  .concat({ name: "crosses", kind: 4, hollow: true, colour: "--ink" });
+
 function shape(ctx, kind, x, y, r, filled) {
   ctx.beginPath();
+  if (kind === 4) {
+    ctx.moveTo(x - r, y - r); ctx.lineTo(x + r, y + r); ctx.moveTo(x - r, y + r); ctx.lineTo(x + r, y - r);
+    ctx.stroke();
+    return;
+  }
   if (kind === 0) ctx.arc(x, y, r, 0, 2 * Math.PI);
   else if (kind === 1) ctx.rect(x - r, y - r, 2 * r, 2 * r);
   else if (kind === 2) { ctx.moveTo(x, y - r * 1.3); ctx.lineTo(x + r * 1.2, y + r); ctx.lineTo(x - r * 1.2, y + r); ctx.closePath(); }
@@ -115,6 +126,7 @@ export function marks(plot, xTitle, yTitle, yFromZero) {
   const options = { ...plain, width: Math.max(plot.clientWidth, 200), height: HEIGHT, scales: { x: { time: false, range: range(true) }, y: { range: range(yFromZero) } }, axes: axes(xTitle, yTitle), series: [{}, { stroke: "transparent", points: { show: false } }, { stroke: "transparent", points: { show: false } }], hooks: { draw: [draw] } };
   const chart = kept(new uPlot(options, [[], [], []], plot), plot);
   return {
+    plot: chart,
     set(all, yName) {
       points = all;
       const sorted = [...all].sort((a, b) => a.x - b.x);
