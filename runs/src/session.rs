@@ -19,6 +19,7 @@ use crate::supervisor::OffReport;
 use calibration::certificate::sha256_hex;
 use models::prediction::FrictionModel;
 use models::reading_evidence::ReadingFinding;
+use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
 use realtime::witness::StallReport;
@@ -104,6 +105,10 @@ pub struct Summary {
     /// When the machine kept ordinary threads from running; `None` in virtual time.
     #[serde(default)]
     pub stalls: Option<StallReport>,
+    /// Time that the clock of a virtual rig was held back while the computer kept threads of the run from
+    /// running; `None` where the clock cannot be held.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held: Option<HeldBack>,
     /// Rows that the record lost.
     pub record_lost: u64,
     /// What the links counted, by instrument.

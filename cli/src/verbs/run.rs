@@ -308,6 +308,9 @@ fn tell(summary: &Summary, json: bool) {
             summary.record_lost
         );
     }
+    if let Some(held) = summary.held.filter(|held| held.share >= 0.01) {
+        told!("{held}");
+    }
     if let (Outcome::Tripped(trip), Some(stalls)) = (&summary.outcome, &summary.stalls)
         && let Some(stall) = stalls.within(Nanos(trip.at.0.saturating_sub(100_000_000)), trip.at)
     {

@@ -128,7 +128,7 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
         w,
         "<h2>Loop</h2>{}{}<p>{} cycles of {} us. Lateness: median {}, 99 % {}, 99.9 % {}, worst {}. \
          {} deadlines missed. Scheduling: {class}, {locked}. Page faults in the loop: {} minor, {} major. \
-         Rows lost: {}.</p>",
+         Rows lost: {}.{}</p>",
         plots::run::lateness(report)?,
         note("How late the loop was at each deadline, missed ones included. Both axes logarithmic."),
         report.cycles,
@@ -141,6 +141,7 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
         report.minor_faults,
         report.major_faults,
         run.summary.as_ref().map_or(0, |s| s.record_lost),
+        run.summary.as_ref().and_then(|s| s.held).map_or_else(String::new, |held| format!(" {held}.")),
     );
     Ok(())
 }

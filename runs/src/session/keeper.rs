@@ -9,6 +9,7 @@ use crate::sequence::{Event, Findings, MeasuredPass, Outcome};
 use crate::supervisor::OffReport;
 use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
+use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::cycle::Config;
 use realtime::pacing::LoopReport;
@@ -185,12 +186,13 @@ impl Keeper {
         mut self,
         outcome: Outcome,
         findings: Findings,
-        machine: Option<(LoopReport, StallReport)>,
+        machine: Option<(LoopReport, StallReport, Option<HeldBack>)>,
         record_lost: u64,
         links: BTreeMap<String, serde_json::Value>,
         off: OffReport,
     ) -> Summary {
-        let (loop_report, stalls) = machine.unzip();
+        let (loop_report, stalls, held) =
+            machine.map_or((None, None, None), |(report, stalls, held)| (Some(report), Some(stalls), held));
         let mut summary = Summary {
             requirement: outcome.cause().and_then(Cause::requirement).map(String::from),
             remedy: outcome.cause().map(|cause| cause.remedy().to_string()),
@@ -203,6 +205,7 @@ impl Keeper {
             psi_reading: findings.psi_reading,
             loop_report,
             stalls,
+            held,
             record_lost,
             links,
             off,
