@@ -116,7 +116,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + k.pairs_from_nats)
     {
         progress.with("pairs of effects", 0.6, || leading(&candidates));
-        let companions = second_causes(&problem, &candidates, &lapsed, &search);
+        let companions = second_causes(&problem, &candidates, &lapsed, &search, discrepancy.log_evidence);
         sought_again(&problem, &mut candidates, &companions, &search);
         candidates.extend(companions);
     }
@@ -205,17 +205,20 @@ fn sought_again(problem: &Problem, singles: &mut [Candidate], pairs: &[Candidate
 }
 
 /// Pairs, where the best single leaves something: one that leaves nothing needs no second cause, unless it is the
-/// stiffnesses that took it up.
+/// stiffnesses that took it up, or the open set is ahead of it: what it leaves may be less than runs shift by.
 fn second_causes(
     problem: &Problem,
     singles: &[Candidate],
     lapsed: &[usize],
     search: &Search<'_>,
+    open: f64,
 ) -> Vec<Candidate> {
     let best = &singles[0].best;
+    let behind = open - singles[0].log_evidence;
     let misfit = problem.misfit(&best.prediction) + best.pull();
     let n = problem.len() as f64;
-    if misfit <= n + problem.constants.misfit_sd * (2.0 * n).sqrt() {
+    let k = &problem.constants;
+    if misfit <= n + k.misfit_sd * (2.0 * n).sqrt() && behind < k.pairs_from_nats {
         return Vec::new();
     }
     let mut grown = pairs(problem, singles, search.loose, search.basis);
