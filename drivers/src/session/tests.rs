@@ -3,6 +3,7 @@
 use super::*;
 use crate::endpoint::tests::amplifier;
 use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Instant;
 
 mod life;
 

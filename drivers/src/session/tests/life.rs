@@ -10,6 +10,7 @@ use crate::ports::AmplifierPort;
 use crate::{InstrumentSetup, profile};
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Instant;
 
 fn io(text: &str) -> Ended {
     Ended::from(std::io::Error::other(text))
