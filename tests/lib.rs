@@ -14,7 +14,7 @@ pub fn file(path: &str) -> PathBuf {
 }
 
 /// A setup by name; `scpi` and `siglent` are the ideal virtual rig with a generator in the place of its amplifier, which has no
-/// thermometer, and `zaber` the one with a stage of lines of text, which loads nothing.
+/// thermometer, `zaber` the one with a stage of lines of text, which loads nothing, and `wago` the one with a watchdog output as its relay.
 pub fn setup(name: &str) -> runs::setup::Setup {
     let ideal = || runs::setup::Setup::load("virtual-ideal").expect("a bundled setup").text;
     let generator = |profile: &str| {
@@ -25,6 +25,11 @@ pub fn setup(name: &str) -> runs::setup::Setup {
     let text = match name {
         "scpi" => generator("keysight-33500b"),
         "siglent" => generator("siglent-sdg"),
+        "wago" => runs::setup::Setup::load("virtual-relay")
+            .expect("a bundled setup")
+            .text
+            .replace("muprime-relay", "wago-750-watchdog")
+            .replace("profile = \"wago-750-watchdog\"\n", "profile = \"wago-750-watchdog\"\nunit = 9\n"),
         "zaber" => ideal().replace(
             "profile = \"muprime-stage\"\naddress = \"127.0.0.1:0\"",
             "profile = \"zaber-x-lsm\"\naddress = \"pty\"\ndead_weight_n = 0.25",

@@ -41,7 +41,7 @@ pub fn run(
     sample: Option<String>,
     licence: Option<String>,
 ) -> PyResult<String> {
-    let notes = Notes { operator, sample, licence };
+    let notes = Notes { operator, subject: None, sample, licence };
     let plan = Plan::parse(plan, text).map_err(refused)?;
     let job = job(plan, setup, out, seed, defects.as_deref(), model.as_deref(), notes).map_err(refused)?;
     let signals = Signals::default();

@@ -16,6 +16,7 @@ use realtime::pacing;
 use realtime::ports::Nanos;
 use realtime::turn::Ports;
 use realtime::witness::Witnesses;
+use runs::exposure_left::Left;
 use runs::sequence::{Event, MeasuredPass, Outcome};
 use runs::session::keeper::{self, Keeper};
 use runs::session::{Begun, Job, Signals, Snapshot, Snapshots, Summary, Unfinished, Update, words};
@@ -64,8 +65,11 @@ fn over_instruments(
     let Begun { dir, mut sequence, planned, .. } = begun;
     let key = if job.setup.hand_at_key() { Some(DeadManKey::open()?) } else { None };
     let _claim = RigClaim::take(&job.setup)?;
-    let ledger = Ledger::open(&job.setup)?;
-    job.setup.config.exposed = ledger.as_ref().map(Ledger::exposed).unwrap_or_default();
+    let ledger = Ledger::open(&job.setup, &job.notes)?;
+    if let Some(ledger) = &ledger {
+        job.setup.config.exposed = ledger.exposed();
+        sequence.exposure_left(Left::of(&job.setup.config.limits, &job.setup.config.exposed));
+    }
     let epoch = Instant::now();
     let simulated = job.setup.file.virtual_rig.is_some();
     let clock = if simulated { Clock::holdable(epoch) } else { Clock::from(epoch) };

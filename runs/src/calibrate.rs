@@ -140,7 +140,7 @@ pub struct Common {
     /// For how many days the certificate holds
     #[arg(long, default_value_t = 180.0)]
     valid_days: f64,
-    /// The certificate's file [default: <kind>-<serial>.toml]
+    /// The certificate's file [default: KIND-SERIAL.toml]
     #[arg(long)]
     out: Option<PathBuf>,
     /// Write over an existing certificate
@@ -172,7 +172,7 @@ pub fn certified(what: &What, bench: &dyn Bench) -> miette::Result<Issued> {
 /// open instruments is refused. Nothing is written but what the words name (phase table, spectrum). `--out` is not looked at.
 ///
 /// # Errors
-/// As [`run`]; words that the command does not take, in its own words.
+/// As [`certified`]; words that the command does not take, in its own words.
 pub fn from_files(words: &[String]) -> miette::Result<Issued> {
     #[derive(clap::Parser)]
     #[command(name = "calibrate", no_binary_name = true, disable_help_flag = true)]

@@ -43,6 +43,10 @@ pub enum Kind {
 pub struct FingertipSetup {
     /// Name in the library, or path of a file, relative to the setup.
     pub tip: String,
+    /// The numbers of a human fingertip are used and nobody touches the plate: the guards for a finger are off. It stands in the
+    /// record, the report and on every page of a run.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub nobody_touches_the_plate: bool,
     /// Overrides, N/m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal_stiffness_n_per_m: Option<f64>,

@@ -35,6 +35,7 @@ pub mod calibrate;
 pub mod catalogue;
 pub mod certificates;
 pub mod compare;
+pub mod exposure_left;
 pub mod files;
 pub mod fingertip;
 pub mod input;

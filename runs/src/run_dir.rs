@@ -34,6 +34,9 @@ pub struct Identity {
     pub seed: u64,
     /// SHA-256 of the model file, or the model's name.
     pub model: String,
+    /// The setup names a human fingertip, and says that nobody touches the plate.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub nobody_touches_the_plate: bool,
 }
 
 /// One session of a run: from its start until its end, a stop or a crash. A run that is taken up again has several.

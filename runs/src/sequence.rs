@@ -4,7 +4,7 @@
 //! ```text
 //! Arm -> Zero -> [ Approach -> Settle -> Measure ]* -> Zero -> Done
 //!  any -> Failed(trip)      Stopped by request at any time
-//!  before a pass: Paused, by request, until it is to go on
+//!  before a pass: Paused, by request; disarmed, and armed again when it is to go on
 //! ```
 
 mod arming;
@@ -13,7 +13,9 @@ mod events;
 pub use events::{Event, MeasuredPass, Outcome};
 
 use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
+use crate::exposure_left::Left;
 use crate::plan::{PassTimes, Point};
+use crate::setup::Guards;
 use arming::{Arming, Next};
 use models::condition::{Ambient, Condition};
 use models::pass::Pass;
@@ -45,11 +47,24 @@ pub struct Reaction {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Arm,
-    Zero { since: Option<Nanos>, after: bool },
-    Paused,
-    Approach { since: Nanos },
-    Settle { since: Nanos },
-    Measure { since: Nanos },
+    Zero {
+        since: Option<Nanos>,
+        after: bool,
+    },
+    /// Since when, and when the rig was last seen off, at rest and lifted off.
+    Paused {
+        since: Nanos,
+        quiet: Nanos,
+    },
+    Approach {
+        since: Nanos,
+    },
+    Settle {
+        since: Nanos,
+    },
+    Measure {
+        since: Nanos,
+    },
     Over,
 }
 
@@ -59,6 +74,13 @@ const ZERO_FOR: Nanos = Nanos(200_000_000);
 const ZERO_SETTLE: Nanos = Nanos(150_000_000);
 /// Time to wait for a start position.
 const APPROACH_WITHIN: Nanos = Nanos(20_000_000_000);
+/// Longest pause, where a setup does not say.
+pub const PAUSE_MAX_S: f64 = 600.0;
+/// A paused rig shows itself off, at rest and lifted off, no longer ago than this.
+const QUIET_WITHIN: Nanos = Nanos(2_500_000_000);
+/// A stage that stands, in m/s, and what a sensor may show with the finger lifted off, in N (as SR-43 has it).
+const STANDS_M_S: f64 = 2e-3;
+const LIFTED_N: f64 = 0.3;
 /// A pass without contact is made again so often before the sweep gives up.
 const TRIES: u32 = 3;
 
@@ -122,6 +144,14 @@ pub struct Sequence {
     ambient: Ambient,
     ambient_sent: Ambient,
     has_watchdog: bool,
+    guards: Guards,
+    exposure_left: Option<Left>,
+    /// How each arming begins.
+    unarmed: Arming,
+    load_commanded: bool,
+    pause_max: Nanos,
+    /// The stop of a pause is on its way: the trip that shows it ends nothing.
+    pausing: bool,
     session: Option<u64>,
     start_s: f64,
 }
@@ -158,6 +188,12 @@ impl Sequence {
             ambient: Ambient::default(),
             ambient_sent: Ambient::default(),
             has_watchdog: true,
+            guards: Guards::default(),
+            exposure_left: None,
+            unarmed: Arming::new(),
+            load_commanded: true,
+            pause_max: Nanos::from_seconds(PAUSE_MAX_S),
+            pausing: false,
             session: None,
             start_s: 0.0,
         }
@@ -181,11 +217,23 @@ impl Sequence {
     /// The same, with the limits of the rig that is armed: what guards are missing is told then.
     pub fn guarded_by(self, limits: &Limits) -> Self {
         Sequence {
-            has_watchdog: limits.amplifier_watchdog,
+            has_watchdog: limits.amplifier_watchdog || limits.supply_watchdog,
             arming: self.arming.guarded_by(limits),
+            unarmed: self.unarmed.guarded_by(limits),
+            load_commanded: limits.load_commanded,
             approach: Approach::at(limits.timing.cycle, &limits.timing.stage),
             ..self
         }
+    }
+
+    /// The same, with what is told of its guards at each arming, and the longest pause in s.
+    pub fn on_rig(self, guards: Guards, pause_max_s: f64) -> Self {
+        Sequence { guards, pause_max: Nanos::from_seconds(pause_max_s), ..self }
+    }
+
+    /// What is left to a human finger of the hour is told at the first arming.
+    pub fn exposure_left(&mut self, left: Left) {
+        self.exposure_left = Some(left);
     }
 
     /// Takes in a pass of an earlier session of the same run: `mu_0` and the evidence go on from there.
@@ -233,13 +281,16 @@ impl Sequence {
             return out;
         }
         let stopped = row.tripped.is_some_and(|trip| trip.cause == Cause::Stopped);
+        if stopped && std::mem::take(&mut self.pausing) {
+            return out;
+        }
         if let Some(trip) = row.tripped.filter(|_| stopped || self.stage != Stage::Arm) {
             out.events.push(Event::Tripped(trip));
             self.finish(&mut out, if stopped { Outcome::Stopped } else { Outcome::Tripped(trip) });
             return out;
         }
         if self.stopping {
-            self.stopping = false;
+            (self.stopping, self.pausing) = (false, false);
             out.events.push(Event::StopRequested);
             out.commands.push(Command::Stop);
             if !row.armed {
@@ -250,7 +301,7 @@ impl Sequence {
         match self.stage {
             Stage::Arm => self.arm(row, &mut out),
             Stage::Zero { since, after } => self.zero(row, since, after, &mut out),
-            Stage::Paused => self.rest(row, &mut out),
+            Stage::Paused { since, quiet } => self.rest(row, since, quiet, &mut out),
             Stage::Approach { .. } if self.paused => self.begin_next(row, &mut out),
             Stage::Approach { since } => self.approach(row, since, &mut out),
             Stage::Settle { since } => self.settle(row, since, &mut out),
@@ -293,6 +344,13 @@ impl Sequence {
         }
         if !self.has_watchdog {
             out.events.push(Event::NoWatchdog);
+        }
+        out.events.extend(self.exposure_left.take().map(Event::ExposureLeft));
+        if self.guards.nobody_touches_the_plate {
+            out.events.push(Event::NobodyTouches);
+        }
+        if !self.guards.not_wired.is_empty() {
+            out.events.push(Event::NotWired { contacts: self.guards.not_wired.clone() });
         }
         if seen.amplifier.is_ok_and(|a| a.temperature_c == Err(NoData::NotFitted)) {
             let certificates = self.temperature_ranges.iter().map(|range| range.certificate.clone());
@@ -343,7 +401,9 @@ impl Sequence {
         if self.paused {
             out.events.push(Event::Paused { point: self.points[self.next].number });
             out.commands.push(Command::Set(Request::default(), self.marker(Phase::Idle)));
-            self.stage = Stage::Paused;
+            out.commands.push(Command::Stop);
+            self.pausing = true;
+            self.stage = Stage::Paused { since: row.now, quiet: row.now };
             return;
         }
         self.sums = Sums::default();
@@ -356,12 +416,38 @@ impl Sequence {
         self.approach(row, row.now, out);
     }
 
-    /// Waits until it is to go on.
-    fn rest(&mut self, row: &Row, out: &mut Reaction) {
-        if !self.paused {
+    /// Waits until it is to go on, not armed. It goes on by arming: the second channel is proved again, and a hand at the dead-man
+    /// device must let go and grip again.
+    fn rest(&mut self, row: &Row, since: Nanos, quiet: Nanos, out: &mut Reaction) {
+        let loud = self.loud(row);
+        let quiet = if loud.is_none() { row.now } else { quiet };
+        self.stage = Stage::Paused { since, quiet };
+        if let Some(cause) = loud.filter(|_| row.now.since(quiet) > QUIET_WITHIN) {
+            out.events.push(Event::PauseNotQuiet { cause });
+            self.finish(out, Outcome::WouldNotArm { blocking: Some(cause) });
+        } else if row.now.since(since) > self.pause_max {
+            out.events.push(Event::PauseTooLong { bound: self.pause_max.seconds() });
+            self.finish(out, Outcome::Stopped);
+        } else if !self.paused && !row.armed {
             out.events.push(Event::Resumed);
-            self.begin_next(row, out);
+            self.arming = self.unarmed;
+            self.stage = Stage::Arm;
         }
+    }
+
+    /// The rule that a paused rig breaks: it is not seen off, at rest and lifted off. Weights that load the finger are not lifted.
+    fn loud(&self, row: &Row) -> Option<Cause> {
+        let seen = &row.inputs.seen;
+        let (Ok(amplifier), Ok(stage)) = (&seen.amplifier, &seen.stage) else {
+            return Some(if seen.stage.is_ok() { Cause::AmplifierStale } else { Cause::StageStale });
+        };
+        let force = seen.forces.normal.as_ref().map_or(f64::INFINITY, |reading| reading.value.abs());
+        let all = [
+            (amplifier.output_on, Cause::RefusesOff),
+            (stage.velocity_m_s.abs() > STANDS_M_S, Cause::StageNotFollowing),
+            (self.load_commanded && force > LIFTED_N, Cause::LoadImplausible),
+        ];
+        all.into_iter().find(|(is, _)| *is).map(|(_, cause)| cause)
     }
 
     fn approach(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {

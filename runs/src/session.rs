@@ -13,8 +13,8 @@ pub use telemetry::{Extremes, Snapshot, Snapshots};
 
 use crate::plan::{Plan, Point, Resolution};
 use crate::run_dir::{Identity, RunDir};
-use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
-use crate::setup::Setup;
+use crate::sequence::{Event, MeasuredPass, Outcome, PAUSE_MAX_S, Sequence};
+use crate::setup::{Guards, Setup};
 use crate::supervisor::OffReport;
 use calibration::certificate::sha256_hex;
 use models::prediction::FrictionModel;
@@ -55,6 +55,8 @@ pub struct Job {
 pub struct Notes {
     /// Who leads the run.
     pub operator: Option<String>,
+    /// Whose finger it is: what it was exposed to is counted under this name, whatever the rig.
+    pub subject: Option<String>,
     /// What is measured: the fingertip, its preparation, the plate.
     pub sample: Option<String>,
     /// Licence of the data: an SPDX identifier or an address.
@@ -117,6 +119,9 @@ pub struct Summary {
     /// Every pass had been made before: nothing was driven.
     #[serde(default)]
     pub finished_before: bool,
+    /// What is to be known of the rig's guards.
+    #[serde(default)]
+    pub guards: Guards,
 }
 
 /// The finding of a summary that was written before it had one.
@@ -190,6 +195,7 @@ impl Job {
             plan_sha256: sha256_hex(self.plan.text.as_bytes()),
             seed: self.seed,
             model,
+            nobody_touches_the_plate: self.setup.file.finger.nobody_touches_the_plate,
         }
     }
 
@@ -252,6 +258,7 @@ impl Job {
         .watching(&self.setup.certificates.temperature_ranges)
         .in_air(self.setup.ambient())
         .guarded_by(&self.setup.config.limits)
+        .on_rig(self.setup.guards(), self.setup.file.limits.pause_max_s.unwrap_or(PAUSE_MAX_S))
         // In virtual time the loop's own time goes on from session to session.
         .in_session(session.session, if self.fast { 0.0 } else { session.start_s });
         for pass in &dir.made {

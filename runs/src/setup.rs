@@ -1,6 +1,7 @@
 //! A setup: which instruments make up the rig, its limits, its fingertip, its noise.
 
 mod bundled;
+mod guards;
 mod limits;
 mod profiles;
 
@@ -110,15 +111,16 @@ pub struct Pace {
     /// CPU to run on and no other: for one that is kept free of other work.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cpu: Option<usize>,
-    /// Keeps CPUs out of deep sleep while the loop runs, for some watts.
-    pub keep_cpus_awake: bool,
+    /// Keeps CPUs out of deep sleep while the loop runs, for some watts. Left out: with real instruments, and not on a virtual rig.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub keep_cpus_awake: Option<bool>,
     /// us before each deadline that are spun, not slept; at 1 kHz 100 us cost a tenth of a CPU.
     pub spin_us: f64,
 }
 
 impl Default for Pace {
     fn default() -> Self {
-        Pace { rate_hz: 1000.0, priority: 80, cpu: None, keep_cpus_awake: false, spin_us: 0.0 }
+        Pace { rate_hz: 1000.0, priority: 80, cpu: None, keep_cpus_awake: None, spin_us: 0.0 }
     }
 }
 
@@ -128,7 +130,7 @@ impl Pace {
         Pacing {
             priority: (self.priority > 0).then_some(self.priority),
             cpu: self.cpu,
-            keep_cpus_awake: self.keep_cpus_awake,
+            keep_cpus_awake: self.keep_cpus_awake.unwrap_or(false),
             spin_ns: (self.spin_us * 1e3) as u64,
         }
     }
@@ -159,6 +161,42 @@ impl VirtualRig {
         config
     }
 }
+
+/// What is to be known of a rig's guards: it stands in the record, the summary, the report and on every page of a run.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Guards {
+    /// The fingertip is a person's, and the setup says that nobody touches the plate.
+    pub nobody_touches_the_plate: bool,
+    /// Contacts of the board that are declared to have no device: they are not watched.
+    pub not_wired: Vec<String>,
+    /// What happens to output and stage when this program dies.
+    pub if_this_program_dies: String,
+}
+
+impl Guards {
+    /// What a record says of them.
+    pub fn of_facts(mut fact: impl FnMut(&str) -> Option<String>) -> Self {
+        let contacts = fact("contacts_not_wired").unwrap_or_default();
+        Guards {
+            nobody_touches_the_plate: fact("nobody_touches_the_plate").is_some(),
+            not_wired: contacts.split(", ").filter(|name| !name.is_empty()).map(String::from).collect(),
+            if_this_program_dies: fact("if_this_program_dies").unwrap_or_default(),
+        }
+    }
+
+    /// The same as names and words, for a record.
+    pub fn facts(&self) -> Vec<(&'static str, String)> {
+        let nobody = self.nobody_touches_the_plate.then(|| ("nobody_touches_the_plate", NOBODY.to_string()));
+        let unwatched =
+            (!self.not_wired.is_empty()).then(|| ("contacts_not_wired", self.not_wired.join(", ")));
+        let dies = Some(("if_this_program_dies", self.if_this_program_dies.clone()));
+        [nobody, unwatched, dies].into_iter().flatten().filter(|(_, words)| !words.is_empty()).collect()
+    }
+}
+
+/// What is said where a person's fingertip is named and nobody is there.
+pub const NOBODY: &str = "nobody touches the plate (stated in the setup): the guards for a finger are off";
 
 const fn default_estimate() -> EstimateConfig {
     EstimateConfig { window: 50, normal_force_min_n: 0.02, sample_sd_n: 0.002 }
@@ -207,6 +245,7 @@ impl Setup {
     /// What is wrong, with the place in the file.
     pub fn parse(origin: &str, text: &str, folder: &Path) -> miette::Result<Self> {
         let mut file: SetupFile = input::parse_toml(origin, text)?;
+        file.pace.keep_cpus_awake.get_or_insert(file.virtual_rig.is_none());
         let mut wrong = Problems::of(origin, text);
         let rate_hz = file.pace.rate_hz;
         let loops = (10.0..=4000.0).contains(&rate_hz);
@@ -261,12 +300,13 @@ impl Setup {
             wrong.add(&table, problem, None);
         }
         let limits = if loops && described {
-            limits::all_of(&file, Nanos((1e9 / rate_hz).round() as u64), &mut wrong)
+            let person = guards::person(&file, tip.as_ref());
+            limits::all_of(&file, person, Nanos((1e9 / rate_hz).round() as u64), &mut wrong)
         } else {
             None
         };
-        let guarded = limits::guarded(&file);
-        wrong.keep(&["limits", "human_contact"], guarded);
+        guards::contradictions(&file, tip.as_ref(), &mut wrong);
+        guards::guarded(&file, tip.as_ref(), &mut wrong);
         #[allow(clippy::disallowed_methods, reason = "a certificate is good until a date")]
         let now_unix_s = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
@@ -304,10 +344,16 @@ impl Setup {
     /// Whether a key that is held at the terminal stands for the dead-man device: the setup says so, and none is wired.
     pub fn hand_at_key(&self) -> bool {
         let limits = &self.config.limits;
-        let device = |inputs: &drivers::InstrumentSetup| {
-            inputs.is_wired("dead_man") && inputs.description().is_ok_and(|p| p.signal("dead_man").is_some())
-        };
-        limits.human_contact && limits.dead_man_key && !self.file.safety_inputs.as_ref().is_some_and(device)
+        limits.human_contact && limits.dead_man_key && !guards::is_wired(&self.file, "dead_man")
+    }
+
+    /// What is to be known of the rig's guards, for whoever arms it and whoever reads of it later.
+    pub fn guards(&self) -> Guards {
+        Guards {
+            nobody_touches_the_plate: self.file.finger.nobody_touches_the_plate,
+            not_wired: guards::not_wired(&self.file),
+            if_this_program_dies: guards::if_this_program_dies(&self.file),
+        }
     }
 
     /// The instruments' part, for the drivers.

@@ -103,7 +103,7 @@ impl Paced {
             defects: None,
             out: out.to_path_buf(),
             fast: true,
-            notes: Notes { operator: Some(OPERATOR.into()), sample: Some(SAMPLE.into()), licence: None },
+            notes: Notes { operator: Some(OPERATOR.into()), sample: Some(SAMPLE.into()), ..Notes::default() },
         };
         let signals = Signals::default();
         let asked = signals.clone();

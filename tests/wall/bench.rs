@@ -77,7 +77,7 @@ impl Plant for BenchPlant {
                 Command::DriveHeartbeat => Some(Quantity::Heartbeat),
                 Command::Velocity => Some(Quantity::VelocitySetPoint),
                 Command::NormalForce => Some(Quantity::LoadSetPoint),
-                Command::StageHeartbeat => None,
+                Command::StageHeartbeat | Command::SupplyHeartbeat => None,
                 Command::CloseSupply => Some(Quantity::SupplyClosed),
             };
             if let Some(echo) = echo {

@@ -19,8 +19,8 @@ fn setup(rig: &ServedRig, limits: &str) -> String {
     let board =
         |table: &str| format!("[{table}]\nprofile = \"muprime-relay\"\naddress = \"{}\"\n", rig.address);
     format!(
-        "{}human_contact = true\ndead_man_key = true\n{limits}\n{}{}wired = [\"emergency_stop\", \"interlock\"]\n",
-        served::setup("hand", rig.address),
+        "{}dead_man_key = true\n{limits}\n{}{}wired = [\"emergency_stop\", \"interlock\"]\n",
+        served::setup("hand", rig.address).replace("artificial-silicone", "human-index-moist"),
         board("supply_relay"),
         board("safety_inputs"),
     )
@@ -175,22 +175,34 @@ impl Drop for Run {
     }
 }
 
-/// The ledger of a served rig's amplifier, removed with the test: the port is another rig's tomorrow.
-struct Ledger(PathBuf);
+/// The ledgers of a served rig's amplifier, removed with the test: the port is another rig's tomorrow.
+struct Ledger(Vec<PathBuf>);
 
 impl Ledger {
     fn of(rig: &ServedRig) -> Self {
-        let identity = format!("tcp/{}/unit 2", rig.address);
-        let name = &calibration::certificate::sha256_hex(identity.as_bytes())[..16];
-        let ledger = Ledger(Path::new("/var/tmp").join(format!("muprime-{name}.exposure")));
-        let _ = std::fs::remove_file(&ledger.0);
+        let amplifier = drivers::InstrumentSetup::new("muprime-amplifier", &rig.address.to_string());
+        let known = drivers::identity::every(&amplifier).unwrap();
+        let path = |identity: &String| {
+            let name = &calibration::certificate::sha256_hex(identity.as_bytes())[..16];
+            // SAFETY: it reads a number of this process and cannot fail.
+            let user = unsafe { libc::geteuid() };
+            Path::new("/var/tmp").join(format!("muprime-{name}-{user}.exposure"))
+        };
+        let ledger = Ledger(known.iter().map(path).collect());
+        ledger.remove();
         ledger
+    }
+
+    fn remove(&self) {
+        for path in &self.0 {
+            let _ = std::fs::remove_file(path);
+        }
     }
 }
 
 impl Drop for Ledger {
     fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.0);
+        self.remove();
     }
 }
 
@@ -359,7 +371,7 @@ fn three_runs(folder: &Path) -> Result<(), PathBuf> {
     assert!(alone < most, "tripped after {alone} s of its own: {before} s of {most} s were driven before");
 
     // A ledger that nobody can read refuses the finger, before anything moves.
-    std::fs::write(&ledger.0, "no ledger").unwrap();
+    std::fs::write(&ledger.0[0], "no ledger").unwrap();
     let mut refused = Run::start(&rig, folder, "refused", "");
     let (status, said) = refused.end();
     assert_eq!(status, Some(2), "{said}");

@@ -61,6 +61,8 @@ cases! {
     "muprime-stage" "load" in "virtual-ideal": Some((Wire::NormalForce, 1.0)) => Trips(&[LoadImplausible, ForceRate, NormalOverforce, Noisy], 2500);
     "muprime-stage" "heartbeat" in "virtual-ideal": None => Unseen(ANOTHER_LIFE);
     "muprime-relay" "closed" in "virtual-relay": Some((Wire::CloseSupply, 0.0)) => Trips(&[SupplySwitch, EchoMismatch, DriveNoResponse, AmplifierFault], 1000);
+    "wago-750-watchdog" "closed" in "wago": Some((Wire::CloseSupply, 0.0)) => Trips(&[SupplySwitch, EchoMismatch, DriveNoResponse, AmplifierFault], 1000);
+    "wago-750-watchdog" "heartbeat" in "wago": None => Unseen("a second master that keeps feeding it keeps the supply closed beyond this program's end");
     "piezodrive-pdus210" "amplitude" in "virtual-mixed": Some((Wire::Amplitude, 3e-6)) => Trips(DRIVE, 600);
     "piezodrive-pdus210" "frequency" in "virtual-mixed": Some((Wire::Frequency, 28_000.0)) => Trips(DRIVE, 600);
     "piezodrive-pdus210" "enable" in "virtual-mixed": Some((Wire::Enable, 0.0)) => Trips(DRIVE, 600);

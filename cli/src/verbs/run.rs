@@ -61,6 +61,9 @@ pub struct Args {
     /// Who leads the run, for its record and report
     #[arg(long, value_name = "NAME")]
     operator: Option<String>,
+    /// Whose finger it is (a code, no name, where the data are published): exposure is counted under it, whatever the rig [default: the operator]
+    #[arg(long, value_name = "CODE")]
+    subject: Option<String>,
     /// What is measured, for its record and report: the fingertip, its preparation, the plate
     #[arg(long, value_name = "WORDS")]
     sample: Option<String>,
@@ -147,8 +150,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             publisher.publish(name, &message());
         }
     };
-    let of =
-        serde_json::json!({ "plan": job.plan.file.name, "setup": job.setup.file.name, "planned": planned });
+    let of = serde_json::json!({ "plan": job.plan.file.name, "setup": job.setup.file.name, "planned": planned, "guards": job.setup.guards() });
     let began = |state: &str| {
         let mut run = of.clone();
         run["state"] = state.into();
@@ -213,10 +215,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         );
         ended
     });
-    if let (Some(publisher), Some(broker)) = (publisher, &broker) {
-        if let Some(missing) = publisher.end() {
-            told!("{}:{}: {missing}", broker.host, broker.port);
-        }
+    if let (Some(publisher), Some(broker)) = (publisher, &broker)
+        && let Some(missing) = publisher.end()
+    {
+        told!("{}:{}: {missing}", broker.host, broker.port);
     }
     let summary = summary?;
     super::exit(match summary.outcome {
@@ -260,7 +262,8 @@ fn job(args: Args) -> miette::Result<Job> {
     };
     let seed = args.seed.unwrap_or(plan.file.seed);
     let out = args.out.unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
-    let notes = Notes { operator: args.operator, sample: args.sample, licence: args.licence };
+    let notes =
+        Notes { operator: args.operator, subject: args.subject, sample: args.sample, licence: args.licence };
     Ok(Job { setup, plan, seed, model, model_file, defects, out, fast: args.fast, notes })
 }
 
@@ -318,10 +321,11 @@ fn tell(summary: &Summary, json: bool) {
     if let Some(report) = &summary.loop_report {
         let [p50, _, p99, _, max] = report.lateness_ns.map(|ns| ns as f64 / 1e3);
         told!(
-            "loop: {} cycles, lateness median {p50:.0} us, 99 % {p99:.0} us, worst {max:.0} us; {} overruns, {} rows lost",
+            "loop: {} cycles, lateness median {p50:.0} us, 99 % {p99:.0} us, worst {max:.0} us; {} overruns, {} rows lost; CPUs {}",
             report.cycles,
             report.overruns,
-            summary.record_lost
+            summary.record_lost,
+            if report.grants.cpus_kept_awake { "kept out of deep sleep" } else { "allowed to sleep deeply" }
         );
     }
     if let Some(held) = summary.held.filter(|held| held.share >= 0.01) {

@@ -4,6 +4,7 @@ use crate::live::{Ended, Message, Progress, Run, Told};
 use miette::{IntoDiagnostic, WrapErr};
 use runs::catalogue::{Catalogue, RunEntry};
 use runs::run_dir::is_held;
+use runs::setup::Guards;
 use serde::Serialize;
 use std::path::Path;
 
@@ -95,6 +96,7 @@ pub fn past(folder: &Path) -> miette::Result<Vec<Message>> {
         process: 0,
         planned,
         made_before: 0,
+        guards: Guards::of_facts(fact),
     };
     let mut messages = vec![Message::Run(Box::new(of))];
     let progress = Progress { made: run.passes.len(), planned, remaining_s: 0.0 };

@@ -5,6 +5,7 @@ use realtime::ports::Channel;
 use realtime::safety::Cause;
 use runs::sequence::{Event, MeasuredPass, Outcome};
 use runs::session::{Extremes, Job, Snapshot, unix_ns};
+use runs::setup::Guards;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -53,6 +54,9 @@ pub struct Run {
     pub planned: usize,
     /// Passes that earlier sessions have made.
     pub made_before: usize,
+    /// What is to be known of the rig's guards.
+    #[serde(default)]
+    pub guards: Guards,
 }
 
 impl Run {
@@ -70,6 +74,7 @@ impl Run {
             process: std::process::id(),
             planned,
             made_before,
+            guards: job.setup.guards(),
         }
     }
 }

@@ -25,6 +25,7 @@ fn run(folder: &Path) -> Run {
         process: 1,
         planned: 9,
         made_before: 2,
+        guards: Default::default(),
     }
 }
 

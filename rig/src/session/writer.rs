@@ -120,7 +120,8 @@ mod tests {
     #[test]
     fn a_record_that_cannot_be_ended_is_said_and_nobody_waits_for_ever() {
         let path = std::env::temp_dir().join(format!("muprime-writer-{}.mcap", std::process::id()));
-        let file = Placed::fresh(&path).unwrap();
+        let mut options = std::fs::OpenOptions::new();
+        let file = Placed::open(&path, options.create_new(true).write(true)).unwrap();
         let (_rows_in, rows) = ringbuf::HeapRb::<Row>::new(8).split();
         let (_entries_in, entries) = channel::<Entry>();
         let (last_in, last) = channel::<Last>();

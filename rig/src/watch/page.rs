@@ -86,6 +86,9 @@ fn small(page: &Page<'_>, buffer: &mut Buffer) {
     }
     let (state, style) = state(page);
     let mut lines: Vec<(String, Style)> = vec![(state, style)];
+    if page.view.run.as_ref().is_some_and(|run| run.guards.nobody_touches_the_plate) {
+        lines.push(("NOBODY TOUCHES THE PLATE".into(), page.look.heading()));
+    }
     lines.extend(page.note.map(|note| (plain(note), page.look.heading())));
     let width = usize::from(area.width);
     let urgent = urgent(page.view);
@@ -133,8 +136,10 @@ fn title(view: &View) -> String {
 
 fn who(view: &View) -> String {
     let run = view.run.as_ref();
+    let nobody = run.is_some_and(|run| run.guards.nobody_touches_the_plate);
     format!(
-        "operator {}  sample {}  model {}",
+        "{}operator {}  sample {}  model {}",
+        if nobody { "NOBODY TOUCHES THE PLATE  " } else { "" },
         or_none(run.and_then(|run| run.operator.as_deref())),
         or_none(run.and_then(|run| run.sample.as_deref())),
         or_none(run.map(|run| run.model.as_str())),

@@ -4,6 +4,7 @@ use super::{Shared, Source};
 use crate::live::{Ended, Heard, Progress, Run, Viewer};
 use runs::run_dir::{self, passes_in};
 use runs::session::Summary;
+use runs::setup::Guards;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -133,5 +134,6 @@ fn run_of(folder: &Path) -> Option<Run> {
         process: 0,
         planned: 0,
         made_before: 0,
+        guards: Guards::of_facts(fact),
     })
 }

@@ -30,7 +30,11 @@ pub fn of_run(
         ("sample", fact("sample").unwrap_or_else(|| not_stated("run --sample"))),
     ];
     let known = [
+        ("subject", fact("subject")),
         ("fingertip", fact("fingertip")),
+        ("plate", fact("nobody_touches_the_plate")),
+        ("contacts not watched", fact("contacts_not_wired")),
+        ("if this program dies", fact("if_this_program_dies")),
         ("setup", fact("setup")),
         ("plan", fact("plan").map(|plan| format!("{plan}, seed {}", fact("seed").unwrap_or_default()))),
         ("compared with", fact("model")),

@@ -13,7 +13,17 @@ pub fn describe(event: &Event) -> String {
             "no second switch-off channel: what the amplifier refuses, only a hand at its supply switches off"
                 .into()
         }
-        Event::NoWatchdog => "the amplifier has no watchdog: the second channel stands for it".into(),
+        Event::NoWatchdog => "warning: if this program dies the output stays on: neither the amplifier nor its supply has a watchdog. \
+             Keep a hand at the mains switch, or fit a relay with a heartbeat (wago-750-watchdog)"
+            .into(),
+        Event::ExposureLeft(left) => format!(
+            "exposure left to the finger: {:.0} s of this hour, {:.1} m2/s of its dose, {:.0} s in one go",
+            left.hour_s, left.dose_m2_s, left.in_one_go_s
+        ),
+        Event::NobodyTouches => format!("warning: {}", crate::setup::NOBODY),
+        Event::NotWired { contacts } => {
+            format!("warning: not watched, as the setup says that no device is on it: {}", contacts.join(", "))
+        }
         Event::ArmingDisturbed { cause, held_up } => {
             let what = match cause {
                 Cause::EmergencyStop => {
@@ -43,8 +53,14 @@ pub fn describe(event: &Event) -> String {
             format!("the model has left the measurement at point {point} (evidence beyond 10^{odds:.0} to 1)")
         }
         Event::StopRequested => "stopping: the rig goes to its safe state first".into(),
-        Event::Paused { point } => format!("paused before point {point}: no drive, lifted off, armed"),
-        Event::Resumed => "it goes on".into(),
+        Event::Paused { point } => format!("paused before point {point}: drive off, lifted off, not armed"),
+        Event::PauseTooLong { bound } => format!("the pause was longer than {bound:.0} s (pause_max_s): the run ends"),
+        Event::PauseNotQuiet { cause } => {
+            format!("in the pause the rig was not seen off, at rest and lifted off ({cause:?}): the run ends\n  {}", cause.remedy())
+        }
+        Event::Resumed => "warning: resuming: the rig is armed again, then stage and plate move. Keep hands off; with a finger, \
+             let go of the dead-man device and grip it again"
+            .into(),
         Event::PassRepeated { point } => format!("point {point}: no contact, once more"),
         Event::TemperatureBeyondCertificate { point, flag } => {
             format!("point {point} and on: {flag}; the passes are flagged, nothing is corrected")

@@ -1,6 +1,7 @@
 //! What a sweep tells: its passes, events and end, as the record, the catalogue and the report hold them.
 
 use crate::certificates::temperature::TemperatureFlag;
+use crate::exposure_left::Left;
 use models::pass::Pass;
 use models::prediction::Regime;
 use realtime::compare::PassComparison;
@@ -34,9 +35,17 @@ pub enum Event {
     Armed,
     /// It was armed without a second switch-off channel: what the amplifier refuses, nothing else switches off.
     NoSecondChannel,
-    /// It was armed with an amplifier that has no watchdog of its own: if this program dies, the second channel is what
-    /// switches off.
+    /// It was armed with no watchdog at the amplifier and none at its supply: if this program dies, the output stays on.
     NoWatchdog,
+    /// It was armed with a human finger, to which this much is left.
+    ExposureLeft(Left),
+    /// It was armed with the numbers of a human fingertip, and the setup says that nobody touches the plate.
+    NobodyTouches,
+    /// It was armed with contacts on the board that the setup declares to have no device: they are not watched.
+    NotWired {
+        /// Their names.
+        contacts: Vec<String>,
+    },
     /// Before the rig was armed, with nothing driven, this rule was broken for want of time; what it left behind (a cut supply, a proof
     /// broken off) is cleared by proving the second channel, from the beginning.
     ArmingDisturbed {
@@ -65,12 +74,22 @@ pub enum Event {
     },
     /// A stop was asked for (signal or operator).
     StopRequested,
-    /// The sweep rests before a pass, as the operator asked: no drive, lifted off, armed.
+    /// The sweep rests before a pass, as the operator asked: no drive, lifted off, not armed.
     Paused {
         /// The pass that comes next.
         point: u32,
     },
-    /// It goes on.
+    /// The pause was longer than its limit, in s: the run ends.
+    PauseTooLong {
+        /// The limit.
+        bound: f64,
+    },
+    /// In a pause the rig did not show itself off, at rest and lifted off: the run ends.
+    PauseNotQuiet {
+        /// The rule that says what was not so.
+        cause: Cause,
+    },
+    /// The pause is over: the rig is armed again, from the proof of the second channel on.
     Resumed,
     /// A pass was started again because contact was lost.
     PassRepeated {
@@ -168,6 +187,11 @@ mod tests {
             Event::Armed,
             Event::NoSecondChannel,
             Event::NoWatchdog,
+            Event::NobodyTouches,
+            Event::ExposureLeft(Left { hour_s: 1.0, dose_m2_s: 1.0, in_one_go_s: 1.0 }),
+            Event::NotWired { contacts: vec!["interlock".into()] },
+            Event::PauseTooLong { bound: 600.0 },
+            Event::PauseNotQuiet { cause },
             Event::ArmingDisturbed { cause, held_up: at },
             Event::Zeros { lateral_n: None, normal_n: Some(0.0), after: true },
             Event::Tripped(trip),
@@ -182,6 +206,8 @@ mod tests {
         for event in &all {
             match event {
                 Event::Armed | Event::NoSecondChannel | Event::NoWatchdog | Event::StopRequested => {}
+                Event::NobodyTouches | Event::NotWired { .. } | Event::ExposureLeft(_) => {}
+                Event::PauseTooLong { .. } | Event::PauseNotQuiet { .. } => {}
                 Event::ArmingDisturbed { .. } | Event::Zeros { .. } | Event::Tripped(_) => {}
                 Event::ModelDeparted { .. } | Event::Paused { .. } | Event::Resumed => {}
                 Event::PassRepeated { .. } | Event::TemperatureBeyondCertificate { .. } => {}

@@ -6,6 +6,7 @@ use crate::catalogue::{Catalogue, RunEntry};
 use crate::files::Placed;
 use crate::run_dir::RunDir;
 use crate::sequence::{Event, MeasuredPass, Outcome};
+use crate::setup::Guards;
 use crate::supervisor::OffReport;
 use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
@@ -46,6 +47,7 @@ pub struct Keeper {
     departed: bool,
     /// The catalogue could not be written: it is left alone until the end.
     unnoted: bool,
+    guards: Guards,
 }
 
 /// The wall clock, in ns since 1970.
@@ -80,10 +82,15 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     files.extend(job.model_file.clone());
     files.extend(job.setup.certificates.files.iter().cloned());
     files.extend(job.setup.profiles().into_iter().map(|(name, text)| (format!("profiles/{name}"), text)));
-    let Notes { operator, sample, licence } = &job.notes;
-    let notes = [("operator", operator), ("sample", sample), ("licence", licence)];
+    let Notes { operator, subject, sample, licence } = &job.notes;
+    let notes = [("operator", operator), ("subject", subject), ("sample", sample), ("licence", licence)];
     let notes = notes.into_iter().filter_map(|(k, v)| Some((k, v.clone()?)));
-    let facts = facts.into_iter().chain(notes).map(|(k, v)| (k.to_string(), v)).collect();
+    let facts = facts
+        .into_iter()
+        .chain(job.setup.guards().facts())
+        .chain(notes)
+        .map(|(k, v)| (k.to_string(), v))
+        .collect();
     Ok(Preamble { start_unix_ns, facts, files })
 }
 
@@ -152,7 +159,8 @@ impl Keeper {
             planned: planned as i64,
             departed: false,
         })?;
-        Ok(Keeper { dir, catalogue, folder, passes, planned, departed: false, unnoted: false })
+        let guards = job.setup.guards();
+        Ok(Keeper { dir, catalogue, folder, passes, planned, departed: false, unnoted: false, guards })
     }
 
     /// Keeps what a row led to and passes it on. Returns the pass, once it is safe.
@@ -214,6 +222,7 @@ impl Keeper {
             links,
             off,
             finished_before: false,
+            guards: self.guards.clone(),
         };
         self.departed |= summary.model_departed;
         // The catalogue last: what it calls complete has its summary and its report.

@@ -1,7 +1,6 @@
-//! Limits of a setup: what the file states over the paper's, timing from the instruments' profiles, and the guards that a human
-//! finger needs.
+//! Limits of a setup: what the file states over the paper's, and timing from the instruments' profiles.
 
-use super::SetupFile;
+use super::{SetupFile, guards};
 use crate::input::{Problems, unit_meant};
 use drivers::InstrumentSetup;
 use models::quantity::PeakToPeak;
@@ -37,8 +36,8 @@ pub struct LimitsFile {
     pub travel_max_m: Option<f64>,
     /// Highest temperature: to 48, in deg C. Default: 45.
     pub temperature_max_c: Option<f64>,
-    /// Whether a temperature is read: either, true with a human finger; where a temperature is read, losing
-    /// it is a trip. Default: true.
+    /// Whether a temperature is read; losing one that is read is a trip. `false` only where the amplifier's
+    /// profile has none, and nobody touches the plate. Default: true.
     pub temperature_fitted: Option<bool>,
     /// Equal raw samples in a row that are a frozen channel: 20 to 1000 equal raw samples in a row. Default:
     /// 50.
@@ -46,8 +45,8 @@ pub struct LimitsFile {
     /// Equal raw amplitudes in a row that are a frozen readback: 20 to 1000, while driven. Default: 200 where
     /// the profile states the readback's noise.
     pub amplitude_frozen_after: Option<u32>,
-    /// A human finger is in the rig: second channel, emergency stop, dead-man device and exposure apply.
-    /// Default: false.
+    /// The fingertip says whether a human finger is in the rig; a statement against it is refused. `true` on a virtual rig with
+    /// a human fingertip: its guards are rehearsed. Default: by the fingertip.
     pub human_contact: Option<bool>,
     /// A key held at the terminal stands for a dead-man device: for trials. Default: false.
     pub dead_man_key: Option<bool>,
@@ -59,6 +58,8 @@ pub struct LimitsFile {
     pub exposure_duty_max: Option<f64>,
     /// Squared rms velocity of the plate over the last hour, 1e-3 to 100, in m2/s. Default: 25.
     pub exposure_dose_max_m2_s: Option<f64>,
+    /// Longest pause that an operator may ask for, 1 to 3600, in s; the run ends then. Default: 600.
+    pub pause_max_s: Option<f64>,
     /// 0 to 0.05: how long a link's thread may be held up beyond three of its periods, in s. Default: 0.02.
     pub link_stall_s: Option<f64>,
     /// Missed deadlines among a thousand, to 100. Default: 10.
@@ -75,25 +76,6 @@ const LINK_STALL_MAX_S: f64 = 0.05;
 
 /// Equal amplitudes in a row that count as frozen, where the profile states that the readback has noise.
 const FROZEN_AFTER: u32 = 200;
-
-/// A human finger needs its guards, and is refused with what is missing.
-pub(super) fn guarded(file: &SetupFile) -> Result<(), String> {
-    let human = file.limits.human_contact == Some(true);
-    let key = file.limits.dead_man_key == Some(true);
-    let wired = |name: &str| file.safety_inputs.as_ref().is_some_and(|inputs| inputs.is_wired(name));
-    // A thermometer that is said not to be fitted takes its rule away with it: that is for plates that nobody touches.
-    let unread = file.limits.temperature_fitted == Some(false);
-    let missing = match (&file.supply_relay, wired("emergency_stop"), wired("dead_man") || key) {
-        _ if !human => None,
-        (None, ..) => Some("a second switch-off channel ([supply_relay])"),
-        (_, true, true) if unread => Some("a temperature that is read (temperature_fitted)"),
-        (_, true, true) => None,
-        (_, true, false) => Some("a dead-man device ([safety_inputs])"),
-        (_, false, true) => Some("an emergency stop ([safety_inputs])"),
-        (_, false, false) => Some("an emergency stop and a dead-man device ([safety_inputs])"),
-    };
-    missing.map_or(Ok(()), |what| Err(format!("human_contact = true: a finger needs {what}")))
-}
 
 /// Rates at which a channel may be read, by who it is: what [`Limits::checked`] demands of periods, said of rates.
 fn rate(instrument: &InstrumentSetup, name: &'static str, low: f64) -> Result<f64, LimitError> {
@@ -113,11 +95,16 @@ const FORCE_RATE_MIN_HZ: f64 = 20.0;
 const STATE_RATE_MIN_HZ: f64 = 10.0;
 
 /// The limits of a setup; every one that cannot be used is told of.
-pub(super) fn all_of(file: &SetupFile, cycle: Nanos, wrong: &mut Problems<'_>) -> Option<Limits> {
+pub(super) fn all_of(
+    file: &SetupFile,
+    person: bool,
+    cycle: Nanos,
+    wrong: &mut Problems<'_>,
+) -> Option<Limits> {
     let mut file = file.clone();
     let mut told = Vec::new();
     loop {
-        let error = match of(&file, cycle) {
+        let error = match of(&file, person, cycle) {
             Ok(limits) => return Some(limits),
             Err(error) => error,
         };
@@ -169,7 +156,7 @@ fn forget(file: &mut SetupFile, name: &str) {
 }
 
 /// Soft limits over the paper's, timing from the instruments' profiles.
-fn of(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
+fn of(file: &SetupFile, person: bool, cycle: Nanos) -> Result<Limits, LimitError> {
     let l = &file.limits;
     let mut limits = Limits::paper(cycle);
     let set = |slot: &mut f64, value: Option<f64>| *slot = value.unwrap_or(*slot);
@@ -189,16 +176,17 @@ fn of(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     set(&mut limits.exposure_duty_max, l.exposure_duty_max);
     set(&mut limits.exposure_dose_max_m2_s, l.exposure_dose_max_m2_s);
     limits.amplitude_max = l.amplitude_max_pp_m.map_or(limits.amplitude_max, PeakToPeak::from_metres);
-    limits.temperature_fitted = l.temperature_fitted.unwrap_or(limits.temperature_fitted);
     limits.frozen_after = l.frozen_after.unwrap_or(limits.frozen_after);
     limits.late_cycles_max = l.late_cycles_max.unwrap_or(limits.late_cycles_max);
     limits.late_in_a_row_max = l.late_in_a_row_max.unwrap_or(limits.late_in_a_row_max);
-    limits.human_contact = l.human_contact.unwrap_or(limits.human_contact);
+    limits.human_contact = person;
     limits.dead_man_key = l.dead_man_key.unwrap_or(false);
     limits.supply_required = file.supply_relay.is_some();
     limits.load_commanded = file.stage.dead_weight_n.is_none();
     let profile = file.amplifier.description().ok();
-    let fed = profile.as_ref().is_some_and(|profile| profile.set("heartbeat").is_some());
+    limits.temperature_fitted = l.temperature_fitted.unwrap_or(limits.temperature_fitted);
+    let (fed, supply_fed) = guards::watchdogs(file);
+    limits.supply_watchdog = supply_fed;
     // A virtual rig inside this program drives nothing real: it may go without what a real one must have.
     limits.amplifier_watchdog = fed || file.virtual_rig.is_some();
     let noise = profile.as_ref().and_then(|profile| {
@@ -236,6 +224,11 @@ fn of(file: &SetupFile, cycle: Nanos) -> Result<Limits, LimitError> {
     }
     if let Some(inputs) = &file.safety_inputs {
         limits.timing.contacts = timing(inputs, "safety_inputs")?;
+    }
+    let pause = l.pause_max_s.unwrap_or(1.0);
+    if !(1.0..=3600.0).contains(&pause) {
+        let needed = "from 1 to 3600: a rig that nobody uses is not kept waiting for longer";
+        return Err(LimitError::Unusable { name: "pause_max_s", value: pause, needed });
     }
     limits.checked()
 }

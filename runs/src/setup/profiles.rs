@@ -74,7 +74,7 @@ pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Vec<Problem> {
 }
 
 /// The instruments of a setup with the table in which each stands.
-fn all_of(file: &SetupFile) -> Vec<(&'static str, &InstrumentSetup)> {
+pub(super) fn all_of(file: &SetupFile) -> Vec<(&'static str, &InstrumentSetup)> {
     let force = file.force.iter().map(|instrument| ("force", instrument));
     let relay = file.supply_relay.iter().map(|instrument| ("supply_relay", instrument));
     let inputs = file.safety_inputs.iter().map(|instrument| ("safety_inputs", instrument));

@@ -112,5 +112,7 @@ named! {
         StageHeartbeat = "stage.heartbeat",
         /// The switch in the amplifier's supply closed (1) or open (0).
         CloseSupply = "supply.closed",
+        /// Heartbeat of the watchdog of that switch.
+        SupplyHeartbeat = "supply.heartbeat",
     }
 }

@@ -43,7 +43,7 @@ impl Drive {
     pub(super) fn start(setup: &Setup) -> miette::Result<Drive> {
         if setup.config.limits.human_contact {
             miette::bail!(
-                help = "set human_contact = false for the calibration, and keep hands off",
+                help = "write nobody_touches_the_plate = true in [finger] for the calibration, and keep hands off",
                 "a calibration drives the plate without a finger, and counts nobody's exposure"
             );
         }

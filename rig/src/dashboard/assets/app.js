@@ -262,7 +262,7 @@ function runPage(name, control) {
     const run = picture.run;
     if (run) {
       title.textContent = shown(`${run.plan} on ${run.setup}`);
-      about.textContent = shown(`${name}; operator ${run.operator ?? "not stated"}; sample ${run.sample ?? "not stated"}; compared with ${run.model}${run.fast ? "; in virtual time" : ""}`);
+      about.textContent = shown(`${run.guards?.nobody_touches_the_plate ? "NOBODY TOUCHES THE PLATE: the guards for a finger are off; " : ""}${name}; operator ${run.operator ?? "not stated"}; sample ${run.sample ?? "not stated"}; compared with ${run.model}${run.fast ? "; in virtual time" : ""}`);
     }
     const { made, planned, remaining_s } = picture.progress;
     cells.passes.textContent = `${made} of ${planned}`;
