@@ -106,7 +106,7 @@ fn last_pass(view: &View) -> String {
 fn of_pass(pass: &MeasuredPass) -> String {
     let c = pass.comparison;
     format!(
-        "{}: mu' {}, surprise {}",
+        "{}: mu' {}, {}",
         pass.pass.point,
         value(c.and_then(|c| c.mu_relative), 1.0, 3, ""),
         signed(c.map(|c| c.z), 1, " sd")
