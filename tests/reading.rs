@@ -21,16 +21,17 @@ use runs::session::rehearse;
 use runs::setup::Setup;
 use sim::world::WorldConfig;
 use std::sync::Arc;
+use tests::{documents, muprime, rounds};
 
 #[path = "reading/psi_star.rs"]
 mod psi_star;
 
-use tests::{documents, muprime, rounds};
+const FIRST_SEED: u64 = 23_000;
 
+/// Sweeps of each nature.
 fn sweeps() -> u64 {
     rounds(50, 200)
 }
-const FIRST_SEED: u64 = 23_000;
 
 /// Psi* of each nature, and what should be said of it.
 const NATURES: [(f64, Decision); 3] =

@@ -173,6 +173,7 @@ fn main() -> ExitCode {
     let code = runs::leave::until_the_end(move || run(cli.verb, json), cli::INTERNAL);
     // Whoever leaves at once leaves others no time for it.
     rig::terminal::give_back();
+    cli::keep_unread();
     code
 }
 

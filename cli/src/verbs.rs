@@ -35,7 +35,10 @@ pub mod submit;
 pub mod virtual_rig;
 pub mod watch;
 
+use miette::IntoDiagnostic;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 /// Done, also when the model has left the measurement or the verdict is unknown.
 pub const DONE: u8 = 0;
@@ -53,6 +56,29 @@ pub fn status_of(error: &miette::Report) -> u8 {
         Some(Unfinished::NotKept | Unfinished::Interrupted | Unfinished::NotOff) => FAILED,
         Some(Unfinished::Internal) => INTERNAL,
         None => REFUSED,
+    }
+}
+
+/// Name of the file in a run's folder with what its readers did not take.
+const UNREAD: &str = "unread.txt";
+/// The folder of the run that this process leads.
+static RUN: OnceLock<PathBuf> = OnceLock::new();
+
+/// A rig is driven from now on: nobody waits for a reader of standard output or standard error, and what they do not take stands in
+/// the run's folder afterwards.
+///
+/// # Errors
+/// The system gives no thread.
+pub fn tell_beside(run: &Path) -> miette::Result<()> {
+    let _ = RUN.set(run.into());
+    ::runs::print::beside().into_diagnostic()
+}
+
+/// Waits a moment for those who read, and keeps what they did not take. A folder that was refused stays as it is.
+pub fn keep_unread() {
+    let unread = ::runs::print::end();
+    if let Some(run) = RUN.get().filter(|run| !unread.is_empty() && ::runs::run_dir::has_begun(run)) {
+        let _ = ::runs::files::write_plain(&run.join(UNREAD), unread);
     }
 }
 

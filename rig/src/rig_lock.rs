@@ -5,10 +5,11 @@
 //! then shows set-points that nobody here commanded, and the loop trips.
 
 use miette::WrapErr;
+use runs::files::open_plain;
 use runs::setup::Setup;
 use std::fs::{File, OpenOptions, Permissions, TryLockError};
 use std::io::{self, Read, Write};
-use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 /// Folders that every user of a machine may write to, and in which nobody can replace another's file. The first that is so is
@@ -88,28 +89,25 @@ fn take(folder: &Path, identity: &str) -> miette::Result<File> {
 pub(crate) fn open_shared(path: &Path) -> io::Result<File> {
     let options = |write: bool| {
         let mut options = OpenOptions::new();
-        options.read(true).write(write).custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK);
+        options.read(true).write(write);
         options
     };
     // Never with O_CREAT where the file exists: in a sticky folder kernels refuse that for another user's file.
-    let file = match options(true).open(path) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => match options(true).create_new(true).open(path) {
-            Ok(file) => {
-                // Whatever the mask of this user: the next one must be told who holds it.
-                file.set_permissions(Permissions::from_mode(0o666))?;
-                Ok(file)
+    let open = |mut options: OpenOptions| open_plain(path, &mut options);
+    match open(options(true)) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            match open_plain(path, options(true).create_new(true)) {
+                Ok(file) => {
+                    // Whatever the mask of this user: the next one must be told who holds it.
+                    file.set_permissions(Permissions::from_mode(0o666))?;
+                    Ok(file)
+                }
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => open(options(true)),
+                Err(e) => Err(e),
             }
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => options(true).open(path),
-            Err(e) => Err(e),
-        },
-        Err(e) if e.kind() == io::ErrorKind::PermissionDenied => options(false).open(path),
+        }
+        Err(e) if e.kind() == io::ErrorKind::PermissionDenied => open(options(false)),
         opened => opened,
-    }?;
-    let found = file.metadata()?;
-    if found.is_file() && found.nlink() == 1 {
-        Ok(file)
-    } else {
-        Err(io::Error::other("it is no plain file of its own"))
     }
 }
 

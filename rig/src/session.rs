@@ -1,6 +1,7 @@
 //! A sweep in wall-clock time. Four threads, each with one duty: the loop; the record's writer; the sweep, which answers
-//! the loop's rows within a millisecond or two; and this one, which makes passes safe on the disk and tells the news.
-//! A slow disk so reaches neither the loop nor the stage.
+//! the loop's rows within a millisecond or two; and this one, which makes passes safe on the disk and hands the news on:
+//! what is printed, published or shown has bounded queues and threads of its own. A slow disk so reaches neither the loop nor the
+//! stage, and a reader that takes nothing does not reach this thread.
 #![allow(clippy::disallowed_methods, reason = "a sweep in wall-clock time, beside the loop")]
 
 mod writer;
@@ -37,7 +38,8 @@ struct Note {
     state: Option<Snapshot>,
 }
 
-/// Runs a job: in wall-clock time over its instruments, or in virtual time where the job says so.
+/// Runs a job: in wall-clock time over its instruments, or in virtual time where the job says so. In wall-clock time `update` must
+/// wait for nothing: whoever keeps the passes calls it.
 ///
 /// # Errors
 /// Whatever prevents it before anything was commanded (a refusal), or a fault of this program.
@@ -123,11 +125,13 @@ fn over_instruments(
                     return Some(End::Asked);
                 }
                 let unkept = keeping.is_some_and(|keeping| !keeping.holds());
-                if !knows && (unkept || lost.load(Ordering::Relaxed)) {
-                    knows = true;
-                    return Some(End::NotKept);
-                }
-                None
+                let end = match lost.load(Ordering::Relaxed) {
+                    true => Some(End::NotKept),
+                    false => unkept.then_some(End::ExposureNotKept),
+                };
+                let end = end.filter(|_| !knows);
+                knows |= end.is_some();
+                end
             };
             let mut ask = || Asked { end: ends(), pause: signals.paused.load(Ordering::Relaxed) };
             let mut snapshots = Snapshots::default();
@@ -173,6 +177,8 @@ fn over_instruments(
     });
     // Whatever ended it: off first.
     let Ended { report, links, off } = rig.end();
+    let said_off = std::panic::catch_unwind(AssertUnwindSafe(|| news(Update::Off(&off))));
+    let panicked = panicked.or(said_off.err());
     drop(held);
     if let Some(keeping) = keeping {
         keeping.end(off.read_back);

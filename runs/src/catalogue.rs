@@ -2,7 +2,7 @@
 
 use crate::files::{self, Placed};
 use miette::{IntoDiagnostic, WrapErr};
-use rusqlite::{Connection, OptionalExtension, params};
+use rusqlite::{Connection, OpenFlags, OptionalExtension, params};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -44,8 +44,20 @@ impl Catalogue {
     /// Whatever SQLite says.
     pub fn open(runs: &Path) -> miette::Result<Self> {
         files::make_folder(runs)?;
-        let path = runs.join(FILE);
-        let db = Connection::open(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        // A folder may be reached through links; the catalogue itself may not.
+        let whole = runs.canonicalize().into_diagnostic().wrap_err_with(|| runs.display().to_string())?;
+        let path = whole.join(FILE);
+        // Looked at before SQLite opens it by its name, which follows a link and does not mind a second name.
+        let mut options = std::fs::OpenOptions::new();
+        let file = Placed::open(&path, options.read(true).write(true).create(true).truncate(false))?;
+        // By their names alone: SQLite's locks on a file end when this process closes it anywhere.
+        for suffix in ["-journal", "-wal", "-shm"] {
+            files::refuse_planted(&whole.join(format!("{FILE}{suffix}")))?;
+        }
+        let flags = OpenFlags::default() | OpenFlags::SQLITE_OPEN_NOFOLLOW;
+        let db = Connection::open_with_flags(&path, flags)
+            .into_diagnostic()
+            .wrap_err_with(|| path.display().to_string())?;
         db.pragma_update(None, "journal_mode", "WAL").into_diagnostic()?;
         // FULL keeps the last commit through a power cut, which NORMAL may roll back.
         db.pragma_update(None, "synchronous", "FULL").into_diagnostic()?;
@@ -60,7 +72,6 @@ impl Catalogue {
         .into_diagnostic()
         .wrap_err_with(|| path.display().to_string())?;
         files::sync_folder_of(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-        let file = Placed::open(&path, std::fs::OpenOptions::new().read(true))?;
         Ok(Catalogue { db, file })
     }
 

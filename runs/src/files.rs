@@ -4,7 +4,7 @@
 use miette::{Context, IntoDiagnostic};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
-use std::os::unix::fs::MetadataExt;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 /// What the name of a file ends with while it is being written.
@@ -15,6 +15,48 @@ pub fn beside(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(PART);
     PathBuf::from(name)
+}
+
+/// Opens a file in a folder that others may write to: no link is followed, nothing waits, and nothing is taken but a plain file that has
+/// no other name. `options` must not truncate: what a link leads to would be empty before anybody looks.
+///
+/// # Errors
+/// Whatever the file system says, or something else stands there.
+pub fn open_plain(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
+    let file = options.custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK).open(path)?;
+    let found = file.metadata()?;
+    if found.is_file() && found.nlink() == 1 {
+        return Ok(file);
+    }
+    Err(io::Error::other("it is no plain file of its own: a link, a pipe or a device stands there"))
+}
+
+/// Refuses a place where a link, a pipe or a file with another name stands; nothing may stand there.
+///
+/// # Errors
+/// Something of that kind.
+pub fn refuse_planted(path: &Path) -> miette::Result<()> {
+    if fs::symlink_metadata(path).is_ok_and(|found| !(found.is_file() && found.nlink() == 1)) {
+        miette::bail!(
+            help = "see what it is, and remove it",
+            "{} is no plain file of its own",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
+/// Makes a new file, to be written beside its place. What an earlier program left under that name, or somebody planted there, loses the
+/// name and is not touched.
+///
+/// # Errors
+/// Whatever the file system says.
+pub fn fresh(path: &Path) -> io::Result<File> {
+    let new = || open_plain(path, OpenOptions::new().create_new(true).read(true).write(true));
+    match new() {
+        Err(why) if why.kind() == io::ErrorKind::AlreadyExists => fs::remove_file(path).and_then(|()| new()),
+        made => made,
+    }
 }
 
 /// The folder that holds a file or folder of that name.
@@ -30,24 +72,50 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
     File::open(folder_of(path))?.sync_all()
 }
 
-/// Writes a file whole or not at all: after a crash or a power cut either the old one is there or the new one. What is there
-/// and is no ordinary file, such as a terminal or a pipe, is written to as it is.
+/// Writes a file that a person named, whole or not at all: after a crash or a power cut either the old one is there or the new one.
+/// What is there and is no ordinary file, such as a terminal or a pipe, is written to as it is. A link of this user stays a link.
+///
+/// # Errors
+/// Whatever the file system says, with the file's name; a link that another user has put there.
+pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
+    let written = named(path).and_then(|path| {
+        if fs::metadata(&path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+            return fs::write(path, bytes.as_ref());
+        }
+        put(&path, bytes.as_ref())
+    });
+    written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
+/// Writes a file of a run's or a study's folder, to which others may write, in the same way; a link that stands there is replaced, and what
+/// it leads to is not touched.
 ///
 /// # Errors
 /// Whatever the file system says, with the file's name.
-pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
+pub fn write_plain(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
     put(path, bytes.as_ref()).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
 }
 
-fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    // A link stays a link: what it points to is replaced.
-    let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
-        return fs::write(path, bytes);
+/// What a path leads to, through links of this user and of root.
+fn named(path: &Path) -> io::Result<PathBuf> {
+    let link = fs::symlink_metadata(path)
+        .is_ok_and(|there| there.is_symlink() && there.uid() != 0 && !is_own(&there));
+    if link {
+        return Err(io::Error::other("another user has put a link there"));
     }
+    Ok(fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()))
+}
+
+/// Whether a file is this user's.
+pub fn is_own(file: &fs::Metadata) -> bool {
+    fs::metadata("/proc/self").is_ok_and(|own| own.uid() == file.uid())
+}
+
+fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let part = beside(path);
-    let moved = File::create(&part)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
+    let moved = fresh(&part)
+        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()).map(|()| file))
+        .and_then(|file| Placed { file, path: part.clone() }.still_there().map_err(io::Error::other))
         .and_then(|()| fs::rename(&part, path));
     if let Err(why) = moved {
         let _ = fs::remove_file(&part);
@@ -81,14 +149,26 @@ pub struct Placed {
 }
 
 impl Placed {
-    /// Opens a file as `options` say; the name of a new one is safe when this returns.
+    /// Opens a file as [`open_plain`] does; the name of a new one is safe when this returns.
     ///
     /// # Errors
     /// Whatever the file system says, with the file's name.
-    pub fn open(path: &Path, options: &OpenOptions) -> miette::Result<Self> {
+    pub fn open(path: &Path, options: &mut OpenOptions) -> miette::Result<Self> {
+        Self::of(path, || open_plain(path, options))
+    }
+
+    /// A new file, as [`fresh`] makes it.
+    ///
+    /// # Errors
+    /// Whatever the file system says, with the file's name.
+    pub fn fresh(path: &Path) -> miette::Result<Self> {
+        Self::of(path, || fresh(path))
+    }
+
+    fn of(path: &Path, open: impl FnOnce() -> io::Result<File>) -> miette::Result<Self> {
         let open = || {
             let new = !path.exists();
-            let file = options.open(path)?;
+            let file = open()?;
             if new {
                 sync_folder_of(path)?;
             }
@@ -183,6 +263,31 @@ mod tests {
         assert_eq!(names, ["link", "report.html", "taken"]);
         write_whole(Path::new("/dev/null"), b"a device stays one").unwrap();
         assert!(!fs::metadata("/dev/null").unwrap().is_file());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// Links of both kinds, and a pipe: nothing is followed, waited for or emptied, and what is written lands in the folder.
+    #[test]
+    fn nothing_that_is_planted_is_followed() {
+        let folder = folder("planted");
+        let (victim, path) = (folder.join("victim"), folder.join("summary.json"));
+        let plants: [fn(&Path, &Path); 2] = [
+            |victim, place| std::os::unix::fs::symlink(victim, place).unwrap(),
+            |victim, place| fs::hard_link(victim, place).unwrap(),
+        ];
+        for plant in plants {
+            fs::write(&victim, "precious").unwrap();
+            for place in [beside(&path), path.clone()] {
+                plant(&victim, &place);
+                assert!(open_plain(&place, OpenOptions::new().append(true)).is_err());
+                write_plain(&path, "ours").unwrap();
+                assert_eq!(fs::read_to_string(&victim).unwrap(), "precious");
+                assert_eq!(fs::read_to_string(&path).unwrap(), "ours");
+                fs::remove_file(&path).unwrap();
+            }
+        }
+        let pipe = std::process::Command::new("mkfifo").arg(&path).status().unwrap();
+        assert!(pipe.success() && open_plain(&path, OpenOptions::new().read(true)).is_err());
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -1,5 +1,8 @@
 //! What the program says, on standard output and on standard error: the one place that writes there.
 //!
+//! While a rig is driven ([`beside`]) two threads write, one for each output, and everybody else puts lines into their bounded
+//! queues: whoever keeps a pass or switches a drive off never waits for a terminal, a pipe or a pager.
+//!
 //! A reader may go away at any time (`muprime ... | head -1`), and a run must not end with it: what cannot be written is
 //! dropped. Text may hold what an instrument or a file said: control characters, which could rewrite what a person sees on a
 //! terminal, are shown as `\u001b` and the like; colours and line ends stay.
@@ -8,7 +11,8 @@ use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::io::{self, Write};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 /// A line on standard output.
 #[macro_export]
@@ -30,7 +34,7 @@ macro_rules! ask {
 
 /// Writes a line to standard output: the form behind [`out!`].
 pub fn answer(text: &str) {
-    whole(&mut io::stdout().lock(), text, "\n");
+    put(OUT, Piece::Text(format!("{text}\n")), false);
 }
 
 /// Writes a line to standard error: the form behind [`say!`].
@@ -44,7 +48,186 @@ pub fn question(text: &str) {
         return held.keep(text);
     }
     // Not under that lock: a terminal that takes nothing holds up who writes, and nobody else.
-    whole(&mut io::stderr().lock(), text, "");
+    put(ERR, Piece::Text(text.into()), false);
+}
+
+/// A line on standard error that is written before all that waits there.
+pub fn urgent(text: &str) {
+    if let Some(held) = &mut *HELD.lock().unwrap_or_else(PoisonError::into_inner) {
+        return held.keep(&format!("{text}\n"));
+    }
+    put(ERR, Piece::Text(format!("{text}\n")), true);
+}
+
+/// Draws something on standard error, such as a bar, where remarks are written.
+pub fn draw(drawn: impl FnOnce() + Send + 'static) {
+    put(ERR, Piece::Drawn(Box::new(drawn)), false);
+}
+
+/// The outputs' places among the outlets.
+const OUT: usize = 0;
+const ERR: usize = 1;
+/// What waits for a reader at most, in pieces and in bytes: more is left out, and counted.
+const PIECES: usize = 4096;
+const BYTES: usize = 8 << 20;
+/// How long the end of the program waits for its readers, for both outputs together.
+const LAST_WORDS: Duration = Duration::from_secs(2);
+
+/// What is to be written.
+enum Piece {
+    Text(String),
+    Drawn(Box<dyn FnOnce() + Send>),
+}
+
+impl Piece {
+    fn bytes(&self) -> usize {
+        if let Piece::Text(text) = self { text.len() } else { 0 }
+    }
+
+    fn write(self, output: usize) {
+        match self {
+            Piece::Text(text) if output == OUT => whole(&mut io::stdout().lock(), &text),
+            Piece::Text(text) => whole(&mut io::stderr().lock(), &text),
+            Piece::Drawn(drawn) => drawn(),
+        }
+    }
+}
+
+/// What waits for the reader of one output.
+#[derive(Default)]
+struct Outlet {
+    waiting: VecDeque<Piece>,
+    bytes: usize,
+    /// What is being written now.
+    taken: Option<String>,
+    /// Lines left out since the reader took something.
+    lost: u64,
+    /// Lines left out in all.
+    lost_in_all: u64,
+}
+
+impl Outlet {
+    fn put(&mut self, output: usize, piece: Piece, first: bool) {
+        let bytes = piece.bytes();
+        if !first && (self.waiting.len() >= PIECES || self.bytes + bytes > BYTES) {
+            let text = u64::from(matches!(piece, Piece::Text(_)));
+            (self.lost, self.lost_in_all) = (self.lost + text, self.lost_in_all + text);
+            return;
+        }
+        if self.lost > 0 && !first {
+            // It stands where the lines that were left out would have stood.
+            let marker = left_out(output, std::mem::take(&mut self.lost));
+            self.bytes += marker.len();
+            self.waiting.push_back(Piece::Text(marker));
+        }
+        self.bytes += bytes;
+        if first { self.waiting.push_front(piece) } else { self.waiting.push_back(piece) }
+    }
+
+    /// The next piece; what was left out is said where it would have stood.
+    fn next(&mut self, output: usize) -> Option<Piece> {
+        let piece = match self.waiting.pop_front() {
+            Some(piece) => {
+                self.bytes -= piece.bytes();
+                piece
+            }
+            None if self.lost > 0 => Piece::Text(left_out(output, std::mem::take(&mut self.lost))),
+            None => return None,
+        };
+        self.taken = Some(if let Piece::Text(text) = &piece { text.clone() } else { String::new() });
+        Some(piece)
+    }
+}
+
+/// What a reader finds in place of lines that it did not take.
+fn left_out(output: usize, lines: u64) -> String {
+    if output == OUT {
+        format!("{{\"left_out\":{lines}}}\n")
+    } else {
+        format!("... {lines} lines are left out: nothing was read here for a while ...\n")
+    }
+}
+
+/// Both outputs while threads of their own write them; `None` while everybody writes directly.
+static BESIDE: Mutex<Option<[Outlet; 2]>> = Mutex::new(None);
+static CHANGED: Condvar = Condvar::new();
+
+fn outlets() -> MutexGuard<'static, Option<[Outlet; 2]>> {
+    BESIDE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn put(output: usize, piece: Piece, first: bool) {
+    if let Some(outlets) = &mut *outlets() {
+        outlets[output].put(output, piece, first);
+        return CHANGED.notify_all();
+    }
+    piece.write(output);
+}
+
+/// From now on nobody waits for a reader of what is said; a panic's words go the same way.
+///
+/// # Errors
+/// The system gives no thread.
+pub fn beside() -> io::Result<()> {
+    outlets().get_or_insert_default();
+    for (output, name) in [(OUT, "standard output"), (ERR, "standard error")] {
+        let thread = std::thread::Builder::new().name(name.into()).spawn(move || write_on(output));
+        if let Err(why) = thread {
+            *outlets() = None;
+            return Err(why);
+        }
+    }
+    std::panic::set_hook(Box::new(|panic| {
+        let thread = std::thread::current();
+        remark(&format!("thread '{}' {panic}", thread.name().unwrap_or_default()));
+    }));
+    Ok(())
+}
+
+/// Writes what is put into one output's queue.
+fn write_on(output: usize) {
+    let mut all = outlets();
+    while let Some(outlets) = &mut *all {
+        match outlets[output].next(output) {
+            None => all = CHANGED.wait(all).unwrap_or_else(PoisonError::into_inner),
+            Some(piece) => {
+                drop(all);
+                // A bar that fails to draw ends no output.
+                let _ = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| piece.write(output)));
+                all = self::outlets();
+                if let Some(outlets) = &mut *all {
+                    outlets[output].taken = None;
+                }
+                CHANGED.notify_all();
+            }
+        }
+    }
+}
+
+/// Waits until all is written, for both outputs two seconds at most, and returns what was not: nothing where all was.
+pub fn end() -> String {
+    let unwritten = |outlets: &Option<[Outlet; 2]>| {
+        outlets.iter().flatten().any(|o| !o.waiting.is_empty() || o.taken.is_some() || o.lost > 0)
+    };
+    let waited = CHANGED.wait_timeout_while(outlets(), LAST_WORDS, |outlets| unwritten(outlets));
+    let (mut all, _) = waited.unwrap_or_else(PoisonError::into_inner);
+    let mut rest = String::new();
+    for (outlet, name) in all.iter_mut().flatten().zip(["standard output", "standard error"]) {
+        let waiting = outlet.waiting.drain(..).filter_map(|piece| match piece {
+            Piece::Text(text) => Some(text),
+            Piece::Drawn(_) => None,
+        });
+        let lines: Vec<String> = outlet.taken.iter().cloned().chain(waiting).collect();
+        if !lines.is_empty() || outlet.lost_in_all > 0 {
+            let (count, lost) = (lines.len(), outlet.lost_in_all);
+            let _ = writeln!(
+                rest,
+                "{name}: {count} lines were not read to the end, {lost} were left out before."
+            );
+            rest.extend(lines);
+        }
+    }
+    rest
 }
 
 /// Remarks that are held at most: the first ones, which say what began, and the last ones.
@@ -90,10 +273,9 @@ pub fn release() -> Vec<String> {
     HELD.lock().unwrap_or_else(PoisonError::into_inner).take().map(Held::all).unwrap_or_default()
 }
 
-fn whole(to: &mut impl Write, text: &str, end: &str) {
-    let text = clean(text);
+fn whole(to: &mut impl Write, text: &str) {
     // One write: lines of two threads do not mix.
-    let _ = to.write_all(format!("{text}{end}").as_bytes()).and_then(|()| to.flush());
+    let _ = to.write_all(clean(text).as_bytes()).and_then(|()| to.flush());
 }
 
 /// Standard error for logs: never fails, never passes control characters on.
@@ -151,10 +333,17 @@ fn words(line: &str) -> Vec<(usize, &str)> {
     all
 }
 
-/// Text that a terminal shows as it is: control characters are written out, but for line ends, tabs and colours (`ESC [` digits
-/// and semicolons `m`).
+/// Whether a character changes what is read without being seen: a control character, or a mark that turns the direction of text round,
+/// breaks a line, or has no width (but for those that join letters).
+pub fn is_hidden(c: char) -> bool {
+    let mark = matches!(c, '\u{61c}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}'
+        | '\u{2060}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
+    mark || (c.is_control() && c != '\n' && c != '\t')
+}
+
+/// Text that a terminal shows as it is: what is hidden is written out, but for colours (`ESC [` digits and semicolons `m`).
 pub fn clean(text: &str) -> Cow<'_, str> {
-    if !text.chars().any(|c| c.is_control() && c != '\n' && c != '\t') {
+    if !text.chars().any(is_hidden) {
         return Cow::Borrowed(text);
     }
     let mut shown = String::with_capacity(text.len() + 16);
@@ -166,7 +355,7 @@ pub fn clean(text: &str) -> Cow<'_, str> {
             rest = &rest[colour..];
             continue;
         }
-        if c.is_control() && c != '\n' && c != '\t' {
+        if is_hidden(c) {
             let _ = write!(shown, "\\u{:04x}", u32::from(c));
         } else {
             shown.push(c);
@@ -197,6 +386,12 @@ mod tests {
             "a\\u001b[2Jb\\u001b]0;t\\u0007c\\u000dd\\u0008\\u009b2J"
         );
         assert_eq!(clean("\u{1b}[31"), "\\u001b[31");
+        // A name that is read backwards, and marks that nobody sees; letters that are joined stay joined.
+        assert_eq!(
+            clean("a\u{202e}b\u{2066}c\u{200b}d\u{feff}e\u{2028}"),
+            "a\\u202eb\\u2066c\\u200bd\\ufeffe\\u2028"
+        );
+        assert_eq!(clean("a\u{200d}b \u{5d0}"), "a\u{200d}b \u{5d0}");
     }
 
     #[test]
@@ -226,6 +421,33 @@ mod tests {
     }
 
     #[test]
+    fn a_reader_that_takes_nothing_costs_lines_and_hears_how_many() {
+        let text = |outlet: &mut Outlet| match outlet.next(OUT) {
+            Some(Piece::Text(text)) => Some(text),
+            _ => None,
+        };
+        let mut outlet = Outlet::default();
+        for n in 0..PIECES + 7 {
+            outlet.put(OUT, Piece::Text(format!("{n}\n")), false);
+        }
+        outlet.put(OUT, Piece::Text("the output may still be on\n".into()), true);
+        assert_eq!(text(&mut outlet).as_deref(), Some("the output may still be on\n"));
+        for n in 0..3 {
+            assert_eq!(text(&mut outlet), Some(format!("{n}\n")));
+        }
+        outlet.put(OUT, Piece::Text("later\n".into()), false);
+        let rest: Vec<String> = std::iter::from_fn(|| text(&mut outlet)).collect();
+        assert_eq!(rest.len(), PIECES - 3 + 2);
+        assert_eq!(rest[PIECES - 3..], ["{\"left_out\":7}\n", "later\n"]);
+        assert_eq!((outlet.bytes, outlet.lost_in_all), (0, 7));
+        // Large lines are bounded by their bytes.
+        for _ in 0..100 {
+            outlet.put(OUT, Piece::Text("x".repeat(1 << 20)), false);
+        }
+        assert_eq!((outlet.waiting.len(), outlet.lost), (8, 92));
+    }
+
+    #[test]
     fn what_cannot_be_written_is_dropped() {
         struct Gone;
         impl Write for Gone {
@@ -236,6 +458,6 @@ mod tests {
                 Err(io::ErrorKind::BrokenPipe.into())
             }
         }
-        whole(&mut Gone, "nobody hears this", "\n");
+        whole(&mut Gone, "nobody hears this\n");
     }
 }

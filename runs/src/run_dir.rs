@@ -7,7 +7,7 @@ mod lines;
 mod lock;
 mod record_facts;
 
-use crate::files::{self, Placed, write_whole};
+use crate::files::{self, Placed, write_plain};
 use crate::plan::Point;
 use crate::sequence::MeasuredPass;
 pub use damage::{damage_in, differences, missing_records, of_file};
@@ -17,6 +17,7 @@ use miette::{Context, IntoDiagnostic};
 use models::pass::{self, Pass};
 pub use record_facts::{RecordFacts, record_facts};
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -139,7 +140,7 @@ impl RunDir {
             let file = path.join(name);
             if !file.exists() {
                 new.paths.push(file.clone());
-                write_whole(&file, bytes)?;
+                write_plain(&file, bytes)?;
             }
         }
         let sessions = sessions_in(path)?;
@@ -195,7 +196,7 @@ impl RunDir {
             text.push(b'\n');
         }
         self.stay();
-        write_whole(&self.path.join(SESSIONS), &text)
+        write_plain(&self.path.join(SESSIONS), &text)
     }
 
     /// The folder.
@@ -258,7 +259,7 @@ impl RunDir {
     /// # Errors
     /// Whatever the file system says.
     pub fn write(&self, name: &str, bytes: &[u8]) -> miette::Result<()> {
-        write_whole(&self.path.join(name), bytes)
+        write_plain(&self.path.join(name), bytes)
     }
 }
 
@@ -282,6 +283,11 @@ fn is_record(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let number = name.strip_prefix("run-").and_then(|rest| rest.strip_suffix(".mcap"));
     number.is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Whether a session of a run has begun in a folder.
+pub fn has_begun(path: &Path) -> bool {
+    path.join(SESSIONS).exists()
 }
 
 /// The sessions of a run's folder, oldest first; none where the first has not begun.
@@ -312,16 +318,11 @@ pub fn passes_in(path: &Path) -> miette::Result<Vec<MeasuredPass>> {
     let (kept, _) = whole_table(&read(POINTS)?).wrap_err_with(|| path.join(POINTS).display().to_string())?;
     let (journal, _) =
         whole_passes(&read(JOURNAL)?).wrap_err_with(|| path.join(JOURNAL).display().to_string())?;
-    let mut passes: Vec<MeasuredPass> = Vec::new();
-    for pass in journal {
-        let in_table = kept.iter().any(|k| k.point == pass.pass.point);
-        passes.retain(|p| p.pass.point != pass.pass.point);
-        if in_table {
-            passes.push(pass);
-        }
-    }
-    let lost = kept.iter().find(|k| passes.iter().all(|p| p.pass.point != k.point));
-    match lost {
+    let in_table: BTreeSet<u64> = kept.iter().map(|k| k.point).collect();
+    let last: BTreeMap<u64, usize> = journal.iter().enumerate().map(|(i, p)| (p.pass.point, i)).collect();
+    let counts = |i: usize, p: &MeasuredPass| in_table.contains(&p.pass.point) && last[&p.pass.point] == i;
+    let passes = journal.into_iter().enumerate().filter(|(i, p)| counts(*i, p)).map(|(_, p)| p).collect();
+    match kept.iter().find(|k| !last.contains_key(&k.point)) {
         None => Ok(passes),
         Some(k) => miette::bail!(
             "{}: point {} is in {POINTS} and not in {JOURNAL}: one of them is damaged",

@@ -71,6 +71,8 @@ pub enum Update<'a> {
     Progress(usize, usize, f64),
     /// A cycle ten times a second, and the extremes of all cycles since the last one.
     State(&'a Snapshot),
+    /// The rig was switched off for the last time; comes before anything else is done, in wall-clock time.
+    Off(&'a OffReport),
 }
 
 /// What a run comes to. Its JSON form is what `muprime run --json` ends with.

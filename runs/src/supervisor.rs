@@ -39,6 +39,8 @@ pub enum End {
     Asked,
     /// What comes of it cannot be kept.
     NotKept,
+    /// What the finger is exposed to cannot be written.
+    ExposureNotKept,
 }
 
 /// What whoever leads a sweep asks of it now.
@@ -58,14 +60,19 @@ pub fn sweep(
     ask: &mut dyn FnMut() -> Asked,
     each: &mut dyn FnMut(&Row, &Sequence, Reaction),
 ) -> Outcome {
-    let mut lost = false;
+    let mut instead = None;
     loop {
         let asked = ask();
         if let Some(end) = asked.end {
             // Safe state first: the command goes out before anything else is looked at.
             rig.stop();
             sequence.stop();
-            lost |= end == End::NotKept;
+            let why = match end {
+                End::Asked => None,
+                End::NotKept => Some(Outcome::RecordLost),
+                End::ExposureNotKept => Some(Outcome::ExposureNotKept),
+            };
+            instead = instead.or(why);
         }
         sequence.pause(asked.pause);
         let Some(row) = rig.next_row() else {
@@ -83,7 +90,7 @@ pub fn sweep(
         let outcome = reaction.outcome.clone();
         each(&row, sequence, reaction);
         match outcome {
-            Some(Outcome::Stopped) if lost => return Outcome::RecordLost,
+            Some(Outcome::Stopped) => return instead.unwrap_or(Outcome::Stopped),
             Some(outcome) => return outcome,
             None => {}
         }

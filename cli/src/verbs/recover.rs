@@ -4,7 +4,7 @@ use miette::{IntoDiagnostic, WrapErr};
 use realtime::recorder::{self, Integrity, Recovery};
 use runs::files::{self, Placed};
 use runs::{out, say};
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -28,7 +28,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let damaged = BufReader::new(File::open(file).into_diagnostic().wrap_err_with(shown)?);
     let part = files::beside(file);
-    let whole = Placed::open(&part, OpenOptions::new().create(true).truncate(true).read(true).write(true))?;
+    let whole = Placed::fresh(&part)?;
     let disk = whole.handle()?;
     let found = recorder::recover(damaged, whole);
     let found = found.into_diagnostic().and_then(|found| disk.sync().map(|()| found));
@@ -82,12 +82,16 @@ fn tell(found: &Integrity) {
 fn put_in_place(file: &Path, part: &Path) -> miette::Result<PathBuf> {
     let mut original = file.with_extension("mcap.original");
     let mut n = 1;
-    while original.exists() {
+    // A name that leads nowhere is taken too.
+    while original.symlink_metadata().is_ok() {
         n += 1;
         original = file.with_extension(format!("mcap.original-{n}"));
     }
     fs::hard_link(file, &original)
-        .or_else(|_| fs::copy(file, &original).and_then(|_| File::open(&original)?.sync_all()))
+        .or_else(|_| {
+            let mut copy = files::fresh(&original)?;
+            std::io::copy(&mut File::open(file)?, &mut copy).and_then(|_| copy.sync_all())
+        })
         .and_then(|()| files::sync_folder_of(file))
         .and_then(|()| fs::rename(part, file))
         .and_then(|()| files::sync_folder_of(file))

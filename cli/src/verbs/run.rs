@@ -11,7 +11,7 @@ use rig::publish::{Broker, Publisher};
 use rig::watch::{Lead, Watch};
 use runs::catalogue::runs_folder;
 use runs::plan::Plan;
-use runs::print::{clean, folded};
+use runs::print::{self, clean, folded};
 use runs::sequence::{Event, Outcome};
 use runs::session::{Job, Notes, Signals, Summary, Update, unix_ns};
 use runs::setup::Setup;
@@ -96,6 +96,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let browsers =
         args.dashboard.map(|listen| Place { listen, hosts: Vec::new(), allow_control: args.allow_control });
     let job = job(args)?;
+    if !job.fast {
+        // In virtual time nothing is driven, and a slow reader gets every line.
+        super::tell_beside(&job.out)?;
+    }
     if job.setup.hand_at_key() {
         if job.fast {
             miette::bail!(
@@ -122,9 +126,11 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     };
     let bar = progress_bar(json || tui);
     bar.set_length(planned as u64);
+    // Looked at once: while it is drawn, whoever asks it anything waits for the terminal.
+    let hidden = bar.is_hidden();
     let say = |text: String| {
-        let text = fitted(text);
-        if bar.is_hidden() { say!("{text}") } else { bar.println(clean(&text)) }
+        let (text, bar) = (fitted(text), bar.clone());
+        if hidden { say!("{text}") } else { print::draw(move || bar.println(clean(&text))) }
     };
     if !json {
         let clock = if job.fast { "virtual time" } else { "wall-clock time" };
@@ -177,32 +183,42 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                     "progress",
                     &|| serde_json::json!({ "made": made, "planned": all, "remaining_s": left_s }),
                 );
-                let resumed = planned as u64 - bar.length().unwrap_or(0).min(planned as u64);
-                bar.set_position(made as u64 + resumed);
-                bar.set_message(format!("{left_s:.0} s to go"));
+                let bar = bar.clone();
+                print::draw(move || {
+                    bar.set_position((planned.saturating_sub(all) + made) as u64);
+                    bar.set_message(format!("{left_s:.0} s to go"));
+                });
             }
+            Update::Off(off) if !off.read_back => {
+                print::urgent(&fitted(off.words()));
+                publish("off", &|| serde_json::json!(off));
+                if json {
+                    out!("{}", serde_json::json!({ "off": off }));
+                }
+            }
+            Update::Off(_) => {}
         }
     });
+    print::draw(move || bar.finish_and_clear());
+    drop(watch);
+    if let Ok(summary) = &summary {
+        tell(summary, json);
+    }
     feed.end(live::Ended::of(&summary));
     publish("run", &|| {
         let mut ended = began("ended");
         ended["summary"] = summary.as_ref().map_or_else(
             |why| serde_json::json!({ "error": why.to_string() }),
-            |summary| serde_json::json!({ "passes": summary.passes, "outcome": summary.outcome }),
+            |summary| serde_json::json!({ "passes": summary.passes, "outcome": summary.outcome, "off": summary.off }),
         );
         ended
     });
-    bar.finish_and_clear();
-    drop(watch);
     if let (Some(publisher), Some(broker)) = (publisher, &broker) {
-        let (dropped, whole) = publisher.end();
-        if dropped > 0 || !whole {
-            let rest = if whole { "" } else { ", and the last ones may be missing" };
-            told!("{}:{}: {dropped} messages were not published{rest}", broker.host, broker.port);
+        if let Some(missing) = publisher.end() {
+            told!("{}:{}: {missing}", broker.host, broker.port);
         }
     }
     let summary = summary?;
-    tell(&summary, json);
     super::exit(match summary.outcome {
         Outcome::Complete if summary.off.read_back => super::DONE,
         _ => super::FAILED,

@@ -2,8 +2,8 @@
 
 use super::server::Shared;
 use super::{pages, stream};
-use crate::live::{Ask, Viewer};
-use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use crate::live::{self, Ask, Viewer};
+use axum::extract::{Path, Query, Request, State};
 use axum::http::{StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
@@ -12,9 +12,12 @@ use axum::{Json, Router};
 use runs::report::{FIGURES, UPLOT, UPLOT_STYLE};
 use serde::Deserialize;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Largest body of a request in bytes.
 const BODY: usize = 256;
+/// Time that a body may take in all.
+const BODY_WITHIN: Duration = Duration::from_secs(5);
 /// What pages may load and from where: this server, and styles and pictures that stand in a report.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
                       connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -38,7 +41,7 @@ pub fn routes(shared: Arc<Shared>) -> Router {
         .route("/uplot.css", get(|| asset("text/css", UPLOT_STYLE)))
         .route("/uplot.js", get(|| asset("text/javascript", UPLOT)))
         .merge(data)
-        .layer(DefaultBodyLimit::max(BODY))
+        .layer(middleware::from_fn(with_body))
         .layer(middleware::from_fn_with_state(Arc::clone(&shared), at_this_place))
         .with_state(shared)
 }
@@ -63,6 +66,16 @@ async fn at_this_place(State(shared): State<Arc<Shared>>, request: Request, next
         response.headers_mut().insert(name, header::HeaderValue::from_static(value));
     }
     response
+}
+
+/// Before whatever reads it: a body that is small and whole.
+async fn with_body(request: Request, next: Next) -> Response {
+    let (head, body) = request.into_parts();
+    match tokio::time::timeout(BODY_WITHIN, axum::body::to_bytes(body, BODY)).await {
+        Ok(Ok(body)) => next.run(Request::from_parts(head, body.into())).await,
+        Ok(Err(_)) => StatusCode::PAYLOAD_TOO_LARGE.into_response(),
+        Err(_) => (StatusCode::REQUEST_TIMEOUT, [(header::CONNECTION, "close")]).into_response(),
+    }
 }
 
 /// Before data: the token.
@@ -149,8 +162,14 @@ async fn ask(
         return Err((StatusCode::FORBIDDEN, why).into_response());
     }
     let folder = shared.folder(&name).ok_or_else(|| StatusCode::NOT_FOUND.into_response())?;
-    let asked = beside(move || Viewer::connect(&folder).and_then(|viewer| viewer.asking()?(ask))).await?;
-    asked.map_err(|_| (StatusCode::CONFLICT, "this run does not go on").into_response())?;
+    let asked = beside(move || match ask {
+        // Answered as done only where the run shows it.
+        Ask::Stop => live::stop(&folder).map(drop),
+        ask => Viewer::connect(&folder)
+            .and_then(|viewer| viewer.asking()?(ask))
+            .map_err(|why| format!("not asked: {why}")),
+    });
+    asked.await?.map_err(|why| (StatusCode::CONFLICT, why).into_response())?;
     tracing::info!(run = name, ask = ask.word(), "asked for from a browser");
     Ok(StatusCode::NO_CONTENT)
 }

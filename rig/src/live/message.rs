@@ -22,6 +22,8 @@ pub enum Message {
     Event(Told),
     /// How far it is.
     Progress(Progress),
+    /// The drive was not read back off: what to do, before the run's end is told.
+    Off(String),
     /// It is over; always last.
     Ended(Box<Ended>),
 }

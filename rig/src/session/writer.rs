@@ -120,8 +120,7 @@ mod tests {
     #[test]
     fn a_record_that_cannot_be_ended_is_said_and_nobody_waits_for_ever() {
         let path = std::env::temp_dir().join(format!("muprime-writer-{}.mcap", std::process::id()));
-        let file =
-            Placed::open(&path, std::fs::OpenOptions::new().create(true).write(true).truncate(true)).unwrap();
+        let file = Placed::fresh(&path).unwrap();
         let (_rows_in, rows) = ringbuf::HeapRb::<Row>::new(8).split();
         let (_entries_in, entries) = channel::<Entry>();
         let (last_in, last) = channel::<Last>();

@@ -1,13 +1,12 @@
 //! What the keys do. A stop takes one key and no question: it is the safe direction.
 
 use super::{Shared, Source};
-use crate::live::Ask;
+use crate::live::{self, Ask};
 use crate::terminal;
-use runs::run_dir;
 use runs::session::Signals;
 use std::io;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 
 /// Who leads the run that is shown.
@@ -25,10 +24,6 @@ pub(super) type Asking = Box<dyn FnMut(Ask) -> io::Result<()> + Send>;
 pub(super) struct Hand {
     own: Option<Signals>,
     feed: Mutex<Option<Asking>>,
-    /// A stop went through the feed; it is asked for once more by a signal.
-    asked: AtomicBool,
-    /// A second signal would end that process without waiting for its sweep: it gets one.
-    signalled: AtomicBool,
 }
 
 impl Hand {
@@ -37,7 +32,7 @@ impl Hand {
             Lead::Own(signals) => Some(signals),
             Lead::Other => None,
         };
-        Hand { own, feed: Mutex::default(), asked: AtomicBool::new(false), signalled: AtomicBool::new(false) }
+        Hand { own, feed: Mutex::default() }
     }
 
     /// From now on a run is asked this way; `None` where its feed is gone.
@@ -56,23 +51,7 @@ impl Hand {
             signals.stops.fetch_add(1, Ordering::Relaxed);
             return "stop asked for: the rig goes to its safe state first".into();
         }
-        if !run_dir::is_held(folder) {
-            return "nothing to stop: no process leads this run".into();
-        }
-        let first = !self.asked.swap(true, Ordering::Relaxed);
-        if first && self.by_feed(Ask::Stop) {
-            return "stop asked for: the rig goes to its safe state first".into();
-        }
-        if self.signalled.swap(true, Ordering::Relaxed) {
-            return "stop was asked for twice: use the emergency stop if the rig does not obey".into();
-        }
-        match run_dir::holder(folder) {
-            Some(number) => match interrupt(number) {
-                Ok(()) => format!("stop asked for: SIGINT to process {}", number),
-                Err(why) => format!("NOT STOPPED: process {}: {why}", number),
-            },
-            None => "NOT STOPPED: another machine or user leads this run; stop it there".into(),
-        }
+        live::stop(folder).unwrap_or_else(|why| why)
     }
 
     /// Has the run rest before its next pass, or go on; says what comes of it.
@@ -116,7 +95,10 @@ fn take(shared: &Shared, pressed: &[u8]) {
     for key in pressed.iter().map(u8::to_ascii_lowercase).filter(|key| !long || *key == CTRL_C) {
         // What asks of the run does not wait for the picture: the lock of what is seen is taken for the note alone.
         match key {
-            b's' | CTRL_C => shared.note(shared.hand.stop(&shared.folder)),
+            b's' | CTRL_C => {
+                shared.note("stop asked for".into());
+                shared.note(shared.hand.stop(&shared.folder));
+            }
             b'p' | b'r' => shared.note(rest(shared, if key == b'p' { Ask::Pause } else { Ask::Resume })),
             b'q' if shared.own => shared.note("the view ends with the run: s stops the run".into()),
             b'q' => shared.over.store(true, Ordering::Relaxed),
@@ -142,11 +124,4 @@ fn rest(shared: &Shared, ask: Ask) -> String {
         }
         _ => shared.hand.pause(ask),
     }
-}
-
-/// Sends SIGINT to a process.
-fn interrupt(number: u32) -> rustix::io::Result<()> {
-    let process = i32::try_from(number).ok().and_then(rustix::process::Pid::from_raw);
-    let process = process.ok_or(rustix::io::Errno::SRCH)?;
-    rustix::process::kill_process(process, rustix::process::Signal::INT)
 }

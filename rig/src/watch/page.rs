@@ -225,6 +225,9 @@ fn urgent(view: &View) -> Vec<String> {
         lines.push(format!("TRIP {}", plain(&trip.to_string())));
         lines.push(format!("remedy: {}", plain(trip.cause.remedy())));
     }
+    // Until the end is told, which holds the same words.
+    let not_off = view.not_off.as_deref().filter(|_| view.ended.is_none());
+    lines.extend(not_off.iter().flat_map(|off| off.lines()).map(plain));
     if let Some(ended) = &view.ended {
         let remedy = ended.remedy.as_ref().filter(|_| trip.is_none());
         lines.extend(remedy.map(|remedy| format!("remedy: {}", plain(remedy))));

@@ -13,6 +13,7 @@ pub fn escape(text: &str) -> String {
             '"' => safe.push_str("&quot;"),
             '\'' => safe.push_str("&#39;"),
             c if c.is_control() && c != '\n' => safe.push('\u{fffd}'),
+            c if crate::print::is_hidden(c) => safe.push_str(&crate::print::clean(&c.to_string())),
             c => safe.push(c),
         }
     }

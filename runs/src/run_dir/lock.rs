@@ -1,5 +1,6 @@
 //! The lock of a run's folder, and of whatever else only one process may hold.
 
+use crate::files::open_plain;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::path::Path;
@@ -14,8 +15,9 @@ pub(super) const NAME: &str = ".lock";
 pub fn claim(lock: &Path) -> miette::Result<File> {
     let shown = lock.display();
     let wrong = |e: std::io::Error| miette::miette!("{shown}: {e}");
-    let mut file =
-        OpenOptions::new().create(true).read(true).write(true).truncate(false).open(lock).map_err(wrong)?;
+    let mut options = OpenOptions::new();
+    options.create(true).read(true).write(true).truncate(false);
+    let mut file = open_plain(lock, &mut options).map_err(wrong)?;
     match file.try_lock() {
         Ok(()) => {
             file.set_len(0).map_err(wrong)?;
@@ -36,7 +38,7 @@ pub fn claim(lock: &Path) -> miette::Result<File> {
 
 /// Whether a process holds the lock of a run's folder.
 pub fn is_held(run: &Path) -> bool {
-    let Ok(file) = File::open(run.join(NAME)) else { return false };
+    let Ok(file) = open_plain(&run.join(NAME), OpenOptions::new().read(true)) else { return false };
     matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
 }
 
@@ -54,6 +56,19 @@ pub fn holder(run: &Path) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_lock_that_is_a_link_is_refused_and_what_it_leads_to_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let (victim, lock) = (folder.path().join("victim"), folder.path().join(NAME));
+        fs::write(&victim, "precious").unwrap();
+        std::os::unix::fs::symlink(&victim, &lock).unwrap();
+        assert!(claim(&lock).is_err());
+        fs::remove_file(&lock).unwrap();
+        fs::hard_link(&victim, &lock).unwrap();
+        assert!(claim(&lock).is_err());
+        assert_eq!(fs::read_to_string(&victim).unwrap(), "precious");
+    }
 
     #[test]
     fn the_holder_is_who_has_the_lock_open_and_nobody_else() {

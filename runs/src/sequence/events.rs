@@ -117,6 +117,8 @@ pub enum Outcome {
     LoopLost,
     /// Record, passes, catalogue, summary or report could not be written: a measurement that is not kept is not made.
     RecordLost,
+    /// What the finger was exposed to could not be written in time: nothing is driven that is not counted. What was measured is kept.
+    ExposureNotKept,
 }
 
 impl Outcome {
@@ -142,6 +144,7 @@ impl Outcome {
             Outcome::NoContact { point } => format!("no contact at point {point}"),
             Outcome::LoopLost => "nothing was heard of the loop".into(),
             Outcome::RecordLost => "the record could not be kept".into(),
+            Outcome::ExposureNotKept => "the exposure of the finger could not be written in time".into(),
         }
     }
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::plan::{Plan, Resolution};
 use crate::setup::Setup;
-use crate::supervisor::{self, Asked, VirtualLoop};
+use crate::supervisor::{self, Asked, End, VirtualLoop};
 use models::prediction::SpringSlider;
 use realtime::turn::Ports;
 use sim::virtual_rig::VirtualRig;
@@ -13,6 +13,14 @@ const PLAN: &str = "name = \"p\"\nseed = 3\nreference_every = 0\n[pass]\nsettle_
 /// Sweeps with somebody who asks for a pause in these spans of time (s); returns the passes, the events and every row with whether the
 /// sweep rested then.
 fn swept(pauses: &[[f64; 2]]) -> (Vec<MeasuredPass>, Vec<Event>, Vec<(Row, bool)>, Outcome) {
+    swept_until(pauses, None)
+}
+
+/// The same, ended from outside at a time in s.
+fn swept_until(
+    pauses: &[[f64; 2]],
+    mut ends: Option<(f64, End)>,
+) -> (Vec<MeasuredPass>, Vec<Event>, Vec<(Row, bool)>, Outcome) {
     let setup = Setup::load("virtual-ideal").unwrap();
     let plan = Plan::parse("plan.toml", PLAN).unwrap();
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
@@ -24,8 +32,10 @@ fn swept(pauses: &[[f64; 2]]) -> (Vec<MeasuredPass>, Vec<Event>, Vec<(Row, bool)
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let now = std::cell::Cell::new(0.0);
-    let mut ask =
-        || Asked { end: None, pause: pauses.iter().any(|[from, to]| (*from..*to).contains(&now.get())) };
+    let mut ask = || {
+        let end = ends.take_if(|(at, _)| now.get() >= *at).map(|(_, end)| end);
+        Asked { end, pause: pauses.iter().any(|[from, to]| (*from..*to).contains(&now.get())) }
+    };
     let (mut passes, mut events, mut rows, mut rests) = (Vec::new(), Vec::new(), Vec::new(), false);
     let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut ask, &mut |row, _, reaction| {
         now.set(row.now.seconds());
@@ -84,5 +94,20 @@ fn a_pause_rests_without_drive_and_lifted_off_and_loses_no_pass() {
     for (a, b) in passes.iter().zip(&plain) {
         let mu = |p: &MeasuredPass| p.pass.lateral_force_n.unwrap().abs() / p.pass.normal_force_n;
         assert!((mu(a) / mu(b) - 1.0).abs() < 0.1, "{} {}", mu(a), mu(b));
+    }
+}
+
+/// Whoever ended it: a ledger of the finger's exposure that was not written is no record that was lost.
+#[test]
+fn each_end_from_outside_has_its_own_outcome() {
+    for (end, outcome) in [
+        (End::Asked, Outcome::Stopped),
+        (End::NotKept, Outcome::RecordLost),
+        (End::ExposureNotKept, Outcome::ExposureNotKept),
+    ] {
+        let (passes, events, rows, found) = swept_until(&[], Some((1.0, end)));
+        assert_eq!(found, outcome);
+        assert!(passes.len() < 5 && events.contains(&Event::StopRequested), "{events:?}");
+        assert!(rows.last().is_some_and(|(row, _)| !row.armed && row.drive_pp_m == 0.0));
     }
 }

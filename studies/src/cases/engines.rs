@@ -64,11 +64,21 @@ impl Job {
     /// Reads `job.json`.
     ///
     /// # Errors
-    /// A folder without one, or one of another version.
+    /// A folder without one, one of another version, or one that another user wrote.
     pub fn read(folder: &Path) -> miette::Result<Job> {
         let path = folder.join("job.json");
-        let bytes = std::fs::read(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-        serde_json::from_slice(&bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())
+        let shown = || path.display().to_string();
+        let file = runs::files::open_plain(&path, std::fs::OpenOptions::new().read(true));
+        let file = file.into_diagnostic().wrap_err_with(shown)?;
+        if !runs::files::is_own(&file.metadata().into_diagnostic()?) {
+            miette::bail!(
+                help = "whoever handed it over follows and cancels it",
+                "{}: another user's job",
+                shown()
+            );
+        }
+        let bytes = std::io::read_to_string(file).into_diagnostic().wrap_err_with(shown)?;
+        serde_json::from_str(&bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())
     }
 
     /// Writes `job.json`.
@@ -76,7 +86,7 @@ impl Job {
     /// # Errors
     /// Whatever the file system says.
     pub fn write(&self, folder: &Path) -> miette::Result<()> {
-        runs::files::write_whole(&folder.join("job.json"), serde_json::to_vec_pretty(self).into_diagnostic()?)
+        runs::files::write_plain(&folder.join("job.json"), serde_json::to_vec_pretty(self).into_diagnostic()?)
     }
 }
 
@@ -108,6 +118,17 @@ pub fn folders(out: &Path) -> miette::Result<Vec<PathBuf>> {
         entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.join("job.json").exists()).collect();
     all.sort();
     Ok(all)
+}
+
+/// The names of a job, where each is a number: anything else could be an option of the program that gets it.
+///
+/// # Errors
+/// One that is none.
+pub fn numbers(ids: &[String]) -> miette::Result<&[String]> {
+    match ids.iter().find(|id| id.is_empty() || !id.bytes().all(|b| b.is_ascii_digit())) {
+        None => Ok(ids),
+        Some(id) => miette::bail!("a job's name is a number, and {id:?} is none"),
+    }
 }
 
 /// A word as a shell takes it.

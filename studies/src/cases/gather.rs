@@ -90,7 +90,7 @@ pub fn gather(study: &Study, to: &Path, any_build: bool) -> miette::Result<Gathe
         miette::bail!("{}: the study has {cases} cases only", study.shard(beyond).display());
     }
     let part = runs::files::beside(to);
-    let file = std::fs::File::create(&part).into_diagnostic().wrap_err_with(|| part.display().to_string())?;
+    let file = runs::files::fresh(&part).into_diagnostic().wrap_err_with(|| part.display().to_string())?;
     let written = merged(study, &there, BufWriter::new(file), any_build);
     let moved = written.and_then(|gathered| {
         std::fs::rename(&part, to).into_diagnostic().wrap_err_with(|| to.display().to_string())?;

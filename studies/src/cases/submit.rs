@@ -122,9 +122,15 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
         wall_seconds: 0.0,
     };
     for (folder, job) in at_work(&study.out)? {
-        if let Some(engine) = engines::by_name(&job.engine)? {
-            let Ok(handed) = (engine.again)(&folder, &job) else { continue };
-            follow(study, engine, &folder, handed, &bar)?;
+        match engine.filter(|engine| engine.name == job.engine) {
+            Some(engine) => {
+                // The folder says which job it is; programs and their options come from the command line.
+                let (server, python) = (options.server.clone(), options.python.clone());
+                let job = Job { server, python, command: Vec::new(), options: Vec::new(), ..job };
+                let Ok(handed) = (engine.again)(&folder, &job) else { continue };
+                follow(study, engine, &folder, handed, &bar)?;
+            }
+            None => say!("{}: handed to another engine; --engine says which one to follow", folder.display()),
         }
     }
     let (mut before, mut in_vain) = (u64::MAX, 0);
@@ -196,10 +202,7 @@ fn hand_over(
     plan: &Plan,
     options: &Options,
 ) -> miette::Result<(PathBuf, Handed)> {
-    let next = engines::folders(&study.out)?.len() + 1;
-    let folder = (next..).map(|n| study.out.join("jobs").join(format!("{n:04}"))).find(|f| !f.exists());
-    let folder = folder.unwrap_or_default();
-    runs::files::make_folder(&folder)?;
+    let folder = new_folder(&study.out.join("jobs"))?;
     let exe = std::env::current_exe().into_diagnostic()?;
     let text = |path: &Path| path.display().to_string();
     let command = [
@@ -230,13 +233,34 @@ fn hand_over(
     let handed = match (engine.submit)(&folder, &job) {
         Ok(handed) => handed,
         Err(why) => {
-            runs::files::write_whole(&folder.join("ended"), "")?;
+            runs::files::write_plain(&folder.join("ended"), "")?;
             return Err(why);
         }
     };
     job.ids.clone_from(&handed.ids);
     job.write(&folder)?;
     Ok((folder, handed))
+}
+
+/// A folder of a new job, which nobody else has made.
+fn new_folder(jobs: &Path) -> miette::Result<PathBuf> {
+    runs::files::make_folder(jobs)?;
+    let wrong = || format!("cannot make a folder in {}", jobs.display());
+    if jobs.symlink_metadata().into_diagnostic()?.is_symlink() {
+        miette::bail!("{} is a link", jobs.display());
+    }
+    let mut number = 1;
+    loop {
+        let folder = jobs.join(format!("{number:04}"));
+        match std::fs::create_dir(&folder) {
+            Ok(()) => {
+                runs::files::sync_folder_of(&folder).into_diagnostic().wrap_err_with(wrong)?;
+                return Ok(folder);
+            }
+            Err(why) if why.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
+            Err(why) => return Err(why).into_diagnostic().wrap_err_with(wrong),
+        }
+    }
 }
 
 /// Looks at the folder until nothing is missing or the engine has nothing left to run.
@@ -265,7 +289,7 @@ fn follow(
     if let Some(child) = &mut handed.child {
         let _ = child.wait();
     }
-    runs::files::write_whole(&folder.join("ended"), "")
+    runs::files::write_plain(&folder.join("ended"), "")
 }
 
 /// Jobs that nobody has seen the end of.
@@ -282,7 +306,7 @@ pub fn cancel(out: &Path) -> miette::Result<Vec<String>> {
     let mut ids = Vec::new();
     for (folder, job) in at_work(out)? {
         // First the word for the workers, then the engine: a task that starts between sees it.
-        runs::files::write_whole(&folder.join("cancelled"), "")?;
+        runs::files::write_plain(&folder.join("cancelled"), "")?;
         if let Some(engine) = engines::by_name(&job.engine)? {
             (engine.cancel)(&job).wrap_err_with(|| folder.display().to_string())?;
         }

@@ -93,7 +93,7 @@ pub fn complete(
     if todo.is_empty() {
         return Ok((results, 0));
     }
-    let file = OpenOptions::new().create(true).append(true).open(path).into_diagnostic();
+    let file = runs::files::open_plain(path, OpenOptions::new().create(true).append(true)).into_diagnostic();
     let file = file.wrap_err_with(|| format!("cannot write {}", path.display()))?;
     drop_cut_line(path, &file)?;
     let file = Mutex::new(file);

@@ -16,7 +16,7 @@ use mcap::{Attachment, Compression, WriteOptions, Writer};
 use miette::{Context, IntoDiagnostic};
 use realtime::recorder::{EVENTS, Entry, HEADER, PASSES, Reader};
 use realtime::turn::Row;
-use runs::files::{beside, sync_folder_of};
+use runs::files::{beside, fresh, sync_folder_of};
 use runs::report::RunData;
 use runs::run_dir::records_in;
 use runs::sequence::MeasuredPass;
@@ -34,7 +34,7 @@ use std::path::Path;
 /// Whatever the file system or the format's library says. Nothing is left behind then.
 pub fn write(folder: &Path, run: &RunData, facts: &Facts, to: &Path) -> miette::Result<()> {
     let part = beside(to);
-    let written = File::create(&part).into_diagnostic().and_then(|file| {
+    let written = fresh(&part).into_diagnostic().and_then(|file| {
         let mut flat = Flat::begin(BufWriter::new(file), run, facts).into_diagnostic()?;
         for path in records_in(folder)? {
             let file = File::open(&path).into_diagnostic()?;

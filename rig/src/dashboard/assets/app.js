@@ -15,6 +15,10 @@ const STATES = 600;
 
 const get = (address, options = {}) => fetch(address, { ...options, headers: { ...options.headers, Authorization: `Bearer ${token}` } });
 
+// Marks that turn text round or that nobody sees are written out, as in the other views.
+const hidden = /[\u061c\u200b\u200e\u200f\u2028-\u202e\u2060\u2066-\u2069\ufeff]/g;
+const shown = (text) => (typeof text === "string" ? text.replace(hidden, (c) => `\\u${c.charCodeAt(0).toString(16).padStart(4, "0")}`) : text);
+
 // Elements are made of text, never of markup: names in records may hold some.
 function el(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
@@ -23,7 +27,7 @@ function el(tag, attributes = {}, ...children) {
     else if (value === true) made.setAttribute(name, "");
     else if (value !== false && value != null) made.setAttribute(name, value);
   }
-  made.append(...children.filter((c) => c != null));
+  made.append(...children.filter((c) => c != null).map(shown));
   return made;
 }
 
@@ -110,6 +114,7 @@ class Picture {
     this.progress = { made: run?.made_before ?? 0, planned: run?.planned ?? 0, remaining_s: 0 };
     this.trip = null;
     this.paused = false;
+    this.off = null;
     this.ended = null;
     this.changed = { passes: true, events: true, states: true };
   }
@@ -118,6 +123,7 @@ class Picture {
     else if (about === "state") { this.states.push(said); if (this.states.length > STATES) this.states.shift(); this.changed.states = true; }
     else if (about === "pass") { this.passes.push(said); this.changed.passes = true; }
     else if (about === "progress") this.progress = said;
+    else if (about === "off") this.off = said;
     else if (about === "ended") this.ended = said;
     else if (about === "event") {
       const what = said.event.event;
@@ -256,8 +262,8 @@ function runPage(name, control) {
   function drawWords() {
     const run = picture.run;
     if (run) {
-      title.textContent = `${run.plan} on ${run.setup}`;
-      about.textContent = `${name}; operator ${run.operator ?? "not stated"}; sample ${run.sample ?? "not stated"}; compared with ${run.model}${run.fast ? "; in virtual time" : ""}`;
+      title.textContent = shown(`${run.plan} on ${run.setup}`);
+      about.textContent = shown(`${name}; operator ${run.operator ?? "not stated"}; sample ${run.sample ?? "not stated"}; compared with ${run.model}${run.fast ? "; in virtual time" : ""}`);
     }
     const { made, planned, remaining_s } = picture.progress;
     cells.passes.textContent = `${made} of ${planned}`;
@@ -268,11 +274,11 @@ function runPage(name, control) {
     stop.disabled = Boolean(ended);
     pause.disabled = Boolean(ended) || Boolean(run?.fast);
     pause.textContent = picture.paused ? "Go on" : "Pause";
-    const lines = [picture.trip?.words, ended?.error, ended && !picture.trip && ended.outcome?.outcome !== "stopped" ? ended.remedy : null, ended?.off, ended?.agreement].filter(Boolean);
+    const lines = [picture.trip?.words, ended?.error, ended && !picture.trip && ended.outcome?.outcome !== "stopped" ? ended.remedy : null, ended?.off ?? picture.off, ended?.agreement].filter(Boolean);
     const key = lines.join("\n");
     if (trip.dataset.key !== key) {
       trip.dataset.key = key;
-      trip.className = picture.trip || ended?.error ? "trip" : "";
+      trip.className = picture.trip || picture.off || ended?.error ? "trip" : "";
       trip.replaceChildren(...lines.map((line) => el("p", {}, line)));
     }
   }

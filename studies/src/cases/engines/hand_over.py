@@ -1,13 +1,17 @@
 """Hands the tasks of a job of muprime to HyperQueue or to Dask, and stays until they have ended.
 
-usage: hand_over.py JOB_FOLDER [ID...]    (with the ids of a HyperQueue job: waits for it)
+usage: python -c SCRIPT JOB_FOLDER [ID...]    (with the ids of a HyperQueue job: waits for it)
 
-The folder holds job.json, as `muprime submit` writes it. The first line on standard output is a JSON list with the names of the job.
+The job comes by the standard input, as `muprime submit` writes job.json. The first line on standard output is a JSON list with the names of the job.
 """
+
+import sys
+
+# Nothing is imported from the folder that the command is called in: others may write to it.
+sys.path[:] = [place for place in sys.path if place]
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 
@@ -62,7 +66,7 @@ def dask(folder, job, ids):
 
 def main():
     folder, ids = Path(sys.argv[1]), sys.argv[2:]
-    job = json.loads((folder / "job.json").read_text())
+    job = json.load(sys.stdin)
     engine = {"hq": hyperqueue, "dask": dask}[job["engine"]]
     sys.exit(0 if engine(folder, job, ids) else 1)
 

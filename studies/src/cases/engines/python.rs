@@ -1,9 +1,10 @@
 //! HyperQueue and Dask, spoken to in Python by their own packages, with the script `hand_over.py` beside this file: it hands the tasks
 //! over and stays until they have ended. HyperQueue goes on without it; a Dask scheduler drops what waits when its client leaves.
 
-use super::{Engine, Handed, Job};
+use super::{Engine, Handed, Job, numbers};
 use miette::{Context, IntoDiagnostic, miette};
-use std::io::{BufRead, BufReader};
+use runs::files;
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -16,13 +17,12 @@ pub const DASK: Engine = Engine { name: "dask", submit, again: gone, alive, canc
 const SCRIPT: &str = include_str!("hand_over.py");
 
 fn submit(folder: &Path, job: &Job) -> miette::Result<Handed> {
-    runs::files::write_whole(&folder.join("hand_over.py"), SCRIPT)?;
     job.write(folder)?;
     begun(folder, job, &[])
 }
 
 fn again(folder: &Path, job: &Job) -> miette::Result<Handed> {
-    begun(folder, job, &job.ids)
+    begun(folder, job, numbers(&job.ids)?)
 }
 
 fn gone(_: &Path, job: &Job) -> miette::Result<Handed> {
@@ -31,23 +31,26 @@ fn gone(_: &Path, job: &Job) -> miette::Result<Handed> {
 
 /// Starts the script; its first line names the job, or what is wrong.
 fn begun(folder: &Path, job: &Job, ids: &[String]) -> miette::Result<Handed> {
-    let log = std::fs::OpenOptions::new()
-        .create(true)
-        .append(true)
-        .open(folder.join("log.txt"))
-        .into_diagnostic()?;
+    let mut options = std::fs::OpenOptions::new();
+    let log = files::open_plain(&folder.join("log.txt"), options.create(true).append(true));
+    let log = log.into_diagnostic().wrap_err("log.txt")?;
     let mut child = Command::new(&job.python)
-        .arg(folder.join("hand_over.py"))
+        // Nothing of the folder is run or trusted: the script is this program's, and the job comes by its standard input.
+        .args(["-c", SCRIPT])
         .arg(folder)
         .args(ids)
         // What it says of an error is for people: no frames of other programs.
         .env("RUST_BACKTRACE", "0")
-        .stdin(Stdio::null())
+        .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(log)
         .spawn()
         .into_diagnostic()
         .wrap_err_with(|| format!("{} cannot be run: name a Python with --python", job.python))?;
+    if let Some(mut to) = child.stdin.take() {
+        // One that ends at once says why below.
+        let _ = to.write_all(&serde_json::to_vec(job).into_diagnostic()?);
+    }
     let mut line = String::new();
     if let Some(said) = child.stdout.take() {
         BufReader::new(said).read_line(&mut line).into_diagnostic()?;

@@ -1,6 +1,6 @@
 //! Slurm: array jobs by `sbatch`. A task that a node's failure ends is queued again by Slurm (`--requeue`).
 
-use super::{Engine, Handed, Job, quoted};
+use super::{Engine, Handed, Job, numbers, quoted};
 use miette::{Context, IntoDiagnostic, miette};
 use std::path::Path;
 use std::process::{Command, Output};
@@ -37,9 +37,9 @@ fn ran(command: &mut Command) -> miette::Result<Output> {
 
 fn submit(folder: &Path, job: &Job) -> miette::Result<Handed> {
     let lines: String = job.ranges.iter().map(|r| format!("{}..{}\n", r.start, r.end)).collect();
-    runs::files::write_whole(&folder.join("ranges.txt"), lines)?;
+    runs::files::write_plain(&folder.join("ranges.txt"), lines)?;
     let path = folder.join("task.sh");
-    runs::files::write_whole(&path, script(folder, job))?;
+    runs::files::write_plain(&path, script(folder, job))?;
     let mut ids = Vec::new();
     for first in (0..job.ranges.len()).step_by(ARRAY) {
         let last = ARRAY.min(job.ranges.len() - first) - 1;
@@ -60,11 +60,13 @@ fn submit(folder: &Path, job: &Job) -> miette::Result<Handed> {
         }
         let told = String::from_utf8_lossy(&said.stdout);
         ids.push(told.trim().split(';').next().unwrap_or_default().to_string());
+        numbers(&ids)?;
     }
     Ok(Handed { ids, child: None })
 }
 
 fn again(_: &Path, job: &Job) -> miette::Result<Handed> {
+    numbers(&job.ids)?;
     Ok(Handed { ids: job.ids.clone(), child: None })
 }
 
@@ -96,7 +98,7 @@ fn cancel(job: &Job) -> miette::Result<()> {
     if job.ids.is_empty() {
         return Ok(());
     }
-    let said = ran(Command::new("scancel").args(&job.ids))?;
+    let said = ran(Command::new("scancel").args(numbers(&job.ids)?))?;
     let told = String::from_utf8_lossy(&said.stderr).into_owned();
     if said.status.success() || told.contains("Invalid job id") {
         return Ok(());
