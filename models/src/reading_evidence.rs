@@ -20,8 +20,10 @@ use std::fmt;
 
 /// `Psi*` that 'neither reading' holds for possible, evenly in its logarithm.
 pub const PSI_STAR_RANGE: [f64; 2] = [0.3, 9.0];
-/// `Psi` of the true stroke at which passes are asked: about one, where the readings differ most.
+/// `Psi` of the true stroke at which passes are asked: about one, where the readings differ most. A pass at an end has half its weight.
 pub const PSI_RANGE: [f64; 2] = [0.4, 4.0];
+/// Factor about each end over which the weight goes from all to nothing: a `mu_0` with noise then moves no pass in or out at once.
+pub const PSI_EDGE: f64 = 1.25;
 /// Ends of the search for `Psi*`.
 const SEARCH: [f64; 2] = [0.03, 90.0];
 /// The law's error, rms, in units of 4 mu' (1 - mu'): how far a pass may be off the fit before it weighs less.
@@ -121,6 +123,8 @@ struct Under {
     law_n: f64,
     /// Variance of the pass's noise, in N^2.
     noise: f64,
+    /// Its weight by its Psi, 0 to 1: [`PSI_RANGE`].
+    asked: f64,
 }
 
 /// The passes of a table or a sweep, ready for the fit.
@@ -166,8 +170,6 @@ pub fn of_passes(
         .map(|(load, _)| load * load * ((noise.pass_relative_sd * mu0 * load).powi(2) + force_variance))
         .sum::<f64>()
         / (mu0 * loads).powi(2);
-    let psi = |pass: &Judged| PsiEq17::at(&Condition { mu0, ..pass.condition }, poisson_ratio).0;
-    judged.retain(|pass| (PSI_RANGE[0]..=PSI_RANGE[1]).contains(&psi(pass)));
     Passes { judged, poisson_ratio, noise }.finding(mu0, mu0_variance, scale_sd)
 }
 
@@ -190,7 +192,7 @@ impl Passes {
         if !variance.is_finite() {
             return None;
         }
-        let (passes_low, passes_high) = self.each(mu0);
+        let (judged, passes_low, passes_high) = self.each(mu0)?;
         let half = Z95 * variance.sqrt();
         let (decision, nats, neither_nats) = decide(ln_star, variance + law * law);
         Some(ReadingFinding {
@@ -202,7 +204,7 @@ impl Passes {
             psi_star_high: (ln_star + half).exp(),
             passes_low,
             passes_high,
-            judged: u32::try_from(self.judged.len()).unwrap_or(u32::MAX),
+            judged,
         })
     }
 
@@ -225,7 +227,7 @@ impl Passes {
             let under = self.under(pass, ln_star, mu0);
             let sd = under.noise.sqrt().hypot(LAW_SD * under.law_n);
             let off = (pass.force_n - under.expected) / sd;
-            under.slope * off / (1.0 + (off / ROBUST).powi(2)).sqrt() / sd
+            under.asked * under.slope * off / (1.0 + (off / ROBUST).powi(2)).sqrt() / sd
         };
         self.judged.iter().map(pull).sum()
     }
@@ -236,6 +238,7 @@ impl Passes {
         let variance = under.noise + (LAW_SD * under.law_n).powi(2);
         let off = (pass.force_n - under.expected).powi(2) / variance;
         let weight = (1.0 + off / (ROBUST * ROBUST)).powf(-1.5) / variance;
+        let weight = under.asked * weight;
         (under, weight)
     }
 
@@ -250,25 +253,40 @@ impl Passes {
             slope: full * ratio * (-ratio).exp(),
             law_n: full * 4.0 * law * (1.0 - law),
             noise: (relative * full * law).powi(2) + own * own * (1.0 + (mu0 * law).powi(2)),
+            asked: asked(psi.0),
         }
     }
 
-    /// Between which `Psi*` nine of ten passes lie, each by itself; no friction below that without vibration: infinite.
-    fn each(&self, mu0: f64) -> (f64, Option<f64>) {
+    /// How many passes are asked, and between which `Psi*` nine of ten lie, each by itself; no friction below that without vibration: infinite.
+    fn each(&self, mu0: f64) -> Option<(u32, f64, Option<f64>)> {
         let by_hand = |pass: &Judged| {
             let c = &Condition { mu0, ..pass.condition };
-            let left = 1.0 - pass.force_n / (mu0 * c.normal_force_n);
-            if left <= 0.0 {
-                f64::INFINITY
-            } else {
-                (-PsiEq17::at(c, self.poisson_ratio).0 / left.ln()).max(0.0)
+            let psi = PsiEq17::at(c, self.poisson_ratio).0;
+            if !(PSI_RANGE[0]..=PSI_RANGE[1]).contains(&psi) {
+                return None;
             }
+            let left = 1.0 - pass.force_n / (mu0 * c.normal_force_n);
+            Some(if left <= 0.0 { f64::INFINITY } else { (-psi / left.ln()).max(0.0) })
         };
-        let mut each: Vec<f64> = self.judged.iter().map(by_hand).collect();
+        let mut each: Vec<f64> = self.judged.iter().filter_map(by_hand).collect();
         each.sort_by(f64::total_cmp);
         let beyond = each.len() / 20;
-        (each[beyond], Some(each[each.len() - 1 - beyond]).filter(|high| high.is_finite()))
+        let high = *each.get(each.len().checked_sub(1 + beyond)?)?;
+        Some((
+            u32::try_from(each.len()).unwrap_or(u32::MAX),
+            each[beyond],
+            Some(high).filter(|high| high.is_finite()),
+        ))
     }
+}
+
+/// The weight of a pass by its Psi: one within [`PSI_RANGE`], nothing far outside, smooth between.
+fn asked(psi: f64) -> f64 {
+    let edge = |beyond: f64| {
+        let t = (0.5 + beyond.ln() / (2.0 * PSI_EDGE.ln())).clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
+    };
+    edge(psi / PSI_RANGE[0]) * edge(PSI_RANGE[1] / psi)
 }
 
 /// What is said of the readings where `ln Psi*` is known within a variance; the two logarithms of odds.

@@ -1,7 +1,7 @@
 //! A verdict for people: what a terminal shows, and the plan of the experiment that tells most.
 
 use diagnosis::certificates;
-use diagnosis::verdict::Diagnosis;
+use diagnosis::verdict::{Diagnosis, probability};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::rig_file::RigFile;
@@ -56,7 +56,7 @@ pub fn terminal(result: &Diagnosis) -> String {
     let mut text = format!("{}\n\nHypotheses\n", r.text);
     for h in r.hypotheses.iter().filter(|h| h.probability > 0.005).take(8) {
         let name = if h.effects.is_empty() { "no gap".to_string() } else { h.effects.join(" + ") };
-        text.push_str(&format!("  {:5.3}  {name}", h.probability));
+        text.push_str(&format!("  {:>7}  {name}", probability(h.probability)));
         if h.alias_class.len() > 1 {
             text.push_str(&format!("  (not told from {})", h.alias_class[1..].join(", ")));
         }

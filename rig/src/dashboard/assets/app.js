@@ -97,8 +97,9 @@ async function catalogue() {
 
 // Without script and without an origin: a report asks for nothing.
 async function written(title, address) {
-  const text = await (await fetched(address)).text();
-  main.replaceChildren(el("h1", {}, title), el("iframe", { sandbox: "", srcdoc: text, title }));
+  const page = new DOMParser().parseFromString(await (await fetched(address)).text(), "text/html");
+  for (const script of page.querySelectorAll("script")) script.remove();
+  main.replaceChildren(el("h1", {}, title), el("iframe", { sandbox: "", srcdoc: `<!doctype html>${page.documentElement.outerHTML}`, title }));
 }
 
 // --- a run ---------------------------------------------------------------------------------------------------------
