@@ -46,7 +46,7 @@ fn full_pipe() -> (OwnedFd, File) {
 
 /// Writes until nothing more is taken.
 fn fill(mut to: &File) {
-    let set = |flags| {
+    let set = |flags: libc::c_int| {
         // SAFETY: a descriptor that is open, and flags of it.
         assert_eq!(unsafe { libc::fcntl(to.as_raw_fd(), libc::F_SETFL, flags) }, 0);
     };
