@@ -1,12 +1,9 @@
 //! Helpers that several system tests share.
 
+pub mod peer;
 pub mod served;
-mod wall_time;
-
-pub use wall_time::{
-    cut_by_a_stall, in_wall_clock_time, sweep_taken_up_again, sweep_unless_the_machine_stalls,
-    unless_the_machine_stalls,
-};
+pub mod study;
+pub mod waiting;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -107,6 +107,7 @@ fn parsed(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Cli
 fn features() -> Vec<&'static str> {
     let all = [
         ("arrow", cfg!(feature = "arrow")),
+        ("can", cfg!(feature = "can")),
         ("dashboard", cfg!(feature = "dashboard")),
         ("excel", cfg!(feature = "excel")),
         ("matlab", cfg!(feature = "matlab")),

@@ -154,8 +154,14 @@ fn modbus_round_trip_driver(bencher: Bencher<'_, '_>) {
     let (table, poll) = (profile.description.poll[0].table, profile.frames()[0].spans[0]);
     let link = &profile.description.link;
     let unit = link.unit.unwrap_or(1);
-    let mut wire =
-        drivers::modbus_tcp::Tcp::connect(&runtime, server.address(), unit, 1000, link.response_timeout_ms)
-            .unwrap();
+    let clock = realtime::clock::Clock::from(std::time::Instant::now());
+    let mut wire = drivers::modbus_tcp::Tcp::connect(
+        (&runtime, &clock),
+        server.address(),
+        unit,
+        1000,
+        link.response_timeout_ms,
+    )
+    .unwrap();
     bencher.bench_local(|| wire.read_registers(table, poll.address, poll.count).unwrap());
 }

@@ -61,6 +61,7 @@ fn main() {
         watch,
         life: Arc::clone(&life),
         origin_ns: pacing::monotonic_ns(),
+        held: None,
     };
     let looping = std::thread::spawn(move || pacing::run(parts, pacing));
     std::thread::sleep(std::time::Duration::from_secs_f64(seconds));

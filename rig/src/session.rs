@@ -11,6 +11,7 @@ use crate::exposure::Ledger;
 use crate::rig_lock::RigClaim;
 use crate::wall_loop::{Ended, Parts, WallLoop};
 use miette::{IntoDiagnostic, WrapErr};
+use realtime::clock::Clock;
 use realtime::pacing;
 use realtime::ports::Nanos;
 use realtime::turn::Ports;
@@ -66,14 +67,13 @@ fn over_instruments(
     let ledger = Ledger::open(&job.setup)?;
     job.setup.config.exposed = ledger.as_ref().map(Ledger::exposed).unwrap_or_default();
     let epoch = Instant::now();
+    let simulated = job.setup.file.virtual_rig.is_some();
+    let clock = if simulated { Clock::holdable(epoch) } else { Clock::from(epoch) };
     let origin_ns = pacing::monotonic_ns();
     let start_unix_ns = keeper::unix_ns();
     let mut instruments = job.setup.instruments();
-    let _embedded = match &job.setup.file.virtual_rig {
-        Some(_) => Some(embed(&job, &mut instruments, epoch)?),
-        None => None,
-    };
-    let rig = drivers::open(&instruments, epoch).map_err(|e| {
+    let _embedded = simulated.then(|| embed(&job, &mut instruments, clock.clone())).transpose()?;
+    let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
         miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
     })?;
     let mut kept = Keeper::begin(&job, dir, planned, start_unix_ns)?;
@@ -106,7 +106,8 @@ fn over_instruments(
     let (last_in, last_out) = channel();
     let writing = {
         let lost = RaisedByPanic(Arc::clone(&lost));
-        let write = move || writer::write(file, preamble, row_out, &notes, &last_out, &lost.0);
+        let clock = clock.join(writer::SLACK);
+        let write = move || writer::write(file, preamble, row_out, &notes, &last_out, &lost.0, &clock);
         std::thread::Builder::new().name("recorder".into()).spawn(write).into_diagnostic()?
     };
 
@@ -183,6 +184,7 @@ fn over_instruments(
         keeping.end(off.read_back);
     }
     let stalls = witnesses.finish();
+    let held = clock.held_back();
     drop(to_writer);
     let outcome = outcome.map_err(|_| fault("the sweep's thread panicked"));
     let mut last = BTreeMap::new();
@@ -219,8 +221,8 @@ fn over_instruments(
     let unrecorded = written.problem.is_some() && outcome == Outcome::Complete;
     let outcome = if unrecorded { Outcome::RecordLost } else { outcome };
     let record_lost = written.lost_rows + report.ring_drops;
-    let findings = sequence.findings(outcome == Outcome::Complete);
-    Ok(kept.end(outcome, findings, Some((report, stalls)), record_lost, links, off))
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, Some((report, stalls, held)), record_lost, links, off))
 }
 
 /// Raises a flag where the thread that holds it panics.
@@ -241,8 +243,8 @@ fn fault(what: &'static str) -> miette::Report {
 fn embed(
     job: &Job,
     instruments: &mut drivers::InstrumentsSetup,
-    epoch: Instant,
+    clock: Clock,
 ) -> miette::Result<crate::emulators::Embedded> {
-    let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), epoch);
+    let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), clock);
     crate::emulators::embed(instruments, &plant, false).map_err(|problem| miette::miette!("{problem}"))
 }

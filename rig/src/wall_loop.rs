@@ -4,8 +4,10 @@
 use drivers::Links;
 use miette::IntoDiagnostic;
 use models::prediction::FrictionModel;
+use realtime::clock::{Clock, Participant};
 use realtime::cycle::{Command, Config};
 use realtime::pacing::{self, Lifeline, LoopParts, LoopReport, Pacing};
+use realtime::ports::Nanos;
 use realtime::queue::CommandQueue;
 use realtime::turn::{Ports, Row};
 use ringbuf::traits::{Consumer, Split};
@@ -15,19 +17,23 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Rows that a ring holds: eight seconds at 1 kHz.
 const RING: usize = 8192;
 /// Commands that wait for the loop.
 const QUEUE: usize = 64;
 /// The loop counts as lost when nothing is heard of it for this long.
-const LOST_AFTER: Duration = Duration::from_millis(2000);
+const LOST_AFTER: Nanos = Nanos(2_000_000_000);
 /// Cycles that carry a stop to the links.
 const CYCLES_TO_STOP: u64 = 20;
 /// How long those are waited for at most, and the loop's thread after them.
-const STOP_WITHIN: Duration = Duration::from_millis(500);
-const JOIN_WITHIN: Duration = Duration::from_millis(2000);
+const STOP_WITHIN: Nanos = Nanos(500_000_000);
+const JOIN_WITHIN: Nanos = Nanos(2_000_000_000);
+/// How far a held clock may pass a row that the sweep has not answered yet.
+const SWEEP_SLACK: Nanos = Nanos(5_000_000);
+/// Pause of the sweep where no row has come.
+const REST: Nanos = Nanos(500_000);
 
 /// What a loop is made from.
 pub struct Parts {
@@ -49,6 +55,7 @@ pub struct Parts {
 pub struct WallLoop {
     commands: Arc<CommandQueue>,
     life: Arc<Lifeline>,
+    clock: Clock,
     looping: Option<JoinHandle<LoopReport>>,
     links: Option<Links>,
 }
@@ -76,7 +83,8 @@ impl WallLoop {
             commands: Arc::clone(&rig.commands),
             life: Arc::clone(&rig.life),
             watch: watched,
-            heard: Instant::now(),
+            heard: rig.clock.now(),
+            clock: rig.clock.join(SWEEP_SLACK),
         };
         Ok((rig, reins, record))
     }
@@ -85,13 +93,18 @@ impl WallLoop {
         let Parts { config, model, ports, links, pacing, origin_ns } = parts;
         let commands = Arc::new(CommandQueue::new(QUEUE));
         let life = Arc::new(Lifeline::default());
+        let clock = links.clock().clone();
+        // Less than a period: what the machine held up is no missed deadline.
+        let cycle = config.limits.timing.cycle.0;
+        let held = Some(clock.join(Nanos(cycle - cycle / 4))).filter(Participant::is_held);
         let mut rig = WallLoop {
             commands: Arc::clone(&commands),
             life: Arc::clone(&life),
+            clock,
             looping: None,
             links: Some(links),
         };
-        let parts = LoopParts { config, model, ports, commands, rows, watch, life, origin_ns };
+        let parts = LoopParts { config, model, ports, commands, rows, watch, life, origin_ns, held };
         let run = move || pacing::run(parts, pacing);
         rig.looping = Some(std::thread::Builder::new().name("loop".into()).spawn(run).into_diagnostic()?);
         Ok(rig)
@@ -109,7 +122,8 @@ impl WallLoop {
 
     /// Hands a command to the loop. False: the loop does not live any more.
     pub fn send(&self, command: Command) -> bool {
-        send(&self.commands, &self.life, command)
+        let rest = || std::thread::sleep(Duration::from_nanos(REST.0));
+        send(&self.commands, &self.life, &self.clock, &rest, command)
     }
 
     /// Stops the loop, switches off, reads back.
@@ -130,9 +144,9 @@ impl WallLoop {
         self.stop();
         let beat = || self.life.heartbeat.load(Ordering::Relaxed);
         let enough = beat() + CYCLES_TO_STOP;
-        let until = |limit: Duration, done: &dyn Fn() -> bool| {
-            let began = Instant::now();
-            while !done() && began.elapsed() < limit {
+        let until = |limit: Nanos, done: &dyn Fn() -> bool| {
+            let began = self.clock.now();
+            while !done() && self.clock.now().since(began) < limit {
                 std::thread::sleep(Duration::from_millis(1));
             }
         };
@@ -153,19 +167,19 @@ impl Drop for WallLoop {
 
 /// Puts a command into the queue. After a pause of the caller the rows come in a burst, and so do its commands: a full queue
 /// means only that the loop has not taken them yet, as long as its heart beats.
-fn send(commands: &CommandQueue, life: &Lifeline, command: Command) -> bool {
+fn send(commands: &CommandQueue, life: &Lifeline, clock: &Clock, rest: &dyn Fn(), command: Command) -> bool {
     let mut beat = life.heartbeat.load(Ordering::Relaxed);
-    let mut since = Instant::now();
+    let mut since = clock.now();
     let mut waiting = command;
     while let Err(back) = commands.push(waiting) {
         waiting = back;
         let now = life.heartbeat.load(Ordering::Relaxed);
         if now != beat {
-            (beat, since) = (now, Instant::now());
-        } else if since.elapsed() > LOST_AFTER {
+            (beat, since) = (now, clock.now());
+        } else if clock.now().since(since) > LOST_AFTER {
             return false;
         }
-        std::thread::sleep(Duration::from_micros(500));
+        rest();
     }
     true
 }
@@ -175,7 +189,8 @@ pub struct LoopHandle {
     commands: Arc<CommandQueue>,
     life: Arc<Lifeline>,
     watch: HeapCons<Row>,
-    heard: Instant,
+    heard: Nanos,
+    clock: Participant,
 }
 
 impl LoopHandle {
@@ -198,14 +213,16 @@ impl Loop for LoopHandle {
     fn next_row(&mut self) -> Option<Row> {
         let row = self.watch.try_pop();
         match row {
-            Some(_) => self.heard = Instant::now(),
-            None => std::thread::sleep(Duration::from_micros(500)),
+            Some(_) => self.heard = self.clock.now(),
+            // Only one that has answered every row lets a held clock go on.
+            None => self.clock.sleep_until(self.clock.now().plus(REST)),
         }
         row
     }
 
     fn send(&mut self, command: Command) -> bool {
-        send(&self.commands, &self.life, command)
+        let rest = || self.clock.sleep_until(self.clock.now().plus(REST));
+        send(&self.commands, &self.life, self.clock.clock(), &rest, command)
     }
 
     fn stop(&mut self) {
@@ -213,6 +230,6 @@ impl Loop for LoopHandle {
     }
 
     fn is_lost(&self) -> bool {
-        self.heard.elapsed() > LOST_AFTER
+        self.clock.now().since(self.heard) > LOST_AFTER
     }
 }

@@ -77,6 +77,24 @@ pub struct Paired {
     pub difference_sd: f64,
 }
 
+impl Paired {
+    /// The condition in words.
+    pub fn setting(&self) -> String {
+        format!(
+            "{:.2} um pp, {:.1} kHz, {:.1} mm/s, {:.2} N",
+            self.amplitude_pp_m * 1e6,
+            self.frequency_hz / 1e3,
+            self.speed_m_s * f64::from(self.direction) * 1e3,
+            self.normal_force_n
+        )
+    }
+
+    /// The difference in standard deviations.
+    pub fn deviations(&self) -> f64 {
+        self.difference / self.difference_sd
+    }
+}
+
 /// What the comparison comes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -92,6 +110,13 @@ pub enum Answer {
 }
 
 impl Comparison {
+    /// The pairs, those furthest apart first.
+    pub fn furthest_first(&self) -> Vec<&Paired> {
+        let mut pairs: Vec<&Paired> = self.pairs.iter().collect();
+        pairs.sort_by(|x, y| y.deviations().abs().total_cmp(&x.deviations().abs()));
+        pairs
+    }
+
     /// The same for two runs whose noise is one: a difference stands, likeness says nothing.
     pub fn of_one_noise(mut self) -> Self {
         if let Some(judged) = self.judged.as_mut().filter(|judged| judged.answer == Answer::NoDifferenceSeen)
@@ -142,22 +167,41 @@ impl Judged {
         }
     }
 
-    /// The figures behind it in words: the shift, and the scatter about it.
-    pub fn figures_words(&self, conditions: usize) -> [String; 2] {
-        let [low, high] = self.shift_interval_95;
-        [
-            format!(
-                "{conditions} conditions: mu' shifts by {:+.4}, 95 % interval {low:+.4} to {high:+.4} ({})",
-                self.shift,
-                p_value(self.shift_p)
-            ),
-            format!(
-                "scatter about it: chi2 {:.1} at {} degrees of freedom ({})",
-                self.scatter_chi2,
-                self.scatter_degrees,
-                p_value(self.scatter_p)
-            ),
-        ]
+    /// Whether the differences vary from condition to condition by more than their uncertainty: then no shift describes them.
+    pub fn varies(&self) -> bool {
+        self.scatter_p < LEVEL / 2.0
+    }
+
+    /// The figures behind it in words, what decides first: the shift and the scatter about it, or, where the differences vary, from where to
+    /// where, and only then their mean.
+    pub fn figures_words(&self, pairs: &[Paired]) -> [String; 2] {
+        let ([low, high], conditions) = (self.shift_interval_95, pairs.len());
+        let shift = format!("{:+.4}, 95 % interval {low:+.4} to {high:+.4}", self.shift);
+        let scatter = format!(
+            "chi2 {:.1} at {} degrees of freedom, {}",
+            self.scatter_chi2,
+            self.scatter_degrees,
+            p_value(self.scatter_p)
+        );
+        let by_difference = |a: &&Paired, b: &&Paired| a.difference.total_cmp(&b.difference);
+        match (pairs.iter().min_by(by_difference), pairs.iter().max_by(by_difference)) {
+            (Some(least), Some(most)) if self.varies() => [
+                format!(
+                    "the difference of mu' varies over {conditions} conditions, from {:+.3} +- {:.3} at {} to {:+.3} +- {:.3} at {} ({scatter})",
+                    least.difference,
+                    least.difference_sd,
+                    least.setting(),
+                    most.difference,
+                    most.difference_sd,
+                    most.setting()
+                ),
+                format!("no single shift describes that: their weighted mean is {shift}"),
+            ],
+            _ => [
+                format!("{conditions} conditions: mu' shifts by {shift} ({})", p_value(self.shift_p)),
+                format!("scatter about it: {scatter}"),
+            ],
+        }
     }
 }
 

@@ -1,13 +1,15 @@
-//! The report of a run: one self-contained HTML page. No script, no font, no picture from elsewhere.
+//! The report of a run: one self-contained HTML page. Nothing comes from elsewhere, and without JavaScript it says the same.
 
 pub mod about;
 pub mod comparison;
 pub mod diagnosis;
 pub mod events;
+mod explore;
 pub mod html;
 pub mod human;
 mod page;
 pub mod plots;
+mod traces;
 
 use crate::run_dir::{differences, missing_records, of_file, passes_in, records_in};
 use crate::sequence::MeasuredPass;
@@ -20,6 +22,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
+pub use explore::{FIGURES, UPLOT, UPLOT_STYLE};
 pub use html::escape;
 
 /// Everything a report is made of, read from a run's folder.
@@ -96,5 +99,5 @@ pub fn html(folder: &Path) -> miette::Result<String> {
 /// A folder that holds no run.
 pub fn html_and_damage(folder: &Path) -> miette::Result<(String, Vec<String>)> {
     let run = read(folder)?;
-    Ok((page::page(&run)?, run.damage))
+    Ok((page::page(&run, &traces::of(folder)?)?, run.damage))
 }

@@ -10,7 +10,7 @@
 mod arming;
 mod events;
 
-pub use events::{Event, Findings, MeasuredPass, Outcome};
+pub use events::{Event, MeasuredPass, Outcome};
 
 use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
 use crate::plan::{PassTimes, Point};
@@ -20,7 +20,6 @@ use models::pass::Pass;
 use models::prediction::FrictionModel;
 use models::psi::PsiEq17;
 use models::quantity::PeakToPeak;
-use models::reading_evidence::{ReadingEvidence, ReadingFinding};
 use models::rig_file::PassNoise;
 use realtime::compare::{Agreement, Comparator, PassComparison};
 use realtime::cycle::{Command, Marker, Phase};
@@ -109,7 +108,6 @@ pub struct Sequence {
     tries: u32,
     model: Arc<dyn FrictionModel>,
     comparator: Comparator,
-    readings: ReadingEvidence,
     stopping: bool,
     paused: bool,
     departed: bool,
@@ -148,7 +146,6 @@ impl Sequence {
             tries: 0,
             model,
             comparator,
-            readings: ReadingEvidence::new(tip.mu0, tip.finger.poisson_ratio, noise),
             stopping: false,
             paused: false,
             departed: false,
@@ -195,7 +192,6 @@ impl Sequence {
     pub fn remember(&mut self, pass: &Pass) {
         if let Some(friction) = pass.friction_force_n() {
             let condition = pass.condition(1.0).within(&self.ambient);
-            self.readings.pass(&condition, friction);
             // A condition outside the model's domain has no comparison, now as then.
             if let Ok(comparison) = self.comparator.pass(&*self.model, &condition, friction) {
                 self.last_comparison = Some(comparison);
@@ -225,15 +221,9 @@ impl Sequence {
         self.paused = paused;
     }
 
-    /// What the passes say of the two readings of the paper's w; `None` before one that could tell.
-    pub fn psi_reading(&self) -> Option<ReadingFinding> {
-        self.readings.finding()
-    }
-
-    /// What the passes say, for a sweep that came to its end or did not.
-    pub fn findings(&self, complete: bool) -> Findings {
-        let agreement = Agreement::of(self.last_comparison.as_ref(), complete);
-        Findings { agreement, psi_reading: self.psi_reading() }
+    /// What the passes say of the model, for a sweep that came to its end or did not.
+    pub fn agreement(&self, complete: bool) -> Agreement {
+        Agreement::of(self.last_comparison.as_ref(), complete)
     }
 
     /// Takes a row.
@@ -542,16 +532,12 @@ impl Sequence {
         let comparison =
             pass.friction_force_n().and_then(|f| self.comparator.pass(&*self.model, &condition, f).ok());
         self.last_comparison = comparison.or(self.last_comparison);
-        if let Some(friction) = pass.friction_force_n() {
-            self.readings.pass(&condition, friction);
-        }
         let regime = self.model.predict(&condition).ok().map(|p| p.regime);
         let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
         let psi_eq17 =
             known.map(|m| PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0);
         let temperature_flags = self.temperature_flags.clone();
-        let psi_reading = psi_eq17.and_then(|_| self.psi_reading());
-        MeasuredPass { pass, reference, comparison, regime, psi_eq17, psi_reading, temperature_flags }
+        MeasuredPass { pass, reference, comparison, regime, psi_eq17, temperature_flags }
     }
 }
 

@@ -18,7 +18,7 @@ use crate::setup::Setup;
 use crate::supervisor::OffReport;
 use calibration::certificate::sha256_hex;
 use models::prediction::FrictionModel;
-use models::reading_evidence::ReadingFinding;
+use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
 use realtime::witness::StallReport;
@@ -98,14 +98,15 @@ pub struct Summary {
     /// What the comparison of all passes says.
     #[serde(default = "nothing_said")]
     pub agreement: Agreement,
-    /// What they say of the two readings of the paper's w; `None` where none could tell.
-    #[serde(default)]
-    pub psi_reading: Option<ReadingFinding>,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
     /// When the machine kept ordinary threads from running; `None` in virtual time.
     #[serde(default)]
     pub stalls: Option<StallReport>,
+    /// Time that the clock of a virtual rig was held back while the computer kept threads of the run from
+    /// running; `None` where the clock cannot be held.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held: Option<HeldBack>,
     /// Rows that the record lost.
     pub record_lost: u64,
     /// What the links counted, by instrument.
@@ -173,7 +174,7 @@ impl Begun {
     /// # Errors
     /// Whatever file system and SQLite say.
     pub fn finish(self, job: &Job) -> miette::Result<Summary> {
-        Keeper::finish(job, self.dir, self.planned, self.sequence.findings(true))
+        Keeper::finish(job, self.dir, self.planned, self.sequence.agreement(true))
     }
 }
 

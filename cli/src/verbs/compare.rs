@@ -51,9 +51,8 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     match &result.judged {
         None => w.push_str("cannot tell: the runs have no condition in common\n"),
         Some(judged) => {
-            let conditions = result.pairs.len();
-            let [shift, scatter] = judged.figures_words(conditions);
-            let _ = writeln!(w, "{}\n{shift}\n{scatter}", judged.answer_words(conditions));
+            let [first, second] = judged.figures_words(&result.pairs);
+            let _ = writeln!(w, "{}\n{first}\n{second}", judged.answer_words(result.pairs.len()));
         }
     }
     let [a, b] = result.references;
@@ -69,10 +68,7 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     if left + right > 0 {
         let _ = writeln!(w, "passes at conditions that the other run lacks: {left} and {right}");
     }
-    let mut worst: Vec<_> = result.pairs.iter().collect();
-    worst.sort_by(|x, y| {
-        (y.difference / y.difference_sd).abs().total_cmp(&(x.difference / x.difference_sd).abs())
-    });
+    let worst = result.furthest_first();
     if !worst.is_empty() {
         w.push_str("furthest apart (w peak-to-peak; second less first, in standard deviations):\n");
     }
@@ -87,7 +83,7 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
             p.a.mu_relative,
             p.b.mu_relative,
             p.difference,
-            p.difference / p.difference_sd
+            p.deviations()
         );
     }
     let _ = writeln!(

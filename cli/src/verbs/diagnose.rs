@@ -125,7 +125,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 vec![("table", table_path.display().to_string()), ("rig", rig_path.display().to_string())];
             [named, about::of_rig(&rig)].concat()
         };
-        write_text(out, &runs::report::diagnosis::page(&result, &table, &about)?)?;
+        let page = runs::report::diagnosis::page(&result, &table, &about)?;
+        write_text(out, &page)?;
+        keep_in_run(&args.data, out, &page);
     }
     if json {
         out!("{}", document(&result, &rig, &damage).into_diagnostic()?);
@@ -134,6 +136,18 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         out!("{}", folded(runs::verdict::words(&result, &rig).trim_end(), 4));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A run's page that was written elsewhere, once more in the run's folder, where the dashboard lists it. A folder that takes no file, or a
+/// table without a run, keeps nothing.
+fn keep_in_run(run: &Path, page: &Path, text: &str) {
+    let inside = || Some(page.canonicalize().ok()?.parent()? == run.canonicalize().ok()?);
+    if run.is_dir() && inside() == Some(false) {
+        let copy = run.join("diagnosis.html");
+        if let Err(why) = write_text(&copy, text) {
+            say!("the dashboard will not list this page: {why}");
+        }
+    }
 }
 
 /// A bar that follows a diagnosis; on Ctrl-C the effects that lead so far are told.

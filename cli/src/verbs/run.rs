@@ -324,6 +324,9 @@ fn tell(summary: &Summary, json: bool) {
             summary.record_lost
         );
     }
+    if let Some(held) = summary.held.filter(|held| held.share >= 0.01) {
+        told!("{held}");
+    }
     if let (Outcome::Tripped(trip), Some(stalls)) = (&summary.outcome, &summary.stalls)
         && let Some(stall) = stalls.within(Nanos(trip.at.0.saturating_sub(100_000_000)), trip.at)
     {
@@ -341,9 +344,6 @@ fn tell(summary: &Summary, json: bool) {
         told!("the same command with --out {} goes on", summary.folder.display());
     }
     told!("{}", summary.agreement);
-    if let Some(reading) = &summary.psi_reading {
-        told!("{reading}");
-    }
     if summary.model_departed {
         told!("'muprime diagnose {}' says where and why", summary.folder.display());
     }

@@ -9,6 +9,7 @@ use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
+use runs::report::{FIGURES, UPLOT, UPLOT_STYLE};
 use serde::Deserialize;
 use std::sync::Arc;
 use std::time::Duration;
@@ -36,9 +37,9 @@ pub fn routes(shared: Arc<Shared>) -> Router {
         .route("/", get(|| asset("text/html; charset=utf-8", include_str!("assets/index.html"))))
         .route("/app.css", get(|| asset("text/css", include_str!("assets/app.css"))))
         .route("/app.js", get(|| asset("text/javascript", include_str!("assets/app.js"))))
-        .route("/plots.js", get(|| asset("text/javascript", include_str!("assets/plots.js"))))
-        .route("/uplot.css", get(|| asset("text/css", include_str!("assets/uPlot.min.css"))))
-        .route("/uplot.js", get(|| asset("text/javascript", include_str!("assets/uPlot.iife.min.js"))))
+        .route("/plots.js", get(|| asset("text/javascript", FIGURES)))
+        .route("/uplot.css", get(|| asset("text/css", UPLOT_STYLE)))
+        .route("/uplot.js", get(|| asset("text/javascript", UPLOT)))
         .merge(data)
         .layer(middleware::from_fn(with_body))
         .layer(middleware::from_fn_with_state(Arc::clone(&shared), at_this_place))

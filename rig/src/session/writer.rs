@@ -1,6 +1,7 @@
 //! The record's thread: drains the ring, writes, flushes, syncs.
 
 use miette::IntoDiagnostic;
+use realtime::clock::Participant;
 use realtime::ports::Nanos;
 use realtime::recorder::{Preamble, Recorder};
 use realtime::turn::Row;
@@ -17,6 +18,8 @@ use std::time::{Duration, Instant};
 const FLUSH_EVERY: Duration = Duration::from_millis(50);
 /// Sync of the record to the disk.
 const SYNC_EVERY: Duration = Duration::from_secs(1);
+/// How far a held clock may pass what is written: a small part of the ring.
+pub(super) const SLACK: Nanos = Nanos(1_000_000_000);
 
 /// Events and passes for the record, with their time.
 pub(super) type Entry = (Nanos, Vec<Event>, Option<MeasuredPass>);
@@ -41,14 +44,16 @@ pub(super) fn write(
     entries: &Receiver<Entry>,
     last: &Receiver<Last>,
     lost: &AtomicBool,
+    clock: &Participant,
 ) -> Written {
     let mut written = Written::default();
     let mut ended = false;
-    if let Err(problem) = record(file, preamble, &mut rows, entries, last, &mut ended) {
+    if let Err(problem) = record(file, preamble, &mut rows, entries, last, &mut ended, clock) {
         lost.store(true, Ordering::Relaxed);
         written.problem = Some(format!("{problem:#}"));
         // The last words come once: where they have, none are waited for.
         while !ended {
+            clock.promise(clock.now());
             written.lost_rows += rows.pop_iter().count() as u64;
             ended = !matches!(last.recv_timeout(Duration::from_millis(20)), Err(RecvTimeoutError::Timeout));
         }
@@ -64,11 +69,13 @@ fn record(
     entries: &Receiver<Entry>,
     last: &Receiver<Last>,
     ended: &mut bool,
+    clock: &Participant,
 ) -> miette::Result<()> {
     let disk = file.handle()?;
     let mut recorder = Recorder::begin(file, preamble).into_diagnostic()?;
     let (mut flushed, mut synced) = (Instant::now(), Instant::now());
     let last = loop {
+        clock.promise(clock.now());
         let mut idle = true;
         while let Some(row) = rows.try_pop() {
             recorder.row(&row).into_diagnostic()?;
@@ -105,6 +112,7 @@ fn record(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use realtime::clock::Clock;
     use ringbuf::traits::Split;
     use std::sync::mpsc::channel;
 
@@ -118,8 +126,8 @@ mod tests {
         let (last_in, last) = channel::<Last>();
         let (done_in, done) = channel();
         std::thread::spawn(move || {
-            let lost = AtomicBool::new(false);
-            let written = write(file, Preamble::default(), rows, &entries, &last, &lost);
+            let (lost, clock) = (AtomicBool::new(false), Clock::from(Instant::now()).join(SLACK));
+            let written = write(file, Preamble::default(), rows, &entries, &last, &lost, &clock);
             let _ = done_in.send((written.problem, lost.into_inner()));
         });
         // Kept until the writer is done, as the sweep's thread does.

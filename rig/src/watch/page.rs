@@ -1,7 +1,7 @@
 //! The page: what stands where. Eighty columns and twenty-four rows hold everything; more room goes to the curve, the traces and the
 //! events, less room keeps what is needed first.
 
-use super::numbers::{duration, of_state, outcome, phase, plain};
+use super::numbers::{duration, of_state, phase, plain};
 use super::plot::{curve, trace};
 use super::style::Look;
 use super::{Keys, Source};
@@ -146,7 +146,7 @@ fn state(page: &Page<'_>) -> (String, Style) {
     let (view, look) = (page.view, page.look);
     if let Some(ended) = &view.ended {
         let how = match (&ended.outcome, &ended.error) {
-            (Some(how), _) => outcome(how),
+            (Some(how), _) => how.words(),
             (None, Some(error)) => plain(error),
             (None, None) => "nothing is known of its end".into(),
         };

@@ -84,7 +84,6 @@ fn pass(point: u64, amplitude_um: f64, measured: Option<f64>, predicted: f64) ->
         comparison: Some(comparison),
         regime: None,
         psi_eq17: None,
-        psi_reading: None,
         temperature_flags: Vec::new(),
     }
 }
@@ -227,7 +226,7 @@ fn eighty_by_twenty_four_holds_all_that_matters() {
             "frequency     27.500 kHz",
             "output        ON, 24.1 degC",
             "lateness      1.25 ms, worst of 1 s",
-            "last pass     4: mu' 0.200, z -1.2",
+            "last pass     4: mu' 0.200, surprise -1.2 sd",
             "lateral force, N, 60 s: -0.060..+0.060",
             "normal force, N, 60 s: +0.240..+0.260",
             "w, um peak-to-peak",

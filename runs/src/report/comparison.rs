@@ -2,7 +2,7 @@
 
 use super::html::{escape, glossary, list, note, shell, table};
 use super::plots;
-use crate::compare::{Compared, Paired};
+use crate::compare::{Answer, Compared, Comparison, Mean, Paired};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -22,16 +22,21 @@ pub fn page(compared: &Compared) -> miette::Result<String> {
     let conditions = result.pairs.len();
     match &result.judged {
         None => w.push_str(
-            "<div class=\"verdict\"><p>Cannot tell: the runs have no condition in common.</p></div>",
+            "<div class=\"verdict undecided\"><p>Cannot tell: the runs have no condition in common.</p></div>",
         ),
         Some(judged) => {
-            let [shift, scatter] = judged.figures_words(conditions);
+            let [first, second] = judged.figures_words(&result.pairs);
+            let class = match judged.answer {
+                Answer::Differ => " departed",
+                Answer::NoDifferenceSeen => "",
+                Answer::CannotTell | Answer::NotIndependent => " undecided",
+            };
             let _ = write!(
                 w,
-                "<div class=\"verdict\"><p><strong>{}</strong></p><p>{}<br>{}</p></div>",
+                "<div class=\"verdict{class}\"><p><strong>{}</strong></p><p>{}<br>{}</p></div>",
                 escape(&judged.answer_words(conditions)),
-                escape(&shift),
-                escape(&scatter)
+                escape(&first),
+                escape(&second)
             );
         }
     }
@@ -49,7 +54,7 @@ pub fn page(compared: &Compared) -> miette::Result<String> {
             plots::comparison::overlay(result)?,
             plots::comparison::differences(result)?
         );
-        w.push_str(&pairs(&result.pairs));
+        w.push_str(&pairs(result));
     }
     w.push_str(&differences(compared));
     w.push_str(&glossary());
@@ -83,34 +88,44 @@ fn about(compared: &Compared, a: &str, b: &str) -> String {
     table("Both runs", &head, &rows)
 }
 
-fn pairs(pairs: &[Paired]) -> String {
+/// Deviations from which a row stands out.
+const STANDS_OUT: f64 = 3.0;
+
+fn pairs(result: &Comparison) -> String {
     let column = |name: &str| format!("<th scope=\"col\" class=\"n\">{name}</th>");
     let head: String =
         ["w, um", "f, kHz", "U, mm/s", "load, N", "\u{3bc}' first", "\u{3bc}' second", "difference", "in sd"]
             .map(column)
             .concat();
-    let row = |p: &Paired| {
+    let single = result.pairs.iter().all(|p| p.a.passes == 1 && p.b.passes == 1);
+    let mean = |m: &Mean| match single {
+        true => format!("{:.3}", m.mu_relative),
+        false => format!("{:.3} ({})", m.mu_relative, m.passes),
+    };
+    let row = |p: &&Paired| {
+        let out = if p.deviations().abs() > STANDS_OUT { " class=\"out\"" } else { "" };
         let speed = p.speed_m_s * f64::from(p.direction) * 1e3;
         format!(
-            "<tr><td class=\"n\">{:.3}</td><td class=\"n\">{:.2}</td><td class=\"n\">{speed:+.1}</td><td class=\"n\">{:.2}</td>\
-             <td class=\"n\">{:.3} ({})</td><td class=\"n\">{:.3} ({})</td><td class=\"n\">{:+.3} &plusmn; {:.3}</td>\
+            "<tr{out}><td class=\"n\">{:.3}</td><td class=\"n\">{:.2}</td><td class=\"n\">{speed:+.1}</td><td class=\"n\">{:.2}</td>\
+             <td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{:+.3} &plusmn; {:.3}</td>\
              <td class=\"n\">{:+.1}</td></tr>\n",
             p.amplitude_pp_m * 1e6,
             p.frequency_hz / 1e3,
             p.normal_force_n,
-            p.a.mu_relative,
-            p.a.passes,
-            p.b.mu_relative,
-            p.b.passes,
+            mean(&p.a),
+            mean(&p.b),
             p.difference,
             p.difference_sd,
-            p.difference / p.difference_sd
+            p.deviations()
         )
     };
-    let rows: String = pairs.iter().map(row).collect();
+    let rows: String = result.furthest_first().iter().map(row).collect();
+    let passes = if single { "" } else { " In brackets: passes." };
     format!(
         "<h2>Condition by condition</h2>{}{}",
-        note("In brackets: passes."),
+        note(&format!(
+            "Those furthest apart first; in bold what is more than {STANDS_OUT} standard deviations apart.{passes}"
+        )),
         table("Conditions in common", &head, &rows)
     )
 }

@@ -12,7 +12,7 @@ use super::plots::verdict::{Seen, errors_against};
 use diagnosis::Verdict;
 use diagnosis::data::Table;
 use diagnosis::predict::Forecast;
-use diagnosis::verdict::Diagnosis;
+use diagnosis::verdict::{Diagnosis, probability};
 use models::covariate;
 
 /// Parts of the operating space that are told in words, the largest first.
@@ -105,7 +105,7 @@ fn location(result: &Diagnosis, table: &Table, errors: &[(f64, f64)]) -> String 
         .place
         .iter()
         .filter(|(_, p)| **p >= 0.005)
-        .map(|(place, p)| format!("{place} {p:.2}"))
+        .map(|(place, p)| format!("{place} {}", probability(*p)))
         .collect();
     let closed: Vec<String> = r
         .left_out
@@ -151,9 +151,9 @@ fn uncertain(result: &Diagnosis) -> String {
         if let Some(with) = &r.with_suspects {
             let name = if with.effects.is_empty() { "no gap".into() } else { with.effects.join(" + ") };
             text += &format!(
-                "<p>With them counted as any other the leading answer is {} (probability {:.2}).</p>",
+                "<p>With them counted as any other the leading answer is {} (probability {}).</p>",
                 escape(&name),
-                with.probability
+                probability(with.probability)
             );
         }
     }

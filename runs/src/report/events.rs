@@ -34,6 +34,9 @@ pub fn describe(event: &Event) -> String {
             let when = if *after { "after" } else { "before" };
             format!("force zeros {when} the sweep: lateral {}, normal {}", mn(lateral_n), mn(normal_n))
         }
+        Event::Tripped(trip) if trip.cause == Cause::Stopped => {
+            "stopped on request: drive off, stage at rest, finger lifted".into()
+        }
         Event::Tripped(trip) => format!("TRIP {trip}\n  {}", trip.cause.remedy()),
         Event::ModelDeparted { point, log_evidence } => {
             let odds = (log_evidence / std::f64::consts::LN_10).floor();

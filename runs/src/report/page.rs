@@ -2,22 +2,24 @@
 
 use super::RunData;
 use super::html::{escape, glossary, head, note, shell, table};
-use super::{events, plots};
+use super::traces::Trace;
+use super::{events, explore, plots};
 use crate::sequence::Outcome;
 use std::fmt::Write;
 
-pub(super) fn page(run: &RunData) -> miette::Result<String> {
+pub(super) fn page(run: &RunData, traces: &[Trace]) -> miette::Result<String> {
     let fact = |name: &str| escape(run.facts.get(name).map_or("unknown", String::as_str));
     let mut html = String::new();
     let w = &mut html;
     let title = format!("{} on {}", fact("plan"), fact("setup"));
     let _ = writeln!(w, "<h1>{title}</h1>{}", head(&run.about));
     verdict(w, run);
+    w.push_str(&explore::section(run, traces));
     let _ = write!(
         w,
         "<h2>Relative friction against amplitude</h2>{}{}\
          <h2>Relative friction against &Psi;</h2>{}{}\
-         <h2>Residuals</h2>{}{}",
+         <h2>Surprise of each pass</h2>{}{}",
         plots::run::mu_against_amplitude(run)?,
         note(
             "Marks: measured passes with one standard uncertainty. Lines and bands: the spring-slider alone at the \
@@ -25,15 +27,14 @@ pub(super) fn page(run: &RunData) -> miette::Result<String> {
                  too, stands as a short stroke at each pass. w is peak-to-peak."
         ),
         plots::run::mu_against_psi(run)?,
-        note(&format!(
+        note(
             "&Psi; = U / (w f &mu;<sub>0</sub> (1+&nu;)), Eq. 17. Lines and bands: Eq. 20 with the paper's &Psi;* = 2.38 &plusmn; 0.21, \
-             below where its w is the whole stroke, above where it is the sine's amplitude (1.19 of the stroke).{}",
-            reading(run)
-        )),
+             below where its w is the whole stroke, above where it is the sine's amplitude (1.19 of the stroke)."
+        ),
         plots::run::residuals(run)?,
         note(
-            "Measured less predicted lateral force, in standard deviations, in the order of measurement; \
-                 independent from pass to pass as long as the model holds. Dashed: &plusmn;1.96."
+            "How far the force of each pass lies from what the model and the passes before it let expect, in standard deviations, in the \
+             order of measurement. While the model holds it is independent from pass to pass. Dashed: &plusmn;1.96."
         ),
     );
     timing(w, run)?;
@@ -50,7 +51,6 @@ fn verdict(w: &mut String, run: &RunData) {
     let outcome = match &run.summary {
         None => "The run has no ending: it was killed, or is still going.".to_string(),
         Some(s) => {
-            let word = serde_json::to_string(&s.outcome).unwrap_or_default();
             let planned = s.planned;
             match &s.outcome {
                 Outcome::Complete => format!("Complete: {made} of {planned} passes."),
@@ -63,7 +63,9 @@ fn verdict(w: &mut String, run: &RunData) {
                     "The rig would not arm: {cause:?} stood in the way.<br>{}",
                     escape(cause.remedy())
                 ),
-                _ => format!("Ended early after {made} of {planned} passes: {}", escape(&word)),
+                outcome => {
+                    format!("Ended early after {made} of {planned} passes: {}.", escape(&outcome.words()))
+                }
             }
         }
     };
@@ -99,18 +101,6 @@ fn verdict(w: &mut String, run: &RunData) {
     }
 }
 
-/// What the run, or so far its last pass that could tell, says of the two readings.
-fn reading(run: &RunData) -> String {
-    let whole = run.summary.as_ref().and_then(|summary| summary.psi_reading);
-    let last = whole.or_else(|| run.passes.iter().rev().find_map(|p| p.psi_reading));
-    last.map_or_else(String::new, |finding| {
-        let text = finding.to_string();
-        let mut letters = text.chars();
-        let first = letters.next().map_or_else(String::new, |c| c.to_uppercase().to_string());
-        format!(" {}{}.", escape(&first), escape(letters.as_str()))
-    })
-}
-
 fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
     let Some(report) = run.summary.as_ref().and_then(|s| s.loop_report.as_ref()) else {
         let _ = writeln!(w, "<h2>Loop</h2><p>No loop timing: virtual time, or no ending.</p>");
@@ -128,7 +118,7 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
         w,
         "<h2>Loop</h2>{}{}<p>{} cycles of {} us. Lateness: median {}, 99 % {}, 99.9 % {}, worst {}. \
          {} deadlines missed. Scheduling: {class}, {locked}. Page faults in the loop: {} minor, {} major. \
-         Rows lost: {}.</p>",
+         Rows lost: {}.{}</p>",
         plots::run::lateness(report)?,
         note("How late the loop was at each deadline, missed ones included. Both axes logarithmic."),
         report.cycles,
@@ -141,6 +131,7 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
         report.minor_faults,
         report.major_faults,
         run.summary.as_ref().map_or(0, |s| s.record_lost),
+        run.summary.as_ref().and_then(|s| s.held).map_or_else(String::new, |held| format!(" {held}.")),
     );
     Ok(())
 }
@@ -148,17 +139,20 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
 fn passes(w: &mut String, run: &RunData) {
     const HEAD: &str = "<th scope=\"col\">point</th><th scope=\"col\">w um</th><th scope=\"col\">f kHz</th><th scope=\"col\">U mm/s</th>\
          <th scope=\"col\">dir</th><th scope=\"col\">F<sub>n</sub> N</th><th scope=\"col\">L N</th><th scope=\"col\">&mu;'</th>\
-         <th scope=\"col\">&plusmn;</th><th scope=\"col\">predicted</th><th scope=\"col\">&plusmn;</th><th scope=\"col\">z</th>";
+         <th scope=\"col\">&plusmn;</th><th scope=\"col\">predicted</th><th scope=\"col\">&plusmn;</th><th scope=\"col\">difference</th>\
+         <th scope=\"col\">surprise, sd</th>";
     let mut rows = String::new();
     for p in &run.passes {
         let c = p.comparison;
         let number =
             |v: Option<f64>, digits: usize| v.map_or("&ndash;".to_string(), |v| format!("{v:.digits$}"));
+        let signed =
+            |v: Option<f64>, digits: usize| v.map_or("&ndash;".to_string(), |v| format!("{v:+.digits$}"));
         let _ = writeln!(
             rows,
             "<tr><td class=\"n\">{}{}</td><td class=\"n\">{:.3}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td>\
              <td class=\"n\">{}</td><td class=\"n\">{:.4}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
-             <td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>",
+             <td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>",
             p.pass.point,
             if p.temperature_flags.is_empty() { "" } else { "*" },
             p.pass.amplitude.micrometres(),
@@ -171,11 +165,21 @@ fn passes(w: &mut String, run: &RunData) {
             number(c.and_then(|c| c.mu_relative_sd), 3),
             number(c.map(|c| c.predicted), 3),
             number(c.map(|c| c.predicted_sd), 3),
-            number(c.map(|c| c.z), 2),
+            signed(c.and_then(|c| Some(c.mu_relative? - c.predicted)), 3),
+            signed(c.map(|c| c.z), 1),
         );
     }
     let all = table("All passes", HEAD, &rows);
-    let _ = writeln!(w, "<details><summary>All {} passes</summary>{all}</details>", run.passes.len());
+    let _ = writeln!(
+        w,
+        "<details><summary>All {} passes</summary>{}{all}</details>",
+        run.passes.len(),
+        note(
+            "Difference: measured less predicted &mu;', at the stiffnesses that the setup states. Surprise: the force of the pass against \
+             what the model lets expect after the passes before it, which have corrected its stiffnesses and &mu;<sub>0</sub> within what \
+             the setup leaves open. So the two can differ, in sign too; the surprise is what the finding rests on."
+        )
+    );
 }
 
 fn facts(w: &mut String, run: &RunData) {

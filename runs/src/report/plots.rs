@@ -283,12 +283,43 @@ fn measured(
         PathElement::new(vec![(*x, ends[0]), (*x, ends[1])], colour.stroke_width(1))
     });
     chart.draw_series(bars).map_err(wrong)?;
-    let marks = points.iter().map(|(x, y, _)| mark(series, (*x, y.clamp(low, high)), size, colour, true));
+    let series = series.min(SERIES - 1);
+    let filled = filled(series);
+    let marks = points.iter().map(|(x, y, _)| mark(series, (*x, y.clamp(low, high)), size, colour, filled));
     chart.draw_series(marks).map_err(wrong)?;
     Ok(())
 }
 
-/// The shape of a series in a caption, as text.
+/// How many series a figure can tell apart: the marks, and those that are not crosses once more, hollow.
+pub(crate) const SERIES: usize = 2 * MARKS - 1;
+
+/// Whether the marks of a series are filled.
+pub(crate) fn filled(series: usize) -> bool {
+    series < MARKS
+}
+
+/// Which mark stands for which value, for a caption: values beyond the last mark share it, and all of them are named.
+pub(crate) fn series_key(values: &[String], unit: &str) -> String {
+    let of = |series: usize| match series + 1 {
+        SERIES => values[series..].join(", "),
+        _ => values[series].clone(),
+    };
+    let marks = (0..values.len().min(SERIES)).map(|i| format!("{}: {} {unit}", mark_name(i), of(i)));
+    marks.collect::<Vec<_>>().join("; ")
+}
+
+/// The shape of a series in a caption, as text; those beyond the last one share it.
 pub fn mark_name(series: usize) -> &'static str {
-    ["discs", "squares", "triangles", "diamonds", "crosses"][series % MARKS]
+    const NAMES: [&str; SERIES] = [
+        "discs",
+        "squares",
+        "triangles",
+        "diamonds",
+        "crosses",
+        "hollow discs",
+        "hollow squares",
+        "hollow triangles",
+        "hollow diamonds",
+    ];
+    NAMES[series.min(SERIES - 1)]
 }

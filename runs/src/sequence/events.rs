@@ -3,8 +3,7 @@
 use crate::certificates::temperature::TemperatureFlag;
 use models::pass::Pass;
 use models::prediction::Regime;
-use models::reading_evidence::ReadingFinding;
-use realtime::compare::{Agreement, PassComparison};
+use realtime::compare::PassComparison;
 use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip};
 use serde::{Deserialize, Serialize};
@@ -22,21 +21,9 @@ pub struct MeasuredPass {
     pub regime: Option<Regime>,
     /// Psi of Eq. 17 at the measured condition; `None` without vibration or without `mu_0`.
     pub psi_eq17: Option<f64>,
-    /// What the passes so far say of the two readings of the paper's w; `None` without vibration or without `mu_0`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub psi_reading: Option<ReadingFinding>,
     /// Certificates that do not hold at the temperature that the pass began with. Nothing was corrected for it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub temperature_flags: Vec<TemperatureFlag>,
-}
-
-/// What the passes of a sweep say in the end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Findings {
-    /// Of the model that they were compared with.
-    pub agreement: Agreement,
-    /// Of the two readings of the paper's w; `None` where none could tell.
-    pub psi_reading: Option<ReadingFinding>,
 }
 
 /// Something worth a line in the record and on the terminal.
@@ -141,6 +128,23 @@ impl Outcome {
             Outcome::Tripped(trip) => Some(trip.cause),
             Outcome::WouldNotArm { blocking } => *blocking,
             _ => None,
+        }
+    }
+
+    /// How the sweep ended, in words.
+    pub fn words(&self) -> String {
+        match self {
+            Outcome::Complete => "complete".into(),
+            Outcome::Stopped => "stopped on request".into(),
+            Outcome::Tripped(_) => "a safety rule tripped".into(),
+            Outcome::WouldNotArm { blocking: Some(cause) } => {
+                format!("the rig would not arm: {cause:?} stands in the way")
+            }
+            Outcome::WouldNotArm { blocking: None } => "the rig would not arm".into(),
+            Outcome::NoContact { point } => format!("no contact at point {point}"),
+            Outcome::LoopLost => "nothing was heard of the loop".into(),
+            Outcome::RecordLost => "the record could not be kept".into(),
+            Outcome::ExposureNotKept => "the exposure of the finger could not be written in time".into(),
         }
     }
 }

@@ -5,11 +5,12 @@ use super::telemetry::Snapshots;
 use super::{Begun, Job, Signals, Summary, Update};
 use crate::files::Placed;
 use crate::plan::{Plan, Resolution};
-use crate::sequence::{Findings, MeasuredPass, Outcome, Reaction, Sequence};
+use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
 use crate::setup::Setup;
 use crate::supervisor::{self, Asked, End, OffReport, VirtualLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::FrictionModel;
+use realtime::compare::Agreement;
 use realtime::ports::Nanos;
 use realtime::recorder::Recorder;
 use realtime::turn::{Ports, Row};
@@ -57,8 +58,8 @@ pub fn run(
         tracing::error!("the record could not be kept: the sweep was stopped: {why:#}");
         Outcome::RecordLost
     });
-    let findings = sequence.findings(outcome == Outcome::Complete);
-    Ok(kept.end(outcome, findings, None, 0, BTreeMap::new(), off))
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, None, 0, BTreeMap::new(), off))
 }
 
 /// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
@@ -145,8 +146,8 @@ pub struct Rehearsal {
     pub passes: Vec<MeasuredPass>,
     /// How it ended.
     pub outcome: Outcome,
-    /// What they say in the end.
-    pub findings: Findings,
+    /// What they say of the model in the end.
+    pub agreement: Agreement,
     /// Cycles run.
     pub cycles: u64,
 }
@@ -175,8 +176,8 @@ pub fn rehearse(
     let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut Asked::default, &mut |_, _, reaction| {
         passes.extend(reaction.pass);
     });
-    let findings = sequence.findings(outcome == Outcome::Complete);
-    Ok(Rehearsal { passes, outcome, findings, cycles: rig.cycles() })
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(Rehearsal { passes, outcome, agreement, cycles: rig.cycles() })
 }
 
 /// An outcome as JSON, for the record's last words.

@@ -5,10 +5,11 @@ use super::{Job, Notes, Summary, Unfinished, Update};
 use crate::catalogue::{Catalogue, RunEntry};
 use crate::files::Placed;
 use crate::run_dir::RunDir;
-use crate::sequence::{Event, Findings, MeasuredPass, Outcome};
+use crate::sequence::{Event, MeasuredPass, Outcome};
 use crate::supervisor::OffReport;
 use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
+use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::cycle::Config;
 use realtime::pacing::LoopReport;
@@ -102,7 +103,12 @@ impl Keeper {
     ///
     /// # Errors
     /// Whatever file system and SQLite say.
-    pub fn finish(job: &Job, mut dir: RunDir, planned: usize, findings: Findings) -> miette::Result<Summary> {
+    pub fn finish(
+        job: &Job,
+        mut dir: RunDir,
+        planned: usize,
+        agreement: Agreement,
+    ) -> miette::Result<Summary> {
         dir.stay();
         let written = std::fs::read(dir.path().join(SUMMARY)).ok();
         let written: Option<Summary> = written.and_then(|text| serde_json::from_slice(&text).ok());
@@ -113,7 +119,7 @@ impl Keeper {
         let kept = Self::enter(job, dir, catalogue, planned, unix_ns()).wrap_err(Unfinished::NotKept)?;
         Ok(Summary {
             finished_before: true,
-            ..kept.end(Outcome::Complete, findings, None, 0, BTreeMap::new(), OffReport::off())
+            ..kept.end(Outcome::Complete, agreement, None, 0, BTreeMap::new(), OffReport::off())
         })
     }
 
@@ -184,13 +190,14 @@ impl Keeper {
     pub fn end(
         mut self,
         outcome: Outcome,
-        findings: Findings,
-        machine: Option<(LoopReport, StallReport)>,
+        agreement: Agreement,
+        machine: Option<(LoopReport, StallReport, Option<HeldBack>)>,
         record_lost: u64,
         links: BTreeMap<String, serde_json::Value>,
         off: OffReport,
     ) -> Summary {
-        let (loop_report, stalls) = machine.unzip();
+        let (loop_report, stalls, held) =
+            machine.map_or((None, None, None), |(report, stalls, held)| (Some(report), Some(stalls), held));
         let mut summary = Summary {
             requirement: outcome.cause().and_then(Cause::requirement).map(String::from),
             remedy: outcome.cause().map(|cause| cause.remedy().to_string()),
@@ -198,11 +205,11 @@ impl Keeper {
             folder: self.dir.path().to_path_buf(),
             passes: self.passes,
             planned: self.planned,
-            model_departed: findings.agreement == Agreement::Departed,
-            agreement: findings.agreement,
-            psi_reading: findings.psi_reading,
+            model_departed: agreement == Agreement::Departed,
+            agreement,
             loop_report,
             stalls,
+            held,
             record_lost,
             links,
             off,

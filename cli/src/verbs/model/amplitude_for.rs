@@ -31,6 +31,9 @@ pub struct AmplitudeForArgs {
 
 /// Answers; an amplitude out of reach is a failure (1), nonsense is refused (2).
 pub fn run(args: &AmplitudeForArgs, json: bool) -> miette::Result<ExitCode> {
+    if let Err(why) = args.condition.check() {
+        return refused(why);
+    }
     let condition = args.condition.condition();
     let coulomb = condition.mu0 * condition.normal_force_n;
     let Some(wanted) = args.mu_relative.or(args.lateral_force_n.map(|force| force / coulomb)) else {

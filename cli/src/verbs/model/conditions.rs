@@ -4,6 +4,7 @@ use clap::Args;
 use models::condition::Condition;
 use models::quantity::PeakToPeak;
 use models::ridge::{RidgeCase, case};
+use runs::input::unit_meant;
 
 /// One operating point. Defaults are the paper's nominal case.
 #[derive(Args, Clone, Debug)]
@@ -28,7 +29,32 @@ pub struct ConditionArgs {
     pub poisson_ratio: f64,
 }
 
+/// What a flag may be at most on any rig that vibrates a plate under a finger. The models answer for larger values too, and mean nothing.
+const LARGEST: [(&str, f64); 5] = [
+    ("amplitude_pp_m", 1e-4),
+    ("frequency_hz", 1e7),
+    ("speed_m_s", 10.0),
+    ("normal_force_n", 1000.0),
+    ("mu0", 10.0),
+];
+
 impl ConditionArgs {
+    /// The first value that no rig can have; what no model is defined for is refused by the model itself.
+    ///
+    /// # Errors
+    /// The flag, its value, what is allowed, and the unit that was probably meant.
+    pub fn check(&self) -> Result<(), String> {
+        let values = [self.amplitude_pp_m, self.frequency_hz, self.speed_m_s, self.normal_force_n, self.mu0];
+        for ((key, largest), value) in LARGEST.into_iter().zip(values) {
+            if value > largest {
+                let meant = unit_meant(key, value, [1e-6 * largest, largest]);
+                let hint = meant.map_or_else(String::new, |meant| format!(" ({meant})"));
+                return Err(format!("--{} {value}: at most {largest:e}{hint}", key.replace('_', "-")));
+            }
+        }
+        Ok(())
+    }
+
     /// As the point models take it.
     pub fn condition(&self) -> Condition {
         Condition {

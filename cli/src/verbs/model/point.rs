@@ -7,12 +7,12 @@ use miette::IntoDiagnostic;
 use models::finger::Finger;
 use models::prediction::{EmpiricalPsi, FrictionModel};
 use models::psi::{PsiEq16, PsiEq17};
+use models::reading::Reading;
 use models::spring_slider;
 use models::surrogate::Surrogate;
 use runs::out;
 use serde::Serialize;
 use std::process::ExitCode;
-use studies::figures::reading::{self, Reading};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Law {
@@ -29,9 +29,6 @@ pub struct PointArgs {
     /// Which law
     #[arg(long, value_enum, default_value = "spring-slider")]
     model: Law,
-    /// How the paper's w is read, whose Psi* the law 'psi' takes [default: both, a mixture]
-    #[arg(long, value_parser = reading::parser())]
-    reading: Option<Reading>,
     /// Normal stiffness of the finger in N/m
     #[arg(long, default_value_t = 3.9e6, allow_negative_numbers = true)]
     normal_stiffness_n_per_m: f64,
@@ -78,8 +75,8 @@ struct Answer {
 
 /// Answers, or refuses a condition outside the law's domain.
 pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
-    if args.reading.is_some() && args.model != Law::Psi {
-        return refused("--reading belongs to --model psi: the other laws know the plate's stroke alone");
+    if let Err(why) = args.condition.check() {
+        return refused(why);
     }
     let condition = args.condition.condition();
     let finger = Finger {
@@ -107,11 +104,7 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
             &slider
         }
         Law::Psi => {
-            let law = match args.reading {
-                Some(reading) => EmpiricalPsi::read(finger, reading),
-                None => EmpiricalPsi::paper(finger),
-            };
-            empirical = match law {
+            empirical = match EmpiricalPsi::paper(finger) {
                 Ok(law) => law,
                 Err(why) => return refused(why),
             };
@@ -162,11 +155,15 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
     if json {
         out!("{}", serde_json::to_string(&answer).into_diagnostic()?);
     } else {
+        // A law without an error of its own says nothing of how far off it is: no uncertainty is not an uncertainty of zero.
+        let sd = match answer.mu_relative_sd {
+            sd if sd > 0.0 => format!(" +- {sd:.4}"),
+            _ => String::new(),
+        };
         out!(
-            "{}: mu' = {:.4} +- {:.4}, lateral force {:.5} N, contact {:.1} % of the time, phase shift {:.1} deg",
+            "{}: mu' = {:.4}{sd}, lateral force {:.5} N, contact {:.1} % of the time, phase shift {:.1} deg",
             answer.model,
             answer.mu_relative,
-            answer.mu_relative_sd,
             answer.lateral_force_n,
             100.0 * answer.contact_fraction,
             answer.phase_shift_deg

@@ -134,6 +134,9 @@ fn partial(mu: &[f64], cycles: u64, json: bool) {
 
 /// Runs the case; refuses bad input, and fails with a reason where the run diverged.
 pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
+    if let Err(why) = args.condition.check() {
+        return refused(why);
+    }
     let case = args.case();
     let mut settings = RunSettings { step_s: args.time_step_s, ..RunSettings::default() };
     settings.steady.tolerance = args.tolerance;

@@ -2,7 +2,7 @@
 
 use crate::report::html::{bar, escape, table};
 use crate::report::human::with_interval;
-use diagnosis::verdict::{Diagnosis, Hypothesis};
+use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
 
 /// Probability from which a hypothesis is listed, and from which its effects are explained.
 const LISTED: f64 = 0.002;
@@ -10,11 +10,6 @@ const EXPLAINED: f64 = 0.05;
 
 fn name(h: &Hypothesis) -> String {
     if h.effects.is_empty() { "no gap".into() } else { h.effects.join(" + ") }
-}
-
-/// A probability as it can be read: certainty is not claimed.
-fn probability(p: f64) -> String {
-    if p > 0.999 { "> 0.999".into() } else { format!("{p:.3}") }
 }
 
 /// The section.

@@ -1,6 +1,8 @@
 //! The figures of a run.
 
-use super::{COLOURS, Frame, GREY, NARROW, Span, WIDE, band, figure, line, mark, mark_name, measured, wrong};
+use super::{
+    COLOURS, Frame, GREY, NARROW, Span, WIDE, band, figure, line, mark, measured, series_key, wrong,
+};
 use crate::report::RunData;
 use crate::report::html::escape;
 use crate::report::human::number;
@@ -110,11 +112,14 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     // Loads fall together by one digit, which is no word on what the load was.
     let load_n = chosen.iter().map(|p| p.pass.normal_force_n).sum::<f64>() / chosen.len() as f64;
     let load = round(load_n, 2);
-    let marks: Vec<String> =
-        speeds.iter().enumerate().map(|(i, speed)| format!("{}: {speed} mm/s", mark_name(i))).collect();
+    let driven = run.passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO).count();
+    let elsewhere = match driven - chosen.len() {
+        0 => String::new(),
+        n => format!(" {n} passes at other frequencies or loads are in the table, not in this figure."),
+    };
     Ok(format!(
-        "<figure>{svg}<figcaption>at {f} kHz and {load} N. {}. Short strokes: what was predicted for each pass.</figcaption></figure>",
-        escape(&marks.join("; "))
+        "<figure>{svg}<figcaption>at {f} kHz and {load} N. {}. Short strokes: what was predicted for each pass.{elsewhere}</figcaption></figure>",
+        escape(&series_key(&speeds, "mm/s"))
     ))
 }
 
@@ -155,7 +160,7 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
     Ok(format!("<figure>{svg}</figure>"))
 }
 
-/// Standardised residuals in the order of measurement.
+/// How far each pass lies from what was expected after those before it, in the order of measurement.
 ///
 /// # Errors
 /// Only if the drawing library fails.
@@ -167,20 +172,20 @@ pub fn residuals(run: &RunData) -> miette::Result<String> {
         .filter(|(_, z, _)| z.is_finite())
         .collect();
     if points.is_empty() {
-        return Ok("<p>No residual.</p>".into());
+        return Ok("<p>No pass was judged.</p>".into());
     }
     let end = points.iter().map(|p| p.0).fold(1.0, f64::max) * 1.02;
     let worst = points.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
     let most = worst.clamp(3.0, 40.0) * 1.1;
     let alt = format!(
-        "Residuals of {} passes against time, the largest of {} standard deviations.",
+        "Surprise of {} passes against time, the largest of {} standard deviations.",
         points.len(),
         number(worst)
     );
     let frame = Frame {
         sizes: [(WIDE.0, 340), NARROW],
         x: (Span::linear(0.0..end), "time, s"),
-        y: (Span::linear(-most..most), "residual, standard deviations"),
+        y: (Span::linear(-most..most), "surprise, standard deviations"),
         alt: &alt,
     };
     let svg = figure(&frame, |chart, size| {
