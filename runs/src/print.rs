@@ -59,9 +59,11 @@ pub fn urgent(text: &str) {
     put(ERR, Piece::Text(format!("{text}\n")), true);
 }
 
-/// Draws something on standard error, such as a bar, where remarks are written.
-pub fn draw(drawn: impl FnOnce() + Send + 'static) {
-    put(ERR, Piece::Drawn(Box::new(drawn)), false);
+/// Draws something on standard error, such as a bar, where remarks are written; `line` is the line that it writes, empty where it writes
+/// none.
+pub fn draw(line: &str, drawn: impl FnOnce() + Send + 'static) {
+    let line = if line.is_empty() { String::new() } else { format!("{line}\n") };
+    put(ERR, Piece::Drawn(line, Box::new(drawn)), false);
 }
 
 /// The outputs' places among the outlets.
@@ -76,19 +78,22 @@ const LAST_WORDS: Duration = Duration::from_secs(2);
 /// What is to be written.
 enum Piece {
     Text(String),
-    Drawn(Box<dyn FnOnce() + Send>),
+    Drawn(String, Box<dyn FnOnce() + Send>),
 }
 
 impl Piece {
-    fn bytes(&self) -> usize {
-        if let Piece::Text(text) = self { text.len() } else { 0 }
+    /// What a person reads of it.
+    fn text(&self) -> &str {
+        match self {
+            Piece::Text(text) | Piece::Drawn(text, _) => text,
+        }
     }
 
     fn write(self, output: usize) {
         match self {
             Piece::Text(text) if output == OUT => whole(&mut io::stdout().lock(), &text),
             Piece::Text(text) => whole(&mut io::stderr().lock(), &text),
-            Piece::Drawn(drawn) => drawn(),
+            Piece::Drawn(_, drawn) => drawn(),
         }
     }
 }
@@ -108,10 +113,10 @@ struct Outlet {
 
 impl Outlet {
     fn put(&mut self, output: usize, piece: Piece, first: bool) {
-        let bytes = piece.bytes();
+        let bytes = piece.text().len();
         if !first && (self.waiting.len() >= PIECES || self.bytes + bytes > BYTES) {
-            let text = u64::from(matches!(piece, Piece::Text(_)));
-            (self.lost, self.lost_in_all) = (self.lost + text, self.lost_in_all + text);
+            let line = u64::from(bytes > 0);
+            (self.lost, self.lost_in_all) = (self.lost + line, self.lost_in_all + line);
             return;
         }
         if self.lost > 0 && !first {
@@ -128,13 +133,13 @@ impl Outlet {
     fn next(&mut self, output: usize) -> Option<Piece> {
         let piece = match self.waiting.pop_front() {
             Some(piece) => {
-                self.bytes -= piece.bytes();
+                self.bytes -= piece.text().len();
                 piece
             }
             None if self.lost > 0 => Piece::Text(left_out(output, std::mem::take(&mut self.lost))),
             None => return None,
         };
-        self.taken = Some(if let Piece::Text(text) = &piece { text.clone() } else { String::new() });
+        self.taken = Some(piece.text().to_string());
         Some(piece)
     }
 }
@@ -213,11 +218,9 @@ pub fn end() -> String {
     let (mut all, _) = waited.unwrap_or_else(PoisonError::into_inner);
     let mut rest = String::new();
     for (outlet, name) in all.iter_mut().flatten().zip(["standard output", "standard error"]) {
-        let waiting = outlet.waiting.drain(..).filter_map(|piece| match piece {
-            Piece::Text(text) => Some(text),
-            Piece::Drawn(_) => None,
-        });
-        let lines: Vec<String> = outlet.taken.iter().cloned().chain(waiting).collect();
+        let waiting = outlet.waiting.drain(..).map(|piece| piece.text().to_string());
+        let unread = outlet.taken.iter().cloned().chain(waiting);
+        let lines: Vec<String> = unread.filter(|text| !text.is_empty()).collect();
         if !lines.is_empty() || outlet.lost_in_all > 0 {
             let (count, lost) = (lines.len(), outlet.lost_in_all);
             let _ = writeln!(

@@ -127,13 +127,12 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         true => Some(Watch::begin(&job.out, Lead::Own(signals.clone()), job.setup.hand_at_key())?),
         false => None,
     };
-    let bar = progress_bar(json || tui);
-    bar.set_length(planned as u64);
+    let bar = progress_bar(json || tui, planned as u64);
     // Looked at once: while it is drawn, whoever asks it anything waits for the terminal.
     let hidden = bar.is_hidden();
     let say = |text: String| {
-        let (text, bar) = (fitted(text), bar.clone());
-        if hidden { say!("{text}") } else { print::draw(move || bar.println(clean(&text))) }
+        let (text, bar) = (clean(&fitted(text)).into_owned(), bar.clone());
+        if hidden { say!("{text}") } else { print::draw(&text.clone(), move || bar.println(text)) }
     };
     if !json {
         let clock = if job.fast { "virtual time" } else { "wall-clock time" };
@@ -186,7 +185,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                     &|| serde_json::json!({ "made": made, "planned": all, "remaining_s": left_s }),
                 );
                 let bar = bar.clone();
-                print::draw(move || {
+                print::draw("", move || {
                     bar.set_position((planned.saturating_sub(all) + made) as u64);
                     bar.set_message(format!("{left_s:.0} s to go"));
                 });
@@ -201,7 +200,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             Update::Off(_) => {}
         }
     });
-    print::draw(move || bar.finish_and_clear());
+    print::draw("", move || bar.finish_and_clear());
     drop(watch);
     if let Ok(summary) = &summary {
         tell(summary, json);
@@ -296,8 +295,9 @@ fn watch_signals(signals: &Signals) -> miette::Result<()> {
     Ok(())
 }
 
-fn progress_bar(json: bool) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+/// A bar that was not drawn yet: the first line of it too may find a terminal that takes nothing.
+fn progress_bar(json: bool, planned: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(planned), ProgressDrawTarget::stderr());
     if json || !std::io::stderr().is_terminal() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
