@@ -2,6 +2,7 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
+use crate::describe::{Description, at_least, description};
 use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::intervals::{Estimate, curvature, estimates};
 use crate::locate::{Region, ledger, regions};
@@ -104,6 +105,10 @@ pub struct Report {
     /// How far the verdict's model had to pull the stiffnesses from their calibration; empty for `unknown`, which
     /// has no model that holds.
     pub stiffness_pulls: Vec<Pull>,
+    /// What an unknown departure looks like, best first; empty otherwise.
+    pub description: Vec<Description>,
+    /// Causes that are sure under an open verdict.
+    pub at_least: Vec<String>,
     /// Effects that the table cannot show.
     pub not_testable: Vec<NotTestable>,
     /// Under no gap: the size of each effect from which this table would have shown it, most visible first.
@@ -194,6 +199,8 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
         scatter: fitted.scatter.clone(),
         with_suspects,
         stiffness_pulls,
+        description: description(&fitted, &decision),
+        at_least: at_least(&fitted, &decision),
         not_testable: fitted
             .not_testable
             .iter()
@@ -212,6 +219,11 @@ fn label(fitted: &Fitted, candidate: usize) -> String {
     fitted.candidates[candidate].names().join("+")
 }
 
+/// A probability as it can be read: certainty is not claimed.
+pub fn probability(p: f64) -> String {
+    if p > 0.999 { "> 0.999".into() } else { format!("{p:.3}") }
+}
+
 fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
     let closed = gap.shrinkage.map_or_else(
         || match gap.before_rmse {
@@ -220,10 +232,15 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
         },
         |s| {
             let percent = 100.0 * s.abs();
+            // A share without its interval claims more than the passes can show.
+            let within = gap.shrinkage_ci95.map_or_else(String::new, |[low, high]| {
+                let [low, high] = if s < 0.0 { [-high, -low] } else { [low, high] };
+                format!(" (95 %: {:.0} to {:.0})", 100.0 * low, 100.0 * high)
+            });
             if s < 0.0 {
-                format!("on held-out passes it closes nothing: the gap grows by {percent:.0} %")
+                format!("on held-out passes it closes nothing: the gap grows by {percent:.0} %{within}")
             } else {
-                format!("the gap shrinks by {percent:.0} % on held-out passes")
+                format!("the gap shrinks by {percent:.0} %{within} on held-out passes")
             }
         },
     );
@@ -231,9 +248,9 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
     match decision.verdict {
         Verdict::NoGap => "The recalibrated baseline explains the table: no gap.".to_string(),
         Verdict::Named => format!(
-            "{} causes most of the gap (probability {:.2}); {closed}.",
+            "{} causes most of the gap (probability {}); {closed}.",
             label(fitted, leader),
-            decision.probabilities[leader]
+            probability(decision.probabilities[leader])
         ),
         Verdict::Ambiguous if decision.class.len() == 1 => {
             let name = label(fitted, leader);
@@ -243,10 +260,8 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
                     cause.words()
                 )
             } else {
-                let probability = decision.probabilities[leader];
-                format!(
-                    "{name} leads with a probability of {probability:.2}, too little to be named; {closed}."
-                )
+                let probability = probability(decision.probabilities[leader]);
+                format!("{name} leads with a probability of {probability}, too little to be named; {closed}.")
             }
         }
         Verdict::Ambiguous => {
@@ -258,9 +273,14 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
                 let leading = fitted.candidates.get(leader).map_or(f64::NEG_INFINITY, |c| c.log_evidence);
                 s.log_evidence > fitted.discrepancy.log_evidence.max(leading)
             });
-            let hint = known.map_or_else(String::new, |s| {
-                format!(" What comes nearest is not in the library: {}.", s.names().join("+"))
-            });
+            let seen = description(fitted, decision);
+            let hint = match (known, seen.first()) {
+                (Some(s), _) => {
+                    format!(" What comes nearest is not in the library: {}.", s.names().join("+"))
+                }
+                (None, Some(d)) => format!(" It looks like {}.", d.text),
+                (None, None) => String::new(),
+            };
             format!(
                 "There is a gap, and no effect of the library causes most of it; {closed} with a smooth map.{hint}"
             )

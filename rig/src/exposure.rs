@@ -11,12 +11,12 @@
 //! After a restart of the machine only the time since then is known to be over, and only that counts as rest.
 #![allow(clippy::disallowed_methods, reason = "a ledger is written beside the loop, while the run goes")]
 
-use crate::session::Notes;
-use crate::setup::Setup;
 use miette::WrapErr;
 use realtime::pacing::Lifeline;
 use realtime::ports::Nanos;
 use realtime::safety::{Exposed, Limits, MINUTE_NS, MINUTES, PART_MINUTES, PARTS};
+use runs::session::Notes;
+use runs::setup::Setup;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, Permissions};
@@ -129,30 +129,6 @@ pub struct Ledger {
     rest: Nanos,
     /// Strongest squared rms velocity that the limits allow, in m2/s2.
     strongest_m2_s2: f64,
-}
-
-/// What is left of what a finger may be exposed to.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Left {
-    /// Of the hour's share, in s.
-    pub hour_s: f64,
-    /// Of the hour's dose, in m2/s.
-    pub dose_m2_s: f64,
-    /// In one go, in s.
-    pub in_one_go_s: f64,
-}
-
-impl Left {
-    /// Of limits, after an exposure.
-    pub fn of(limits: &Limits, past: &Exposed) -> Self {
-        let hour =
-            past.parts.iter().fold((0.0, 0.0), |(s, dose), part| (s + part.0.seconds(), dose + part.1));
-        Left {
-            hour_s: (3600.0 * limits.exposure_duty_max - hour.0).max(0.0),
-            dose_m2_s: (limits.exposure_dose_max_m2_s - hour.1).max(0.0),
-            in_one_go_s: (limits.exposure_max_s - past.in_one_go.seconds()).max(0.0),
-        }
-    }
 }
 
 impl Ledger {
@@ -296,7 +272,7 @@ fn rested(a: &Exposed, b: &Exposed) -> Nanos {
 impl Book {
     /// Opens this user's file of one identity, and reads those of others.
     fn open(folder: &Path, of: &str, rest: Nanos) -> miette::Result<Self> {
-        if !crate::claim::is_shared(folder) {
+        if !crate::rig_lock::is_shared(folder) {
             miette::bail!(
                 help = "make it one that all may write to, with the sticky bit (mode 1777)",
                 "the folder of the ledger cannot be trusted"
@@ -346,11 +322,7 @@ impl Book {
             for (part, more) in parts.iter_mut().zip(other.parts) {
                 *part = (part.0.plus(more.0), part.1 + more.1);
             }
-            Exposed {
-                in_one_go: sum.in_one_go.plus(other.in_one_go),
-                resting: rested(&sum, &other),
-                parts,
-            }
+            Exposed { in_one_go: sum.in_one_go.plus(other.in_one_go), resting: rested(&sum, &other), parts }
         })
     }
 

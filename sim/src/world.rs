@@ -374,11 +374,6 @@ impl World {
         self.config.room.ambient_pressure_pa
     }
 
-    /// Temperature of the plate (deg C).
-    pub fn plate_temperature_c(&self) -> f64 {
-        self.config.room.temperature_c + self.plate.warming_k()
-    }
-
     /// Averages computed so far.
     pub fn computed(&self) -> u64 {
         self.averager.computed()

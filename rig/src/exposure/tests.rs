@@ -1,4 +1,5 @@
 use super::*;
+use runs::exposure_left::Left;
 
 /// A folder as `/var/tmp` is, gone with the test.
 struct Folder(PathBuf);
@@ -44,13 +45,27 @@ fn last_hour(ledger: &Ledger) -> (u64, f64) {
     ledger.exposed().parts.iter().fold((0, 0.0), |(time, dose), (t, d)| (time + t.0, dose + d))
 }
 
+/// Waits until it is so, for as long as a slow machine may take.
+fn soon(is_so: impl Fn() -> bool) {
+    let pauses = (0..12_000).take_while(|_| !is_so()).map(|_| std::thread::sleep(Duration::from_millis(5)));
+    assert!(pauses.count() < 12_000, "never");
+}
+
+/// Waits for two entries: the second one holds all that was driven before.
+fn written_twice(keeping: &Keeping) {
+    for _ in 0..2 {
+        let before = keeping.state.written_ns.load(Ordering::Relaxed);
+        soon(|| keeping.state.written_ns.load(Ordering::Relaxed) != before);
+    }
+}
+
 /// A loop that drove for so long, kept until its ledger has noticed.
 fn driven(ledger: Ledger, seconds: u64, dose_m2_s: f64) -> Keeping {
     let life = Arc::new(Lifeline::default());
     let keeping = ledger.keep(Arc::clone(&life), || panic!("it can be written")).unwrap();
     life.driven_ns.store(seconds * SECOND, Ordering::Relaxed);
     life.dose_bits.store(dose_m2_s.to_bits(), Ordering::Relaxed);
-    std::thread::sleep(WRITE_EVERY + WRITE_EVERY / 2);
+    written_twice(&keeping);
     assert!(keeping.holds());
     keeping
 }
@@ -167,7 +182,7 @@ fn a_ledger_that_cannot_be_kept_refuses_the_finger_or_stops_the_rig() {
     let keeping = ledger.keep(Arc::default(), move || stop.store(true, Ordering::Relaxed)).unwrap();
     // Removed in mid-run: the next run would know nothing.
     std::fs::remove_file(&path).unwrap();
-    std::thread::sleep(WRITE_EVERY + WRITE_EVERY / 2);
+    soon(|| stopped.load(Ordering::Relaxed));
     assert!(stopped.load(Ordering::Relaxed) && !keeping.holds());
     // No plain file, and a folder that is not shared.
     std::fs::create_dir(&path).unwrap();

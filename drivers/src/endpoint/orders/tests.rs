@@ -373,5 +373,8 @@ fn a_supplys_heartbeat_changes_with_every_command_and_with_nothing_else() {
         assert!(!matches!(again, Due::SetPoints(_)), "{again:?}");
     }
     assert_eq!(value(&endpoint.hand_out_off(Nanos(50_000))), None);
-    assert_eq!(crate::profile("wago-750-watchdog").unwrap().heartbeat().and_then(|set| set.timeout_ms), Some(200));
+    assert_eq!(
+        crate::profile("wago-750-watchdog").unwrap().heartbeat().and_then(|set| set.timeout_ms),
+        Some(200)
+    );
 }
