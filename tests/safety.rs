@@ -31,6 +31,7 @@ impl<S: SafetyInputs> SafetyInputs for WithoutDevice<S> {
 fn rig(defects: &str) -> VirtualLoop {
     let board = |table: &str| format!("[{table}]\nprofile = \"muprime-relay\"\naddress = \"127.0.0.1:0\"\n");
     let text = Setup::load("virtual-ideal").unwrap().text;
+    let text = text.replace("artificial-silicone", "human-index-moist");
     let text = text.replace("[limits]\n", "[limits]\nhuman_contact = true\ndead_man_key = true\n");
     let text = format!(
         "{text}\n{}{}wired = [\"emergency_stop\", \"interlock\"]\n",
@@ -91,7 +92,7 @@ fn a_key_that_is_let_go_switches_off_to_the_cycle() {
     assert_eq!(off.tripped.unwrap().cause, Cause::DeadMan);
     let after = off.now.since(last.now);
     assert!(after.0 <= KEY_AGE.0 + 2_000_000 && after.0 >= KEY_AGE.0 - REPEAT.0 - 2_000_000, "{after:?}");
-    assert!(off.drive_pp_m == 0.0 && off.velocity_m_s == 0.0 && off.supply_cut);
+    assert_eq!((off.drive_pp_m, off.velocity_m_s, off.supply_cut), (0.0, 0.0, true));
     let report = rig.end(&mut |_| {});
     assert!(report.read_back, "{report:?}");
 }

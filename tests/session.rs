@@ -88,7 +88,7 @@ fn a_sweep_that_is_killed_resumes_without_a_lost_or_doubled_pass() {
         let unique: BTreeSet<u64> = kept.iter().copied().collect();
         assert_eq!(unique.len(), kept.len(), "session {sessions}: a pass is there twice");
         assert!(acknowledged.is_subset(&unique), "session {sessions}: {acknowledged:?} {unique:?}");
-        assert!(!complete || unique == (0..400).collect(), "{unique:?}");
+        assert!(!complete || unique == (0..800).collect(), "{unique:?}");
     }
     assert_eq!(runs::run_dir::records_in(&out).unwrap().len(), sessions);
 }

@@ -165,7 +165,7 @@ fn struck(setup: &str, signal: i32, wait: Duration, folder: &Path) -> (Option<f6
 
 #[test]
 fn the_output_falls_by_itself_or_the_record_says_that_it_stays_on() {
-    tests::in_wall_clock_time(strike_all);
+    wall::in_wall_clock_time(strike_all);
 }
 
 fn strike_all() {

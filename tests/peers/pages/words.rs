@@ -80,7 +80,7 @@ fn a_stop_on_request_is_told_as_one() {
     let setup = Setup::load("virtual-ideal").unwrap();
     let model = Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
     let plan = Plan::load("first-sweep").unwrap();
-    let notes = Notes { operator: None, sample: None, licence: None };
+    let notes = Notes::default();
     let (model_file, defects) = (None, None);
     let job = Job { seed: 3, setup, plan, model, model_file, defects, out: out.clone(), fast: true, notes };
     let signals = Signals::default();
