@@ -7,7 +7,7 @@
 //! | [`emulators`] | a virtual rig's instruments where the setup looks for them |
 //! | [`rig_lock`], [`exposure`] | one controller a rig; a finger's exposure, carried from run to run |
 //! | [`dead_man_key`] | a key held at the terminal, for trials |
-//! | [`bench`] | calibrations with the instruments at hand |
+//! | [`mod@bench`] | calibrations with the instruments at hand |
 //! | [`doctor`], [`free_ports`] | the instruments of a setup judged by what a run needs; ports that another program holds |
 //! | [`live`] | a run while it goes on: one feed, and viewers that read it |
 //! | [`terminal`], [`watch`] | the terminal taken and given back; the live view on it |
