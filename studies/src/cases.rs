@@ -13,7 +13,7 @@
 //! | [`submit`] | hands ranges to an engine, follows what comes into the folder, goes on, cancels |
 //! | [`engines`] | one file an engine |
 //! | [`adaptive`] | a surrogate whose nodes are chosen where the error is |
-//! | [`dies`] | the fault points at which a test kills the worker |
+//! | [`crash_points`] | the fault points at which a test kills the worker |
 
 pub mod adaptive;
 pub mod crash_points;
