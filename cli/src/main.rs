@@ -1,7 +1,10 @@
 //! The `muprime` command: parses its arguments and hands over to one file per subcommand in `cli/`.
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
-#![allow(rustdoc::broken_intra_doc_links, reason = "options are documented for a terminal: [user@]host is no link")]
+#![allow(
+    rustdoc::broken_intra_doc_links,
+    reason = "options are documented for a terminal: [user@]host is no link"
+)]
 
 mod verbs;
 
