@@ -1,6 +1,6 @@
 //! Which column of the source is what: stated by `--map` and `--set`, or guessed from the headers.
 
-use super::grid::{Cell, Grid};
+use super::grid::{Block, Cell, Grid};
 use super::targets::{Id, Kind, TARGETS, Target, plain};
 use super::units::{Dimension, Unit};
 use models::covariate;
@@ -66,6 +66,12 @@ impl Map {
             format!("{header}={}{unit}", TARGETS[c.target].name)
         };
         self.columns.iter().map(entry).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The headers that entries of `--map` name.
+    pub fn headers(entries: &[String]) -> Vec<String> {
+        let header = |e: String| Some(e.rsplit_once('=')?.0.trim().to_string());
+        entries.iter().flat_map(|e| parted(e)).filter_map(header).collect()
     }
 
     /// Reads the entries of `--map`: `HEADER=TARGET[:UNIT]`, parted by commas; a header with a comma in double quotes; `#3` is
@@ -212,6 +218,9 @@ fn column(grid: &Grid, entry: &str) -> Result<Taken, String> {
     let (header, rest) =
         entry.rsplit_once('=').ok_or_else(|| format!("'{entry}': HEADER=TARGET:UNIT is needed"))?;
     let header = header.trim();
+    // Within the one group that is read its columns have short names.
+    let last = header.rsplit('/').next().unwrap_or(header);
+    let header = if !grid.within.is_empty() && *header == format!("{}{last}", grid.within) { last } else { header };
     let (target, unit, unit_text) = target_of(rest)?;
     let numbered = header.strip_prefix('#').and_then(|n| n.parse::<usize>().ok());
     let exact: Vec<usize> = (0..grid.header.len()).filter(|k| grid.header[*k] == header).collect();
@@ -270,6 +279,12 @@ pub fn way(text: &str) -> Option<f64> {
     (value.abs() == 1.0).then_some(value)
 }
 
+/// The numbers of a column as they are written.
+fn column_of(grid: &Grid, index: usize) -> Vec<f64> {
+    let number = |r| Unit::SI.apply(&grid.cell(r, index)?.digits(grid.comma)?);
+    grid.rows.iter().filter_map(number).collect()
+}
+
 /// A map from the headers: names that usually mean one thing, with the units that the headers state. A header that two columns
 /// answer to is left to the reader.
 pub fn guess(grid: &Grid) -> Vec<Taken> {
@@ -278,7 +293,7 @@ pub fn guess(grid: &Grid) -> Vec<Taken> {
         let row_of_units = grid.units.get(index).map(String::as_str).filter(|u| !u.is_empty());
         let Some((target, unit)) = meant(header, row_of_units) else { continue };
         let signed = |c: &Cell| c.digits(grid.comma).is_some_and(|d| d.starts_with('-'));
-        let negative = grid.rows.iter().any(|r| r.cells.get(index).is_some_and(signed));
+        let negative = grid.rows.iter().any(|r| grid.cell(r, index).is_some_and(signed));
         let target = match target {
             t if t == Id::Speed as usize && negative => Id::Velocity as usize,
             t if t == Id::FrictionForce as usize && negative => Id::LateralForce as usize,
@@ -295,6 +310,10 @@ pub fn guess(grid: &Grid) -> Vec<Taken> {
             (None, None) => (String::new(), Unit::SI),
         };
         let assumed = dimension.is_some_and(|d| d != Dimension::Ratio) && !stated;
+        // A letter without a unit is not enough for a value that no rig has.
+        if assumed && plain(header).len() <= 2 && !super::remarks::usual(TARGETS[target].column, &column_of(grid, index)) {
+            continue;
+        }
         taken.push(Taken { index, header: header.clone(), target, unit_text, unit, assumed });
     }
     // A force that is read goes before a coefficient that was made of it.
@@ -310,8 +329,66 @@ pub fn guess(grid: &Grid) -> Vec<Taken> {
     taken
 }
 
+/// A name without the unit behind it, case, blanks and marks.
+pub fn name_of(header: &str) -> String {
+    let cut = ["[", "(", "{", "/", ", ", " in "].iter().filter_map(|mark| header.find(mark)).filter(|at| *at > 0);
+    plain(&header[..cut.min().unwrap_or(header.len())])
+}
+
+/// Whether a text usually heads a column.
+pub fn heads(text: &str) -> bool {
+    text != "N" && meant(text, None).is_some()
+}
+
+/// Words that say how an amplitude is counted.
+const STROKES: [(&str, Id); 17] = [
+    ("peak-to-peak", Id::AmplitudePp),
+    ("peak to peak", Id::AmplitudePp),
+    ("peak_to_peak", Id::AmplitudePp),
+    ("zero-to-peak", Id::AmplitudePeak),
+    ("zero to peak", Id::AmplitudePeak),
+    ("pk-pk", Id::AmplitudePp),
+    ("pk_pk", Id::AmplitudePp),
+    ("p-p", Id::AmplitudePp),
+    ("pkpk", Id::AmplitudePp),
+    ("p2p", Id::AmplitudePp),
+    ("ptp", Id::AmplitudePp),
+    ("pp", Id::AmplitudePp),
+    ("0-pk", Id::AmplitudePeak),
+    ("0-p", Id::AmplitudePeak),
+    ("peak", Id::AmplitudePeak),
+    ("pk", Id::AmplitudePeak),
+    ("rms", Id::AmplitudeRms),
+];
+
+/// A header without the word for how an amplitude is counted, and which amplitude that is.
+fn without_stroke(header: &str) -> Option<(String, Id)> {
+    let small = header.to_ascii_lowercase();
+    STROKES.iter().find_map(|(words, id)| {
+        let at = small.find(words)?;
+        let apart = |c: Option<char>| c.is_none_or(|c| !c.is_alphanumeric());
+        let end = at + words.len();
+        let alone = apart(small[..at].chars().next_back()) && apart(small[end..].chars().next());
+        alone.then(|| (format!("{} {}", &header[..at], &header[end..]), *id))
+    })
+}
+
 /// What a header means, and the unit that it states: in brackets, after a slash or a comma, or as its last words.
 fn meant(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(String, Unit)>)> {
+    let amplitude = |at: usize| TARGETS[at].column == Id::AmplitudePp.target().column;
+    if let Some((rest, id)) = without_stroke(header) {
+        let unit = |units: Option<&str>| Some(without_stroke(units?).map_or(units?.to_string(), |(unit, _)| unit));
+        match named(rest.trim(), unit(row_of_units).as_deref()) {
+            Some((at, unit)) if amplitude(at) => return Some((id as usize, unit)),
+            _ => {}
+        }
+    } else if let Some((unit, id)) = row_of_units.and_then(without_stroke) {
+        return named(header, Some(&unit)).filter(|(at, _)| amplitude(*at)).map(|(_, unit)| (id as usize, unit));
+    }
+    named(header, row_of_units)
+}
+
+fn named(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(String, Unit)>)> {
     let find = |name: &str| {
         let name = plain(name);
         TARGETS.iter().position(|t| t.is_headed(&name))
@@ -343,7 +420,69 @@ fn meant(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(Str
             return Some(found);
         }
     }
-    find(header).map(|at| (at, None))
+    let at = find(header)?;
+    // A unit that is none of this quantity says that the column is something else, or needs more than a name.
+    if row_of_units.is_some() && matches!(TARGETS[at].kind, Kind::Number(_)) {
+        return None;
+    }
+    // Force or frequency, amplitude or amplifier: only a unit tells.
+    (!["f", "amp", "ampl"].contains(&plain(header).as_str())).then_some((at, None))
+}
+
+/// The map under another header of the source: the same columns, wherever they are there and whatever their units. `None` where
+/// that header has none of them.
+///
+/// # Errors
+/// In words: a column that is missing there, units that are not stated in both places.
+pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, String> {
+    let there = |c: &Taken| block.columns.get(c.index).copied().flatten();
+    let here = map.columns.iter().filter(|c| there(c).is_some()).count();
+    if here == 0 {
+        return Ok(None);
+    }
+    let mut own = map.clone();
+    for column in &mut own.columns {
+        let place = block.place;
+        let index = there(column).ok_or_else(|| {
+            format!("row {place} is a second header, without a column '{}'", column.header)
+        })?;
+        let unit_row = |units: &[String], at: usize| units.get(at).filter(|u| !u.is_empty()).cloned();
+        let (was, is) = (unit_row(&grid.units, column.index), unit_row(&block.units, index));
+        if grid.header[column.index] != block.header[index] || was != is {
+            let Kind::Number(dimension) = TARGETS[column.target].kind else {
+                column.index = index;
+                continue;
+            };
+            let stated = |header: &str, row: Option<&str>| match (stated(header), row) {
+                (Some(unit), None) | (None, Some(unit)) => Unit::guess(dimension, unit),
+                _ => None,
+            };
+            let first = stated(&grid.header[column.index], was.as_deref());
+            let second = stated(&block.header[index], is.as_deref());
+            match (first, second) {
+                (Some((_, first)), Some((_, second))) if first == column.unit => column.unit = second,
+                (Some((_, first)), Some((_, second))) if first == second => {}
+                _ => {
+                    return Err(format!(
+                        "row {place} is a second header, with another unit of '{}' ('{}')",
+                        column.header, block.header[index]
+                    ));
+                }
+            }
+        }
+        column.index = index;
+    }
+    Ok(Some(own))
+}
+
+/// The unit that a header states in brackets, or after a slash, a comma or 'in'.
+fn stated(header: &str) -> Option<&str> {
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some((_, rest)) = header.split_once(open) {
+            return rest.split(close).next();
+        }
+    }
+    [" / ", ", ", " in ", "/"].iter().find_map(|mark| header.split_once(mark)).map(|(_, unit)| unit)
 }
 
 #[cfg(test)]
@@ -381,6 +520,29 @@ mod tests {
         assert_eq!(broken.unwrap().iter().map(|t| t.index).collect::<Vec<_>>(), [0, 1]);
         let wrong = Map::stated(&grid, &["c=speed:mm/s, b=speed, b=pace:s, b=speed:N".into()]).unwrap_err();
         assert_eq!(wrong.len(), 4, "{wrong:?}");
+    }
+
+    #[test]
+    fn strokes_and_bare_letters() {
+        for (header, said) in [
+            ("Amplitude (µm p-p)", "amplitude_pp:um"),
+            ("Amplitude [um pp]", "amplitude_pp:um"),
+            ("peak-to-peak amplitude (um)", "amplitude_pp:um"),
+            ("Amplitude peak to peak / um", "amplitude_pp:um"),
+            ("Amplitude (um, 0-p)", "amplitude_peak:um"),
+            ("Amplitude (um rms)", "amplitude_rms:um"),
+            ("Amplitude peak (um)", "amplitude_peak:um"),
+            ("amp_um", "amplitude_pp:um"),
+            ("f (kHz)", "frequency:kHz"),
+        ] {
+            let found = guessed(&format!("\"{header}\";b\n1;2\n"));
+            assert!(found.ends_with(&format!("={said}")), "{header}: {found}");
+        }
+        for header in ["F", "amp", "F (N)", "w", "Peak load (N)", "speed;rpm"] {
+            let units = header.split_once(';').map_or(String::new(), |(_, unit)| format!("{unit};N\n"));
+            let name = header.split(';').next().unwrap();
+            assert_eq!(guessed(&format!("{name};Fn (N)\n{units}2;5\n")), "\"Fn (N)\"=normal_force:N", "{header}");
+        }
     }
 
     #[test]
