@@ -47,12 +47,15 @@ fn is_truth(passes: &[Pass], truth: &[Vec<f64>], steps: bool) -> bool {
 #[test]
 fn one_truth_in_many_dialects() {
     let folder = tempfile::tempdir().unwrap();
-    let told = documents(&python().arg(file("tests/peers/foreign_dialects.py")).arg(folder.path()).output().unwrap());
+    let told = documents(
+        &python().arg(file("tests/peers/foreign_dialects.py")).arg(folder.path()).output().unwrap(),
+    );
     let truth: Vec<Vec<f64>> = serde_json::from_value(told[0]["truth"].clone()).unwrap();
     let (mut right, mut refused, mut wrong) = (0, Vec::new(), Vec::new());
     for dialect in &told[1..] {
         let (name, expect) = (dialect["file"].as_str().unwrap(), dialect["expect"].as_str().unwrap());
-        let arguments: Vec<&str> = dialect["args"].as_array().unwrap().iter().map(|a| a.as_str().unwrap()).collect();
+        let arguments: Vec<&str> =
+            dialect["args"].as_array().unwrap().iter().map(|a| a.as_str().unwrap()).collect();
         let (output, passes) = import(folder.path(), &folder.path().join(name), &arguments);
         let said = texts(&output).1;
         match output.status.code() {
@@ -67,7 +70,12 @@ fn one_truth_in_many_dialects() {
             _ => wrong.push(format!("{name}: {said}\n{:?}", passes.iter().take(3).collect::<Vec<_>>())),
         }
     }
-    println!("{} dialects: {right} right, {} refused that are readable, {} wrong", told.len() - 1, refused.len(), wrong.len());
+    println!(
+        "{} dialects: {right} right, {} refused that are readable, {} wrong",
+        told.len() - 1,
+        refused.len(),
+        wrong.len()
+    );
     assert!(wrong.is_empty(), "wrong:\n{}", wrong.join("\n"));
     assert!(told.len() > 80 && refused.is_empty(), "refused:\n{}", refused.join("\n"));
 }

@@ -41,7 +41,9 @@ impl Source {
             let path = folder.join(&name);
             let found = match bundled::file(&name) {
                 Some(text) if !path.exists() => text.to_string(),
-                _ => foreign_text_of(&path).map_err(|problem| OpenError::Unreadable { file: path, problem })?,
+                _ => {
+                    foreign_text_of(&path).map_err(|problem| OpenError::Unreadable { file: path, problem })?
+                }
             };
             kept.push((name, found));
         }

@@ -141,7 +141,9 @@ fn mismatch(error: &tokio_modbus::Error) -> String {
             }
         }
         Error::Protocol(ProtocolError::FunctionCodeMismatch { request, .. }) => {
-            format!("another function than {request} was answered: the transaction is another program's, or the device mixes them up")
+            format!(
+                "another function than {request} was answered: the transaction is another program's, or the device mixes them up"
+            )
         }
         other => other.to_string(),
     }

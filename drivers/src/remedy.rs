@@ -26,9 +26,11 @@ pub fn shown(bytes: &[u8]) -> String {
 #[must_use]
 pub fn unended(came: &[u8], end: &[u8], question: &str) -> String {
     let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02X}")).collect::<Vec<_>>().join(" ");
-    let said = format!("{} bytes came and no line end ({}) among them: {}", came.len(), hex(end), shown(came));
+    let said =
+        format!("{} bytes came and no line end ({}) among them: {}", came.len(), hex(end), shown(came));
     let text = came.iter().filter(|b| matches!(b, 0x20..=0x7e | b'\r' | b'\n' | b'\t' | 0 | 2 | 3)).count();
-    let other = ["\r\n", "\n\r", "\r", "\n", "\0", "\u{3}"].into_iter().find(|e| came.ends_with(e.as_bytes()));
+    let other =
+        ["\r\n", "\n\r", "\r", "\n", "\0", "\u{3}"].into_iter().find(|e| came.ends_with(e.as_bytes()));
     let echoed = !question.is_empty() && came.starts_with(question.as_bytes());
     let cause = match other {
         _ if 4 * text < 3 * came.len() => {
@@ -46,7 +48,9 @@ pub fn unended(came: &[u8], end: &[u8], question: &str) -> String {
 pub fn exception(code: u8) -> String {
     let words = match code {
         1 => "it does not know this function: the table is another (holding, input, coil, discrete)",
-        2 => "it has no such register: check address, count and table of the profile; some manuals count from 1",
+        2 => {
+            "it has no such register: check address, count and table of the profile; some manuals count from 1"
+        }
         3 => "it does not take this value or this many registers: check range and count",
         4 => "it failed: look at its display or its error register",
         5 | 6 => "it is busy: lower the rate, or end what else talks to it",
@@ -80,7 +84,10 @@ mod tests {
     fn each_cause_has_a_remedy_of_its_own() {
         let said = |came: &[u8]| unended(came, b"\r\n", "READ?");
         let line_end = said(b"+1.25E-01,-2.5E-03\r");
-        assert!(line_end.starts_with("19 bytes came and no line end (0D 0A) among them: \"+1.25E-01,-2.5E-03\\r\""));
+        assert!(
+            line_end
+                .starts_with("19 bytes came and no line end (0D 0A) among them: \"+1.25E-01,-2.5E-03\\r\"")
+        );
         assert!(line_end.contains("is rx_terminator right? This ends with 0D"), "{line_end}");
         assert!(said(b"\xfe\x80\x06\xf8").contains("baud, parity"));
         assert!(said(b"READ?\r1.5").contains("echo"));

@@ -202,7 +202,10 @@ impl Talk {
                 if !self.take(deadline)? && Instant::now() >= deadline {
                     return Err(match self.came.len() {
                         0 => Ended::Timeout(self.patience_ms),
-                        n => Ended::Cut(format!("{n} bytes came in place of {length}: {}", remedy::shown(&self.came))),
+                        n => Ended::Cut(format!(
+                            "{n} bytes came in place of {length}: {}",
+                            remedy::shown(&self.came)
+                        )),
                     });
                 }
             } else if !self.take(Instant::now() + AFTER_A_BLOCK)? {
@@ -316,7 +319,8 @@ impl Talk {
                     Some(numbers) => numbers,
                     None => {
                         let echo = if line == query.send { ": switch the instrument's echo off" } else { "" };
-                        return self.bear(session, format!("`{}` was answered by `{line}`{echo}", query.send));
+                        return self
+                            .bear(session, format!("`{}` was answered by `{line}`{echo}", query.send));
                     }
                 }
             }

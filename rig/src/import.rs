@@ -6,9 +6,9 @@ mod arrays;
 mod binary;
 mod clock;
 mod grid;
-mod head;
 #[cfg(feature = "matlab")]
 mod hdf5;
+mod head;
 pub mod map;
 #[cfg(feature = "matlab")]
 mod mat;
@@ -18,6 +18,8 @@ pub mod targets;
 mod text;
 mod units;
 mod values;
+#[cfg(feature = "excel")]
+mod workbook;
 mod write;
 
 use calibration::certificate::sha256_hex;
@@ -50,6 +52,21 @@ mod mat {
 }
 #[cfg(not(feature = "matlab"))]
 use mat as hdf5;
+
+/// Refuses: built without workbooks.
+#[cfg(not(feature = "excel"))]
+mod workbook {
+    /// Refuses.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn read(_: &[u8], _: Option<&str>) -> miette::Result<super::Grid> {
+        miette::bail!(
+            help = "build it with `cargo install --path rig` (the feature is on by default), or save the sheet as CSV",
+            "this muprime was built without its feature `excel`"
+        )
+    }
+}
 
 /// How a column was taken.
 #[derive(Clone, Debug, Serialize)]
@@ -216,7 +233,7 @@ fn read_known(
     } else if bytes.starts_with(b"\x89HDF\r\n") || bytes.starts_with(b"MATLAB 7.3 MAT-file") {
         hdf5::read(bytes, sheet, wanted)
     } else if workbook || bytes.starts_with(b"\xd0\xcf\x11\xe0") {
-        binary::workbook(bytes, sheet)
+        workbook::read(bytes, sheet)
     } else if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"\x1f\x8b") {
         miette::bail!(help = "unpack it first; of .npz, save one array as .npy", "{shown} is packed")
     } else {
@@ -384,7 +401,9 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
 
 /// Whether a row holds nothing but zeros.
 fn is_padding(row: &grid::Row) -> bool {
-    row.cells.iter().all(|c| matches!(c, grid::Cell::Empty) || c.digits(false).is_some_and(|d| d.parse::<f64>() == Ok(0.0)))
+    row.cells.iter().all(|c| {
+        matches!(c, grid::Cell::Empty) || c.digits(false).is_some_and(|d| d.parse::<f64>() == Ok(0.0))
+    })
 }
 
 /// Columns whose names are values with a unit, as of a table with a factor down and another across.
@@ -428,7 +447,8 @@ fn mostly_dropped(
         .collect();
     let negative = dropped.iter().filter(|d| d.column == "normal_force_n" && d.text.starts_with('-')).count();
     let help = if 2 * negative > dropped.len() {
-        "compression is positive: turn the column with a minus before its unit, as in normal_force:-N".to_string()
+        "compression is positive: turn the column with a minus before its unit, as in normal_force:-N"
+            .to_string()
     } else if 2 * padded > dropped.len() {
         format!("the last {padded} rows are zeros in every column: --accept padding leaves them out")
     } else if grid.format.starts_with("text") {

@@ -8,7 +8,8 @@ use tests::{documents, file, python};
 #[test]
 fn buses_are_described_as_cantools_and_python_canopen_read_them() {
     let folder = tempfile::tempdir().unwrap();
-    let told = documents(&python().arg(file("tests/peers/bus_dialects.py")).arg(folder.path()).output().unwrap());
+    let told =
+        documents(&python().arg(file("tests/peers/bus_dialects.py")).arg(folder.path()).output().unwrap());
     let (mut compared, mut refused, mut sheets) = (0, Vec::new(), 0);
     for one in &told {
         let path = one["file"].as_str().unwrap();
@@ -47,13 +48,20 @@ fn buses_are_described_as_cantools_and_python_canopen_read_them() {
                 continue;
             }
             assert_eq!(cob & 0x7FF, 0x185, "{one}");
-            let keys: Vec<u64> =
-                mapped.unwrap_or_else(|why| panic!("{path}: {why}")).0.iter().map(|((i, s), _)| u64::from(*i) << 8 | u64::from(*s)).collect();
+            let keys: Vec<u64> = mapped
+                .unwrap_or_else(|why| panic!("{path}: {why}"))
+                .0
+                .iter()
+                .map(|((i, s), _)| u64::from(*i) << 8 | u64::from(*s))
+                .collect();
             let theirs: Vec<u64> = entries.iter().map(|e| e.as_u64().unwrap() >> 8).collect();
             assert_eq!(keys, theirs, "{one}");
             sheets += 1;
         }
     }
     println!("{compared} values of DBC files and {sheets} data sheets compared; refused: {refused:?}");
-    assert!(compared > 600 && sheets >= 18 && refused.len() * 20 <= compared, "{compared} {sheets} {refused:?}");
+    assert!(
+        compared > 600 && sheets >= 18 && refused.len() * 20 <= compared,
+        "{compared} {sheets} {refused:?}"
+    );
 }

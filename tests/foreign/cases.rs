@@ -44,7 +44,10 @@ fn clocks_that_begin_again_are_refused_until_steps_are_runs() {
     holds(&refused(source, &["--yes"]), &["row 10, 18", "HEADER=run"]);
     let map = "Step=run,Time (s)=time:s,Load (N)=normal_force:N,Friction (N)=friction_force:N,Speed (mm/s)=speed:mm/s";
     let passes = taken(source, &["--map", map]);
-    assert_eq!(passes.iter().map(|p| p.run.as_deref().unwrap()).collect::<String>(), "1".repeat(8) + &"2".repeat(8) + &"3".repeat(8));
+    assert_eq!(
+        passes.iter().map(|p| p.run.as_deref().unwrap()).collect::<String>(),
+        "1".repeat(8) + &"2".repeat(8) + &"3".repeat(8)
+    );
 }
 
 #[test]
@@ -55,7 +58,10 @@ fn a_second_header_holds_for_the_rows_below_it() {
         let friction = if k < 14 { 0.5 + 0.001 * k as f64 } else { 0.8 + 0.001 * (k - 14) as f64 };
         assert!((p.lateral_force_n.unwrap() - friction).abs() < 1e-12 && p.normal_force_n == 2.0, "{p:?}");
     }
-    holds(&refused("header-again-other-order/two-steps.csv", &["--yes"]), &["goes back in row 21", "rows 18 to 20 are a header again"]);
+    holds(
+        &refused("header-again-other-order/two-steps.csv", &["--yes"]),
+        &["goes back in row 21", "rows 18 to 20 are a header again"],
+    );
 }
 
 #[test]
@@ -68,7 +74,8 @@ fn midnight_and_stopwatches() {
 
 #[test]
 fn empty_cells_between_tabs_and_rows_of_unknown_units() {
-    let passes = taken("tabs-with-an-empty-column/gauge.txt", &["--set", "speed=10:mm/s,time_s=rows", "--yes"]);
+    let passes =
+        taken("tabs-with-an-empty-column/gauge.txt", &["--set", "speed=10:mm/s,time_s=rows", "--yes"]);
     assert!(passes.len() == 14 && passes.iter().all(|p| p.normal_force_n == 5.0));
     let passes = taken("unit-row-unknown-unit/rows.csv", &["--yes"]);
     assert!(passes.len() == 14 && passes.iter().all(|p| p.normal_force_n == 5.0 && p.speed_m_s == 0.01));
@@ -98,7 +105,10 @@ fn units_in_attributes_and_workspaces() {
     for name in ["workspace.mat", "workspace73.mat", "workspace.h5"] {
         assert_eq!(taken(&format!("workspace-mat/{name}"), &map).len(), 20, "{name}");
     }
-    holds(&refused("cell-mat/cells.mat", &["--yes"]), &["runs is a cell array (1 x 2)", "writematrix(runs{1}"]);
+    holds(
+        &refused("cell-mat/cells.mat", &["--yes"]),
+        &["runs is a cell array (1 x 2)", "writematrix(runs{1}"],
+    );
 }
 
 #[test]
@@ -136,7 +146,9 @@ fn profiles_of_foreign_files() {
         assert_eq!(status, Some(2), "{name}: {said}");
         holds(&said, &words);
     }
-    for name in ["dbc-unused-bad-message/sensor.toml", "dbc-windows-1252/sensor.toml", "sign-apart/balance.toml"] {
+    for name in
+        ["dbc-unused-bad-message/sensor.toml", "dbc-windows-1252/sensor.toml", "sign-apart/balance.toml"]
+    {
         let (status, said) = check(&at(name));
         assert_eq!(status, Some(0), "{name}: {said}");
     }
@@ -146,7 +158,8 @@ fn profiles_of_foreign_files() {
     std::fs::write(folder.path().join("sensor.toml"), profile).unwrap();
     let marked = std::fs::read(at("dbc-windows-1252/sensor-bom.dbc")).unwrap();
     let text = String::from_utf8(marked[3..].to_vec()).unwrap();
-    let wide: Vec<u8> = [0xFFu8, 0xFE].into_iter().chain(text.encode_utf16().flat_map(u16::to_le_bytes)).collect();
+    let wide: Vec<u8> =
+        [0xFFu8, 0xFE].into_iter().chain(text.encode_utf16().flat_map(u16::to_le_bytes)).collect();
     for bytes in [marked, wide] {
         std::fs::write(folder.path().join("sensor.dbc"), bytes).unwrap();
         let (status, said) = check(&folder.path().join("sensor.toml"));
@@ -160,7 +173,11 @@ fn what_is_exported_is_imported_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
     let plan = tests::short_plan(folder.path());
-    let made = muprime().args(["run", &plan, "--fast", "--out"]).arg(&run).env("MUPRIME_RUNS", folder.path()).output();
+    let made = muprime()
+        .args(["run", &plan, "--fast", "--out"])
+        .arg(&run)
+        .env("MUPRIME_RUNS", folder.path())
+        .output();
     assert_eq!(made.unwrap().status.code(), Some(0));
     let points = |source: &Path| {
         let (output, passes) = import(folder.path(), source, &["--yes"]);
@@ -168,9 +185,12 @@ fn what_is_exported_is_imported_unchanged() {
         std::fs::read(folder.path().join("out").join(source.file_name().unwrap()).join("points.csv")).unwrap()
     };
     let own = points(&run.join("points.csv"));
-    for (format, name) in
-        [("csv", "passes.csv"), ("parquet", "passes.parquet"), ("arrow", "passes.arrow"), ("hdf5", "passes.h5")]
-    {
+    for (format, name) in [
+        ("csv", "passes.csv"),
+        ("parquet", "passes.parquet"),
+        ("arrow", "passes.arrow"),
+        ("hdf5", "passes.h5"),
+    ] {
         let exported = muprime().arg("export").arg(&run).args(["--to", format]).output().unwrap();
         assert_eq!(exported.status.code(), Some(0), "{format}: {}", texts(&exported).1);
         assert_eq!(String::from_utf8(points(&run.join(name))), String::from_utf8(own.clone()), "{format}");

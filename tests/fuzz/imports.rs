@@ -1,7 +1,8 @@
 //! Foreign tables: every reader of `muprime import` ends with a table or a refusal, whatever the bytes are.
 
 use super::Chance;
-use rig::import::map::{Map, guess};
+use rig::import::guess::guess;
+use rig::import::map::Map;
 use rig::import::{Marks, Wanted, import, read};
 use std::path::Path;
 

@@ -127,7 +127,7 @@ text("thousands.csv", lines([["Time (s)", "Speed (mm/s)", "Load (mN)", "Friction
 text("commas-in-commas.csv", lines([NAMES, *ROWS], ",", True), "refused")
 # Words for peak to peak, bare letters.
 for k, head in enumerate(["Amplitude (um p-p)", "Amplitude [um pp]", "peak-to-peak amplitude (um)", "Amplitude peak-peak (um)"]):
-    text(f"stroke-{k}.csv", lines([[*NAMES, head], *[r + [0] for r in ROWS]]), "right" if k < 3 else "either", "direction=1")
+    text(f"stroke-{k}.csv", lines([[*NAMES, head], *[r + [0] for r in ROWS]]), "right", "direction=1")
 text("bare-force.csv", lines([[*NAMES[:3], "F"], *ROWS]), "refused")
 text("bare-amp.csv", lines([[*NAMES, "amp"], *[r + [1.5] for r in ROWS]]), "refused", "direction=1,frequency=27:kHz")
 # Units that need a number.

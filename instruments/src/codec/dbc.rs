@@ -164,15 +164,17 @@ fn one(dbc: &can_dbc::Dbc, message: &can_dbc::Message, begins: &Beginning) -> Db
     let (id, length) = (begins.identifier(), usize::try_from(message.size).unwrap_or(usize::MAX));
     let mut fault = id.clone().err().or_else(|| begins.twice());
     let mut signals = HashMap::new();
-    let line = |name: &str| {
-        begins.signals.iter().find(|(_, n)| n == name).map_or(begins.line, |(line, _)| *line)
-    };
+    let line =
+        |name: &str| begins.signals.iter().find(|(_, n)| n == name).map_or(begins.line, |(line, _)| *line);
     // Identifiers that differ only in what the reader cuts off would share what stands apart from the messages.
     let alike = dbc.messages.iter().filter(|other| other.id == message.id).count();
     let apart = dbc.extended_multiplex.iter().any(|one| one.message_id == message.id)
         || dbc.signal_extended_value_type_list.iter().any(|one| one.message_id == message.id);
     if alike > 1 && apart {
-        fault = fault.or(Some(format!("line {}: another message has the identifier of {}", begins.line, message.name)));
+        fault = fault.or(Some(format!(
+            "line {}: another message has the identifier of {}",
+            begins.line, message.name
+        )));
     }
     for signal in &message.signals {
         match place(dbc, message, signal, length) {
@@ -382,7 +384,11 @@ mod tests {
     fn a_signal_outside_its_message_is_refused() {
         let text = TEXT.replace("Fx : 0|16", "Fx : 60|16");
         let messages = parse(&text).unwrap();
-        assert!(messages["Short"].fault.as_ref().unwrap().contains("line 11: signal Fx"), "{:?}", messages["Short"].fault);
+        assert!(
+            messages["Short"].fault.as_ref().unwrap().contains("line 11: signal Fx"),
+            "{:?}",
+            messages["Short"].fault
+        );
         assert_eq!(messages["Meas"].fault, None, "the other one serves");
         assert!(parse("hello").unwrap_err().contains("line 1"));
     }
@@ -400,9 +406,14 @@ mod tests {
             assert!(said.contains("line 10") && said.contains(raw) && said.contains("29 bits"), "{said}");
         }
         let twice = TEXT.replace(" SG_ Odd", " SG_ Fx : 32|16@1- (1,0) [0|0] \"\" RIG\n SG_ Odd");
-        assert!(fault(&twice, "Short").contains("two signals Fx, lines 11 and 12"), "{}", fault(&twice, "Short"));
+        assert!(
+            fault(&twice, "Short").contains("two signals Fx, lines 11 and 12"),
+            "{}",
+            fault(&twice, "Short")
+        );
         assert!(fault(&TEXT.replace("Short", "Meas"), "Meas").contains("lines 6 and 10"));
-        let store = format!("{TEXT}\nBO_ 3221225472 {STORE}: 0 RIG\n SG_ Spare : 0|8@1+ (1,0) [0|0] \"\" RIG\n");
+        let store =
+            format!("{TEXT}\nBO_ 3221225472 {STORE}: 0 RIG\n SG_ Spare : 0|8@1+ (1,0) [0|0] \"\" RIG\n");
         let messages = parse(&store).unwrap();
         assert!(messages.len() == 2 && messages.values().all(|m| m.fault.is_none()), "{messages:?}");
     }
@@ -413,6 +424,9 @@ mod tests {
             "{TEXT}\nBA_DEF_ BO_ \"SystemMessageLongSymbol\" STRING ;\nBA_DEF_ SG_ \"SystemSignalLongSymbol\" STRING ;\nBA_ \"SystemMessageLongSymbol\" BO_ 437 \"AVeryLongNameOfAMessage\";\nBA_ \"SystemSignalLongSymbol\" SG_ 437 Fx \"AVeryLongNameOfASignal\";\n"
         );
         let messages = parse(&text).unwrap();
-        assert_eq!(messages["AVeryLongNameOfAMessage"].signals["AVeryLongNameOfASignal"], messages["Short"].signals["Fx"]);
+        assert_eq!(
+            messages["AVeryLongNameOfAMessage"].signals["AVeryLongNameOfASignal"],
+            messages["Short"].signals["Fx"]
+        );
     }
 }

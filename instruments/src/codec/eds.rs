@@ -167,7 +167,11 @@ pub fn mapping(objects: &Objects, first: u16, cob: u32) -> Result<(Vec<(Key, usi
     // a node's number.
     let of_node = |d: &DefaultValue| {
         let id = d.value & 0x7FF;
-        id == i64::from(cob) || !d.plus_node && id > i64::from(cob) && id <= i64::from(cob) + 127 && id & !127 == i64::from(cob)
+        id == i64::from(cob)
+            || !d.plus_node
+                && id > i64::from(cob)
+                && id <= i64::from(cob) + 127
+                && id & !127 == i64::from(cob)
     };
     // Bits 31 and 30 say 'not used' and 'no remote request'.
     let (off, on): (Vec<_>, Vec<_>) =
@@ -183,7 +187,13 @@ pub fn mapping(objects: &Objects, first: u16, cob: u32) -> Result<(Vec<(Key, usi
             let known: Vec<String> = frames
                 .iter()
                 .filter(|(_, d)| d.value & 0x8000_0000 == 0)
-                .map(|(_, d)| format!("{:#x}{}", d.value & 0x7FF, if d.plus_node { " plus the node's number" } else { "" }))
+                .map(|(_, d)| {
+                    format!(
+                        "{:#x}{}",
+                        d.value & 0x7FF,
+                        if d.plus_node { " plus the node's number" } else { "" }
+                    )
+                })
                 .collect();
             return Err(format!(
                 "the data sheet has no process data with identifier {cob:#x} plus the node's number; it has {}",
@@ -248,17 +258,21 @@ mod tests {
     #[test]
     fn configured_sheets_compact_arrays_and_frames_that_are_off() {
         let map = |sheet: &str| mapping(&parse(sheet).unwrap(), 0x1800, 0x180);
-        let configured = SHEET.replace("DefaultValue=0x60640020", "DefaultValue=0x60640020\nParameterValue=0x606C0020 ; speed")
+        let configured = SHEET
+            .replace("DefaultValue=0x60640020", "DefaultValue=0x60640020\nParameterValue=0x606C0020 ; speed")
             + "[606C]\nDataType=4\nAccessType=ro\n";
         assert_eq!(map(&configured).unwrap().0[1].0, (0x606C, 0));
         let off = SHEET.replace("0x40000180", "0xC0000180");
         assert!(map(&off).unwrap_err().contains("1800sub1") && map(&off).unwrap_err().contains("off"));
-        let another = off + "[1801sub1]\nDataType=7\nDefaultValue=$NODEID+0x180\n[1A01sub0]\nDataType=5\nDefaultValue=1\n\
+        let another = off
+            + "[1801sub1]\nDataType=7\nDefaultValue=$NODEID+0x180\n[1A01sub0]\nDataType=5\nDefaultValue=1\n\
             [1A01sub1]\nDataType=7\nDefaultValue=0x60410010\n";
         assert_eq!(map(&another).unwrap(), (vec![((0x6041, 0), 0)], 2), "the one that is on");
         assert_eq!(map(&SHEET.replace("$NODEID+0x40000180", "0x185")), map(SHEET), "of node 5");
         assert!(map(&SHEET.replace("$NODEID+0x40000180", "0x285")).unwrap_err().contains("0x285"));
-        let compact = format!("{SHEET}[2000]\nObjectType=8\nDataType=6\nAccessType=rw\nDefaultValue=7\nCompactSubObj=3\n");
+        let compact = format!(
+            "{SHEET}[2000]\nObjectType=8\nDataType=6\nAccessType=rw\nDefaultValue=7\nCompactSubObj=3\n"
+        );
         let objects = parse(&compact).unwrap();
         assert_eq!(objects[&(0x2000, 0)].default.unwrap().value, 3);
         assert!(objects[&(0x2000, 3)].data_type == 6 && !objects.contains_key(&(0x2000, 4)));

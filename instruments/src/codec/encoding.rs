@@ -12,7 +12,10 @@ const WINDOWS: &str = "\u{20ac}\u{81}\u{201a}\u{192}\u{201e}\u{2026}\u{2020}\u{2
 pub fn decoded(bytes: &[u8]) -> Result<String, String> {
     let wide = |rest: &[u8], read: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = rest.chunks_exact(2).map(|pair| read([pair[0], pair[1]])).collect();
-        String::from_utf16(&units).ok().filter(|_| rest.len() % 2 == 0).ok_or("its UTF-16 is damaged".to_string())
+        String::from_utf16(&units)
+            .ok()
+            .filter(|_| rest.len() % 2 == 0)
+            .ok_or("its UTF-16 is damaged".to_string())
     };
     let bytes = match bytes {
         [0xff, 0xfe, rest @ ..] => return wide(rest, u16::from_le_bytes),

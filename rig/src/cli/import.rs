@@ -1,7 +1,8 @@
 //! `muprime import FILE --map '...' -o DIR`: a foreign table made into a point table.
 
 use crate::files::{make_folder, write_whole};
-use crate::import::map::{Map, guess};
+use crate::import::guess::guess;
+use crate::import::map::Map;
 use crate::import::{Cut, Grid, Imported, Marks, Wanted, guessed_lines, import, read};
 use crate::input::{MAX_TABLE_BYTES, bytes_of};
 use crate::{ask, out, say};

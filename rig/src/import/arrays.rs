@@ -43,7 +43,8 @@ impl Beside {
     /// The unit that a text beside an array states: `Fn.data` with `Fn.unit`, `Fn` with `units.Fn`.
     fn unit(&self, name: &str) -> Option<&String> {
         let (around, own) = name.rsplit_once('.').map_or(("", name), |(around, own)| (around, own));
-        let inside = |name: &str| if around.is_empty() { name.to_string() } else { format!("{around}.{name}") };
+        let inside =
+            |name: &str| if around.is_empty() { name.to_string() } else { format!("{around}.{name}") };
         let alone = ["data", "value", "values", "y"].contains(&own.to_lowercase().as_str());
         ["unit", "units", "Unit", "Units"].iter().find_map(|word| {
             let whole = || self.texts.get(&inside(word)).filter(|_| alone);
@@ -88,10 +89,12 @@ pub fn table(
     let named = |arrays: &Vec<Array>| wanted.iter().filter(|w| arrays.iter().any(|a| a.name == **w)).count();
     let rank = |arrays: &Vec<Array>| (named(arrays), arrays.len());
     let best = by_length.values().map(rank).max();
-    let mut first = by_length.iter().filter(|(_, arrays)| Some(rank(arrays)) == best).map(|(length, _)| *length);
+    let mut first =
+        by_length.iter().filter(|(_, arrays)| Some(rank(arrays)) == best).map(|(length, _)| *length);
     let (Some(length), None) = (first.next(), first.next()) else {
         let listed = if all.is_empty() { "none".to_string() } else { all.join(", ") };
-        let why = if beside.notes.is_empty() { String::new() } else { format!("\n{}", beside.notes.join("\n")) };
+        let why =
+            if beside.notes.is_empty() { String::new() } else { format!("\n{}", beside.notes.join("\n")) };
         miette::bail!(
             help = format!("name an array, a structure or a group with --sheet; arrays of numbers: {listed}"),
             "the {format} file holds no table: its arrays have several lengths, or there is none of that name{why}"

@@ -47,7 +47,8 @@ fn reading(cell: &Cell) -> Option<Reading> {
         None => (None, text),
     };
     let fields: Vec<&str> = time.split(':').collect();
-    let number = |k: usize| fields.get(k).map_or(Some(0.0), |p| p.trim().replace(',', ".").parse::<f64>().ok());
+    let number =
+        |k: usize| fields.get(k).map_or(Some(0.0), |p| p.trim().replace(',', ".").parse::<f64>().ok());
     if !(2..=3).contains(&fields.len()) {
         return None;
     }

@@ -62,7 +62,10 @@ impl Cell {
     /// Whether it is a number, a time or a percentage.
     pub fn is_number(&self, comma: bool) -> bool {
         let written = || self.digits(comma).is_some_and(|d| Unit::SI.apply(&d).is_some());
-        matches!(self, Cell::Clock(_)) || written() || self.ratio(comma).is_some() || super::clock::is_time(self)
+        matches!(self, Cell::Clock(_))
+            || written()
+            || self.ratio(comma).is_some()
+            || super::clock::is_time(self)
     }
 }
 

@@ -38,15 +38,23 @@ struct Found {
 
 /// The texts of an attribute.
 fn texts(value: &AttrValue) -> Vec<String> {
-    value.as_str().map(|one| vec![one.to_string()]).or(value.as_strings().map(<[String]>::to_vec)).unwrap_or_default()
+    value
+        .as_str()
+        .map(|one| vec![one.to_string()])
+        .or(value.as_strings().map(<[String]>::to_vec))
+        .unwrap_or_default()
 }
 
 /// The number of an attribute, also where it is an array of one.
 fn value(value: &AttrValue) -> Option<f64> {
-    value.as_f64().or_else(|| value.as_u64().map(|v| v as f64)).or_else(|| value.as_i64().map(|v| v as f64)).or_else(|| {
-        let all = value.to_f64s()?;
-        (all.len() == 1).then_some(all[0])
-    })
+    value
+        .as_f64()
+        .or_else(|| value.as_u64().map(|v| v as f64))
+        .or_else(|| value.as_i64().map(|v| v as f64))
+        .or_else(|| {
+            let all = value.to_f64s()?;
+            (all.len() == 1).then_some(all[0])
+        })
 }
 
 /// One text for each column: a list, or one text with commas, semicolons or blanks.
@@ -63,7 +71,8 @@ fn for_columns(about: &HashMap<String, AttrValue>, names: &[&str], columns: usiz
 
 impl Found {
     fn walk(&mut self, group: &Group, around: &str, depth: usize) -> Result<(), Error> {
-        let inside = |name: &str| if around.is_empty() { name.to_string() } else { format!("{around}/{name}") };
+        let inside =
+            |name: &str| if around.is_empty() { name.to_string() } else { format!("{around}/{name}") };
         for name in group.datasets()? {
             let dataset = group.dataset(&name)?;
             match self.array(&dataset, inside(&name)) {
@@ -106,7 +115,9 @@ impl Found {
         };
         let count = rows.checked_mul(columns).filter(|n| *n <= self.most);
         let Some(count) = count else {
-            return Ok(Some(format!("{name} ({rows} x {columns}) says more than the file can hold: passed over")));
+            return Ok(Some(format!(
+                "{name} ({rows} x {columns}) says more than the file can hold: passed over"
+            )));
         };
         let cells: Vec<Cell> = match dataset.dtype()? {
             DType::F32 => dataset.read_f32()?.into_iter().map(single).collect(),
@@ -139,7 +150,10 @@ impl Found {
         let mut by_columns = if self.matlab || columns == 1 {
             cells
         } else {
-            (0..columns).flat_map(|c| (0..rows).map(move |r| r * columns + c)).map(|i| cells[i].clone()).collect()
+            (0..columns)
+                .flat_map(|c| (0..rows).map(move |r| r * columns + c))
+                .map(|i| cells[i].clone())
+                .collect()
         };
         scaled(&about, &mut by_columns);
         let units = for_columns(&about, &["units", "unit"], columns);

@@ -1,7 +1,7 @@
 //! Where the headers of a table are: one before the data, and others further down, each of which holds for the rows below it.
 
 use super::grid::{Block, Cell, Grid, Row};
-use super::map::{heads, name_of};
+use super::guess::{heads, name_of};
 use super::units::is_unit;
 
 /// What the rows were had from.
@@ -74,8 +74,11 @@ impl Source {
             2 * row.filled() >= usual && 2 * numbers >= row.filled() && numbers > 0
         };
         let first = rows.iter().position(is_data).unwrap_or(rows.len());
-        let mut data: Vec<usize> =
-            rows.iter().filter(|r| is_data(r)).map(|r| if self.blanks { r.filled() } else { r.width() }).collect();
+        let mut data: Vec<usize> = rows
+            .iter()
+            .filter(|r| is_data(r))
+            .map(|r| if self.blanks { r.filled() } else { r.width() })
+            .collect();
         data.sort_unstable();
         let wide = data.get(data.len() / 2).copied().unwrap_or(0);
         let mut grid = Grid { format: self.format.clone(), comma: self.comma, ..Grid::default() };
@@ -84,8 +87,10 @@ impl Source {
             rows[..first].iter().rev().take_while(|r| self.is_words(r) && 2 * r.filled() >= usual).collect();
         let above: Vec<&Row> = above.into_iter().take(3).rev().collect();
         let begin = rows.get(first).map_or(u64::MAX, |r| r.place);
-        let spoken: Vec<&Row> = self.comments.iter().filter(|r| r.place < begin && r.cells.len() > 1).collect();
-        let spoken: Vec<&Row> = spoken.into_iter().filter(|r| r.width() == wide && self.is_words(r)).collect();
+        let spoken: Vec<&Row> =
+            self.comments.iter().filter(|r| r.place < begin && r.cells.len() > 1).collect();
+        let spoken: Vec<&Row> =
+            spoken.into_iter().filter(|r| r.width() == wide && self.is_words(r)).collect();
         let head = self.head(&above).map(|h| (h, false)).or_else(|| Some((self.head(&spoken)?, true)));
         let mut header_rows = 0;
         if let Some((head, in_comment)) = head {
@@ -134,24 +139,23 @@ impl Source {
             return Ok(head.names.clone());
         }
         let first = |row: &Row| match &row.cells[0] {
-            Cell::Text(text) if !row.cells[0].is_number(self.comma) => Some(text.trim_matches('"').to_string()),
+            Cell::Text(text) if !row.cells[0].is_number(self.comma) => {
+                Some(text.trim_matches('"').to_string())
+            }
             cell => cell.digits(self.comma),
         };
         let data: Vec<&Row> = rows.iter().filter(|r| is_data(r)).collect();
         // Some programs leave out the name of a first column that numbers or names the rows.
-        let counted = |from: usize| {
-            (from..).zip(&data).all(|(k, r)| first(r).is_some_and(|t| t.parse() == Ok(k)))
-        };
-        let labelled = || {
-            data.iter().all(|r| matches!(&r.cells[0], Cell::Text(_)) && !r.cells[0].is_number(self.comma))
-        };
+        let counted =
+            |from: usize| (from..).zip(&data).all(|(k, r)| first(r).is_some_and(|t| t.parse() == Ok(k)));
+        let labelled =
+            || data.iter().all(|r| matches!(&r.cells[0], Cell::Text(_)) && !r.cells[0].is_number(self.comma));
         if names + 1 == wide && (counted(0) || counted(1) || labelled()) {
             return Ok(std::iter::once("#1".to_string()).chain(head.names.iter().cloned()).collect());
         }
         // Remarks behind the columns need no name.
-        let remark = |r: &&Row| {
-            r.cells.iter().skip(names).all(|c| *c == Cell::Empty || !c.is_number(self.comma))
-        };
+        let remark =
+            |r: &&Row| r.cells.iter().skip(names).all(|c| *c == Cell::Empty || !c.is_number(self.comma));
         if !self.blanks && names + 1 == wide && data.iter().all(remark) {
             return Ok(head.names.iter().cloned().chain([format!("#{wide}")]).collect());
         }
@@ -181,7 +185,11 @@ impl Source {
             }
             let taken = self.next_block(grid, &pending, &mut block, &row);
             let kept = pending.len() - taken;
-            pending.drain(..).take(kept).filter(|(_, comment)| !comment).for_each(|(r, _)| self.put(grid, r, block, wide));
+            pending
+                .drain(..)
+                .take(kept)
+                .filter(|(_, comment)| !comment)
+                .for_each(|(r, _)| self.put(grid, r, block, wide));
             self.put(grid, row, block, wide);
         }
         pending.into_iter().filter(|(_, comment)| !comment).for_each(|(r, _)| self.put(grid, r, block, wide));
@@ -203,7 +211,8 @@ impl Source {
         let Some(head) = self.head(&like) else { return 0 };
         let bare = |names: &[String]| names.iter().map(|n| name_of(n)).collect::<Vec<_>>();
         let (main, own) = (bare(&grid.header), bare(&head.names));
-        let known = own.iter().any(|n| !n.is_empty() && main.contains(n)) || head.names.iter().any(|n| heads(n));
+        let known =
+            own.iter().any(|n| !n.is_empty() && main.contains(n)) || head.names.iter().any(|n| heads(n));
         let fits = head.names.len() == data.width() || !self.blanks && !spoken;
         if !(known || head.rows == 2) || !fits {
             return 0;

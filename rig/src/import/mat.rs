@@ -96,7 +96,9 @@ impl<'a> Element<'a> {
         match self.kind {
             1 | 2 | 16 => Some(String::from_utf8_lossy(self.data).into_owned()),
             4 | 17 => {
-                let code = |c: &[u8]| if big { u16::from_be_bytes([c[0], c[1]]) } else { u16::from_le_bytes([c[0], c[1]]) };
+                let code = |c: &[u8]| {
+                    if big { u16::from_be_bytes([c[0], c[1]]) } else { u16::from_le_bytes([c[0], c[1]]) }
+                };
                 Some(String::from_utf16_lossy(&self.data.chunks_exact(2).map(code).collect::<Vec<_>>()))
             }
             _ => None,

@@ -45,21 +45,22 @@ pub fn read(bytes: &[u8], marks: Marks) -> miette::Result<Grid> {
     let scored = |d: &char| (*d, score(&data, &remarks, *d));
     let best = tried.iter().map(scored).reduce(|a, b| if b.1 > a.1 { b } else { a });
     let best = best.filter(|(_, score)| *score > 0.0).map(|(delimiter, _)| delimiter);
-    let (delimiter, named) = match best.filter(|d| *d != ',' || marks.delimiter.is_some() || !one_column(&data)) {
-        Some(',') if marks.delimiter.is_none() && commas_are_decimal(&data) => miette::bail!(
-            help = "say which it is: --decimal , (one column) or --delimiter , (two)",
-            "every line is two whole numbers with a comma between: decimal commas, or two columns"
-        ),
-        Some(delimiter) => {
-            let known = DELIMITERS.iter().find(|(c, _)| *c == delimiter);
-            (Some(delimiter), known.map_or("a delimiter of its own", |(_, name)| name))
-        }
-        None if one_column(&data) => (None, "lines: one column"),
-        None => miette::bail!(
-            help = "give the delimiter (--delimiter ';'), or export the table as CSV",
-            "no rows of numbers: no delimiter separates the lines into columns"
-        ),
-    };
+    let (delimiter, named) =
+        match best.filter(|d| *d != ',' || marks.delimiter.is_some() || !one_column(&data)) {
+            Some(',') if marks.delimiter.is_none() && commas_are_decimal(&data) => miette::bail!(
+                help = "say which it is: --decimal , (one column) or --delimiter , (two)",
+                "every line is two whole numbers with a comma between: decimal commas, or two columns"
+            ),
+            Some(delimiter) => {
+                let known = DELIMITERS.iter().find(|(c, _)| *c == delimiter);
+                (Some(delimiter), known.map_or("a delimiter of its own", |(_, name)| name))
+            }
+            None if one_column(&data) => (None, "lines: one column"),
+            None => miette::bail!(
+                help = "give the delimiter (--delimiter ';'), or export the table as CSV",
+                "no rows of numbers: no delimiter separates the lines into columns"
+            ),
+        };
     let cells = |line: &str, usual: usize| match delimiter {
         None => Ok(vec![line.to_string()]),
         Some(' ') => Ok(regrouped(line, usual)),
@@ -173,7 +174,9 @@ fn one_column(lines: &[(u64, &str)]) -> bool {
     let comma = lines.iter().any(|(_, l)| single(l) && l.contains(','));
     numbers > 0
         && 2 * numbers > lines.len()
-        && (!comma || before.is_some_and(|(_, l)| !l.contains(',')) || lines.iter().any(|(_, l)| single(l) && !l.contains(',')))
+        && (!comma
+            || before.is_some_and(|(_, l)| !l.contains(','))
+            || lines.iter().any(|(_, l)| single(l) && !l.contains(',')))
 }
 
 /// Whether every line is two whole numbers with a comma between.

@@ -52,7 +52,9 @@ impl Dimension {
             Dimension::Time => "s, ms, us, min, h, hh:mm, mm:ss",
             Dimension::Frequency => "Hz, kHz, MHz, rpm, rad/s",
             Dimension::Speed => "m/s, mm/s, um/s, nm/s, mm/min, rpm@20mm and rad/s@20mm (turns on a radius)",
-            Dimension::Force => "N, mN, uN, kN, gf, kgf, lbf, 12.5N/V (a sensitivity), Nm@20mm (a torque on an arm)",
+            Dimension::Force => {
+                "N, mN, uN, kN, gf, kgf, lbf, 12.5N/V (a sensitivity), Nm@20mm (a torque on an arm)"
+            }
             Dimension::Pressure => "Pa, hPa, kPa, MPa, bar, mbar, atm, psi, Torr",
             Dimension::Temperature => "degC, K, degF",
             Dimension::Percentage => "%, 1",
@@ -102,7 +104,8 @@ impl Unit {
             return Self::on_an_arm(dimension, turning, arm);
         }
         if let Some((factor, rest)) = factored(text) {
-            let unit = Self::parse(dimension, rest).or_else(|| Self::parse(dimension, rest.rsplit_once('/')?.0))?;
+            let unit =
+                Self::parse(dimension, rest).or_else(|| Self::parse(dimension, rest.rsplit_once('/')?.0))?;
             return (unit.plus == 0.0).then_some(Unit { times: unit.times * factor, ..unit });
         }
         match dimension {
@@ -133,7 +136,9 @@ impl Unit {
             }
             Dimension::Force => match text {
                 // Loads are often stated as the mass that hangs there.
-                "gf" | "g" | "gram" | "grams" | "gram-force" | "grf" | "p" | "pond" => Some(Unit::times(980_665.0, -8)),
+                "gf" | "g" | "gram" | "grams" | "gram-force" | "grf" | "p" | "pond" => {
+                    Some(Unit::times(980_665.0, -8))
+                }
                 "mgf" | "mg" => Some(Unit::times(980_665.0, -11)),
                 "kgf" | "kg" | "kp" => Some(Unit::times(980_665.0, -5)),
                 "lbf" | "lb" | "lbs" => Some(Unit::times(4.448_221_615_260_5, 0)),
@@ -194,7 +199,9 @@ impl Unit {
                     Unit { times: turns(way)? * arm_m, ..Unit::over(time.factor()) }
                 }
             },
-            Dimension::Force => Unit { over: arm_m, ..prefixed(turning, &[("Nmm", -3), ("Ncm", -2), ("Nm", 0)])? },
+            Dimension::Force => {
+                Unit { over: arm_m, ..prefixed(turning, &[("Nmm", -3), ("Ncm", -2), ("Nm", 0)])? }
+            }
             _ => return None,
         })
     }
@@ -245,22 +252,26 @@ fn factored(text: &str) -> Option<(f64, &str)> {
     });
     let (number, rest) = text.split_at(digits + exponent);
     let number: f64 = number.parse().ok()?;
-    (digits > 0 && number.is_finite() && number > 0.0 && !rest.is_empty() && !rest.starts_with('/')).then_some((number, rest))
+    (digits > 0 && number.is_finite() && number > 0.0 && !rest.is_empty() && !rest.starts_with('/'))
+        .then_some((number, rest))
 }
 
 /// Symbols of units, of quantities that no target has among them, and words that stand in their place.
 const SYMBOLS: &[&str] = &[
-    "m", "s", "g", "N", "Pa", "V", "A", "J", "W", "K", "C", "ohm", "\u{3a9}", "\u{2126}", "Hz", "rad", "deg", "°", "°C", "°F", "degC",
-    "degF", "%", "min", "h", "hr", "sec", "rpm", "rev", "revs", "cycle", "cycles", "count", "counts", "cts", "digit", "digits", "bit",
-    "bits", "LSB", "lb", "lbs", "lbf", "in", "inch", "ft", "mil", "psi", "bar", "atm", "Torr", "mmHg", "ppm", "ppb", "a.u.", "au",
-    "arb.", "n/a", "-", "1", "none", "Nm", "Nmm", "Ncm", "Ns", "Wh", "Ah", "VA", "gf", "kgf", "kp", "dyn", "eV", "l", "L", "St", "P",
-    "dB", "pct", "percent", "micron", "microns", "px", "step", "steps", "hh:mm:ss", "hh:mm", "mm:ss", "h:mm:ss", "x",
+    "m", "s", "g", "N", "Pa", "V", "A", "J", "W", "K", "C", "ohm", "\u{3a9}", "\u{2126}", "Hz", "rad", "deg",
+    "°", "°C", "°F", "degC", "degF", "%", "min", "h", "hr", "sec", "rpm", "rev", "revs", "cycle", "cycles",
+    "count", "counts", "cts", "digit", "digits", "bit", "bits", "LSB", "lb", "lbs", "lbf", "in", "inch",
+    "ft", "mil", "psi", "bar", "atm", "Torr", "mmHg", "ppm", "ppb", "a.u.", "au", "arb.", "n/a", "-", "1",
+    "none", "Nm", "Nmm", "Ncm", "Ns", "Wh", "Ah", "VA", "gf", "kgf", "kp", "dyn", "eV", "l", "L", "St", "P",
+    "dB", "pct", "percent", "micron", "microns", "px", "step", "steps", "hh:mm:ss", "hh:mm", "mm:ss",
+    "h:mm:ss", "x",
 ];
 
 /// Whether a text can stand in a row of units: symbols of any quantity, with prefixes, exponents, products and quotients.
 pub fn is_unit(text: &str) -> bool {
     let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
-    let symbol = |t: &str| SYMBOLS.iter().any(|s| *s == t || t.len() > 1 && s.len() > 1 && s.eq_ignore_ascii_case(t));
+    let symbol =
+        |t: &str| SYMBOLS.iter().any(|s| *s == t || t.len() > 1 && s.len() > 1 && s.eq_ignore_ascii_case(t));
     if text.is_empty() || symbol(text) {
         return true;
     }
@@ -371,9 +382,10 @@ mod tests {
 
     #[test]
     fn rows_of_units_may_hold_any_quantity() {
-        for unit in
-            ["ohm", "kΩ", "mV", "N/mm", "m/s2", "m/s²", "mm^3", "J", "Nmm", "rev", "counts", "GPa", "ppm", "a.u.", "[µm]", "mm·s-1"]
-        {
+        for unit in [
+            "ohm", "kΩ", "mV", "N/mm", "m/s2", "m/s²", "mm^3", "J", "Nmm", "rev", "counts", "GPa", "ppm",
+            "a.u.", "[µm]", "mm·s-1",
+        ] {
             assert!(is_unit(unit), "{unit}");
         }
         for name in ["Time", "Load", "Fx", "speed", "t", "F", "mu", "Step 2"] {

@@ -81,7 +81,9 @@ impl Values {
                 // A minus before a unit turns these too.
                 (Some(ratio), Kind::Number(Dimension::Ratio)) => Some(ratio * column.unit.factor().signum()),
                 // Through the decimal digits: a hundred times 0.07 is not 7.
-                (Some(ratio), Kind::Number(Dimension::Percentage)) => Unit::parse(Dimension::Percentage, "1")?.apply(&format!("{ratio:e}")),
+                (Some(ratio), Kind::Number(Dimension::Percentage)) => {
+                    Unit::parse(Dimension::Percentage, "1")?.apply(&format!("{ratio:e}"))
+                }
                 _ => None,
             };
             let value = match TARGETS[column.target].kind {
