@@ -1,15 +1,15 @@
 //! Studies of many cases: the worker killed at each step and at random, a disk that is full, clocks that are wrong, what gathering
 //! refuses, and the same bytes from this machine, from a real Slurm, a real HyperQueue and a real Dask.
 
-use rig::cases::dies::{STEPS, VARIABLE};
-use rig::cases::kinds::Cell;
-use rig::cases::shard::{Reader, Writer};
-use rig::cases::study::Study;
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
+use studies::cases::crash_points::{STEPS, VARIABLE};
+use studies::cases::kinds::Cell;
+use studies::cases::shard::{Reader, Writer};
+use studies::cases::study::Study;
 use tests::{documents, file, muprime, python, rounds, texts};
 
 fn run(command: &mut Command) -> Output {
@@ -187,7 +187,7 @@ fn gathering_refuses_holes_contradictions_and_mixed_versions() {
     let table = out.join("gathered.parquet");
     let refused = || {
         let why = refusal(&["gather", text(&out)]);
-        assert!(!table.exists() && !rig::files::beside(&table).exists(), "{why}");
+        assert!(!table.exists() && !runs::files::beside(&table).exists(), "{why}");
         why
     };
     assert!(refused().contains("10 of 30 cases have no result: 10..20"));
@@ -198,7 +198,7 @@ fn gathering_refuses_holes_contradictions_and_mixed_versions() {
     let study = Study::in_folder(&out, None).unwrap();
     let whole = study.shard(&(10..20));
     let kept = std::fs::read(&whole).unwrap();
-    let changed = |to: &Path, facts: &[(&str, &str)], change: &dyn Fn(&mut rig::cases::shard::Entry)| {
+    let changed = |to: &Path, facts: &[(&str, &str)], change: &dyn Fn(&mut studies::cases::shard::Entry)| {
         std::fs::write(&whole, &kept).unwrap();
         let reader = Reader::open(study.kind, &whole).unwrap();
         let mut told = reader.facts.clone();

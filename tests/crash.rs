@@ -64,7 +64,7 @@ fn acknowledged(output: &Output) -> BTreeSet<u64> {
 }
 
 fn points(run: &Path) -> Vec<u64> {
-    rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
+    runs::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
 }
 
 /// One crash and its repair; false when the sweep came to its end before that step: its threads share the calls out anew.
@@ -87,7 +87,7 @@ fn crash(step: &(String, u64), plan: &Path, folder: &Path, planned: usize) -> bo
         "step {n}: a pass is lost or doubled: {kept:?}"
     );
     assert!(promised.is_subset(&unique), "step {n}");
-    for record in rig::run_dir::records_in(&out).unwrap() {
+    for record in runs::run_dir::records_in(&out).unwrap() {
         let read = realtime::recorder::read(&std::fs::read(&record).unwrap());
         // A kill cuts a record and damages nothing: what the file holds of the last write may be torn.
         assert_eq!(read.integrity.damaged_places, 0, "step {n}: {}", record.display());

@@ -5,10 +5,10 @@
 //! as long as that; the run takes some eight minutes.
 
 use rig::live::{Ended, Feed, Run};
-use rig::plan::Plan;
-use rig::sequence::Event;
-use rig::session::{Job, News, Notes, Signals};
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::sequence::Event;
+use runs::session::{Job, Notes, Signals, Update};
+use runs::setup::Setup;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -111,18 +111,18 @@ impl Paced {
             let planned = job.points().unwrap().len();
             let as_by_a_clock = Run { fast: false, ..Run::of(&job, planned, 0) };
             let mut feed = Feed::new(as_by_a_clock, Vec::new(), &asked);
-            let summary = job.run(&asked, &mut |news| {
+            let summary = rig::session::run(job, &asked, &mut |news| {
                 feed.news(&news);
-                if matches!(news, News::State(_)) {
+                if matches!(news, Update::State(_)) {
                     std::thread::sleep(pace);
                 }
                 let waits = || asked.paused.load(Ordering::Relaxed);
-                if matches!(news, News::Pass(_)) && waits() {
-                    feed.news(&News::Event(&Event::Paused { point: 0 }));
+                if matches!(news, Update::Pass(_)) && waits() {
+                    feed.news(&Update::Event(&Event::Paused { point: 0 }));
                     while waits() && asked.stops.load(Ordering::Relaxed) == 0 {
                         std::thread::sleep(Duration::from_millis(20));
                     }
-                    feed.news(&News::Event(&Event::Resumed));
+                    feed.news(&Update::Event(&Event::Resumed));
                 }
             });
             feed.end(Ended::of(&summary));

@@ -7,7 +7,7 @@ use std::process::Command;
 use tests::{documents, muprime, served, sweep_unless_the_machine_stalls, texts};
 
 fn points(run: &Path) -> Vec<u64> {
-    rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
+    runs::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
 }
 
 #[test]

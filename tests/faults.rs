@@ -1,15 +1,15 @@
 //! The fault list in virtual time: each fault in each phase, its worst reaction beside its bound, and its cause.
 
-use rig::validation::faults::bench::STEADY_AT;
-use rig::validation::faults::rows::What;
-use rig::validation::faults::{
+use studies::validation::faults::bench::STEADY_AT;
+use studies::validation::faults::rows::What;
+use studies::validation::faults::{
     Core, Expect, Moment, Pace, ROWS, Scene, Search, Strike, Tally, run, run_with, search,
 };
 
 const PACES: [Pace; 2] = [Pace::Fast, Pace::Default];
 
 fn assert_clean(tally: &Tally) {
-    rig::cli::faults::table(tally);
+    studies::validation::faults::table(tally);
     let failures: Vec<_> = tally.failures.iter().map(|f| (f.seed, &f.smallest, &f.wrong)).collect();
     assert_eq!(tally.failed, 0, "{failures:#?}");
 }

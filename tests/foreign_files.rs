@@ -8,7 +8,7 @@ mod cases;
 #[path = "foreign/hostile.rs"]
 mod hostile;
 
-use models::record::{Pass, read_passes};
+use models::pass::{Pass, read_passes};
 use std::path::Path;
 use std::process::Output;
 use tests::{documents, file, muprime, python, texts};

@@ -6,8 +6,9 @@ use models::quantity::PeakToPeak;
 use realtime::cycle::{Command, Marker};
 use realtime::safety::{Cause, Request, Trip};
 use realtime::turn::Ports;
-use rig::supervisor::wall::{Parts, Reins};
-use rig::supervisor::{Loop, WallLoop};
+use rig::wall_loop::WallLoop;
+use rig::wall_loop::{LoopHandle, Parts};
+use runs::supervisor::Loop;
 use sim::wire::world::WorldPlant;
 use sim::wire::{Command as Wire, SharedPlant};
 use sim::world::{World, WorldConfig};
@@ -77,9 +78,9 @@ cases! {
 /// A rig that is driven, behind its links.
 struct Driven {
     _rig: WallLoop,
-    reins: Reins,
+    reins: LoopHandle,
     plant: SharedPlant,
-    _emulators: rig::embed::Embedded,
+    _emulators: rig::emulators::Embedded,
 }
 
 impl Driven {
@@ -89,7 +90,7 @@ impl Driven {
         let (epoch, origin_ns) = (Instant::now(), realtime::pacing::monotonic_ns());
         let plant = SharedPlant::new(WorldPlant::new(World::new(&WorldConfig::ideal(), 1).unwrap()), epoch);
         let mut instruments = setup.instruments();
-        let emulators = rig::embed::embed(&mut instruments, &plant, false).unwrap();
+        let emulators = rig::emulators::embed(&mut instruments, &plant, false).unwrap();
         let opened = drivers::open(&instruments, epoch).map_err(|e| e.to_string())?;
         let mut config = setup.config;
         // The generator has neither watchdog nor relay here: what it shows is looked at, not how it is armed.

@@ -151,9 +151,9 @@ fn profiles() {
 
 #[test]
 fn setups_plans_models_and_certificates() {
-    let mut corpus = files("rig/setups", ".toml");
-    corpus.extend(files("rig/plans", ".toml"));
-    corpus.extend(files("rig/fingertips", ".toml"));
+    let mut corpus = files("runs/setups", ".toml");
+    corpus.extend(files("runs/plans", ".toml"));
+    corpus.extend(files("runs/fingertips", ".toml"));
     run("configuration", configuration::ALL, "configuration", &corpus, 20);
 }
 

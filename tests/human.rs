@@ -3,10 +3,10 @@
 
 use models::prediction::SpringSlider;
 use realtime::safety::Cause;
-use rig::plan::Plan;
-use rig::sequence::{Event, Outcome};
-use rig::session::{Job, News, Signals};
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::sequence::{Event, Outcome};
+use runs::session::{Job, Signals, Update};
+use runs::setup::Setup;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -55,12 +55,12 @@ fn run(tables: &str, limits: &str, hand: bool) -> (Outcome, usize, usize, Vec<Ev
         notes: Default::default(),
     };
     let mut events = Vec::new();
-    let mut news = |news: News<'_>| {
-        if let News::Event(event) = news {
+    let mut news = |news: Update<'_>| {
+        if let Update::Event(event) = news {
             events.push(event.clone());
         }
     };
-    let summary = job.run(&Signals::default(), &mut news).unwrap();
+    let summary = rig::session::run(job, &Signals::default(), &mut news).unwrap();
     (summary.outcome, summary.passes, summary.planned, events)
 }
 

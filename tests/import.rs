@@ -1,7 +1,7 @@
 //! Foreign tables: ten sources of one and the same passes, each imported and compared with the truth to the last digit, and sources that are
 //! refused or remarked on.
 
-use models::record::{Pass, read_passes};
+use models::pass::{Pass, read_passes};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;

@@ -1,9 +1,9 @@
 //! What is kept of a run, and what is said of it: files that vanish or lock in the middle, disks that fill at the end, readers
 //! that go away, runs that are taken up again or were finished before, refusals that leave nothing behind.
 
-use rig::plan::Plan;
-use rig::session::{Job, News, Signals, Summary};
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::session::{Job, Signals, Summary, Update};
+use runs::setup::Setup;
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ fn sweep(plan: &Path, out: &Path) -> Command {
 }
 
 fn points(run: &Path) -> BTreeSet<u64> {
-    rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
+    runs::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
 }
 
 /// A sweep in wall-clock time, struck by `strike` after its second pass.
@@ -259,8 +259,8 @@ fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {
             };
             let (signals, mut made) = (Signals::default(), 0);
             let stops = Arc::clone(&signals.stops);
-            job.run(&signals, &mut |news| {
-                made += usize::from(matches!(news, News::Pass(_)));
+            rig::session::run(job, &signals, &mut |news| {
+                made += usize::from(matches!(news, Update::Pass(_)));
                 if stop == Some(made) {
                     stops.store(1, Ordering::Relaxed);
                 }
@@ -268,7 +268,7 @@ fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {
             .unwrap();
         }
         let table = std::fs::File::open(out.join("points.csv")).unwrap();
-        let passes = models::record::read_passes(table).unwrap();
+        let passes = models::pass::read_passes(table).unwrap();
         assert_eq!(passes.len(), 98);
         assert!(passes.is_sorted_by_key(|p| p.time_s), "the run's time goes on");
         let sessions: Vec<u64> = passes.iter().map(|p| p.session.unwrap()).collect();
@@ -479,7 +479,7 @@ fn what_files_say_cannot_rewrite_a_terminal() {
     let folder = tempfile::tempdir().unwrap();
     let plan = plan(folder.path(), 1);
     let setup = folder.path().join("setup.toml");
-    let text = std::fs::read_to_string(file("rig/setups/virtual-ideal.toml")).unwrap();
+    let text = std::fs::read_to_string(file("runs/setups/virtual-ideal.toml")).unwrap();
     let named = text.replacen("name = \"virtual-ideal\"", "name = \"a\\u001b[2Jb\\u009b1A\"", 1);
     assert_ne!(text, named);
     std::fs::write(&setup, named).unwrap();

@@ -42,7 +42,7 @@ fn points(run: &Path) -> Vec<u64> {
     if !run.join("points.csv").exists() {
         return Vec::new();
     }
-    rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
+    runs::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
 }
 
 #[test]
@@ -52,7 +52,8 @@ fn killed_at_any_instant_nothing_acknowledged_is_lost_and_the_drive_drops() {
     let folder = tempfile::tempdir().unwrap();
     let world = World::new(&WorldConfig::ideal(), 5).unwrap();
     let plant = SharedPlant::new(WorldPlant::new(world), Instant::now());
-    let devices = rig::embed::emulators(&rig::setup::Setup::load("virtual").unwrap().instruments()).unwrap();
+    let devices =
+        rig::emulators::emulators(&runs::setup::Setup::load("virtual").unwrap().instruments()).unwrap();
     let server = ModbusTcpServer::start("127.0.0.1:0".parse().unwrap(), devices, plant).unwrap();
     let (plan, setup_file) = (folder.path().join("plan.toml"), folder.path().join("setup.toml"));
     std::fs::write(&plan, served::plan("kills", 3, &[0.5e-6, 1e-6, 2e-6, 3e-6])).unwrap();
@@ -106,7 +107,7 @@ fn killed_at_any_instant_nothing_acknowledged_is_lost_and_the_drive_drops() {
                 let unique: BTreeSet<u64> = kept.iter().copied().collect();
                 assert_eq!(unique.len(), kept.len(), "a pass is there twice: {kept:?}");
                 assert!(acknowledged.is_subset(&unique), "acknowledged {acknowledged:?}, kept {kept:?}");
-                for record in rig::run_dir::records_in(&out).unwrap() {
+                for record in runs::run_dir::records_in(&out).unwrap() {
                     let read = realtime::recorder::read(&std::fs::read(&record).unwrap());
                     assert_eq!(read.integrity.damaged_places, 0, "{}", record.display());
                 }

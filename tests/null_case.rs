@@ -4,10 +4,10 @@
 use models::prediction::{FrictionModel, SpringSlider};
 use rayon::prelude::*;
 use realtime::compare::{Agreement, Lack};
-use rig::plan::Plan;
-use rig::sequence::Outcome;
-use rig::session::{Rehearsal, rehearse};
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::sequence::Outcome;
+use runs::session::{Rehearsal, rehearse};
+use runs::setup::Setup;
 use sim::defects::Defects;
 use sim::world::WorldConfig;
 use std::sync::Arc;

@@ -14,9 +14,10 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use realtime::cycle::{Command, Marker};
 use realtime::safety::Request;
 use realtime::turn::{Ports, Row};
-use rig::setup::Setup;
-use rig::supervisor::wall::{Parts, Reins};
-use rig::supervisor::{Loop, OffReport, WallLoop};
+use rig::wall_loop::WallLoop;
+use rig::wall_loop::{LoopHandle, Parts};
+use runs::setup::Setup;
+use runs::supervisor::{Loop, OffReport};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdout, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -127,7 +128,7 @@ impl Drop for Served {
 /// A rig behind its links, one of which can be struck.
 struct Bench {
     rig: Option<WallLoop>,
-    reins: Reins,
+    reins: LoopHandle,
     served: Arc<Served>,
     trouble: Trouble,
     answer_limit: Duration,

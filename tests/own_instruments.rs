@@ -9,9 +9,9 @@
 mod rows;
 
 use realtime::safety::{Cause, Trip};
-use rig::sequence::Outcome;
-use rig::session::Summary;
 use rows::{Fate, ROWS, Row};
+use runs::sequence::Outcome;
+use runs::session::Summary;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
@@ -165,7 +165,7 @@ fn thirty_passes(own: &[&'static str]) {
     let found: Vec<(f64, f64)> = passes
         .lines()
         .filter_map(|line| {
-            let pass: rig::sequence::MeasuredPass = serde_json::from_str(line).unwrap();
+            let pass: runs::sequence::MeasuredPass = serde_json::from_str(line).unwrap();
             Some((pass.pass.amplitude.metres(), pass.comparison?.mu_relative?))
         })
         .collect();

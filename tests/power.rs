@@ -52,7 +52,7 @@ fn watched() -> Watched {
         .expect("strace is needed: tests/run installs it");
     assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
     let ops = log::read(&std::fs::read_to_string(&log).unwrap(), &root);
-    let planned = rig::run_dir::passes_in(&root.join("runs/r")).unwrap().len();
+    let planned = runs::run_dir::passes_in(&root.join("runs/r")).unwrap().len();
     Watched { _folder: folder, plan, root, ops, planned }
 }
 
@@ -78,14 +78,14 @@ fn judge(root: &Path, acknowledged: &BTreeSet<u64>, ended: bool) -> Result<(), S
     let run = root.join("runs/r");
     let mut kept = BTreeSet::new();
     if run.join("points.csv").exists() {
-        let passes = rig::run_dir::passes_in(&run).map_err(|e| format!("the passes: {e:#}"))?;
+        let passes = runs::run_dir::passes_in(&run).map_err(|e| format!("the passes: {e:#}"))?;
         kept.extend(passes.iter().map(|p| p.pass.point));
     }
     if !acknowledged.is_subset(&kept) {
         return Err(format!("acknowledged {acknowledged:?}, kept {kept:?}"));
     }
     if root.join("runs").exists() {
-        let runs = rig::catalogue::Catalogue::open(&root.join("runs")).and_then(|c| c.all());
+        let runs = runs::catalogue::Catalogue::open(&root.join("runs")).and_then(|c| c.all());
         let runs = runs.map_err(|e| format!("the catalogue: {e:#}"))?;
         let noted = runs.first().map_or(0, |r| r.passes);
         if noted < acknowledged.len() as i64 {
@@ -102,7 +102,8 @@ fn judge(root: &Path, acknowledged: &BTreeSet<u64>, ended: bool) -> Result<(), S
             return Err(format!("the record: {:?}", found.sentences()));
         }
         let summary = std::fs::read(run.join("summary.json")).map_err(|e| format!("the summary: {e}"))?;
-        serde_json::from_slice::<rig::session::Summary>(&summary).map_err(|e| format!("the summary: {e}"))?;
+        serde_json::from_slice::<runs::session::Summary>(&summary)
+            .map_err(|e| format!("the summary: {e}"))?;
         let report =
             std::fs::read_to_string(run.join("report.html")).map_err(|e| format!("the report: {e}"))?;
         if !report.trim_end().ends_with("</html>") {
@@ -172,7 +173,7 @@ fn what_a_power_cut_leaves_is_gone_on_with() {
         let run = left.path().join("runs/r");
         let output = sweep(&watched.plan, &run).output().unwrap();
         assert_eq!(output.status.code(), Some(0), "cut {seed} at {at}: {}", texts(&output).1);
-        let passes = rig::run_dir::passes_in(&run).unwrap();
+        let passes = runs::run_dir::passes_in(&run).unwrap();
         let points: BTreeSet<u64> = passes.iter().map(|p| p.pass.point).collect();
         assert_eq!((passes.len(), points.len()), (watched.planned, watched.planned), "cut {seed} at {at}");
     }

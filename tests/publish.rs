@@ -106,8 +106,7 @@ fn a_run_is_told_to_the_laboratory() {
         for (topic, message) in &all {
             by_topic.entry(topic.strip_prefix("lab/rig-1/").expect("the prefix")).or_default().push(message);
         }
-        let passes =
-            models::record::read_passes(&std::fs::read(out.join("points.csv")).unwrap()[..]).unwrap();
+        let passes = models::pass::read_passes(&std::fs::read(out.join("points.csv")).unwrap()[..]).unwrap();
         let told: Vec<u64> = by_topic["pass"].iter().map(|p| p["pass"]["point"].as_u64().unwrap()).collect();
         let made: Vec<u64> = passes.iter().map(|p| p.point).collect();
         assert_eq!(told, made, "every pass once, in order");
@@ -186,8 +185,7 @@ fn a_broker_that_is_killed_stops_no_run() {
         killing.join().unwrap();
         assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
         let told = heard.lock().unwrap().iter().filter(|(topic, _)| topic == "x/pass").count();
-        let passes =
-            models::record::read_passes(&std::fs::read(out.join("points.csv")).unwrap()[..]).unwrap();
+        let passes = models::pass::read_passes(&std::fs::read(out.join("points.csv")).unwrap()[..]).unwrap();
         assert!(
             told >= 1 && told < passes.len(),
             "{told} of {} were told before it was killed",

@@ -8,11 +8,11 @@ use realtime::cycle::{Command, CycleState};
 use realtime::ports::Nanos;
 use realtime::recorder::{Entry, Preamble, Reader, Recorder};
 use realtime::turn::{Ports, Row, Tick, turn};
-use rig::plan::{Plan, Resolution};
-use rig::sequence::Sequence;
-use rig::setup::Setup;
 use ringbuf::HeapRb;
 use ringbuf::traits::{Consumer, Producer, Split};
+use runs::plan::{Plan, Resolution};
+use runs::sequence::Sequence;
+use runs::setup::Setup;
 use sim::virtual_rig::VirtualRig;
 use sim::world::WorldConfig;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -136,15 +136,15 @@ impl realtime::ports::ForceSensor for Counted {
 #[test]
 fn the_loops_thread_allocates_nothing_behind_real_drivers() {
     use realtime::safety::Request;
-    use rig::supervisor::Loop;
-    use rig::supervisor::wall::{Parts, WallLoop};
+    use rig::wall_loop::{Parts, WallLoop};
+    use runs::supervisor::Loop;
     use std::sync::atomic::{AtomicU64, Ordering};
     let setup = tests::slower(&Setup::load("virtual-ideal").unwrap());
     let (epoch, origin_ns) = (std::time::Instant::now(), realtime::pacing::monotonic_ns());
     let world = sim::world::World::new(&WorldConfig::ideal(), 1).unwrap();
     let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(world), epoch);
     let mut instruments = setup.instruments();
-    let _emulators = rig::embed::embed(&mut instruments, &plant, false).unwrap();
+    let _emulators = rig::emulators::embed(&mut instruments, &plant, false).unwrap();
     let opened = drivers::open(&instruments, epoch).unwrap();
     let counted = Arc::new(AtomicU64::new(u64::MAX));
     let force = setup.certificates.calibrated(opened.force);

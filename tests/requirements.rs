@@ -4,11 +4,11 @@
 //! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements` writes it anew.
 
 use realtime::safety::{Cause, RULES, Rule, Unit};
-use rig::validation::faults::bench::STEADY_AT;
-use rig::validation::faults::bench::{RING, T};
-use rig::validation::faults::{ELSEWHERE, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
+use studies::validation::faults::bench::STEADY_AT;
+use studies::validation::faults::bench::{RING, T};
+use studies::validation::faults::{ELSEWHERE, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run};
 use tests::file;
 
 /// Unit tests of the safety core that name a cause.
@@ -260,7 +260,7 @@ fn keys_of<T: serde::de::DeserializeOwned>() -> BTreeSet<String> {
 fn every_key_of_a_setup_and_of_rig_toml_has_its_word() {
     use drivers::{AxisSetup, InstrumentSetup, vibrometer::VibrometerSetup};
     use models::rig_file::{Calibration, PassNoise, RigFile};
-    use rig::setup::{LimitsFile, Pace, SetupFile, VirtualRig};
+    use runs::setup::{LimitsFile, Pace, SetupFile, VirtualRig};
     let missing = |page: &str, keys: BTreeSet<String>| {
         let text = std::fs::read_to_string(file(page)).unwrap();
         let named = |key: &String| ["`", "[", "[["].iter().any(|open| text.contains(&format!("{open}{key}")));
@@ -276,7 +276,7 @@ fn every_key_of_a_setup_and_of_rig_toml_has_its_word() {
         keys_of::<VibrometerSetup>(),
         keys_of::<PassNoise>(),
         keys_of::<realtime::estimate::EstimateConfig>(),
-        keys_of::<rig::fingertip::FingertipSetup>(),
+        keys_of::<runs::fingertip::FingertipSetup>(),
     ]
     .into_iter()
     .flatten()

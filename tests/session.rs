@@ -13,7 +13,7 @@ use tests::{
 /// Point numbers in a run's table.
 fn points(run: &Path) -> Vec<u64> {
     let table = std::fs::File::open(run.join("points.csv")).unwrap();
-    models::record::read_passes(table).unwrap().iter().map(|p| p.point).collect()
+    models::pass::read_passes(table).unwrap().iter().map(|p| p.point).collect()
 }
 
 fn assert_each_once(points: &[u64], planned: u64) {
@@ -176,7 +176,7 @@ fn a_killed_sweep_resumes_without_a_lost_or_doubled_pass() {
         }
         assert!(finished);
         assert_each_once(&points(&out), 22);
-        let records = rig::run_dir::records_in(&out).unwrap();
+        let records = runs::run_dir::records_in(&out).unwrap();
         assert_eq!(records.len(), sessions);
         for record in records {
             let read = realtime::recorder::read(&std::fs::read(&record).unwrap());
@@ -251,7 +251,7 @@ fn an_interrupt_stops_safely_and_keeps_what_was_measured() {
 fn a_trip_is_told_with_its_unit_and_its_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let plan = short_plan(folder.path());
-    let ideal = rig::setup::Setup::load("virtual-ideal").unwrap().text;
+    let ideal = runs::setup::Setup::load("virtual-ideal").unwrap().text;
     // The load of the plan, and no more: its noise breaks the limit.
     let tight = ideal.replace("[limits]\n", "[limits]\nnormal_force_max_n = 0.25\n");
     let setup = folder.path().join("tight.toml");
@@ -338,7 +338,7 @@ fn bad_input_is_refused_with_its_place_and_nothing_is_touched() {
 #[test]
 fn everything_bundled_passes_its_own_check() {
     let mut files = Vec::new();
-    for folder in ["rig/plans", "rig/setups", "drivers/profiles"] {
+    for folder in ["runs/plans", "runs/setups", "drivers/profiles"] {
         let entries = std::fs::read_dir(file(folder)).unwrap();
         files.extend(
             entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "toml")),

@@ -280,9 +280,9 @@ fn a_terminal_that_nobody_reads_holds_nothing_up() {
         drop(master);
         assert!(child.wait().unwrap().code().is_some());
         filler.join().unwrap();
-        let summary: rig::session::Summary =
+        let summary: runs::session::Summary =
             serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
-        if matches!(summary.outcome, rig::sequence::Outcome::Tripped(_)) {
+        if matches!(summary.outcome, runs::sequence::Outcome::Tripped(_)) {
             return Some(out);
         }
         assert_eq!((summary.passes, summary.record_lost), (12, 0));
@@ -314,7 +314,7 @@ fn the_page_of_the_docs_is_that_of_a_run() {
     let out = folder.path().join("monday");
     // The bundled rig at 250 Hz, where a stall of a busy machine is a few deadlines: what is looked at is the page, not the loop.
     let setup = folder.path().join("virtual.toml");
-    let text = rig::setup::Setup::load("virtual").unwrap().text;
+    let text = runs::setup::Setup::load("virtual").unwrap().text;
     let slower = text.replace("rate_hz = 1000", "rate_hz = 250");
     assert_ne!(slower, text);
     std::fs::write(&setup, slower).unwrap();
@@ -324,7 +324,7 @@ fn the_page_of_the_docs_is_that_of_a_run() {
     // A machine that stalls may trip it all the same: it is taken up again where it was cut, unless the moment is past.
     let page = (0..16).find_map(|tries: u64| {
         std::thread::sleep(std::time::Duration::from_secs(tries.min(8)));
-        if rig::run_dir::passes_in(&out).is_ok_and(|made| made.len() > 58) {
+        if runs::run_dir::passes_in(&out).is_ok_and(|made| made.len() > 58) {
             std::fs::remove_dir_all(&out).unwrap();
         }
         let own = Tmux::start(folder.path(), "docs", (80, 24), &[], &words);

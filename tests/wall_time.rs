@@ -115,13 +115,13 @@ pub fn sweep_taken_up_again(out: &Path, sweep: impl Fn() -> Command) -> Output {
 pub fn cut_by_a_stall(out: &Path) -> Option<String> {
     let said = std::fs::read_to_string(out.join("summary.json"));
     let said = said.unwrap_or_else(|e| panic!("no summary in {}: {e}", out.display()));
-    let summary: rig::session::Summary = serde_json::from_str(&said).unwrap();
+    let summary: runs::session::Summary = serde_json::from_str(&said).unwrap();
     let stalls = summary.stalls.expect("a run in wall-clock time has witnesses");
     let trip = match summary.outcome {
-        rig::sequence::Outcome::Tripped(trip) => trip,
+        runs::sequence::Outcome::Tripped(trip) => trip,
         // The proof of the second channel has its own bounds in time, and ten seconds to go through.
         // An amplifier whose supply was cut for a stall has no fault: that cause is never forgiven.
-        rig::sequence::Outcome::WouldNotArm { blocking }
+        runs::sequence::Outcome::WouldNotArm { blocking }
             if stalls.worst.0 >= KEEPS_FROM_ARMING.0
                 && blocking != Some(realtime::safety::Cause::AmplifierFault) =>
         {

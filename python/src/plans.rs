@@ -4,9 +4,9 @@ use crate::{MuprimeError, refused};
 use miette::IntoDiagnostic;
 use models::prediction::{FrictionModel, SpringSlider};
 use pyo3::prelude::*;
-use rig::plan::{Plan, PlanFile};
-use rig::session::Job;
-use rig::setup::Setup;
+use runs::plan::{Plan, PlanFile};
+use runs::session::Job;
+use runs::setup::Setup;
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -10,11 +10,11 @@
 //! After a restart of the machine only the time since then is known to be over, and only that counts as rest.
 #![allow(clippy::disallowed_methods, reason = "a ledger is written beside the loop, while the run goes")]
 
-use crate::setup::Setup;
 use miette::WrapErr;
 use realtime::pacing::Lifeline;
 use realtime::ports::Nanos;
 use realtime::safety::{Exposed, Limits, MINUTE_NS, MINUTES, PART_MINUTES, PARTS};
+use runs::setup::Setup;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -151,13 +151,13 @@ impl Ledger {
     }
 
     fn read(path: &Path, amplifier: &str, limits: &Limits) -> miette::Result<Self> {
-        if !crate::claim::is_shared(path.parent().unwrap_or(Path::new("/"))) {
+        if !crate::rig_lock::is_shared(path.parent().unwrap_or(Path::new("/"))) {
             miette::bail!(
                 help = "make it one that all may write to, with the sticky bit (mode 1777)",
                 "the folder of the ledger cannot be trusted"
             );
         }
-        let file = crate::claim::open_shared(path).map_err(|e| miette::miette!("{e}"))?;
+        let file = crate::rig_lock::open_shared(path).map_err(|e| miette::miette!("{e}"))?;
         let (boot, now_ns) =
             machine_time().map_err(|e| miette::miette!("this machine tells no time: {e}"))?;
         let length = file.metadata().map_err(|e| miette::miette!("{e}"))?.len();

@@ -1,7 +1,7 @@
 //! A run while it goes on, for whoever looks: the terminal view and the browser, in the run's own process or in another one.
 //!
 //! ```text
-//! session --News--> Feed (bounded queue, a thread) --JSON lines over a local socket--> Viewer -> View -> terminal, browser
+//! session --Update--> Feed (bounded queue, a thread) --JSON lines over a local socket--> Viewer -> View -> terminal, browser
 //!                    ^ stop, pause, resume, one word a line, of the same user only ----'
 //! ```
 //!

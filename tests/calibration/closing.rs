@@ -92,7 +92,7 @@ fn a_calibrated_rig_is_no_longer_blamed_and_bad_certificates_are_refused() {
     let certified =
         muprime(at, "calibrate force series.csv --operator Operator --serial V-1 --out force.toml --json");
     assert!(certified.status.success(), "{}", tests::texts(&certified).1);
-    let setup = std::fs::read_to_string(tests::file("rig/setups/virtual-ideal.toml")).unwrap();
+    let setup = std::fs::read_to_string(tests::file("runs/setups/virtual-ideal.toml")).unwrap();
     let with = |serial: &str| {
         setup
             .replace("name = \"virtual-ideal\"", "name = \"virtual-ideal\"\ncertificates = [\"force.toml\"]")

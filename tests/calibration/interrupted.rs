@@ -57,7 +57,7 @@ impl Bench {
     }
 
     fn setup(&self, folder: &Path) {
-        let text = std::fs::read_to_string(tests::file("rig/setups/virtual-ideal.toml")).unwrap();
+        let text = std::fs::read_to_string(tests::file("runs/setups/virtual-ideal.toml")).unwrap();
         let text =
             text.replace("127.0.0.1:0", &self.address.to_string()).replace("[virtual]\nideal = true\n", "");
         std::fs::write(folder.join("rig.toml"), text).unwrap();

@@ -32,7 +32,7 @@ struct Served {
 
 impl Served {
     fn start(folder: &Path, factor: f64) -> Self {
-        let ideal = std::fs::read_to_string(tests::file("rig/setups/virtual-ideal.toml")).unwrap();
+        let ideal = std::fs::read_to_string(tests::file("runs/setups/virtual-ideal.toml")).unwrap();
         let vibrometer =
             "[vibrometer]\nprofile = \"polytec-ofv5000\"\naddress = \"pty\"\ndecoder = \"VD-02\"\n\n";
         let served = ideal.replace("[amplifier]\n", &format!("{vibrometer}[amplifier]\n"));

@@ -14,7 +14,7 @@ use realtime::cycle::{Command, CycleState, Marker};
 use realtime::ports::Nanos;
 use realtime::safety::Request;
 use realtime::turn::{Ports, Tick, turn};
-use rig::setup::Setup;
+use runs::setup::Setup;
 use sim::defects::Defects;
 use sim::noise::Noise;
 use sim::wire::SharedPlant;
@@ -218,7 +218,7 @@ fn dead_weights_over_modbus_and_can_find_what_was_withheld() {
         let withheld = Withheld::draw(&mut draw);
         std::fs::write(at.join("withheld.toml"), withheld.toml()).unwrap();
         let mut served = Served::start(at, setup, &more);
-        let text = std::fs::read_to_string(tests::file(&format!("rig/setups/{setup}.toml"))).unwrap();
+        let text = std::fs::read_to_string(tests::file(&format!("runs/setups/{setup}.toml"))).unwrap();
         // A rig like any other: not `[virtual]`, at the addresses that were given out.
         let (force, tcp) = (served.address(profile), served.address("muprime-stage"));
         let text = text
@@ -241,7 +241,7 @@ struct Bench {
     rig: drivers::Rig,
     setup: Setup,
     epoch: Instant,
-    _embedded: rig::embed::Embedded,
+    _embedded: rig::emulators::Embedded,
 }
 
 impl Bench {
@@ -251,7 +251,7 @@ impl Bench {
         let (world, hands) = WorldPlant::at_hand(World::new(config, 7).unwrap());
         let plant = SharedPlant::new(world, epoch);
         let mut instruments = setup.instruments();
-        let embedded = rig::embed::embed(&mut instruments, &plant, false).unwrap();
+        let embedded = rig::emulators::embed(&mut instruments, &plant, false).unwrap();
         let rig = drivers::open(&instruments, epoch).unwrap();
         Bench { plant, hands, rig, setup, epoch, _embedded: embedded }
     }

@@ -1,9 +1,9 @@
 //! Foreign tables: every reader of `muprime import` ends with a table or a refusal, whatever the bytes are.
 
 use super::Chance;
-use rig::import::guess::guess;
-use rig::import::map::Map;
-use rig::import::{Marks, Wanted, import, read};
+use tables::import::guess::guess;
+use tables::import::map::Map;
+use tables::import::{Marks, Wanted, import, read};
 use std::path::Path;
 
 /// All of them, by name, in the order that the coverage-guided target counts them.
@@ -16,7 +16,7 @@ fn imported(name: &str, input: &[u8]) {
     map.set(&["amplitude_pp_m=0,direction=1".into()]).unwrap();
     let wanted = Wanted { map, ..Wanted::default() };
     if let Ok(done) = import(name, input, &grid, &wanted) {
-        let passes = models::record::read_passes(done.table.as_bytes()).unwrap();
+        let passes = models::pass::read_passes(done.table.as_bytes()).unwrap();
         assert!(!passes.is_empty() && passes.iter().all(|p| p.normal_force_n > 0.0 && p.time_s.is_finite()));
     }
 }

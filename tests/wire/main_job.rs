@@ -4,7 +4,7 @@
 //! each run states for each `mu'`, which follows from the repeatability in its setup.
 
 use super::peers::file;
-use rig::sequence::MeasuredPass;
+use runs::sequence::MeasuredPass;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;

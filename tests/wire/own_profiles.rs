@@ -55,7 +55,7 @@ fn the_examples_hold_and_the_page_shows_what_they_say() {
     let page = std::fs::read_to_string(file("docs/profiles.md")).unwrap();
     let texts: Vec<String> = EXAMPLES.iter().map(|name| source(name).text).collect();
     for name in EXAMPLES {
-        rig::rehearsal::of(&file(&format!("docs/profiles/{name}.toml")))
+        runs::rehearsal::of(&file(&format!("docs/profiles/{name}.toml")))
             .unwrap_or_else(|said| panic!("{said}"));
         assert!(page.contains(&format!("(profiles/{name}.toml)")), "the page does not link {name}");
     }
@@ -302,7 +302,7 @@ fn a_sweep_with_the_board_as_its_force_sensor() {
         let found: Vec<(f64, f64, f64)> = passes
             .lines()
             .filter_map(|line| {
-                let pass: rig::sequence::MeasuredPass = serde_json::from_str(line).unwrap();
+                let pass: runs::sequence::MeasuredPass = serde_json::from_str(line).unwrap();
                 let compared = pass.comparison?;
                 let amplitude = pass.pass.amplitude.metres();
                 Some((amplitude, compared.mu_relative?, compared.mu_relative_sd?))
@@ -339,7 +339,7 @@ fn a_float_sensor_is_judged_by_its_stated_resolution_or_not_by_its_count() {
         std::fs::write(folder.path().join("amp.toml"), text).unwrap();
         let setup = setup_with("amp.toml", "127.0.0.1:1502");
         let setup =
-            rig::setup::Setup::parse("own", &setup, folder.path()).unwrap_or_else(|e| panic!("{e:?}"));
+            runs::setup::Setup::parse("own", &setup, folder.path()).unwrap_or_else(|e| panic!("{e:?}"));
         setup.lateral_channel().unwrap().unwrap().count_n
     };
     assert_eq!(count(&text), Some(2e-4));

@@ -2,8 +2,8 @@
 #![allow(clippy::disallowed_methods, reason = "threads beside everything else")]
 
 use super::{Ask, Ended, Message, Progress, Run, State, Told, View, place};
-use crate::sequence::MeasuredPass;
-use crate::session::{News, Signals};
+use runs::sequence::MeasuredPass;
+use runs::session::{Signals, Update};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::sync::Arc;
@@ -51,15 +51,15 @@ impl Feed {
     }
 
     /// Tells news.
-    pub fn news(&mut self, news: &News<'_>) {
+    pub fn news(&mut self, news: &Update<'_>) {
         let message = match news {
-            News::Pass(pass) => Message::Pass(Box::new((*pass).clone())),
-            News::Event(event) => Message::Event(Told::of(self.now_s, (*event).clone())),
-            News::State(glimpse) => {
+            Update::Pass(pass) => Message::Pass(Box::new((*pass).clone())),
+            Update::Event(event) => Message::Event(Told::of(self.now_s, (*event).clone())),
+            Update::State(glimpse) => {
                 self.now_s = glimpse.row.now.seconds();
                 Message::State(Box::new(State::of(glimpse)))
             }
-            News::Progress(made, _, remaining_s) => Message::Progress(Progress {
+            Update::Progress(made, _, remaining_s) => Message::Progress(Progress {
                 made: self.run.made_before + made,
                 planned: self.run.planned,
                 remaining_s: *remaining_s,

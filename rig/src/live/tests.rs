@@ -1,10 +1,10 @@
 #![allow(clippy::disallowed_methods, reason = "waits for threads of the system")]
 
 use super::*;
-use crate::sequence::{Event, MeasuredPass};
-use crate::session::{News, Signals};
 use models::condition::Condition;
-use models::record::Pass;
+use models::pass::Pass;
+use runs::sequence::{Event, MeasuredPass};
+use runs::session::{Signals, Update};
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::Ordering;
@@ -59,12 +59,12 @@ fn whoever_comes_late_has_the_same_picture() {
     let folder = tempfile::tempdir().unwrap();
     let mut feed = Feed::new(run(folder.path()), vec![pass(1), pass(2)], &Signals::default());
     assert!(Viewer::connect(folder.path()).is_err(), "nothing was told yet");
-    feed.news(&News::Event(&Event::Armed));
+    feed.news(&Update::Event(&Event::Armed));
     let (mut early, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut early, &mut view, |view| view.events.len() == 1);
-    feed.news(&News::Pass(&pass(3)));
-    feed.news(&News::Progress(1, 7, 5.0));
-    feed.news(&News::Event(&Event::Paused { point: 4 }));
+    feed.news(&Update::Pass(&pass(3)));
+    feed.news(&Update::Progress(1, 7, 5.0));
+    feed.news(&Update::Event(&Event::Paused { point: 4 }));
     seen(&mut early, &mut view, |view| view.paused);
     let (mut late, mut same) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut late, &mut same, |view| view.progress.made == 3);
@@ -81,7 +81,7 @@ fn what_viewers_ask_is_heard_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let signals = Signals::default();
     let mut feed = Feed::new(run(folder.path()), Vec::new(), &signals);
-    feed.news(&News::Event(&Event::Armed));
+    feed.news(&Update::Event(&Event::Armed));
     let heard = |what: &dyn Fn() -> bool| {
         let began = Instant::now();
         while !what() {
@@ -110,12 +110,12 @@ fn what_viewers_ask_is_heard_and_nothing_else() {
 fn a_viewer_that_reads_nothing_holds_nobody_up() {
     let folder = tempfile::tempdir().unwrap();
     let mut feed = Feed::new(run(folder.path()), Vec::new(), &Signals::default());
-    feed.news(&News::Event(&Event::Armed));
+    feed.news(&Update::Event(&Event::Armed));
     let mut deaf = UnixStream::connect_addr(&place(folder.path()).unwrap()).unwrap();
     let (mut viewer, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut viewer, &mut view, |view| view.events.len() == 1);
     for point in 0..4000 {
-        feed.news(&News::Pass(&pass(point)));
+        feed.news(&Update::Pass(&pass(point)));
         while view.passes.len() + 500 < point as usize {
             seen(&mut viewer, &mut view, |view| view.passes.len() + 500 >= point as usize);
         }

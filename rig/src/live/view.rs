@@ -1,8 +1,8 @@
 //! The picture that messages add up to: what a viewer shows, and what a new one is told first.
 
 use super::{Ended, Message, Progress, Run, State, Told};
-use crate::sequence::{Event, MeasuredPass};
 use realtime::safety::Trip;
+use runs::sequence::{Event, MeasuredPass};
 use std::collections::VecDeque;
 
 /// States that are remembered: a minute of them.

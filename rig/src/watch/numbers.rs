@@ -1,10 +1,10 @@
 //! What is seen of a run in words and numbers. Missing data is 'none', never 0.
 
 use crate::live::{State, View};
-use crate::print::clean;
-use crate::report::human::number;
-use crate::sequence::{MeasuredPass, Outcome};
 use realtime::cycle::Phase;
+use runs::print::clean;
+use runs::report::human::number;
+use runs::sequence::{MeasuredPass, Outcome};
 
 /// States of the last second.
 const SECOND: usize = 10;

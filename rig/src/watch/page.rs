@@ -1,17 +1,17 @@
 //! The page: what stands where. Eighty columns and twenty-four rows hold everything; more room goes to the curve, the traces and the
 //! events, less room keeps what is needed first.
 
-use super::look::Look;
 use super::numbers::{duration, of_state, outcome, phase, plain};
 use super::plot::{curve, trace};
+use super::style::Look;
 use super::{Keys, Source};
 use crate::live::View;
-use crate::report::events::describe;
 use calibration::certificate::date;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use realtime::safety::Cause;
+use runs::report::events::describe;
 
 /// Columns and rows from which on the whole page is shown.
 const WHOLE: [u16; 2] = [80, 24];
@@ -150,7 +150,7 @@ fn state(page: &Page<'_>) -> (String, Style) {
             (None, Some(error)) => plain(error),
             (None, None) => "nothing is known of its end".into(),
         };
-        let complete = ended.outcome == Some(crate::sequence::Outcome::Complete);
+        let complete = ended.outcome == Some(runs::sequence::Outcome::Complete);
         return (format!("ENDED: {how}"), if complete { look.strong(Color::Green) } else { look.alarm() });
     }
     if let Some(trip) = view.trip {

@@ -1,15 +1,15 @@
 use super::*;
 use crate::live::{Ended, Message, Progress, Run, State, Told};
-use crate::sequence::{Event, MeasuredPass, Outcome};
-use crate::session::Extremes;
 use models::condition::Condition;
-use models::record::Pass;
+use models::pass::Pass;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use realtime::compare::PassComparison;
 use realtime::cycle::Phase;
 use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip, Unit};
+use runs::sequence::{Event, MeasuredPass, Outcome};
+use runs::session::Extremes;
 
 const PLAIN: Look = Look { colour: false, unicode: false };
 
