@@ -6,6 +6,7 @@ mod arrays;
 mod binary;
 mod clock;
 mod grid;
+pub mod guess;
 #[cfg(feature = "matlab")]
 mod hdf5;
 mod head;
