@@ -13,6 +13,8 @@ mod chance;
 mod configuration;
 #[path = "fuzz/decoders.rs"]
 mod decoders;
+#[path = "fuzz/imports.rs"]
+mod imports;
 #[path = "fuzz/records.rs"]
 mod records;
 
@@ -191,4 +193,18 @@ fn whole_records() {
     writer.finish().unwrap();
     drop(writer);
     run("records", records::ALL, "records", &[whole.into_inner()], 4);
+}
+
+/// Foreign tables: the readers of several libraries and our own.
+#[test]
+fn imports_of_text() {
+    let corpus = [files("tests/foreign/seeds", ".csv"), files("tests/foreign/seeds", ".txt")].concat();
+    run("imports", imports::ALL, "texts", &corpus, 20);
+}
+
+#[test]
+fn imports_of_binaries() {
+    let ends = [".xlsx", ".parquet", ".arrow", ".npy", ".mat", ".h5"];
+    let corpus: Vec<Vec<u8>> = ends.iter().flat_map(|end| files("tests/foreign/seeds", end)).collect();
+    run("imports", imports::ALL, "binaries", &corpus, 20);
 }

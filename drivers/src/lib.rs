@@ -74,6 +74,7 @@ pub mod modbus_rtu;
 pub mod modbus_tcp;
 pub mod off;
 pub mod ports;
+pub mod remedy;
 pub mod serial;
 pub mod session;
 pub mod setup;

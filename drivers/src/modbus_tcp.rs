@@ -136,12 +136,44 @@ impl<'a> Tcp<'a> {
     }
 }
 
+/// What is wrong with an answer whose head does not fit its question, in words.
+fn mismatch(error: &tokio_modbus::Error) -> String {
+    use tokio_modbus::{Error, ProtocolError};
+    match error {
+        Error::Protocol(ProtocolError::HeaderMismatch { message, .. }) => {
+            let number = |half: &str, name: &str| -> Option<u32> {
+                let rest = half.split_once(&format!("{name}: "))?.1;
+                rest.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
+            };
+            let (asked, came) = message.split_once("actual").unwrap_or((message, ""));
+            let both = |name: &str| Some((number(asked, name)?, number(came, name)?));
+            match (both("unit_id"), both("transaction_id")) {
+                (Some((asked, came)), _) if asked != came => format!(
+                    "another unit answers, {came} in place of {asked}: set `unit` to the one that is meant (255 or 0 for a device \
+                     without a gateway)"
+                ),
+                (_, Some((asked, came))) if asked != came => format!(
+                    "an answer carries transaction {came} in place of {asked}: a gateway that does not number as Modbus TCP does is reached \
+                     as RTU over TCP (address tcp:HOST:PORT with a profile of kind modbus_rtu)"
+                ),
+                _ => "an answer carries another head than its question".into(),
+            }
+        }
+        Error::Protocol(ProtocolError::FunctionCodeMismatch { request, .. }) => {
+            format!(
+                "another function than {request} was answered: the transaction is another program's, or the device mixes them up"
+            )
+        }
+        other => other.to_string(),
+    }
+}
+
 /// Parts what tokio-modbus parts: an exception of the instrument, and trouble on the way.
 fn part<T>(answer: Result<tokio_modbus::Result<T>, Ended>) -> Result<T, Trouble> {
     match answer {
         Ok(Ok(Ok(value))) => Ok(value),
-        Ok(Ok(Err(exception))) => Err(Trouble::Refused(exception.to_string())),
-        Ok(Err(error)) => Err(Trouble::Ended(Ended::Io(error.to_string()))),
+        Ok(Ok(Err(exception))) => Err(Trouble::Refused(super::remedy::exception(exception.into()))),
+        Ok(Err(error)) => Err(Trouble::Ended(Ended::Io(mismatch(&error)))),
         Err(ended) => Err(Trouble::Ended(ended)),
     }
 }

@@ -31,6 +31,9 @@ pub enum Ended {
     /// A deadline passed.
     #[error("no answer within {0} ms")]
     Timeout(u32),
+    /// A deadline passed in the midst of an answer: what came of it, and the likely cause.
+    #[error("{0}")]
+    Cut(String),
     /// The line itself failed.
     #[error("{0}")]
     Io(String),
@@ -182,7 +185,7 @@ impl Session {
                     self.closed("stopped before a state came".into())
                 };
             }
-            if matches!(ended, Ended::Timeout(_)) {
+            if matches!(ended, Ended::Timeout(_) | Ended::Cut(_)) {
                 health.count(&health.timeouts);
             }
             last_words = ended.to_string();

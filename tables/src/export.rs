@@ -38,20 +38,11 @@ mod parquet {
     pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
         Err(super::absent("parquet"))
     }
-    /// Refuses.
-    ///
-    /// # Errors
-    /// Always.
-    pub fn as_csv(_: &std::path::Path) -> miette::Result<String> {
-        Err(super::absent("parquet"))
-    }
 }
 
 use clap::ValueEnum;
 use runs::report::RunData;
 use std::path::{Path, PathBuf};
-
-pub use parquet::as_csv as parquet_as_csv;
 
 /// A format to export to. Add one: a file in `export/`, a variant, and a line in [`export`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -10,7 +10,7 @@ use std::path::Path;
 /// A table that cannot be read, with its row.
 pub fn parse_passes(path: &Path, bytes: &[u8]) -> miette::Result<Vec<Pass>> {
     if bytes.starts_with(b"PAR1") {
-        let csv = crate::export::parquet_as_csv(path).wrap_err_with(|| path.display().to_string())?;
+        let csv = crate::import::parquet_as_csv(path).wrap_err_with(|| path.display().to_string())?;
         return read_passes(csv.as_bytes()).into_diagnostic().wrap_err_with(|| path.display().to_string());
     }
     read_passes(bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())

@@ -74,12 +74,13 @@ fn files_of_arrays_are_refused_in_words() {
         let output = muprime().arg("import").arg(&source).args(["--yes", "-o"]).arg(&out).output().unwrap();
         (output.status.code(), texts(&output).1)
     };
-    for (name, lists) in [("packed.mat", "sweep.t_s (19 x 1)"), ("table.h5", "run/sweep/t_s (19 x 1)")] {
-        let bytes = std::fs::read(folder.path().join(name)).unwrap();
-        let (code, said) = import("several.bin", &bytes);
+    // Arrays of the commonest length are the table; what is left over is noted.
+    for (name, rest) in [("packed.mat", "raw (1000 x 1)"), ("table.h5", "another length were passed over")] {
+        let (code, said) = import("several.bin", &std::fs::read(folder.path().join(name)).unwrap());
         let words = said.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
-        assert_eq!(code, Some(2), "{said}");
-        assert!(words.contains(lists) && words.contains("--sheet"), "{name}: {words}");
+        assert_eq!(code, Some(0), "{said}");
+        assert!(words.contains(rest), "{name}: {words}");
+        std::fs::remove_dir_all(folder.path().join("out")).unwrap();
     }
     // Wherever it is cut and whichever byte is another: status 0 or 2, never a panic.
     for name in ["columns.mat", "packed.mat", "table.h5", "new.mat"] {

@@ -7,7 +7,8 @@ use runs::{ask, out, say};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tables::import::map::{Map, guess};
+use tables::import::guess::guess;
+use tables::import::map::Map;
 use tables::import::{Cut, Grid, Imported, Marks, Wanted, guessed_lines, import, read};
 
 /// Arguments.
@@ -43,6 +44,9 @@ pub struct Args {
     /// A rig.toml that is known [default: written, with what was assumed]
     #[arg(long, conflicts_with = "tip")]
     rig: Option<PathBuf>,
+    /// What is right although it looks wrong: padding (rows of zeros at the end), unsorted (rows that are not in the order of time)
+    #[arg(long, value_parser = ["padding", "unsorted"])]
+    accept: Vec<String>,
     /// Fingertip of the library whose stiffnesses rig.toml gets
     #[arg(long)]
     tip: Option<String>,
@@ -89,7 +93,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let bytes = bytes_of(&args.file, MAX_TABLE_BYTES)?;
     let marks =
         Marks { delimiter: args.delimiter, decimal: args.decimal.as_ref().and_then(|d| d.chars().next()) };
-    let grid = read(&args.file, &bytes, args.sheet.as_deref(), marks)?;
+    let wanted = Map::headers(&args.map);
+    let grid = read(&args.file, &bytes, args.sheet.as_deref(), marks, &wanted)?;
     let map = map_of(&args, &grid)?;
     let rig = match &args.rig {
         Some(path) => {
@@ -99,7 +104,16 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         None => None,
     };
     let series = args.series.then_some(Cut { settle_s: args.settle_s, window_s: args.window_s });
-    let wanted = Wanted { map, set: args.set.clone(), series, rig, tip: args.tip.as_deref() };
+    let accepts = |what: &str| args.accept.iter().any(|a| a == what);
+    let wanted = Wanted {
+        map,
+        set: args.set.clone(),
+        series,
+        rig,
+        tip: args.tip.as_deref(),
+        padding: accepts("padding"),
+        unsorted: accepts("unsorted"),
+    };
     let source = args.file.file_name().unwrap_or_default().to_string_lossy();
     let Imported { table, rig, log } = import(&source, &bytes, &grid, &wanted)?;
     make_folder(&args.out)?;

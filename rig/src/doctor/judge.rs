@@ -120,7 +120,7 @@ fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
                 OpenError::Mismatch { problem, .. } | OpenError::Link { problem, .. } => problem.clone(),
                 other => other.to_string(),
             };
-            let advice = "check address, wiring, power, and that no other program holds the link";
+            let advice = drivers::remedy::advice(&said);
             return Finding::new(subject, false, said, advice);
         }
     };

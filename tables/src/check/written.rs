@@ -13,7 +13,7 @@ use std::path::Path;
 pub(super) fn table(path: &Path) -> miette::Result<Good> {
     let bytes = bytes_of(path, MAX_TABLE_BYTES)?;
     let passes = if bytes.starts_with(b"PAR1") {
-        read_passes(crate::export::parquet_as_csv(path)?.as_bytes())
+        read_passes(crate::import::parquet_as_csv(path)?.as_bytes())
     } else {
         read_passes(&bytes[..])
     };

@@ -1,4 +1,4 @@
-//! Parquet: written as one row group, and read for the diagnosis.
+//! Parquet: written as one row group.
 
 use super::columns::{Column, Table};
 use super::facts::Facts;
@@ -7,9 +7,6 @@ use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{FileReader, SerializedFileReader};
-use parquet::record::Field;
-use std::path::Path;
 
 /// The table of [`super::arrow`], whose schema goes along (`ARROW:schema`): readers that know Arrow see units and facts where
 /// Arrow has them. For those that do not, the file's own metadata hold the facts, and `muprime.columns`: name, unit and meaning
@@ -31,39 +28,4 @@ pub fn bytes(table: &Table, facts: &Facts) -> miette::Result<Vec<u8>> {
     writer.write(&batch).into_diagnostic()?;
     writer.close().into_diagnostic()?;
     Ok(bytes)
-}
-
-/// The columns of a Parquet point table as CSV text: one reader judges both formats.
-///
-/// # Errors
-/// A file that is no Parquet table.
-pub fn as_csv(path: &Path) -> miette::Result<String> {
-    let reader = SerializedFileReader::new(std::fs::File::open(path).into_diagnostic()?).into_diagnostic()?;
-    let mut text = String::new();
-    let names: Vec<String> = reader
-        .metadata()
-        .file_metadata()
-        .schema_descr()
-        .columns()
-        .iter()
-        .map(|c| c.name().to_string())
-        .collect();
-    text.push_str(&names.join(","));
-    text.push('\n');
-    for row in reader.get_row_iter(None).into_diagnostic()? {
-        let row = row.into_diagnostic()?;
-        let cells: Vec<String> = row
-            .get_column_iter()
-            .map(|(_, field)| match field {
-                Field::Null => String::new(),
-                Field::Str(s) => format!("\"{}\"", s.replace('"', "\"\"")),
-                Field::Double(v) => format!("{v:e}"),
-                Field::Float(v) => format!("{v:e}"),
-                other => other.to_string(),
-            })
-            .collect();
-        text.push_str(&cells.join(","));
-        text.push('\n');
-    }
-    Ok(text)
 }

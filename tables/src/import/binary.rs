@@ -1,79 +1,7 @@
-//! Tables of binary formats: workbooks, Parquet, NumPy.
+//! Tables of binary formats: Parquet, Arrow, NumPy.
 
 use super::grid::{Cell, Grid, Row};
 use miette::IntoDiagnostic;
-
-/// Days, as workbooks count time, in s.
-#[cfg(feature = "excel")]
-const DAY_S: f64 = 86_400.0;
-
-/// A sheet of a workbook: Excel or OpenDocument.
-///
-/// # Errors
-/// A file that is none, a sheet that is not there, several sheets and none named.
-#[cfg(feature = "excel")]
-pub fn workbook(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
-    use calamine::{Data, Reader};
-    let mut book = calamine::open_workbook_auto_from_rs(std::io::Cursor::new(bytes)).into_diagnostic()?;
-    let names = book.sheet_names();
-    let named = match sheet {
-        Some(name) => names.iter().find(|n| *n == name),
-        None if names.len() == 1 => names.first(),
-        None => {
-            let mut filled = names
-                .iter()
-                .filter(|n| book.worksheet_range(n).is_ok_and(|r| !r.is_empty()))
-                .collect::<Vec<_>>();
-            if filled.len() == 1 { filled.pop() } else { None }
-        }
-    };
-    let Some(name) = named.cloned() else {
-        let listed = names.iter().map(|n| format!("'{n}'")).collect::<Vec<_>>().join(", ");
-        match sheet {
-            Some(sheet) => {
-                miette::bail!(help = format!("its sheets: {listed}"), "the workbook has no sheet '{sheet}'")
-            }
-            None => miette::bail!(
-                help = format!("name one with --sheet: {listed}"),
-                "the workbook has several sheets"
-            ),
-        }
-    };
-    let range = book.worksheet_range(&name).into_diagnostic()?;
-    let top = range.start().map_or(0, |(row, _)| u64::from(row));
-    let cell = |data: &Data| match data {
-        Data::Int(v) => Cell::Number(*v as f64),
-        Data::Float(v) => Cell::Number(*v),
-        Data::Bool(v) => Cell::Number(f64::from(u8::from(*v))),
-        Data::DateTime(v) => Cell::Clock(v.as_f64() * DAY_S),
-        Data::String(text) | Data::DateTimeIso(text) | Data::DurationIso(text) => Cell::of(text),
-        Data::Error(error) => Cell::Text(format!("{error}")),
-        Data::Empty => Cell::Empty,
-    };
-    let row =
-        |(k, cells): (u64, &[Data])| Row { place: top + k + 1, cells: cells.iter().map(cell).collect() };
-    let rows: Vec<Row> = (0..).zip(range.rows()).map(row).collect();
-    // Numbers that were typed as text follow the mark of the country.
-    let text_with_comma = |c: &Cell| matches!(c, Cell::Text(t) if t.contains(',') && !t.contains('.'));
-    let comma = rows.iter().any(|r| {
-        r.cells.iter().any(|c| {
-            text_with_comma(c) && c.digits(true).is_some_and(|d| super::units::Unit::SI.apply(&d).is_some())
-        })
-    });
-    Ok(Grid::find(format!("workbook, sheet '{name}'"), rows, comma, None))
-}
-
-/// Refuses: built without workbooks.
-///
-/// # Errors
-/// Always.
-#[cfg(not(feature = "excel"))]
-pub fn workbook(_: &[u8], _: Option<&str>) -> miette::Result<Grid> {
-    miette::bail!(
-        help = "build it with `cargo install --path rig` (the feature is on by default), or save the sheet as CSV",
-        "this muprime was built without its feature `excel`"
-    )
-}
 
 /// A Parquet table.
 ///
@@ -87,14 +15,19 @@ pub fn parquet(path: &std::path::Path) -> miette::Result<Grid> {
         miette::miette!(help = "write it uncompressed or with snappy, or as CSV", "the Parquet file: {e}")
     };
     let reader = SerializedFileReader::new(std::fs::File::open(path).into_diagnostic()?).map_err(wrong)?;
-    let names: Vec<String> = reader
-        .metadata()
-        .file_metadata()
-        .schema_descr()
-        .columns()
-        .iter()
-        .map(|c| c.name().to_string())
-        .collect();
+    let about = reader.metadata().file_metadata();
+    let names: Vec<String> = {
+        let fields = about.schema_descr().root_schema().get_fields();
+        fields.iter().map(|f| f.name().to_string()).collect()
+    };
+    let size = path.metadata().map_or(0, |m| m.len() as usize);
+    let cells = usize::try_from(about.num_rows()).unwrap_or(0).saturating_mul(names.len());
+    if cells > super::most_cells(size) {
+        return Err(super::too_many("the Parquet file", cells, size));
+    }
+    // Readers that know Arrow find the units of the fields in its schema.
+    let schema = parquet::arrow::parquet_to_arrow_schema(about.schema_descr(), about.key_value_metadata());
+    let units = schema.map(|s| s.fields().iter().map(|f| unit(f.metadata())).collect()).unwrap_or_default();
     let cell = |field: &Field| match field {
         Field::Null => Cell::Empty,
         Field::Double(v) if v.is_nan() => Cell::Empty,
@@ -105,16 +38,97 @@ pub fn parquet(path: &std::path::Path) -> miette::Result<Grid> {
         Field::TimestampMillis(v) => Cell::Clock(*v as f64 * 1e-3),
         Field::TimestampMicros(v) => Cell::Clock(*v as f64 * 1e-6),
         Field::Str(text) => Cell::of(text),
+        Field::Group(_) | Field::ListInternal(_) | Field::MapInternal(_) => Cell::Text("(nested)".into()),
         other => Cell::of(&other.to_string()),
     };
     let mut rows = Vec::new();
     for (k, row) in (1..).zip(reader.get_row_iter(None).map_err(wrong)?) {
-        rows.push(Row {
-            place: k,
-            cells: row.map_err(wrong)?.get_column_iter().map(|(_, f)| cell(f)).collect(),
-        });
+        let cells = row.map_err(wrong)?.get_column_iter().map(|(_, f)| cell(f)).collect();
+        rows.push(Row::new(k, cells));
     }
-    Ok(Grid::named("Parquet".into(), names, rows))
+    Ok(Grid { units, ..Grid::named("Parquet".into(), names, rows) })
+}
+
+/// The unit that the metadata of a field state.
+#[cfg(feature = "arrow")]
+fn unit(about: &arrow_schema::Metadata) -> String {
+    let found = about.iter().find(|(name, _)| ["unit", "units"].contains(&name.to_lowercase().as_str()));
+    found.map(|(_, unit)| unit.to_string()).unwrap_or_default()
+}
+
+/// An Arrow IPC (Feather) file.
+///
+/// # Errors
+/// A file that is none, a compression that is not built in, columns of other than numbers and text.
+#[cfg(feature = "arrow")]
+pub fn arrow(bytes: &[u8]) -> miette::Result<Grid> {
+    use arrow_array::cast::AsArray;
+    use arrow_array::types::{
+        Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
+        UInt32Type, UInt64Type,
+    };
+    use arrow_array::{Array, ArrayRef};
+    use arrow_schema::DataType;
+    let wrong = |e: arrow_schema::ArrowError| {
+        miette::miette!(help = "write it without compression, or as CSV", "the Arrow file: {e}")
+    };
+    let reader = arrow_ipc::reader::FileReader::try_new(std::io::Cursor::new(bytes), None).map_err(wrong)?;
+    let schema = reader.schema();
+    let names = schema.fields().iter().map(|f| f.name().clone()).collect();
+    let units = schema.fields().iter().map(|f| unit(f.metadata())).collect();
+    let cell = |column: &ArrayRef, k: usize| {
+        macro_rules! number {
+            ($type:ty) => {
+                match column.as_primitive::<$type>().value(k) as f64 {
+                    v if v.is_nan() => Cell::Empty,
+                    v => Cell::Number(v),
+                }
+            };
+        }
+        if column.is_null(k) {
+            return Cell::Empty;
+        }
+        match column.data_type() {
+            DataType::Float64 => number!(Float64Type),
+            DataType::Float32 => Cell::of(&format!("{:e}", column.as_primitive::<Float32Type>().value(k))),
+            DataType::Int8 => number!(Int8Type),
+            DataType::Int16 => number!(Int16Type),
+            DataType::Int32 => number!(Int32Type),
+            DataType::Int64 => number!(Int64Type),
+            DataType::UInt8 => number!(UInt8Type),
+            DataType::UInt16 => number!(UInt16Type),
+            DataType::UInt32 => number!(UInt32Type),
+            DataType::UInt64 => number!(UInt64Type),
+            DataType::Utf8 => Cell::of(column.as_string::<i32>().value(k)),
+            DataType::LargeUtf8 => Cell::of(column.as_string::<i64>().value(k)),
+            other => Cell::Text(format!("({other})")),
+        }
+    };
+    let mut rows = Vec::new();
+    for batch in reader {
+        let batch = batch.map_err(wrong)?;
+        let cells = (rows.len() + batch.num_rows()).saturating_mul(batch.num_columns());
+        if cells > super::most_cells(bytes.len()) {
+            return Err(super::too_many("the Arrow file", cells, bytes.len()));
+        }
+        for k in 0..batch.num_rows() {
+            let cells = batch.columns().iter().map(|column| cell(column, k)).collect();
+            rows.push(Row::new(rows.len() as u64 + 1, cells));
+        }
+    }
+    Ok(Grid { units, ..Grid::named("Arrow".into(), names, rows) })
+}
+
+/// Refuses: built without Arrow.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "arrow"))]
+pub fn arrow(_: &[u8]) -> miette::Result<Grid> {
+    miette::bail!(
+        help = "build it with `cargo install --path rig` (the feature is on by default), or take CSV",
+        "this muprime was built without its feature `arrow`"
+    )
 }
 
 /// Refuses: built without Parquet.
@@ -142,12 +156,12 @@ pub fn npy(bytes: &[u8]) -> miette::Result<Grid> {
     };
     let short = || refuse("it is cut short");
     let version = *bytes.get(6).ok_or_else(short)?;
-    let (length, start) = match version {
+    let (length, start): (_, usize) = match version {
         1 => (bytes.get(8..10).map(|b| usize::from(u16::from_le_bytes([b[0], b[1]]))), 10),
         _ => (bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize), 12),
     };
     let length = length.ok_or_else(short)?;
-    let header = bytes.get(start..start + length).ok_or_else(short)?;
+    let header = bytes.get(start..start.saturating_add(length)).ok_or_else(short)?;
     let header = std::str::from_utf8(header).into_diagnostic()?;
     let data = &bytes[start + length..];
     let value = |key: &str| header.split_once(&format!("'{key}':")).map(|(_, rest)| rest.trim_start());
@@ -166,11 +180,16 @@ pub fn npy(bytes: &[u8]) -> miette::Result<Grid> {
                 words.chunks_exact(2).map(|p| (p[0].clone(), p[1].clone())).unzip();
             (names, kinds, *rows)
         }
-        (None, [rows, columns]) => {
+        (None, [rows]) => {
+            (vec!["#1".to_string()], vec![quoted(descr).first().cloned().unwrap_or_default()], *rows)
+        }
+        // A number has a byte at least, so that a shape is no larger than its bytes.
+        (None, [rows, columns]) if *rows > 0 && *columns <= data.len() => {
             let kind = quoted(descr).first().cloned().unwrap_or_default();
             ((1..=*columns).map(|k| format!("#{k}")).collect(), vec![kind; *columns], *rows)
         }
-        _ => return Err(refuse("neither two-dimensional nor a list of records")),
+        (None, [_, _]) => return Err(refuse("it is empty, or cut short")),
+        _ => return Err(refuse("neither of one or two dimensions nor a list of records")),
     };
     let size = |kind: &str| match kind {
         "<f8" | "<i8" => Ok(8),
@@ -204,7 +223,7 @@ pub fn npy(bytes: &[u8]) -> miette::Result<Grid> {
         Cell::Number(v) if v.is_nan() => Cell::Empty,
         cell => cell,
     };
-    let row = |r| Row { place: r as u64 + 1, cells: (0..names.len()).map(|c| cell(r, c)).collect() };
+    let row = |r| Row::new(r as u64 + 1, (0..names.len()).map(|c| cell(r, c)).collect());
     let rows: Vec<Row> = (0..rows).map(row).collect();
     Ok(Grid::named("NumPy".into(), names, rows))
 }

@@ -1,4 +1,4 @@
-//! A table of any format as cells, and where its header stands.
+//! A table of any format as cells. `head` finds where its headers are.
 
 use super::units::Unit;
 
@@ -11,6 +11,8 @@ pub enum Cell {
     Number(f64),
     /// A clock's reading in s from some day.
     Clock(f64),
+    /// A ratio that a workbook shows in per cent.
+    Percent(f64),
     /// Text, numbers of text formats with it.
     Text(String),
 }
@@ -30,6 +32,7 @@ impl Cell {
         match self {
             Cell::Empty => String::new(),
             Cell::Number(v) | Cell::Clock(v) => v.to_string(),
+            Cell::Percent(v) => format!("{} %", v * 100.0),
             Cell::Text(text) => text.clone(),
         }
     }
@@ -44,9 +47,25 @@ impl Cell {
         }
     }
 
-    fn is_number(&self, comma: bool) -> bool {
+    /// The ratio of a cell in per cent, as it is written with a point.
+    pub fn ratio(&self, comma: bool) -> Option<f64> {
+        match self {
+            Cell::Percent(v) => Some(*v),
+            Cell::Text(text) => {
+                let number = Cell::Text(text.strip_suffix('%')?.trim_end().into());
+                Unit::PER_CENT.apply(&number.digits(comma)?)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether it is a number, a time or a percentage.
+    pub fn is_number(&self, comma: bool) -> bool {
         let written = || self.digits(comma).is_some_and(|d| Unit::SI.apply(&d).is_some());
-        matches!(self, Cell::Clock(_)) || written()
+        matches!(self, Cell::Clock(_))
+            || written()
+            || self.ratio(comma).is_some()
+            || super::clock::is_time(self)
     }
 }
 
@@ -57,6 +76,38 @@ pub struct Row {
     pub place: u64,
     /// Its cells.
     pub cells: Vec<Cell>,
+    /// Which header holds for it: 0 is the table's, others stand in [`Grid::blocks`] from 1.
+    pub block: usize,
+}
+
+impl Row {
+    /// A row under the table's own header.
+    pub fn new(place: u64, cells: Vec<Cell>) -> Self {
+        Row { place, cells, block: 0 }
+    }
+
+    /// Cells that hold something.
+    pub fn filled(&self) -> usize {
+        self.cells.iter().filter(|c| **c != Cell::Empty).count()
+    }
+
+    /// Cells up to the last that holds something.
+    pub fn width(&self) -> usize {
+        self.cells.iter().rposition(|c| *c != Cell::Empty).map_or(0, |k| k + 1)
+    }
+}
+
+/// A later part of the source under a header of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Block {
+    /// Line or row of that header.
+    pub place: u64,
+    /// Its names.
+    pub header: Vec<String>,
+    /// Its units, where a row of their own states them.
+    pub units: Vec<String>,
+    /// For each column of the table, its place under this header.
+    pub columns: Vec<Option<usize>>,
 }
 
 /// A table that was read.
@@ -72,6 +123,12 @@ pub struct Grid {
     pub units: Vec<String>,
     /// The rows of data.
     pub rows: Vec<Row>,
+    /// The group that all columns are in, with what separates it from their names; empty where they are in several.
+    pub within: String,
+    /// Later headers, and what they say.
+    pub blocks: Vec<Block>,
+    /// Rows that are no rows of the table: line, what is there, why it was left out.
+    pub left_out: Vec<(u64, String, String)>,
     /// What was passed over or assumed while it was read.
     pub notes: Vec<String>,
 }
@@ -82,79 +139,27 @@ impl Grid {
         Grid { format, header, rows, ..Grid::default() }
     }
 
-    /// Finds header, units and data among rows: data begin with the first row of mostly numbers that is about as wide as most,
-    /// the header is the row of words before it, or before a row of units.
-    pub fn find(format: String, rows: Vec<Row>, comma: bool, spoken: Option<Vec<String>>) -> Self {
-        let filled = |row: &Row| row.cells.iter().filter(|c| **c != Cell::Empty).count();
-        let numbers = |row: &Row| row.cells.iter().filter(|c| c.is_number(comma)).count();
-        let mut widths: Vec<usize> = rows.iter().map(filled).filter(|n| *n > 0).collect();
-        widths.sort_unstable();
-        let usual = widths.get(widths.len() / 2).copied().unwrap_or(0);
-        let is_data =
-            |row: &Row| 2 * filled(row) >= usual && 2 * numbers(row) >= filled(row) && numbers(row) > 0;
-        let first = rows.iter().position(is_data).unwrap_or(rows.len());
-        let words = |row: &&Row| 2 * numbers(row) < filled(row) && 2 * filled(row) >= usual;
-        let text = |row: &Row| row.cells.iter().map(Cell::shown).collect::<Vec<_>>();
-        let before = |at: usize| at.checked_sub(1).and_then(|k| rows.get(k)).filter(words);
-        let mut grid = Grid { format, comma, ..Grid::default() };
-        let mut head = first;
-        match (before(first), before(first.saturating_sub(1))) {
-            (Some(units), Some(header)) if units.cells.iter().all(is_unit) => {
-                (grid.units, grid.header) = (text(units), text(header));
-                head = first - 2;
-            }
-            (Some(header), _) => {
-                grid.header = text(header);
-                head = first - 1;
-            }
-            (None, _) => {}
-        }
-        for row in rows[..head].iter().filter(|row| filled(row) > 0) {
-            grid.notes.push(format!(
-                "row {} before the header was passed over: {}",
-                row.place,
-                text(row).join(" ").trim()
-            ));
-        }
-        grid.rows = rows.into_iter().skip(first).filter(|row| filled(row) > 0).collect();
-        let wide = grid.rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
-        if grid.header.is_empty() {
-            if let Some(spoken) = spoken.filter(|names| names.len() == wide) {
-                grid.notes.push("the header stands in a comment".into());
-                grid.header = spoken;
-            } else {
-                grid.notes.push("there is no header: columns are #1, #2, ...".into());
-            }
-        }
-        grid.header.truncate(wide.max(1));
-        while grid.header.len() < wide {
-            grid.header.push(format!("#{}", grid.header.len() + 1));
-        }
-        for (k, name) in grid.header.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {
-            *name = format!("#{}", k + 1);
-        }
-        grid
+    /// The cell of a row under a column of the table, wherever that column is under the row's own header.
+    pub fn cell<'a>(&self, row: &'a Row, column: usize) -> Option<&'a Cell> {
+        let at = match row.block.checked_sub(1) {
+            None => column,
+            Some(block) => self.blocks.get(block)?.columns.get(column).copied().flatten()?,
+        };
+        row.cells.get(at)
     }
-}
 
-/// Whether a cell can stand in a row of units: short words, or nothing.
-fn is_unit(cell: &Cell) -> bool {
-    use super::units::Dimension as D;
-    let all = [
-        D::Length,
-        D::Time,
-        D::Frequency,
-        D::Speed,
-        D::Force,
-        D::Pressure,
-        D::Temperature,
-        D::Angle,
-        D::Percentage,
-        D::Ratio,
-    ];
-    match cell {
-        Cell::Empty => true,
-        Cell::Text(text) => all.iter().any(|d| Unit::guess(*d, text).is_some()),
-        Cell::Number(_) | Cell::Clock(_) => false,
+    /// The table as CSV, numbers with the fewest digits that stand for them.
+    pub fn csv(&self) -> miette::Result<String> {
+        use miette::IntoDiagnostic;
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&self.header).into_diagnostic()?;
+        let shown = |cell: &Cell| match cell {
+            Cell::Number(v) => format!("{v:e}"),
+            cell => cell.shown(),
+        };
+        for row in &self.rows {
+            writer.write_record(row.cells.iter().map(shown)).into_diagnostic()?;
+        }
+        String::from_utf8(writer.into_inner().into_diagnostic()?).into_diagnostic()
     }
 }

@@ -1,7 +1,7 @@
 //! Which column of the source is what: stated by `--map` and `--set`, or guessed from the headers.
 
-use super::grid::{Cell, Grid};
-use super::targets::{Id, Kind, TARGETS, Target, plain};
+use super::grid::{Block, Grid};
+use super::targets::{Id, Kind, TARGETS, Target};
 use super::units::{Dimension, Unit};
 use models::covariate;
 
@@ -66,6 +66,12 @@ impl Map {
             format!("{header}={}{unit}", TARGETS[c.target].name)
         };
         self.columns.iter().map(entry).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The headers that entries of `--map` name.
+    pub fn headers(entries: &[String]) -> Vec<String> {
+        let header = |e: String| Some(e.rsplit_once('=')?.0.trim().to_string());
+        entries.iter().flat_map(|e| parted(e)).filter_map(header).collect()
     }
 
     /// Reads the entries of `--map`: `HEADER=TARGET[:UNIT]`, parted by commas; a header with a comma in double quotes; `#3` is
@@ -212,6 +218,10 @@ fn column(grid: &Grid, entry: &str) -> Result<Taken, String> {
     let (header, rest) =
         entry.rsplit_once('=').ok_or_else(|| format!("'{entry}': HEADER=TARGET:UNIT is needed"))?;
     let header = header.trim();
+    // Within the one group that is read its columns have short names.
+    let last = header.rsplit('/').next().unwrap_or(header);
+    let header =
+        if !grid.within.is_empty() && *header == format!("{}{last}", grid.within) { last } else { header };
     let (target, unit, unit_text) = target_of(rest)?;
     let numbered = header.strip_prefix('#').and_then(|n| n.parse::<usize>().ok());
     let exact: Vec<usize> = (0..grid.header.len()).filter(|k| grid.header[*k] == header).collect();
@@ -270,84 +280,64 @@ pub fn way(text: &str) -> Option<f64> {
     (value.abs() == 1.0).then_some(value)
 }
 
-/// A map from the headers: names that usually mean one thing, with the units that the headers state. A header that two columns
-/// answer to is left to the reader.
-pub fn guess(grid: &Grid) -> Vec<Taken> {
-    let mut taken: Vec<Taken> = Vec::new();
-    for (index, header) in grid.header.iter().enumerate() {
-        let row_of_units = grid.units.get(index).map(String::as_str).filter(|u| !u.is_empty());
-        let Some((target, unit)) = meant(header, row_of_units) else { continue };
-        let signed = |c: &Cell| c.digits(grid.comma).is_some_and(|d| d.starts_with('-'));
-        let negative = grid.rows.iter().any(|r| r.cells.get(index).is_some_and(signed));
-        let target = match target {
-            t if t == Id::Speed as usize && negative => Id::Velocity as usize,
-            t if t == Id::FrictionForce as usize && negative => Id::LateralForce as usize,
-            t => t,
-        };
-        let dimension = match TARGETS[target].kind {
-            Kind::Number(dimension) => Some(dimension),
-            _ => None,
-        };
-        let stated = unit.is_some();
-        let (unit_text, unit) = match (dimension, unit) {
-            (Some(d), None) => (d.si().to_string(), Unit::SI),
-            (_, Some((text, unit))) => (text, unit),
-            (None, None) => (String::new(), Unit::SI),
-        };
-        let assumed = dimension.is_some_and(|d| d != Dimension::Ratio) && !stated;
-        taken.push(Taken { index, header: header.clone(), target, unit_text, unit, assumed });
+/// The map under another header of the source: the same columns, wherever they are there and whatever their units. `None` where
+/// that header has none of them.
+///
+/// # Errors
+/// In words: a column that is missing there, units that are not stated in both places.
+pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, String> {
+    let there = |c: &Taken| block.columns.get(c.index).copied().flatten();
+    let here = map.columns.iter().filter(|c| there(c).is_some()).count();
+    if here == 0 {
+        return Ok(None);
     }
-    // A force that is read goes before a coefficient that was made of it.
-    let forces = |t: &Taken| TARGETS[t.target].column == "lateral_force_n";
-    if taken.iter().any(|t| forces(t) && t.target != Id::FrictionCoefficient as usize) {
-        taken.retain(|t| t.target != Id::FrictionCoefficient as usize);
+    let mut own = map.clone();
+    for column in &mut own.columns {
+        let place = block.place;
+        let index = there(column)
+            .ok_or_else(|| format!("row {place} is a second header, without a column '{}'", column.header))?;
+        let unit_row = |units: &[String], at: usize| units.get(at).filter(|u| !u.is_empty()).cloned();
+        let (was, is) = (unit_row(&grid.units, column.index), unit_row(&block.units, index));
+        if grid.header[column.index] != block.header[index] || was != is {
+            let Kind::Number(dimension) = TARGETS[column.target].kind else {
+                column.index = index;
+                continue;
+            };
+            let stated = |header: &str, row: Option<&str>| match (stated(header), row) {
+                (Some(unit), None) | (None, Some(unit)) => Unit::guess(dimension, unit),
+                _ => None,
+            };
+            let first = stated(&grid.header[column.index], was.as_deref());
+            let second = stated(&block.header[index], is.as_deref());
+            match (first, second) {
+                (Some((_, first)), Some((_, second))) if first == column.unit => column.unit = second,
+                (Some((_, first)), Some((_, second))) if first == second => {}
+                _ => {
+                    return Err(format!(
+                        "row {place} is a second header, with another unit of '{}' ('{}')",
+                        column.header, block.header[index]
+                    ));
+                }
+            }
+        }
+        column.index = index;
     }
-    let twice = |t: &Taken, all: &[Taken]| {
-        all.iter().filter(|o| TARGETS[o.target].column == TARGETS[t.target].column).count() > 1
-    };
-    let all = taken.clone();
-    taken.retain(|t| !twice(t, &all));
-    taken
+    Ok(Some(own))
 }
 
-/// What a header means, and the unit that it states: in brackets, after a slash or a comma, or as its last words.
-fn meant(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(String, Unit)>)> {
-    let find = |name: &str| {
-        let name = plain(name);
-        TARGETS.iter().position(|t| t.is_headed(&name))
-    };
-    let with_unit = |name: &str, text: &str| {
-        let at = find(name)?;
-        let Kind::Number(dimension) = TARGETS[at].kind else { return None };
-        Some((at, Some(Unit::guess(dimension, text)?)))
-    };
+/// The unit that a header states in brackets, or after a slash, a comma or 'in'.
+fn stated(header: &str) -> Option<&str> {
     for (open, close) in [('[', ']'), ('(', ')')] {
-        let bracketed =
-            header.split_once(open).and_then(|(name, rest)| Some((name, rest.split(close).next()?)));
-        if let Some(found) = bracketed.and_then(|(name, unit)| with_unit(name, unit)) {
-            return Some(found);
+        if let Some((_, rest)) = header.split_once(open) {
+            return rest.split(close).next();
         }
     }
-    for mark in [" / ", ", ", " in ", "/"] {
-        if let Some(found) = header.split_once(mark).and_then(|(name, unit)| with_unit(name, unit)) {
-            return Some(found);
-        }
-    }
-    if let Some(found) = row_of_units.and_then(|unit| with_unit(header, unit)) {
-        return Some(found);
-    }
-    let words: Vec<&str> = header.split(['_', ' ', '.', '-']).filter(|w| !w.is_empty()).collect();
-    for tail in [2, 1] {
-        let Some(cut) = words.len().checked_sub(tail).filter(|cut| *cut > 0) else { continue };
-        if let Some(found) = with_unit(&words[..cut].join("_"), &words[cut..].join("/")) {
-            return Some(found);
-        }
-    }
-    find(header).map(|at| (at, None))
+    [" / ", ", ", " in ", "/"].iter().find_map(|mark| header.split_once(mark)).map(|(_, unit)| unit)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::guess::guess;
     use super::super::text::{Marks, read};
     use super::*;
 
@@ -381,6 +371,34 @@ mod tests {
         assert_eq!(broken.unwrap().iter().map(|t| t.index).collect::<Vec<_>>(), [0, 1]);
         let wrong = Map::stated(&grid, &["c=speed:mm/s, b=speed, b=pace:s, b=speed:N".into()]).unwrap_err();
         assert_eq!(wrong.len(), 4, "{wrong:?}");
+    }
+
+    #[test]
+    fn strokes_and_bare_letters() {
+        for (header, said) in [
+            ("Amplitude (µm p-p)", "amplitude_pp:um"),
+            ("Amplitude [um pp]", "amplitude_pp:um"),
+            ("peak-to-peak amplitude (um)", "amplitude_pp:um"),
+            ("Amplitude peak to peak / um", "amplitude_pp:um"),
+            ("Amplitude peak-peak (um)", "amplitude_pp:um"),
+            ("Amplitude (um, 0-p)", "amplitude_peak:um"),
+            ("Amplitude (um rms)", "amplitude_rms:um"),
+            ("Amplitude peak (um)", "amplitude_peak:um"),
+            ("amp_um", "amplitude_pp:um"),
+            ("f (kHz)", "frequency:kHz"),
+        ] {
+            let found = guessed(&format!("\"{header}\";b\n1;2\n"));
+            assert!(found.ends_with(&format!("={said}")), "{header}: {found}");
+        }
+        for header in ["F", "amp", "F (N)", "w", "Peak load (N)", "speed;rpm"] {
+            let units = header.split_once(';').map_or(String::new(), |(_, unit)| format!("{unit};N\n"));
+            let name = header.split(';').next().unwrap();
+            assert_eq!(
+                guessed(&format!("{name};Fn (N)\n{units}2;5\n")),
+                "\"Fn (N)\"=normal_force:N",
+                "{header}"
+            );
+        }
     }
 
     #[test]

@@ -1,13 +1,11 @@
 //! MAT files of version 5 (the form that MATLAB writes with `-v7` and `-v6`, and scipy.io.savemat): numeric arrays, also within structures.
 //! 'MAT-File Format', The MathWorks, chapter 1. Version 7.3 is HDF5.
 
-use super::arrays::{Array, number, single, table};
+use super::arrays::{Array, Beside, number, single, table};
 use super::grid::{Cell, Grid};
 use flate2::read::ZlibDecoder;
 use std::io::Read;
 
-/// The most that a compressed array may unfold to, in bytes.
-const MOST: u64 = 1 << 30;
 /// Structures within structures that are followed.
 const DEPTH: usize = 4;
 
@@ -15,13 +13,15 @@ const DEPTH: usize = 4;
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 const STRUCTURE: u8 = 2;
+const CHARACTERS: u8 = 4;
+const OPAQUE: u8 = 17;
 const COMPLEX: u8 = 0x08;
 
 /// Reads a file.
 ///
 /// # Errors
 /// A file that is cut or is none, and what [`table`] says.
-pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
+pub fn read(bytes: &[u8], sheet: Option<&str>, wanted: &[String]) -> miette::Result<Grid> {
     let cut =
         || miette::miette!(help = "save it anew, with `save -v7`", "the MAT file is cut short or damaged");
     let big = match bytes.get(126..128) {
@@ -29,15 +29,21 @@ pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
         Some(b"MI") => true,
         _ => return Err(cut()),
     };
-    let (mut arrays, mut notes) = (Vec::new(), Vec::new());
+    let (mut arrays, mut beside) = (Vec::new(), Beside::default());
+    // What all compressed arrays together may unfold to: a number has eight bytes at most.
+    let mut most = 8 * super::most_cells(bytes.len());
     let mut rest = &bytes[128..];
     while rest.len() >= 8 {
         let element = Element::next(&mut rest, big).ok_or_else(cut)?;
         let unfolded = match element.kind {
             COMPRESSED => {
                 let mut unfolded = Vec::new();
-                let read = ZlibDecoder::new(element.data).take(MOST).read_to_end(&mut unfolded);
+                let read = ZlibDecoder::new(element.data).take(most as u64).read_to_end(&mut unfolded);
                 read.map_err(|_| cut())?;
+                most -= unfolded.len();
+                if most == 0 {
+                    return Err(super::too_many("the MAT file", unfolded.len() / 8, bytes.len()));
+                }
                 unfolded
             }
             _ => Vec::new(),
@@ -46,10 +52,14 @@ pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
         let element =
             if unfolded.is_empty() { element } else { Element::next(&mut inside, big).ok_or_else(cut)? };
         if element.kind == MATRIX {
-            matrix(element.data, big, "", 0, &mut arrays, &mut notes).ok_or_else(cut)?;
+            matrix(element.data, big, "", 0, &mut arrays, &mut beside).ok_or_else(cut)?;
+            let cells: usize = arrays.iter().map(|a| a.cells.len()).sum();
+            if cells > super::most_cells(bytes.len()) {
+                return Err(super::too_many("the MAT file", cells, bytes.len()));
+            }
         }
     }
-    table("MAT", arrays, sheet, notes)
+    table("MAT", arrays, sheet, wanted, beside)
 }
 
 /// A piece of data with its type.
@@ -79,6 +89,20 @@ impl<'a> Element<'a> {
         let filled = if first == COMPRESSED { length } else { length.div_ceil(8) * 8 };
         *rest = rest.get(8 + filled..).unwrap_or_default();
         Some(Element { kind: first, data })
+    }
+
+    /// Its codes as text: bytes, UTF-16 or UTF-8 by the type.
+    fn codes(&self, big: bool) -> Option<String> {
+        match self.kind {
+            1 | 2 | 16 => Some(String::from_utf8_lossy(self.data).into_owned()),
+            4 | 17 => {
+                let code = |c: &[u8]| {
+                    if big { u16::from_be_bytes([c[0], c[1]]) } else { u16::from_le_bytes([c[0], c[1]]) }
+                };
+                Some(String::from_utf16_lossy(&self.data.chunks_exact(2).map(code).collect::<Vec<_>>()))
+            }
+            _ => None,
+        }
     }
 
     /// Its numbers as cells.
@@ -119,13 +143,20 @@ fn matrix(
     around: &str,
     depth: usize,
     arrays: &mut Vec<Array>,
-    notes: &mut Vec<String>,
+    beside: &mut Beside,
 ) -> Option<()> {
     if rest.is_empty() {
         return Some(());
     }
     let flags = word(Element::next(&mut rest, big)?.data, big)?;
     let (class, marks) = (flags as u8, (flags >> 8) as u8);
+    if class == OPAQUE {
+        let name = String::from_utf8_lossy(Element::next(&mut rest, big)?.data).into_owned();
+        let kind = Element::next(&mut rest, big).and_then(|_| Element::next(&mut rest, big));
+        let kind = kind.map(|e| String::from_utf8_lossy(e.data).into_owned()).unwrap_or_default();
+        beside.notes.push(unread(&name, &kind, ""));
+        return Some(());
+    }
     let sizes = Element::next(&mut rest, big)?;
     let sizes: Vec<usize> =
         sizes.data.chunks_exact(4).map(|c| word(c, big).map_or(0, |n| n as usize)).collect();
@@ -143,7 +174,7 @@ fn matrix(
             for field in names.chunks_exact(width.max(1)) {
                 let field = String::from_utf8_lossy(field.split(|b| *b == 0).next()?).into_owned();
                 let element = Element::next(&mut rest, big)?;
-                matrix(element.data, big, &format!("{name}.{field}"), depth + 1, arrays, notes)?;
+                matrix(element.data, big, &format!("{name}.{field}"), depth + 1, arrays, beside)?;
             }
         }
         6..=15 if sizes.len() == 2 && marks & COMPLEX == 0 => {
@@ -151,12 +182,54 @@ fn matrix(
             if cells.len() != count {
                 return None;
             }
-            if count > 0 {
-                let name = name.trim_start_matches('.').to_string();
-                arrays.push(Array { name, rows: sizes[0], columns: sizes[1], cells });
+            let name = name.trim_start_matches('.').to_string();
+            // What objects refer to has no name.
+            if count > 0 && !name.is_empty() {
+                arrays.push(Array { name, rows: sizes[0], columns: sizes[1], cells, ..Array::default() });
             }
         }
-        _ => notes.push(format!("{name} is no real array of one or two dimensions: passed over")),
+        CHARACTERS => {
+            let text = Element::next(&mut rest, big)?;
+            let short = count <= 64 && sizes.first() == Some(&1);
+            if let (true, Some(cells)) = (short, text.codes(big)) {
+                beside.texts.insert(name.clone(), cells);
+            }
+            beside.notes.push(format!("{name} is text: passed over"));
+        }
+        _ => {
+            let kind = match class {
+                1 => "cell",
+                STRUCTURE => "struct",
+                3 => "object",
+                5 => "sparse",
+                6..=15 if marks & COMPLEX != 0 => "complex",
+                6..=15 => "array",
+                16 => "function_handle",
+                _ => "unknown",
+            };
+            let size = sizes.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ");
+            beside.notes.push(unread(&name, kind, &size));
+        }
     }
     Some(())
+}
+
+/// What an array that is not read is, and the line of MATLAB that makes it one that is.
+pub fn unread(name: &str, kind: &str, size: &str) -> String {
+    let size = if size.is_empty() { String::new() } else { format!(" ({size})") };
+    let (what, line) = match kind {
+        "cell" => ("a cell array", format!("writematrix({name}{{1}}, '{name}1.csv')")),
+        "struct" => ("an array of structures", format!("writetable(struct2table({name}), '{name}.csv')")),
+        "table" => ("a table object", format!("writetable({name}, '{name}.csv')")),
+        "timetable" => ("a timetable object", format!("writetimetable({name}, '{name}.csv')")),
+        "categorical" => ("a categorical array", format!("{name} = double({name})")),
+        "string" => ("a string array", format!("{name} = char({name})")),
+        "datetime" => ("an array of dates", format!("{name} = posixtime({name})")),
+        "duration" => ("an array of durations", format!("{name} = seconds({name})")),
+        "sparse" => ("a sparse matrix", format!("{name} = full({name})")),
+        "complex" => ("an array of complex numbers", format!("{name} = real({name})")),
+        "array" => ("an array of more than two dimensions", format!("{name} = {name}(:,:,1)")),
+        _ => ("an object", format!("{name} = double({name})")),
+    };
+    format!("{name} is {what}{size}, which is not read; in MATLAB: {line}")
 }

@@ -30,6 +30,13 @@ const RATIO: [f64; 2] = [2e-3, 20.0];
 /// Largest speed of a vibrating plate in m/s, `pi f w`.
 const PLATE_SPEED: f64 = 10.0;
 
+/// Whether values are those of a tribometer, as far as a range is known for the column.
+pub fn usual(column: &str, values: &[f64]) -> bool {
+    let sizes = sorted(values.iter().map(|v| v.abs()).filter(|v| *v > 0.0));
+    let within = |[low, high]: [f64; 2]| sizes.get(sizes.len() / 2).is_none_or(|v| (low..=high).contains(v));
+    USUAL.iter().find(|(c, _)| c.name == column).is_none_or(|(_, range)| within(*range))
+}
+
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut all: Vec<f64> = values.collect();
     all.sort_by(f64::total_cmp);

@@ -5,7 +5,7 @@
 //! over the window about it. Steady samples in a row are a stretch; its beginning, in which friction settles, is left out.
 
 use super::targets::Id;
-use super::values::{Values, mean as average};
+use super::values::{Dropped, Values, mean as average};
 use models::pass::Pass;
 use serde::Serialize;
 
@@ -60,8 +60,13 @@ pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, T
         return Err("a series needs a time in every row (map a column to time)".into());
     }
     if let Some(k) = times.windows(2).position(|w| w[1] <= w[0]) {
+        let why = if times[k + 1] < times[k] {
+            "it goes back: give one record at a time"
+        } else {
+            "samples share a stamp: the clock is too coarse; map time from a finer column, or set it from the sampling rate"
+        };
         return Err(format!(
-            "the time does not rise from row {} ({} s) to row {} ({} s); give one record at a time",
+            "the time does not rise from row {} ({} s) to row {} ({} s): {why}",
             samples[k].place,
             times[k],
             samples[k + 1].place,
@@ -115,6 +120,18 @@ pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, T
         ));
     }
     Ok((passes, spreads, told))
+}
+
+/// Takes off a last sample that is the one before it once more, as some recorders write their end.
+pub fn last_twice(samples: &mut Vec<Values>) -> Option<Dropped> {
+    let [.., before, last] = samples.as_slice() else { return None };
+    let same = before.get(Id::Time).is_some() && before.get(Id::Time) == last.get(Id::Time);
+    same.then(|| samples.pop()).flatten().map(|last| Dropped {
+        row: last.place,
+        column: "time_s".into(),
+        text: last.get(Id::Time).unwrap_or_default().to_string(),
+        reason: "the last sample is there twice".into(),
+    })
 }
 
 /// What a stretch has besides its means.

@@ -1,6 +1,8 @@
 //! Tables as text: any delimiter, either decimal mark, comments, the usual encodings.
 
+use super::clock::is_time;
 use super::grid::{Cell, Grid, Row};
+use super::head::Source;
 use super::units::Unit;
 use miette::IntoDiagnostic;
 
@@ -25,41 +27,57 @@ pub struct Marks {
 /// No text, no rows that a delimiter parts, both decimal marks at once.
 pub fn read(bytes: &[u8], marks: Marks) -> miette::Result<Grid> {
     let (text, encoding) = decoded(bytes)?;
+    // The typographic minus.
+    let text = text.replace('\u{2212}', "-");
     let comment = |line: &str| {
         let line = line.trim_start();
         line.starts_with(['#', '%', '!']) || line.starts_with("//")
     };
     let lines: Vec<(u64, &str)> = (1..).zip(text.lines()).filter(|(_, l)| !l.trim().is_empty()).collect();
     let (said, data): (Vec<_>, Vec<_>) = lines.into_iter().partition(|(_, line)| comment(line));
-    let tried: Vec<_> =
-        DELIMITERS.iter().filter(|(c, _)| marks.delimiter.is_none_or(|d| d == *c)).map(|(c, _)| *c).collect();
+    // A decimal mark that is stated does not separate cells.
+    let serves = |c: char| marks.delimiter.map_or(marks.decimal != Some(c), |d| d == c);
+    let tried: Vec<_> = DELIMITERS.iter().filter(|(c, _)| serves(*c)).map(|(c, _)| *c).collect();
     let tried = if tried.is_empty() { marks.delimiter.into_iter().collect() } else { tried };
+    let spoken = |line: &str| line.trim_start().trim_start_matches(['#', '%', '!', '/']).trim().to_string();
+    let remarks: Vec<(u64, String)> = said.iter().map(|(place, line)| (*place, spoken(line))).collect();
     // The largest share of numbers in rows of one width; of equals the first.
-    let scored = |d: &char| (*d, score(&data, *d));
+    let scored = |d: &char| (*d, score(&data, &remarks, *d));
     let best = tried.iter().map(scored).reduce(|a, b| if b.1 > a.1 { b } else { a });
-    let Some((delimiter, _)) = best.filter(|(_, score)| *score > 0.0) else {
-        miette::bail!(
-            help = "give the delimiter (--delimiter ';'), or export the table as CSV",
-            "no rows of numbers: no delimiter parts the lines into columns"
-        );
+    let best = best.filter(|(_, score)| *score > 0.0).map(|(delimiter, _)| delimiter);
+    let (delimiter, named) =
+        match best.filter(|d| *d != ',' || marks.delimiter.is_some() || !one_column(&data)) {
+            Some(',') if marks.delimiter.is_none() && commas_are_decimal(&data) => miette::bail!(
+                help = "say which it is: --decimal , (one column) or --delimiter , (two)",
+                "every line is two whole numbers with a comma between: decimal commas, or two columns"
+            ),
+            Some(delimiter) => {
+                let known = DELIMITERS.iter().find(|(c, _)| *c == delimiter);
+                (Some(delimiter), known.map_or("a delimiter of its own", |(_, name)| name))
+            }
+            None if one_column(&data) => (None, "lines: one column"),
+            None => miette::bail!(
+                help = "give the delimiter (--delimiter ';'), or export the table as CSV",
+                "no rows of numbers: no delimiter separates the lines into columns"
+            ),
+        };
+    let cells = |line: &str, usual: usize| match delimiter {
+        None => Ok(vec![line.to_string()]),
+        Some(' ') => Ok(regrouped(line, usual)),
+        Some(delimiter) => split(line, delimiter),
     };
-    let mut rows = Vec::with_capacity(data.len());
-    for (place, line) in &data {
-        rows.push(Row {
-            place: *place,
-            cells: split(line, delimiter)?.iter().map(|c| Cell::of(c)).collect(),
-        });
-    }
-    let comma = decimal_comma(&rows, delimiter, marks.decimal)?;
-    let spoken = said.iter().rev().find_map(|(_, line)| {
-        let names =
-            split(line.trim_start().trim_start_matches(['#', '%', '!', '/']).trim(), delimiter).ok()?;
-        (names.len() > 1).then(|| names.iter().map(|n| n.trim().to_string()).collect())
-    });
-    let named =
-        DELIMITERS.iter().find(|(c, _)| *c == delimiter).map_or("a delimiter of its own", |(_, name)| name);
+    let usual = delimiter.map_or(1, |d| usual_width(&data, d).0);
+    let row = |place: u64, line: &str| {
+        let cells = cells(line, usual)?.iter().map(|c| Cell::of(c.trim().trim_matches('"'))).collect();
+        miette::Result::Ok(Row::new(place, cells))
+    };
+    let rows = data.iter().map(|(place, line)| row(*place, line)).collect::<miette::Result<Vec<_>>>()?;
+    let comments = remarks.iter().filter_map(|(place, line)| row(*place, line).ok()).collect();
+    let comma = decimal_comma(&rows, delimiter.unwrap_or('\n'), marks.decimal)?;
     let mark = if comma { ", decimal commas" } else { "" };
-    let mut grid = Grid::find(format!("text, {encoding}, parted by {named}{mark}"), rows, comma, spoken);
+    let format = format!("text, {encoding}, separated by {named}{mark}");
+    let source = Source { format, comma, comments, places: false, blanks: delimiter == Some(' ') };
+    let mut grid = source.find(rows);
     if let Some((first, _)) = said.first() {
         grid.notes.push(format!("{} comment lines were passed over, the first in line {first}", said.len()));
     }
@@ -90,7 +108,7 @@ fn decoded(bytes: &[u8]) -> miette::Result<(String, &'static str)> {
 /// The cells of a line; quotes keep a delimiter in a cell.
 fn split(line: &str, delimiter: char) -> miette::Result<Vec<String>> {
     if delimiter == ' ' {
-        return Ok(line.split_whitespace().map(String::from).collect());
+        return Ok(words(line));
     }
     if !line.contains('"') {
         return Ok(line.split(delimiter).map(String::from).collect());
@@ -106,14 +124,74 @@ fn split(line: &str, delimiter: char) -> miette::Result<Vec<String>> {
     Ok(record.iter().map(String::from).collect())
 }
 
+/// Words at blanks outside of quotes.
+fn words(line: &str) -> Vec<String> {
+    let (mut all, mut now, mut quoted) = (Vec::new(), String::new(), false);
+    for c in line.chars() {
+        quoted ^= c == '"';
+        if c.is_whitespace() && !quoted {
+            all.extend(Some(std::mem::take(&mut now)).filter(|w| !w.is_empty()));
+        } else {
+            now.push(c);
+        }
+    }
+    all.extend(Some(now).filter(|w| !w.is_empty()));
+    all
+}
+
+/// The words of a line that is to have `usual` cells: names may hold single blanks, and units in brackets behind one.
+fn regrouped(line: &str, usual: usize) -> Vec<String> {
+    let plain = words(line);
+    if plain.len() <= usual || plain.iter().all(|w| is_number(w, ' ')) {
+        return plain;
+    }
+    let apart = line.replace('\t', "  ");
+    let apart: Vec<String> =
+        apart.split("  ").map(|w| w.trim().to_string()).filter(|w| !w.is_empty()).collect();
+    if apart.len() == usual {
+        return apart;
+    }
+    let mut joined: Vec<String> = Vec::new();
+    for word in &plain {
+        let open = |w: &String| w.matches(['(', '[']).count() > w.matches([')', ']']).count();
+        match joined.last_mut() {
+            Some(last) if word.starts_with(['(', '[']) || open(last) => {
+                last.push(' ');
+                last.push_str(word);
+            }
+            _ => joined.push(word.clone()),
+        }
+    }
+    if joined.len() == usual { joined } else { plain }
+}
+
+/// Whether the lines are one number each, but for a header.
+fn one_column(lines: &[(u64, &str)]) -> bool {
+    let single = |line: &str| is_number(line, ' ');
+    let numbers = lines.iter().filter(|(_, l)| single(l)).count();
+    let before = lines.iter().take_while(|(_, l)| !single(l)).last();
+    // Of a comma it is a decimal one only where a header of one name, or a point somewhere, says so.
+    let comma = lines.iter().any(|(_, l)| single(l) && l.contains(','));
+    numbers > 0
+        && 2 * numbers > lines.len()
+        && (!comma
+            || before.is_some_and(|(_, l)| !l.contains(','))
+            || lines.iter().any(|(_, l)| single(l) && !l.contains(',')))
+}
+
+/// Whether every line is two whole numbers with a comma between.
+fn commas_are_decimal(lines: &[(u64, &str)]) -> bool {
+    lines.iter().all(|(_, l)| l.matches(',').count() == 1 && !l.contains('.') && is_number(l, ' '))
+}
+
 /// Whether a cell is a number with either mark (a comma only where it does not part cells).
 fn is_number(cell: &str, delimiter: char) -> bool {
     let point = if delimiter == ',' { cell.trim().to_string() } else { cell.trim().replacen(',', ".", 1) };
     Unit::SI.apply(&point).is_some()
 }
 
-/// How well a delimiter serves: the share of lines with the usual number of cells, at least two, times that of numbers in them.
-fn score(lines: &[(u64, &str)], delimiter: char) -> f64 {
+/// The usual number of cells of a line, and the lines as cells.
+fn usual_width(lines: &[(u64, &str)], delimiter: char) -> (usize, Vec<Vec<String>>) {
     let split: Vec<Vec<String>> = lines
         .iter()
         .take(LOOKED_AT)
@@ -122,12 +200,30 @@ fn score(lines: &[(u64, &str)], delimiter: char) -> f64 {
         .collect();
     let mut widths: Vec<usize> = split.iter().map(Vec::len).collect();
     widths.sort_unstable();
-    let usual = widths.get(widths.len() / 2).copied().unwrap_or(0);
+    (widths.get(widths.len() / 2).copied().unwrap_or(0), split)
+}
+
+/// How well a delimiter serves: the share of lines with the usual number of cells, at least two, times that of numbers among
+/// the cells that hold something. Half of that where the names above the numbers are not as many.
+fn score(lines: &[(u64, &str)], remarks: &[(u64, String)], delimiter: char) -> f64 {
+    let (usual, split) = usual_width(lines, delimiter);
     let alike: Vec<&Vec<String>> = split.iter().filter(|c| c.len() == usual && usual > 1).collect();
-    let cells = alike.iter().flat_map(|c| c.iter());
-    let numbers = cells.clone().filter(|c| is_number(c, delimiter)).count();
+    let cells = alike.iter().flat_map(|c| c.iter()).filter(|c| !c.trim().is_empty());
+    let number = |c: &String| is_number(c.trim().trim_end_matches('%'), delimiter) || is_time(&Cell::of(c));
+    let numbers = cells.clone().filter(|c| number(c)).count();
     let count = cells.count().max(1);
-    alike.len() as f64 / split.len().max(1) as f64 * numbers as f64 / count as f64
+    let mostly = |c: &Vec<String>| 2 * c.iter().filter(|c| number(c)).count() >= c.len();
+    let first = split.iter().position(mostly).unwrap_or(0);
+    let as_wide = |line: &str| match delimiter {
+        ' ' => regrouped(line, usual).len() == usual,
+        _ => self::split(line, delimiter).is_ok_and(|c| c.len() == usual),
+    };
+    let fits = match lines.get(first.wrapping_sub(1)) {
+        Some((_, line)) => as_wide(line),
+        None => remarks.is_empty() || remarks.iter().any(|(_, line)| as_wide(line)),
+    };
+    let share = alike.len() as f64 / split.len().max(1) as f64 * numbers as f64 / count as f64;
+    if fits { share } else { 0.5 * share }
 }
 
 /// Whether the decimal mark is a comma: one stands where a point would, and no number has a point.

@@ -48,11 +48,13 @@ impl Dimension {
     /// Some units that are understood, for refusals.
     pub const fn known(self) -> &'static str {
         match self {
-            Dimension::Length => "m, mm, um, nm, cm, in",
-            Dimension::Time => "s, ms, us, min, h",
+            Dimension::Length => "m, mm, um, nm, cm, in, rev@20mm (turns on a radius)",
+            Dimension::Time => "s, ms, us, min, h, hh:mm, mm:ss",
             Dimension::Frequency => "Hz, kHz, MHz, rpm, rad/s",
-            Dimension::Speed => "m/s, mm/s, um/s, nm/s, mm/min",
-            Dimension::Force => "N, mN, uN, kN, gf, kgf, lbf",
+            Dimension::Speed => "m/s, mm/s, um/s, nm/s, mm/min, rpm@20mm and rad/s@20mm (turns on a radius)",
+            Dimension::Force => {
+                "N, mN, uN, kN, gf, kgf, lbf, 12.5N/V (a sensitivity), Nm@20mm (a torque on an arm)"
+            }
             Dimension::Pressure => "Pa, hPa, kPa, MPa, bar, mbar, atm, psi, Torr",
             Dimension::Temperature => "degC, K, degF",
             Dimension::Percentage => "%, 1",
@@ -75,6 +77,9 @@ impl Unit {
     /// The unit of the SI itself.
     pub const SI: Unit = Unit { ten: 0, times: 1.0, over: 1.0, plus: 0.0 };
 
+    /// Hundredths.
+    pub const PER_CENT: Unit = Unit::ten(-2);
+
     const fn ten(ten: i32) -> Self {
         Unit { ten, ..Unit::SI }
     }
@@ -95,6 +100,14 @@ impl Unit {
             return Some(Unit { times: -unit.times, plus: -unit.plus, ..unit });
         }
         let text = text.as_str();
+        if let Some((turning, arm)) = text.split_once('@') {
+            return Self::on_an_arm(dimension, turning, arm);
+        }
+        if let Some((factor, rest)) = factored(text) {
+            let unit =
+                Self::parse(dimension, rest).or_else(|| Self::parse(dimension, rest.rsplit_once('/')?.0))?;
+            return (unit.plus == 0.0).then_some(Unit { times: unit.times * factor, ..unit });
+        }
         match dimension {
             Dimension::Length => match text {
                 "micron" | "microns" => Some(Unit::ten(-6)),
@@ -105,6 +118,7 @@ impl Unit {
             Dimension::Time => match text {
                 "sec" | "seconds" => Some(Unit::SI),
                 "min" | "minutes" => Some(Unit::times(60.0, 0)),
+                "hh:mm:ss" | "h:mm:ss" | "hh:mm" | "mm:ss" => Some(Unit::SI),
                 "h" | "hr" | "hours" => Some(Unit::times(3600.0, 0)),
                 _ => prefixed(text, &[("s", 0)]),
             },
@@ -122,9 +136,12 @@ impl Unit {
             }
             Dimension::Force => match text {
                 // Loads are often stated as the mass that hangs there.
-                "gf" | "g" => Some(Unit::times(980_665.0, -8)),
+                "gf" | "g" | "gram" | "grams" | "gram-force" | "grf" | "p" | "pond" => {
+                    Some(Unit::times(980_665.0, -8))
+                }
+                "mgf" | "mg" => Some(Unit::times(980_665.0, -11)),
                 "kgf" | "kg" | "kp" => Some(Unit::times(980_665.0, -5)),
-                "lbf" => Some(Unit::times(4.448_221_615_260_5, 0)),
+                "lbf" | "lb" | "lbs" => Some(Unit::times(4.448_221_615_260_5, 0)),
                 _ => prefixed(text, &[("N", 0), ("dyn", -5)]),
             },
             Dimension::Pressure => match text {
@@ -155,6 +172,38 @@ impl Unit {
                 _ => None,
             },
         }
+    }
+
+    /// A turn, a rate of turns or a torque on an arm that is a length with its unit.
+    fn on_an_arm(dimension: Dimension, turning: &str, arm: &str) -> Option<Unit> {
+        let (length, unit) = factored(arm)?;
+        let unit = Self::parse(Dimension::Length, unit)?;
+        let arm_m = unit.factor() * length;
+        if !(arm_m.is_finite() && arm_m > 0.0) {
+            return None;
+        }
+        let turns = |name: &str| match name {
+            "rev" | "revs" | "turn" | "turns" | "cycles" | "r" => Some(2.0 * PI),
+            "rad" => Some(1.0),
+            "deg" | "°" => Some(PI / 180.0),
+            _ => None,
+        };
+        Some(match dimension {
+            Dimension::Length => Unit::times(turns(turning)? * arm_m, 0),
+            Dimension::Speed => match turning {
+                "rpm" | "1/min" | "U/min" => Unit { times: 2.0 * PI * arm_m, ..Unit::over(60.0) },
+                "Hz" | "rps" | "1/s" => Unit::times(2.0 * PI * arm_m, 0),
+                _ => {
+                    let (way, time) = turning.split_once('/')?;
+                    let time = Self::parse(Dimension::Time, time)?;
+                    Unit { times: turns(way)? * arm_m, ..Unit::over(time.factor()) }
+                }
+            },
+            Dimension::Force => {
+                Unit { over: arm_m, ..prefixed(turning, &[("Nmm", -3), ("Ncm", -2), ("Nm", 0)])? }
+            }
+            _ => return None,
+        })
     }
 
     /// The unit that a header seems to state, whatever its case, and its spelling: `MN` is millinewton and `mhz` megahertz, the
@@ -193,9 +242,54 @@ impl Unit {
     }
 }
 
+/// A number before a unit (`12.5N`), which is no fraction (`1/min`).
+fn factored(text: &str) -> Option<(f64, &str)> {
+    let digits = text.bytes().take_while(|b| b.is_ascii_digit() || *b == b'.').count();
+    let exponent = text[digits..].strip_prefix(['e', 'E']).map_or(0, |rest| {
+        let sign = usize::from(rest.starts_with(['+', '-']));
+        let count = rest[sign..].bytes().take_while(u8::is_ascii_digit).count();
+        if count > 0 { 1 + sign + count } else { 0 }
+    });
+    let (number, rest) = text.split_at(digits + exponent);
+    let number: f64 = number.parse().ok()?;
+    (digits > 0 && number.is_finite() && number > 0.0 && !rest.is_empty() && !rest.starts_with('/'))
+        .then_some((number, rest))
+}
+
+/// Symbols of units, of quantities that no target has among them, and words that stand in their place.
+const SYMBOLS: &[&str] = &[
+    "m", "s", "g", "N", "Pa", "V", "A", "J", "W", "K", "C", "ohm", "\u{3a9}", "\u{2126}", "Hz", "rad", "deg",
+    "°", "°C", "°F", "degC", "degF", "%", "min", "h", "hr", "sec", "rpm", "rev", "revs", "cycle", "cycles",
+    "count", "counts", "cts", "digit", "digits", "bit", "bits", "LSB", "lb", "lbs", "lbf", "in", "inch",
+    "ft", "mil", "psi", "bar", "atm", "Torr", "mmHg", "ppm", "ppb", "a.u.", "au", "arb.", "n/a", "-", "1",
+    "none", "Nm", "Nmm", "Ncm", "Ns", "Wh", "Ah", "VA", "gf", "kgf", "kp", "dyn", "eV", "l", "L", "St", "P",
+    "dB", "pct", "percent", "micron", "microns", "px", "step", "steps", "hh:mm:ss", "hh:mm", "mm:ss",
+    "h:mm:ss", "x",
+];
+
+/// Whether a text can stand in a row of units: symbols of any quantity, with prefixes, exponents, products and quotients.
+pub fn is_unit(text: &str) -> bool {
+    let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
+    let symbol =
+        |t: &str| SYMBOLS.iter().any(|s| *s == t || t.len() > 1 && s.len() > 1 && s.eq_ignore_ascii_case(t));
+    if text.is_empty() || symbol(text) {
+        return true;
+    }
+    let with_prefix = |t: &str| {
+        let rest = t.strip_prefix(['n', 'u', '\u{b5}', '\u{3bc}', 'm', 'c', 'd', 'h', 'k', 'M', 'G']);
+        symbol(t) || rest.is_some_and(|rest| SYMBOLS.contains(&rest) && rest.chars().all(char::is_alphabetic))
+    };
+    let exponent = |c: char| c.is_ascii_digit() || "^-+²³¹⁻".contains(c);
+    text.chars().count() <= 12
+        && text.split(['/', '*', '·', ' ', '.']).all(|t| {
+            let bare = t.trim_end_matches(exponent);
+            with_prefix(if bare.is_empty() { t } else { bare })
+        })
+}
+
 /// Without brackets, with one spelling of micro and of 'per second'.
 fn plain(text: &str) -> String {
-    let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
+    let text = text.trim().trim_matches(['[', ']', '(', ')']).trim_matches([',', ';', ' ']);
     let text = text.replace(['µ', 'μ'], "u").replace('⁻', "-").replace('¹', "1");
     let text = text.replace(['·', '*'], " ");
     for per in [" s^-1", " s-1", ".s^-1", ".s-1"] {
@@ -215,6 +309,8 @@ fn prefixed(text: &str, bases: &[(&str, i32)]) -> Option<Unit> {
             "u" => -6,
             "m" => -3,
             "c" => -2,
+            "d" => -1,
+            "da" => 1,
             "h" => 2,
             "k" | "K" => 3,
             "M" => 6,
@@ -270,12 +366,31 @@ mod tests {
         let near = |a: f64, b: f64| assert!((a - b).abs() <= b.abs() * 3e-16, "{a} {b}");
         near(si(Dimension::Speed, "mm/min", "60"), 0.001);
         near(si(Dimension::Force, "gf", "100"), 0.980_665);
+        near(si(Dimension::Force, "12.5 N/V", "2"), 25.0);
+        near(si(Dimension::Force, "-12.5*N", "2"), -25.0);
+        near(si(Dimension::Force, "N·m@20mm", "0.1"), 5.0);
+        near(si(Dimension::Speed, "rpm@20 mm", "60"), 0.04 * PI);
+        near(si(Dimension::Speed, "rad/s@0.02m", "3"), 0.06);
+        near(si(Dimension::Length, "rev@20mm", "0.5"), 0.02 * PI);
         near(si(Dimension::Frequency, "rpm", "200"), 200.0 / 60.0);
         near(si(Dimension::Temperature, "K", "300"), 300.0 - 273.15);
         assert!((si(Dimension::Temperature, "°F", "212") - 100.0).abs() < 1e-12);
         near(si(Dimension::Angle, "rad", "1"), 180.0 / PI);
         near(si(Dimension::Percentage, "1", "0.5"), 50.0);
         near(si(Dimension::Pressure, "Torr", "760"), 101_325.0);
+    }
+
+    #[test]
+    fn rows_of_units_may_hold_any_quantity() {
+        for unit in [
+            "ohm", "kΩ", "mV", "N/mm", "m/s2", "m/s²", "mm^3", "J", "Nmm", "rev", "counts", "GPa", "ppm",
+            "a.u.", "[µm]", "mm·s-1",
+        ] {
+            assert!(is_unit(unit), "{unit}");
+        }
+        for name in ["Time", "Load", "Fx", "speed", "t", "F", "mu", "Step 2"] {
+            assert!(!is_unit(name), "{name}");
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::grid::{Cell, Grid, Row};
 use super::map::{Map, way};
 use super::targets::{COUNT, Id, Kind, TARGETS};
+use super::units::{Dimension, Unit};
 use models::condition::Condition;
 use models::covariate;
 use models::pass::Pass;
@@ -45,7 +46,7 @@ impl Values {
         Some(self.numbers[id as usize]).filter(|v| !v.is_nan())
     }
 
-    /// Reads a row. `number` is its place among the data, `clock_start` what clock times count from.
+    /// Reads a row. `number` is its place among the data, `clock` its time where a clock says it.
     ///
     /// # Errors
     /// The first cell that cannot be read.
@@ -54,7 +55,7 @@ impl Values {
         map: &Map,
         row: &Row,
         number: usize,
-        clock_start: Option<f64>,
+        clock: Option<f64>,
     ) -> Result<Self, Dropped> {
         let mut values = Values { place: row.place, numbers: [f64::NAN; COUNT], run: None };
         for constant in &map.constants {
@@ -75,7 +76,16 @@ impl Values {
                 text: cell.shown(),
                 reason: reason.into(),
             };
-            let number = || cell.digits(grid.comma).and_then(|d| column.unit.apply(&d));
+            let number = || match (cell.ratio(grid.comma), TARGETS[column.target].kind) {
+                (None, _) => cell.digits(grid.comma).and_then(|d| column.unit.apply(&d)),
+                // A minus before a unit turns these too.
+                (Some(ratio), Kind::Number(Dimension::Ratio)) => Some(ratio * column.unit.factor().signum()),
+                // Through the decimal digits: a hundred times 0.07 is not 7.
+                (Some(ratio), Kind::Number(Dimension::Percentage)) => {
+                    Unit::parse(Dimension::Percentage, "1")?.apply(&format!("{ratio:e}"))
+                }
+                _ => None,
+            };
             let value = match TARGETS[column.target].kind {
                 Kind::Text => {
                     values.run = Some(cell.shown());
@@ -90,8 +100,7 @@ impl Values {
                     number().filter(whole).ok_or_else(|| drop("no whole number"))?
                 }
                 Kind::Number(_) if column.target == Id::Time as usize => {
-                    let seconds = clock(cell).map(|s| s - clock_start.unwrap_or(0.0));
-                    seconds.or_else(number).ok_or_else(|| drop("neither a number nor a time of day"))?
+                    clock.or_else(number).ok_or_else(|| drop("neither a number nor a time of day"))?
                 }
                 Kind::Number(_) => number().ok_or_else(|| drop("no number"))?,
             };
@@ -208,49 +217,5 @@ impl Values {
             other => self.drop("", None, &other.to_string()),
         })?;
         Ok(pass)
-    }
-}
-
-/// Seconds of a clock: a workbook's time, `12:34:56.7`, with a date before it where there is one (`2024-03-01`).
-pub fn clock(cell: &Cell) -> Option<f64> {
-    let text = match cell {
-        Cell::Clock(seconds) => return Some(*seconds),
-        Cell::Text(text) if text.contains(':') => text.trim_end_matches('Z'),
-        _ => return None,
-    };
-    let (date, time) = match text.split_once(['T', ' ']) {
-        Some((date, time)) => (Some(date), time),
-        None => (None, text),
-    };
-    let mut parts = time.split(':');
-    let mut part = || parts.next().map(|p| p.trim().replace(',', ".").parse::<f64>());
-    let (hours, minutes, seconds) = (part()?.ok()?, part()?.ok()?, part().unwrap_or(Ok(0.0)).ok()?);
-    let days = match date {
-        None => 0.0,
-        Some(date) => {
-            let mut numbers = date.split('-').map(|n| n.parse::<i64>());
-            let (y, m, d) = (numbers.next()?.ok()?, numbers.next()?.ok()?, numbers.next()?.ok()?);
-            // Days of the civil calendar (proleptic Gregorian), the year beginning in March.
-            let (y, m) = if m > 2 { (y, m - 3) } else { (y - 1, m + 9) };
-            (365 * y + y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400) + (153 * m + 2) / 5 + d) as f64
-        }
-    };
-    Some(days * 86_400.0 + hours * 3600.0 + minutes * 60.0 + seconds)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn clocks_are_read() {
-        let at = |text: &str| clock(&Cell::Text(text.into()));
-        assert_eq!(at("01:02:03.5"), Some(3723.5));
-        assert_eq!(at("00:01"), Some(60.0));
-        let day = |a: &str, b: &str| at(b).unwrap() - at(a).unwrap();
-        assert_eq!(day("2024-02-28 23:59:59", "2024-03-01T00:00:00Z"), 86_401.0);
-        assert_eq!(day("2023-12-31 00:00:00", "2024-12-31 00:00:00"), 366.0 * 86_400.0);
-        assert_eq!(at("1.5"), None);
-        assert_eq!(at("a:b"), None);
     }
 }
