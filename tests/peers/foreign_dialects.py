@@ -160,7 +160,7 @@ book("book-blocks.xlsx", [*first, [], ["Step 2"], [NAMES[k] for k in (3, 1, 0, 2
 book("book-formula.xlsx", [NAMES, *[[t, v, l, f"=C{k + 2}*0.4"] for k, (t, v, l, f) in enumerate(ROWS)]], "refused")
 exact = [[t, v, l, c] for (t, v, l, _), c in zip(ROWS, COF)]
 book("book-percent.xlsx", [[*NAMES[:3], "COF (%)"], *exact], "right", SET, shape=percent)
-book("book-far.xlsx", [NAMES, *ROWS], "refused", SET, shape=lambda sheet: sheet.cell(1048576, 16384, 1.0))
+book("book-far.xlsx", [NAMES, *ROWS], "right", SET, shape=lambda sheet: sheet.cell(1048576, 16384, 1.0))
 # Arrays.
 arrays = {n: numpy.array([float(r[k]) for r in ROWS]) for k, n in enumerate(["t", "v", "Fn", "Ff"])}
 MAP = ["--map", "t=time:s,v=speed:mm/s,Fn=normal_force:N,Ff=friction_force:N"]

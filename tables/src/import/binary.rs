@@ -184,7 +184,7 @@ pub fn npy(bytes: &[u8]) -> miette::Result<Grid> {
             (vec!["#1".to_string()], vec![quoted(descr).first().cloned().unwrap_or_default()], *rows)
         }
         // A number has a byte at least, so that a shape is no larger than its bytes.
-        (None, [rows, columns]) if *rows > 0 && *columns <= data.len() => {
+        (None, [rows, columns]) if *rows > 0 && *columns > 0 && *columns <= data.len() => {
             let kind = quoted(descr).first().cloned().unwrap_or_default();
             ((1..=*columns).map(|k| format!("#{k}")).collect(), vec![kind; *columns], *rows)
         }
@@ -198,7 +198,8 @@ pub fn npy(bytes: &[u8]) -> miette::Result<Grid> {
     };
     let sizes = kinds.iter().map(|k| size(k)).collect::<miette::Result<Vec<usize>>>()?;
     let wide: usize = sizes.iter().sum();
-    if wide.checked_mul(rows) != Some(data.len()) {
+    // Rows of no bytes could be any number.
+    if wide == 0 || wide.checked_mul(rows) != Some(data.len()) {
         return Err(short());
     }
     let offsets: Vec<usize> = sizes

@@ -74,7 +74,10 @@ impl Source {
             2 * row.filled() >= usual && 2 * numbers >= row.filled() && numbers > 0
         };
         let first = rows.iter().position(is_data).unwrap_or(rows.len());
-        let mut data: Vec<usize> = rows
+        // The header is judged by the rows that it heads: other words further down may head wider ones.
+        let words_below = rows.iter().skip(first).position(|r| self.is_words(r) && r.filled() > 1);
+        let end = words_below.map_or(rows.len(), |k| first + k);
+        let mut data: Vec<usize> = rows[..end]
             .iter()
             .filter(|r| is_data(r))
             .map(|r| if self.blanks { r.filled() } else { r.width() })
@@ -94,7 +97,7 @@ impl Source {
         let head = self.head(&above).map(|h| (h, false)).or_else(|| Some((self.head(&spoken)?, true)));
         let mut header_rows = 0;
         if let Some((head, in_comment)) = head {
-            match self.fitted(&head, &rows, &is_data, wide) {
+            match self.fitted(&head, &rows[..end], &is_data, wide) {
                 Ok(names) => {
                     (grid.header, grid.units) = (names, head.units);
                     header_rows = if in_comment { 0 } else { head.rows };

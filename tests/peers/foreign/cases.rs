@@ -140,7 +140,7 @@ fn profiles_of_foreign_files() {
     let at = |name: &str| file("tests/foreign").join(name);
     for (name, words) in [
         ("dbc-identifier-too-large/sensor.toml", ["536871000", "29 bits", "line 9"]),
-        ("dbc-two-of-one-name/sensor.toml", ["two signals Fx", "9", "11"]),
+        ("dbc-two-of-one-name/sensor.toml", ["two signals Fx", "10", "12"]),
     ] {
         let (status, said) = check(&at(name));
         assert_eq!(status, Some(2), "{name}: {said}");
