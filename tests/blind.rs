@@ -3,12 +3,12 @@ use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
-use models::record::Pass;
+use models::pass::Pass;
 use rayon::prelude::*;
-use rig::validation::blind::distance::distance;
-use rig::validation::blind::score;
 use sim::sealed::{Ask, Stratum, generate};
 use std::collections::BTreeSet;
+use studies::validation::blind::distance::distance;
+use studies::validation::blind::score;
 
 fn rig_of(text: &str) -> RigFile {
     toml::from_str(text).expect("rig.toml of a sealed set")
@@ -83,7 +83,7 @@ fn a_withheld_cause_is_no_other_cause() {
     assert!(confident.is_empty(), "{confident:?}");
 }
 
-/// Least distance of a sealed form from the library's law of its name; see `rig::validation::blind::distance`.
+/// Least distance of a sealed form from the library's law of its name; see `studies::validation::blind::distance`.
 const LEAST_DISTANCE: f64 = 0.01;
 
 /// The simulation's forms are not the library's: sizes, shapes, stiffnesses and `mu0` free, no law of a cause's own name leaves

@@ -17,8 +17,6 @@ mod closing;
 mod finger;
 #[path = "calibration/force.rs"]
 mod force;
-#[path = "calibration/interrupted.rs"]
-mod interrupted;
 #[path = "calibration/latency.rs"]
 mod latency;
 #[path = "calibration/phase.rs"]
@@ -27,9 +25,5 @@ mod phase;
 mod refusals;
 #[path = "calibration/sensor.rs"]
 mod sensor;
-#[path = "calibration/vibrometer.rs"]
-mod vibrometer;
 #[path = "calibration/whole.rs"]
 mod whole;
-#[path = "calibration/wire.rs"]
-mod wire;

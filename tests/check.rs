@@ -1,6 +1,6 @@
 //! `check` against `run`: what one refuses, the other refuses; with place, cause and remedy, and all at once.
 
-use models::record::Pass;
+use models::pass::Pass;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use tests::{documents, muprime, texts};
@@ -46,8 +46,8 @@ impl Made {
         assert_eq!(verdict.status.code(), Some(0), "{}", texts(&verdict).1);
         std::fs::write(made.at("verdict.json"), &verdict.stdout).unwrap();
         std::fs::write(made.at("rig.toml"), RIG).unwrap();
-        std::fs::write(made.at("setup.toml"), rig::setup::bundled_text("virtual-ideal").unwrap()).unwrap();
-        std::fs::write(made.at("tip.toml"), rig::fingertip::BUNDLED[0].1).unwrap();
+        std::fs::write(made.at("setup.toml"), runs::setup::bundled_text("virtual-ideal").unwrap()).unwrap();
+        std::fs::write(made.at("tip.toml"), runs::fingertip::BUNDLED[0].1).unwrap();
         std::fs::write(made.at("profile.toml"), drivers::bundled::text("muprime-force2").unwrap()).unwrap();
         made
     }
@@ -64,7 +64,7 @@ impl Made {
 /// A certificate of today, as `calibrate` would write it.
 fn certificate() -> String {
     use calibration::certificate::{Instrument, Kind, Occasion, Outcome, Parameter, RawData, Residuals};
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_secs();
+    let now = tests::waiting::now_unix_s() as u64;
     let parameter = Parameter {
         name: "delay".into(),
         value: 1e-3,
@@ -527,6 +527,6 @@ fn nothing_that_check_approves_is_refused_by_run() {
 #[test]
 fn the_tables_of_the_trials_can_be_read() {
     let made = Made::new();
-    let passes: Vec<Pass> = models::record::read_passes(made.text("run/points.csv").as_bytes()).unwrap();
+    let passes: Vec<Pass> = models::pass::read_passes(made.text("run/points.csv").as_bytes()).unwrap();
     assert!(passes.len() >= 12, "{}", passes.len());
 }

@@ -3,10 +3,10 @@
 use effects::corrected::{SavedEffect, SavedModel, SavedParameter};
 use effects::{Active, Baseline, Design, lateral_force};
 use models::condition::Condition;
+use models::pass::{Pass, write_passes};
 use models::quantity::{Direction, PeakToPeak};
-use models::record::{Pass, write_passes};
-use rig::plan::Plan;
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::setup::Setup;
 use sim::world::WorldConfig;
 use std::path::Path;
 
@@ -46,7 +46,7 @@ fn warming(detuning_per_kelvin: f64) -> String {
 }
 
 fn setup_text(stated: &str) -> String {
-    let text = std::fs::read_to_string(tests::file("rig/setups/virtual-ideal.toml")).unwrap();
+    let text = std::fs::read_to_string(tests::file("runs/setups/virtual-ideal.toml")).unwrap();
     let name = "name = \"virtual-ideal\"\n";
     assert!(text.contains(name));
     text.replace(name, &format!("{name}{stated}\n"))
@@ -54,9 +54,9 @@ fn setup_text(stated: &str) -> String {
 
 /// What a sweep of a setup expected of its vibrating passes under a model.
 fn expected(setup: &Setup, model: &str) -> Vec<f64> {
-    let model = rig::model_file::load_for(setup, "model.toml", model).unwrap();
+    let model = runs::model_file::load_for(setup, "model.toml", model).unwrap();
     let plan = Plan::load("first-sweep").unwrap();
-    let made = rig::session::rehearse(setup, &plan, 3, &WorldConfig::ideal(), model).unwrap();
+    let made = runs::session::rehearse(setup, &plan, 3, &WorldConfig::ideal(), model).unwrap();
     let vibrating = made.passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO);
     vibrating.filter_map(|p| p.comparison.map(|c| c.predicted)).collect()
 }
@@ -109,11 +109,11 @@ fn what_a_setup_states_reaches_the_files_of_the_run() {
         setup_text("ambient_pressure_pa = 95000.0\nrelative_humidity_pct = 41.0\nspeed_gain_sd = 0.003");
     let setup = Setup::parse("s.toml", &text, Path::new(".")).unwrap();
     assert_eq!(setup.rig_file().calibration.speed_gain_sd, Some(0.003));
-    let model = rig::model_file::load_for(&setup, "model.toml", &warming(0.0));
+    let model = runs::model_file::load_for(&setup, "model.toml", &warming(0.0));
     assert!(model.is_err(), "the law needs a temperature, whatever its size");
     let plan = Plan::load("first-sweep").unwrap();
     let law = std::sync::Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
-    let made = rig::session::rehearse(&setup, &plan, 3, &WorldConfig::ideal(), law).unwrap();
+    let made = runs::session::rehearse(&setup, &plan, 3, &WorldConfig::ideal(), law).unwrap();
     assert!(!made.passes.is_empty());
     for p in &made.passes {
         assert_eq!(p.pass.ambient_pressure_pa, Some(95_000.0));

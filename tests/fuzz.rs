@@ -13,6 +13,8 @@ mod chance;
 mod configuration;
 #[path = "fuzz/decoders.rs"]
 mod decoders;
+#[path = "fuzz/imports.rs"]
+mod imports;
 #[path = "fuzz/records.rs"]
 mod records;
 
@@ -149,9 +151,9 @@ fn profiles() {
 
 #[test]
 fn setups_plans_models_and_certificates() {
-    let mut corpus = files("rig/setups", ".toml");
-    corpus.extend(files("rig/plans", ".toml"));
-    corpus.extend(files("rig/fingertips", ".toml"));
+    let mut corpus = files("runs/setups", ".toml");
+    corpus.extend(files("runs/plans", ".toml"));
+    corpus.extend(files("runs/fingertips", ".toml"));
     run("configuration", configuration::ALL, "configuration", &corpus, 20);
 }
 
@@ -191,4 +193,18 @@ fn whole_records() {
     writer.finish().unwrap();
     drop(writer);
     run("records", records::ALL, "records", &[whole.into_inner()], 4);
+}
+
+/// Foreign tables: the readers of several libraries and our own.
+#[test]
+fn imports_of_text() {
+    let corpus = [files("tests/foreign/seeds", ".csv"), files("tests/foreign/seeds", ".txt")].concat();
+    run("imports", imports::ALL, "texts", &corpus, 20);
+}
+
+#[test]
+fn imports_of_binaries() {
+    let ends = [".xlsx", ".parquet", ".arrow", ".npy", ".mat", ".h5"];
+    let corpus: Vec<Vec<u8>> = ends.iter().flat_map(|end| files("tests/foreign/seeds", end)).collect();
+    run("imports", imports::ALL, "binaries", &corpus, 20);
 }

@@ -4,7 +4,7 @@ use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::{Report, diagnose};
-use models::record::Pass;
+use models::pass::Pass;
 use rayon::prelude::*;
 use sim::defects::Kind;
 use sim::sealed::rough::{RoughSet, Roughness, rough};

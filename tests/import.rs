@@ -1,107 +1,13 @@
 //! Foreign tables: ten sources of one and the same passes, each imported and compared with the truth to the last digit, and sources that are
 //! refused or remarked on.
 
-use models::record::{Pass, read_passes};
-use serde_json::Value;
+#[path = "import/truth.rs"]
+mod source;
+
+use source::{import, lines, moved, number, same, truth};
 use std::fmt::Write;
 use std::path::Path;
-use std::process::Output;
-use tests::{documents, file, muprime, python, texts};
-
-/// A pass of the truth as decimal texts: what a person would type in SI is what every source holds in units of its own.
-struct Truth {
-    time_s: u32,
-    amplitude_nm: u32,
-    frequency_hz: u32,
-    speed_um_s: u32,
-    direction: i8,
-    position_um: i32,
-    normal_mn: u32,
-    lateral_un: i64,
-}
-
-/// Passes with every digit that an instrument might give, 4 amplitudes by 3 speeds by both directions.
-fn truth(still: bool) -> Vec<Truth> {
-    let mut all = Vec::new();
-    for (k, amplitude_nm) in [0, 731, 1513, 2999].into_iter().enumerate() {
-        for (j, speed_um_s) in [5003, 20_011, 79_999].into_iter().enumerate() {
-            for direction in [1i8, -1] {
-                let n = all.len() as u32;
-                let normal_mn = 247 + n % 7;
-                let amplitude_nm = if still { 0 } else { amplitude_nm };
-                let mu_ppm = 500_000 - if still { 0 } else { 70_000 * k as i64 }
-                    + 3_001 * j as i64
-                    + 17 * i64::from(n);
-                all.push(Truth {
-                    time_s: 7 * n,
-                    amplitude_nm,
-                    frequency_hz: 27_513,
-                    speed_um_s,
-                    direction,
-                    position_um: 137 * n as i32 - 900,
-                    normal_mn,
-                    lateral_un: i64::from(direction) * mu_ppm * i64::from(normal_mn) / 1000,
-                });
-            }
-        }
-    }
-    all
-}
-
-/// `n` with its point moved: the decimal that a person writes.
-fn moved(n: i64, places: usize) -> String {
-    let digits = format!("{:0width$}", n.unsigned_abs(), width = places + 1);
-    let (whole, rest) = digits.split_at(digits.len() - places);
-    let sign = if n < 0 { "-" } else { "" };
-    if places == 0 { format!("{sign}{whole}") } else { format!("{sign}{whole}.{rest}") }
-}
-
-fn number(n: i64, places: usize) -> f64 {
-    moved(n, places).parse().unwrap()
-}
-
-fn same(passes: &[Pass], truth: &[Truth], ulps: u64, what: &str) {
-    assert_eq!(passes.len(), truth.len(), "{what}");
-    for (p, t) in passes.iter().zip(truth) {
-        let pairs = [
-            ("time_s", p.time_s, f64::from(t.time_s)),
-            ("amplitude_pp_m", p.amplitude.metres(), number(t.amplitude_nm.into(), 9)),
-            ("speed_m_s", p.speed_m_s, number(t.speed_um_s.into(), 6)),
-            ("direction", p.direction.sign(), f64::from(t.direction)),
-            ("normal_force_n", p.normal_force_n, number(t.normal_mn.into(), 3)),
-            ("lateral_force_n", p.lateral_force_n.unwrap(), number(t.lateral_un, 6)),
-        ];
-        for (name, is, was) in pairs {
-            let apart = is.to_bits().abs_diff(was.to_bits());
-            assert!(apart <= ulps, "{what}: {name} is {is:e}, was {was:e}: {apart} last digits apart");
-        }
-    }
-}
-
-struct Import {
-    output: Output,
-    passes: Vec<Pass>,
-    log: Value,
-}
-
-fn import(folder: &Path, source: &Path, arguments: &[&str]) -> Import {
-    let out = folder.join(format!("out-{}", source.file_name().unwrap().to_str().unwrap()));
-    let output = muprime().arg("import").arg(source).args(arguments).arg("-o").arg(&out).output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{source:?}: {}", texts(&output).1);
-    let passes = read_passes(std::fs::File::open(out.join("points.csv")).unwrap()).unwrap();
-    let log = serde_json::from_str(&std::fs::read_to_string(out.join("import.json")).unwrap()).unwrap();
-    models::rig_file::RigFile::parse(&std::fs::read_to_string(out.join("rig.toml")).unwrap()).unwrap();
-    Import { output, passes, log }
-}
-
-/// A text of the passes: a header, then a line a pass with these cells.
-fn lines(truth: &[Truth], header: &str, cell: impl Fn(&Truth) -> String) -> String {
-    let mut text = format!("{header}\n");
-    for t in truth {
-        writeln!(text, "{}", cell(t)).unwrap();
-    }
-    text
-}
+use tests::{documents, file, muprime, texts};
 
 fn comma(text: &str) -> String {
     text.replace('.', ",")
@@ -251,96 +157,6 @@ fn text_tables_come_in_to_the_last_digit() {
         let said = muprime().args(["diagnose", "--no-pairs", "--json"]).arg(&out).output().unwrap();
         assert_eq!(said.status.code(), Some(0), "{name}: {}", texts(&said).1);
         assert_eq!(documents(&said)[0]["data"]["points"], 24);
-    }
-}
-
-/// Excel, Parquet and NumPy, written by openpyxl, pyarrow and numpy.
-#[test]
-fn binary_tables_come_in_to_the_last_digit() {
-    let folder = tempfile::tempdir().unwrap();
-    let moving = truth(false);
-    let table = lines(&moving, "t_s,w_um,f_khz,v_mm_s,dir,fn_mn,ft_mn", |t| {
-        format!(
-            "{},{},{},{},{},{},{}",
-            t.time_s,
-            moved(t.amplitude_nm.into(), 3),
-            moved(t.frequency_hz.into(), 3),
-            moved(t.speed_um_s.into(), 3),
-            t.direction,
-            t.normal_mn,
-            moved(t.lateral_un, 3)
-        )
-    });
-    let csv = folder.path().join("table.csv");
-    std::fs::write(&csv, table).unwrap();
-    let made =
-        python().arg(file("tests/peers/foreign_tables.py")).arg(&csv).arg(folder.path()).output().unwrap();
-    assert!(made.status.success(), "{}", texts(&made).1);
-    let map = "t_s=time:s, w_um=amplitude_pp:um, f_khz=frequency:kHz, v_mm_s=speed:mm/s, dir=direction, fn_mn=normal_force:mN, ft_mn=lateral_force:mN";
-    let matrix = "#1=time:s, #2=amplitude_pp:um, #3=frequency:kHz, #4=speed:mm/s, #5=direction, #6=normal_force:mN, #7=lateral_force:mN";
-    // 7 to 16.
-    for (name, arguments) in [
-        ("book.xlsx", vec!["--yes", "--sheet", "Friction"]),
-        ("table.parquet", vec!["--yes"]),
-        ("records.npy", vec!["--map", map]),
-        ("matrix.npy", vec!["--map", matrix]),
-        ("columns.mat", vec!["--map", map]),
-        ("packed.mat", vec!["--sheet", "sweep", "--map", map]),
-        ("matrix.mat", vec!["--map", matrix]),
-        ("new.mat", vec!["--map", matrix]),
-        ("table.h5", vec!["--sheet", "run/sweep", "--map", map]),
-        ("matrix.h5", vec!["--map", matrix]),
-    ] {
-        same(&import(folder.path(), &folder.path().join(name), &arguments).passes, &moving, 0, name);
-    }
-    let several = muprime()
-        .arg("import")
-        .arg(folder.path().join("book.xlsx"))
-        .args(["--yes", "-o"])
-        .arg(folder.path().join("none"))
-        .output()
-        .unwrap();
-    assert_eq!(several.status.code(), Some(2));
-    assert!(texts(&several).1.contains("'Notes', 'Friction'"), "{}", texts(&several).1);
-}
-
-/// Arrays of several lengths are listed; a file that is cut, or whose sizes lie, ends with words and not otherwise.
-#[test]
-fn files_of_arrays_are_refused_in_words() {
-    let folder = tempfile::tempdir().unwrap();
-    let csv = folder.path().join("plain.csv");
-    let header = "t_s,w_um,f_khz,v_mm_s,dir,fn_mn,ft_mn";
-    let rows: String = (1..20).map(|k| format!("{k},1,27.5,10,1,250,{k}\n")).collect();
-    std::fs::write(&csv, format!("{header}\n{rows}")).unwrap();
-    let made =
-        python().arg(file("tests/peers/foreign_tables.py")).arg(&csv).arg(folder.path()).output().unwrap();
-    assert!(made.status.success(), "{}", texts(&made).1);
-    let import = |name: &str, bytes: &[u8]| {
-        let (source, out) = (folder.path().join(name), folder.path().join("out"));
-        std::fs::write(&source, bytes).unwrap();
-        let output = muprime().arg("import").arg(&source).args(["--yes", "-o"]).arg(&out).output().unwrap();
-        (output.status.code(), texts(&output).1)
-    };
-    for (name, lists) in [("packed.mat", "sweep.t_s (19 x 1)"), ("table.h5", "run/sweep/t_s (19 x 1)")] {
-        let bytes = std::fs::read(folder.path().join(name)).unwrap();
-        let (code, said) = import("several.bin", &bytes);
-        let words = said.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
-        assert_eq!(code, Some(2), "{said}");
-        assert!(words.contains(lists) && words.contains("--sheet"), "{name}: {words}");
-    }
-    // Wherever it is cut and whichever byte is another: status 0 or 2, never a panic.
-    for name in ["columns.mat", "packed.mat", "table.h5", "new.mat"] {
-        let whole = std::fs::read(folder.path().join(name)).unwrap();
-        for k in 1..12 {
-            let cut = whole.len() * k / 12;
-            let mut other = whole.clone();
-            other[cut] ^= 0x5a;
-            for bytes in [&whole[..cut], &other[..]] {
-                let (code, said) = import("hurt.bin", bytes);
-                assert!(matches!(code, Some(0 | 2)), "{name} at {cut}: {code:?} {said}");
-                let _ = std::fs::remove_dir_all(folder.path().join("out"));
-            }
-        }
     }
 }
 

@@ -1,16 +1,15 @@
 //! What is kept of a run, and what is said of it: files that vanish or lock in the middle, disks that fill at the end, readers
 //! that go away, runs that are taken up again or were finished before, refusals that leave nothing behind.
 
-use rig::plan::Plan;
-use rig::session::{Job, News, Signals, Summary};
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::session::{Job, Signals, Update};
+use runs::setup::Setup;
 use std::collections::BTreeSet;
-use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use tests::waiting::{self, now_unix_s};
 use tests::{documents, file, muprime, served, texts};
 
 fn plan(folder: &Path, amplitudes: usize) -> PathBuf {
@@ -29,199 +28,43 @@ fn sweep(plan: &Path, out: &Path) -> Command {
 }
 
 fn points(run: &Path) -> BTreeSet<u64> {
-    rig::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
-}
-
-/// A sweep in wall-clock time, struck by `strike` after its second pass.
-struct Struck {
-    out: PathBuf,
-    status: Option<i32>,
-    acknowledged: BTreeSet<u64>,
-    outcome: serde_json::Value,
-    stderr: String,
-}
-
-/// Sweeps in wall-clock time that are tried on a machine that others use too.
-const ATTEMPTS: u32 = 8;
-
-/// Whether a sweep was refused or cut short as a busy machine does it: an instrument of this very process answered too late, or
-/// the loop ran too late. What is judged here is what is kept, not the loop.
-fn too_busy(status: Option<i32>, outcome: &serde_json::Value, stderr: &str) -> bool {
-    outcome == "tripped"
-        || outcome == "would_not_arm"
-        || (status == Some(2) && stderr.contains("no answer within"))
-}
-
-/// Sweeps until one was not cut short by a machine that is too busy; its folder is `N/run`.
-fn struck(folder: &Path, mut strike: impl FnMut(&Path)) -> Struck {
-    // Several times as long as the writer takes to look for its file, once a second.
-    let plan = plan(folder, 40);
-    for attempt in 1..=ATTEMPTS {
-        let out = folder.join(format!("{attempt}/run"));
-        let mut child = sweep(&plan, &out).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        let mut stderr = child.stderr.take().unwrap();
-        let said = std::thread::spawn(move || {
-            let mut text = String::new();
-            let _ = stderr.read_to_string(&mut text);
-            text
-        });
-        let (mut acknowledged, mut outcome) = (BTreeSet::new(), serde_json::Value::Null);
-        for line in BufReader::new(child.stdout.take().unwrap()).lines() {
-            let said: serde_json::Value = serde_json::from_str(&line.unwrap()).unwrap();
-            if let Some(pass) = said.get("pass") {
-                acknowledged.insert(pass["pass"]["point"].as_u64().unwrap());
-                if acknowledged.len() == 2 {
-                    strike(&out);
-                }
-            }
-            if let Some(summary) = said.get("summary") {
-                outcome = summary["outcome"].clone();
-            }
-        }
-        let status = child.wait().unwrap().code();
-        let stderr = said.join().unwrap();
-        if !too_busy(status, &outcome, &stderr) {
-            return Struck { out, status, acknowledged, outcome, stderr };
-        }
-        eprintln!("attempt {attempt}: {outcome} {stderr}");
-    }
-    panic!("{ATTEMPTS} sweeps in a row tripped: this machine is too busy for a test in wall-clock time");
-}
-
-#[test]
-fn a_record_that_is_removed_in_mid_run_stops_the_sweep_and_is_said() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let run = struck(folder.path(), |out| std::fs::remove_file(out.join("run-1.mcap")).unwrap());
-        assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
-        assert!(run.stderr.contains("run-1.mcap was removed or replaced"), "{}", run.stderr);
-        let kept = points(&run.out);
-        assert!(run.acknowledged.is_subset(&kept) && kept.len() < 40, "{kept:?}");
-        let report = muprime().args(["--json", "report"]).arg(&run.out).output().unwrap();
-        assert!(documents(&report)[0]["damage"].to_string().contains("the record of session 1 is missing"));
-    });
-}
-
-#[test]
-fn a_catalogue_that_is_locked_or_removed_in_mid_run_stops_the_sweep_and_every_pass_is_kept() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let mut lock = None;
-        let run = struck(&made(folder.path(), "locked"), |out| {
-            let db = rusqlite::Connection::open(out.with_file_name("catalogue.sqlite")).unwrap();
-            db.execute_batch("BEGIN IMMEDIATE").unwrap();
-            lock = Some(db);
-        });
-        drop(lock);
-        assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
-        assert!(run.stderr.contains("catalogue") && run.stderr.contains("locked"), "{}", run.stderr);
-        let kept = points(&run.out);
-        assert!(run.acknowledged.len() > 2 && run.acknowledged == kept, "{:?} {kept:?}", run.acknowledged);
-        let summary: Summary =
-            serde_json::from_slice(&std::fs::read(run.out.join("summary.json")).unwrap()).unwrap();
-        assert_eq!(summary.passes, kept.len());
-        assert!(run.out.join("report.html").exists());
-
-        let run = struck(&made(folder.path(), "removed"), |out| {
-            std::fs::remove_file(out.with_file_name("catalogue.sqlite")).unwrap();
-        });
-        assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
-        assert!(run.stderr.contains("catalogue.sqlite was removed or replaced"), "{}", run.stderr);
-        assert_eq!(run.acknowledged, points(&run.out));
-    });
-}
-
-fn made(folder: &Path, name: &str) -> PathBuf {
-    let path = folder.join(name);
-    std::fs::create_dir(&path).unwrap();
-    path
-}
-
-/// The disk fills while the record is being ended: the last tens of kilobytes are its index.
-#[test]
-fn a_disk_that_fills_at_the_very_end_hangs_nobody() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let plan = plan(folder.path(), 3);
-        let length = (1..=ATTEMPTS).find_map(|attempt| {
-            let whole = folder.path().join(format!("whole-{attempt}"));
-            let done = sweep(&plan, &whole).output().unwrap().status.code() == Some(0);
-            done.then(|| std::fs::metadata(whole.join("run-1.mcap")).unwrap().len() / 1024)
-        });
-        let length = length.expect("a machine that is not too busy for wall-clock time");
-        let mut lost = 0;
-        for short_kib in [2, 6, 12, 24] {
-            let out = folder.path().join(format!("short-{short_kib}"));
-            let mut limited = Command::new("bash");
-            limited.args([
-                "-c",
-                &format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", length - short_kib),
-                "bash",
-            ]);
-            let plain = sweep(&plan, &out);
-            let limited = limited.arg(plain.get_program()).args(plain.get_args());
-            let mut child = limited.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-            let stdout = child.stdout.take().unwrap();
-            let last =
-                std::thread::spawn(move || BufReader::new(stdout).lines().map_while(Result::ok).last());
-            let began = Instant::now();
-            let status = loop {
-                if let Some(status) = child.try_wait().unwrap() {
-                    break status;
-                }
-                if began.elapsed() > Duration::from_secs(60) {
-                    child.kill().unwrap();
-                    panic!("{short_kib} kB short: it hangs");
-                }
-                std::thread::sleep(Duration::from_millis(20));
-            };
-            let last = last.join().unwrap().unwrap_or_default();
-            if last.contains(r#""outcome":"record_lost""#) {
-                assert_eq!(status.code(), Some(1));
-                lost += 1;
-            }
-        }
-        assert!(lost > 0, "no limit struck the record's end");
-    });
+    runs::run_dir::passes_in(run).unwrap().iter().map(|p| p.pass.point).collect()
 }
 
 #[test]
 fn the_same_command_on_a_finished_run_says_so_and_touches_nothing() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
-        for clock in [Some("--fast"), None] {
-            let again = |n: u32| {
-                let output =
-                    sweep(&plan, &out).args(if n == 0 { Some("--fast") } else { clock }).output().unwrap();
-                assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
-                documents(&output).pop().unwrap()["summary"].clone()
-            };
-            let first = again(0);
-            let files = |out: &Path| {
-                let entries = std::fs::read_dir(out).unwrap().map(|e| e.unwrap().path());
-                let mut all: Vec<_> = entries.map(|p| (p.clone(), std::fs::read(&p).unwrap())).collect();
-                all.retain(|(path, _)| !path.ends_with(".lock"));
-                all.sort();
-                all
-            };
-            let before = files(&out);
-            let second = again(1);
-            assert!(files(&out) == before, "a finished run was changed");
-            assert_eq!((&first["outcome"], &second["outcome"]), (&"complete".into(), &"complete".into()));
-            assert_eq!(second["finished_before"], true);
-            let said = sweep(&plan, &out).output().unwrap();
-            assert!(!documents(&said).iter().any(|d| d["event"]["event"] == "armed"), "nothing is armed");
-        }
-    });
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
+    for clock in [Some("--fast"), None] {
+        let again = |n: u32| {
+            let output =
+                sweep(&plan, &out).args(if n == 0 { Some("--fast") } else { clock }).output().unwrap();
+            assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
+            documents(&output).pop().unwrap()["summary"].clone()
+        };
+        let first = again(0);
+        let files = |out: &Path| {
+            let entries = std::fs::read_dir(out).unwrap().map(|e| e.unwrap().path());
+            let mut all: Vec<_> = entries.map(|p| (p.clone(), std::fs::read(&p).unwrap())).collect();
+            all.retain(|(path, _)| !path.ends_with(".lock"));
+            all.sort();
+            all
+        };
+        let before = files(&out);
+        let second = again(1);
+        assert!(files(&out) == before, "a finished run was changed");
+        assert_eq!((&first["outcome"], &second["outcome"]), (&"complete".into(), &"complete".into()));
+        assert_eq!(second["finished_before"], true);
+        let said = sweep(&plan, &out).output().unwrap();
+        assert!(!documents(&said).iter().any(|d| d["event"]["event"] == "armed"), "nothing is armed");
+    }
 }
 
 #[test]
 fn runs_in_virtual_time_are_catalogued_when_they_were_made() {
     let folder = tempfile::tempdir().unwrap();
     let plan = plan(folder.path(), 1);
-    let now = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs_f64();
-    let before = now();
+    let before = now_unix_s();
     for name in ["b", "a"] {
         assert_eq!(sweep(&plan, &folder.path().join(name)).arg("--fast").status().unwrap().code(), Some(0));
     }
@@ -230,7 +73,7 @@ fn runs_in_virtual_time_are_catalogued_when_they_were_made() {
     let runs = muprime().args(["--json", "runs", "--folder"]).arg(folder.path()).output().unwrap();
     let runs = documents(&runs).remove(0);
     let started = |i: usize| runs[i]["started_unix_s"].as_f64().unwrap();
-    assert!(started(0) <= now() && started(1) >= before - 1.0, "{runs}");
+    assert!(started(0) <= now_unix_s() && started(1) >= before - 1.0, "{runs}");
     assert_eq!((&runs[0]["folder"], &runs[1]["folder"]), (&"a".into(), &"b".into()), "newest first");
 }
 
@@ -260,8 +103,8 @@ fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {
             };
             let (signals, mut made) = (Signals::default(), 0);
             let stops = Arc::clone(&signals.stops);
-            job.run(&signals, &mut |news| {
-                made += usize::from(matches!(news, News::Pass(_)));
+            rig::session::run(job, &signals, &mut |news| {
+                made += usize::from(matches!(news, Update::Pass(_)));
                 if stop == Some(made) {
                     stops.store(1, Ordering::Relaxed);
                 }
@@ -269,7 +112,7 @@ fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {
             .unwrap();
         }
         let table = std::fs::File::open(out.join("points.csv")).unwrap();
-        let passes = models::record::read_passes(table).unwrap();
+        let passes = models::pass::read_passes(table).unwrap();
         assert_eq!(passes.len(), 98);
         assert!(passes.is_sorted_by_key(|p| p.time_s), "the run's time goes on");
         let sessions: Vec<u64> = passes.iter().map(|p| p.session.unwrap()).collect();
@@ -346,17 +189,7 @@ fn names_that_are_no_text_and_files_that_are_none_are_refused_at_once() {
     ];
     for case in cases {
         let mut child = muprime().args(case).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        let began = Instant::now();
-        let status = loop {
-            if let Some(status) = child.try_wait().unwrap() {
-                break status.code();
-            }
-            if began.elapsed() > Duration::from_secs(30) {
-                child.kill().unwrap();
-                panic!("{case:?} hangs");
-            }
-            std::thread::sleep(Duration::from_millis(10));
-        };
+        let status = waiting::end_of(&format!("{case:?}"), &mut child).code();
         assert_eq!(status, Some(2), "{case:?}");
     }
 }
@@ -427,52 +260,40 @@ fn one_flipped_bit_is_told_by_replay_report_recover_and_diagnose() {
 
 #[test]
 fn a_reader_that_goes_away_ends_nothing() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
-        assert_eq!(sweep(&plan, &out).arg("--fast").output().unwrap().status.code(), Some(0));
-        // Standard output and standard error are pipes that nobody reads any more.
-        let deaf = |arguments: &[&str]| {
-            let mut shell = Command::new("bash");
-            shell.args(["-c", "exec 3> >(true); wait $!; exec \"$@\" >&3 2>&3", "bash"]);
-            shell.arg(muprime().get_program()).args(arguments).status().unwrap().code()
-        };
-        let (run, record) = (out.to_str().unwrap(), out.join("run-1.mcap"));
-        let (plan, record) = (plan.to_str().unwrap(), record.to_str().unwrap());
-        for verb in [
-            ["--help"].as_slice(),
-            &["completions", "bash"],
-            &["model", "effects"],
-            &["model", "point"],
-            &["replay", run],
-            &["report", run],
-            &["export", run, "--to", "csv"],
-            &["recover", record],
-            &["watch", run],
-            &["check", plan],
-            &["runs", "--folder", folder.path().to_str().unwrap()],
-        ] {
-            assert_eq!(deaf(verb), Some(0), "{verb:?}");
-        }
-        assert_eq!(deaf(&["check", "/dev/null/nothing"]), Some(2));
-        // A sweep, in virtual and in wall-clock time: all of it is made and kept.
-        let silent = folder.path().join("silent");
-        assert_eq!(
-            deaf(&["run", "--fast", "--setup", "virtual-ideal", plan, "--out", silent.to_str().unwrap()]),
-            Some(0)
-        );
-        assert_eq!(points(&silent), points(&out));
-        let wall = (1..=ATTEMPTS).any(|attempt| {
-            let silent = folder.path().join(format!("wall-{attempt}"));
-            let status = deaf(&["run", "--setup", "virtual-ideal", plan, "--out", silent.to_str().unwrap()]);
-            assert!(matches!(status, Some(0..=2)), "{status:?}");
-            let made = || std::fs::read(silent.join("summary.json")).ok();
-            let summary: Option<Summary> = made().and_then(|text| serde_json::from_slice(&text).ok());
-            assert_eq!(status == Some(2), summary.is_none(), "a sweep that had begun has its end");
-            status == Some(0) && points(&silent) == points(&out)
-        });
-        assert!(wall, "{ATTEMPTS} sweeps in a row were cut short");
-    });
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
+    assert_eq!(sweep(&plan, &out).arg("--fast").output().unwrap().status.code(), Some(0));
+    // Standard output and standard error are pipes that nobody reads any more.
+    let deaf = |arguments: &[&str]| {
+        let mut shell = Command::new("bash");
+        shell.args(["-c", "exec 3> >(true); wait $!; exec \"$@\" >&3 2>&3", "bash"]);
+        shell.arg(muprime().get_program()).args(arguments).status().unwrap().code()
+    };
+    let (run, record) = (out.to_str().unwrap(), out.join("run-1.mcap"));
+    let (plan, record) = (plan.to_str().unwrap(), record.to_str().unwrap());
+    for verb in [
+        ["--help"].as_slice(),
+        &["completions", "bash"],
+        &["model", "effects"],
+        &["model", "point"],
+        &["replay", run],
+        &["report", run],
+        &["export", run, "--to", "csv"],
+        &["recover", record],
+        &["watch", run],
+        &["check", plan],
+        &["runs", "--folder", folder.path().to_str().unwrap()],
+    ] {
+        assert_eq!(deaf(verb), Some(0), "{verb:?}");
+    }
+    assert_eq!(deaf(&["check", "/dev/null/nothing"]), Some(2));
+    // A sweep: all of it is made and kept. In wall-clock time: tests/wall/keeping.rs.
+    let silent = folder.path().join("silent");
+    assert_eq!(
+        deaf(&["run", "--fast", "--setup", "virtual-ideal", plan, "--out", silent.to_str().unwrap()]),
+        Some(0)
+    );
+    assert_eq!(points(&silent), points(&out));
 }
 
 #[test]
@@ -480,7 +301,7 @@ fn what_files_say_cannot_rewrite_a_terminal() {
     let folder = tempfile::tempdir().unwrap();
     let plan = plan(folder.path(), 1);
     let setup = folder.path().join("setup.toml");
-    let text = std::fs::read_to_string(file("rig/setups/virtual-ideal.toml")).unwrap();
+    let text = std::fs::read_to_string(file("runs/setups/virtual-ideal.toml")).unwrap();
     let named = text.replacen("name = \"virtual-ideal\"", "name = \"a\\u001b[2Jb\\u009b1A\"", 1);
     assert_ne!(text, named);
     std::fs::write(&setup, named).unwrap();

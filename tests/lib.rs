@@ -1,12 +1,9 @@
 //! Helpers that several system tests share.
 
+pub mod peer;
 pub mod served;
-mod wall_time;
-
-pub use wall_time::{
-    cut_by_a_stall, in_wall_clock_time, sweep_taken_up_again, sweep_unless_the_machine_stalls,
-    unless_the_machine_stalls,
-};
+pub mod study;
+pub mod waiting;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -17,9 +14,9 @@ pub fn file(path: &str) -> PathBuf {
 }
 
 /// A setup by name; `scpi` and `siglent` are the ideal virtual rig with a generator in the place of its amplifier, which has no
-/// thermometer, and `zaber` the one with a stage of lines of text, which loads nothing.
-pub fn setup(name: &str) -> rig::setup::Setup {
-    let ideal = || rig::setup::Setup::load("virtual-ideal").expect("a bundled setup").text;
+/// thermometer, `zaber` the one with a stage of lines of text, which loads nothing, and `wago` the one with a watchdog output as its relay.
+pub fn setup(name: &str) -> runs::setup::Setup {
+    let ideal = || runs::setup::Setup::load("virtual-ideal").expect("a bundled setup").text;
     let generator = |profile: &str| {
         let generator = format!("profile = \"{profile}\"\namplitude_m_per_unit = 1e-6\n");
         let text = ideal().replace("profile = \"muprime-amplifier\"\n", &generator);
@@ -28,31 +25,36 @@ pub fn setup(name: &str) -> rig::setup::Setup {
     let text = match name {
         "scpi" => generator("keysight-33500b"),
         "siglent" => generator("siglent-sdg"),
+        "wago" => runs::setup::Setup::load("virtual-relay")
+            .expect("a bundled setup")
+            .text
+            .replace("muprime-relay", "wago-750-watchdog")
+            .replace("profile = \"wago-750-watchdog\"\n", "profile = \"wago-750-watchdog\"\nunit = 9\n"),
         "zaber" => ideal().replace(
             "profile = \"muprime-stage\"\naddress = \"127.0.0.1:0\"",
             "profile = \"zaber-x-lsm\"\naddress = \"pty\"\ndead_weight_n = 0.25",
         ),
-        _ => return rig::setup::Setup::load(name).expect("a bundled setup"),
+        _ => return runs::setup::Setup::load(name).expect("a bundled setup"),
     };
-    rig::setup::Setup::parse(name, &text, Path::new(".")).expect("a setup")
+    runs::setup::Setup::parse(name, &text, Path::new(".")).expect("a setup")
 }
 
 /// A bundled setup at no more than 250 Hz, written into a folder; its path. For sweeps in wall-clock time whose subject is not the loop's
 /// timing: a machine that takes a CPU away for some milliseconds at a time then costs few deadlines.
 pub fn unhurried(setup: &str, folder: &Path) -> String {
     let path = folder.join(format!("{setup}-250.toml"));
-    let slower = slower(&rig::setup::Setup::load(setup).expect("a bundled setup"));
+    let slower = slower(&runs::setup::Setup::load(setup).expect("a bundled setup"));
     std::fs::write(&path, slower.text).expect("a folder that can be written");
     path.display().to_string()
 }
 
 /// A setup at no more than 250 Hz.
-pub fn slower(setup: &rig::setup::Setup) -> rig::setup::Setup {
+pub fn slower(setup: &runs::setup::Setup) -> runs::setup::Setup {
     let (head, rest) = setup.text.split_once("[loop]\nrate_hz = ").expect("its rate is the loop's first key");
     let (rate_hz, rest) = rest.split_once('\n').expect("more lines");
     let rate_hz: u32 = rate_hz.parse().expect("a rate");
     let text = format!("{head}[loop]\nrate_hz = {}\n{rest}", rate_hz.min(250));
-    rig::setup::Setup::parse("slower", &text, Path::new(".")).expect("a setup")
+    runs::setup::Setup::parse("slower", &text, Path::new(".")).expect("a setup")
 }
 
 /// How many rounds of a campaign whose rounds differ by their seeds alone: `few`, or `all` with `MUPRIME_LONG=1` (`tests/run long`).

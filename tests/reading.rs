@@ -1,4 +1,4 @@
-//! Which reading of the paper's w holds: the bundled plan 'psi-reading' on rigs whose Psi* is known, and decided 200 times for each.
+//! Which reading of the paper's w holds: the bundled plan 'psi-reading' on rigs whose Psi* is known, decided again and again for each.
 //!
 //! Two natures: the paper's finite element ridge, by its table, at a multiple of the stroke, on the virtual rig in virtual time and at once with
 //! many mu_0; and Eq. 20 itself.
@@ -9,22 +9,29 @@ use models::prediction::SpringSlider;
 use models::psi::{PsiEq17, relative_friction};
 use models::quantity::PeakToPeak;
 use models::reading::Reading;
-use models::reading_evidence::{Decision, ReadingEvidence, ReadingFinding};
+use models::reading_evidence::{Decision, ReadingFinding, of_passes};
 use models::rig_file::PassNoise;
 use models::surrogate::Surrogate;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
-use rig::plan::{Plan, Resolution};
-use rig::sequence::Outcome;
-use rig::session::rehearse;
-use rig::setup::Setup;
+use runs::plan::{Plan, Resolution};
+use runs::sequence::Outcome;
+use runs::session::rehearse;
+use runs::setup::Setup;
 use sim::world::WorldConfig;
 use std::sync::Arc;
-use tests::{documents, muprime};
+use tests::{documents, muprime, rounds};
 
-const SWEEPS: u64 = 200;
+#[path = "reading/psi_star.rs"]
+mod psi_star;
+
 const FIRST_SEED: u64 = 23_000;
+
+/// Sweeps of each nature.
+fn sweeps() -> u64 {
+    rounds(50, 200)
+}
 
 /// Psi* of each nature, and what should be said of it.
 const NATURES: [(f64, Decision); 3] =
@@ -73,8 +80,13 @@ const ASKED: usize = 95;
 
 fn show(nature: &str, psi_star: f64, told: &Tally) {
     println!(
-        "{nature:<44} Psi* {psi_star:.2}: right {:>3}, undecided {:>3}, wrong {:>3} of {SWEEPS}; mean {:+.1} nats, Psi* found {:.2}",
-        told.right, told.other, told.wrong, told.nats, told.psi_star
+        "{nature:<44} Psi* {psi_star:.2}: right {:>3}, undecided {:>3}, wrong {:>3} of {}; mean {:+.1} nats, Psi* found {:.2}",
+        told.right,
+        told.other,
+        told.wrong,
+        sweeps(),
+        told.nats,
+        told.psi_star
     );
 }
 
@@ -83,17 +95,17 @@ fn the_plan_decides_on_a_virtual_rig_built_under_either_reading() {
     for (strokes, expected) in RIDGES {
         let told = tally(expected, &on_the_virtual_rig(strokes));
         show("virtual rig, finite element ridge", RIDGES_PSI_STAR * strokes, &told);
-        assert!(told.right * 100 >= ASKED * SWEEPS as usize, "{told:?}");
+        assert!(told.right * 100 >= ASKED * sweeps() as usize, "{told:?}");
     }
 }
 
-/// The virtual rig's own finger, a slider on springs, is no rig of either reading: its best exponential lies between, with stiffnesses that scatter
-/// by 5 %.
+/// The virtual rig's own finger, a slider on springs, is no rig of either reading: at the plan's conditions its best exponential lies between, nearer
+/// to the second, with stiffnesses that scatter by 5 %.
 #[test]
 fn the_spring_slider_lies_between() {
     let told = tally(Decision::Between, &on_the_virtual_rig(0.0));
     show("virtual rig, slider on springs", told.psi_star, &told);
-    assert!(told.right * 100 >= 80 * SWEEPS as usize, "{told:?}");
+    assert!(told.right * 100 >= 50 * sweeps() as usize && (1.3..1.6).contains(&told.psi_star), "{told:?}");
 }
 
 /// The plan's sweeps in virtual time; no strokes: the slider.
@@ -103,12 +115,14 @@ fn on_the_virtual_rig(strokes: f64) -> Vec<ReadingFinding> {
     let model = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     let mut world = WorldConfig::ideal();
     world.finger.ridge_table_strokes = strokes;
-    (0..SWEEPS)
+    (0..sweeps())
         .into_par_iter()
         .map(|i| {
             let run = rehearse(&setup, &plan, FIRST_SEED + i, &world, Arc::clone(&model) as _).unwrap();
             assert_eq!(run.outcome, Outcome::Complete);
-            run.findings.psi_reading.unwrap()
+            let passes =
+                run.passes.iter().filter_map(|p| Some((p.pass.condition(1.0), p.pass.friction_force_n()?)));
+            of_passes(passes, setup.tip.finger.poisson_ratio, setup.file.noise, 0.0).unwrap()
         })
         .collect()
 }
@@ -128,20 +142,20 @@ fn swept(mu_relative: impl Fn(&Condition) -> f64 + Sync, conditions: usize) -> V
     plan.file.series.truncate(conditions);
     let noise: PassNoise = setup.file.noise;
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
-    (0..SWEEPS)
+    (0..sweeps())
         .into_par_iter()
         .map(|i| {
             let mut draw = Draw(ChaCha8Rng::seed_from_u64(FIRST_SEED + i));
             let mu0 = 0.5 * (0.2 * draw.normal()).clamp(-0.35, 0.35).exp();
-            let mut evidence = ReadingEvidence::new(0.5, setup.tip.finger.poisson_ratio, noise);
-            for point in plan.points(FIRST_SEED + i, &setup.config.limits, &resolution).unwrap() {
+            let points = plan.points(FIRST_SEED + i, &setup.config.limits, &resolution).unwrap();
+            let passes = points.into_iter().map(|point| {
                 let c = Condition { mu0, ..point.condition };
                 let still = c.amplitude == PeakToPeak::ZERO;
                 let mu = if still { 1.0 } else { mu_relative(&c) };
                 let force = mu * mu0 * c.normal_force_n * (1.0 + noise.pass_relative_sd * draw.normal());
-                evidence.pass(&c, force + noise.force_sd_n * draw.normal());
-            }
-            evidence.finding().unwrap()
+                (c, force + noise.force_sd_n * draw.normal())
+            });
+            of_passes(passes, setup.tip.finger.poisson_ratio, noise, 0.0).unwrap()
         })
         .collect()
 }
@@ -164,7 +178,7 @@ fn the_plan_decides_where_the_finite_element_ridge_is_the_truth() {
                 RIDGES_PSI_STAR * strokes,
                 &told,
             );
-            assert!(conditions < 3 || told.right * 100 >= ASKED * SWEEPS as usize, "{told:?}");
+            assert!(conditions < 3 || told.right * 100 >= ASKED * sweeps() as usize, "{told:?}");
         }
     }
 }
@@ -180,7 +194,7 @@ fn the_plan_has_the_fewest_passes_that_decide() {
             let told = tally(expected, &swept(law(psi_star), conditions));
             show(&format!("Eq. 20, {conditions} conditions, {} passes", 2 * conditions), psi_star, &told);
             assert_eq!(told.wrong, 0, "{told:?}");
-            assert!(conditions < 3 || told.right * 100 >= 95 * SWEEPS as usize, "{told:?}");
+            assert!(conditions < 3 || told.right * 100 >= 95 * sweeps() as usize, "{told:?}");
         }
     }
 }
@@ -206,17 +220,18 @@ fn run_diagnose_check_and_point_tell_it() {
     with(1.0);
     let (status, run) = told(&["run", "psi-reading", "--setup", setup, "--fast", "--out", out]);
     assert_eq!(status, Some(0), "{run:?}");
-    let reading = &run.last().unwrap()["summary"]["psi_reading"];
+    let verdict = &told(&["diagnose", out]).1[0];
+    let reading = &verdict["psi_reading"];
     assert_eq!(
         (&reading["decision"], &reading["judged"]),
         (&"sine_amplitude".into(), &6.into()),
         "{reading}"
     );
-    let verdict = &told(&["diagnose", out]).1[0];
-    assert_eq!(verdict["psi_reading"]["decision"], "sine_amplitude", "{verdict}");
     let remarks = verdict["remarks"].as_array().unwrap();
     assert!(remarks.iter().any(|r| r.as_str().unwrap().starts_with("Eq. 20 of the paper")), "{remarks:?}");
-    assert!(std::fs::read_to_string(format!("{out}/report.html")).unwrap().contains("half of the stroke"));
+    // It is a question about the paper: a run does not answer it.
+    let page = std::fs::read_to_string(format!("{out}/report.html")).unwrap();
+    assert!(!format!("{run:?}{page}").contains("favour"), "{run:?}");
 
     let point = &told(&["model", "point", "--model", "psi"]).1[0];
     let number = |value: &serde_json::Value, key: &str| value[key].as_f64().unwrap();
@@ -235,7 +250,7 @@ fn what_neither_reading_explains_is_given_to_neither() {
         let law = |c: &Condition| relative_friction(PsiEq17::at(c, Finger::paper().poisson_ratio), psi_star);
         let told = tally(Decision::Neither, &swept(law, 3));
         show("Eq. 20, far from both", psi_star, &told);
-        assert!(told.right * 100 >= 95 * SWEEPS as usize, "{told:?}");
+        assert!(told.right * 100 >= 95 * sweeps() as usize, "{told:?}");
     }
 }
 
@@ -243,27 +258,24 @@ fn what_neither_reading_explains_is_given_to_neither() {
 #[test]
 fn a_bad_pass_does_not_decide_and_mu_0_must_be_known() {
     let noise = PassNoise::default();
-    let mut evidence = ReadingEvidence::new(0.5, 0.33, noise);
+    let of = |passes: &[(Condition, f64)]| of_passes(passes.iter().copied(), 0.33, noise, 0.0);
     let at = |um: f64, speed_m_s: f64| Condition {
         amplitude: PeakToPeak::from_metres(um * 1e-6),
         speed_m_s,
         ..Condition::paper()
     };
-    evidence.pass(&at(2.0, 0.048), 0.05);
-    assert!(evidence.finding().is_none());
-    evidence.pass(&at(0.0, 0.02), 0.125);
+    assert!(of(&[(at(2.0, 0.048), 0.05)]).is_none());
+    let mut passes = vec![(at(0.0, 0.02), 0.125)];
+    assert!(of(&passes).is_none());
     let force = |c: &Condition, star: f64| 0.125 * relative_friction(PsiEq17::at(c, 0.33), star);
     for (um, speed) in [(1.0, 0.024), (2.0, 0.048), (3.0, 0.072)] {
-        evidence.pass(&at(um, speed), force(&at(um, speed), 2.38));
-        evidence.pass(&at(um, speed), force(&at(um, speed), 2.38));
+        passes.extend([(at(um, speed), force(&at(um, speed), 2.38)); 2]);
     }
-    let before = evidence.finding().unwrap();
+    let before = of(&passes).unwrap();
     assert_eq!(before.decision, Decision::PeakToPeak);
     // As it would be under the other reading, and as no law has it.
     for bad in [force(&at(2.0, 0.048), 1.19), 1.0, -1.0] {
-        let mut evidence = evidence.clone();
-        evidence.pass(&at(2.0, 0.048), bad);
-        let after = evidence.finding().unwrap();
+        let after = of(&[&passes[..], &[(at(2.0, 0.048), bad)]].concat()).unwrap();
         assert_ne!(after.decision, Decision::SineAmplitude, "{bad}: {before:?} {after:?}");
     }
     assert_eq!(Reading::ALL.map(|r| r.psi_star().0), [2.38, 1.19]);

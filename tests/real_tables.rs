@@ -5,14 +5,14 @@ use diagnosis::data::{RigFile, Table};
 use diagnosis::decision::Verdict;
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::{Diagnosis, Report, diagnose};
-use models::record::Pass;
+use models::pass::Pass;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use tests::file;
 
 fn passes_of(table: &str) -> Vec<Pass> {
     let path = file("tests/recordings").join(table);
-    models::record::read_passes(std::fs::File::open(&path).unwrap()).unwrap()
+    models::pass::read_passes(std::fs::File::open(&path).unwrap()).unwrap()
 }
 
 fn diagnosis_of(table: &str, passes: &[Pass]) -> Diagnosis {

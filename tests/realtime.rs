@@ -1,18 +1,16 @@
 //! The promises that do not depend on the machine: the loop does not allocate, whatever the cycle does; the record's writer
 //! holds no more memory after hours than after seconds.
 
-#![allow(clippy::disallowed_methods, reason = "drivers are opened with a reading of the clock")]
-
 use models::prediction::SpringSlider;
 use realtime::cycle::{Command, CycleState};
 use realtime::ports::Nanos;
 use realtime::recorder::{Entry, Preamble, Reader, Recorder};
 use realtime::turn::{Ports, Row, Tick, turn};
-use rig::plan::{Plan, Resolution};
-use rig::sequence::Sequence;
-use rig::setup::Setup;
 use ringbuf::HeapRb;
 use ringbuf::traits::{Consumer, Producer, Split};
+use runs::plan::{Plan, Resolution};
+use runs::sequence::Sequence;
+use runs::setup::Setup;
 use sim::virtual_rig::VirtualRig;
 use sim::world::WorldConfig;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -106,86 +104,6 @@ fn no_allocation_in_a_million_cycles_of_a_sweep() {
     println!("{cycles} cycles, {armed} armed, {driven} driving, {} allocations", COUNT.get());
     assert!(driven > cycles * 3 / 10, "the cycles must be those of a real sweep: {driven}");
     assert_eq!(COUNT.get(), 0);
-}
-
-/// A force port that counts the allocations of the loop's own thread between two of its cycles.
-struct Counted {
-    inner: Box<dyn realtime::ports::ForceSensor>,
-    reads: u64,
-    counted: Arc<std::sync::atomic::AtomicU64>,
-}
-
-/// The cycles between which is counted: the first ones touch what the loop touches once.
-const COUNTED: std::ops::Range<u64> = 200..3200;
-
-impl realtime::ports::ForceSensor for Counted {
-    fn read(&mut self, now: Nanos) -> realtime::ports::Forces {
-        self.reads += 1;
-        if self.reads == COUNTED.start {
-            COUNT.set(0);
-            COUNTING.set(true);
-        } else if self.reads == COUNTED.end {
-            COUNTING.set(false);
-            self.counted.store(COUNT.get(), std::sync::atomic::Ordering::Release);
-        }
-        self.inner.read(now)
-    }
-}
-
-/// The loop's own thread, `pacing::run` and all, over the ports of real drivers (Modbus TCP on loopback), armed and driving.
-#[test]
-fn the_loops_thread_allocates_nothing_behind_real_drivers() {
-    use realtime::safety::Request;
-    use rig::supervisor::Loop;
-    use rig::supervisor::wall::{Parts, WallLoop};
-    use std::sync::atomic::{AtomicU64, Ordering};
-    let setup = tests::slower(&Setup::load("virtual-ideal").unwrap());
-    let (epoch, origin_ns) = (std::time::Instant::now(), realtime::pacing::monotonic_ns());
-    let world = sim::world::World::new(&WorldConfig::ideal(), 1).unwrap();
-    let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(world), epoch);
-    let mut instruments = setup.instruments();
-    let _emulators = rig::embed::embed(&mut instruments, &plant, false).unwrap();
-    let opened = drivers::open(&instruments, epoch).unwrap();
-    let counted = Arc::new(AtomicU64::new(u64::MAX));
-    let force = setup.certificates.calibrated(opened.force);
-    let force = Box::new(Counted { inner: force, reads: 0, counted: Arc::clone(&counted) });
-    let amplifier = setup.certificates.calibrated_amplifier(opened.amplifier);
-    let (rig, mut reins, mut record) = WallLoop::start(Parts {
-        config: setup.config,
-        model: Arc::new(SpringSlider::new(setup.tip.finger).unwrap()),
-        ports: Ports::new(force, amplifier, opened.stage),
-        links: opened.links,
-        pacing: realtime::pacing::Pacing::default(),
-        origin_ns,
-    })
-    .unwrap();
-    let request = Request {
-        amplitude: models::quantity::PeakToPeak::from_metres(2e-6),
-        frequency_hz: 27_500.0,
-        velocity_m_s: 0.0,
-        normal_force_n: 0.25,
-    };
-    let (mut driven, mut last_asked) = (0u64, 0);
-    let began = std::time::Instant::now();
-    while counted.load(Ordering::Acquire) == u64::MAX && began.elapsed().as_secs() < 60 {
-        while record.try_pop().is_some() {}
-        let Some(row) = reins.next_row() else { continue };
-        driven += u64::from(row.drive_pp_m > 0.0 && COUNTED.contains(&row.cycle));
-        if row.cycle > last_asked + 60 {
-            last_asked = row.cycle;
-            let ask = if row.armed {
-                Command::Set(request, realtime::cycle::Marker::default())
-            } else {
-                Command::Reset
-            };
-            reins.send(ask);
-        }
-    }
-    let allocations = counted.load(Ordering::Acquire);
-    println!("{} cycles behind drivers, {driven} driving, {allocations} allocations", COUNTED.count());
-    rig.end();
-    assert_eq!(allocations, 0);
-    assert!(driven > 500, "the cycles must be those of a driven rig: {driven}");
 }
 
 /// A model that looks, when it is asked, whether the commands of its cycle have left.

@@ -1,9 +1,9 @@
 //! The record under abuse: cut at every byte, bits flipped.
 
 use realtime::recorder::{self, Contents, Integrity, Recovery};
-use rig::plan::Plan;
-use rig::session::{Job, Signals};
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::session::{Job, Signals};
+use runs::setup::Setup;
 use std::io::Cursor;
 use std::sync::{Arc, LazyLock};
 
@@ -27,7 +27,7 @@ static RECORD: LazyLock<Vec<u8>> = LazyLock::new(|| {
         fast: true,
         notes: Default::default(),
     };
-    job.run(&Signals::default(), &mut |_| {}).unwrap();
+    rig::session::run(job, &Signals::default(), &mut |_| {}).unwrap();
     std::fs::read(out.join("run-1.mcap")).unwrap()
 });
 

@@ -4,11 +4,11 @@
 //! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements` writes it anew.
 
 use realtime::safety::{Cause, RULES, Rule, Unit};
-use rig::validation::faults::bench::STEADY_AT;
-use rig::validation::faults::bench::{RING, T};
-use rig::validation::faults::{ELSEWHERE, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
+use studies::validation::faults::bench::STEADY_AT;
+use studies::validation::faults::bench::{RING, T};
+use studies::validation::faults::{ELSEWHERE, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run};
 use tests::file;
 
 /// Unit tests of the safety core that name a cause.
@@ -30,20 +30,30 @@ fn unit_tests() -> BTreeMap<String, BTreeSet<String>> {
     found
 }
 
-/// Faults of the list by the cause that they tripped, and the tally of the same scenes, at one pace.
-fn faults_by_cause(pace: Pace) -> (BTreeMap<String, BTreeSet<&'static str>>, Tally) {
-    let (mut by_cause, mut tally) = (BTreeMap::<String, BTreeSet<_>>::new(), Tally::default());
-    for (row, fault) in ROWS.iter().enumerate() {
-        for moment in fault.moments {
-            let scene =
-                Scene { moment: *moment, seed: 1, strikes: vec![Strike { row, at: STEADY_AT }], pace };
-            tally.take(&scene, false);
-            if let Some(trip) = run(&scene, false).trip {
-                by_cause.entry(format!("{:?}", trip.cause)).or_default().insert(fault.name);
-            }
+/// Every fault of the list in each of its phases, at one pace.
+fn scenes(pace: Pace) -> impl Iterator<Item = (&'static str, Scene)> {
+    ROWS.iter().enumerate().flat_map(move |(row, fault)| {
+        let strikes = vec![Strike { row, at: STEADY_AT }];
+        let scene = move |moment: &Moment| Scene { moment: *moment, seed: 1, strikes: strikes.clone(), pace };
+        fault.moments.iter().map(move |moment| (fault.name, scene(moment)))
+    })
+}
+
+fn tally(pace: Pace) -> Tally {
+    let mut tally = Tally::default();
+    scenes(pace).for_each(|(_, scene)| tally.take(&scene, false));
+    tally
+}
+
+/// Faults of the list by the cause that they trip.
+fn faults_by_cause() -> BTreeMap<String, BTreeSet<&'static str>> {
+    let mut by_cause = BTreeMap::<String, BTreeSet<_>>::new();
+    for (name, scene) in scenes(Pace::Fast) {
+        if let Some(trip) = run(&scene, false).trip {
+            by_cause.entry(format!("{:?}", trip.cause)).or_default().insert(name);
         }
     }
-    (by_cause, tally)
+    by_cause
 }
 
 fn words(names: impl IntoIterator<Item = impl AsRef<str>>) -> String {
@@ -62,8 +72,8 @@ fn units_of(rule: &Rule) -> String {
 }
 
 fn page() -> String {
-    let (units, (faults, tally)) = (unit_tests(), faults_by_cause(Pace::Fast));
-    let (_, slow) = faults_by_cause(Pace::Default);
+    let (units, faults) = (unit_tests(), faults_by_cause());
+    let (tally, slow) = (tally(Pace::Fast), tally(Pace::Default));
     assert_eq!((tally.failed, slow.failed), (0, 0), "{:?} {:?}", tally.failures, slow.failures);
     let mut out = String::from(
         "# Safety: requirements, tests, reactions\n\n\
@@ -260,7 +270,7 @@ fn keys_of<T: serde::de::DeserializeOwned>() -> BTreeSet<String> {
 fn every_key_of_a_setup_and_of_rig_toml_has_its_word() {
     use drivers::{AxisSetup, InstrumentSetup, vibrometer::VibrometerSetup};
     use models::rig_file::{Calibration, PassNoise, RigFile};
-    use rig::setup::{LimitsFile, Pace, SetupFile, VirtualRig};
+    use runs::setup::{LimitsFile, Pace, SetupFile, VirtualRig};
     let missing = |page: &str, keys: BTreeSet<String>| {
         let text = std::fs::read_to_string(file(page)).unwrap();
         let named = |key: &String| ["`", "[", "[["].iter().any(|open| text.contains(&format!("{open}{key}")));
@@ -276,7 +286,7 @@ fn every_key_of_a_setup_and_of_rig_toml_has_its_word() {
         keys_of::<VibrometerSetup>(),
         keys_of::<PassNoise>(),
         keys_of::<realtime::estimate::EstimateConfig>(),
-        keys_of::<rig::fingertip::FingertipSetup>(),
+        keys_of::<runs::fingertip::FingertipSetup>(),
     ]
     .into_iter()
     .flatten()

@@ -4,9 +4,9 @@ use diagnosis::Verdict;
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::Report;
 use rayon::prelude::*;
-use rig::validation::blind::rough::{answer, run};
 use sim::defects::Kind;
 use sim::sealed::rough::{RoughSet, Roughness, rough};
+use studies::validation::blind::rough::{answer, run};
 use tests::rounds;
 
 fn quick() -> Options {

@@ -73,15 +73,6 @@ impl Drop for ServedRig {
     }
 }
 
-/// Waits until a served amplifier is on, or off.
-pub fn wait_until(amplifier: &mut AmplifierWatch, on: bool) {
-    let began = std::time::Instant::now();
-    while amplifier.read().on != on {
-        assert!(began.elapsed().as_secs() < 20, "the amplifier never shows {on}");
-        std::thread::sleep(std::time::Duration::from_millis(2));
-    }
-}
-
 /// What the amplifier says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AmplifierSaid {

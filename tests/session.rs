@@ -1,96 +1,9 @@
-//! Whole runs of the real program: sweeps, refusals, kills, signals, resumption, exports.
+//! Whole runs of the real program in virtual time: sweeps, refusals, trips.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
-use tests::{
-    SHORT, cut_by_a_stall, documents, file, muprime, python, short_plan, sweep_unless_the_machine_stalls,
-    texts,
-};
-
-/// Point numbers in a run's table.
-fn points(run: &Path) -> Vec<u64> {
-    let table = std::fs::File::open(run.join("points.csv")).unwrap();
-    models::record::read_passes(table).unwrap().iter().map(|p| p.point).collect()
-}
-
-fn assert_each_once(points: &[u64], planned: u64) {
-    let mut seen = BTreeMap::<u64, u32>::new();
-    for p in points {
-        *seen.entry(*p).or_default() += 1;
-    }
-    assert_eq!(seen.len() as u64, planned, "{points:?}");
-    assert!(seen.values().all(|n| *n == 1), "{points:?}");
-}
-
-/// The command for a sweep on the ideal virtual rig at 250 Hz, in wall-clock time.
-fn unhurried(plan: &str, out: &Path) -> Command {
-    let setup = tests::unhurried("virtual-ideal", Path::new(plan).parent().unwrap());
-    let mut sweep = muprime();
-    sweep.args(["--json", "run", plan, "--setup", &setup, "--out"]).arg(out);
-    sweep
-}
-
-/// Such a sweep.
-fn started(plan: &str, out: &Path) -> Child {
-    let mut sweep = unhurried(plan, out);
-    sweep.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
-}
-
-#[test]
-fn a_sweep_over_real_modbus_tcp_ends_with_table_record_and_report() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let plan = short_plan(folder.path());
-        let (out, output) = sweep_unless_the_machine_stalls(folder.path(), |out| unhurried(&plan, out));
-        let (_, stderr) = texts(&output);
-        assert_eq!(output.status.code(), Some(0), "{stderr}");
-        let said = documents(&output);
-        let summary = &said.last().unwrap()["summary"];
-        assert_eq!(summary["outcome"], "complete");
-        assert_eq!(summary["passes"], summary["planned"]);
-        assert_eq!(
-            said.iter().filter(|d| d.get("pass").is_some()).count() as u64,
-            summary["planned"].as_u64().unwrap()
-        );
-        assert_each_once(&points(&out), summary["planned"].as_u64().unwrap());
-        let report = std::fs::read_to_string(out.join("report.html")).unwrap();
-        assert!(
-            report.matches("<svg").count() >= 4
-                && !report.contains("http-equiv")
-                && !report.contains("<script")
-        );
-        assert!(report.contains("at 27.5 kHz and 0.25 N"), "the load of the plan stands below the curve");
-        assert!(report.contains("the spring-slider alone"), "it is said which model is drawn");
-        let histogram = summary["loop_report"]["histogram"].as_array().unwrap();
-        let counted: u64 = histogram.iter().map(|b| b[1].as_u64().unwrap()).sum();
-        let of_loop = |name: &str| summary["loop_report"][name].as_u64().unwrap();
-        assert_eq!(counted, of_loop("cycles") + of_loop("overruns"), "the histogram holds every deadline");
-        // The record says the same, with setup, plan and the loop's report inside.
-        let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
-        assert!(record.integrity.complete(), "{:?}", record.integrity);
-        assert_eq!(
-            record.rows().count() as u64 + summary["record_lost"].as_u64().unwrap(),
-            of_loop("cycles")
-        );
-        assert!(
-            record.files.iter().any(|f| f.0 == "plan.toml") && record.files.iter().any(|f| f.0 == "rig.toml")
-        );
-        assert!(record.facts("muprime.end").unwrap()["loop"].contains("lateness_ns"));
-        let passes = record.passes().count();
-        assert_eq!(passes as u64, summary["planned"].as_u64().unwrap());
-        // And to an ordinary reader, which checks every checksum and finds its way by the index.
-        let script = "import sys; from mcap.reader import make_reader\n\
-                  with open(sys.argv[1], 'rb') as f:\n\
-                  \tr = make_reader(f, validate_crcs=True); s = r.get_summary()\n\
-                  \tprint(s.statistics.message_count, len(s.chunk_indexes) > 9, sum(1 for _ in r.iter_messages()))";
-        let counted = python().args(["-c", script]).arg(out.join("run-1.mcap")).output().unwrap();
-        let all = record.messages.len();
-        assert_eq!(texts(&counted).0.trim(), format!("{all} True {all}"), "{}", texts(&counted).1);
-    });
-}
+use std::process::Stdio;
+use tests::{SHORT, documents, file, muprime, served, short_plan, texts};
 
 #[test]
 fn in_virtual_time_equal_seeds_give_equal_bytes() {
@@ -138,112 +51,46 @@ fn the_story_of_the_readme_ends_with_a_model_that_agrees() {
     assert!(compared.starts_with("the runs differ"), "{compared}");
 }
 
+/// A sweep of more passes than a pipe holds, killed after the first, the eleventh and the fortieth that it tells of, then left alone: nothing
+/// that was acknowledged is lost, and no pass is made twice. It waits for its reader, so that each kill strikes it on its way.
 #[test]
-fn a_killed_sweep_resumes_without_a_lost_or_doubled_pass() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().join("run");
-        let plan = short_plan(folder.path());
-        let mut acknowledged = Vec::new();
-        let mut finished = false;
-        // Killed after one, three, five acknowledged passes, then left alone (and taken up again, should the machine stall).
-        let mut sessions = 0;
-        for kill_after in [1, 3, 5, usize::MAX, usize::MAX, usize::MAX] {
-            if finished {
-                break;
-            }
-            sessions += 1;
-            let mut child = started(&plan, &out);
-            let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-            let mut heard = 0;
-            for line in lines {
-                let document: serde_json::Value = serde_json::from_str(&line.unwrap()).unwrap();
-                if let Some(pass) = document.get("pass") {
-                    acknowledged.push(pass["pass"]["point"].as_u64().unwrap());
-                    heard += 1;
-                    if heard == kill_after {
-                        child.kill().unwrap();
-                    }
-                }
-                if let Some(summary) = document.get("summary") {
-                    finished = summary["outcome"] == "complete";
+fn a_sweep_that_is_killed_resumes_without_a_lost_or_doubled_pass() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (folder.path().join("plan.toml"), folder.path().join("run"));
+    let amplitudes: Vec<f64> = (1..=400).map(|n| 1e-8 * f64::from(n)).collect();
+    std::fs::write(&plan, served::plan("killed", 0, &amplitudes)).unwrap();
+    let start = || {
+        let mut sweep = muprime();
+        sweep.args(["--json", "run", "--fast", "--setup", "virtual-ideal"]).arg(&plan).arg("--out").arg(&out);
+        sweep.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
+    };
+    let mut acknowledged = BTreeSet::new();
+    let mut sessions = 0;
+    for kill_after in [1, 11, 40, usize::MAX] {
+        let mut child = start();
+        let (mut heard, mut complete) = (0, false);
+        for line in BufReader::new(child.stdout.take().unwrap()).lines() {
+            // The kill may cut the last line: then it acknowledged nothing.
+            let Ok(said) = serde_json::from_str::<serde_json::Value>(&line.unwrap()) else { continue };
+            complete |= said["summary"]["outcome"] == "complete";
+            if let Some(pass) = said.get("pass") {
+                acknowledged.insert(pass["pass"]["point"].as_u64().unwrap());
+                heard += 1;
+                if heard == kill_after {
+                    child.kill().unwrap();
                 }
             }
-            child.wait().unwrap();
-            for point in &acknowledged {
-                assert!(points(&out).contains(point), "point {point} was acknowledged and lost");
-            }
         }
-        assert!(finished);
-        assert_each_once(&points(&out), 22);
-        let records = rig::run_dir::records_in(&out).unwrap();
-        assert_eq!(records.len(), sessions);
-        for record in records {
-            let read = realtime::recorder::read(&std::fs::read(&record).unwrap());
-            assert!(read.facts("muprime.run").is_some() && read.rows().count() > 0, "{}", record.display());
-        }
-    });
-}
-
-#[test]
-fn a_killed_record_is_recovered_and_an_ordinary_reader_opens_it() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let plan = short_plan(folder.path());
-        let killed = |attempt: u32| {
-            let out = folder.path().join(format!("run-{attempt}"));
-            let mut child = started(&plan, &out);
-            let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
-            let third = lines.by_ref().filter(|l| l.as_ref().unwrap().contains("\"pass\"")).nth(2);
-            child.kill().unwrap();
-            child.wait().unwrap();
-            if third.is_none() {
-                eprintln!("attempt {attempt}: {}", cut_by_a_stall(&out).expect("three passes or a stall"));
-            }
-            third.map(|_| out)
-        };
-        let out = (1..=5).find_map(killed).expect("a machine that is not too busy for wall-clock time");
-        let record = out.join("run-1.mcap");
-        let before = realtime::recorder::read(&std::fs::read(&record).unwrap());
-        assert!(before.integrity.cut.is_some() && before.integrity.damaged_places == 0);
-        let recovered = muprime().args(["--json", "recover"]).arg(&record).output().unwrap();
-        assert_eq!(recovered.status.code(), Some(0), "{}", texts(&recovered).1);
-        assert_eq!(documents(&recovered)[0]["messages"], before.messages.len());
-        assert!(record.with_extension("mcap.original").exists());
-        let script = "import sys; from mcap.reader import make_reader\n\
-                  with open(sys.argv[1], 'rb') as f: print(sum(1 for _ in make_reader(f).iter_messages()))";
-        let counted = python().args(["-c", script]).arg(&record).output().unwrap();
-        assert_eq!(texts(&counted).0.trim(), before.messages.len().to_string(), "{}", texts(&counted).1);
-        let again = muprime().args(["--json", "recover"]).arg(&record).output().unwrap();
-        assert_eq!(documents(&again)[0]["whole"], true);
-    });
-}
-
-#[test]
-fn an_interrupt_stops_safely_and_keeps_what_was_measured() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().join("run");
-        let plan = short_plan(folder.path());
-        let mut child = started(&plan, &out);
-        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
-        lines.by_ref().find(|l| l.as_ref().unwrap().contains("\"pass\"")).unwrap().unwrap();
-        // SAFETY: sends SIGINT to the child that this test has started and not yet waited for.
-        unsafe { libc::kill(child.id() as libc::pid_t, libc::SIGINT) };
-        let rest: Vec<serde_json::Value> =
-            lines.map(|l| serde_json::from_str(&l.unwrap()).unwrap()).collect();
-        assert_eq!(
-            child.wait().unwrap().code(),
-            Some(1),
-            "stopped is not done: 'run && diagnose' must not go on"
-        );
-        assert_eq!(rest.last().unwrap()["summary"]["outcome"], "stopped");
-        assert!(!points(&out).is_empty());
-        let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
-        assert!(record.integrity.complete(), "the record was ended properly: {:?}", record.integrity);
-        let last = record.rows().last().unwrap();
-        assert!(!last.armed && last.drive_pp_m == 0.0 && last.load_n == 0.0 && last.velocity_m_s == 0.0);
-    });
+        child.wait().unwrap();
+        sessions += 1;
+        assert_eq!(complete, kill_after == usize::MAX, "session {sessions}");
+        let kept: Vec<u64> = runs::run_dir::passes_in(&out).unwrap().iter().map(|p| p.pass.point).collect();
+        let unique: BTreeSet<u64> = kept.iter().copied().collect();
+        assert_eq!(unique.len(), kept.len(), "session {sessions}: a pass is there twice");
+        assert!(acknowledged.is_subset(&unique), "session {sessions}: {acknowledged:?} {unique:?}");
+        assert!(!complete || unique == (0..800).collect(), "{unique:?}");
+    }
+    assert_eq!(runs::run_dir::records_in(&out).unwrap().len(), sessions);
 }
 
 /// What a trip means and what to do about it: on the terminal, in the summary and in the report.
@@ -251,7 +98,7 @@ fn an_interrupt_stops_safely_and_keeps_what_was_measured() {
 fn a_trip_is_told_with_its_unit_and_its_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let plan = short_plan(folder.path());
-    let ideal = rig::setup::Setup::load("virtual-ideal").unwrap().text;
+    let ideal = runs::setup::Setup::load("virtual-ideal").unwrap().text;
     // The load of the plan, and no more: its noise breaks the limit.
     let tight = ideal.replace("[limits]\n", "[limits]\nnormal_force_max_n = 0.25\n");
     let setup = folder.path().join("tight.toml");
@@ -278,32 +125,6 @@ fn a_trip_is_told_with_its_unit_and_its_remedy() {
     );
     let report = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(report.contains(remedy) && report.contains(" N against 0.25 N"), "{report}");
-}
-
-#[test]
-fn two_controllers_never_share_a_run() {
-    tests::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().join("run");
-        let plan = short_plan(folder.path());
-        let mut first = muprime()
-            .args(["run", &plan, "--setup", "virtual-ideal", "--out"])
-            .arg(&out)
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let waited = Instant::now();
-        while !out.join(".lock").exists() {
-            assert!(waited.elapsed() < Duration::from_secs(20));
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        let second =
-            muprime().args(["run", &plan, "--setup", "virtual-ideal", "--out"]).arg(&out).output().unwrap();
-        assert_eq!(second.status.code(), Some(2));
-        assert!(texts(&second).1.contains("another muprime"), "{}", texts(&second).1);
-        first.kill().unwrap();
-        first.wait().unwrap();
-    });
 }
 
 #[test]
@@ -338,7 +159,7 @@ fn bad_input_is_refused_with_its_place_and_nothing_is_touched() {
 #[test]
 fn everything_bundled_passes_its_own_check() {
     let mut files = Vec::new();
-    for folder in ["rig/plans", "rig/setups", "drivers/profiles"] {
+    for folder in ["runs/plans", "runs/setups", "drivers/profiles"] {
         let entries = std::fs::read_dir(file(folder)).unwrap();
         files.extend(
             entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "toml")),
@@ -348,96 +169,4 @@ fn everything_bundled_passes_its_own_check() {
     let output = muprime().args(["--json", "check"]).args(&files).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", texts(&output).0);
     assert_eq!(documents(&output).len(), files.len());
-}
-
-/// A program that ends with the test.
-struct Peer(Child);
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn first_line(mut command: std::process::Command) -> (Peer, String) {
-    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-    let mut line = String::new();
-    BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
-    assert!(!line.is_empty(), "the peer ended without a word");
-    (Peer(child), line.trim().to_string())
-}
-
-/// An instrument that nobody here wrote (pymodbus) replays a measured rock-friction trace; `muprime run` reads it, with
-/// amplifier and stage of the virtual rig. What the record holds must be what was replayed, with its age.
-#[test]
-fn a_foreign_instrument_replaying_a_measured_trace_is_recorded_as_it_was() {
-    tests::in_wall_clock_time(|| {
-        const ROWS_PER_SECOND: f64 = 100.0;
-        let folder = tempfile::tempdir().unwrap();
-        let recording = file("tests/recordings/rock-velocity-steps/velstep4_excerpt.txt");
-        let mut replay = python();
-        replay.arg(file("tests/peers/replay_server.py")).arg(&recording).arg(ROWS_PER_SECOND.to_string());
-        let (_replay, port) = first_line(replay);
-        let mut rest = muprime();
-        rest.args(["--json", "virtual-rig", "--setup", "virtual-ideal", "--modbus-tcp", "127.0.0.1:0"]);
-        let (_rest, said) = first_line(rest);
-        let said: serde_json::Value = serde_json::from_str(&said).unwrap();
-        let others = said["modbus_tcp"].as_str().unwrap();
-        let setup = folder.path().join("setup.toml");
-        let text = format!(
-            "name = \"replayed\"\n[[force]]\nprofile = \"muprime-force2\"\naddress = \"127.0.0.1:{port}\"\nrate_hz = 200\n\
-         [amplifier]\nprofile = \"muprime-amplifier\"\naddress = \"{others}\"\n\
-         [stage]\nprofile = \"muprime-stage\"\naddress = \"{others}\"\n\
-         [finger]\ntip = \"artificial-silicone\"\n[noise]\npass_relative_sd = 0.015\nforce_sd_n = 0.0008\n\
-         [limits]\nlink_stall_s = 0.045\nlate_cycles_max = 100\nlate_in_a_row_max = 45\n[loop]\nrate_hz = 250\n"
-        );
-        std::fs::write(&setup, text).unwrap();
-        let plan = folder.path().join("plan.toml");
-        let text =
-            SHORT.replace("seed = 7", "directions = [1]").replace("[0.5e-6, 1e-6, 2e-6, 3e-6]", "[0.0]");
-        std::fs::write(&plan, text.replace("reference_every = 4", "reference_every = 0")).unwrap();
-        let (out, output) = sweep_unless_the_machine_stalls(folder.path(), |out| {
-            let mut sweep = muprime();
-            sweep.args(["--json", "run"]).arg(&plan).arg("--setup").arg(&setup).arg("--out").arg(out);
-            sweep
-        });
-        assert_eq!(output.status.code(), Some(0), "{}{}", texts(&output).0, texts(&output).1);
-
-        let rows: Vec<Vec<f64>> = std::fs::read_to_string(&recording)
-            .unwrap()
-            .lines()
-            .skip(1)
-            .map(|line| line.split_whitespace().map(|x| x.parse().unwrap()).collect())
-            .collect();
-        let count = |newton: f64| (newton / 1e-5).round_ties_even() as i64;
-        let replayed = |row: usize| {
-            let normal = 0.25 * rows[row][3] / rows[0][3];
-            (count(rows[row][2] * normal), count(normal))
-        };
-        let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
-        let (mut distinct, mut oldest) = (std::collections::BTreeSet::new(), 0.0f64);
-        for row in record.rows() {
-            let (Ok(lateral), Ok(normal)) = (row.inputs.seen.forces.lateral, row.inputs.seen.forces.normal)
-            else {
-                continue;
-            };
-            let expected = replayed(lateral.sequence as usize);
-            assert_eq!((lateral.raw, normal.raw), expected, "row {}", lateral.sequence);
-            assert!((lateral.value - expected.0 as f64 * 1e-5).abs() < 1e-12);
-            assert!((normal.value - expected.1 as f64 * 1e-5).abs() < 1e-12);
-            distinct.insert(lateral.sequence);
-            oldest = oldest.max(lateral.age(row.now).seconds());
-        }
-        println!(
-            "{} samples of the trace recorded, none changed; greatest age {:.1} ms",
-            distinct.len(),
-            oldest * 1e3
-        );
-        assert!(distinct.len() > 50);
-        assert!(
-            oldest > 1.0 / ROWS_PER_SECOND * 0.5,
-            "a sample is held until the next one comes: its age must show"
-        );
-    });
 }

@@ -1,14 +1,14 @@
 //! The ratio k_l/k_n, which decides the law of friction, from a rig's own passes: how often its 95 % interval holds the truth, and how wide it is.
 
 use calibration::finger::springs::{Springs, springs};
+use models::pass::Pass;
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
-use models::record::Pass;
 use rayon::prelude::*;
-use rig::plan::Plan;
-use rig::sequence::Outcome;
-use rig::session::rehearse;
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::sequence::Outcome;
+use runs::session::rehearse;
+use runs::setup::Setup;
 use sim::finger::Finger;
 use sim::world::WorldConfig;
 use std::sync::Arc;

@@ -3,7 +3,7 @@ use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::{Report, diagnose};
-use models::record::Pass;
+use models::pass::Pass;
 use rayon::prelude::*;
 use sim::sealed::rough::{Roughness, rough};
 use std::f64::consts::PI;

@@ -3,8 +3,8 @@
 use effects::{Design, Need};
 use models::condition::Condition;
 use models::covariate::{self, Scale};
+use models::pass::Pass;
 use models::quantity::PeakToPeak;
-use models::record::Pass;
 pub use models::rig_file::RigFile;
 
 /// A table that the diagnosis refuses, and what would mend it.

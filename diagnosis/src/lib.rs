@@ -22,7 +22,7 @@
 //! docs/diagnosis/model.md states the whole model once. A small table in, a verdict out:
 //!
 //! ```
-//! use models::record::read_passes;
+//! use models::pass::read_passes;
 //! use muprime_diagnosis::{Verdict, data::{RigFile, Table}, hypotheses::Options, verdict::diagnose};
 //!
 //! // Twelve passes of a plate that stands still: friction of 0.5 N/N in both directions, repeatable to half a per cent.
@@ -39,10 +39,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod certificates;
 pub mod constants;
 pub mod data;
 pub mod decision;
 pub mod discrepancy;
+pub mod document;
 pub mod evidence;
 #[cfg(test)]
 mod example;

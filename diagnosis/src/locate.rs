@@ -133,19 +133,18 @@ fn region(
         });
     }
     let place = if words.is_empty() { "everywhere".to_string() } else { format!("at {}", words.join(", ")) };
-    let p = match p_value {
-        None => "no pass inside".to_string(),
+    let percent = 100.0 * share;
+    let text = match p_value {
+        // A share of what was measured would be one of nothing.
+        None => format!(
+            "nothing was measured {place}: the verdict's model alone puts {percent:.0} % of its gap there"
+        ),
         // The test's distribution is not known so far out: smaller ones are not told apart.
-        Some(p) if p < 1e-6 => "p < 1e-6".to_string(),
-        Some(p) if p < 0.01 => format!("p = {p:.1e}"),
-        Some(p) => format!("p = {p:.2}"),
+        Some(p) if p < 1e-6 => format!("{percent:.0} % of the gap lies {place} (p < 1e-6)"),
+        Some(p) if p < 0.01 => format!("{percent:.0} % of the gap lies {place} (p = {p:.1e})"),
+        Some(p) => format!("{percent:.0} % of the gap lies {place} (p = {p:.2})"),
     };
-    Region {
-        bounds: named,
-        share_of_gap: share,
-        p_value: p_value.unwrap_or(1.0),
-        text: format!("{:.0} % of the gap lies {place} ({p})", 100.0 * share),
-    }
+    Region { bounds: named, share_of_gap: share, p_value: p_value.unwrap_or(1.0), text }
 }
 
 /// Conditions of the same design: what can be set is drawn independently, from the table's levels or from between
@@ -185,4 +184,25 @@ fn conditions_between(passes: &[Condition], count: usize) -> Vec<Condition> {
             ..pick(uniform())
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A part of the operating space without a pass is no share of what was measured, and its text does not say so.
+    #[test]
+    fn a_share_of_the_gap_is_one_of_passes() {
+        let passes =
+            [1e-6, 4e-6].map(|w| Condition { amplitude: PeakToPeak::from_metres(w), ..Condition::paper() });
+        let amplitude = covariate::TOLD.iter().position(|c| c.name == "amplitude_pp_m").unwrap();
+        let bounds = BTreeMap::from([(amplitude, [2e-6, 3e-6])]);
+        let empty = region(&bounds, &passes, 0.08, None).text;
+        assert_eq!(
+            empty,
+            "nothing was measured at amplitude 2.000 to 3.000 um pp: the verdict's model alone puts 8 % of its gap there"
+        );
+        let seen = region(&bounds, &passes, 0.08, Some(0.002)).text;
+        assert_eq!(seen, "8 % of the gap lies at amplitude 2.000 to 3.000 um pp (p = 2.0e-3)");
+    }
 }

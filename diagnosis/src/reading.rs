@@ -1,4 +1,4 @@
-//! What a table says of the two readings of the paper's `w`: [`models::reading_evidence`] on the passes as they were measured.
+//! What a table says of `Psi*` and of the two readings of the paper's `w`: [`models::reading_evidence`] on the passes as measured.
 //!
 //! It stands beside the verdict and is no part of it: the baseline is the spring-slider, whatever the empirical law's scale is. A cause
 //! that the verdict names moves `Psi*` too, so what is told then is told of the passes as they are.
@@ -6,27 +6,22 @@
 use crate::Verdict;
 use crate::data::{RigFile, Table};
 use crate::scatter::Scatter;
-use models::quantity::PeakToPeak;
-use models::reading_evidence::{Decision, ReadingEvidence, ReadingFinding};
-use models::rig_file::PassNoise;
+use models::reading_evidence::{self, Decision, ReadingFinding};
+use models::rig_file::{CertifiedKey, PassNoise};
 
-/// The finding of a table: passes without vibration first, since they tell `mu_0`; suspects left out, with the scatter that the table
-/// has. `None` without a pass of each kind.
+/// The finding of a table: suspects left out, with the scatter that the table has and what certificates leave open of amplitude and
+/// speed. `None` without a pass with and one without vibration.
 pub fn of_table(table: &Table, rig: &RigFile, scatter: &Scatter) -> Option<ReadingFinding> {
     let noise = PassNoise {
         pass_relative_sd: rig.noise.pass_relative_sd * scatter.scale,
         force_sd_n: rig.noise.force_sd_n * scatter.scale,
     };
-    let mut evidence = ReadingEvidence::new(table.still_coefficient()?, rig.finger.poisson_ratio, noise);
     let suspect = |row: usize| scatter.suspects.iter().any(|s| s.row == row);
-    for still in [true, false] {
-        for (row, (c, lateral)) in table.passes.iter().zip(&table.lateral).enumerate() {
-            if (c.amplitude == PeakToPeak::ZERO) == still && !suspect(row) {
-                evidence.pass(c, c.direction.sign() * lateral);
-            }
-        }
-    }
-    evidence.finding()
+    let passes = table.passes.iter().zip(&table.lateral).enumerate().filter(|(row, _)| !suspect(*row));
+    let passes = passes.map(|(_, (c, lateral))| (*c, c.direction.sign() * lateral));
+    let gain = |key| rig.calibration.sd(key).unwrap_or(0.0);
+    let scale_sd = gain(CertifiedKey::AmplitudeGain).hypot(gain(CertifiedKey::SpeedGain));
+    reading_evidence::of_passes(passes, rig.finger.poisson_ratio, noise, scale_sd)
 }
 
 /// The remark of a finding; none where the passes tell too little.

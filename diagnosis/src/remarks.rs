@@ -4,6 +4,7 @@ use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
 use crate::hypotheses::{Fitted, Options, fit_believing};
 use crate::scatter::{Belief, Scatter};
+use crate::verdict::probability;
 use effects::known;
 use models::covariate::{AMPLITUDE, Role, SMOOTH};
 use models::quantity::PeakToPeak;
@@ -220,9 +221,9 @@ fn suspects(scatter: &Scatter, effects: &[String], verdict: Verdict, other: &Wit
         n => format!(" and {n} more"),
     };
     let with = if other.verdict == verdict && other.effects == effects {
-        format!("The verdict is the same with them (probability {:.2})", other.probability)
+        format!("The verdict is the same with them (probability {})", probability(other.probability))
     } else {
-        format!("With them it would be {} (probability {:.2})", other.words(), other.probability)
+        format!("With them it would be {} (probability {})", other.words(), probability(other.probability))
     };
     format!(
         "Suspect passes, which count for little: points {}{more}. {with}. Look them up in the record.",

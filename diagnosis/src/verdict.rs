@@ -212,6 +212,11 @@ fn label(fitted: &Fitted, candidate: usize) -> String {
     fitted.candidates[candidate].names().join("+")
 }
 
+/// A probability as it can be read: certainty is not claimed.
+pub fn probability(p: f64) -> String {
+    if p > 0.999 { "> 0.999".into() } else { format!("{p:.3}") }
+}
+
 fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
     let closed = gap.shrinkage.map_or_else(
         || match gap.before_rmse {
@@ -220,10 +225,15 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
         },
         |s| {
             let percent = 100.0 * s.abs();
+            // A share without its interval claims more than the passes can show.
+            let within = gap.shrinkage_ci95.map_or_else(String::new, |[low, high]| {
+                let [low, high] = if s < 0.0 { [-high, -low] } else { [low, high] };
+                format!(" (95 %: {:.0} to {:.0})", 100.0 * low, 100.0 * high)
+            });
             if s < 0.0 {
-                format!("on held-out passes it closes nothing: the gap grows by {percent:.0} %")
+                format!("on held-out passes it closes nothing: the gap grows by {percent:.0} %{within}")
             } else {
-                format!("the gap shrinks by {percent:.0} % on held-out passes")
+                format!("the gap shrinks by {percent:.0} %{within} on held-out passes")
             }
         },
     );
@@ -231,9 +241,9 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
     match decision.verdict {
         Verdict::NoGap => "The recalibrated baseline explains the table: no gap.".to_string(),
         Verdict::Named => format!(
-            "{} causes most of the gap (probability {:.2}); {closed}.",
+            "{} causes most of the gap (probability {}); {closed}.",
             label(fitted, leader),
-            decision.probabilities[leader]
+            probability(decision.probabilities[leader])
         ),
         Verdict::Ambiguous if decision.class.len() == 1 => {
             let name = label(fitted, leader);
@@ -243,10 +253,8 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
                     cause.words()
                 )
             } else {
-                let probability = decision.probabilities[leader];
-                format!(
-                    "{name} leads with a probability of {probability:.2}, too little to be named; {closed}."
-                )
+                let probability = probability(decision.probabilities[leader]);
+                format!("{name} leads with a probability of {probability}, too little to be named; {closed}.")
             }
         }
         Verdict::Ambiguous => {

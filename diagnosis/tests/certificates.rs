@@ -1,7 +1,7 @@
 //! What a certificate leaves open bounds the prior of what it certifies, and nothing else.
 use models::condition::Condition;
+use models::pass::Pass;
 use models::quantity::{Direction, PeakToPeak};
-use models::record::Pass;
 use models::rig_file::{CertifiedKey, RigFile};
 use muprime_diagnosis::data::Table;
 use muprime_diagnosis::fit::{Member, Problem};

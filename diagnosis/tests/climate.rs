@@ -1,7 +1,7 @@
 //! A cause that goes with temperature, and that no effect of the library is, shows as such in the open set.
 use models::condition::Condition;
+use models::pass::Pass;
 use models::quantity::{Direction, PeakToPeak};
-use models::record::Pass;
 use models::rig_file::RigFile;
 use muprime_diagnosis::data::Table;
 use muprime_diagnosis::decision::Verdict;

@@ -20,6 +20,7 @@ const PROFILES: &[(&str, &str)] = &[
     ("robotiq-ft300", include_str!("../profiles/robotiq-ft300.toml")),
     ("robotiq-ft300-stream", include_str!("../profiles/robotiq-ft300-stream.toml")),
     ("siglent-sdg", include_str!("../profiles/siglent-sdg.toml")),
+    ("wago-750-watchdog", include_str!("../profiles/wago-750-watchdog.toml")),
     ("zaber-x-lsm", include_str!("../profiles/zaber-x-lsm.toml")),
 ];
 

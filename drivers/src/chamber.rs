@@ -9,11 +9,13 @@ use super::modbus_tcp::{Tcp, resolve};
 use instruments::profile::FrameKind;
 use instruments::schema::{LinkKind, Role};
 use instruments::{FrameId, Profile};
+use realtime::clock::Clock;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use tokio::runtime::Runtime;
 
 /// Names of signals and set-points: pressure (Pa), temperature (deg C), relative humidity (%).
 pub const QUANTITIES: [&str; 3] = ["pressure", "temperature", "humidity"];
@@ -50,7 +52,7 @@ pub struct Chamber {
 /// Why not, in words.
 pub fn serves(profile: &Profile) -> Result<(), String> {
     let id = profile.id();
-    if !profile.has_role(Role::AmbientChamber) {
+    if !profile.description.profile.roles.contains(&Role::AmbientChamber) {
         return Err(format!("profile `{id}` is no chamber's: its roles lack `ambient.chamber`"));
     }
     if profile.description.link.kind != LinkKind::ModbusTcp {
@@ -84,11 +86,16 @@ impl Chamber {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         let runtime = runtime.map_err(|error| at(error.to_string()))?;
         let shared = Arc::new(Mutex::new(Shared::default()));
-        let air = talk.connect(&runtime).and_then(|mut wire| talk.look(&mut wire, &[None; 3])).map_err(at)?;
+        // An outage of the air's line only ages its readings: the time that its answers may take is never held.
+        let clock = Clock::from(Instant::now());
+        let air = talk
+            .connect((&runtime, &clock))
+            .and_then(|mut wire| talk.look(&mut wire, &[None; 3]))
+            .map_err(at)?;
         lock(&shared).air = air;
         let stop = Arc::new(AtomicBool::new(false));
         let (theirs, ends) = (Arc::clone(&shared), Arc::clone(&stop));
-        let work = move || talk.go_on(&runtime, &theirs, &ends);
+        let work = move || talk.go_on((&runtime, &clock), &theirs, &ends);
         let thread = std::thread::Builder::new().name("chamber".into()).spawn(work);
         Ok(Self { shared, stop, thread: Some(thread.map_err(|error| at(error.to_string()))?) })
     }
@@ -130,12 +137,12 @@ struct Talk {
 }
 
 impl Talk {
-    fn connect<'a>(&self, runtime: &'a tokio::runtime::Runtime) -> Result<Tcp<'a>, String> {
+    fn connect<'a>(&self, runtime: (&'a Runtime, &'a Clock)) -> Result<Tcp<'a>, String> {
         Tcp::connect(runtime, self.address, self.unit, self.connect_ms, self.answer_ms)
             .map_err(|e| e.to_string())
     }
 
-    fn go_on(&mut self, runtime: &tokio::runtime::Runtime, shared: &Mutex<Shared>, ends: &AtomicBool) {
+    fn go_on(&mut self, runtime: (&Runtime, &Clock), shared: &Mutex<Shared>, ends: &AtomicBool) {
         let mut wire = None;
         while !ends.load(Ordering::Acquire) {
             let set = lock(shared).set;

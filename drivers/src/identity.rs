@@ -7,28 +7,33 @@ use instruments::schema::LinkKind;
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 
-/// The identities of all instruments of a setup that exist outside this process. An instrument has one by its address and, where
-/// the setup names its serial number, one by that.
+/// The identities of all instruments of a setup that exist outside this process: each by its place and, where the setup names it, by
+/// its serial number. What drives or moves is claimed with all that answers at its socket: many devices do not look at the unit
+/// of a request, and would be driven twice under two units.
 ///
 /// # Errors
 /// A profile that does not exist, or an address that stands for nothing.
 pub fn identities(setup: &InstrumentsSetup) -> Result<BTreeSet<String>, OpenError> {
     let mut all = BTreeSet::new();
-    for instrument in setup.all() {
+    for instrument in [&setup.amplifier, &setup.stage].into_iter().chain(&setup.supply_relay) {
+        all.extend(every(instrument)?);
+    }
+    for instrument in setup.force.iter().chain(&setup.safety_inputs) {
         all.extend(place(instrument)?);
         all.extend(by_serial(instrument));
     }
     Ok(all)
 }
 
-/// The identity of one instrument: by its serial number where the setup names it, else by its address. `None` where it exists
-/// within this process only.
+/// Every identity of one instrument that drives or moves: its place, the socket that it answers at, and its serial number where the
+/// setup names it. None where it exists within this process only.
 ///
 /// # Errors
 /// A profile that does not exist, or an address that stands for nothing.
-pub fn identity(instrument: &InstrumentSetup) -> Result<Option<String>, OpenError> {
-    let place = place(instrument)?;
-    Ok(place.map(|place| by_serial(instrument).unwrap_or(place)))
+pub fn every(instrument: &InstrumentSetup) -> Result<BTreeSet<String>, OpenError> {
+    let Some(place) = place(instrument)? else { return Ok(BTreeSet::new()) };
+    let socket = place.split_once("/unit ").map(|(socket, _)| socket.to_string());
+    Ok(socket.into_iter().chain(by_serial(instrument)).chain([place]).collect())
 }
 
 fn by_serial(instrument: &InstrumentSetup) -> Option<String> {
@@ -115,6 +120,30 @@ mod tests {
         assert_ne!(of("muprime-amplifier", "127.0.0.1"), of("muprime-stage", "127.0.0.1"), "two units");
         let served = |address: &str| of("piezodrive-pdus210", address).unwrap();
         assert_eq!(served("tcp:127.0.0.1:4001"), served("tcp:localhost:4001"), "behind a device server");
+    }
+
+    /// A device that does not look at the unit is one device, whatever unit a setup names.
+    #[test]
+    fn what_drives_has_its_socket_to_itself_and_a_serial_number_hides_no_place() {
+        let amplifier = |unit: u8, serial: Option<&str>| {
+            let mut one = InstrumentSetup::new("muprime-amplifier", "10.0.0.7");
+            (one.unit, one.serial) = (Some(unit), serial.map(String::from));
+            every(&one).unwrap()
+        };
+        assert!(!amplifier(2, None).is_disjoint(&amplifier(7, None)));
+        assert!(!amplifier(2, None).is_disjoint(&amplifier(2, Some("a"))));
+        assert!(!amplifier(2, Some("b")).is_disjoint(&amplifier(2, Some("a"))));
+        let rig = |unit: u8| {
+            let at = |profile| InstrumentSetup::new(profile, "10.0.0.7");
+            let mut setup = InstrumentsSetup::new(
+                vec![at("muprime-force2")],
+                at("muprime-amplifier"),
+                at("muprime-stage"),
+            );
+            setup.amplifier.unit = Some(unit);
+            identities(&setup).unwrap()
+        };
+        assert!(rig(2).contains("tcp/10.0.0.7:1502") && !rig(2).is_disjoint(&rig(7)));
     }
 
     #[test]

@@ -76,10 +76,15 @@ pub mod modbus_rtu;
 pub mod modbus_tcp;
 pub mod off;
 pub mod ports;
+pub mod remedy;
 pub mod serial;
 pub mod session;
 pub mod setup;
 pub mod slcan;
+#[cfg(all(feature = "can", target_os = "linux"))]
+pub mod socketcan;
+#[cfg(not(all(feature = "can", target_os = "linux")))]
+#[path = "without_can.rs"]
 pub mod socketcan;
 pub mod stream;
 pub mod text;
@@ -95,12 +100,12 @@ pub use setup::{AxisSetup, InstrumentSetup, InstrumentsSetup};
 use endpoint::Endpoint;
 use instruments::Profile;
 use instruments::schema::LinkKind;
+use realtime::clock::Clock;
 use realtime::ports::{Absent, Amplifier, ForceSensor, SafetyInputs, Stage, SupplySwitch};
 use session::Session;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::Instant;
 
 /// The ports of a rig, connected.
 pub struct Rig {
@@ -220,6 +225,7 @@ pub struct LinkEnd {
 pub struct Links {
     stop: Arc<AtomicBool>,
     links: Vec<Link>,
+    clock: Clock,
 }
 
 struct Link {
@@ -230,8 +236,14 @@ struct Link {
 }
 
 impl Links {
-    fn none() -> Self {
-        Self { stop: Arc::new(AtomicBool::new(false)), links: Vec::new() }
+    fn none(clock: Clock) -> Self {
+        Self { stop: Arc::new(AtomicBool::new(false)), links: Vec::new(), clock }
+    }
+
+    /// The time that they stamp with.
+    #[must_use]
+    pub const fn clock(&self) -> &Clock {
+        &self.clock
     }
 
     /// Each instrument's name and counters.
@@ -266,30 +278,32 @@ impl Drop for Links {
 }
 
 /// Connects every instrument of a setup. Returns once each has answered with its signature and a
-/// first sample.
+/// first sample. A clock that can be held may be from now on, if this process serves every instrument itself.
 ///
 /// # Errors
 /// The first instrument that is unknown, does not fit the setup, does not answer, or is another
 /// than the profile says. Nothing was commanded then.
-pub fn open(setup: &InstrumentsSetup, epoch: Instant) -> Result<Rig, OpenError> {
-    let mut links = Links::none();
+pub fn open(setup: &InstrumentsSetup, clock: impl Into<Clock>) -> Result<Rig, OpenError> {
+    let clock = &clock.into();
+    clock.hold_for(setup.all().map(|instrument| instrument.address.as_str()));
+    let mut links = Links::none(clock.clone());
     let mut force = Vec::new();
     for instrument in &setup.force {
         let (endpoint, port) = Endpoint::force(instrument.description()?, instrument)
             .map_err(|problem| mismatch(instrument, problem))?;
-        start(&mut links, instrument, endpoint, epoch)?;
+        start(&mut links, instrument, endpoint, clock)?;
         force.push(port);
     }
     let force = ports::compose(force).map_err(|problem| mismatch(&setup.force[0], problem))?;
 
     let (endpoint, amplifier) = Endpoint::amplifier(setup.amplifier.description()?, &setup.amplifier)
         .map_err(|problem| mismatch(&setup.amplifier, problem))?;
-    start(&mut links, &setup.amplifier, endpoint, epoch)?;
+    start(&mut links, &setup.amplifier, endpoint, clock)?;
 
     let (endpoint, stage) = Endpoint::stage(setup.stage.description()?, &setup.stage)
         .map_err(|problem| mismatch(&setup.stage, problem))?;
-    start(&mut links, &setup.stage, endpoint, epoch)?;
-    let (supply, contacts) = open_safety(setup, &mut links, epoch)?;
+    start(&mut links, &setup.stage, endpoint, clock)?;
+    let (supply, contacts) = open_safety(setup, &mut links, clock)?;
     Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), supply, contacts, links })
 }
 
@@ -297,20 +311,20 @@ pub fn open(setup: &InstrumentsSetup, epoch: Instant) -> Result<Rig, OpenError> 
 fn open_safety(
     setup: &InstrumentsSetup,
     links: &mut Links,
-    epoch: Instant,
+    clock: &Clock,
 ) -> Result<(Box<dyn SupplySwitch>, Box<dyn SafetyInputs>), OpenError> {
     let mut supply: Box<dyn SupplySwitch> = Box::new(Absent);
     let mut contacts: Box<dyn SafetyInputs> = Box::new(Absent);
     if let Some(instrument) = &setup.supply_relay {
         let (endpoint, port) =
             Endpoint::supply(instrument.description()?).map_err(|problem| mismatch(instrument, problem))?;
-        start(links, instrument, endpoint, epoch)?;
+        start(links, instrument, endpoint, clock)?;
         supply = Box::new(port);
     }
     if let Some(instrument) = &setup.safety_inputs {
         let (endpoint, port) = Endpoint::contacts(instrument.description()?, instrument)
             .map_err(|problem| mismatch(instrument, problem))?;
-        start(links, instrument, endpoint, epoch)?;
+        start(links, instrument, endpoint, clock)?;
         contacts = Box::new(port);
     }
     Ok((supply, contacts))
@@ -342,10 +356,11 @@ fn mismatch(instrument: &InstrumentSetup, problem: String) -> OpenError {
 pub fn open_one(
     instrument: &InstrumentSetup,
     endpoint: Endpoint,
-    epoch: Instant,
+    clock: impl Into<Clock>,
 ) -> Result<Links, OpenError> {
-    let mut links = Links::none();
-    start(&mut links, instrument, endpoint, epoch)?;
+    let mut links = Links::none(clock.into());
+    let clock = &links.clock.clone();
+    start(&mut links, instrument, endpoint, clock)?;
     Ok(links)
 }
 
@@ -354,11 +369,11 @@ fn start(
     links: &mut Links,
     instrument: &InstrumentSetup,
     endpoint: Endpoint,
-    epoch: Instant,
+    clock: &Clock,
 ) -> Result<(), OpenError> {
     let (health, role) = (endpoint.health(), endpoint.role());
     let (ready, opened) = std::sync::mpsc::sync_channel(1);
-    let session = Session::new(endpoint, epoch, Arc::clone(&links.stop), ready);
+    let session = Session::new(endpoint, clock.clone(), Arc::clone(&links.stop), ready);
     let failed = |problem: String| OpenError::Link {
         id: instrument.profile.clone(),
         address: instrument.address.clone(),

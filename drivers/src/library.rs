@@ -41,7 +41,9 @@ impl Source {
             let path = folder.join(&name);
             let found = match bundled::file(&name) {
                 Some(text) if !path.exists() => text.to_string(),
-                _ => text_of(&path).map_err(|problem| OpenError::Unreadable { file: path, problem })?,
+                _ => {
+                    foreign_text_of(&path).map_err(|problem| OpenError::Unreadable { file: path, problem })?
+                }
             };
             kept.push((name, found));
         }
@@ -148,6 +150,15 @@ impl Library {
 
 /// Text of an ordinary file of a sensible size.
 fn text_of(path: &Path) -> Result<String, String> {
+    String::from_utf8(bytes_of(path)?).map_err(|error| format!("it is not UTF-8: {error}"))
+}
+
+/// Text that another program wrote, in whatever encoding.
+fn foreign_text_of(path: &Path) -> Result<String, String> {
+    instruments::codec::encoding::decoded(&bytes_of(path)?)
+}
+
+fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
     if !std::fs::metadata(path).map_err(|error| error.to_string())?.is_file() {
         return Err("it is no ordinary file".into());
     }
@@ -157,7 +168,7 @@ fn text_of(path: &Path) -> Result<String, String> {
     if bytes.len() as u64 > MAX_BYTES {
         return Err(format!("it has more than {MAX_BYTES} bytes"));
     }
-    String::from_utf8(bytes).map_err(|error| format!("it is not UTF-8: {error}"))
+    Ok(bytes)
 }
 
 #[cfg(test)]

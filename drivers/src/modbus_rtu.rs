@@ -105,7 +105,14 @@ impl Rtu {
             loop {
                 let count = line.read(&mut buffer, deadline)?;
                 if count == 0 {
-                    return Err(Ended::Timeout(answer_ms));
+                    return Err(match answer.len() {
+                        0 => Ended::Timeout(answer_ms),
+                        n => Ended::Cut(format!(
+                            "{n} bytes came in place of {}: {}: are baud and format right, and `unit` one of its own?",
+                            request.answer_length,
+                            super::remedy::shown(&answer)
+                        )),
+                    });
                 }
                 answer.extend_from_slice(&buffer[..count]);
                 // The length is known from the request, however the bytes come.
@@ -122,7 +129,7 @@ impl Rtu {
     /// Judges an answer; after a bad one the line is drained, so that its rest is no next answer.
     fn judged<T>(&mut self, judged: Result<T, RtuError>) -> Result<T, Trouble> {
         judged.map_err(|error| match error {
-            RtuError::Exception(code) => Trouble::Refused(format!("exception {code}")),
+            RtuError::Exception(code) => Trouble::Refused(super::remedy::exception(code)),
             other => {
                 let quiet = Duration::from_millis(u64::from(self.quiet_ms));
                 match self.line.with(|line| line.drain(quiet, 10 * quiet)) {

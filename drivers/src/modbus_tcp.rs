@@ -11,6 +11,8 @@ use super::session::{Ended, Session};
 use super::setup::InstrumentSetup;
 use super::trace::Traced;
 use instruments::schema::Table;
+use realtime::clock::Clock;
+use realtime::ports::Nanos;
 use std::future::Future;
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::thread::JoinHandle;
@@ -18,6 +20,9 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 use tokio_modbus::client::{Context, Reader, Writer, tcp};
 use tokio_modbus::prelude::Slave;
+
+/// Whoever waits for an answer looks at the clock so often.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
 
 /// Starts the thread of one instrument.
 ///
@@ -34,7 +39,8 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         .build()
         .map_err(|error| error.to_string())?;
     session.spawn(move |session| {
-        let mut wire = Tcp::connect(&runtime, address, unit, connect_ms, answer_ms)?;
+        let clock = session.clock.clock().clone();
+        let mut wire = Tcp::connect((&runtime, &clock), address, unit, connect_ms, answer_ms)?;
         let health = session.endpoint.health();
         health.count(&health.connections);
         Conversation::begin(session, &mut wire)?.go_on(session, &mut wire, rate_hz)
@@ -56,17 +62,30 @@ pub fn resolve(address: &str, port: Option<u16>) -> Result<SocketAddr, String> {
     found.next().ok_or_else(|| format!("`{address}` stands for no address"))
 }
 
-/// Runs one request against its deadline.
-fn within<T>(runtime: &Runtime, limit_ms: u32, request: impl Future<Output = T>) -> Result<T, Ended> {
-    let limit = Duration::from_millis(u64::from(limit_ms));
-    runtime
-        .block_on(async { tokio::time::timeout(limit, request).await })
-        .map_err(|_| Ended::Timeout(limit_ms))
+/// Runs one request against its deadline. While the clock is held the deadline does not come nearer.
+fn within<T>(
+    (runtime, clock): (&Runtime, &Clock),
+    limit_ms: u32,
+    request: impl Future<Output = T>,
+) -> Result<T, Ended> {
+    let deadline = clock.now().plus(Nanos(u64::from(limit_ms) * 1_000_000));
+    runtime.block_on(async {
+        let mut request = std::pin::pin!(request);
+        loop {
+            let left = Duration::from_nanos(deadline.since(clock.now()).0).min(LOOK_EVERY);
+            if let Ok(answer) = tokio::time::timeout(left, request.as_mut()).await {
+                return Ok(answer);
+            }
+            if deadline <= clock.now() {
+                return Err(Ended::Timeout(limit_ms));
+            }
+        }
+    })
 }
 
 /// A connection whose every request has a deadline. After any error it must be dropped.
 pub struct Tcp<'a> {
-    runtime: &'a Runtime,
+    runtime: (&'a Runtime, &'a Clock),
     context: Context,
     answer_ms: u32,
 }
@@ -77,7 +96,7 @@ impl<'a> Tcp<'a> {
     /// # Errors
     /// Nobody there, or not in time.
     pub fn connect(
-        runtime: &'a Runtime,
+        runtime: (&'a Runtime, &'a Clock),
         address: SocketAddr,
         unit: u8,
         connect_ms: u32,
@@ -130,12 +149,44 @@ impl<'a> Tcp<'a> {
     }
 }
 
+/// What is wrong with an answer whose head does not fit its question, in words.
+fn mismatch(error: &tokio_modbus::Error) -> String {
+    use tokio_modbus::{Error, ProtocolError};
+    match error {
+        Error::Protocol(ProtocolError::HeaderMismatch { message, .. }) => {
+            let number = |half: &str, name: &str| -> Option<u32> {
+                let rest = half.split_once(&format!("{name}: "))?.1;
+                rest.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
+            };
+            let (asked, came) = message.split_once("actual").unwrap_or((message, ""));
+            let both = |name: &str| Some((number(asked, name)?, number(came, name)?));
+            match (both("unit_id"), both("transaction_id")) {
+                (Some((asked, came)), _) if asked != came => format!(
+                    "another unit answers, {came} in place of {asked}: set `unit` to the one that is meant (255 or 0 for a device \
+                     without a gateway)"
+                ),
+                (_, Some((asked, came))) if asked != came => format!(
+                    "an answer carries transaction {came} in place of {asked}: a gateway that does not number as Modbus TCP does is reached \
+                     as RTU over TCP (address tcp:HOST:PORT with a profile of kind modbus_rtu)"
+                ),
+                _ => "an answer carries another head than its question".into(),
+            }
+        }
+        Error::Protocol(ProtocolError::FunctionCodeMismatch { request, .. }) => {
+            format!(
+                "another function than {request} was answered: the transaction is another program's, or the device mixes them up"
+            )
+        }
+        other => other.to_string(),
+    }
+}
+
 /// Parts what tokio-modbus parts: an exception of the instrument, and trouble on the way.
 fn part<T>(answer: Result<tokio_modbus::Result<T>, Ended>) -> Result<T, Trouble> {
     match answer {
         Ok(Ok(Ok(value))) => Ok(value),
-        Ok(Ok(Err(exception))) => Err(Trouble::Refused(exception.to_string())),
-        Ok(Err(error)) => Err(Trouble::Ended(Ended::Io(error.to_string()))),
+        Ok(Ok(Err(exception))) => Err(Trouble::Refused(super::remedy::exception(exception.into()))),
+        Ok(Err(error)) => Err(Trouble::Ended(Ended::Io(mismatch(&error)))),
         Err(ended) => Err(Trouble::Ended(ended)),
     }
 }

@@ -2,6 +2,7 @@
 
 use super::endpoint::{BadFrame, Endpoint};
 use super::off::{Closed, OFF_WITHIN};
+use realtime::clock::{Clock, Participant};
 use realtime::ports::{Nanos, NoData};
 use std::convert::Infallible;
 use std::panic::AssertUnwindSafe;
@@ -9,10 +10,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A thread looks at least this often whether it is to stop.
 pub const LONGEST_SLEEP: Duration = Duration::from_millis(20);
+
+/// How far a held clock may pass the time at which a driver's thread was to look at it again: a turn of
+/// requests and answers on a machine with time to spare.
+const SLACK: Nanos = Nanos(2_000_000);
 
 /// So many bad answers in a row end a connection.
 pub const BAD_IN_A_ROW: u32 = 3;
@@ -26,6 +31,9 @@ pub enum Ended {
     /// A deadline passed.
     #[error("no answer within {0} ms")]
     Timeout(u32),
+    /// A deadline passed in the midst of an answer: what came of it, and the likely cause.
+    #[error("{0}")]
+    Cut(String),
     /// The line itself failed.
     #[error("{0}")]
     Io(String),
@@ -84,14 +92,14 @@ impl Periodic {
 pub struct Session {
     /// Frames to samples, commands to set-points.
     pub endpoint: Endpoint,
-    /// The moment that the loop calls zero.
-    pub epoch: Instant,
+    /// Time from the moment that the loop calls zero.
+    pub clock: Participant,
     /// Set when the thread is to send the safe set-points and end.
     pub stop: Arc<AtomicBool>,
     /// Takes the outcome of the first connection, once.
     pub ready: Option<SyncSender<Result<(), String>>>,
     /// When the thread is to be done with switching off; known from the moment that it sees `stop`.
-    off_by: Option<Instant>,
+    off_by: Option<Nanos>,
 }
 
 impl Session {
@@ -99,11 +107,11 @@ impl Session {
     #[must_use]
     pub fn new(
         endpoint: Endpoint,
-        epoch: Instant,
+        clock: impl Into<Clock>,
         stop: Arc<AtomicBool>,
         ready: SyncSender<Result<(), String>>,
     ) -> Self {
-        Self { endpoint, epoch, stop, ready: Some(ready), off_by: None }
+        Self { endpoint, clock: clock.into().join(SLACK), stop, ready: Some(ready), off_by: None }
     }
 
     /// Whether no connection has given a sample yet: nothing was commanded then, and nothing may be.
@@ -114,13 +122,14 @@ impl Session {
 
     /// Whether the time for switching off is over. It runs from the first time that this is asked.
     pub fn off_time_over(&mut self) -> bool {
-        Instant::now() >= *self.off_by.get_or_insert_with(|| Instant::now() + OFF_WITHIN)
+        let now = self.now();
+        now >= *self.off_by.get_or_insert(now.plus(Nanos(OFF_WITHIN.as_nanos() as u64)))
     }
 
     /// Nanoseconds since the epoch.
     #[must_use]
     pub fn now(&self) -> Nanos {
-        Nanos(u64::try_from(self.epoch.elapsed().as_nanos()).unwrap_or(u64::MAX))
+        self.clock.now()
     }
 
     /// Tells whoever opened the rig how the first connection went. Returns whether it was the first.
@@ -139,8 +148,8 @@ impl Session {
 
     /// Sleeps until `due`, but never long.
     pub fn sleep_until(&self, due: Option<Nanos>) {
-        let pause = due.map_or(LONGEST_SLEEP, |due| Duration::from_nanos(due.since(self.now()).0));
-        std::thread::sleep(pause.min(LONGEST_SLEEP));
+        let latest = self.now().plus(Nanos(LONGEST_SLEEP.as_nanos() as u64));
+        self.clock.sleep_until(due.map_or(latest, |due| due.min(latest)));
     }
 
     /// Starts the thread, which converses again and again until it is told to stop and the instrument is off.
@@ -176,7 +185,7 @@ impl Session {
                     self.closed("stopped before a state came".into())
                 };
             }
-            if matches!(ended, Ended::Timeout(_)) {
+            if matches!(ended, Ended::Timeout(_) | Ended::Cut(_)) {
                 health.count(&health.timeouts);
             }
             last_words = ended.to_string();

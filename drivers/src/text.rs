@@ -8,6 +8,7 @@
 
 use super::endpoint::Due;
 use super::off::{self, Closed, OFF_ANSWER_MS, OffWay};
+use super::remedy;
 use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
 use super::setup::InstrumentSetup;
 use super::way::{Place, Way};
@@ -80,6 +81,8 @@ struct Talk {
     link: Link,
     came: Vec<u8>,
     asked_at: Instant,
+    /// The line that was sent last.
+    asked: String,
     sent: HashMap<SetId, (String, Instant)>,
     newest: HashMap<SetId, f64>,
     alarms: Vec<Alarm>,
@@ -98,6 +101,7 @@ impl Talk {
             link,
             came: Vec::new(),
             asked_at: Instant::now(),
+            asked: String::new(),
             sent: HashMap::new(),
             newest: HashMap::new(),
             alarms,
@@ -124,6 +128,7 @@ impl Talk {
         let end = self.link.tx_terminator.clone().unwrap_or_else(|| "\n".into());
         self.way.write(format!("{line}{end}").as_bytes())?;
         self.asked_at = Instant::now();
+        line.clone_into(&mut self.asked);
         Ok(())
     }
 
@@ -179,7 +184,10 @@ impl Talk {
                 return Err(Ended::Corrupt("a line without an end".into()));
             }
             if !self.take(deadline)? && Instant::now() >= deadline {
-                return Err(Ended::Timeout(self.patience_ms));
+                return Err(match self.came.is_empty() {
+                    true => Ended::Timeout(self.patience_ms),
+                    false => Ended::Cut(remedy::unended(&self.came, &end, &self.asked)),
+                });
             }
         }
     }
@@ -192,7 +200,13 @@ impl Talk {
             self.unasked(session);
             if self.came.len() < length {
                 if !self.take(deadline)? && Instant::now() >= deadline {
-                    return Err(Ended::Timeout(self.patience_ms));
+                    return Err(match self.came.len() {
+                        0 => Ended::Timeout(self.patience_ms),
+                        n => Ended::Cut(format!(
+                            "{n} bytes came in place of {length}: {}",
+                            remedy::shown(&self.came)
+                        )),
+                    });
                 }
             } else if !self.take(Instant::now() + AFTER_A_BLOCK)? {
                 let block = std::mem::take(&mut self.came);
@@ -303,7 +317,11 @@ impl Talk {
                 let line = self.line(session)?;
                 match session.endpoint.profile().frames()[frame.0].read_line(&line) {
                     Some(numbers) => numbers,
-                    None => return self.bear(session, format!("`{}` was answered by `{line}`", query.send)),
+                    None => {
+                        let echo = if line == query.send { ": switch the instrument's echo off" } else { "" };
+                        return self
+                            .bear(session, format!("`{}` was answered by `{line}`{echo}", query.send));
+                    }
                 }
             }
         };
@@ -395,7 +413,7 @@ impl OffWay for Talk {
             // An answer that stays away is not waited for twice, and keeps nothing from being sent.
             all &= match self.set(session, one) {
                 Ok(taken) => taken,
-                Err(Ended::Timeout(_) | Ended::Corrupt(_)) => false,
+                Err(Ended::Timeout(_) | Ended::Cut(_) | Ended::Corrupt(_)) => false,
                 Err(ended) => return Err(ended),
             };
         }

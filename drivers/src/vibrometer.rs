@@ -127,7 +127,7 @@ pub fn settings(setup: &VibrometerSetup) -> Result<Settings, String> {
         match talk.ask(&choice.ask.replace("{which}", &number.to_string())) {
             Ok(name) if is_name(&name) => decoders.push(name),
             // The end of the list: silence, or words that are no name.
-            Ok(_) | Err(Ended::Timeout(_)) => break,
+            Ok(_) | Err(Ended::Timeout(_) | Ended::Cut(_)) => break,
             Err(error) => return Err(told(error)),
         }
     }
@@ -204,7 +204,10 @@ impl Talk {
             let count = self.line.read(&mut buffer, deadline)?;
             self.came.extend_from_slice(&buffer[..count]);
             if count == 0 && Instant::now() >= deadline {
-                return Err(Ended::Timeout(self.link.response_timeout_ms));
+                return Err(match self.came.is_empty() {
+                    true => Ended::Timeout(self.link.response_timeout_ms),
+                    false => Ended::Cut(super::remedy::unended(&self.came, &came, question)),
+                });
             }
         }
     }

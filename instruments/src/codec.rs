@@ -7,6 +7,7 @@
 //! | [`can`] | CAN frames, and the lines of serial CAN adapters |
 //! | [`canopen`] | NMT, SDO, heartbeat, emergency, and the states of CiA 402 |
 //! | [`eds`] | CANopen objects by an electronic data sheet |
+//! | [`encoding`] | texts of other programs, whatever their encoding |
 //! | [`dbc`] | signals of CAN messages by a DBC file |
 //! | [`pattern`] | lines of text with numbers in them |
 //! | [`text`] | answers that are lines of text |
@@ -17,6 +18,7 @@ pub mod canopen;
 pub mod checksum;
 pub mod dbc;
 pub mod eds;
+pub mod encoding;
 pub mod modbus_rtu;
 pub mod pattern;
 pub mod stream;

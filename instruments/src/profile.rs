@@ -10,13 +10,12 @@ mod frame;
 mod sets;
 
 use std::collections::HashMap;
-use std::ops::Range;
 
 use crate::codec::dbc::DbcSignal;
 use crate::error::ProfileError;
 use crate::expression::Expression;
 use crate::field::Field;
-use crate::schema::{Description, Role, Severity};
+use crate::schema::{Description, Severity};
 use compile::Compiler;
 pub use frame::{Frame, FrameKind, MOST_REGISTERS, Part, Span};
 use sets::CompiledSet;
@@ -181,12 +180,6 @@ impl Profile {
     #[must_use]
     pub fn id(&self) -> &str {
         &self.description.profile.id
-    }
-
-    /// Whether the instrument can be used as `role`.
-    #[must_use]
-    pub fn has_role(&self, role: Role) -> bool {
-        self.description.profile.roles.contains(&role)
     }
 
     /// The signal of that name.
@@ -394,12 +387,6 @@ impl Profile {
             Severity::Log => 2,
         };
         (0..self.faults.len()).filter(|&i| self.faults[i].holds(values.as_slice())).min_by_key(grave)
-    }
-
-    /// The bytes of the file where a set-point, signal, poll or block is named, for messages.
-    #[must_use]
-    pub fn span_of_signal(&self, signal: SignalId) -> Range<usize> {
-        self.description.signal[signal.0].name.span()
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Name (the column of the point table), unit, words, how it is read off a condition and put into one, the range that
 //! any rig can have, and how the diagnosis sees it. Tables, exports, maps of the gap and the reports go through these
-//! lists. A new one: its field in [`Condition`] and in [`crate::record::Pass`], and its entry here.
+//! lists. A new one: its field in [`Condition`] and in [`crate::pass::Pass`], and its entry here.
 
 use crate::condition::Condition;
 use crate::quantity::{Direction, PeakToPeak};

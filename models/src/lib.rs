@@ -14,7 +14,7 @@
 //! | [`ridge`] | the finite element model of section 3 |
 //! | [`surrogate`], [`inverse`] | a table of the ridge that is quick to read; the amplitude for a wanted friction |
 //! | [`prediction`] | what every friction law answers |
-//! | [`record`] | the data vocabulary: passes, the point table |
+//! | [`pass`] | the data vocabulary: passes, the point table |
 //! | [`rig_file`] | `rig.toml`: finger, repeatability, what certificates leave open |
 //! | [`root`] | roots in a bracket |
 //!
@@ -38,13 +38,14 @@ pub mod condition;
 pub mod covariate;
 pub mod finger;
 pub mod inverse;
+pub mod pass;
 pub mod prediction;
 pub mod psi;
 pub mod psi_fit;
 pub mod quantity;
 pub mod reading;
 pub mod reading_evidence;
-pub mod record;
+
 pub mod ridge;
 pub mod rig_file;
 pub mod root;

@@ -69,14 +69,6 @@ impl Direction {
             Direction::Backward => -1.0,
         }
     }
-
-    /// The other direction.
-    pub const fn reversed(self) -> Self {
-        match self {
-            Direction::Forward => Direction::Backward,
-            Direction::Backward => Direction::Forward,
-        }
-    }
 }
 
 impl From<Direction> for i8 {

@@ -1,13 +1,14 @@
-//! Which reading of the paper's `w` a rig's passes favour, and by how many nats.
+//! `Psi*` of a rig's own passes, and which reading of the paper's `w` it favours, by how many nats.
 //!
-//! Eq. 20 is held against the forces of the passes under every `Psi*` of a grid. Under each, `mu_0` and the law's own error are
-//! carried along in a Kalman filter: the exponential is a fit, and what it is off by is common to passes at like conditions, so that
-//! no number of repeats can take it for evidence. The evidence of a reading is the mean of the grid's likelihoods over the paper's
-//! `Psi*` and its uncertainty; that of 'neither' over any `Psi*`, flat in its logarithm.
+//! Eq. 20 has one free number, `Psi*`. It is fitted to the forces of the passes by weighted least squares, with `mu_0` from the passes
+//! without vibration. Each pass weighs by its noise and by the law's own error, which is never fitted: the exponential is an
+//! approximation, and a correction of it that depends on the conditions would trade against `Psi*`. The fit is a weighted mean of what each
+//! condition gives by hand, `-Psi / ln(1 - mu')`, so it lies within the range of those values.
 //!
-//! The law's error is `4 mu' (1 - mu')` times a plane in the logarithms of Psi, w, U and F_n: it is nothing where friction is
-//! whole or gone. Its coefficients are the scatter of the finite element ridge about its own best exponential, 0.055 rms in
-//! those units and 0.02 to 0.05 a factor of e (Fig. 9's study under both readings, `docs/ridge.md`).
+//! What is estimated is the `Psi*` that this fit gives for the same conditions without noise: where the law holds it is the law's, and
+//! elsewhere it belongs to these conditions. The interval is that of the noise. Between the readings the law's error counts too:
+//! 0.055 rms in units of `4 mu' (1 - mu')`, nothing where friction is whole or gone, common to all passes. That is the scatter of the finite
+//! element ridge about its own best exponential (Fig. 9's study under both readings, `docs/ridge.md`).
 
 use crate::condition::Condition;
 use crate::psi::{PsiEq17, relative_friction};
@@ -17,27 +18,24 @@ use crate::rig_file::PassNoise;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Values of `Psi*`.
-const NODES: usize = 72;
-/// The least and the greatest `Psi*` of the grid.
+/// `Psi*` that 'neither reading' holds for possible, evenly in its logarithm.
 pub const PSI_STAR_RANGE: [f64; 2] = [0.3, 9.0];
-/// `Psi` of the true stroke at which passes are asked: about one, where the readings differ most.
+/// `Psi` of the true stroke at which passes are asked: about one, where the readings differ most. A pass at an end has half its weight.
 pub const PSI_RANGE: [f64; 2] = [0.4, 4.0];
-/// `mu_0`, and the law's error: everywhere, with Psi, w, U and F_n.
-const STATES: usize = 6;
-/// Standard deviation of each coefficient of the law's error (-).
-const FORM_SD: f64 = 0.04;
-/// Relative width of the prior on `mu_0`.
-const MU0_RELATIVE_SD: f64 = 1.0;
-/// What the plane leaves of the law's error, in the same units: the ridge's, 0.02 rms.
-const FORM_REST_SD: f64 = 0.02;
-/// Share of bad passes, and how far their mu' may be off: one bad pass must not decide.
-const BAD_SHARE: f64 = 0.01;
-const BAD_SD: f64 = 0.3;
+/// Factor about each end over which the weight goes from all to nothing: a `mu_0` with noise then moves no pass in or out at once.
+pub const PSI_EDGE: f64 = 1.25;
+/// Ends of the search for `Psi*`.
+const SEARCH: [f64; 2] = [0.03, 90.0];
+/// The law's error, rms, in units of 4 mu' (1 - mu'): how far a pass may be off the fit before it weighs less.
+const LAW_SD: f64 = 0.055;
+/// Standard deviations at which a pass begins to weigh less: one bad pass must not decide.
+const ROBUST: f64 = 5.0;
 /// Nats from which a reading is said to be favoured: odds of 20 to 1.
 pub const DECIDED_NATS: f64 = 2.995_732_273_553_991;
 /// Standard deviation of `ln Psi*` up to which the two readings, a factor of 2 apart, are told from what lies between them.
 const RESOLVED_SD: f64 = 0.25;
+/// Half a width of 95 % in standard deviations.
+const Z95: f64 = 1.959_963_985;
 
 /// What the passes say of the readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -64,264 +62,257 @@ pub struct ReadingFinding {
     pub nats: f64,
     /// Natural logarithm of the evidence for any other `Psi*` over that for the better of the two readings.
     pub neither_nats: f64,
-    /// `Psi*` of the true stroke (-), free of both readings: the median.
+    /// `Psi*` of the true stroke (-) that fits the passes best, whatever the readings say.
     pub psi_star: f64,
     /// Its interval of 95 %, low end.
     pub psi_star_low: f64,
     /// Its interval of 95 %, high end.
     pub psi_star_high: f64,
+    /// Nine of ten of those passes lie, each by itself, at a `Psi*` from here ...
+    pub passes_low: f64,
+    /// ... to here; `None` where more than one in twenty has no friction below that without vibration.
+    pub passes_high: Option<f64>,
     /// Passes with vibration behind it.
     pub judged: u32,
 }
 
 impl fmt::Display for ReadingFinding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let free = format!(
-            "Psi* {:.2}, 95 % from {:.2} to {:.2}",
-            self.psi_star, self.psi_star_low, self.psi_star_high
-        );
-        let passes = self.judged;
-        let favoured = |reading: Reading, f: &mut fmt::Formatter<'_>| {
-            let (nats, words) = (self.nats.abs(), reading.words());
-            write!(
-                f,
-                "of the two readings of the paper's w, {passes} passes favour that {words}, by {nats:.1} nats; free of both: {free}"
-            )
-        };
+        let (passes, nats) = (self.judged, self.nats.abs());
+        write!(
+            f,
+            "Psi* = {:.2} fits {passes} passes with vibration best, 95 % from {:.2} to {:.2}; nine of ten, each by itself, give {:.2} \
+             to {}; ",
+            self.psi_star,
+            self.psi_star_low,
+            self.psi_star_high,
+            self.passes_low,
+            self.passes_high.map_or("any more".into(), |high| format!("{high:.2}"))
+        )?;
         match self.decision {
-            Decision::PeakToPeak => favoured(Reading::PeakToPeak, f),
-            Decision::SineAmplitude => favoured(Reading::SineAmplitude, f),
+            Decision::PeakToPeak => {
+                write!(f, "they favour by {nats:.1} nats that the paper's {}", Reading::PeakToPeak.words())
+            }
+            Decision::SineAmplitude => {
+                write!(f, "they favour by {nats:.1} nats that the paper's {}", Reading::SineAmplitude.words())
+            }
             Decision::Between => {
-                write!(
-                    f,
-                    "neither reading of the paper's w is favoured by {passes} passes: {free}, between 1.19 and 2.38"
-                )
+                f.write_str("that favours neither reading of the paper's w, between Psi* 1.19 and 2.38")
             }
-            Decision::Neither => {
-                write!(f, "neither reading of the paper's w (Psi* 2.38 or 1.19) fits {passes} passes: {free}")
-            }
-            Decision::TooLittle => write!(
-                f,
-                "which reading of the paper's w holds (Psi* 2.38 or 1.19) cannot be told from {passes} passes with vibration near Psi = 1: {free}; \
-                 the plan 'psi-reading' asks for it"
+            Decision::Neither => f.write_str("neither reading of the paper's w fits (Psi* 2.38 or 1.19)"),
+            Decision::TooLittle => f.write_str(
+                "too little to favour a reading of the paper's w (Psi* 2.38 or 1.19): measure the plan 'psi-reading'",
             ),
         }
     }
 }
 
-/// One value of `Psi*` under the passes so far.
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    psi_star: f64,
-    estimate: [f64; STATES],
-    covariance: [[f64; STATES]; STATES],
-    log_likelihood: f64,
+/// A pass with vibration.
+struct Judged {
+    condition: Condition,
+    force_n: f64,
 }
 
-/// The evidence of a sweep, pass by pass, in the order they were made.
-#[derive(Clone, Debug)]
-pub struct ReadingEvidence {
-    nodes: Vec<Node>,
-    noise: PassNoise,
+/// What Eq. 20 says of a pass under a `Psi*`.
+struct Under {
+    /// Force in N.
+    expected: f64,
+    /// How much more of it there is for less of `ln Psi*`, in N.
+    slope: f64,
+    /// `4 mu' (1 - mu')` in N: what the law's error is counted in.
+    law_n: f64,
+    /// Variance of the pass's noise, in N^2.
+    noise: f64,
+    /// Its weight by its Psi, 0 to 1: [`PSI_RANGE`].
+    asked: f64,
+}
+
+/// The passes of a table or a sweep, ready for the fit.
+struct Passes {
+    judged: Vec<Judged>,
     poisson_ratio: f64,
-    judged: u32,
-    references: u32,
+    noise: PassNoise,
 }
 
-impl ReadingEvidence {
-    /// Before the first pass. `mu0` needs the right order only: it is taken as known within a factor of two.
-    pub fn new(mu0: f64, poisson_ratio: f64, noise: PassNoise) -> Self {
-        let mut covariance = [[0.0; STATES]; STATES];
-        covariance[0][0] = (mu0 * MU0_RELATIVE_SD).powi(2);
-        for (i, row) in covariance.iter_mut().enumerate().skip(1) {
-            row[i] = FORM_SD * FORM_SD;
+/// What the passes say, in any order: each one's measured condition (whose `mu0` is ignored) and mean friction force in N, positive along
+/// the sliding direction. `scale_sd` is the relative standard uncertainty of Psi that all passes share, of the gains of
+/// amplitude and speed.
+///
+/// Left out are passes that the law says nothing of (no load, no speed, no finite force) and those whose Psi is far from one
+/// ([`PSI_RANGE`]). `None` without a pass of each kind, or where friction under vibration is nowhere between none and that without.
+pub fn of_passes(
+    passes: impl IntoIterator<Item = (Condition, f64)>,
+    poisson_ratio: f64,
+    noise: PassNoise,
+    scale_sd: f64,
+) -> Option<ReadingFinding> {
+    let usable = |v: f64| v.is_finite() && v > 0.0;
+    let (mut still, mut judged) = (Vec::new(), Vec::new());
+    for (c, force_n) in passes {
+        let moves = usable(c.frequency_hz) && usable(c.amplitude.metres());
+        if !usable(c.normal_force_n) || !usable(c.speed_m_s) || !force_n.is_finite() {
+            continue;
         }
-        let mut estimate = [0.0; STATES];
-        estimate[0] = mu0;
-        let [low, high] = PSI_STAR_RANGE;
-        let node = |i: usize| Node {
-            psi_star: low * (high / low).powf(i as f64 / (NODES - 1) as f64),
-            estimate,
-            covariance,
-            log_likelihood: 0.0,
-        };
-        ReadingEvidence {
-            nodes: (0..NODES).map(node).collect(),
-            noise,
-            poisson_ratio,
-            judged: 0,
-            references: 0,
-        }
-    }
-
-    /// Takes a pass: its measured condition (whose `mu0` is ignored) and mean friction force in N, positive along the
-    /// sliding direction. Left out are passes that the law says nothing of (no load, no speed, no finite force), those whose Psi is
-    /// far from one ([`PSI_RANGE`]), and those with vibration before the first one without, which alone tells `mu_0`.
-    pub fn pass(&mut self, condition: &Condition, friction_force_n: f64) {
-        let usable = |v: f64| v.is_finite() && v > 0.0;
-        let still = condition.amplitude == PeakToPeak::ZERO;
-        let moves = usable(condition.frequency_hz) && usable(condition.amplitude.metres());
-        if !usable(condition.normal_force_n)
-            || !usable(condition.speed_m_s)
-            || !friction_force_n.is_finite()
-            || !(still || moves)
-        {
-            return;
-        }
-        // Without mu_0 the friction under vibration says nothing of Psi*; far from Psi = 1 the readings hardly differ, and the exponential
-        // is least of all to be trusted.
-        let known = self.references > 0;
-        let psi = PsiEq17::at(&self.nodes[NODES / 2].at_its_mu0(condition), self.poisson_ratio).0;
-        if still {
-            self.references += 1;
-        } else if known && (PSI_RANGE[0]..=PSI_RANGE[1]).contains(&psi) {
-            self.judged += 1;
-        } else {
-            return;
-        }
-        for node in &mut self.nodes {
-            node.pass(condition, self.poisson_ratio, &self.noise, friction_force_n, known);
+        if c.amplitude == PeakToPeak::ZERO {
+            still.push((c.normal_force_n, force_n));
+        } else if moves {
+            judged.push(Judged { condition: c, force_n });
         }
     }
+    let loads: f64 = still.iter().map(|(load, _)| load * load).sum();
+    let mu0 = still.iter().map(|(load, force)| load * force).sum::<f64>() / loads;
+    if !usable(mu0) {
+        return None;
+    }
+    let force_variance = noise.force_sd_n.powi(2) * (1.0 + mu0 * mu0);
+    let mu0_variance = still
+        .iter()
+        .map(|(load, _)| load * load * ((noise.pass_relative_sd * mu0 * load).powi(2) + force_variance))
+        .sum::<f64>()
+        / (mu0 * loads).powi(2);
+    Passes { judged, poisson_ratio, noise }.finding(mu0, mu0_variance, scale_sd)
+}
 
-    /// What the passes say; `None` before one with vibration.
-    pub fn finding(&self) -> Option<ReadingFinding> {
-        if self.judged == 0 {
+impl Passes {
+    fn finding(&self, mu0: f64, mu0_variance: f64, scale_sd: f64) -> Option<ReadingFinding> {
+        let ln_star = self.fit(mu0)?;
+        // The slopes of the score in its unknowns, by differences: with what the passes are off by, which a linear law has not.
+        let step = 1e-4;
+        let slope = |f: &dyn Fn(f64) -> f64| (f(step) - f(-step)) / (2.0 * step);
+        let in_star = slope(&|h| self.score(ln_star + h, mu0));
+        let in_mu0 = slope(&|h| self.score(ln_star, mu0 * h.exp()));
+        let mut variance = (in_mu0 / in_star).powi(2) * mu0_variance + scale_sd * scale_sd;
+        let mut law = 0.0;
+        for pass in &self.judged {
+            let (under, weight) = self.weighed(pass, ln_star, mu0);
+            let influence = under.slope * weight / in_star;
+            variance += influence * influence * under.noise;
+            law += influence * LAW_SD * under.law_n;
+        }
+        if !variance.is_finite() {
             return None;
         }
-        let [pp, sine] = Reading::ALL.map(|reading| {
-            let (psi_star, sd) = reading.psi_star();
-            let relative = sd / psi_star;
-            self.evidence(|at| (-0.5 * ((at / psi_star).ln() / relative).powi(2)).exp())
-        });
-        let neither = self.evidence(|_| 1.0);
-        let (nats, neither_nats) = (pp - sine, neither - pp.max(sine));
-        let (low, middle, high, sd) = self.psi_star();
-        let span = [Reading::SineAmplitude, Reading::PeakToPeak].map(|reading| reading.psi_star().0);
-        let decision = if sd > RESOLVED_SD && nats.abs() < DECIDED_NATS {
-            Decision::TooLittle
-        } else if neither_nats >= DECIDED_NATS && !(span[0]..=span[1]).contains(&middle) {
-            Decision::Neither
-        } else if nats.abs() < DECIDED_NATS || neither_nats >= DECIDED_NATS {
-            Decision::Between
-        } else if nats > 0.0 {
-            Decision::PeakToPeak
-        } else {
-            Decision::SineAmplitude
-        };
+        let (judged, passes_low, passes_high) = self.each(mu0)?;
+        let half = Z95 * variance.sqrt();
+        let (decision, nats, neither_nats) = decide(ln_star, variance + law * law);
         Some(ReadingFinding {
             decision,
             nats,
             neither_nats,
-            psi_star: middle,
-            psi_star_low: low,
-            psi_star_high: high,
-            judged: self.judged,
+            psi_star: ln_star.exp(),
+            psi_star_low: (ln_star - half).exp(),
+            psi_star_high: (ln_star + half).exp(),
+            passes_low,
+            passes_high,
+            judged,
         })
     }
 
-    /// Logarithm of the mean likelihood under a prior over `Psi*`.
-    fn evidence(&self, prior: impl Fn(f64) -> f64) -> f64 {
-        let most = self.nodes.iter().map(|n| n.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for node in &self.nodes {
-            let p = prior(node.psi_star);
-            sum += p * (node.log_likelihood - most).exp();
-            weight += p;
+    /// `ln Psi*` where the score is nothing. Below what every pass gives by hand the score is negative, above it positive.
+    fn fit(&self, mu0: f64) -> Option<f64> {
+        let [mut low, mut high] = SEARCH.map(f64::ln);
+        if !(self.score(low, mu0) < 0.0 && self.score(high, mu0) > 0.0) {
+            return None;
         }
-        most + (sum / weight).max(f64::MIN_POSITIVE).ln()
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.score(middle, mu0) < 0.0 { low = middle } else { high = middle }
+        }
+        Some(0.5 * (low + high))
     }
 
-    /// Low, median and high end of 95 % of `Psi*` under the flat prior, and the standard deviation of its logarithm.
-    fn psi_star(&self) -> (f64, f64, f64, f64) {
-        let most = self.nodes.iter().map(|n| n.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
-        let weights: Vec<f64> = self.nodes.iter().map(|n| (n.log_likelihood - most).exp()).collect();
-        let total: f64 = weights.iter().sum();
-        let log = |i: usize| self.nodes[i].psi_star.ln();
-        let quantile = |share: f64| {
-            let mut before = 0.0;
-            for (i, weight) in weights.iter().enumerate() {
-                let after = before + weight / total;
-                if after >= share {
-                    // Each node stands for the step about it.
-                    let step = log(1) - log(0);
-                    let within = (share - before) / (after - before) - 0.5;
-                    return (log(i) + within * step).exp();
-                }
-                before = after;
-            }
-            self.nodes[NODES - 1].psi_star
+    /// Half the slope of the weighted squares in `ln Psi*`: a pass that is far off pulls no harder than [`ROBUST`] standard deviations.
+    fn score(&self, ln_star: f64, mu0: f64) -> f64 {
+        let pull = |pass: &Judged| {
+            let under = self.under(pass, ln_star, mu0);
+            let sd = under.noise.sqrt().hypot(LAW_SD * under.law_n);
+            let off = (pass.force_n - under.expected) / sd;
+            under.asked * under.slope * off / (1.0 + (off / ROBUST).powi(2)).sqrt() / sd
         };
-        let mean = weights.iter().enumerate().map(|(i, w)| w / total * log(i)).sum::<f64>();
-        let variance =
-            weights.iter().enumerate().map(|(i, w)| w / total * (log(i) - mean).powi(2)).sum::<f64>();
-        (quantile(0.025), quantile(0.5), quantile(0.975), variance.sqrt())
+        self.judged.iter().map(pull).sum()
+    }
+
+    /// A pass under a `Psi*`, and how the score's pull by it changes with its force, without the slope (N^-2).
+    fn weighed(&self, pass: &Judged, ln_star: f64, mu0: f64) -> (Under, f64) {
+        let under = self.under(pass, ln_star, mu0);
+        let variance = under.noise + (LAW_SD * under.law_n).powi(2);
+        let off = (pass.force_n - under.expected).powi(2) / variance;
+        let weight = (1.0 + off / (ROBUST * ROBUST)).powf(-1.5) / variance;
+        let weight = under.asked * weight;
+        (under, weight)
+    }
+
+    fn under(&self, pass: &Judged, ln_star: f64, mu0: f64) -> Under {
+        let c = &Condition { mu0, ..pass.condition };
+        let (psi, full) = (PsiEq17::at(c, self.poisson_ratio), mu0 * c.normal_force_n);
+        let ratio = psi.0 / ln_star.exp();
+        let law = relative_friction(psi, ln_star.exp());
+        let [relative, own] = [self.noise.pass_relative_sd, self.noise.force_sd_n];
+        Under {
+            expected: full * law,
+            slope: full * ratio * (-ratio).exp(),
+            law_n: full * 4.0 * law * (1.0 - law),
+            noise: (relative * full * law).powi(2) + own * own * (1.0 + (mu0 * law).powi(2)),
+            asked: asked(psi.0),
+        }
+    }
+
+    /// How many passes are asked, and between which `Psi*` nine of ten lie, each by itself; no friction below that without vibration: infinite.
+    fn each(&self, mu0: f64) -> Option<(u32, f64, Option<f64>)> {
+        let by_hand = |pass: &Judged| {
+            let c = &Condition { mu0, ..pass.condition };
+            let psi = PsiEq17::at(c, self.poisson_ratio).0;
+            if !(PSI_RANGE[0]..=PSI_RANGE[1]).contains(&psi) {
+                return None;
+            }
+            let left = 1.0 - pass.force_n / (mu0 * c.normal_force_n);
+            Some(if left <= 0.0 { f64::INFINITY } else { (-psi / left.ln()).max(0.0) })
+        };
+        let mut each: Vec<f64> = self.judged.iter().filter_map(by_hand).collect();
+        each.sort_by(f64::total_cmp);
+        let beyond = each.len() / 20;
+        let high = *each.get(each.len().checked_sub(1 + beyond)?)?;
+        Some((
+            u32::try_from(each.len()).unwrap_or(u32::MAX),
+            each[beyond],
+            Some(high).filter(|high| high.is_finite()),
+        ))
     }
 }
 
-impl Node {
-    /// A condition with the `mu_0` that this node has come to.
-    fn at_its_mu0(&self, c: &Condition) -> Condition {
-        Condition { mu0: self.estimate[0].max(1e-6), ..*c }
-    }
+/// The weight of a pass by its Psi: one within [`PSI_RANGE`], nothing far outside, smooth between.
+fn asked(psi: f64) -> f64 {
+    let edge = |beyond: f64| {
+        let t = (0.5 + beyond.ln() / (2.0 * PSI_EDGE.ln())).clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
+    };
+    edge(psi / PSI_RANGE[0]) * edge(PSI_RANGE[1] / psi)
+}
 
-    fn pass(&mut self, c: &Condition, poisson_ratio: f64, noise: &PassNoise, force_n: f64, known: bool) {
-        let c = &self.at_its_mu0(c);
-        let (mu0, load) = (c.mu0, c.normal_force_n);
-        let (mut expected, mut slope) = (mu0 * load, [0.0; STATES]);
-        slope[0] = load;
-        // What the force does as the load moves: nothing beyond Coulomb's where the plate is still.
-        let mut load_slope = mu0;
-        let mut rest = 0.0;
-        if c.amplitude > PeakToPeak::ZERO {
-            let psi = PsiEq17::at(c, poisson_ratio);
-            let ratio = psi.0 / self.psi_star;
-            let law = relative_friction(psi, self.psi_star);
-            let weight = 4.0 * law * (1.0 - law);
-            let features = [
-                1.0,
-                ratio.ln(),
-                (c.amplitude.metres() / 2e-6).ln(),
-                (c.speed_m_s / 0.02).ln(),
-                (load / 0.25).ln(),
-            ];
-            let error: f64 = features.iter().zip(&self.estimate[1..]).map(|(f, b)| f * b).sum();
-            let mu_relative = law + weight * error;
-            expected = mu0 * load * mu_relative;
-            for (slope, feature) in slope[1..].iter_mut().zip(features) {
-                *slope = mu0 * load * weight * feature;
-            }
-            // mu_0 (1 - exp(-P / mu_0)): its slope in mu_0.
-            slope[0] = load * (mu_relative - ratio * (-ratio).exp());
-            load_slope = mu0 * mu_relative;
-            rest = FORM_REST_SD * weight * mu0 * load;
-        }
-        let own = (noise.pass_relative_sd * expected).powi(2)
-            + noise.force_sd_n.powi(2) * (1.0 + load_slope * load_slope)
-            + rest * rest;
-        let gain = self.covariance.map(|row| row.iter().zip(&slope).map(|(a, b)| a * b).sum::<f64>());
-        let variance = own + gain.iter().zip(&slope).map(|(a, b)| a * b).sum::<f64>();
-        let innovation = force_n - expected;
-        // A pass belongs to the rest or is a bad one; what it says of the state is weighed by how likely that is.
-        let bad = variance + (BAD_SD * mu0 * load).powi(2);
-        let log = |share: f64, v: f64| share.ln() - 0.5 * (innovation * innovation / v + v.ln());
-        let [good, bad_one] = [log(1.0 - BAD_SHARE, variance), log(BAD_SHARE, bad)];
-        let belongs = if known { 1.0 / (1.0 + (bad_one - good).exp()) } else { 1.0 };
-        // The first word on mu_0 is the same under every Psi*: no evidence.
-        if known {
-            let most = good.max(bad_one);
-            self.log_likelihood += most + ((good - most).exp() + (bad_one - most).exp()).ln();
-        }
-        let taken = belongs / variance + (1.0 - belongs) / bad;
-        let apart = innovation * (1.0 / variance - 1.0 / bad);
-        let narrowed = taken - belongs * (1.0 - belongs) * apart * apart;
-        for (estimate, gain) in self.estimate.iter_mut().zip(&gain) {
-            *estimate += gain * taken * innovation;
-        }
-        for (row, left) in self.covariance.iter_mut().zip(&gain) {
-            for (cell, right) in row.iter_mut().zip(&gain) {
-                *cell -= left * right * narrowed;
-            }
-        }
-    }
+/// What is said of the readings where `ln Psi*` is known within a variance; the two logarithms of odds.
+fn decide(ln_star: f64, variance: f64) -> (Decision, f64, f64) {
+    let normal = |away: f64, variance: f64| {
+        -0.5 * (away * away / variance + variance.ln() + std::f64::consts::TAU.ln())
+    };
+    let [pp, sine] = Reading::ALL.map(|reading| {
+        let (psi_star, sd) = reading.psi_star();
+        normal(ln_star - psi_star.ln(), variance + (sd / psi_star).powi(2))
+    });
+    let neither = -(PSI_STAR_RANGE[1] / PSI_STAR_RANGE[0]).ln().ln();
+    let (nats, neither_nats) = (pp - sine, neither - pp.max(sine));
+    let span = [Reading::SineAmplitude, Reading::PeakToPeak].map(|reading| reading.psi_star().0.ln());
+    // As near to the middle of the two as to the nearer one: that is neither's.
+    let between = (ln_star - 0.5 * (span[0] + span[1])).abs() < 0.25 * (span[1] - span[0]);
+    let decision = if variance.sqrt() > RESOLVED_SD && nats.abs() < DECIDED_NATS {
+        Decision::TooLittle
+    } else if neither_nats >= DECIDED_NATS && !(span[0]..=span[1]).contains(&ln_star) {
+        Decision::Neither
+    } else if between || nats.abs() < DECIDED_NATS || neither_nats >= DECIDED_NATS {
+        Decision::Between
+    } else if nats > 0.0 {
+        Decision::PeakToPeak
+    } else {
+        Decision::SineAmplitude
+    };
+    (decision, nats, neither_nats)
 }

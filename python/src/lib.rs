@@ -41,7 +41,7 @@ fn refused(why: miette::Report) -> PyErr {
 /// What the models' answers come from, as JSON: `models` of `muprime --version --json`.
 #[pyfunction]
 fn models_json() -> PyResult<String> {
-    serde_json::to_string(&rig::version::models()).map_err(|why| MuprimeError::new_err(why.to_string()))
+    serde_json::to_string(&::runs::version::models()).map_err(|why| MuprimeError::new_err(why.to_string()))
 }
 
 /// The module.

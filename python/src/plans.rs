@@ -4,9 +4,9 @@ use crate::{MuprimeError, refused};
 use miette::IntoDiagnostic;
 use models::prediction::{FrictionModel, SpringSlider};
 use pyo3::prelude::*;
-use rig::plan::{Plan, PlanFile};
-use rig::session::Job;
-use rig::setup::Setup;
+use runs::plan::{Plan, PlanFile};
+use runs::session::Job;
+use runs::setup::Setup;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -46,7 +46,8 @@ pub fn plan_passes(name: &str, text: &str, setup: &str, seed: Option<u64>) -> Py
         let model: Arc<dyn FrictionModel> = Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?);
         let seed = seed.unwrap_or(plan.file.seed);
         let (model_file, defects, out, notes) = (None, None, PathBuf::new(), Default::default());
-        let job = Job { setup, plan, seed, model, model_file, defects, out, fast: true, notes };
+        let job =
+            Job { setup, plan, seed, model, model_file, defects, out, fast: true, notes, answers: None };
         serde_json::to_string(&job.points_seen(None)?).into_diagnostic()
     };
     passes().map_err(refused)

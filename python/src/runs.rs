@@ -5,9 +5,9 @@ use miette::IntoDiagnostic;
 use models::prediction::{FrictionModel, SpringSlider};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use rig::plan::Plan;
-use rig::session::{Job, Notes, Signals};
-use rig::setup::Setup;
+use runs::plan::Plan;
+use runs::session::{Job, Notes, Signals};
+use runs::setup::Setup;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -16,9 +16,9 @@ use std::sync::atomic::Ordering;
 #[pyfunction]
 pub fn load(py: Python<'_>, folder: PathBuf) -> PyResult<(Py<PyBytes>, String)> {
     let told = py.detach(|| -> miette::Result<_> {
-        let run = rig::report::read(&folder)?;
+        let run = runs::report::read(&folder)?;
         let about = serde_json::json!({ "facts": run.facts, "summary": run.summary, "damage": run.damage });
-        Ok((rig::export::arrow_bytes(&run)?, about.to_string()))
+        Ok((tables::export::arrow_bytes(&run)?, about.to_string()))
     });
     let (bytes, about) = told.map_err(refused)?;
     Ok((PyBytes::new(py, &bytes).unbind(), about))
@@ -41,7 +41,7 @@ pub fn run(
     sample: Option<String>,
     licence: Option<String>,
 ) -> PyResult<String> {
-    let notes = Notes { operator, sample, licence };
+    let notes = Notes { operator, subject: None, sample, licence };
     let plan = Plan::parse(plan, text).map_err(refused)?;
     let job = job(plan, setup, out, seed, defects.as_deref(), model.as_deref(), notes).map_err(refused)?;
     let signals = Signals::default();
@@ -49,7 +49,7 @@ pub fn run(
     // A key that interrupts the interpreter ends the sweep as a stop does: asked for at every pass.
     let mut interrupted = None;
     let summary = py.detach(|| {
-        job.run(&signals, &mut |_| {
+        job.run_in_virtual_time(&signals, &mut |_| {
             if interrupted.is_none() {
                 interrupted = Python::attach(|py| py.check_signals()).err();
                 stops.fetch_add(usize::from(interrupted.is_some()), Ordering::Relaxed);
@@ -83,19 +83,19 @@ fn job(
     let defects = match defects {
         None => None,
         Some(path) => {
-            let text = rig::input::text_of(path)?;
+            let text = runs::input::text_of(path)?;
             let read = sim::defects::Defects::parse(&text);
             Some(read.map_err(|why| miette::miette!("{}: {why}", path.display()))?)
         }
     };
     let model_file = match model {
         None => None,
-        Some(path) => Some(("model.toml".to_string(), rig::input::text_of(path)?)),
+        Some(path) => Some(("model.toml".to_string(), runs::input::text_of(path)?)),
     };
     let law: Arc<dyn FrictionModel> = match &model_file {
         None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
-        Some((name, text)) => rig::model_file::load_for(&setup, name, text)?,
+        Some((name, text)) => runs::model_file::load_for(&setup, name, text)?,
     };
     let seed = seed.unwrap_or(plan.file.seed);
-    Ok(Job { setup, plan, seed, model: law, model_file, defects, out, fast: true, notes })
+    Ok(Job { setup, plan, seed, model: law, model_file, defects, out, fast: true, notes, answers: None })
 }

@@ -3,12 +3,14 @@
 use crate::{MuprimeError, refused};
 use calibration::certificate::sha256_hex;
 use diagnosis::data::Table;
+use diagnosis::document::{document, predictions};
 use diagnosis::hypotheses::Options;
 use miette::{Context, IntoDiagnostic};
-use models::record::read_passes;
+use models::pass::read_passes;
 use pyo3::prelude::*;
-use rig::cli::diagnose as command;
+use runs::verdict::words;
 use std::path::Path;
+use tables::passes::parse_passes;
 
 /// What a diagnosis comes to: the JSON document of `muprime diagnose --json`, its words, its page, and predictions as CSV where asked.
 type Told = (String, String, String, Option<String>);
@@ -45,8 +47,8 @@ fn told(
     predict: Option<Vec<u8>>,
     damage: &[String],
 ) -> miette::Result<Told> {
-    let rig = rig::input::rig_text(rig_name, rig)?;
-    let passes = command::parse_passes(Path::new(name), bytes)?;
+    let rig = runs::input::rig_text(rig_name, rig)?;
+    let passes = parse_passes(Path::new(name), bytes)?;
     let table = Table::measured(&passes).into_diagnostic().wrap_err_with(|| name.to_string())?;
     let conditions = match predict {
         None => None,
@@ -59,9 +61,9 @@ fn told(
     let options = Options { pairs, without, ..Options::default() };
     let result = diagnosis::verdict::diagnose(&table, &rig, &options, sha256_hex(bytes));
     let about =
-        [vec![("table", name.to_string()), ("rig", rig_name.to_string())], rig::report::about::of_rig(&rig)]
+        [vec![("table", name.to_string()), ("rig", rig_name.to_string())], runs::report::about::of_rig(&rig)]
             .concat();
-    let page = rig::report::diagnosis::page(&result, &table, &about)?;
-    let predictions = conditions.as_ref().map(|conditions| command::predictions(&result, conditions));
-    Ok((command::document(&result, &rig, damage)?, command::words(&result, &rig), page, predictions))
+    let page = runs::report::diagnosis::page(&result, &table, &about)?;
+    let predicted = conditions.as_ref().map(|conditions| predictions(&result, conditions));
+    Ok((document(&result, &rig, damage).into_diagnostic()?, words(&result, &rig), page, predicted))
 }

@@ -177,12 +177,4 @@ impl Moments {
     pub fn sd(&self) -> Option<f64> {
         (self.n > 1).then(|| (self.sum_squares / (self.n - 1) as f64).max(0.0).sqrt())
     }
-
-    /// Standard error of the mean, widened for a first-order autocorrelation `r`: by `(1+r)/(1-r)` in variance.
-    pub fn standard_error(&self) -> Option<f64> {
-        let sd = self.sd()?;
-        let r =
-            if self.sum_squares > 0.0 { (self.products / self.sum_squares).clamp(0.0, 0.98) } else { 0.0 };
-        Some(sd * ((1.0 + r) / (1.0 - r) / self.n as f64).sqrt())
-    }
 }

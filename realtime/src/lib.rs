@@ -9,6 +9,7 @@
 //! | [`compare`] | residuals against the model; the test that says when it has left the measurement |
 //! | [`turn`] | one turn of the loop over real ports; the row that it leaves behind |
 //! | [`pacing`] | the thread: absolute deadlines, lateness histogram; in `pacing/machine.rs` what it asks of the machine |
+//! | [`clock`] | time of drivers, loop and virtual world; a virtual rig's can be held |
 //! | [`queue`] | commands to the loop; a stop waits behind nothing |
 //! | [`wrap`] | ports around ports: faults |
 //! | [`witness`] | notes when the machine kept ordinary threads from running |
@@ -27,8 +28,9 @@
 //! assert!(limits.checked().is_err());
 //! ```
 //!
-//! The wall clock is forbidden here, and the monotonic clock is read by `pacing` alone.
+//! The wall clock is forbidden here, and the monotonic clock is read by `pacing` and `clock` alone.
 
+pub mod clock;
 pub mod compare;
 pub mod cycle;
 pub mod estimate;

@@ -7,6 +7,7 @@
 
 mod machine;
 
+use crate::clock::Participant;
 use crate::cycle::{Config, CycleState};
 use crate::ports::{Nanos, SupplyCommand};
 use crate::queue::CommandQueue;
@@ -84,6 +85,8 @@ pub struct LoopParts {
     pub life: Arc<Lifeline>,
     /// CLOCK_MONOTONIC in ns that counts as loop time zero. Drivers stamp with the same origin.
     pub origin_ns: u64,
+    /// The held clock of a virtual rig, as which the loop then reads time; `None`: the machine's.
+    pub held: Option<Participant>,
 }
 
 /// The grid of deadlines.
@@ -115,7 +118,9 @@ impl Grid {
 /// `pacing` is what to ask of the machine; a bare FIFO priority, or `None`, will do.
 pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
     let pacing = pacing.into();
-    let LoopParts { config, model, mut ports, commands, mut rows, mut watch, life, origin_ns } = parts;
+    let LoopParts { config, model, mut ports, commands, mut rows, mut watch, life, origin_ns, held } = parts;
+    // On the machine's scale, whichever clock it is.
+    let now_ns = || held.as_ref().map_or_else(monotonic_ns, |clock| origin_ns + clock.now().0);
     let period = config.limits.timing.cycle.0;
     let mut lateness_histogram = lateness_histogram();
     let mut grants = match pacing.priority {
@@ -138,10 +143,14 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
     let (mut cycles, mut overruns, mut ring_drops, mut watch_drops) = (0u64, 0u64, 0u64, 0u64);
     let mut faults_at_start = (0, 0);
     let mut panicked = None;
-    let mut grid = Grid { period, due: monotonic_ns() + period };
+    let mut grid = Grid { period, due: now_ns() + period };
     loop {
-        wait_until(grid.next(monotonic_ns()), pacing.spin_ns);
-        let begun = monotonic_ns();
+        let due = grid.next(now_ns());
+        match &held {
+            None => wait_until(due, pacing.spin_ns),
+            Some(clock) => clock.sleep_until(Nanos(due - origin_ns)),
+        }
+        let begun = now_ns();
         let (late, missed) = grid.begin(begun);
         overruns += missed;
         cycles += 1;
@@ -177,7 +186,7 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
             faults_at_start = thread_faults();
         }
     }
-    switch_off(&mut ports, Nanos(monotonic_ns().saturating_sub(origin_ns)));
+    switch_off(&mut ports, Nanos(now_ns().saturating_sub(origin_ns)));
     drop(awake);
     let (minor_faults, major_faults) = faults_between(faults_at_start, thread_faults());
     let quantile = |q| lateness_histogram.value_at_quantile(q);

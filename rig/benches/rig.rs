@@ -6,13 +6,13 @@ use divan::counter::ItemsCount;
 use models::condition::Condition;
 use models::finger::Finger;
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider};
-use muprime_rig::plan::Plan;
-use muprime_rig::session::rehearse;
-use muprime_rig::setup::Setup;
 use realtime::cycle::{self, Command, CycleState, Inputs, Marker, Phase};
 use realtime::estimate::Mu0;
 use realtime::ports::{AmplifierState, Contacts, Forces, Nanos, NoData, Quality, Reading, StageState};
 use realtime::safety::{Observation, Request};
+use runs::plan::Plan;
+use runs::session::rehearse;
+use runs::setup::Setup;
 use sim::wire::SharedPlant;
 use sim::wire::modbus_tcp::ModbusTcpServer;
 use sim::wire::world::WorldPlant;
@@ -121,7 +121,7 @@ fn server() -> ModbusTcpServer {
     let setup = Setup::load("virtual").unwrap();
     let world = World::new(&WorldConfig::ideal(), 1).unwrap();
     let plant = SharedPlant::new(WorldPlant::new(world), Instant::now());
-    let devices = muprime_rig::embed::emulators(&setup.instruments()).unwrap();
+    let devices = muprime_rig::emulators::emulators(&setup.instruments()).unwrap();
     ModbusTcpServer::start("127.0.0.1:0".parse().unwrap(), devices, plant).unwrap()
 }
 
@@ -154,8 +154,14 @@ fn modbus_round_trip_driver(bencher: Bencher<'_, '_>) {
     let (table, poll) = (profile.description.poll[0].table, profile.frames()[0].spans[0]);
     let link = &profile.description.link;
     let unit = link.unit.unwrap_or(1);
-    let mut wire =
-        drivers::modbus_tcp::Tcp::connect(&runtime, server.address(), unit, 1000, link.response_timeout_ms)
-            .unwrap();
+    let clock = realtime::clock::Clock::from(std::time::Instant::now());
+    let mut wire = drivers::modbus_tcp::Tcp::connect(
+        (&runtime, &clock),
+        server.address(),
+        unit,
+        1000,
+        link.response_timeout_ms,
+    )
+    .unwrap();
     bencher.bench_local(|| wire.read_registers(table, poll.address, poll.count).unwrap());
 }

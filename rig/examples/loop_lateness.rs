@@ -5,13 +5,13 @@
 
 use models::finger::Finger;
 use models::prediction::SpringSlider;
-use muprime_rig::setup::Setup;
 use realtime::pacing::{self, Lifeline, LoopParts, Pacing};
 use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Stage, StageState};
 use realtime::safety::{DriveCommand, StageCommand};
 use realtime::turn::Ports;
 use ringbuf::HeapRb;
 use ringbuf::traits::Split;
+use runs::setup::Setup;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -61,6 +61,7 @@ fn main() {
         watch,
         life: Arc::clone(&life),
         origin_ns: pacing::monotonic_ns(),
+        held: None,
     };
     let looping = std::thread::spawn(move || pacing::run(parts, pacing));
     std::thread::sleep(std::time::Duration::from_secs_f64(seconds));

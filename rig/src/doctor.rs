@@ -8,16 +8,15 @@ mod judge;
 mod ports;
 
 pub use follow::{ChannelReport, Follow, Seen};
-pub(crate) use judge::THERMOMETER;
 pub use judge::{Asked, Finding, judge};
 
-use crate::setup::Setup;
 use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, OpenError};
 use ports::Opened;
 use realtime::cycle::{COMMANDS_PER_CYCLE, Config, CycleState, Inputs, decide};
 use realtime::ports::{AmplifierState, Channel, Contacts, Nanos, NoData, StageState, SupplyState};
 use realtime::safety::{Cause, ChannelTiming, Observation, Timing};
 use realtime::witness::{StallReport, Witnesses};
+use runs::setup::Setup;
 use serde::Serialize;
 use std::time::{Duration, Instant};
 

@@ -1,7 +1,8 @@
 //! The ledger of a human finger's exposure: what was vibrated in earlier runs counts in the next one.
 //!
-//! It is kept where a machine keeps files over a restart and every user may write (`/var/tmp`), one file for each amplifier
-//! ([`drivers::identity`]), and it is written while the run goes, once a second. What stands in it is always ahead of the truth:
+//! It is kept where a machine keeps files over a restart (`/var/tmp`), for each identity of the amplifier ([`drivers::identity::every`])
+//! and for the person, where one is named; the worst of them holds. Each user has a file of each, which no other user can write: what
+//! several users drove is added up. It is written while the run goes, once a second. What stands in it is always ahead of the truth:
 //! each entry holds [`AHEAD`] of driving at the setup's strongest as if it had happened, and the entry of an orderly end takes
 //! that back. So a program that is killed loses nothing; it is charged too much, by [`AHEAD`] at most. A file has two places
 //! that are written in turn, each with its check sum: what is torn by a power cut leaves the other.
@@ -10,16 +11,17 @@
 //! After a restart of the machine only the time since then is known to be over, and only that counts as rest.
 #![allow(clippy::disallowed_methods, reason = "a ledger is written beside the loop, while the run goes")]
 
-use crate::setup::Setup;
 use miette::WrapErr;
 use realtime::pacing::Lifeline;
 use realtime::ports::Nanos;
 use realtime::safety::{Exposed, Limits, MINUTE_NS, MINUTES, PART_MINUTES, PARTS};
+use runs::session::Notes;
+use runs::setup::Setup;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{File, OpenOptions, Permissions};
 use std::io;
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -44,7 +46,7 @@ const PLACE: usize = 8192;
 struct Entry {
     /// Counts entries: the newest that can be read is the ledger.
     number: u64,
-    /// The amplifier.
+    /// What or whom it is of: one identity of the amplifier, or the person.
     amplifier: String,
     /// Which start of the machine the times below belong to.
     boot: String,
@@ -112,72 +114,57 @@ fn machine_time() -> io::Result<(String, u64)> {
     Ok((boot.trim().to_string(), t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64))
 }
 
-/// The ledger of one amplifier, open.
-pub struct Ledger {
+/// What one user's file holds of one identity, open for writing.
+struct Book {
     file: File,
     path: PathBuf,
     entry: Entry,
+    /// What other users' files hold of the same.
+    others: Vec<Entry>,
+}
+
+/// The ledger of a run: a book for each identity of its amplifier, and one for its person.
+pub struct Ledger {
+    books: Vec<Book>,
     rest: Nanos,
     /// Strongest squared rms velocity that the limits allow, in m2/s2.
     strongest_m2_s2: f64,
 }
 
 impl Ledger {
-    /// Opens the ledger of a setup's amplifier, where a human finger is declared: what cannot be read, or cannot be written,
-    /// refuses the finger. `None` without a finger, and for an amplifier inside this program, which vibrates nobody.
+    /// Opens the ledger of a setup's amplifier and of the person (the subject, else the operator), where a human finger is in the
+    /// rig: what cannot be read, or cannot be written, refuses the finger. `None` without a finger, and for an amplifier inside this
+    /// program, which vibrates nobody.
     ///
     /// # Errors
     /// The reason.
-    pub fn open(setup: &Setup) -> miette::Result<Option<Self>> {
+    pub fn open(setup: &Setup, notes: &Notes) -> miette::Result<Option<Self>> {
         let limits = &setup.config.limits;
         if !limits.human_contact {
             return Ok(None);
         }
-        let instruments = setup.instruments();
-        let amplifier =
-            drivers::identity::identity(&instruments.amplifier).map_err(|e| miette::miette!("{e}"))?;
-        amplifier.map(|identity| Self::open_in(Path::new(FOLDER), &identity, limits)).transpose()
+        let known =
+            drivers::identity::every(&setup.instruments().amplifier).map_err(|e| miette::miette!("{e}"))?;
+        let person =
+            notes.subject.as_ref().or(notes.operator.as_ref()).map(|name| format!("person/{}", name.trim()));
+        let amplifier = !known.is_empty();
+        let known: Vec<String> = known.into_iter().chain(person).collect();
+        amplifier.then(|| Self::open_in(Path::new(FOLDER), &known, limits)).transpose()
     }
 
-    fn open_in(folder: &Path, amplifier: &str, limits: &Limits) -> miette::Result<Self> {
-        let name = &calibration::certificate::sha256_hex(amplifier.as_bytes())[..16];
-        let path = folder.join(format!("muprime-{name}.exposure"));
-        Self::read(&path, amplifier, limits).wrap_err_with(|| {
-            format!(
-                "no human finger: what it was exposed to in the last hour is not known ({})",
-                path.display()
-            )
-        })
-    }
-
-    fn read(path: &Path, amplifier: &str, limits: &Limits) -> miette::Result<Self> {
-        if !crate::claim::is_shared(path.parent().unwrap_or(Path::new("/"))) {
-            miette::bail!(
-                help = "make it one that all may write to, with the sticky bit (mode 1777)",
-                "the folder of the ledger cannot be trusted"
-            );
-        }
-        let file = crate::claim::open_shared(path).map_err(|e| miette::miette!("{e}"))?;
-        let (boot, now_ns) =
-            machine_time().map_err(|e| miette::miette!("this machine tells no time: {e}"))?;
-        let length = file.metadata().map_err(|e| miette::miette!("{e}"))?.len();
-        let places = [0, 1].map(|place| read_place(&file, place).filter(|e| e.amplifier == amplifier));
-        let newest = places.into_iter().flatten().max_by_key(|entry| entry.number);
-        let entry = match newest {
-            Some(entry) => entry.moved_to(&boot),
-            None if length == 0 => {
-                Entry { amplifier: amplifier.into(), boot, until_ns: now_ns, ..Entry::default() }
-            }
-            None => miette::bail!(help = "rest for an hour, then remove the file", "the ledger is damaged"),
-        };
+    fn open_in(folder: &Path, known: &[String], limits: &Limits) -> miette::Result<Self> {
         let strongest = std::f64::consts::FRAC_1_SQRT_2
             * std::f64::consts::PI
             * limits.amplitude_max.metres()
             * limits.frequency_hz.1;
         let rest = Nanos::from_seconds(limits.exposure_rest_s);
-        let mut ledger =
-            Ledger { file, path: path.to_path_buf(), entry, rest, strongest_m2_s2: strongest * strongest };
-        ledger.entry.add(0, 0.0, rest, now_ns);
+        let open = |of: &String| {
+            let why = "no human finger: what it was exposed to in the last hour is not known";
+            Book::open(folder, of, rest).wrap_err_with(|| format!("{why} ({})", folder.display()))
+        };
+        let books = known.iter().map(open).collect::<miette::Result<Vec<_>>>()?;
+        let mut ledger = Ledger { books, rest, strongest_m2_s2: strongest * strongest };
+        let (_, now_ns) = machine_time().map_err(|e| miette::miette!("this machine tells no time: {e}"))?;
         ledger.write_ahead(now_ns).map_err(|e| {
             miette::miette!(
                 help = "give this user the right to write it",
@@ -187,35 +174,32 @@ impl Ledger {
         Ok(ledger)
     }
 
-    /// What the loop takes over from earlier runs.
+    /// What the loop takes over from earlier runs: in each part the worst of all books.
     pub fn exposed(&self) -> Exposed {
-        self.entry.exposed(self.entry.until_ns)
+        self.books.iter().map(Book::exposed).reduce(worst).unwrap_or_default()
     }
 
-    /// Writes an entry that is ahead of what was driven.
+    /// Adds what was driven since the last time to every book.
+    fn add(&mut self, driven_ns: u64, dose_m2_s: f64, now_ns: u64) {
+        let rest = self.rest;
+        self.books.iter_mut().for_each(|book| book.entry.add(driven_ns, dose_m2_s, rest, now_ns));
+    }
+
+    /// Writes entries that are ahead of what was driven.
     fn write_ahead(&mut self, now_ns: u64) -> io::Result<()> {
         let ahead = AHEAD.as_nanos() as u64;
-        let mut entry = self.entry.clone();
-        entry.add(ahead, self.strongest_m2_s2 * AHEAD.as_secs_f64(), self.rest, now_ns.saturating_add(ahead));
-        self.write(entry)
+        let dose = self.strongest_m2_s2 * AHEAD.as_secs_f64();
+        for book in &mut self.books {
+            let mut entry = book.entry.clone();
+            entry.add(ahead, dose, self.rest, now_ns.saturating_add(ahead));
+            book.write(entry)?;
+        }
+        Ok(())
     }
 
-    fn write(&mut self, mut entry: Entry) -> io::Result<()> {
-        // Somebody who removed the file would make the next run start from nothing.
-        if std::fs::symlink_metadata(&self.path).map(|m| inode(&m))? != inode(&self.file.metadata()?) {
-            return Err(io::Error::other("the file was replaced"));
-        }
-        self.entry.number += 1;
-        entry.number = self.entry.number;
-        let text = serde_json::to_string(&entry)?;
-        let mut place =
-            format!("{} {text}", calibration::certificate::sha256_hex(text.as_bytes())).into_bytes();
-        if place.len() > PLACE {
-            return Err(io::Error::other("the entry is too long"));
-        }
-        place.resize(PLACE, b' ');
-        self.file.write_all_at(&place, (entry.number % 2) * PLACE as u64)?;
-        self.file.sync_data()
+    /// Writes entries of what was driven, and no more.
+    fn write(&mut self) -> io::Result<()> {
+        self.books.iter_mut().try_for_each(|book| book.write(book.entry.clone()))
     }
 
     /// Keeps the ledger on a thread of its own while the loop behind `life` drives, until the answer ends. `stop` stops the rig
@@ -240,16 +224,11 @@ impl Ledger {
                 let written = machine_time().and_then(|(_, now_ns)| {
                     let driven = life.driven_ns.load(Ordering::Relaxed);
                     let dose = f64::from_bits(life.dose_bits.load(Ordering::Relaxed));
-                    ledger.entry.add(
-                        driven.saturating_sub(before.0),
-                        (dose - before.1).max(0.0),
-                        ledger.rest,
-                        now_ns,
-                    );
+                    ledger.add(driven.saturating_sub(before.0), (dose - before.1).max(0.0), now_ns);
                     before = (driven, dose);
                     match last {
                         // It was read back off: nothing more was driven.
-                        Some(true) => ledger.write(ledger.entry.clone()),
+                        Some(true) => ledger.write(),
                         _ => ledger.write_ahead(now_ns),
                     }
                     .map(|()| now_ns)
@@ -269,6 +248,132 @@ impl Ledger {
         };
         let thread = std::thread::Builder::new().name("exposure".into()).spawn(keep)?;
         Ok(Keeping { state, end, thread: Some(thread) })
+    }
+}
+
+/// The worse of two exposures, part by part.
+fn worst(a: Exposed, b: Exposed) -> Exposed {
+    let mut parts = a.parts;
+    for (worse, other) in parts.iter_mut().zip(b.parts) {
+        *worse = (worse.0.max(other.0), worse.1.max(other.1));
+    }
+    Exposed { in_one_go: a.in_one_go.max(b.in_one_go), resting: rested(&a, &b), parts }
+}
+
+/// Time rested since the later of two goes; where one of them drove nothing, since the other.
+fn rested(a: &Exposed, b: &Exposed) -> Nanos {
+    match (a.in_one_go.0, b.in_one_go.0) {
+        (0, _) => b.resting,
+        (_, 0) => a.resting,
+        _ => a.resting.min(b.resting),
+    }
+}
+
+impl Book {
+    /// Opens this user's file of one identity, and reads those of others.
+    fn open(folder: &Path, of: &str, rest: Nanos) -> miette::Result<Self> {
+        if !crate::rig_lock::is_shared(folder) {
+            miette::bail!(
+                help = "make it one that all may write to, with the sticky bit (mode 1777)",
+                "the folder of the ledger cannot be trusted"
+            );
+        }
+        let (boot, now_ns) =
+            machine_time().map_err(|e| miette::miette!("this machine tells no time: {e}"))?;
+        let stem = format!("muprime-{}-", &calibration::certificate::sha256_hex(of.as_bytes())[..16]);
+        // SAFETY: it reads a number of this process and cannot fail.
+        let user = unsafe { libc::geteuid() };
+        let path = folder.join(format!("{stem}{user}.exposure"));
+        let file = open_owned(&path, user, true).map_err(|e| {
+            miette::miette!(help = "see what it is, and remove it", "{}: {e}", path.display())
+        })?;
+        let none =
+            || Entry { amplifier: of.into(), boot: boot.clone(), until_ns: now_ns, ..Entry::default() };
+        let found = |file: &File, path: &Path| {
+            let entry = newest(file, of).wrap_err_with(|| path.display().to_string())?;
+            let mut entry = entry.map_or_else(none, |entry| entry.moved_to(&boot));
+            entry.add(0, 0.0, rest, now_ns);
+            Ok::<_, miette::Report>(entry)
+        };
+        let entry = found(&file, &path)?;
+        let mut others = Vec::new();
+        for one in
+            std::fs::read_dir(folder).map_err(|e| miette::miette!("{}: {e}", folder.display()))?.flatten()
+        {
+            let name = one.file_name().to_string_lossy().into_owned();
+            let owner =
+                name.strip_prefix(&stem).and_then(|rest| rest.strip_suffix(".exposure")?.parse().ok());
+            if let Some(owner) = owner.filter(|owner: &u32| *owner != user) {
+                let path = one.path();
+                let file = open_owned(&path, owner, false)
+                    .map_err(|e| miette::miette!("{}: {e}", path.display()))?;
+                others.push(found(&file, &path)?);
+            }
+        }
+        Ok(Book { file, path, entry, others })
+    }
+
+    /// What all users drove.
+    fn exposed(&self) -> Exposed {
+        let now_ns = self.entry.until_ns;
+        let all = self.others.iter().map(|entry| entry.exposed(now_ns));
+        all.fold(self.entry.exposed(now_ns), |sum, other| {
+            let mut parts = sum.parts;
+            for (part, more) in parts.iter_mut().zip(other.parts) {
+                *part = (part.0.plus(more.0), part.1 + more.1);
+            }
+            Exposed { in_one_go: sum.in_one_go.plus(other.in_one_go), resting: rested(&sum, &other), parts }
+        })
+    }
+
+    fn write(&mut self, mut entry: Entry) -> io::Result<()> {
+        // Somebody who removed the file would make the next run start from nothing.
+        if std::fs::symlink_metadata(&self.path).map(|m| inode(&m))? != inode(&self.file.metadata()?) {
+            return Err(io::Error::other("the file was replaced"));
+        }
+        self.entry.number += 1;
+        entry.number = self.entry.number;
+        let text = serde_json::to_string(&entry)?;
+        let mut place =
+            format!("{} {text}", calibration::certificate::sha256_hex(text.as_bytes())).into_bytes();
+        if place.len() > PLACE {
+            return Err(io::Error::other("the entry is too long"));
+        }
+        place.resize(PLACE, b' ');
+        self.file.write_all_at(&place, (entry.number % 2) * PLACE as u64)?;
+        self.file.sync_data()
+    }
+}
+
+/// The newest entry of a file that is of this identity; none where nothing was ever written.
+fn newest(file: &File, of: &str) -> miette::Result<Option<Entry>> {
+    let length = file.metadata().map_err(|e| miette::miette!("{e}"))?.len();
+    let places = [0, 1].map(|place| read_place(file, place).filter(|e| e.amplifier == of));
+    let newest = places.into_iter().flatten().max_by_key(|entry| entry.number);
+    if newest.is_none() && length > 0 {
+        miette::bail!(help = "rest for an hour, then remove the file", "the ledger is damaged");
+    }
+    Ok(newest)
+}
+
+/// Opens a plain file that only its owner can write, and makes this user's own where there is none. Nothing is followed.
+fn open_owned(path: &Path, owner: u32, own: bool) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true).write(own).custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK);
+    let file = match options.open(path) {
+        Err(e) if own && e.kind() == io::ErrorKind::NotFound => {
+            let file = options.create_new(true).mode(0o644).open(path)?;
+            // Whatever the mask of this user: the next one must know of it.
+            file.set_permissions(Permissions::from_mode(0o644))?;
+            Ok(file)
+        }
+        opened => opened,
+    }?;
+    let found = file.metadata()?;
+    let plain = found.is_file() && found.nlink() == 1 && found.uid() == owner;
+    match plain && found.mode() & 0o022 == 0 {
+        true => Ok(file),
+        false => Err(io::Error::other("it is no plain file that its owner alone can write")),
     }
 }
 
@@ -308,7 +413,6 @@ impl Keeping {
 }
 
 fn inode(metadata: &std::fs::Metadata) -> (u64, u64) {
-    use std::os::unix::fs::MetadataExt;
     (metadata.dev(), metadata.ino())
 }
 

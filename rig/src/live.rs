@@ -1,7 +1,7 @@
 //! A run while it goes on, for whoever looks: the terminal view and the browser, in the run's own process or in another one.
 //!
 //! ```text
-//! session --News--> Feed (bounded queue, a thread) --JSON lines over a local socket--> Viewer -> View -> terminal, browser
+//! session --Update--> Feed (bounded queue, a thread) --JSON lines over a local socket--> Viewer -> View -> terminal, browser
 //!                    ^ stop, pause, resume, one word a line, of the same user only ----'
 //! ```
 //!
@@ -10,11 +10,13 @@
 
 mod feed;
 mod message;
+mod stop;
 mod view;
 mod viewer;
 
 pub use feed::Feed;
 pub use message::{Ended, Message, Progress, Run, State, Told};
+pub use stop::stop;
 pub use view::View;
 pub use viewer::{Heard, Viewer};
 
@@ -56,6 +58,11 @@ fn place(run: &Path) -> std::io::Result<SocketAddr> {
     let whole = run.canonicalize()?;
     let name = calibration::certificate::sha256_hex(whole.as_os_str().as_encoded_bytes());
     SocketAddr::from_abstract_name(format!("muprime-run-{}", &name[..32]))
+}
+
+/// Whether the other end of a socket is a process of the same user, or of the one who may do everything.
+fn is_ours(peer: &rustix::net::UCred) -> bool {
+    peer.uid == rustix::process::geteuid() || peer.uid.is_root()
 }
 
 #[cfg(test)]

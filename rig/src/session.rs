@@ -1,316 +1,260 @@
-//! A sweep from beginning to end: opens the rig, runs the loop, keeps what comes of it.
-//!
-//! Two ways, one sequence: in wall-clock time with the loop on a thread of its own and instruments behind drivers, or in
-//! virtual time in this thread with the virtual rig's ports.
+//! A sweep in wall-clock time. Four threads, each with one duty: the loop; the record's writer; the sweep, which answers
+//! the loop's rows within a millisecond or two; and this one, which makes passes safe on the disk and hands the news on:
+//! what is printed, published or shown has bounded queues and threads of its own. A slow disk so reaches neither the loop nor the
+//! stage, and a reader that takes nothing does not reach this thread.
+#![allow(clippy::disallowed_methods, reason = "a sweep in wall-clock time, beside the loop")]
 
-mod fast;
-mod glimpse;
-mod keeper;
-mod live;
+mod writer;
 
-pub use fast::{Rehearsal, rehearse};
-pub use glimpse::{Extremes, Glimpse};
-pub use keeper::{REPLAYABLE, Replayable, unix_ns};
-
-use crate::ambient::LevelsFound;
-use crate::plan::{Plan, Point, Resolution};
-use crate::run_dir::{Identity, RunDir};
-use crate::sequence::{Event, MeasuredPass, Outcome, Sequence};
-use crate::setup::Setup;
-use crate::supervisor::OffReport;
-use calibration::certificate::sha256_hex;
-use keeper::Keeper;
-use models::prediction::FrictionModel;
-use models::reading_evidence::ReadingFinding;
-use realtime::compare::Agreement;
-use realtime::pacing::LoopReport;
-use realtime::witness::StallReport;
-use serde::{Deserialize, Serialize};
+use crate::dead_man_key::DeadManKey;
+use crate::exposure::Ledger;
+use crate::rig_lock::RigClaim;
+use crate::wall_loop::{Ended, Parts, WallLoop};
+use miette::{IntoDiagnostic, WrapErr};
+use realtime::clock::Clock;
+use realtime::pacing;
+use realtime::ports::Nanos;
+use realtime::turn::Ports;
+use realtime::witness::Witnesses;
+use runs::ambient::{Bench, World};
+use runs::exposure_left::Left;
+use runs::sequence::{Event, MeasuredPass, Outcome};
+use runs::session::keeper::{self, Keeper};
+use runs::session::{Begun, Job, Signals, Snapshot, Snapshots, Summary, Unfinished, Update, words};
+use runs::supervisor::{self, Asked, End};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Instant;
 
-/// What is to be run.
-pub struct Job {
-    /// The rig.
-    pub setup: Setup,
-    /// The passes.
-    pub plan: Plan,
-    /// Seed of the order and of the virtual world.
-    pub seed: u64,
-    /// The model to compare with.
-    pub model: Arc<dyn FrictionModel>,
-    /// Text and name of the model file, where one was given.
-    pub model_file: Option<(String, String)>,
-    /// Defects of the virtual rig in place of its own.
-    pub defects: Option<sim::defects::Defects>,
-    /// Folder of the run.
-    pub out: PathBuf,
-    /// In virtual time.
-    pub fast: bool,
-    /// Who runs it, and on what: for the record.
-    pub notes: Notes,
-    /// A file with the answers of the person at the rig.
-    pub answers: Option<PathBuf>,
-}
-
-/// What a person says of a run. It stands in the record and on the report, and changes nothing.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Notes {
-    /// Who leads the run.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub operator: Option<String>,
-    /// What is measured: the fingertip, its preparation, the plate.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sample: Option<String>,
-    /// Licence of the data: an SPDX identifier or an address.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub licence: Option<String>,
-}
-
-impl Notes {
-    /// These, and where they say nothing those of an earlier session.
-    #[must_use]
-    pub fn or(self, before: &Notes) -> Notes {
-        let or = |now: Option<String>, before: &Option<String>| now.or_else(|| before.clone());
-        Notes {
-            operator: or(self.operator, &before.operator),
-            sample: or(self.sample, &before.sample),
-            licence: or(self.licence, &before.licence),
-        }
-    }
-}
-
-/// What happened, for whoever watches.
-pub enum News<'a> {
-    /// A pass was kept: it is safe on the disk.
-    Pass(&'a MeasuredPass),
-    /// Something worth a line.
-    Event(&'a Event),
+/// What the sweep has to keep and to tell.
+struct Note {
+    at: Nanos,
+    events: Vec<Event>,
+    pass: Option<MeasuredPass>,
     /// Passes made, planned, s to go.
-    Progress(usize, usize, f64),
-    /// A cycle ten times a second, and the extremes of all cycles since the last one.
-    State(&'a Glimpse),
+    progress: (usize, usize, f64),
+    /// The cycle, where it is to be told.
+    state: Option<Snapshot>,
 }
 
-/// What a run comes to. Its JSON form is what `muprime run --json` ends with.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Summary {
-    /// How it ended.
-    #[serde(flatten)]
-    pub outcome: Outcome,
-    /// Requirement (`SR-..`) whose rule ended it or kept it from being armed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub requirement: Option<String>,
-    /// What to do about that.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub remedy: Option<String>,
-    /// Folder of the run.
-    pub folder: PathBuf,
-    /// Passes made in all sessions.
-    pub passes: usize,
-    /// Passes planned.
-    pub planned: usize,
-    /// Whether the model has left the measurement.
-    pub model_departed: bool,
-    /// What the comparison of all passes says.
-    #[serde(default = "nothing_said")]
-    pub agreement: Agreement,
-    /// What they say of the two readings of the paper's w; `None` where none could tell.
-    #[serde(default)]
-    pub psi_reading: Option<ReadingFinding>,
-    /// The loop; `None` in virtual time.
-    pub loop_report: Option<LoopReport>,
-    /// When the machine kept ordinary threads from running; `None` in virtual time.
-    #[serde(default)]
-    pub stalls: Option<StallReport>,
-    /// Rows that the record lost.
-    pub record_lost: u64,
-    /// What the links counted, by instrument.
-    pub links: BTreeMap<String, serde_json::Value>,
-    /// Whether the rig was read back off in the end.
-    #[serde(default)]
-    pub off: OffReport,
-    /// Who ran it, and on what.
-    #[serde(default)]
-    pub notes: Notes,
-    /// The plan's `[protocol]`.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub protocol: BTreeMap<String, toml::Value>,
-    /// What was found of the air, and typed at the rig.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub levels: Vec<LevelsFound>,
-    /// Every pass had been made before: nothing was driven.
-    #[serde(default)]
-    pub finished_before: bool,
-}
-
-/// The finding of a summary that was written before it had one.
-fn nothing_said() -> Agreement {
-    Agreement::of(None, false)
-}
-
-/// Why a run that had begun did not come to an orderly end. Anything else that goes wrong is a refusal: it comes before
-/// the rig or the folder of the run is touched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error, miette::Diagnostic)]
-pub enum Unfinished {
-    /// The sweep ran, and its record could not be kept.
-    #[error("the sweep had begun, and what came of it could not be kept")]
-    NotKept,
-    /// A thread hangs or has panicked: a fault of this program.
-    #[error("the sweep had begun; the instruments' own watchdogs switch off; what was measured is kept")]
-    Internal,
-    /// A signal ended it.
-    #[error("stopped by a signal")]
-    Interrupted,
-    /// The drive was not read back off.
-    #[error("the output may still be on: switch the supply off")]
-    NotOff,
-}
-
-/// What a run looks at while it goes on: what was asked of it from outside.
-#[derive(Clone, Debug, Default)]
-pub struct Signals {
-    /// How often a stop was asked for: SIGINT, SIGTERM, SIGHUP, or somebody who watches.
-    pub stops: Arc<AtomicUsize>,
-    /// Whether the sweep is to rest before its next pass. In virtual time nothing waits.
-    pub paused: Arc<AtomicBool>,
-}
-
-impl Job {
-    /// What the run is of.
-    pub fn identity(&self) -> Identity {
-        let model = self
-            .model_file
-            .as_ref()
-            .map_or_else(|| self.model.name().to_string(), |(_, text)| sha256_hex(text.as_bytes()));
-        Identity {
-            setup_sha256: self.setup.sha256(),
-            plan_sha256: sha256_hex(self.plan.text.as_bytes()),
-            seed: self.seed,
-            model,
-            notes: self.notes.clone(),
-            protocol: self.plan.protocol(),
-        }
+/// Runs a job: in wall-clock time over its instruments, or in virtual time where the job says so. In wall-clock time `update` must
+/// wait for nothing: whoever keeps the passes calls it.
+///
+/// # Errors
+/// Whatever prevents it before anything was commanded (a refusal), or a fault of this program.
+pub fn run(job: Job, signals: &Signals, update: &mut dyn FnMut(Update<'_>)) -> miette::Result<Summary> {
+    let mut job = job;
+    if job.fast {
+        return job.run_in_virtual_time(signals, update);
     }
-
-    /// The passes of the plan, checked.
-    ///
-    /// # Errors
-    /// The values that the rig cannot do, or the first series whose expected change of force its sensor cannot
-    /// see, with their places in the plan.
-    pub fn points(&self) -> miette::Result<Vec<Point>> {
-        self.points_seen(None)
+    let begun = job.begin()?;
+    if begun.is_complete() {
+        return begun.finish(&job);
     }
+    over_instruments(job, begun, signals, update)
+}
 
-    /// The same, with the noise in N that the lateral channel was found to have.
-    ///
-    /// # Errors
-    /// As [`Job::points`].
-    pub fn points_seen(&self, noise_n: Option<f64>) -> miette::Result<Vec<Point>> {
-        let resolution = self.resolution()?;
-        let points = self.plan.points(self.seed, &self.setup.config.limits, &resolution)?;
-        self.plan.check_ambient(&self.setup)?;
-        self.plan.check_reach(&self.setup.reaches()?)?;
-        if let Some(mut channel) = self.setup.lateral_channel()? {
-            channel.noise_n = noise_n.or(channel.noise_n);
-            let mu0 = self.setup.tip.mu0;
-            self.plan.check_visible(&points, &resolution, &*self.model, mu0, &channel)?;
-        }
-        Ok(points)
+/// Runs a job in wall-clock time.
+fn over_instruments(
+    mut job: Job,
+    begun: Begun,
+    signals: &Signals,
+    news: &mut dyn FnMut(Update<'_>),
+) -> miette::Result<Summary> {
+    let Begun { dir, mut sequence, planned, answers, .. } = begun;
+    let key = if job.setup.hand_at_key() { Some(DeadManKey::open()?) } else { None };
+    let _claim = RigClaim::take(&job.setup)?;
+    let ledger = Ledger::open(&job.setup, &job.notes)?;
+    if let Some(ledger) = &ledger {
+        job.setup.config.exposed = ledger.exposed();
+        sequence.exposure_left(Left::of(&job.setup.config.limits, &job.setup.config.exposed));
     }
+    let epoch = Instant::now();
+    let simulated = job.setup.file.virtual_rig.is_some();
+    let clock = if simulated { Clock::holdable(epoch) } else { Clock::from(epoch) };
+    let origin_ns = pacing::monotonic_ns();
+    let start_unix_ns = keeper::unix_ns();
+    let mut instruments = job.setup.instruments();
+    let embedded = simulated.then(|| embed(&job, &mut instruments, clock.clone())).transpose()?;
+    let air = embedded.as_ref().map(|(_, plant)| World::Served(plant.clone()));
+    let mut bench = Bench::open(&sequence, instruments.chamber.as_ref(), air, answers)?;
+    let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
+        miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
+    })?;
+    let mut kept = Keeper::begin(&job, dir, planned, start_unix_ns)?;
+    let file = kept.new_record()?;
+    let preamble = keeper::preamble(&job, start_unix_ns)?;
 
-    /// What the setup's amplifier can set, by its profile.
-    fn resolution(&self) -> miette::Result<Resolution> {
-        let amplifier = &self.setup.file.amplifier;
-        let profile = amplifier.description().map_err(|e| miette::miette!("{e}"))?;
-        let step = |name: &str| {
-            profile.set(name).map_or(0.0, |set| {
-                let described = &profile.description.set[set.0];
-                let per_unit = amplifier.amplitude_m_per_unit.filter(|_| name == "amplitude");
-                described.scale * per_unit.unwrap_or(described.si.factor)
-            })
-        };
-        Ok(Resolution { amplitude_pp_m: step("amplitude"), frequency_hz: step("frequency") })
-    }
-
-    /// Runs the job.
-    ///
-    /// # Errors
-    /// Whatever prevents it before anything was commanded (a refusal), or a fault of this program.
-    pub fn run(mut self, signals: &Signals, news: &mut dyn FnMut(News<'_>)) -> miette::Result<Summary> {
-        let points = self.points()?;
-        let planned = points.len();
-        let answers = self.setup.answers(self.answers.as_deref(), self.asks_a_person())?;
-        let mut dir = RunDir::open(&self.out, &self.identity())?;
-        self.notes = dir.notes().clone();
-        let left = dir.left_of(points);
-        let session = dir.plan_session(keeper::unix_ns(), self.plan.file.pass.measure_s, self.fast);
-        let mut sequence = Sequence::new(
-            left,
-            crate::plan::times(&self.setup.reaches()?, self.plan.file.pass),
-            Arc::clone(&self.model),
-            &self.setup.tip,
-            self.setup.file.noise,
+    let lost = Arc::new(AtomicBool::new(false));
+    let witnesses = Witnesses::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
+    let (rig, mut reins, row_out) = WallLoop::start(Parts {
+        config: job.setup.config,
+        model: Arc::clone(&job.model),
+        ports: Ports::new(
+            job.setup.certificates.calibrated(rig.force),
+            job.setup.certificates.calibrated_amplifier(rig.amplifier),
+            rig.stage,
         )
-        .watching(&self.setup.certificates.temperature_ranges)
-        .in_air(self.setup.ambient())
-        .at_rig(&self.plan, &self.setup)
-        .guarded_by(&self.setup.config.limits)
-        // In virtual time the loop's own time goes on from session to session.
-        .in_session(session.session, if self.fast { 0.0 } else { session.start_s });
-        for pass in &dir.made {
-            sequence.remember(pass);
-        }
-        if sequence.progress().1 == 0 {
-            return Keeper::finish(&self, dir, planned, sequence.findings(true));
-        }
-        if self.fast {
-            fast::run(self, dir, session.start_s, sequence, answers, planned, signals, news)
-        } else {
-            live::run(self, dir, sequence, answers, planned, signals, news)
-        }
-    }
+        .with_supply(rig.supply)
+        .with_contacts(rig.contacts),
+        links: rig.links,
+        pacing: job.setup.file.pace.pacing(),
+        origin_ns,
+    })
+    .wrap_err(Unfinished::Internal)?;
+    let keeping = match ledger {
+        None => None,
+        Some(ledger) => Some(ledger.keep(rig.life(), reins.stopper()).into_diagnostic()?),
+    };
+    let held = key.map(|key| key.hold(reins.sender())).transpose().into_diagnostic()?;
+    let (to_writer, notes) = channel();
+    let (last_in, last_out) = channel();
+    let writing = {
+        let lost = RaisedByPanic(Arc::clone(&lost));
+        let clock = clock.join(writer::SLACK);
+        let write = move || writer::write(file, preamble, row_out, &notes, &last_out, &lost.0, &clock);
+        std::thread::Builder::new().name("recorder".into()).spawn(write).into_diagnostic()?
+    };
 
-    /// Whether the run waits for a person at the rig.
-    pub fn asks_a_person(&self) -> bool {
-        let means = self.setup.file.means();
-        let air = self.plan.sets_air().into_iter().zip(means);
-        let sets = air.into_iter().any(|(sets, by)| sets && by.is_some_and(|by| by.needs_a_person()));
-        sets || !self.plan.file.step.is_empty()
-    }
-
-    /// Whether that person answers at the terminal.
-    pub fn asks_at_the_terminal(&self) -> bool {
-        self.asks_a_person() && self.answers.is_none() && self.setup.file.virtual_rig.is_none()
-    }
-
-    /// The world of the virtual rig.
-    fn world(&self) -> miette::Result<sim::world::World> {
-        let virtual_rig = self.setup.file.virtual_rig.clone().unwrap_or_default();
-        let mut config = virtual_rig.world();
-        // What the setup states of the air is so in its world.
-        let air = self.setup.ambient();
-        config.room.ambient_pressure_pa = air.ambient_pressure_pa.unwrap_or(config.room.ambient_pressure_pa);
-        config.room.temperature_c = air.temperature_c.unwrap_or(config.room.temperature_c);
-        config.room.relative_humidity_pct =
-            air.relative_humidity_pct.unwrap_or(config.room.relative_humidity_pct);
-        if let Some(defects) = &self.defects {
-            config.defects = defects.clone();
+    let (note_in, note_out) = channel::<Note>();
+    let mut unkept = None;
+    let (outcome, panicked) = std::thread::scope(|scope| {
+        let (following_sequence, lost, stop) = (&mut sequence, &*lost, reins.stopper());
+        let keeping = keeping.as_ref();
+        let following = scope.spawn(move || {
+            let (mut stops, mut knows) = (0, false);
+            let mut ends = || {
+                let asked = signals.stops.load(Ordering::Relaxed);
+                if asked > stops {
+                    stops = asked;
+                    return Some(End::Asked);
+                }
+                let unkept = keeping.is_some_and(|keeping| !keeping.holds());
+                let end = match lost.load(Ordering::Relaxed) {
+                    true => Some(End::NotKept),
+                    false => unkept.then_some(End::ExposureNotKept),
+                };
+                let end = end.filter(|_| !knows);
+                knows |= end.is_some();
+                end
+            };
+            let mut ask = || Asked { end: ends(), pause: signals.paused.load(Ordering::Relaxed) };
+            let mut snapshots = Snapshots::default();
+            supervisor::sweep(&mut reins, following_sequence, &mut ask, &mut |row, sequence, reaction| {
+                bench.serve(row.now, sequence, &reaction);
+                let state = snapshots.take(row);
+                if state.is_some() || !reaction.events.is_empty() || reaction.pass.is_some() {
+                    let (done, all) = sequence.progress();
+                    let progress = (done, all, sequence.remaining_s());
+                    let (events, pass) = (reaction.events, reaction.pass);
+                    // The other end lives as long as this one: it reads until this end is dropped.
+                    let _ = note_in.send(Note { at: row.now, events, pass, progress, state });
+                }
+            })
+        });
+        let mut keep = |notes: &Receiver<Note>, news: &mut dyn FnMut(Update<'_>)| {
+            for note in notes {
+                // Passes that come until the sweep has stopped are kept where they can be.
+                if let Err(why) = kept.keep(&note.events, note.pass.as_ref(), news) {
+                    lost.store(true, Ordering::Relaxed);
+                    unkept.get_or_insert(why);
+                }
+                if note.pass.is_some() {
+                    let (done, all, left_s) = note.progress;
+                    news(Update::Progress(done, all, left_s));
+                }
+                if let Some(snapshot) = &note.state {
+                    news(Update::State(snapshot));
+                }
+                if note.pass.is_some() || !note.events.is_empty() {
+                    let _ = to_writer.send((note.at, note.events, note.pass));
+                }
+            }
+        };
+        // Whoever is told the news is foreign code, and may panic where its terminal is gone: then the rig is stopped before
+        // anything else, what was measured is kept, and the panic goes on when the rig is off.
+        let told = std::panic::catch_unwind(AssertUnwindSafe(|| keep(&note_out, news)));
+        if told.is_err() {
+            stop();
+            lost.store(true, Ordering::Relaxed);
+            keep(&note_out, &mut |_| {});
         }
-        // The finger is the rig's: it stays the same from run to run, and only noise and order follow the seed.
-        let wrong = |e: sim::world::ConfigError| miette::miette!("the virtual rig: {e}");
-        let finger = sim::world::World::new(&config, virtual_rig.finger_seed).map_err(wrong)?.true_finger();
-        config.finger.normal_stiffness_n_per_m = finger.normal_stiffness_n_per_m;
-        config.finger.lateral_stiffness_n_per_m = finger.lateral_stiffness_n_per_m;
-        config.finger.stiffness_relative_sd = 0.0;
-        let mut world = sim::world::World::new(&config, self.seed).map_err(wrong)?;
-        if virtual_rig.hand_holds {
-            let holds_dead_man_from = Some(realtime::ports::Nanos(200_000_000));
-            world.set_operator(sim::world::Operator { holds_dead_man_from, ..world.operator() });
-        }
-        Ok(world)
+        (following.join(), told.err())
+    });
+    // Whatever ended it: off first.
+    let Ended { report, links, off } = rig.end();
+    let said_off = std::panic::catch_unwind(AssertUnwindSafe(|| news(Update::Off(&off))));
+    let panicked = panicked.or(said_off.err());
+    drop(held);
+    if let Some(keeping) = keeping {
+        keeping.end(off.read_back);
     }
+    let stalls = witnesses.finish();
+    let held = clock.held_back();
+    drop(to_writer);
+    let outcome = outcome.map_err(|_| fault("the sweep's thread panicked"));
+    let mut last = BTreeMap::new();
+    if let Ok(outcome) = &outcome {
+        last.insert("outcome".to_string(), words(outcome)?);
+    }
+    last.insert("loop".to_string(), serde_json::to_string(&report).into_diagnostic()?);
+    last.insert("stalls".to_string(), serde_json::to_string(&stalls).into_diagnostic()?);
+    last.insert("links".to_string(), serde_json::to_string(&links).into_diagnostic()?);
+    last.insert("off".to_string(), serde_json::to_string(&off).into_diagnostic()?);
+    let _ = last_in.send(last);
+    // A writer that cannot write waits for the other end of this channel to go.
+    drop(last_in);
+    let written = writing.join().map_err(|_| fault("the recorder's thread panicked"));
+    if let Some(panic) = panicked {
+        tracing::error!("{}", off.words());
+        std::panic::resume_unwind(panic);
+    }
+    let ended = outcome.and_then(|outcome| Ok((outcome, written?, report)));
+    let (outcome, written, report) = match ended {
+        Ok((outcome, written, Some(report))) => (outcome, written, report),
+        Ok((.., None)) => {
+            return Err(fault("the loop's thread is stuck inside a driver").wrap_err(off.words()));
+        }
+        Err(fault) => return Err(fault.wrap_err(off.words())),
+    };
+    if let Some(what) = &report.panicked {
+        tracing::error!(what, "a port panicked in the loop: the rig was stopped");
+    }
+    for why in written.problem.iter().cloned().chain(unkept.map(|e| format!("{e:#}"))) {
+        tracing::error!(why, "the record could not be kept: the sweep was stopped");
+    }
+    // A file that failed only while the last rows went into it: the sweep was over, but it is not recorded.
+    let unrecorded = written.problem.is_some() && outcome == Outcome::Complete;
+    let outcome = if unrecorded { Outcome::RecordLost } else { outcome };
+    let record_lost = written.lost_rows + report.ring_drops;
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, Some((report, stalls, held)), record_lost, links, off))
+}
+
+/// Raises a flag where the thread that holds it panics.
+struct RaisedByPanic(Arc<AtomicBool>);
+
+impl Drop for RaisedByPanic {
+    fn drop(&mut self) {
+        self.0.fetch_or(std::thread::panicking(), Ordering::Relaxed);
+    }
+}
+
+/// A fault of this program, after the rig was touched.
+fn fault(what: &'static str) -> miette::Report {
+    miette::miette!("{what}").wrap_err(Unfinished::Internal)
+}
+
+/// Serves the virtual rig where the setup looks for its instruments, and puts the real places there.
+fn embed(
+    job: &Job,
+    instruments: &mut drivers::InstrumentsSetup,
+    clock: Clock,
+) -> miette::Result<(crate::emulators::Embedded, sim::wire::SharedPlant)> {
+    let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), clock);
+    let embedded = crate::emulators::embed(instruments, &plant, false);
+    Ok((embedded.map_err(|problem| miette::miette!("{problem}"))?, plant))
 }

@@ -2,7 +2,7 @@
 //! a SIGKILL (`reset` does it then).
 #![allow(clippy::disallowed_methods, reason = "writes to a terminal beside everything else")]
 
-use crate::print;
+use runs::print;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::termios::{
     LocalModes, OptionalActions, SpecialCodeIndex, Termios, isatty, tcgetattr, tcgetpgrp, tcgetwinsize,

@@ -1,28 +1,28 @@
 //! A run on the terminal while it goes on: what `muprime watch` and `muprime run --tui` show.
 //!
 //! ```text
-//! Viewer (or journal) --ears--> Seen --painter--> screen
+//! Viewer (or journal) --source--> Seen --painter--> screen
 //!                       keys ----^ stop, pause, resume at once, whatever the painter waits for
 //! ```
 //!
 //! Three threads beside the run: one hears, one paints, one takes keys. A terminal that takes nothing holds up the painter alone.
 #![allow(clippy::disallowed_methods, reason = "a picture for people, in wall-clock time")]
 
-mod ears;
-mod hand;
-mod look;
+mod keys;
 mod numbers;
 mod page;
-mod paint;
 mod plot;
+mod render;
+mod source;
+mod style;
 
-pub use hand::Lead;
-pub use look::Look;
+pub use keys::Lead;
 pub use page::{Page, draw};
+pub use style::Look;
 
 use crate::live::View;
 use crate::terminal::{self, CtrlC};
-use hand::Hand;
+use keys::Hand;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
@@ -128,12 +128,12 @@ impl Watch {
         let shared = Arc::new(shared);
         let (done, painted) = channel();
         let mut watch = Watch { shared, threads: Vec::new(), painted };
-        watch.thread("watch: ears", ears::hear)?;
+        watch.thread("watch: source", source::hear)?;
         if watch.shared.keys == Keys::Here {
-            watch.thread("watch: keys", hand::take_keys)?;
+            watch.thread("watch: keys", keys::take_keys)?;
         }
         watch.thread("watch: painter", move |shared| {
-            paint::paint(shared);
+            render::paint(shared);
             drop(done);
         })?;
         Ok(watch)

@@ -24,7 +24,7 @@ pub mod oracle;
 pub mod rough;
 
 use models::condition::Condition;
-use models::record::Pass;
+use models::pass::Pass;
 use serde::{Deserialize, Serialize};
 
 use crate::defects::{ALL, Defect, Defects, Kind};
@@ -255,7 +255,7 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
     let without = bench.noise_free(&seen_hidden, &Defects::none());
     // Nominal baseline: docs/contract.md's mu0, from the table's passes without vibration.
     let mut nominal = bench.nominal;
-    nominal.mu0 = models::record::coulomb_coefficient(&passes).unwrap_or(nominal.mu0);
+    nominal.mu0 = models::pass::coulomb_coefficient(&passes).unwrap_or(nominal.mu0);
     let label = Label {
         schema: "muprime.sealed/1".to_string(),
         seed,

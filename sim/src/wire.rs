@@ -34,9 +34,9 @@ pub mod world;
 
 pub use quantity::{Command, Quantity};
 
+use realtime::clock::Clock;
 use realtime::ports::Nanos;
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Instant;
 
 /// The world as instruments meet it. All quantities are in SI units.
 pub trait Plant: Send {
@@ -54,20 +54,20 @@ pub trait Plant: Send {
 #[derive(Clone)]
 pub struct SharedPlant {
     plant: Arc<Mutex<dyn Plant>>,
-    epoch: Instant,
+    clock: Clock,
 }
 
 impl SharedPlant {
-    /// A world whose time zero is `epoch`.
-    pub fn new(plant: impl Plant + 'static, epoch: Instant) -> Self {
-        Self { plant: Arc::new(Mutex::new(plant)), epoch }
+    /// A world that lives in the time of `clock`.
+    pub fn new(plant: impl Plant + 'static, clock: impl Into<Clock>) -> Self {
+        Self { plant: Arc::new(Mutex::new(plant)), clock: clock.into() }
     }
 
     /// The world, brought up to now.
     pub fn now(&self) -> (MutexGuard<'_, dyn Plant + 'static>, Nanos) {
         // A panic in one emulator must not silence the others: the world itself is still whole.
         let mut plant = self.plant.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let now = Nanos(u64::try_from(self.epoch.elapsed().as_nanos()).unwrap_or(u64::MAX));
+        let now = self.clock.now();
         plant.advance(now);
         (plant, now)
     }
@@ -75,6 +75,6 @@ impl SharedPlant {
     /// The world as it was left, and what time it is: for whoever advances it in steps of his own.
     pub fn as_left(&self) -> (MutexGuard<'_, dyn Plant + 'static>, Nanos) {
         let plant = self.plant.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        (plant, Nanos(u64::try_from(self.epoch.elapsed().as_nanos()).unwrap_or(u64::MAX)))
+        (plant, self.clock.now())
     }
 }

@@ -379,11 +379,6 @@ impl World {
         &mut self.room
     }
 
-    /// Temperature of the plate (deg C).
-    pub fn plate_temperature_c(&self) -> f64 {
-        self.room.of(Air::Temperature) + self.plate.warming_k()
-    }
-
     /// Averages computed so far.
     pub fn computed(&self) -> u64 {
         self.averager.computed()

@@ -10,7 +10,7 @@ fn a_set_is_its_seeds_and_reads_back_from_its_files() {
     let folder = std::env::temp_dir().join(format!("sealed-{}", std::process::id()));
     set.write(&folder.join("open"), &folder.join("sealed")).unwrap();
     let table = std::fs::File::open(folder.join("open/points.csv")).unwrap();
-    assert_eq!(models::record::read_passes(table).unwrap(), set.passes);
+    assert_eq!(models::pass::read_passes(table).unwrap(), set.passes);
     let label = std::fs::read_to_string(folder.join("sealed/label.toml")).unwrap();
     assert_eq!(Label::parse(&label).unwrap(), set.label);
     let rig: toml::Table = std::fs::read_to_string(folder.join("open/rig.toml")).unwrap().parse().unwrap();

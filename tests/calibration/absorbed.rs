@@ -38,7 +38,7 @@ fn rig_with_certificate(at: &Path, factor: f64) {
     let args = "calibrate amplitude --table table.csv --form bent --serial A-1 --operator O --out a.toml --overwrite";
     let said = muprime(at, args);
     assert!(said.status.success(), "{}", tests::texts(&said).1);
-    let ideal = std::fs::read_to_string(tests::file("rig/setups/virtual-ideal.toml")).unwrap();
+    let ideal = std::fs::read_to_string(tests::file("runs/setups/virtual-ideal.toml")).unwrap();
     let setup = ideal
         .replace("name = \"virtual-ideal\"", "name = \"wrong\"\ncertificates = [\"a.toml\"]")
         .replace("profile = \"muprime-amplifier\"", "profile = \"muprime-amplifier\"\nserial = \"A-1\"");

@@ -1,6 +1,6 @@
 //! Amplitude: the true plate under a vibrometer whose scale error is withheld.
 
-use crate::bench::{Coverage, TRIALS, seed};
+use crate::bench::{Coverage, seed, trials};
 use crate::bound::{independent, jacobian};
 use crate::force::{at, occasion};
 use calibration::amplitude::AmplitudePoint;
@@ -117,7 +117,7 @@ fn gain_resonance_droop_are_covered_as_stated() {
     let (mut gain, mut resonance, mut quality, mut drooped) =
         (Coverage::default(), Coverage::default(), Coverage::default(), Coverage::default());
     let mut refused = 0;
-    for trial in 0..TRIALS {
+    for trial in 0..trials() {
         let mut draw = Noise::new(seed(trial), "amplitude truth");
         let load_ratio = draw.log_between(0.05, 0.5);
         let mut config = WorldConfig::default();
@@ -200,8 +200,8 @@ fn gain_resonance_droop_are_covered_as_stated() {
             assert!((use_it.amplitude(s, 0.0, 0.5).metres() / w.metres() - 1.0).abs() < 1e-12);
         }
     }
-    println!("refused: {refused} of {TRIALS}");
-    assert!(refused <= 8, "at most 2 % of good tables may be refused");
+    println!("refused: {refused} of {}", trials());
+    assert!(50 * refused <= trials(), "at most 2 % of good tables may be refused");
     gain.judge("amplitude gain");
     resonance.judge("resonance frequency");
     quality.judge("quality factor");
@@ -212,7 +212,7 @@ fn gain_resonance_droop_are_covered_as_stated() {
 fn mode_shapes_are_covered_as_stated() {
     let (mut wavelength, mut antinode, mut share) =
         (Coverage::default(), Coverage::default(), Coverage::default());
-    for trial in 0..TRIALS {
+    for trial in 0..trials() {
         let mut draw = Noise::new(seed(trial), "mode truth");
         let (depth, phase, half_wave) =
             (draw.between(0.3, 0.9), draw.between(0.2, 2.9), draw.between(9e-3, 18e-3));

@@ -9,8 +9,10 @@ use realtime::ports::Nanos;
 use sim::noise::Noise;
 use sim::sensor::{Sensor, SensorConfig};
 
-/// Number of trials of each quantity.
-pub const TRIALS: u64 = 400;
+/// Number of trials of each quantity: with 100, coverages below 87 % and above 99.9 % are found out, with 400 those outside of 92 to 98 %.
+pub fn trials() -> u64 {
+    tests::rounds(100, 400)
+}
 /// Base of their seeds: fixed on 2026-11-21 before the first trial with it, when the calibrations stood still. The base
 /// before it, 0x6d75_7072, was in use while three of their choices were made (docs/calibration.md names them).
 const SEEDS: u64 = 20_261_121;
@@ -143,7 +145,7 @@ impl Coverage {
         self.ratio += statistical_half / (1.959_964 * bound_sd);
     }
 
-    /// Two-sided binomial test at 0.001 against 95 %, and the 92-98 % that the issue asks for.
+    /// Two-sided binomial test at 0.001 against 95 %, and over all trials the 92-98 % that are asked for.
     pub fn judge(&self, name: &str) {
         let share = self.hits as f64 / self.trials as f64;
         let p = calibration::uncertainty::student::binomial_p_value(self.hits, self.trials, 0.95);
@@ -154,6 +156,6 @@ impl Coverage {
         };
         println!("{name:>34}: {}/{} = {:.1} %, p = {p:.3}{length}", self.hits, self.trials, 100.0 * share);
         assert!(p > 1e-3, "{name}: coverage {share} over {} trials, p = {p}", self.trials);
-        assert!((0.92..=0.98).contains(&share), "{name}: coverage {share}");
+        assert!(self.trials < 390 || (0.92..=0.98).contains(&share), "{name}: coverage {share}");
     }
 }

@@ -92,7 +92,7 @@ fn a_calibrated_rig_is_no_longer_blamed_and_bad_certificates_are_refused() {
     let certified =
         muprime(at, "calibrate force series.csv --operator Operator --serial V-1 --out force.toml --json");
     assert!(certified.status.success(), "{}", tests::texts(&certified).1);
-    let setup = std::fs::read_to_string(tests::file("rig/setups/virtual-ideal.toml")).unwrap();
+    let setup = std::fs::read_to_string(tests::file("runs/setups/virtual-ideal.toml")).unwrap();
     let with = |serial: &str| {
         setup
             .replace("name = \"virtual-ideal\"", "name = \"virtual-ideal\"\ncertificates = [\"force.toml\"]")
@@ -145,6 +145,18 @@ fn a_calibrated_rig_is_no_longer_blamed_and_bad_certificates_are_refused() {
     assert!(!at.join("c").exists(), "nothing was touched");
 }
 
+/// The program that asks for one weight after the other.
+fn guided(folder: &Path, certificate: &str) -> std::process::Child {
+    tests::muprime()
+        .current_dir(folder)
+        .args(["calibrate", "force", "--operator", "O", "--serial", "S", "--json", "--out", certificate])
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
 #[test]
 fn guided_at_the_terminal_a_series_gives_a_certificate() {
     use std::io::Write as _;
@@ -156,14 +168,7 @@ fn guided_at_the_terminal_a_series_gives_a_certificate() {
         let _ = writeln!(input, "{} {} {}\n{} {}", cells[1], cells[2], cells[5], cells[3], cells[4]);
     }
     input.push_str("done\n");
-    let mut child = tests::muprime()
-        .current_dir(folder.path())
-        .args(["calibrate", "force", "--operator", "O", "--serial", "S", "--json", "--out", "guided.toml"])
-        .stdin(std::process::Stdio::piped())
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = guided(folder.path(), "guided.toml");
     child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
     let guided = child.wait_with_output().unwrap();
     assert!(guided.status.success(), "{}", tests::texts(&guided).1);
@@ -179,4 +184,38 @@ fn guided_at_the_terminal_a_series_gives_a_certificate() {
         // The virtual sensor without defects: 0.1 mN a count.
         assert!(low < 1e4 && 1e4 < high && high - low < 100.0, "{parameter}");
     }
+}
+
+/// A series taken in two sessions gives the certificate that it gives in one: the same rows, the same numbers.
+#[test]
+fn a_series_in_two_sessions_is_one_series() {
+    use std::io::Write as _;
+    let folder = tempfile::tempdir().unwrap();
+    let text = series(&Defects::none());
+    let rows: Vec<Vec<String>> =
+        text.lines().skip(1).map(|l| l.split(',').map(String::from).collect()).collect();
+    let (first, second) = rows.split_at(rows.len() / 2);
+    for (part, last) in [(first, false), (second, true)] {
+        let mut guided = guided(folder.path(), "weighed.toml");
+        let mut typed = guided.stdin.take().unwrap();
+        for cells in part {
+            writeln!(typed, "{} {} {}", cells[1], cells[2], cells[5]).unwrap();
+            writeln!(typed, "{} {}", cells[3], cells[4]).unwrap();
+        }
+        if last {
+            writeln!(typed, "done").unwrap();
+        }
+        drop(typed);
+        let done = guided.wait_with_output().unwrap();
+        assert_eq!(done.status.success(), last, "{}", tests::texts(&done).1);
+    }
+    let kept = std::fs::read_to_string(folder.path().join("weighed.csv")).unwrap();
+    let counts = |line: &str| line.split(',').skip(1).take(4).map(String::from).collect::<Vec<_>>();
+    let kept: Vec<Vec<String>> = kept.lines().skip(1).map(counts).collect();
+    assert_eq!(kept.len(), rows.len());
+    for (kept, typed) in kept.iter().zip(&rows) {
+        assert_eq!(kept[0], typed[1]);
+        assert_eq!(kept[2].parse::<f64>().unwrap(), typed[3].parse::<f64>().unwrap());
+    }
+    assert!(!folder.path().join("weighed.csv.part").exists() && folder.path().join("weighed.toml").exists());
 }

@@ -1,7 +1,7 @@
 //! Finger: friction without vibration of the virtual fingertip, its coefficient withheld; and the command of the
 //! inverse analysis on a file of phases made by another mesh and step.
 
-use crate::bench::{Coverage, TRIALS, seed};
+use crate::bench::{Coverage, seed, trials};
 use crate::bound::{independent, jacobian};
 use calibration::finger::friction::{FrictionPoint, friction};
 use calibration::uncertainty::student::coverage_factor;
@@ -46,7 +46,7 @@ fn passes(finger: &Finger, defects: &Defects, draw: &mut Noise) -> Vec<FrictionP
 #[test]
 fn friction_and_its_exponents_are_covered_as_stated() {
     let mut covered: [Coverage; 3] = Default::default();
-    for trial in 0..TRIALS {
+    for trial in 0..trials() {
         let mut draw = Noise::new(seed(trial), "friction bench");
         let config = FingerConfig { mu0: draw.between(0.2, 1.2), ..FingerConfig::default() };
         let finger = Finger::new(&config, seed(trial));

@@ -1,6 +1,6 @@
 //! Force: withheld gains, cross-talk, offsets, load errors and directions are recovered as stated.
 
-use crate::bench::{AVERAGE_S, Coverage, ForceBench, PERIOD_S, TRIALS, seed};
+use crate::bench::{AVERAGE_S, Coverage, ForceBench, PERIOD_S, seed, trials};
 use calibration::certificate::{Certificate, Circumstances, Instrument, Kind, Occasion, RawData};
 use calibration::force::apply::ForceCalibration;
 use calibration::force::matrix::{ForceError, Linearity, Options, Term, fit};
@@ -63,7 +63,7 @@ fn gains_and_cross_talk_are_covered_as_stated() {
     let mut gains: [Coverage; 4] = Default::default();
     let mut applied: [Coverage; 2] = Default::default();
     let mut refused = 0;
-    for trial in 0..TRIALS {
+    for trial in 0..trials() {
         let mut bench = ForceBench::new(seed(trial), &weighing);
         let readings = bench.series();
         let found = match fit(&readings, &weighing, &Options::default()) {
@@ -105,8 +105,8 @@ fn gains_and_cross_talk_are_covered_as_stated() {
             applied[a].add([got[a] - half, got[a] + half], force[a]);
         }
     }
-    println!("refused: {refused} of {TRIALS}");
-    assert!(refused <= 8, "at most 2 % of good series may be refused");
+    println!("refused: {refused} of {}", trials());
+    assert!(50 * refused <= trials(), "at most 2 % of good series may be refused");
     for (k, name) in ["lateral on lateral", "normal on lateral", "lateral on normal", "normal on normal"]
         .iter()
         .enumerate()

@@ -1,6 +1,6 @@
 //! Latency and clocks: withheld delays, bandwidths and drifts of the virtual sensor.
 
-use crate::bench::{Coverage, TRIALS, seed};
+use crate::bench::{Coverage, seed, trials};
 use crate::bound::{information, jacobian};
 use calibration::force::dynamics::{second_order_step, step_response};
 use calibration::latency::{channel_delay, clock};
@@ -52,7 +52,7 @@ fn delay_bound(c: &SensorConfig) -> f64 {
 #[test]
 fn delays_and_clock_drift_are_covered_as_stated() {
     let (mut delay, mut drift) = (Coverage::default(), Coverage::default());
-    for trial in 0..TRIALS {
+    for trial in 0..trials() {
         let mut draw = Noise::new(seed(trial), "latency bench");
         let config = SensorConfig {
             latency_s: draw.between(0.3e-3, 4e-3),

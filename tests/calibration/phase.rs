@@ -1,6 +1,6 @@
 //! Phase: a non-linear oscillator in the time domain behind two vibrometers with withheld delay errors.
 
-use crate::bench::{Coverage, TRIALS, seed};
+use crate::bench::{Coverage, seed, trials};
 use calibration::amplitude::vibrometer::Decoder;
 use calibration::phase::{Shift, Waveforms, repeated, shift};
 use calibration::uncertainty::student::coverage_factor;
@@ -97,7 +97,7 @@ fn delayed(lines: &[(f64, f64, f64)], n: usize, delay_s: f64) -> Vec<f64> {
 fn phase_shifts_over_ten_repeats_are_covered_as_stated() {
     let mut covered = Coverage::default();
     let delay_sd = 0.1e-6;
-    for trial in 0..TRIALS {
+    for trial in 0..trials() {
         let mut draw = Noise::new(seed(trial), "phase bench");
         let (natural, zeta, bend) =
             (draw.between(25e3, 60e3), draw.between(0.2, 0.5), draw.between(0.0, 0.15));

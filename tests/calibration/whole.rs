@@ -47,7 +47,7 @@ fn certify(at: &Path, args: &str) {
 
 /// The ideal rig's setup with serials, these certificates, and more lines at its head.
 fn setup(certificates: &str, more: &str) -> String {
-    let text = std::fs::read_to_string(tests::file("rig/setups/virtual-ideal.toml")).unwrap();
+    let text = std::fs::read_to_string(tests::file("runs/setups/virtual-ideal.toml")).unwrap();
     text.replace(
         "name = \"virtual-ideal\"",
         &format!("name = \"calibrated\"\ncertificates = [{certificates}]\n{more}"),

@@ -12,9 +12,9 @@ pub const ALL: &[(&str, fn(&[u8], &mut Chance))] =
 pub fn configuration(input: &[u8], _: &mut Chance) {
     let Ok(text) = std::str::from_utf8(input) else { return };
     let refusals = [
-        rig::setup::Setup::parse("fuzz", text, Path::new(".")).err(),
-        rig::plan::Plan::parse("fuzz", text).err(),
-        rig::model_file::load("fuzz", text).err(),
+        runs::setup::Setup::parse("fuzz", text, Path::new(".")).err(),
+        runs::plan::Plan::parse("fuzz", text).err(),
+        runs::model_file::load("fuzz", text).err(),
     ];
     for refusal in refusals.into_iter().flatten() {
         assert!(!format!("{refusal:?}").is_empty());

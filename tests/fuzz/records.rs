@@ -22,7 +22,7 @@ pub fn records(input: &[u8], _: &mut Chance) {
 
 /// Tables of passes: whatever is read has finite numbers.
 pub fn tables(input: &[u8], _: &mut Chance) {
-    for pass in models::record::read_passes(input).into_iter().flatten() {
+    for pass in models::pass::read_passes(input).into_iter().flatten() {
         assert!(pass.normal_force_n.is_finite());
     }
 }

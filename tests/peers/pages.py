@@ -30,6 +30,53 @@ LOOK = """() => {
   };
 }"""
 
+
+
+def explored(browser, path):
+    """What is wrong with the part of a run's page that is worked with: hover, click, legend, files; and the page without scripts."""
+    page, faults = browser.new_page(viewport={"width": 1200, "height": 900}), []
+    page.set_default_timeout(WITHIN_MS)
+    page.on("pageerror", lambda e: faults.append(str(e)))
+    page.goto(path.as_uri())
+    over = page.locator("#explore .u-over").first
+    over.scroll_into_view_if_needed()
+    box, tip = over.bounding_box(), None
+    for step in range(2, 98):
+        for up in range(4, 96, 6):
+            page.mouse.move(box["x"] + box["width"] * step / 100, box["y"] + box["height"] * up / 100)
+            tip = page.evaluate("() => document.querySelector('.tip:not([hidden])')?.textContent")
+            if tip:
+                break
+        if tip:
+            break
+    number = (tip or "pass none:").split(":")[0].removeprefix("pass ")
+    page.mouse.down()
+    page.mouse.up()
+    if page.evaluate("() => document.getElementById('pass').value") != number:
+        faults.append(f"a click on '{tip}' does not show its forces")
+    if f"pass {number}:" not in page.locator("figure", has=page.locator("h2", has_text="Forces")).inner_text():
+        faults.append(f"the forces are not said to be those of pass {number}")
+    rows = []
+    for _ in range(2):
+        with page.expect_download() as got:
+            page.locator("#explore button", has_text="CSV").first.click()
+        rows.append(Path(got.value.path()).read_text().splitlines())
+        page.locator("#explore button[aria-pressed]").first.click()
+    if not (len(rows[0]) > len(rows[1]) > 1 and {"point", "time_s", "w_um"} <= set(rows[0][0].split(","))):
+        faults.append(f"the legend hides nothing: {len(rows[0])} and {len(rows[1])} rows")
+    with page.expect_download() as got:
+        page.locator("button", has_text="SVG").first.click()
+    if not Path(got.value.path()).read_text().startswith("<svg"):
+        faults.append("the figure's file is no SVG")
+    page.close()
+    quiet = browser.new_context(java_script_enabled=False).new_page()
+    quiet.goto(path.as_uri())
+    if quiet.locator("#explore").is_visible() or not quiet.locator("svg").first.is_visible():
+        faults.append("without scripts the figures do not stand")
+    quiet.close()
+    return faults
+
+
 out, pages = Path(sys.argv[1]), [Path(p).resolve() for p in sys.argv[2:]]
 # A busy machine draws a page slowly: this is for one that never does.
 WITHIN_MS = 180_000
@@ -40,6 +87,7 @@ axe, seen = Axe(), []
 with sync_playwright() as p:
     browser = p.chromium.launch(executable_path=chromium, timeout=WITHIN_MS, args=["--no-sandbox", "--disable-gpu"])
     for path in pages:
+        tried = explored(browser, path) if path.name == "report.html" else []
         for width in WIDTHS:
             for scheme in ["light", "dark"]:
                 page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
@@ -65,7 +113,7 @@ with sync_playwright() as p:
                         page.keyboard.press("Enter")
                 folded = page.evaluate("() => [...document.querySelectorAll('details:not([open])')].length")
                 seen.append(
-                    dict(page=path.name, width=width, scheme=scheme, axe=faults, asked=asked, ran=ran,
+                    dict(page=path.name, width=width, scheme=scheme, axe=faults, tried=tried, asked=asked, ran=ran,
                          details=opened, folded=folded, **look)
                 )
                 page.close()

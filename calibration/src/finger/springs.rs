@@ -8,8 +8,8 @@
 use super::FingerError;
 use models::condition::Condition;
 use models::finger::Finger;
+use models::pass::{Pass, coulomb_coefficient};
 use models::quantity::PeakToPeak;
-use models::record::{Pass, coulomb_coefficient};
 use models::rig_file::PassNoise;
 use models::spring_slider;
 use nalgebra::{DMatrix, DVector};

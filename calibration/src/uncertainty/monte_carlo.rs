@@ -29,13 +29,6 @@ impl Sampled {
         (sum / (self.sorted.len() as f64 - 1.0)).sqrt()
     }
 
-    /// The probabilistically symmetric coverage interval (Supplement 1, 7.7.2).
-    pub fn symmetric_interval(&self, coverage: f64) -> [f64; 2] {
-        let n = self.sorted.len();
-        let at = |p: f64| self.sorted[((p * n as f64) as usize).min(n - 1)];
-        [at(0.5 - 0.5 * coverage), at(0.5 + 0.5 * coverage)]
-    }
-
     /// The shortest coverage interval (Supplement 1, 5.3.4).
     pub fn shortest_interval(&self, coverage: f64) -> [f64; 2] {
         let n = self.sorted.len();

@@ -4,7 +4,7 @@ use super::*;
 use crate::example::{Deviates, rig, table};
 use crate::hypotheses::Options;
 use crate::verdict::diagnose;
-use models::record::read_passes;
+use models::pass::read_passes;
 
 /// A table of passes of a plate that stands still: friction of 0.5 N/N, forces by a rule.
 fn still(count: usize, force: impl Fn(usize, f64, f64) -> f64) -> Vec<Pass> {

@@ -46,6 +46,8 @@ pub(super) struct Orders {
     off_sent: Option<Nanos>,
     /// It was refused, wholly or in part.
     refused: bool,
+    /// Heartbeats that a supply's switch was sent. They count what leaves: of a coil that has two values, none may be skipped.
+    beats: u32,
 }
 
 impl Orders {
@@ -127,7 +129,15 @@ impl Endpoint {
                     return self.safe(now);
                 }
                 wanted.sent = true;
-                let (set_points, on) = (wanted.set_points.clone(), wanted.on);
+                let (mut set_points, on) = (wanted.set_points.clone(), wanted.on);
+                if matches!(self.part, Part::Supply { .. }) {
+                    // Each is a new command of the loop: a loop that is dead feeds no watchdog.
+                    self.orders.beats = self.orders.beats.wrapping_add(1);
+                    let beat = heartbeat(&self.profile, self.orders.beats);
+                    // Before what closes, behind what opens.
+                    let at = if on { 0 } else { set_points.len() };
+                    drop(set_points.splice(at..at, beat));
+                }
                 self.orders.driven |= on;
                 self.orders.off_sent = if on { None } else { Some(now) };
                 self.health.count(&self.health.commands_sent);
@@ -259,9 +269,6 @@ impl Endpoint {
         let set = |name: &str, si: f64| {
             profile.set(name).map(|set| (set, si / profile.description.set[set.0].si.factor))
         };
-        let heartbeat = |sequence: u32| {
-            profile.set("heartbeat").map(|set| (set, f64::from(sequence) % profile.heartbeat_turns(set)))
-        };
         match &self.part {
             Part::Force { .. } | Part::Contacts(_) => None,
             Part::Supply { link, .. } => {
@@ -282,7 +289,7 @@ impl Endpoint {
                     // Off leaves the frequency as it is: there may be no valid one.
                     safe_set_points(profile)
                 };
-                set_points.extend(heartbeat(command.sequence));
+                set_points.extend(heartbeat(profile, command.sequence));
                 Some(Wanted { set_points, on: command.enable, expires_at: command.expires_at, sent: false })
             }
             Part::Stage { link, dead_weight_n, .. } => {
@@ -300,7 +307,7 @@ impl Endpoint {
                     set("velocity", command.velocity_m_s),
                     set("load", command.normal_force_n),
                     set("enable", f64::from(u8::from(!command.rests()))),
-                    heartbeat(command.sequence),
+                    heartbeat(profile, command.sequence),
                 ];
                 Some(Wanted {
                     set_points: wanted.into_iter().flatten().collect(),
@@ -311,6 +318,12 @@ impl Endpoint {
             }
         }
     }
+}
+
+/// The heartbeat of a count, where the profile has one.
+fn heartbeat(profile: &Profile, count: u32) -> Option<(SetId, f64)> {
+    let set = profile.set("heartbeat")?;
+    Some((set, profile.heartbeat_value(set, count)))
 }
 
 fn safe_set_points(profile: &Profile) -> Vec<(SetId, f64)> {

@@ -49,58 +49,188 @@ pub struct DbcMessage {
     pub length: usize,
     /// Signals by name.
     pub signals: HashMap<String, DbcSignal>,
+    /// What is wrong with it, with the line: nobody may use it.
+    pub fault: Option<String>,
 }
 
-/// All messages of a file, by name.
+/// The message in which editors store signals that no message has.
+const STORE: &str = "VECTOR__INDEPENDENT_SIG_MSG";
+
+/// A line that begins a message: its number, identifier and name, and the lines and names of its signals.
+struct Beginning {
+    line: usize,
+    raw: u64,
+    name: String,
+    signals: Vec<(usize, String)>,
+}
+
+/// Where the messages of a file begin; lines within texts are none.
+fn beginnings(text: &str) -> Vec<Beginning> {
+    let (mut all, mut quoted) = (Vec::<Beginning>::new(), false);
+    for (number, line) in (1..).zip(text.lines()) {
+        let outside = !quoted;
+        quoted ^= line.replace("\\\"", "").matches('"').count() % 2 == 1;
+        let line = line.trim_start();
+        let mut words = line.split(|c: char| c.is_whitespace() || c == ':').filter(|w| !w.is_empty());
+        match (words.next().filter(|_| outside), words.next(), words.next()) {
+            (Some("BO_"), Some(raw), Some(name)) => {
+                if let Ok(raw) = raw.parse() {
+                    all.push(Beginning { line: number, raw, name: name.into(), signals: Vec::new() });
+                }
+            }
+            (Some("SG_"), Some(name), _) => {
+                if let Some(message) = all.last_mut() {
+                    message.signals.push((number, name.into()));
+                }
+            }
+            _ => {}
+        }
+    }
+    all
+}
+
+impl Beginning {
+    /// The identifier, and whether it has 29 bits.
+    fn identifier(&self) -> Result<(u32, bool), String> {
+        // Bit 31 marks identifiers of 29 bits. Some files leave it out where 11 bits are not enough.
+        let id = self.raw & 0x7FFF_FFFF;
+        let id = u32::try_from(id).ok().filter(|id| *id <= 0x1FFF_FFFF && self.raw <= u64::from(u32::MAX));
+        let id = id.ok_or_else(|| {
+            format!("line {}: the identifier {} of {} has more than 29 bits", self.line, self.raw, self.name)
+        })?;
+        Ok((id, self.raw >> 31 == 1 || id > 0x7FF))
+    }
+
+    /// Two signals of one name.
+    fn twice(&self) -> Option<String> {
+        self.signals.iter().enumerate().find_map(|(k, (line, name))| {
+            let (first, _) = self.signals[..k].iter().find(|(_, n)| n == name)?;
+            Some(format!("the message {} has two signals {name}, lines {first} and {line}", self.name))
+        })
+    }
+}
+
+/// The refusal of a file that is no DBC file, with the place where reading stopped.
+fn no_dbc(text: &str, error: &can_dbc::DbcError) -> String {
+    let said = error.to_string();
+    let place = said.split_once("--> ").and_then(|(_, rest)| {
+        let (line, rest) = rest.split_once(':')?;
+        let column = rest.split_whitespace().next()?;
+        Some((line.trim().parse::<usize>().ok()?, column.parse::<usize>().ok()?))
+    });
+    match place {
+        Some((line, column)) => {
+            let shown = text.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();
+            format!("no DBC file: line {line} cannot be read from column {column} on: `{shown}`")
+        }
+        None => format!("no DBC file: {said}"),
+    }
+}
+
+/// All messages of a file, by name, and by their long name where the file has one. What is wrong with a message is its
+/// `fault`: a file serves for its other messages.
 ///
 /// # Errors
-/// Where the file is no DBC file, or a signal does not lie within its message.
+/// Where the file is no DBC file.
 pub fn parse(text: &str) -> Result<HashMap<String, DbcMessage>, String> {
-    let dbc = can_dbc::Dbc::try_from(text).map_err(|error| format!("no DBC file: {error:?}"))?;
-    let mut messages = HashMap::new();
-    for message in &dbc.messages {
-        let length = usize::try_from(message.size).map_err(|_| "a message is too long".to_string())?;
-        let mut signals = HashMap::new();
-        let ranges = |name: &str| {
-            dbc.extended_multiplex.iter().any(|one| one.message_id == message.id && one.signal_name == name)
-        };
-        for signal in &message.signals {
-            let float = match dbc.extended_value_type_for_signal(message.id, &signal.name) {
-                None | Some(can_dbc::SignalExtendedValueType::SignedOrUnsignedInteger) => None,
-                Some(can_dbc::SignalExtendedValueType::IEEEfloat32Bit) => Some(32),
-                Some(can_dbc::SignalExtendedValueType::IEEEdouble64bit) => Some(64),
-            };
-            if float.is_some_and(|bits| bits != signal.size) {
-                return Err(format!("signal {} is a float of {} bits", signal.name, signal.size));
-            }
-            let place = DbcSignal {
-                start: u16::try_from(signal.start_bit).map_err(|_| "a start bit is too large")?,
-                size: u16::try_from(signal.size).map_err(|_| "a signal is too wide")?,
-                little_endian: signal.byte_order == can_dbc::ByteOrder::LittleEndian,
-                signed: signal.value_type == can_dbc::ValueType::Signed,
-                float: float.is_some(),
-                multiplex: match signal.multiplexer_indicator {
-                    _ if ranges(&signal.name) => Multiplex::Nested,
-                    can_dbc::MultiplexIndicator::Plain => Multiplex::Always,
-                    can_dbc::MultiplexIndicator::Multiplexor => Multiplex::Selector,
-                    can_dbc::MultiplexIndicator::MultiplexedSignal(value) => Multiplex::Where(value),
-                    can_dbc::MultiplexIndicator::MultiplexorAndMultiplexedSignal(_) => Multiplex::Nested,
-                },
-                factor: signal.factor,
-                offset: signal.offset,
-            };
-            if !place.fits(length) {
-                return Err(format!("signal {} does not lie within message {}", signal.name, message.name));
-            }
-            signals.insert(signal.name.clone(), place);
+    let dbc = can_dbc::Dbc::try_from(text).map_err(|error| no_dbc(text, &error))?;
+    let beginnings = beginnings(text);
+    let mut messages = HashMap::<String, DbcMessage>::new();
+    for (k, message) in dbc.messages.iter().enumerate().filter(|(_, message)| message.name != STORE) {
+        let own = |b: &&Beginning| b.name == message.name;
+        let begins = beginnings.get(k).filter(own).or_else(|| beginnings.iter().find(own));
+        let begins = begins.ok_or_else(|| format!("the message {} cannot be found again", message.name))?;
+        let mut read = one(&dbc, message, begins);
+        if let Some(first) = beginnings[..k.min(beginnings.len())].iter().find(own) {
+            read.fault = Some(format!(
+                "there are two messages {}, lines {} and {}",
+                message.name, first.line, begins.line
+            ));
         }
-        let (id, extended) = match message.id {
-            can_dbc::MessageId::Standard(id) => (u32::from(id), false),
-            can_dbc::MessageId::Extended(id) => (id, true),
+        let attribute = |name: &str| match dbc.message_attribute(message.id, name) {
+            Some(can_dbc::AttributeValue::String(long)) if !long.is_empty() => Some(long.clone()),
+            _ => None,
         };
-        messages.insert(message.name.clone(), DbcMessage { id, extended, length, signals });
+        if let Some(long) = attribute("SystemMessageLongSymbol").filter(|long| !messages.contains_key(long)) {
+            messages.insert(long, read.clone());
+        }
+        messages.insert(message.name.clone(), read);
     }
     Ok(messages)
+}
+
+/// One message, with what is wrong with it.
+fn one(dbc: &can_dbc::Dbc, message: &can_dbc::Message, begins: &Beginning) -> DbcMessage {
+    let (id, length) = (begins.identifier(), usize::try_from(message.size).unwrap_or(usize::MAX));
+    let mut fault = id.clone().err().or_else(|| begins.twice());
+    let mut signals = HashMap::new();
+    let line =
+        |name: &str| begins.signals.iter().find(|(_, n)| n == name).map_or(begins.line, |(line, _)| *line);
+    // Identifiers that differ only in what the reader cuts off would share what stands apart from the messages.
+    let alike = dbc.messages.iter().filter(|other| other.id == message.id).count();
+    let apart = dbc.extended_multiplex.iter().any(|one| one.message_id == message.id)
+        || dbc.signal_extended_value_type_list.iter().any(|one| one.message_id == message.id);
+    if alike > 1 && apart {
+        fault = fault.or(Some(format!(
+            "line {}: another message has the identifier of {}",
+            begins.line, message.name
+        )));
+    }
+    for signal in &message.signals {
+        match place(dbc, message, signal, length) {
+            Ok(place) => {
+                if let Some(can_dbc::AttributeValue::String(long)) =
+                    dbc.signal_attribute(message.id, &signal.name, "SystemSignalLongSymbol")
+                {
+                    signals.entry(long.clone()).or_insert(place);
+                }
+                signals.insert(signal.name.clone(), place);
+            }
+            Err(why) => fault = fault.or(Some(format!("line {}: {why}", line(&signal.name)))),
+        }
+    }
+    let (id, extended) = id.unwrap_or((u32::MAX, true));
+    DbcMessage { id, extended, length, signals, fault }
+}
+
+/// Where a signal is in its message.
+fn place(
+    dbc: &can_dbc::Dbc,
+    message: &can_dbc::Message,
+    signal: &can_dbc::Signal,
+    length: usize,
+) -> Result<DbcSignal, String> {
+    let ranges =
+        dbc.extended_multiplex.iter().any(|o| o.message_id == message.id && o.signal_name == signal.name);
+    let float = match dbc.extended_value_type_for_signal(message.id, &signal.name) {
+        None | Some(can_dbc::SignalExtendedValueType::SignedOrUnsignedInteger) => None,
+        Some(can_dbc::SignalExtendedValueType::IEEEfloat32Bit) => Some(32),
+        Some(can_dbc::SignalExtendedValueType::IEEEdouble64bit) => Some(64),
+    };
+    if float.is_some_and(|bits| bits != signal.size) {
+        return Err(format!("signal {} is a float of {} bits", signal.name, signal.size));
+    }
+    let place = DbcSignal {
+        start: u16::try_from(signal.start_bit).map_err(|_| "a start bit is too large")?,
+        size: u16::try_from(signal.size).map_err(|_| "a signal is too wide")?,
+        little_endian: signal.byte_order == can_dbc::ByteOrder::LittleEndian,
+        signed: signal.value_type == can_dbc::ValueType::Signed,
+        float: float.is_some(),
+        multiplex: match signal.multiplexer_indicator {
+            _ if ranges => Multiplex::Nested,
+            can_dbc::MultiplexIndicator::Plain => Multiplex::Always,
+            can_dbc::MultiplexIndicator::Multiplexor => Multiplex::Selector,
+            can_dbc::MultiplexIndicator::MultiplexedSignal(value) => Multiplex::Where(value),
+            can_dbc::MultiplexIndicator::MultiplexorAndMultiplexedSignal(_) => Multiplex::Nested,
+        },
+        factor: signal.factor,
+        offset: signal.offset,
+    };
+    if place.fits(length) {
+        Ok(place)
+    } else {
+        Err(format!("signal {} does not lie within message {}", signal.name, message.name))
+    }
 }
 
 impl DbcMessage {
@@ -253,7 +383,50 @@ mod tests {
     #[test]
     fn a_signal_outside_its_message_is_refused() {
         let text = TEXT.replace("Fx : 0|16", "Fx : 60|16");
-        assert!(parse(&text).unwrap_err().contains("Fx"));
-        assert!(parse("hello").is_err());
+        let messages = parse(&text).unwrap();
+        assert!(
+            messages["Short"].fault.as_ref().unwrap().contains("line 11: signal Fx"),
+            "{:?}",
+            messages["Short"].fault
+        );
+        assert_eq!(messages["Meas"].fault, None, "the other one serves");
+        assert!(parse("hello").unwrap_err().contains("line 1"));
+    }
+
+    #[test]
+    fn identifiers_that_do_not_fit_and_names_that_stand_twice_are_told_with_their_lines() {
+        let fault = |text: &str, name: &str| parse(text).unwrap()[name].fault.clone().unwrap_or_default();
+        for (raw, id) in [("5000", 5000), ("2147483736", 0x58), ("2047", 0x7FF), ("536870911", 0x1FFF_FFFF)] {
+            let messages = parse(&TEXT.replace("437", raw)).unwrap();
+            assert_eq!((messages["Short"].id, messages["Short"].fault.clone()), (id, None), "{raw}");
+            assert_eq!(messages["Short"].extended, raw != "2047", "{raw}");
+        }
+        for raw in ["536871000", "3221225472", "4294967295"] {
+            let said = fault(&TEXT.replace("437", raw), "Short");
+            assert!(said.contains("line 10") && said.contains(raw) && said.contains("29 bits"), "{said}");
+        }
+        let twice = TEXT.replace(" SG_ Odd", " SG_ Fx : 32|16@1- (1,0) [0|0] \"\" RIG\n SG_ Odd");
+        assert!(
+            fault(&twice, "Short").contains("two signals Fx, lines 11 and 12"),
+            "{}",
+            fault(&twice, "Short")
+        );
+        assert!(fault(&TEXT.replace("Short", "Meas"), "Meas").contains("lines 6 and 10"));
+        let store =
+            format!("{TEXT}\nBO_ 3221225472 {STORE}: 0 RIG\n SG_ Spare : 0|8@1+ (1,0) [0|0] \"\" RIG\n");
+        let messages = parse(&store).unwrap();
+        assert!(messages.len() == 2 && messages.values().all(|m| m.fault.is_none()), "{messages:?}");
+    }
+
+    #[test]
+    fn long_names_serve_too() {
+        let text = format!(
+            "{TEXT}\nBA_DEF_ BO_ \"SystemMessageLongSymbol\" STRING ;\nBA_DEF_ SG_ \"SystemSignalLongSymbol\" STRING ;\nBA_ \"SystemMessageLongSymbol\" BO_ 437 \"AVeryLongNameOfAMessage\";\nBA_ \"SystemSignalLongSymbol\" SG_ 437 Fx \"AVeryLongNameOfASignal\";\n"
+        );
+        let messages = parse(&text).unwrap();
+        assert_eq!(
+            messages["AVeryLongNameOfAMessage"].signals["AVeryLongNameOfASignal"],
+            messages["Short"].signals["Fx"]
+        );
     }
 }

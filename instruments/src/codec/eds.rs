@@ -27,7 +27,8 @@ pub struct Object {
     pub data_type: u16,
     /// `ro`, `wo`, `rw`, `rwr`, `rww` or `const`.
     pub access: String,
-    /// Value after power-on, where the data sheet states a whole number.
+    /// Value after power-on, where the data sheet states a whole number: that of the device as it is configured
+    /// (`ParameterValue`), else its maker's (`DefaultValue`).
     pub default: Option<DefaultValue>,
 }
 
@@ -62,7 +63,7 @@ pub fn parse(text: &str) -> Result<Objects, String> {
     let mut objects = Objects::new();
     let mut section: Option<(Key, BTreeMap<String, (String, usize)>)> = None;
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line.trim())) {
-        if line.is_empty() || line.starts_with(';') {
+        if line.is_empty() || line.starts_with([';', '#']) {
             continue;
         }
         if let Some(name) = line.strip_prefix('[') {
@@ -74,6 +75,8 @@ pub fn parse(text: &str) -> Result<Objects, String> {
         let (name, value) =
             line.split_once('=').ok_or(format!("line {number}: `{line}` is no `key=value`"))?;
         if let Some((_, entries)) = &mut section {
+            // A remark stands behind a blank and a semicolon.
+            let value = value.find(" ;").or(value.find("\t;")).map_or(value, |at| &value[..at]);
             entries.insert(name.trim().to_ascii_lowercase(), (value.trim().to_string(), number));
         }
     }
@@ -104,22 +107,28 @@ fn close(
         format!("line {line}: {name} of object {index:04X}sub{sub}: `{said}` is no number")
     };
     let whole = |name: &str| entry(name).map(|said| self::number(said).ok_or(wrong(name, said))).transpose();
-    if entries.contains_key("compactsubobj") {
-        return Err(format!("object {index:04X}: CompactSubObj is not read; write its sub-objects out"));
-    }
-    if matches!(whole("objecttype")?, Some(8 | 9)) {
+    let compact = whole("compactsubobj")?.filter(|count| *count > 0);
+    if compact.is_none() && matches!(whole("objecttype")?, Some(8 | 9)) {
         return Ok(());
     }
     let data_type = whole("datatype")?.and_then(|kind| u16::try_from(kind).ok());
     let data_type = data_type.ok_or(format!("object {index:04X}sub{sub} has no DataType"))?;
     let access = entry("accesstype").unwrap_or("rw").to_ascii_lowercase();
-    let default = entry("defaultvalue").and_then(default_of);
+    let default = entry("parametervalue").or_else(|| entry("defaultvalue")).and_then(default_of);
     let name = entry("parametername").unwrap_or_default().to_string();
     let object = Object { name, data_type, access, default };
-    if objects.insert(key, object).is_some() {
-        return Err(format!("object {index:04X}sub{sub} is described twice"));
-    }
-    Ok(())
+    let mut put = |sub: u8, object: Object| match objects.insert((index, sub), object) {
+        Some(_) => Err(format!("object {index:04X}sub{sub} is described twice")),
+        None => Ok(()),
+    };
+    let Some(count) = compact else { return put(sub, object) };
+    // An array in one section (CiA 306, 4.6.3.3): how many there are, then that many of one kind. Values of single ones are
+    // elsewhere, so none is known here.
+    let count = u8::try_from(count).ok().filter(|count| *count < 255);
+    let count = count.ok_or_else(|| wrong("CompactSubObj", entry("compactsubobj").unwrap_or_default()))?;
+    let number = DefaultValue { value: count.into(), plus_node: false };
+    put(0, Object { name: "NrOfObjects".into(), data_type: 5, access: "ro".into(), default: Some(number) })?;
+    (1..=count).try_for_each(|sub| put(sub, Object { default: None, ..object.clone() }))
 }
 
 /// A whole number: decimal, or hexadecimal after `0x`.
@@ -147,16 +156,51 @@ fn default_of(text: &str) -> Option<DefaultValue> {
 /// 0x1400 for what it takes; `cob` is the frame's identifier less the node's number.
 ///
 /// # Errors
-/// Where the data sheet has no such frame, or one that is not made of whole bytes.
+/// Where the data sheet has no such frame that is switched on, or one that is not made of whole bytes.
 pub fn mapping(objects: &Objects, first: u16, cob: u32) -> Result<(Vec<(Key, usize)>, usize), String> {
-    let is_frame = |(&(index, sub), object): (&Key, &Object)| {
-        // Bits 31 and 30 say 'not used' and 'no remote request'.
-        let found = object.default.filter(|d| d.plus_node && d.value & 0x7FF == i64::from(cob));
-        ((first..first + 0x200).contains(&index) && sub == 1 && found.is_some()).then_some(index)
+    let frame = |(&(index, sub), object): (&Key, &Object)| {
+        let within = (first..first + 0x200).contains(&index) && sub == 1;
+        object.default.filter(|_| within).map(|identifier| (index, identifier))
     };
-    let communication = objects.iter().find_map(is_frame).ok_or(format!(
-        "the data sheet has no process data with identifier {cob:#x} plus the node's number"
-    ))?;
+    let frames: Vec<(u16, DefaultValue)> = objects.iter().filter_map(frame).collect();
+    // A sheet that was configured for one node may state its identifier as a whole; only what the base of a frame leaves can be
+    // a node's number.
+    let of_node = |d: &DefaultValue| {
+        let id = d.value & 0x7FF;
+        id == i64::from(cob)
+            || !d.plus_node
+                && id > i64::from(cob)
+                && id <= i64::from(cob) + 127
+                && id & !127 == i64::from(cob)
+    };
+    // Bits 31 and 30 say 'not used' and 'no remote request'.
+    let (off, on): (Vec<_>, Vec<_>) =
+        frames.iter().filter(|(_, d)| of_node(d)).partition(|(_, d)| d.value & 0x8000_0000 != 0);
+    let communication = match (&on[..], &off[..]) {
+        ([(index, _), ..], _) => *index,
+        ([], [(index, _), ..]) => {
+            return Err(format!(
+                "object {index:04X}sub1: the data sheet switches the frame {cob:#x} off (bit 31 of its identifier)"
+            ));
+        }
+        _ => {
+            let known: Vec<String> = frames
+                .iter()
+                .filter(|(_, d)| d.value & 0x8000_0000 == 0)
+                .map(|(_, d)| {
+                    format!(
+                        "{:#x}{}",
+                        d.value & 0x7FF,
+                        if d.plus_node { " plus the node's number" } else { "" }
+                    )
+                })
+                .collect();
+            return Err(format!(
+                "the data sheet has no process data with identifier {cob:#x} plus the node's number; it has {}",
+                if known.is_empty() { "none".into() } else { known.join(", ") }
+            ));
+        }
+    };
     let map = communication + 0x200;
     let value = |sub: u8| objects.get(&(map, sub)).and_then(|object| object.default).map(|d| d.value);
     let count = value(0).ok_or(format!("object {map:04X}sub0 has no default: nothing is mapped"))?;
@@ -209,6 +253,29 @@ mod tests {
             mapping(&parse(&wrong).unwrap(), 0x1800, 0x180).unwrap_err().contains("16 bits"),
             "i32 in 16 bits"
         );
+    }
+
+    #[test]
+    fn configured_sheets_compact_arrays_and_frames_that_are_off() {
+        let map = |sheet: &str| mapping(&parse(sheet).unwrap(), 0x1800, 0x180);
+        let configured = SHEET
+            .replace("DefaultValue=0x60640020", "DefaultValue=0x60640020\nParameterValue=0x606C0020 ; speed")
+            + "[606C]\nDataType=4\nAccessType=ro\n";
+        assert_eq!(map(&configured).unwrap().0[1].0, (0x606C, 0));
+        let off = SHEET.replace("0x40000180", "0xC0000180");
+        assert!(map(&off).unwrap_err().contains("1800sub1") && map(&off).unwrap_err().contains("off"));
+        let another = off
+            + "[1801sub1]\nDataType=7\nDefaultValue=$NODEID+0x180\n[1A01sub0]\nDataType=5\nDefaultValue=1\n\
+            [1A01sub1]\nDataType=7\nDefaultValue=0x60410010\n";
+        assert_eq!(map(&another).unwrap(), (vec![((0x6041, 0), 0)], 2), "the one that is on");
+        assert_eq!(map(&SHEET.replace("$NODEID+0x40000180", "0x185")), map(SHEET), "of node 5");
+        assert!(map(&SHEET.replace("$NODEID+0x40000180", "0x285")).unwrap_err().contains("0x285"));
+        let compact = format!(
+            "{SHEET}[2000]\nObjectType=8\nDataType=6\nAccessType=rw\nDefaultValue=7\nCompactSubObj=3\n"
+        );
+        let objects = parse(&compact).unwrap();
+        assert_eq!(objects[&(0x2000, 0)].default.unwrap().value, 3);
+        assert!(objects[&(0x2000, 3)].data_type == 6 && !objects.contains_key(&(0x2000, 4)));
     }
 
     #[test]

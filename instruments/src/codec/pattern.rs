@@ -9,7 +9,7 @@
 //! | `{*}` | anything, up to what follows |
 //! | `{{`, `}}` | a brace |
 //!
-//! A space stands for one or more of them, and spaces before a number do not count. All else must be there as it is written.
+//! A space stands for one or more of them; spaces before a number and between its sign and its digits do not count. All else must be there as it is written.
 
 /// How a number is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -91,7 +91,9 @@ fn decimal(text: &str) -> Option<(f64, &str)> {
     let bytes = text.as_bytes();
     let digits =
         |from: usize| bytes[from.min(bytes.len())..].iter().take_while(|byte| byte.is_ascii_digit()).count();
-    let sign = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
+    let signed = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
+    // Balances write the sign first and fill up with spaces.
+    let sign = signed + bytes[signed..].iter().take_while(|byte| signed == 1 && **byte == b' ').count();
     let mut end = sign + digits(sign);
     if bytes.get(end) == Some(&b'.') {
         end += 1 + digits(end + 1);
@@ -102,7 +104,8 @@ fn decimal(text: &str) -> Option<(f64, &str)> {
         // A letter that begins a unit is no exponent.
         end += if exponent > 0 { 1 + sign + exponent } else { 0 };
     }
-    text[..end].parse().ok().filter(|number: &f64| number.is_finite()).map(|number| (number, &text[end..]))
+    let number = format!("{}{}", &text[..signed], &text[sign..end]);
+    number.parse().ok().filter(|number: &f64| number.is_finite()).map(|number| (number, &text[end..]))
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -281,6 +284,11 @@ mod tests {
             ("{*}={v} N", "channel two -1.25 N", None),
             ("v{v}{*}", "v3 and so on", Some(vec![3.0])),
             ("{{{v}}}", "{7}", Some(vec![7.0])),
+            ("N {v} g", "N     -   62.916 g", Some(vec![-62.916])),
+            ("N {v} g", "N     +   62.916 g", Some(vec![62.916])),
+            ("N {v} g", "N     -   g", None),
+            ("N {v} g", "N     - - 2 g", None),
+            ("{a},{b}", "- 1,+ 2", Some(vec![-1.0, 2.0])),
             ("{v}", "inf", None),
             ("{v}", "nan", None),
             ("{v}", "1e999", None),

@@ -237,6 +237,11 @@ impl Compiler<'_> {
             let message = messages.get(reply).ok_or_else(|| {
                 self.at(group.name.span(), format!("`{reply}` of `{name}` is no message of the DBC file"))
             })?;
+            if let Some(fault) = &message.fault {
+                return Err(
+                    self.at(group.name.span(), format!("`{reply}` of `{name}` cannot be used: {fault}"))
+                );
+            }
             let id = message.id.checked_sub(group.dbc_base.unwrap_or(0)).ok_or_else(|| {
                 self.at(group.name.span(), format!("the identifier of `{reply}` is below `dbc_base`"))
             })?;

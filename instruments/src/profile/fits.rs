@@ -6,7 +6,7 @@ mod frames;
 use super::compile::Compiler;
 use super::{Frame, FrameKind};
 use crate::error::ProfileError;
-use crate::schema::{Init, LinkKind, Role, Table};
+use crate::schema::{Init, LinkKind, Role, Set, Table};
 use crate::vector::from_hex;
 
 /// What a role needs: signals, and set-points.
@@ -34,7 +34,7 @@ const COMMANDED: &[(Role, &[&str])] = &[
     (Role::DriveUltrasonic, &["amplitude", "frequency", "enable", "heartbeat"]),
     (Role::MotionSlide, &["velocity", "enable", "heartbeat"]),
     (Role::MotionLoad, &["load", "heartbeat"]),
-    (Role::SafetySupply, &["closed"]),
+    (Role::SafetySupply, &["closed", "heartbeat"]),
     (Role::AmbientChamber, &["pressure", "temperature", "humidity"]),
 ];
 
@@ -315,7 +315,20 @@ impl Compiler<'_> {
                 return said("a signal".into());
             }
         }
+        self.check_heartbeat()?;
         self.check_commanded()
+    }
+
+    /// Only a heartbeat has a time that the instrument waits for the next one.
+    fn check_heartbeat(&self) -> Result<(), ProfileError> {
+        let wrong = |set: &&Set| set.timeout_ms.is_some_and(|ms| ms == 0 || set.name.as_ref() != "heartbeat");
+        match self.description.set.iter().find(wrong) {
+            None => Ok(()),
+            Some(set) => {
+                let problem = "`timeout_ms` is above zero, and belongs to the set-point `heartbeat`";
+                Err(self.at(set.name.span(), problem))
+            }
+        }
     }
 
     /// Whether each set-point is one that the roles command.

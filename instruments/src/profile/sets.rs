@@ -3,6 +3,7 @@
 use super::{Profile, SetId};
 use crate::codec::pattern::Pattern;
 use crate::field::Field;
+use crate::schema::Set;
 
 /// One block of set-points, compiled.
 #[derive(Debug, Clone)]
@@ -87,10 +88,18 @@ impl Profile {
         Some(if heard.is_empty() { vec![(set, 1.0)] } else { heard })
     }
 
-    /// How many values a heartbeat has before it runs round.
+    /// The value of a heartbeat's count: it runs round at the end of its range, else of its register.
     #[must_use]
-    pub fn heartbeat_turns(&self, set: SetId) -> f64 {
-        self.sets[set.0].block.map_or(65536.0, |(_, field)| field.number.limits().1 + 1.0)
+    pub fn heartbeat_value(&self, set: SetId, count: u32) -> f64 {
+        let last = self.sets[set.0].block.map_or(65535.0, |(_, field)| field.number.limits().1);
+        let (low, high) = self.description.set[set.0].range.unwrap_or((0.0, last));
+        low + f64::from(count) % (high.min(last) - low + 1.0)
+    }
+
+    /// What feeds the instrument's own watchdog, if it has one.
+    #[must_use]
+    pub fn heartbeat(&self) -> Option<&Set> {
+        self.set("heartbeat").map(|set| &self.description.set[set.0])
     }
 
     /// The value nearest to `value` that the set-point can take (both in its `unit`).

@@ -146,6 +146,9 @@ pub struct Set {
     /// The signal that echoes what the instrument took.
     #[serde(default)]
     pub echo: Option<String>,
+    /// Of a `heartbeat`: how long the instrument waits for another value until it switches off by itself, in ms.
+    #[serde(default)]
+    pub timeout_ms: Option<u32>,
     /// What it is, for the generated documentation.
     #[serde(default)]
     pub text: String,

@@ -4,7 +4,7 @@
 //! and no interpolation error stands between the verdict and the loop. The one exception is ridge inertia,
 //! whose table's error is stated in [`crate::contact::impact::STATED_ERROR`].
 
-use crate::effect::{Effect, Place};
+use crate::effect::Effect;
 use crate::operating::{Baseline, Design};
 use crate::predict::{Active, lateral_force};
 use models::condition::{Ambient, Condition, OutOfDomain};
@@ -227,11 +227,6 @@ impl Corrected {
     /// Stated error of mu' by interpolation.
     pub fn interpolation_error(&self) -> f64 {
         self.interpolation_error
-    }
-
-    /// True where an effect acts on a reading rather than on friction.
-    pub fn acts_on_reading(&self) -> bool {
-        self.effects.iter().any(|c| c.effect.place() == Place::Instrument)
     }
 
     /// Signed mean lateral force that the sensor will read at a pass, N. Allocates nothing.

@@ -107,13 +107,6 @@ impl Plate {
         &self.load
     }
 
-    /// Energy stored in the contact springs, J per metre of depth.
-    pub fn stored_energy(&self) -> f64 {
-        let each = self.penalty.iter().zip(&self.along).zip(&self.stretch).zip(&self.load);
-        each.map(|(((k, along), s), f)| if *k > 0.0 { 0.5 * along * s * s + 0.5 * f * f / k } else { 0.0 })
-            .sum()
-    }
-
     /// Presses and drags the surface: the plate stands at `height` (m) and moves along +x at `speed` (m/s).
     #[inline]
     pub fn touch(&mut self, surface: &mut Surface<'_>, height: f64, speed: f64) -> ContactForce {

@@ -144,6 +144,7 @@ impl Running {
             watch,
             life: Arc::clone(&life),
             origin_ns: monotonic_ns(),
+            held: None,
         };
         let thread = std::thread::spawn(move || run(parts, None));
         Running { scene, queue, life, rows, thread }

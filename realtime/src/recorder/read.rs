@@ -47,8 +47,13 @@ pub enum Entry {
 const LONGEST: u64 = 64 << 20;
 /// Length of an opcode and the length that follows it.
 const HEAD: usize = 9;
-/// Bytes that are looked through at once for the next good record.
-const WINDOW: usize = 64 * 1024;
+/// Bytes that are looked through at once for the next good record: few at first, for it is mostly near.
+const WINDOWS: std::ops::RangeInclusive<usize> = 256..=64 * 1024;
+/// Bytes that are read for what turns out to be no record, in lengths of the file, and beyond them: bytes that look like heads of long
+/// chunks would otherwise cost the square of the file.
+const IN_VAIN: (u64, u64) = (4, 1 << 20);
+/// What a look at something that is no record costs at least, in bytes: a place is looked up, and a buffer is filled.
+const A_LOOK: u64 = 8 * 1024;
 
 /// Reads whatever a record still holds, in the order it was written. Never panics, never invents: what a checksum does not
 /// vouch for is left out and noted in [`Reader::integrity`], and reading goes on behind it.
@@ -62,6 +67,10 @@ pub struct Reader<R> {
     wanted: Wanted,
     /// Number of the last message of every topic.
     last: [u32; TOPICS.len()],
+    /// Length of the file when reading began.
+    size: Option<u64>,
+    /// Bytes that were read for what turned out to be no record.
+    in_vain: u64,
     /// Of the data so far, then of the index; `None` once something was left out.
     checksum: Option<crc32fast::Hasher>,
     found: Integrity,
@@ -102,6 +111,8 @@ impl<R: Read + Seek> Reader<R> {
             messages: VecDeque::new(),
             wanted: Wanted::All,
             last: [0; TOPICS.len()],
+            size: None,
+            in_vain: 0,
             checksum: Some(crc32fast::Hasher::new()),
             found: Integrity::default(),
         }
@@ -142,9 +153,10 @@ impl<R: Read + Seek> Reader<R> {
         Ok(Ok(Some((head[0], length, head))))
     }
 
-    /// Reads the record of the format that begins here; `None` at the end of the file.
-    fn record(&mut self) -> Result<Option<(Sound, [u8; HEAD])>, Trouble> {
+    /// Reads the record of the format that begins at `at`, where the file is read now; `None` at the end of the file.
+    fn record(&mut self, at: u64) -> Result<Option<(Sound, [u8; HEAD])>, Trouble> {
         let bad = |e: std::io::Error| Trouble::Bad(e.to_string());
+        let size = self.size(at).map_err(bad)?;
         let Some((opcode, length, head)) = self.head().map_err(bad)?? else { return Ok(None) };
         if !known(opcode) {
             return Err(Trouble::Bad(format!("no record is of the kind {opcode:#04x}")));
@@ -152,10 +164,14 @@ impl<R: Read + Seek> Reader<R> {
         if length > LONGEST {
             return Err(Trouble::Bad(format!("a record of {length} bytes is longer than any")));
         }
-        if !self.fill(length).map_err(bad)? {
+        if at + HEAD as u64 + length > size || !self.fill(length).map_err(bad)? {
             return Err(Trouble::Short);
         }
-        sound(opcode, &self.body, self.wanted).map(|sound| Some((sound, head))).map_err(Trouble::Bad)
+        let sound = sound(opcode, &self.body, self.wanted).map_err(Trouble::Bad);
+        if sound.is_err() {
+            self.in_vain += length + A_LOOK;
+        }
+        Ok(Some((sound?, head)))
     }
 
     fn seek(&mut self, to: u64) -> Result<(), Trouble> {
@@ -165,26 +181,44 @@ impl<R: Read + Seek> Reader<R> {
     /// The next place from `from` on where a sound record begins, by its checksum or by its form alone where it is the mark of the
     /// data's end.
     fn next_sound(&mut self, from: u64) -> Option<u64> {
-        let mut window = Vec::with_capacity(WINDOW);
-        let mut base = from;
+        let mut window = Vec::new();
+        let (mut base, mut length, size) = (from, *WINDOWS.start(), self.size(from).ok()?);
         loop {
             self.seek(base).ok()?;
             window.clear();
-            (&mut self.from).take(WINDOW as u64).read_to_end(&mut window).ok()?;
+            (&mut self.from).take(length as u64).read_to_end(&mut window).ok()?;
             let starts = window.len().checked_sub(HEAD)?;
-            for i in (0..=starts).filter(|i| may_begin(&window[*i..])) {
+            for i in 0..=starts {
                 let at = base + i as u64;
+                if may_begin(&window[i..]).is_none_or(|length| at + HEAD as u64 + length > size) {
+                    continue;
+                }
+                if self.is_in_vain(size) {
+                    return None;
+                }
                 self.seek(at).ok()?;
-                if matches!(self.record(), Ok(Some(_))) {
+                if matches!(self.record(at), Ok(Some(_))) {
                     return Some(at);
                 }
             }
             base += starts as u64 + 1;
+            length = (2 * length).min(*WINDOWS.end());
         }
     }
 
-    fn size(&mut self) -> u64 {
-        self.from.seek(SeekFrom::End(0)).unwrap_or(self.at)
+    /// Whether so much was read for nothing that the search ends.
+    fn is_in_vain(&self, size: u64) -> bool {
+        self.in_vain > IN_VAIN.0.saturating_mul(size).saturating_add(IN_VAIN.1)
+    }
+
+    /// Length of the file; it is read on from `at` then.
+    fn size(&mut self, at: u64) -> std::io::Result<u64> {
+        if let Some(size) = self.size {
+            return Ok(size);
+        }
+        let size = self.from.seek(SeekFrom::End(0))?;
+        self.from.seek(SeekFrom::Start(at))?;
+        Ok(*self.size.insert(size))
     }
 
     /// Leaves out what cannot be read from here on, up to the next good record; without one the record is cut here.
@@ -202,9 +236,14 @@ impl<R: Read + Seek> Reader<R> {
                 self.at = next;
             }
             _ => {
-                let size = self.size();
+                let size = self.size(from).unwrap_or(from);
                 self.part = Part::Over;
-                self.found.cut = Some(format!("nothing can be read behind byte {from} of {size} ({why})"));
+                let what = if self.is_in_vain(size) {
+                    "too much looks like a record and is none: the search ended, and nothing is read"
+                } else {
+                    "nothing can be read"
+                };
+                self.found.cut = Some(format!("{what} behind byte {from} of {size} ({why})"));
             }
         }
     }
@@ -232,7 +271,7 @@ impl<R: Read + Seek> Reader<R> {
 
     /// Reads on in the data.
     fn data(&mut self) -> Option<Entry> {
-        let (sound, head) = match self.record() {
+        let (sound, head) = match self.record(self.at) {
             Ok(Some(read)) => read,
             Ok(None) => {
                 self.part = Part::Over;
@@ -315,7 +354,7 @@ impl<R: Read + Seek> Reader<R> {
             }
             Err(Trouble::Bad(why)) => {
                 self.part = Part::Over;
-                let size = self.size();
+                let size = self.size(start).unwrap_or(start);
                 self.found.place(start, size, format!("the index: {why}; all of the data is there"));
             }
         }
@@ -388,3 +427,5 @@ impl<R: Read + Seek> Iterator for Reader<R> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod work;

@@ -287,12 +287,13 @@ impl Unit {
 }
 
 /// What [`Cause::Unguarded`] misses, by its value.
-const MISSING: [&str; 5] = [
+const MISSING: [&str; 6] = [
     "guard",
     "second channel beside an amplifier without watchdog",
     "second channel",
     "emergency stop",
     "dead-man device",
+    "watchdog at the amplifier or at its supply",
 ];
 
 /// One line: cause, requirement, value and bound with their unit, time and cycle.

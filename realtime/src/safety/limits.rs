@@ -224,6 +224,9 @@ pub struct Limits {
     /// Whether the amplifier switches off by itself when its heartbeat stands still.
     #[serde(default = "yes")]
     pub amplifier_watchdog: bool,
+    /// Whether the second channel opens by itself when its heartbeat stands still.
+    #[serde(default)]
+    pub supply_watchdog: bool,
     /// Whether the setup declares a second channel: then it is missed where the rig shows none.
     #[serde(default)]
     pub supply_required: bool,
@@ -336,6 +339,7 @@ impl Limits {
             exposure_duty_max: duty_by_default(),
             exposure_dose_max_m2_s: dose_by_default(),
             amplifier_watchdog: true,
+            supply_watchdog: false,
             supply_required: false,
             load_commanded: true,
             late_cycles_max: 10,

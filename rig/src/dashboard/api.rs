@@ -2,18 +2,22 @@
 
 use super::server::Shared;
 use super::{pages, stream};
-use crate::live::{Ask, Viewer};
-use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use crate::live::{self, Ask, Viewer};
+use axum::extract::{Path, Query, Request, State};
 use axum::http::{StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
+use runs::report::{FIGURES, UPLOT, UPLOT_STYLE};
 use serde::Deserialize;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Largest body of a request in bytes.
 const BODY: usize = 256;
+/// Time that a body may take in all.
+const BODY_WITHIN: Duration = Duration::from_secs(5);
 /// What pages may load and from where: this server, and styles and pictures that stand in a report.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
                       connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -33,11 +37,11 @@ pub fn routes(shared: Arc<Shared>) -> Router {
         .route("/", get(|| asset("text/html; charset=utf-8", include_str!("assets/index.html"))))
         .route("/app.css", get(|| asset("text/css", include_str!("assets/app.css"))))
         .route("/app.js", get(|| asset("text/javascript", include_str!("assets/app.js"))))
-        .route("/plots.js", get(|| asset("text/javascript", include_str!("assets/plots.js"))))
-        .route("/uplot.css", get(|| asset("text/css", include_str!("assets/uPlot.min.css"))))
-        .route("/uplot.js", get(|| asset("text/javascript", include_str!("assets/uPlot.iife.min.js"))))
+        .route("/plots.js", get(|| asset("text/javascript", FIGURES)))
+        .route("/uplot.css", get(|| asset("text/css", UPLOT_STYLE)))
+        .route("/uplot.js", get(|| asset("text/javascript", UPLOT)))
         .merge(data)
-        .layer(DefaultBodyLimit::max(BODY))
+        .layer(middleware::from_fn(with_body))
         .layer(middleware::from_fn_with_state(Arc::clone(&shared), at_this_place))
         .with_state(shared)
 }
@@ -62,6 +66,16 @@ async fn at_this_place(State(shared): State<Arc<Shared>>, request: Request, next
         response.headers_mut().insert(name, header::HeaderValue::from_static(value));
     }
     response
+}
+
+/// Before whatever reads it: a body that is small and whole.
+async fn with_body(request: Request, next: Next) -> Response {
+    let (head, body) = request.into_parts();
+    match tokio::time::timeout(BODY_WITHIN, axum::body::to_bytes(body, BODY)).await {
+        Ok(Ok(body)) => next.run(Request::from_parts(head, body.into())).await,
+        Ok(Err(_)) => StatusCode::PAYLOAD_TOO_LARGE.into_response(),
+        Err(_) => (StatusCode::REQUEST_TIMEOUT, [(header::CONNECTION, "close")]).into_response(),
+    }
 }
 
 /// Before data: the token.
@@ -148,8 +162,14 @@ async fn ask(
         return Err((StatusCode::FORBIDDEN, why).into_response());
     }
     let folder = shared.folder(&name).ok_or_else(|| StatusCode::NOT_FOUND.into_response())?;
-    let asked = beside(move || Viewer::connect(&folder).and_then(|viewer| viewer.asking()?(ask))).await?;
-    asked.map_err(|_| (StatusCode::CONFLICT, "this run does not go on").into_response())?;
+    let asked = beside(move || match ask {
+        // Answered as done only where the run shows it.
+        Ask::Stop => live::stop(&folder).map(drop),
+        ask => Viewer::connect(&folder)
+            .and_then(|viewer| viewer.asking()?(ask))
+            .map_err(|why| format!("not asked: {why}")),
+    });
+    asked.await?.map_err(|why| (StatusCode::CONFLICT, why).into_response())?;
     tracing::info!(run = name, ask = ask.word(), "asked for from a browser");
     Ok(StatusCode::NO_CONTENT)
 }

@@ -1,9 +1,10 @@
 //! What is read from the disk for a browser.
 
-use crate::catalogue::{Catalogue, RunEntry};
 use crate::live::{Ended, Message, Progress, Run, Told};
-use crate::run_dir::is_held;
 use miette::{IntoDiagnostic, WrapErr};
+use runs::catalogue::{Catalogue, RunEntry};
+use runs::run_dir::is_held;
+use runs::setup::Guards;
 use serde::Serialize;
 use std::path::Path;
 
@@ -71,8 +72,8 @@ pub fn page(run: &Path, name: &str) -> miette::Result<String> {
 /// # Errors
 /// Runs that cannot be compared.
 pub fn compare(a: &Path, b: &Path) -> miette::Result<String> {
-    let compared = crate::compare::Compared::of([a, b])?;
-    crate::report::comparison::page(&compared)
+    let compared = runs::compare::Compared::of([a, b])?;
+    runs::report::comparison::page(&compared)
 }
 
 /// What a viewer of a run that is over is told: the same messages as of one that goes on, without states.
@@ -80,7 +81,7 @@ pub fn compare(a: &Path, b: &Path) -> miette::Result<String> {
 /// # Errors
 /// A folder that holds no run, or one that cannot be read.
 pub fn past(folder: &Path) -> miette::Result<Vec<Message>> {
-    let run = crate::report::read(folder)?;
+    let run = runs::report::read(folder)?;
     let fact = |name: &str| run.facts.get(name).cloned();
     let planned = run.summary.as_ref().map_or(run.passes.len(), |s| s.planned);
     let of = Run {
@@ -95,6 +96,7 @@ pub fn past(folder: &Path) -> miette::Result<Vec<Message>> {
         process: 0,
         planned,
         made_before: 0,
+        guards: Guards::of_facts(fact),
     };
     let mut messages = vec![Message::Run(Box::new(of))];
     let progress = Progress { made: run.passes.len(), planned, remaining_s: 0.0 };

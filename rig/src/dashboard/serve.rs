@@ -1,4 +1,4 @@
-//! The server's door: so many connections at once, so long for a request's head, and no more.
+//! The server's door: so many connections at once, so long for a request's head, its answer and a whole connection, and no more.
 
 use axum::Router;
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -12,6 +12,11 @@ use tokio::sync::Semaphore;
 const CONNECTIONS: usize = 64;
 /// Time that the head of a request may take, also that of the next one on a connection that is kept.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
+/// Time that the other end may let pass without taking what was sent to it.
+const TAKEN_WITHIN: Duration = Duration::from_secs(5);
+/// Time after which a connection gets no further request, and what the last answer may take after that. A live stream is none of these.
+const WHOLE_WITHIN: Duration = Duration::from_secs(30);
+const LAST_ANSWER_WITHIN: Duration = Duration::from_secs(10);
 /// Largest head of a request in bytes.
 const HEAD_BYTES: usize = 16 * 1024;
 /// What the system may hold for one that reads slowly, in bytes (it takes twice as much): with its own bound of some megabytes a slow
@@ -37,15 +42,20 @@ pub async fn serve(listener: TcpListener, routes: Router) {
             let _place = place;
             let _ = stream.set_nodelay(true);
             let _ = rustix::net::sockopt::set_socket_send_buffer_size(&stream, HELD_BYTES);
+            let _ = rustix::net::sockopt::set_tcp_user_timeout(&stream, TAKEN_WITHIN.as_millis() as u32);
             let service = TowerToHyperService::new(routes);
-            // An error is that of the other end.
-            let _ = hyper::server::conn::http1::Builder::new()
+            let connection = hyper::server::conn::http1::Builder::new()
                 .timer(TokioTimer::new())
                 .header_read_timeout(HEAD_WITHIN)
                 .max_buf_size(HEAD_BYTES)
                 .serve_connection(TokioIo::new(stream), service)
-                .with_upgrades()
-                .await;
+                .with_upgrades();
+            tokio::pin!(connection);
+            // An error is that of the other end.
+            if tokio::time::timeout(WHOLE_WITHIN, connection.as_mut()).await.is_err() {
+                connection.as_mut().graceful_shutdown();
+                let _ = tokio::time::timeout(LAST_ANSWER_WITHIN, connection).await;
+            }
         });
     }
 }

@@ -16,10 +16,11 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 
 /// Streams at once.
 const STREAMS: usize = 16;
-/// Lines that wait for a browser at most.
-const QUEUE: usize = 256;
-/// Free places in the queue below which states are left out.
-const FOR_THE_REST: usize = QUEUE / 2;
+/// Lines that wait for a browser at most: passes and events of hours. A run ends soon after its last pass and waits for no viewer, so a
+/// slow browser's lines wait here.
+const QUEUE: usize = 4096;
+/// Lines that wait from which on states are left out.
+const WITHOUT_STATES: usize = 128;
 /// A browser that takes nothing for so long is let go.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Largest message from a browser in bytes: it has nothing to say here.
@@ -78,7 +79,7 @@ fn hear(folder: &std::path::Path, to: &Sender<String>) {
             Heard::Nothing => continue,
             Heard::Gone => return,
         };
-        if matches!(*message, Message::State(_)) && to.capacity() < FOR_THE_REST {
+        if matches!(*message, Message::State(_)) && to.max_capacity() - to.capacity() >= WITHOUT_STATES {
             continue;
         }
         let Ok(line) = serde_json::to_string(&message) else { continue };

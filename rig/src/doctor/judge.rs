@@ -1,11 +1,11 @@
 //! What was found, against what a run needs.
 
 use super::{Answers, ChannelReport, Found, Look};
-use crate::plan::Plan;
-use crate::setup::Setup;
 use drivers::OpenError;
 use realtime::ports::{AmplifierState, Contact, NoData, StageState};
 use realtime::safety::RULES;
+use runs::plan::Plan;
+use runs::setup::{Setup, THERMOMETER};
 use serde::Serialize;
 
 /// What is said of one subject.
@@ -72,9 +72,6 @@ const OFF_AMPLITUDE_PP_M: f64 = 0.3e-6;
 /// A problem and what to do about it.
 type Problem = (String, &'static str);
 
-/// What to do about an amplifier that shows no temperature.
-pub(crate) const THERMOMETER: &str =
-    "state `temperature_fitted = false` in [limits] where nobody touches the plate, or take one that is read";
 const LINK: &str = "look at cable and power, and at what else talks on this line";
 const UNIT: &str = "look at unit, factor, type and byte order of the signal in its profile, and at `gain`";
 
@@ -123,7 +120,7 @@ fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
                 OpenError::Mismatch { problem, .. } | OpenError::Link { problem, .. } => problem.clone(),
                 other => other.to_string(),
             };
-            let advice = "check address, wiring, power, and that no other program holds the link";
+            let advice = drivers::remedy::advice(&said);
             return Finding::new(subject, false, said, advice);
         }
     };
@@ -390,7 +387,7 @@ fn planned(look: &Look, setup: &Setup, plan: &Plan, mended: bool) -> Finding {
         all.find(|c| c.name == name).filter(|c| c.missing.is_none())
     };
     let noise = channel("lateral").and_then(|c| c.noise_sd);
-    let passes = match crate::check::preflight(setup, plan.clone(), None, noise) {
+    let passes = match tables::check::preflight(setup, plan.clone(), None, noise) {
         Ok(passes) => passes,
         Err(why) => {
             let advice = why.help().map_or("change plan or setup".into(), |h| h.to_string());

@@ -1,7 +1,6 @@
 //! The instruments of a setup, each opened by itself and all kept open together.
 
 use super::Role;
-use crate::setup::Setup;
 use drivers::endpoint::Endpoint;
 use drivers::ports::{AmplifierPort, ContactsPort, ForcePort, StagePort, SupplyPort};
 use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, Links, OpenError};
@@ -9,6 +8,7 @@ use realtime::ports::{
     Amplifier, Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs, Stage, SupplySwitch,
 };
 use realtime::safety::Observation;
+use runs::setup::Setup;
 use std::time::Instant;
 
 enum Port {

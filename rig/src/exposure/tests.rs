@@ -1,5 +1,5 @@
 use super::*;
-use std::os::unix::fs::PermissionsExt;
+use runs::exposure_left::Left;
 
 /// A folder as `/var/tmp` is, gone with the test.
 struct Folder(PathBuf);
@@ -14,7 +14,12 @@ impl Folder {
     }
 
     fn open(&self) -> miette::Result<Ledger> {
-        Ledger::open_in(&self.0, "tcp/a", &limits())
+        self.of(&["tcp/a"])
+    }
+
+    fn of(&self, known: &[&str]) -> miette::Result<Ledger> {
+        let known: Vec<String> = known.iter().map(ToString::to_string).collect();
+        Ledger::open_in(&self.0, &known, &limits())
     }
 
     fn file(&self) -> PathBuf {
@@ -40,13 +45,27 @@ fn last_hour(ledger: &Ledger) -> (u64, f64) {
     ledger.exposed().parts.iter().fold((0, 0.0), |(time, dose), (t, d)| (time + t.0, dose + d))
 }
 
+/// Waits until it is so, for as long as a slow machine may take.
+fn soon(is_so: impl Fn() -> bool) {
+    let pauses = (0..12_000).take_while(|_| !is_so()).map(|_| std::thread::sleep(Duration::from_millis(5)));
+    assert!(pauses.count() < 12_000, "never");
+}
+
+/// Waits for two entries: the second one holds all that was driven before.
+fn written_twice(keeping: &Keeping) {
+    for _ in 0..2 {
+        let before = keeping.state.written_ns.load(Ordering::Relaxed);
+        soon(|| keeping.state.written_ns.load(Ordering::Relaxed) != before);
+    }
+}
+
 /// A loop that drove for so long, kept until its ledger has noticed.
 fn driven(ledger: Ledger, seconds: u64, dose_m2_s: f64) -> Keeping {
     let life = Arc::new(Lifeline::default());
     let keeping = ledger.keep(Arc::clone(&life), || panic!("it can be written")).unwrap();
     life.driven_ns.store(seconds * SECOND, Ordering::Relaxed);
     life.dose_bits.store(dose_m2_s.to_bits(), Ordering::Relaxed);
-    std::thread::sleep(WRITE_EVERY + WRITE_EVERY / 2);
+    written_twice(&keeping);
     assert!(keeping.holds());
     keeping
 }
@@ -65,6 +84,53 @@ fn what_one_run_drove_the_next_one_knows() {
     let third = folder.open().unwrap();
     assert_eq!(last_hour(&third), (100 * SECOND, 2.5));
     assert!(third.exposed().resting >= Nanos(SECOND), "{:?}", third.exposed());
+}
+
+/// One amplifier in three setups, with no serial number and with two: whatever a file calls it, the worst holds. So does a person's.
+#[test]
+fn every_identity_counts_and_the_worst_holds() {
+    let folder = Folder::new("identities");
+    driven(folder.of(&["tcp/a", "person/x"]).unwrap(), 100, 2.5).end(true);
+    driven(folder.of(&["tcp/a", "serial/1"]).unwrap(), 50, 1.0).end(true);
+    let found = |known: &[&str]| {
+        let mut ledger = folder.of(known).unwrap();
+        ledger.write().unwrap();
+        last_hour(&ledger)
+    };
+    for known in [&["tcp/a", "serial/2"][..], &["serial/2", "tcp/a"], &["serial/1", "tcp/a"]] {
+        assert_eq!(found(known), (150 * SECOND, 3.5), "{known:?}");
+    }
+    // The same amplifier at another address, and the same person at another amplifier.
+    assert_eq!(found(&["tcp/b", "serial/1"]).0, 50 * SECOND);
+    assert_eq!(found(&["tcp/c", "person/x"]).0, 100 * SECOND);
+    let left = Left::of(&limits(), &folder.of(&["tcp/a"]).unwrap().exposed());
+    assert_eq!((left.hour_s, left.dose_m2_s, left.in_one_go_s), (750.0, 21.5, 0.0));
+}
+
+/// What others may write, or what is another's under this user's name, is no ledger; what other users drove is added.
+#[test]
+fn nobody_else_can_write_a_ledger_and_what_others_drove_counts() {
+    let folder = Folder::new("users");
+    driven(folder.open().unwrap(), 100, 2.5).end(true);
+    let own = folder.file();
+    assert_eq!(own.metadata().unwrap().permissions().mode() & 0o777, 0o644);
+    std::fs::set_permissions(&own, Permissions::from_mode(0o666)).unwrap();
+    assert!(format!("{:?}", folder.open().err()).contains("its owner alone can write"));
+    std::fs::set_permissions(&own, Permissions::from_mode(0o644)).unwrap();
+    // A file in another user's name that is not that user's: nobody knows what it leaves out.
+    let name = own.file_name().unwrap().to_string_lossy().into_owned();
+    let (stem, _) = name.rsplit_once('-').unwrap();
+    let other = folder.0.join(format!("{stem}-65534.exposure"));
+    std::fs::copy(&own, &other).unwrap();
+    assert!(format!("{:?}", folder.open().err()).contains("no human finger"));
+    // SAFETY: a path that is a string without zeros.
+    let theirs = unsafe {
+        let path = std::ffi::CString::new(other.as_os_str().as_encoded_bytes()).unwrap();
+        libc::chown(path.as_ptr(), 65534, 65534) == 0
+    };
+    if theirs {
+        assert_eq!(last_hour(&folder.open().unwrap()), (200 * SECOND, 5.0));
+    }
 }
 
 /// A program that is killed writes no last entry: what it drove is charged, and what it might have driven.
@@ -116,7 +182,7 @@ fn a_ledger_that_cannot_be_kept_refuses_the_finger_or_stops_the_rig() {
     let keeping = ledger.keep(Arc::default(), move || stop.store(true, Ordering::Relaxed)).unwrap();
     // Removed in mid-run: the next run would know nothing.
     std::fs::remove_file(&path).unwrap();
-    std::thread::sleep(WRITE_EVERY + WRITE_EVERY / 2);
+    soon(|| stopped.load(Ordering::Relaxed));
     assert!(stopped.load(Ordering::Relaxed) && !keeping.holds());
     // No plain file, and a folder that is not shared.
     std::fs::create_dir(&path).unwrap();

@@ -1,16 +1,19 @@
 //! The run's end of the socket: takes the news without ever waiting, and tells them to every viewer.
 #![allow(clippy::disallowed_methods, reason = "threads beside everything else")]
 
-use super::{Ask, Ended, Message, Progress, Run, State, Told, View, place};
-use crate::sequence::MeasuredPass;
-use crate::session::{News, Signals};
+use super::{Ask, Ended, Message, Progress, Run, State, Told, View, is_ours, place};
+use runs::sequence::MeasuredPass;
+use runs::session::{Signals, Update};
+use rustix::net::sockopt::socket_peercred;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{
+    Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, channel, sync_channel,
+};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Messages that wait to be told at most: several minutes of states in wall-clock time.
 const QUEUE: usize = 4096;
@@ -20,6 +23,8 @@ const VIEWER_QUEUE: usize = 1024;
 const VIEWERS: usize = 16;
 /// A viewer that takes nothing for so long is let go.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// How long the end of a run waits for all its viewers together.
+const LAST_WORDS: Duration = Duration::from_secs(2);
 /// Time between two looks for new viewers.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// Longest line that a viewer may say, in bytes.
@@ -39,7 +44,7 @@ pub struct Feed {
 /// A feed whose place is open.
 struct Open {
     queue: SyncSender<Message>,
-    teller: JoinHandle<()>,
+    teller: JoinHandle<usize>,
 }
 
 impl Feed {
@@ -51,15 +56,17 @@ impl Feed {
     }
 
     /// Tells news.
-    pub fn news(&mut self, news: &News<'_>) {
+    pub fn news(&mut self, news: &Update<'_>) {
         let message = match news {
-            News::Pass(pass) => Message::Pass(Box::new((*pass).clone())),
-            News::Event(event) => Message::Event(Told::of(self.now_s, (*event).clone())),
-            News::State(glimpse) => {
+            Update::Pass(pass) => Message::Pass(Box::new((*pass).clone())),
+            Update::Event(event) => Message::Event(Told::of(self.now_s, (*event).clone())),
+            Update::State(glimpse) => {
                 self.now_s = glimpse.row.now.seconds();
                 Message::State(Box::new(State::of(glimpse)))
             }
-            News::Progress(made, _, remaining_s) => Message::Progress(Progress {
+            Update::Off(off) if off.read_back => return,
+            Update::Off(off) => Message::Off(off.words()),
+            Update::Progress(made, _, remaining_s) => Message::Progress(Progress {
                 made: self.run.made_before + made,
                 planned: self.run.planned,
                 remaining_s: *remaining_s,
@@ -80,6 +87,17 @@ impl Feed {
                 self.lost
             );
         }
+        let left_behind = self.close();
+        if left_behind > 0 {
+            tracing::warn!("{left_behind} viewers read too slowly and did not get everything");
+        }
+    }
+
+    /// Tells what is left and closes; returns how many viewers did not get everything.
+    fn close(&mut self) -> usize {
+        let Some(Open { queue, teller }) = self.open.take() else { return 0 };
+        drop(queue);
+        teller.join().unwrap_or(0)
     }
 
     /// Puts a message into the queue, or loses it where that is full.
@@ -100,7 +118,8 @@ impl Feed {
         view.take(Message::Run(Box::new(self.run.clone())));
         view.passes = std::mem::take(&mut self.before);
         let (queue, told) = sync_channel(QUEUE);
-        let teller = Teller { listener, signals: self.signals.clone(), view, viewers: Vec::new() };
+        let (signals, viewers) = (self.signals.clone(), Vec::new());
+        let teller = Teller { listener, signals, view, viewers, left_behind: 0 };
         let tell = move || teller.tell(&told);
         let teller = std::thread::Builder::new().name("viewers".into()).spawn(tell)?;
         Ok(Open { queue, teller })
@@ -109,10 +128,7 @@ impl Feed {
 
 impl Drop for Feed {
     fn drop(&mut self) {
-        if let Some(Open { queue, teller }) = self.open.take() {
-            drop(queue);
-            let _ = teller.join();
-        }
+        self.close();
     }
 }
 
@@ -122,17 +138,20 @@ struct Teller {
     signals: Signals,
     view: View,
     viewers: Vec<Seat>,
+    /// Viewers that did not get everything.
+    left_behind: usize,
 }
 
 /// A viewer.
 struct Seat {
     lines: SyncSender<Arc<str>>,
     stream: UnixStream,
-    writer: JoinHandle<()>,
+    /// Ends when everything was written; whether it was.
+    written: Receiver<bool>,
 }
 
 impl Teller {
-    fn tell(mut self, queue: &Receiver<Message>) {
+    fn tell(mut self, queue: &Receiver<Message>) -> usize {
         loop {
             match queue.recv_timeout(LOOK_EVERY) {
                 Ok(message) => self.pass_on(message),
@@ -141,23 +160,33 @@ impl Teller {
             }
             self.look();
         }
-        // The last words reach those who read.
-        for Seat { lines, writer, .. } in self.viewers {
-            drop(lines);
-            let _ = writer.join();
+        // The last words reach those who read: all queues end at once, and one bound holds for all viewers together.
+        let seats = std::mem::take(&mut self.viewers).into_iter();
+        let last: Vec<_> = seats.map(|Seat { stream, written, .. }| (stream, written)).collect();
+        let until = Instant::now() + LAST_WORDS;
+        for (stream, written) in last {
+            let left = until.saturating_duration_since(Instant::now());
+            if !written.recv_timeout(left).unwrap_or(false) {
+                self.left_behind += 1;
+                let _ = stream.shutdown(std::net::Shutdown::Both);
+            }
         }
+        self.left_behind
     }
 
     fn pass_on(&mut self, message: Message) {
         if !self.viewers.is_empty()
             && let Some(line) = line(&message)
         {
-            self.viewers.retain(|viewer| {
-                let told = viewer.lines.try_send(Arc::clone(&line)).is_ok();
-                if !told {
+            let left_behind = &mut self.left_behind;
+            self.viewers.retain(|viewer| match viewer.lines.try_send(Arc::clone(&line)) {
+                Ok(()) => true,
+                Err(why) => {
+                    let full = matches!(why, TrySendError::Full(_));
+                    *left_behind += usize::from(full || viewer.written.try_recv() == Ok(false));
                     let _ = viewer.stream.shutdown(std::net::Shutdown::Both);
+                    false
                 }
-                told
             });
         }
         self.view.take(message);
@@ -166,8 +195,13 @@ impl Teller {
     /// Lets in whoever has come.
     fn look(&mut self) {
         while let Ok((stream, _)) = self.listener.accept() {
-            self.viewers.retain(|viewer| !viewer.writer.is_finished());
-            if self.viewers.len() >= VIEWERS || !is_ours(&stream) {
+            let left_behind = &mut self.left_behind;
+            self.viewers.retain(|viewer| {
+                let written = viewer.written.try_recv();
+                *left_behind += usize::from(written == Ok(false));
+                written == Err(TryRecvError::Empty)
+            });
+            if self.viewers.len() >= VIEWERS || !socket_peercred(&stream).is_ok_and(|peer| is_ours(&peer)) {
                 continue;
             }
             match self.welcome(stream) {
@@ -183,24 +217,20 @@ impl Teller {
         let before: Vec<Arc<str>> = self.view.messages().iter().filter_map(line).collect();
         let (lines, rest) = sync_channel::<Arc<str>>(VIEWER_QUEUE);
         let (mut to, from) = (stream.try_clone()?, stream.try_clone()?);
-        let writer = std::thread::Builder::new().name("viewer".into()).spawn(move || {
-            for line in before.into_iter().chain(rest) {
-                if to.write_all(line.as_bytes()).is_err() {
-                    break;
-                }
-            }
+        let (done, written) = channel();
+        std::thread::Builder::new().name("viewer".into()).spawn(move || {
+            let whole = before.into_iter().chain(rest).try_for_each(|line| to.write_all(line.as_bytes()));
             let _ = to.shutdown(std::net::Shutdown::Both);
+            // One that has gone away by itself misses nothing.
+            let gone = |e: &io::Error| {
+                matches!(e.kind(), io::ErrorKind::BrokenPipe | io::ErrorKind::ConnectionReset)
+            };
+            let _ = done.send(whole.map_or_else(|e| gone(&e), |()| true));
         })?;
         let signals = self.signals.clone();
         std::thread::Builder::new().name("viewer's word".into()).spawn(move || listen(from, &signals))?;
-        Ok(Seat { lines, stream, writer })
+        Ok(Seat { lines, stream, written })
     }
-}
-
-/// Whether the other end is a process of the same user, or of the one who may do everything.
-fn is_ours(stream: &UnixStream) -> bool {
-    rustix::net::sockopt::socket_peercred(stream)
-        .is_ok_and(|peer| peer.uid == rustix::process::geteuid() || peer.uid.is_root())
 }
 
 fn line(message: &Message) -> Option<Arc<str>> {

@@ -1,10 +1,11 @@
 //! What is told of a run that goes on.
 
-use crate::sequence::{Event, MeasuredPass, Outcome};
-use crate::session::{Extremes, Glimpse, Job, unix_ns};
 use realtime::cycle::Phase;
 use realtime::ports::Channel;
 use realtime::safety::Cause;
+use runs::sequence::{Event, MeasuredPass, Outcome};
+use runs::session::{Extremes, Job, Snapshot, unix_ns};
+use runs::setup::Guards;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -22,6 +23,8 @@ pub enum Message {
     Event(Told),
     /// How far it is.
     Progress(Progress),
+    /// The drive was not read back off: what to do, before the run's end is told.
+    Off(String),
     /// It is over; always last.
     Ended(Box<Ended>),
 }
@@ -51,6 +54,9 @@ pub struct Run {
     pub planned: usize,
     /// Passes that earlier sessions have made.
     pub made_before: usize,
+    /// What is to be known of the rig's guards.
+    #[serde(default)]
+    pub guards: Guards,
 }
 
 impl Run {
@@ -68,6 +74,7 @@ impl Run {
             process: std::process::id(),
             planned,
             made_before,
+            guards: job.setup.guards(),
         }
     }
 }
@@ -121,7 +128,7 @@ pub struct State {
 
 impl State {
     /// Of a glimpse of the loop.
-    pub fn of(glimpse: &Glimpse) -> Self {
+    pub fn of(glimpse: &Snapshot) -> Self {
         let row = &glimpse.row;
         let seen = &row.inputs.seen;
         let value = |channel: Channel| channel.ok().map(|r| r.value);
@@ -166,7 +173,7 @@ pub struct Told {
 impl Told {
     /// An event at a time.
     pub fn of(at_s: f64, event: Event) -> Self {
-        let words = crate::report::events::describe(&event);
+        let words = runs::report::events::describe(&event);
         Told { at_s, event, words }
     }
 }
@@ -199,7 +206,7 @@ pub struct Ended {
 
 impl Ended {
     /// Of what a session returned.
-    pub fn of(summary: &miette::Result<crate::session::Summary>) -> Self {
+    pub fn of(summary: &miette::Result<runs::session::Summary>) -> Self {
         match summary {
             Ok(summary) => Ended {
                 outcome: Some(summary.outcome.clone()),

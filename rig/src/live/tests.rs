@@ -1,16 +1,16 @@
 #![allow(clippy::disallowed_methods, reason = "waits for threads of the system")]
 
 use super::*;
-use crate::sequence::{Event, MeasuredPass};
-use crate::session::{News, Signals};
 use models::condition::Condition;
-use models::record::Pass;
+use models::pass::Pass;
+use runs::sequence::{Event, MeasuredPass};
+use runs::session::{Signals, Update};
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-const SOON: Duration = Duration::from_secs(10);
+const SOON: Duration = Duration::from_secs(60);
 
 fn run(folder: &Path) -> Run {
     Run {
@@ -25,6 +25,7 @@ fn run(folder: &Path) -> Run {
         process: 1,
         planned: 9,
         made_before: 2,
+        guards: Default::default(),
     }
 }
 
@@ -36,7 +37,6 @@ fn pass(point: u64) -> MeasuredPass {
         comparison: None,
         regime: None,
         psi_eq17: None,
-        psi_reading: None,
         temperature_flags: Vec::new(),
         levels: Vec::new(),
     }
@@ -60,12 +60,12 @@ fn whoever_comes_late_has_the_same_picture() {
     let folder = tempfile::tempdir().unwrap();
     let mut feed = Feed::new(run(folder.path()), vec![pass(1), pass(2)], &Signals::default());
     assert!(Viewer::connect(folder.path()).is_err(), "nothing was told yet");
-    feed.news(&News::Event(&Event::Armed));
+    feed.news(&Update::Event(&Event::Armed));
     let (mut early, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut early, &mut view, |view| view.events.len() == 1);
-    feed.news(&News::Pass(&pass(3)));
-    feed.news(&News::Progress(1, 7, 5.0));
-    feed.news(&News::Event(&Event::Paused { point: 4 }));
+    feed.news(&Update::Pass(&pass(3)));
+    feed.news(&Update::Progress(1, 7, 5.0));
+    feed.news(&Update::Event(&Event::Paused { point: 4 }));
     seen(&mut early, &mut view, |view| view.paused);
     let (mut late, mut same) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut late, &mut same, |view| view.progress.made == 3);
@@ -82,7 +82,7 @@ fn what_viewers_ask_is_heard_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let signals = Signals::default();
     let mut feed = Feed::new(run(folder.path()), Vec::new(), &signals);
-    feed.news(&News::Event(&Event::Armed));
+    feed.news(&Update::Event(&Event::Armed));
     let heard = |what: &dyn Fn() -> bool| {
         let began = Instant::now();
         while !what() {
@@ -111,12 +111,12 @@ fn what_viewers_ask_is_heard_and_nothing_else() {
 fn a_viewer_that_reads_nothing_holds_nobody_up() {
     let folder = tempfile::tempdir().unwrap();
     let mut feed = Feed::new(run(folder.path()), Vec::new(), &Signals::default());
-    feed.news(&News::Event(&Event::Armed));
+    feed.news(&Update::Event(&Event::Armed));
     let mut deaf = UnixStream::connect_addr(&place(folder.path()).unwrap()).unwrap();
     let (mut viewer, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut viewer, &mut view, |view| view.events.len() == 1);
     for point in 0..4000 {
-        feed.news(&News::Pass(&pass(point)));
+        feed.news(&Update::Pass(&pass(point)));
         while view.passes.len() + 500 < point as usize {
             seen(&mut viewer, &mut view, |view| view.passes.len() + 500 >= point as usize);
         }
@@ -127,4 +127,56 @@ fn a_viewer_that_reads_nothing_holds_nobody_up() {
     let mut held = Vec::new();
     deaf.read_to_end(&mut held).unwrap();
     assert!(held.len() < 2_000_000, "{} bytes were kept for it", held.len());
+}
+
+/// Viewers that take a few bytes now and then: the end of the run waits for all of them together, and not for each of their lines.
+#[test]
+fn slow_viewers_hold_up_no_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut feed = Feed::new(run(folder.path()), Vec::new(), &Signals::default());
+    feed.news(&Update::Event(&Event::Armed));
+    for _ in 0..3 {
+        let mut slow = UnixStream::connect_addr(&place(folder.path()).unwrap()).unwrap();
+        std::thread::spawn(move || {
+            let mut few = [0; 64];
+            while slow.read(&mut few).is_ok_and(|count| count > 0) {
+                std::thread::sleep(Duration::from_millis(100));
+            }
+        });
+    }
+    let (mut viewer, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
+    seen(&mut viewer, &mut view, |view| view.events.len() == 1);
+    for point in 0..900 {
+        feed.news(&Update::Pass(&pass(point)));
+        while view.passes.len() + 300 < point as usize {
+            seen(&mut viewer, &mut view, |view| view.passes.len() + 300 >= point as usize);
+        }
+    }
+    let (done, over) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        feed.end(Ended { outcome: None, remedy: None, error: None, off: None, agreement: None });
+        let _ = done.send(());
+    });
+    // The one that reads gets everything.
+    seen(&mut viewer, &mut view, |view| view.ended.is_some());
+    assert_eq!(view.passes.len(), 900);
+    over.recv_timeout(Duration::from_secs(30)).expect("the end waits for slow viewers");
+}
+
+#[test]
+fn a_drive_that_is_not_off_is_told_before_the_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut feed = Feed::new(run(folder.path()), Vec::new(), &Signals::default());
+    feed.news(&Update::Off(&runs::supervisor::OffReport::off()));
+    feed.news(&Update::Event(&Event::Armed));
+    let (mut viewer, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
+    seen(&mut viewer, &mut view, |view| view.events.len() == 1);
+    assert_eq!(view.not_off, None);
+    let not_off = runs::supervisor::NotOff { instrument: "x".into(), drives: true, why: "silent".into() };
+    let off = runs::supervisor::OffReport { read_back: false, not_read_back: vec![not_off] };
+    feed.news(&Update::Off(&off));
+    seen(&mut viewer, &mut view, |view| view.not_off.is_some());
+    assert_eq!(view.not_off, Some(off.words()));
+    let (mut late, mut same) = (Viewer::connect(folder.path()).unwrap(), View::default());
+    seen(&mut late, &mut same, |view| view.not_off.is_some());
 }

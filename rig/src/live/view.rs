@@ -1,8 +1,8 @@
 //! The picture that messages add up to: what a viewer shows, and what a new one is told first.
 
 use super::{Ended, Message, Progress, Run, State, Told};
-use crate::sequence::{Event, MeasuredPass};
 use realtime::safety::Trip;
+use runs::sequence::{Event, MeasuredPass};
 use std::collections::VecDeque;
 
 /// States that are remembered: a minute of them.
@@ -27,6 +27,8 @@ pub struct View {
     pub trip: Option<Trip>,
     /// Whether it rests before a pass.
     pub paused: bool,
+    /// What is said of a drive that was not read back off.
+    pub not_off: Option<String>,
     /// How it ended.
     pub ended: Option<Ended>,
 }
@@ -52,6 +54,7 @@ impl View {
                 push(&mut self.events, told, EVENTS);
             }
             Message::Progress(progress) => self.progress = progress,
+            Message::Off(words) => self.not_off = Some(words),
             Message::Ended(ended) => self.ended = Some(*ended),
         }
     }
@@ -63,8 +66,9 @@ impl View {
         let events = self.events.iter().map(|told| Message::Event(told.clone()));
         let progress = self.run.iter().map(|_| Message::Progress(self.progress));
         let states = self.states.iter().map(|state| Message::State(Box::new(state.clone())));
+        let not_off = self.not_off.iter().map(|words| Message::Off(words.clone()));
         let ended = self.ended.iter().map(|ended| Message::Ended(Box::new(ended.clone())));
-        run.chain(passes).chain(events).chain(progress).chain(states).chain(ended).collect()
+        run.chain(passes).chain(events).chain(progress).chain(states).chain(not_off).chain(ended).collect()
     }
 
     /// Loop time in s of the last state.

@@ -1,6 +1,7 @@
 //! The other end of the socket: whoever looks at a run.
 
-use super::{Ask, Message, place};
+use super::{Ask, Message, is_ours, place};
+use runs::run_dir;
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
@@ -28,9 +29,15 @@ impl Viewer {
     /// Looks at the run in a folder.
     ///
     /// # Errors
-    /// No such folder, or nobody tells of that run: it is over, of another machine, or of another user.
+    /// No such folder, or nobody tells of that run: it is over, of another machine, or of another user; or
+    /// another user's process answers in its place.
     pub fn connect(run: &Path) -> io::Result<Self> {
         let stream = UnixStream::connect_addr(&place(run)?)?;
+        // The name is made from the folder's path: any user may have taken it before the run.
+        let peer = rustix::net::sockopt::socket_peercred(&stream)?;
+        if !(is_ours(&peer) || run_dir::holder(run) == u32::try_from(peer.pid.as_raw_nonzero().get()).ok()) {
+            return Err(io::Error::other("another user's process answers in the run's place"));
+        }
         Ok(Viewer { reader: BufReader::new(stream), begun: String::new() })
     }
 

@@ -5,7 +5,7 @@ use miette::IntoDiagnostic;
 use rumqttc::{Client, ConnectionError, Event, LastWill, MqttOptions, Outgoing, QoS};
 use serde_json::Value;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
@@ -22,6 +22,7 @@ const LARGEST: usize = 1 << 20;
 pub struct Publisher {
     client: Client,
     prefix: String,
+    given: u64,
     dropped: u64,
     shared: Arc<Shared>,
     ended: Receiver<()>,
@@ -30,8 +31,9 @@ pub struct Publisher {
 #[derive(Default)]
 struct Shared {
     connected: AtomicBool,
+    answered: AtomicBool,
+    complained: AtomicBool,
     ending: AtomicBool,
-    sent: AtomicU64,
 }
 
 impl Publisher {
@@ -65,7 +67,7 @@ impl Publisher {
                 let _ = end.send(());
             })
             .into_diagnostic()?;
-        Ok(Publisher { client, prefix: broker.prefix.clone(), dropped: 0, shared, ended })
+        Ok(Publisher { client, prefix: broker.prefix.clone(), given: 0, dropped: 0, shared, ended })
     }
 
     /// Puts a message into the queue, or drops it where that is full.
@@ -77,20 +79,27 @@ impl Publisher {
             _ => (QoS::AtLeastOnce, false),
         };
         let sent = self.client.try_publish(topic(&self.prefix, name), quality, retain, message.to_string());
+        self.given += 1;
         self.dropped += u64::from(sent.is_err());
     }
 
-    /// Waits a moment for what is in the queue, and says how many messages were dropped and whether all others have left.
-    pub fn end(mut self) -> (u64, bool) {
+    /// Waits a moment for what is in the queue, and says what was not published; `None` where all was.
+    pub fn end(self) -> Option<String> {
         self.shared.ending.store(true, Ordering::Relaxed);
-        if !self.shared.connected.load(Ordering::Relaxed) {
-            return (self.dropped, false);
+        if !self.shared.answered.load(Ordering::Relaxed) {
+            return Some(format!("the broker never answered: none of {} messages was published", self.given));
         }
-        if self.client.try_disconnect().is_err() {
-            self.dropped += 1;
-            return (self.dropped, false);
+        let connected = self.shared.connected.load(Ordering::Relaxed);
+        let whole =
+            connected && self.client.try_disconnect().is_ok() && self.ended.recv_timeout(LAST_WORDS).is_ok();
+        match (self.dropped, whole) {
+            (0, true) => None,
+            (0, false) => Some("the last messages may not have been published".into()),
+            (dropped, true) => Some(format!("{dropped} messages were not published")),
+            (dropped, false) => {
+                Some(format!("{dropped} messages were not published, and the last ones may be missing"))
+            }
         }
-        (self.dropped, self.ended.recv_timeout(LAST_WORDS).is_ok())
     }
 }
 
@@ -103,20 +112,18 @@ fn follow(event: &Result<Event, ConnectionError>, shared: &Shared, place: &str) 
     let ending = shared.ending.load(Ordering::Relaxed);
     match event {
         Ok(Event::Outgoing(Outgoing::Disconnect)) => return false,
-        Ok(Event::Outgoing(Outgoing::Publish(_))) => {
-            shared.sent.fetch_add(1, Ordering::Relaxed);
-        }
         Ok(Event::Incoming(rumqttc::Packet::ConnAck(_))) => {
             shared.connected.store(true, Ordering::Relaxed);
+            shared.answered.store(true, Ordering::Relaxed);
             tracing::info!(place, "publishing");
         }
         Ok(_) => {}
         Err(_) if ending => return false,
         Err(why) => {
-            if shared.connected.swap(false, Ordering::Relaxed) || shared.sent.load(Ordering::Relaxed) == 0 {
+            // Once while it is gone; the next word is that it is there again.
+            let gone = shared.connected.swap(false, Ordering::Relaxed);
+            if !shared.complained.swap(true, Ordering::Relaxed) || gone {
                 tracing::warn!(place, "nothing is published now, and the run goes on: {why}");
-                // Told once; the next word is that it is there again.
-                shared.sent.fetch_max(1, Ordering::Relaxed);
             }
             #[allow(clippy::disallowed_methods, reason = "a thread beside everything else")]
             std::thread::sleep(RETRY);

@@ -24,7 +24,7 @@ impl Publisher {
     }
 
     /// Nothing.
-    pub fn end(self) -> (u64, bool) {
+    pub fn end(self) -> Option<String> {
         match self {}
     }
 }

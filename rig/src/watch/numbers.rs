@@ -1,10 +1,10 @@
 //! What is seen of a run in words and numbers. Missing data is 'none', never 0.
 
 use crate::live::{State, View};
-use crate::print::clean;
-use crate::report::human::number;
-use crate::sequence::{MeasuredPass, Outcome};
 use realtime::cycle::Phase;
+use runs::print::clean;
+use runs::report::human::number;
+use runs::sequence::MeasuredPass;
 
 /// States of the last second.
 const SECOND: usize = 10;
@@ -47,26 +47,6 @@ pub fn phase(phase: Phase) -> &'static str {
         Phase::Settle => "settling",
         Phase::Measure => "measuring",
         Phase::Zero => "reading zeros",
-    }
-}
-
-/// How a sweep ended, in words.
-pub fn outcome(outcome: &Outcome) -> String {
-    match outcome {
-        Outcome::Complete => "complete".into(),
-        Outcome::Stopped => "stopped on request".into(),
-        Outcome::Tripped(_) => "a safety rule tripped".into(),
-        Outcome::WouldNotArm { blocking: Some(cause) } => {
-            format!("the rig would not arm: {cause:?} stands in the way")
-        }
-        Outcome::WouldNotArm { blocking: None } => "the rig would not arm".into(),
-        Outcome::NoContact { point } => format!("no contact at point {point}"),
-        Outcome::LevelNotReached { quantity, wanted, found } => {
-            let last = found.map_or_else(|| "nothing was read".into(), |found| format!("last {found:.6}"));
-            format!("{quantity} = {wanted:.6} was not reached: {last}")
-        }
-        Outcome::LoopLost => "nothing was heard of the loop".into(),
-        Outcome::RecordLost => "the record could not be kept".into(),
     }
 }
 
@@ -126,10 +106,10 @@ fn last_pass(view: &View) -> String {
 fn of_pass(pass: &MeasuredPass) -> String {
     let c = pass.comparison;
     format!(
-        "{}: mu' {}, z {}",
+        "{}: mu' {}, {}",
         pass.pass.point,
         value(c.and_then(|c| c.mu_relative), 1.0, 3, ""),
-        signed(c.map(|c| c.z), 1, "")
+        signed(c.map(|c| c.z), 1, " sd")
     )
 }
 

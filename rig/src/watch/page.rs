@@ -1,17 +1,17 @@
 //! The page: what stands where. Eighty columns and twenty-four rows hold everything; more room goes to the curve, the traces and the
 //! events, less room keeps what is needed first.
 
-use super::look::Look;
-use super::numbers::{duration, of_state, outcome, phase, plain};
+use super::numbers::{duration, of_state, phase, plain};
 use super::plot::{curve, trace};
+use super::style::Look;
 use super::{Keys, Source};
 use crate::live::View;
-use crate::report::events::describe;
 use calibration::certificate::date;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use realtime::safety::Cause;
+use runs::report::events::describe;
 
 /// Columns and rows from which on the whole page is shown.
 const WHOLE: [u16; 2] = [80, 24];
@@ -86,6 +86,9 @@ fn small(page: &Page<'_>, buffer: &mut Buffer) {
     }
     let (state, style) = state(page);
     let mut lines: Vec<(String, Style)> = vec![(state, style)];
+    if page.view.run.as_ref().is_some_and(|run| run.guards.nobody_touches_the_plate) {
+        lines.push(("NOBODY TOUCHES THE PLATE".into(), page.look.heading()));
+    }
     lines.extend(page.note.map(|note| (plain(note), page.look.heading())));
     let width = usize::from(area.width);
     let urgent = urgent(page.view);
@@ -133,8 +136,10 @@ fn title(view: &View) -> String {
 
 fn who(view: &View) -> String {
     let run = view.run.as_ref();
+    let nobody = run.is_some_and(|run| run.guards.nobody_touches_the_plate);
     format!(
-        "operator {}  sample {}  model {}",
+        "{}operator {}  sample {}  model {}",
+        if nobody { "NOBODY TOUCHES THE PLATE  " } else { "" },
         or_none(run.and_then(|run| run.operator.as_deref())),
         or_none(run.and_then(|run| run.sample.as_deref())),
         or_none(run.map(|run| run.model.as_str())),
@@ -146,11 +151,11 @@ fn state(page: &Page<'_>) -> (String, Style) {
     let (view, look) = (page.view, page.look);
     if let Some(ended) = &view.ended {
         let how = match (&ended.outcome, &ended.error) {
-            (Some(how), _) => outcome(how),
+            (Some(how), _) => how.words(),
             (None, Some(error)) => plain(error),
             (None, None) => "nothing is known of its end".into(),
         };
-        let complete = ended.outcome == Some(crate::sequence::Outcome::Complete);
+        let complete = ended.outcome == Some(runs::sequence::Outcome::Complete);
         return (format!("ENDED: {how}"), if complete { look.strong(Color::Green) } else { look.alarm() });
     }
     if let Some(trip) = view.trip {
@@ -225,6 +230,9 @@ fn urgent(view: &View) -> Vec<String> {
         lines.push(format!("TRIP {}", plain(&trip.to_string())));
         lines.push(format!("remedy: {}", plain(trip.cause.remedy())));
     }
+    // Until the end is told, which holds the same words.
+    let not_off = view.not_off.as_deref().filter(|_| view.ended.is_none());
+    lines.extend(not_off.iter().flat_map(|off| off.lines()).map(plain));
     if let Some(ended) = &view.ended {
         let remedy = ended.remedy.as_ref().filter(|_| trip.is_none());
         lines.extend(remedy.map(|remedy| format!("remedy: {}", plain(remedy))));

@@ -1,6 +1,6 @@
 //! The traces of the last minute and the curve, drawn with characters.
 
-use super::look::Look;
+use super::style::Look;
 use crate::live::{State, View};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;

@@ -1,15 +1,15 @@
 use super::*;
 use crate::live::{Ended, Message, Progress, Run, State, Told};
-use crate::sequence::{Event, MeasuredPass, Outcome};
-use crate::session::Extremes;
 use models::condition::Condition;
-use models::record::Pass;
+use models::pass::Pass;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use realtime::compare::PassComparison;
 use realtime::cycle::Phase;
 use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip, Unit};
+use runs::sequence::{Event, MeasuredPass, Outcome};
+use runs::session::Extremes;
 
 const PLAIN: Look = Look { colour: false, unicode: false };
 
@@ -26,6 +26,7 @@ fn run() -> Run {
         process: 1,
         planned: 9,
         made_before: 0,
+        guards: Default::default(),
     }
 }
 
@@ -84,7 +85,6 @@ fn pass(point: u64, amplitude_um: f64, measured: Option<f64>, predicted: f64) ->
         comparison: Some(comparison),
         regime: None,
         psi_eq17: None,
-        psi_reading: None,
         temperature_flags: Vec::new(),
         levels: Vec::new(),
     }
@@ -228,7 +228,7 @@ fn eighty_by_twenty_four_holds_all_that_matters() {
             "frequency     27.500 kHz",
             "output        ON, 24.1 degC",
             "lateness      1.25 ms, worst of 1 s",
-            "last pass     4: mu' 0.200, z -1.2",
+            "last pass     4: mu' 0.200, -1.2 sd",
             "lateral force, N, 60 s: -0.060..+0.060",
             "normal force, N, 60 s: +0.240..+0.260",
             "w, um peak-to-peak",

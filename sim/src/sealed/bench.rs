@@ -1,7 +1,7 @@
 //! The bench of one sealed set: its fingertip, its noise, its causes' sizes, its measurement.
 
+use models::pass::Pass;
 use models::quantity::PeakToPeak;
-use models::record::Pass;
 use models::rig_file::{Calibration, PassNoise, RigFile};
 use serde::{Deserialize, Serialize};
 

@@ -15,8 +15,8 @@ impl Set {
     pub fn write(&self, open: &Path, sealed: &Path) -> io::Result<()> {
         fs::create_dir_all(open)?;
         fs::create_dir_all(sealed)?;
-        let table = |path: &Path, passes: &[models::record::Pass]| -> io::Result<()> {
-            models::record::write_passes(passes, fs::File::create(path)?).map_err(io::Error::other)
+        let table = |path: &Path, passes: &[models::pass::Pass]| -> io::Result<()> {
+            models::pass::write_passes(passes, fs::File::create(path)?).map_err(io::Error::other)
         };
         table(&open.join("points.csv"), &self.passes)?;
         table(&open.join("conditions.csv"), &self.conditions)?;

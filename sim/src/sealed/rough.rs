@@ -7,7 +7,7 @@ use super::bench::Bench;
 use super::design::{Design, Planned};
 use crate::defects::{Defects, Kind};
 use crate::noise::Noise;
-use models::record::Pass;
+use models::pass::Pass;
 
 /// How the scatter of a set departs from normal, independent scatter of the stated size.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -40,6 +40,7 @@ impl ModbusTcpServer {
     pub fn start(address: SocketAddr, devices: BTreeMap<u8, Device>, plant: SharedPlant) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
+        plant.clock.serves(&listener);
         let address = listener.local_addr()?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let (stop, stopped) = tokio::sync::oneshot::channel();

@@ -124,5 +124,7 @@ named! {
         RelativeHumidity = "air.relative_humidity_pct",
         /// The switch in the amplifier's supply closed (1) or open (0).
         CloseSupply = "supply.closed",
+        /// Heartbeat of the watchdog of that switch.
+        SupplyHeartbeat = "supply.heartbeat",
     }
 }

@@ -53,25 +53,34 @@ pub struct WorldPlant {
     hands: Hands,
     drive: AmplifierInput,
     motion: StageInput,
-    guard: StageGuard,
+    guard: Watchdog,
+    supply_guard: Watchdog,
 }
 
 /// Time that the stage moves on without a new heartbeat: twice that of the amplifier's watchdog, so that the plate is quiet before
 /// the finger leaves it.
 pub const STAGE_HEARTBEAT_WITHIN: Nanos = Nanos(100_000_000);
+/// Time that the switch in the supply stays closed without a new heartbeat: what the profiles of watchdog outputs have as `timeout_ms`.
+pub const SUPPLY_HEARTBEAT_WITHIN: Nanos = Nanos(200_000_000);
 /// A stage at rest, lifted off.
 const AT_REST: StageInput = StageInput { velocity_m_s: 0.0, normal_force_n: 0.0 };
 
-/// The stage's watchdog: where heartbeats have come and then stand still, the stage stops and lifts off, and takes no set-point
-/// until the heartbeat goes on. A controller whose stage profile has no heartbeat is not watched.
-#[derive(Clone, Copy, Default)]
-struct StageGuard {
+/// A watchdog of the stage or of the supply's switch: where heartbeats have come and then stand still, the stage stops and lifts off,
+/// or the switch opens, and takes no set-point until the heartbeat goes on. A controller whose profile has no heartbeat is not watched.
+#[derive(Clone, Copy)]
+struct Watchdog {
+    /// How long it waits.
+    within: Nanos,
     /// Last heartbeat, and when it was new.
     last: Option<(f64, Nanos)>,
     lapsed: bool,
 }
 
-impl StageGuard {
+impl Watchdog {
+    const fn new(within: Nanos) -> Self {
+        Watchdog { within, last: None, lapsed: false }
+    }
+
     fn beat(&mut self, value: f64, now: Nanos) {
         if self.last.is_none_or(|(before, _)| before != value) {
             (self.last, self.lapsed) = (Some((value, now)), false);
@@ -80,7 +89,7 @@ impl StageGuard {
 
     /// When the heartbeat has stood still for too long, if that is still to come or has not been acted upon.
     fn due(&self) -> Option<Nanos> {
-        self.last.filter(|_| !self.lapsed).map(|(_, since)| Nanos(since.0 + STAGE_HEARTBEAT_WITHIN.0))
+        self.last.filter(|_| !self.lapsed).map(|(_, since)| since.plus(self.within))
     }
 }
 
@@ -95,8 +104,9 @@ impl WorldPlant {
         let hands = Hands::default();
         let drive =
             AmplifierInput { amplitude: PeakToPeak::ZERO, frequency_hz: 0.0, enable: false, heartbeat: 0 };
-        let guard = StageGuard::default();
-        (WorldPlant { world, hands: hands.clone(), drive, motion: AT_REST, guard }, hands)
+        let guard = Watchdog::new(STAGE_HEARTBEAT_WITHIN);
+        let supply_guard = Watchdog::new(SUPPLY_HEARTBEAT_WITHIN);
+        (WorldPlant { world, hands: hands.clone(), drive, motion: AT_REST, guard, supply_guard }, hands)
     }
 }
 
@@ -105,11 +115,19 @@ impl Plant for WorldPlant {
         // Whatever was hung since the last look has been there since then.
         let [lateral_n, normal_n] = self.hands.bench().hung_n;
         self.world.hang(lateral_n, normal_n);
-        if let Some(due) = self.guard.due().filter(|due| *due < now) {
+        // The earlier of the two first.
+        while let Some(due) = [&self.guard, &self.supply_guard].iter().filter_map(|g| g.due()).min()
+            && due < now
+        {
             self.world.advance_to(due);
-            self.guard.lapsed = true;
-            self.motion = AT_REST;
-            self.world.command_stage(AT_REST);
+            if self.supply_guard.due() == Some(due) {
+                self.supply_guard.lapsed = true;
+                self.world.cut_supply();
+            } else {
+                self.guard.lapsed = true;
+                self.motion = AT_REST;
+                self.world.command_stage(AT_REST);
+            }
         }
         self.world.advance_to(now);
         self.hands.bench().free = Laser {
@@ -180,9 +198,11 @@ impl Plant for WorldPlant {
                 Command::Velocity => self.motion.velocity_m_s = value,
                 Command::NormalForce => self.motion.normal_force_n = value,
                 Command::StageHeartbeat => self.guard.beat(value, self.world.now()),
+                Command::SupplyHeartbeat => self.supply_guard.beat(value, self.world.now()),
                 // The switch has a wire of its own: it moves nothing else.
-                Command::CloseSupply if value != 0.0 => self.world.close_supply(),
-                Command::CloseSupply => self.world.cut_supply(),
+                Command::CloseSupply if value == 0.0 => self.world.cut_supply(),
+                Command::CloseSupply if self.supply_guard.lapsed => {}
+                Command::CloseSupply => self.world.close_supply(),
                 Command::AmbientPressure => self.world.room_mut().set(Air::Pressure, value),
                 Command::AirTemperature => self.world.room_mut().set(Air::Temperature, value),
                 Command::RelativeHumidity => self.world.room_mut().set(Air::Humidity, value),
@@ -254,6 +274,26 @@ mod tests {
             slide(&mut unseen, Some(n as f64));
         }
         assert!(moving(&mut unseen) && loaded(&mut unseen));
+    }
+
+    #[test]
+    fn a_switch_whose_heartbeat_stands_still_opens_and_stays_open_until_it_beats_again() {
+        let mut plant = WorldPlant::new(World::new(&WorldConfig::ideal(), 1).unwrap());
+        let closed = |plant: &mut WorldPlant, now: Nanos| {
+            plant.advance(now);
+            plant.measure(Quantity::SupplyClosed) == 1.0
+        };
+        plant.command(&[(Command::CloseSupply, 1.0)]);
+        assert!(closed(&mut plant, ms(900)), "one without a heartbeat is not watched");
+        for n in 901..1000 {
+            plant.advance(ms(n));
+            plant.command(&[(Command::CloseSupply, 1.0), (Command::SupplyHeartbeat, (n % 2) as f64)]);
+        }
+        assert!(closed(&mut plant, ms(999 + 200)) && !closed(&mut plant, ms(999 + 202)));
+        plant.command(&[(Command::CloseSupply, 1.0), (Command::SupplyHeartbeat, 1.0)]);
+        assert!(!closed(&mut plant, ms(1300)), "the same value is no life");
+        plant.command(&[(Command::SupplyHeartbeat, 0.0), (Command::CloseSupply, 1.0)]);
+        assert!(closed(&mut plant, ms(1301)));
     }
 
     #[test]

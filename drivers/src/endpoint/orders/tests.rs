@@ -336,3 +336,45 @@ fn a_stage_is_enabled_while_it_is_to_move_or_to_load() {
     let enable = endpoint.profile().set("enable").unwrap();
     assert!(endpoint.safe_set_points().contains(&(enable, 0.0)));
 }
+
+/// A coil that has two values changes with every command that leaves, however the loop's commands and the link's turns fall; what the
+/// loop does not ask for, and a safe set-point, feed nothing.
+#[test]
+fn a_supplys_heartbeat_changes_with_every_command_and_with_nothing_else() {
+    let relay = crate::bundled::text("muprime-relay").unwrap();
+    let beats = "[[set]]\nname = \"heartbeat\"\nregister = 1\ntype = \"u16\"\nrange = [0.0, 1.0]\ntimeout_ms = 200\n\n[emulator.measure]";
+    let coils =
+        relay.replace("table = \"coil\"\naddress = 0\ncount = 1", "table = \"coil\"\naddress = 0\ncount = 2");
+    let coils = coils.replace(
+        "registers = [1]\nexpect = { closed = 1 }",
+        "registers = [1, 1]\nexpect = { closed = 1, heartbeat = 1 }",
+    );
+    let text = coils.replace("[emulator.measure]", beats);
+    let profile = Profile::parse(&text).unwrap_or_else(|error| panic!("{error}"));
+    let (mut endpoint, mut port) = Endpoint::supply(profile).unwrap();
+    let beat = endpoint.profile().set("heartbeat").unwrap();
+    let value =
+        |set_points: &[(SetId, f64)]| set_points.iter().find(|(set, _)| *set == beat).map(|(_, v)| *v);
+    let mut before = None;
+    for (turn, every) in (0..40).zip([1, 2, 4, 5].into_iter().cycle()) {
+        // So many cycles of the loop pass between two turns of the link.
+        for cycle in 0..every {
+            let command = if turn < 30 { SupplyCommand::Restore } else { SupplyCommand::Cut };
+            SupplySwitch::command(&mut port, command, Nanos(1000 * turn + cycle));
+        }
+        let Due::SetPoints(set_points) = endpoint.due(Nanos(1000 * turn + 10)) else { panic!("turn {turn}") };
+        let now = value(&set_points);
+        assert!(now.is_some() && now != before, "turn {turn}: {set_points:?}");
+        // What opens leaves before the heartbeat, what closes behind it.
+        assert_eq!(set_points[0].0 == beat, turn < 30);
+        before = now;
+        // A loop that is dead says nothing more.
+        let again = endpoint.due(Nanos(1000 * turn + 11));
+        assert!(!matches!(again, Due::SetPoints(_)), "{again:?}");
+    }
+    assert_eq!(value(&endpoint.hand_out_off(Nanos(50_000))), None);
+    assert_eq!(
+        crate::profile("wago-750-watchdog").unwrap().heartbeat().and_then(|set| set.timeout_ms),
+        Some(200)
+    );
+}

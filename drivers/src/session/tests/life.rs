@@ -10,6 +10,7 @@ use crate::ports::AmplifierPort;
 use crate::{InstrumentSetup, profile};
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Instant;
 
 fn io(text: &str) -> Ended {
     Ended::from(std::io::Error::other(text))
@@ -189,29 +190,34 @@ fn the_end_waits_for_an_off_no_longer_than_it_may() {
 
 #[test]
 fn pauses_double_up_to_the_longest_and_begin_anew_after_a_good_link() {
-    let link = Link::start(
-        10,
-        2000,
-        Box::new(|number, session| match number {
-            1 => {
-                works(number, session, false);
-                io("cut")
-            }
-            2..=7 => io("nobody"),
-            8 => {
-                works(number, session, false);
-                io("cut")
-            }
-            _ => Ended::Stopped,
-        }),
-    );
-    link.closed();
-    for (number, least_ms) in [(2, 10), (3, 20), (4, 40), (5, 80), (6, 160), (7, 320), (8, 640), (9, 10)] {
-        let pause = link.pause_before(number);
-        assert!(pause >= Duration::from_millis(least_ms), "{pause:?} before conversation {number}");
-    }
-    let anew = link.pause_before(9);
-    assert!(anew < Duration::from_millis(1000), "{anew:?} would have been twice 640 ms");
+    let pauses = || {
+        let link = Link::start(
+            10,
+            2000,
+            Box::new(|number, session| match number {
+                1 => {
+                    works(number, session, false);
+                    io("cut")
+                }
+                2..=7 => io("nobody"),
+                8 => {
+                    works(number, session, false);
+                    io("cut")
+                }
+                _ => Ended::Stopped,
+            }),
+        );
+        link.closed();
+        for (number, least_ms) in [(2, 10), (3, 20), (4, 40), (5, 80), (6, 160), (7, 320), (8, 640), (9, 10)]
+        {
+            let pause = link.pause_before(number);
+            assert!(pause >= Duration::from_millis(least_ms), "{pause:?} before conversation {number}");
+        }
+        link.pause_before(9)
+    };
+    // It would have been twice 640 ms each time; a machine that stalls adds to one.
+    let anew = (0..5).map(|_| pauses()).find(|anew| *anew < Duration::from_millis(1000));
+    assert!(anew.is_some());
     // No longer than the longest.
     let link = Link::start(
         10,
@@ -229,22 +235,26 @@ fn pauses_double_up_to_the_longest_and_begin_anew_after_a_good_link() {
 /// Where 'off' is owed a good link that was lost is made anew at once; one that cannot be had is not asked for without a pause.
 #[test]
 fn an_owed_off_is_tried_at_once_and_then_with_pauses() {
-    let link = Link::start(
-        1500,
-        1500,
-        Box::new(|number, session| {
-            match number {
-                1 => works(number, session, true),
-                2 => {}
-                _ => return switches_off(number, session),
-            }
-            io("cut")
-        }),
-    );
-    assert_eq!(link.closed(), Closed::ReadBackOff);
-    let (at_once, later) = (link.pause_before(2), link.pause_before(3));
-    assert!(at_once < Duration::from_millis(1000), "{at_once:?}");
-    assert!(later >= Duration::from_millis(1500), "{later:?}");
+    let at_once = || {
+        let link = Link::start(
+            1500,
+            1500,
+            Box::new(|number, session| {
+                match number {
+                    1 => works(number, session, true),
+                    2 => {}
+                    _ => return switches_off(number, session),
+                }
+                io("cut")
+            }),
+        );
+        assert_eq!(link.closed(), Closed::ReadBackOff);
+        let later = link.pause_before(3);
+        assert!(later >= Duration::from_millis(1500), "{later:?}");
+        link.pause_before(2)
+    };
+    // A machine that stalls adds to one of them.
+    assert!((0..5).any(|_| at_once() < Duration::from_millis(1000)));
 }
 
 /// A pause of an hour does not hold up the end, and what the loop wants meanwhile is not kept for later.

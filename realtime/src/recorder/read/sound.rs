@@ -20,15 +20,17 @@ pub(super) fn known(opcode: u8) -> bool {
     [op::HEADER, op::CHUNK, op::MESSAGE_INDEX, op::ATTACHMENT, op::METADATA, op::DATA_END].contains(&opcode)
 }
 
-/// Whether a record from which reading can go on may begin here: kinds that carry a checksum, and the mark of the data's end.
-pub(super) fn may_begin(bytes: &[u8]) -> bool {
-    let Some(head) = bytes.first_chunk::<HEAD>() else { return false };
+/// Length of a record from which reading can go on, if one may begin here: of a kind that carries a checksum, or the mark of the data's
+/// end.
+pub(super) fn may_begin(bytes: &[u8]) -> Option<u64> {
+    let head = bytes.first_chunk::<HEAD>()?;
     let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
-    match head[0] {
+    let may = match head[0] {
         op::CHUNK | op::ATTACHMENT | op::METADATA => length <= LONGEST,
         op::DATA_END => length == 4,
         _ => false,
-    }
+    };
+    may.then_some(length)
 }
 
 /// Checks a record of the format by all that vouches for it.

@@ -140,6 +140,13 @@ fn a_human_finger_is_refused_where_anything_is_missing() {
             cause => assert_eq!((cause, which), (Cause::DeadMan, 4.0)),
         }
     }
+    // A relay that the same program switches is no watchdog: one must be at the amplifier or at the relay itself.
+    for (amplifier, supply) in [(true, false), (false, true), (true, true), (false, false)] {
+        let mut rig = Guarded::driving();
+        (rig.bench.limits.amplifier_watchdog, rig.bench.limits.supply_watchdog) = (amplifier, supply);
+        let tripped = rig.cycle(|_| {}, Controls::default()).tripped.map(|trip| (trip.cause, trip.value));
+        assert_eq!(tripped, (!amplifier && !supply).then_some((Cause::Unguarded, 5.0)));
+    }
     // An interlock that is not fitted is not missed.
     let mut rig = Guarded::driving();
     let without = |s: &mut Observation| s.contacts.interlock = Err(NoData::NotFitted);

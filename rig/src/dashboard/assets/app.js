@@ -1,4 +1,4 @@
-import { figure, marks, traces } from "/plots.js";
+import { figure, marks, SERIES, traces } from "/plots.js";
 
 // The token comes with the address's fragment, which is never sent, and stays with this tab.
 const given = new URLSearchParams(location.hash.slice(1)).get("token");
@@ -15,6 +15,10 @@ const STATES = 600;
 
 const get = (address, options = {}) => fetch(address, { ...options, headers: { ...options.headers, Authorization: `Bearer ${token}` } });
 
+// Marks that turn text round or that nobody sees are written out, as in the other views.
+const hidden = /[\u061c\u200b\u200e\u200f\u2028-\u202e\u2060\u2066-\u2069\ufeff]/g;
+const shown = (text) => (typeof text === "string" ? text.replace(hidden, (c) => `\\u${c.charCodeAt(0).toString(16).padStart(4, "0")}`) : text);
+
 // Elements are made of text, never of markup: names in records may hold some.
 function el(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
@@ -23,7 +27,7 @@ function el(tag, attributes = {}, ...children) {
     else if (value === true) made.setAttribute(name, "");
     else if (value !== false && value != null) made.setAttribute(name, value);
   }
-  made.append(...children.filter((c) => c != null));
+  made.append(...children.filter((c) => c != null).map(shown));
   return made;
 }
 
@@ -93,8 +97,9 @@ async function catalogue() {
 
 // Without script and without an origin: a report asks for nothing.
 async function written(title, address) {
-  const text = await (await fetched(address)).text();
-  main.replaceChildren(el("h1", {}, title), el("iframe", { sandbox: "", srcdoc: text, title }));
+  const page = new DOMParser().parseFromString(await (await fetched(address)).text(), "text/html");
+  for (const script of page.querySelectorAll("script")) script.remove();
+  main.replaceChildren(el("h1", {}, title), el("iframe", { sandbox: "", srcdoc: `<!doctype html>${page.documentElement.outerHTML}`, title }));
 }
 
 // --- a run ---------------------------------------------------------------------------------------------------------
@@ -109,6 +114,7 @@ class Picture {
     this.progress = { made: run?.made_before ?? 0, planned: run?.planned ?? 0, remaining_s: 0 };
     this.trip = null;
     this.paused = false;
+    this.off = null;
     this.ended = null;
     this.changed = { passes: true, events: true, states: true };
   }
@@ -117,10 +123,12 @@ class Picture {
     else if (about === "state") { this.states.push(said); if (this.states.length > STATES) this.states.shift(); this.changed.states = true; }
     else if (about === "pass") { this.passes.push(said); this.changed.passes = true; }
     else if (about === "progress") this.progress = said;
+    else if (about === "off") this.off = said;
     else if (about === "ended") this.ended = said;
     else if (about === "event") {
       const what = said.event.event;
-      if (what === "tripped") this.trip = said;
+      // A stop that was asked for trips nothing: it is no alarm.
+      if (what === "tripped" && said.event.cause !== "stopped") this.trip = said;
       if (what === "paused") this.paused = true;
       if (what === "resumed") this.paused = false;
       this.events.push(said);
@@ -175,12 +183,12 @@ function runPage(name, control) {
   const rows = el("tbody");
   const head = (text) => el("th", { scope: "col", class: "n" }, text);
   const table = el("div", { class: "scroll passes", tabindex: "0", role: "region", "aria-label": "Passes" }, el("table", {},
-    el("thead", {}, el("tr", {}, ...["point", "w, um", "f, kHz", "U, mm/s", "load, N", "\u03bc'", "predicted", "residual, sd"].map(head))), rows));
+    el("thead", {}, el("tr", {}, ...["point", "w, um", "f, kHz", "U, mm/s", "load, N", "\u03bc'", "predicted", "difference", "surprise, sd"].map(head))), rows));
   main.replaceChildren(title, about, keys, said, trip, now, plots, el("h2", {}, "Events"), events, el("h2", {}, "Passes"), table);
 
   const figures = {
     forces: figure(plots, "Forces"), mu: figure(plots, "Relative friction now"), w: figure(plots, "Relative friction against amplitude"),
-    psi: figure(plots, "Relative friction against \u03a8"), map: figure(plots, "Residuals over the conditions"), late: figure(plots, "Lateness of the loop"),
+    psi: figure(plots, "Relative friction against \u03a8"), map: figure(plots, "Surprise over the conditions"), late: figure(plots, "Lateness of the loop"),
   };
   const charts = {
     forces: traces(figures.forces.plot, "lateral force, N", [{ colour: "--a", band: true }, { colour: "--b", band: true, dash: [8, 4], right: true }], "normal force, N"),
@@ -224,14 +232,13 @@ function runPage(name, control) {
 
   function drawPasses() {
     const compared = picture.passes.filter((p) => p.comparison && p.comparison.mu_relative != null && p.pass.amplitude > 0);
-    const speeds = [...new Set(compared.map((p) => (p.pass.speed_m_s * 1e3).toPrecision(2)))].sort((a, b) => a - b);
-    const colours = ["--a", "--b", "--c", "--grey"];
-    const place = (x) => (p) => {
-      const i = speeds.indexOf((p.pass.speed_m_s * 1e3).toPrecision(2)) % 4;
-      return { x: x(p), y: p.comparison.mu_relative, sd: p.comparison.mu_relative_sd, predicted: p.comparison.predicted, predicted_sd: p.comparison.predicted_sd, kind: i, colour: colours[i] };
-    };
-    const names = ["discs", "squares", "triangles", "diamonds"];
-    const key = speeds.slice(0, 4).map((speed, i) => `${names[i]}: ${Number(speed)} mm/s`).join("; ");
+    const speedOf = (p) => (p.pass.speed_m_s * 1e3).toPrecision(2);
+    const speeds = [...new Set(compared.map(speedOf))].sort((a, b) => a - b);
+    // Speeds beyond the last mark share it, and the key says so: no mark stands for a speed that is not its own.
+    const series = (speed) => SERIES[Math.min(speeds.indexOf(speed), SERIES.length - 1)];
+    const place = (x) => (p) => ({ x: x(p), y: p.comparison.mu_relative, sd: p.comparison.mu_relative_sd, predicted: p.comparison.predicted, predicted_sd: p.comparison.predicted_sd, ...series(speedOf(p)) });
+    const key = SERIES.map((one) => [one.name, speeds.filter((speed) => series(speed) === one).map(Number)])
+      .filter(([, of]) => of.length).map(([mark, of]) => `${mark}: ${of.join(", ")} mm/s`).join("; ");
     const tail = "Strokes: predicted, with twice its standard uncertainty.";
     charts.w.set(compared.map(place((p) => p.pass.amplitude * 1e6)));
     figures.w.say(compared.length ? `${compared.length} passes; ${key}. ${tail}` : "No pass with vibration yet.");
@@ -245,18 +252,18 @@ function runPage(name, control) {
       return { x: p.pass.amplitude * 1e6, y: factor.of(p), kind: 0, size: 2 + 2.2 * Math.min(Math.abs(z), 5), hollow: z < 0, faint: true, colour: z < 0 ? "--b" : "--a" };
     }), factor.name);
     const worst = judged.reduce((w, p) => (w && Math.abs(w.comparison.z) >= Math.abs(p.comparison.z) ? w : p), null);
-    figures.map.say(worst ? `Filled: measured above predicted; hollow: below; the larger, the more standard deviations. Largest: ${signed(worst.comparison.z, 1)} at point ${worst.pass.point}.` : "No pass was judged yet.");
+    figures.map.say(worst ? `Filled: more friction than the model and the passes before let expect; hollow: less; the larger, the more standard deviations. Largest: ${signed(worst.comparison.z, 1)} at point ${worst.pass.point}.` : "No pass was judged yet.");
     rows.replaceChildren(...picture.passes.slice(-200).reverse().map((p) => {
       const c = p.comparison;
-      return el("tr", {}, ...[String(p.pass.point), fixed(p.pass.amplitude * 1e6, 3), fixed(p.pass.frequency_hz / 1e3, 2), signed(p.pass.speed_m_s * (p.pass.direction ?? 1) * 1e3, 1), fixed(p.pass.normal_force_n, 3), fixed(c?.mu_relative, 3), fixed(c?.predicted, 3), signed(c?.z, 1)].map((text) => el("td", { class: "n" }, text)));
+      return el("tr", {}, ...[String(p.pass.point), fixed(p.pass.amplitude * 1e6, 3), fixed(p.pass.frequency_hz / 1e3, 2), signed(p.pass.speed_m_s * (p.pass.direction ?? 1) * 1e3, 1), fixed(p.pass.normal_force_n, 3), fixed(c?.mu_relative, 3), fixed(c?.predicted, 3), signed(c?.mu_relative == null ? null : c.mu_relative - c.predicted, 3), signed(c?.z, 1)].map((text) => el("td", { class: "n" }, text)));
     }));
   }
 
   function drawWords() {
     const run = picture.run;
     if (run) {
-      title.textContent = `${run.plan} on ${run.setup}`;
-      about.textContent = `${name}; operator ${run.operator ?? "not stated"}; sample ${run.sample ?? "not stated"}; compared with ${run.model}${run.fast ? "; in virtual time" : ""}`;
+      title.textContent = shown(`${run.plan} on ${run.setup}`);
+      about.textContent = shown(`${run.guards?.nobody_touches_the_plate ? "NOBODY TOUCHES THE PLATE: the guards for a finger are off; " : ""}${name}; operator ${run.operator ?? "not stated"}; sample ${run.sample ?? "not stated"}; compared with ${run.model}${run.fast ? "; in virtual time" : ""}`);
     }
     const { made, planned, remaining_s } = picture.progress;
     cells.passes.textContent = `${made} of ${planned}`;
@@ -267,11 +274,11 @@ function runPage(name, control) {
     stop.disabled = Boolean(ended);
     pause.disabled = Boolean(ended) || Boolean(run?.fast);
     pause.textContent = picture.paused ? "Go on" : "Pause";
-    const lines = [picture.trip?.words, ended?.error, ended && !picture.trip ? ended.remedy : null, ended?.off, ended?.agreement].filter(Boolean);
+    const lines = [picture.trip?.words, ended?.error, ended && !picture.trip && ended.outcome?.outcome !== "stopped" ? ended.remedy : null, ended?.off ?? picture.off, ended?.agreement].filter(Boolean);
     const key = lines.join("\n");
     if (trip.dataset.key !== key) {
       trip.dataset.key = key;
-      trip.className = picture.trip || ended?.error ? "trip" : "";
+      trip.className = picture.trip || picture.off || ended?.error ? "trip" : "";
       trip.replaceChildren(...lines.map((line) => el("p", {}, line)));
     }
   }

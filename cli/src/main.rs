@@ -1,0 +1,304 @@
+//! The `muprime` command: parses its arguments and hands over to one file per subcommand in `cli/`.
+
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+#![allow(
+    rustdoc::broken_intra_doc_links,
+    reason = "options are documented for a terminal: [user@]host is no link"
+)]
+
+mod verbs;
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use runs::print::Remarks;
+use runs::version;
+use runs::{out, say};
+use std::io::IsTerminal;
+use std::process::ExitCode;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
+use verbs as cli;
+
+/// Controller of a hardware-in-the-loop tribometer: ultrasonic friction reduction, measured and explained.
+#[derive(Parser)]
+#[command(name = "muprime", version, arg_required_else_help = true, max_term_width = 80)]
+struct Cli {
+    /// Print one JSON document (or one per line where a command streams) on stdout and nothing else.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Folder of instrument profiles, besides ~/.config/muprime/profiles and the bundled ones
+    #[arg(long, global = true, value_name = "DIR")]
+    profiles: Option<std::path::PathBuf>,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// An automated friction sweep; without arguments on the bundled virtual rig
+    Run(cli::run::Args),
+    /// Serve the simulated rig behind real protocols until interrupted
+    VirtualRig(cli::virtual_rig::Args),
+    /// Data in, a dated and hashed certificate with uncertainties out
+    Calibrate(cli::calibrate::Args),
+    /// Read setups, plans, profiles, certificates; say what is wrong, with the place in the file
+    Check(cli::check::Args),
+    /// Judge this machine, and the instruments of a setup
+    Doctor(cli::doctor::Args),
+    /// Say where simulation and reality part, which effect causes it, and how far it shrinks
+    Diagnose(cli::diagnose::Args),
+    /// Score the diagnosis on sealed sets of an independent simulation
+    Blind(cli::blind::Args),
+    /// Strike the virtual rig with every fault of the list, in virtual time, from seeds
+    Faults(cli::faults::Args),
+    /// Write a file of cases: a study for one machine or for many
+    #[cfg(feature = "parquet")]
+    Cases(cli::cases::Args),
+    /// Run one case of a study, or a range of them, once
+    #[cfg(feature = "parquet")]
+    Case(cli::case::Args),
+    /// Run what is missing of a study: here, or on Slurm, HyperQueue, Dask
+    #[cfg(feature = "parquet")]
+    Submit(cli::submit::Args),
+    /// Make one table of a study's results
+    #[cfg(feature = "parquet")]
+    Gather(cli::gather::Args),
+    /// Evaluate the models: a point, a finite element case, a study, the paper's figures
+    Model(cli::model::ModelArgs),
+    /// Make a point table of a foreign one: any delimiter, Excel, Parquet, NumPy, time series
+    Import(cli::import::Args),
+    /// Write the report of a run
+    Report(cli::report::Args),
+    /// Two runs side by side: whether they differ beyond their uncertainty, and in what
+    Compare(cli::compare::Args),
+    /// Run a recorded run's cycles again: the same decisions, bit for bit
+    Replay(cli::replay::Args),
+    /// Convert the passes of a run
+    Export(cli::export::Args),
+    /// Make a cut record whole again
+    Recover(cli::recover::Args),
+    /// List the runs
+    Runs(cli::runs::Args),
+    /// Follow a run
+    Watch(cli::watch::Args),
+    /// See the rig, the catalogue and the reports in a browser
+    Dashboard(cli::dashboard::Args),
+    /// Print the JSON Schema of a kind of file, for editors and programs
+    Schema(cli::schema::Args),
+    /// Print a commented file to begin with: a plan, a setup, a fingertip, a profile
+    Init(cli::init::Args),
+    /// List what is bundled, or print one of it
+    Show(cli::show::Args),
+    /// Print a page on an instrument profile: what it reads and writes
+    Doc(cli::doc::Args),
+    /// Write manual pages
+    Man(cli::man::Args),
+    /// Print a completion script for a shell
+    Completions(cli::completions::Args),
+}
+
+/// The command line, with an example for every command.
+fn command() -> clap::Command {
+    cli::examples::with_examples(Cli::command())
+}
+
+fn parsed(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Cli, clap::Error> {
+    Cli::from_arg_matches(&command().try_get_matches_from(arguments)?)
+}
+
+/// The features of this build.
+fn features() -> Vec<&'static str> {
+    let all = [
+        ("arrow", cfg!(feature = "arrow")),
+        ("can", cfg!(feature = "can")),
+        ("dashboard", cfg!(feature = "dashboard")),
+        ("excel", cfg!(feature = "excel")),
+        ("matlab", cfg!(feature = "matlab")),
+        ("mqtt", cfg!(feature = "mqtt")),
+        ("parquet", cfg!(feature = "parquet")),
+    ];
+    all.into_iter().filter(|(_, there)| *there).map(|(name, _)| name).collect()
+}
+
+/// `-V` is a line, `--version` says which build and which models, with `--json` as a document.
+fn say_version() -> ExitCode {
+    let asked = |flag: &str| std::env::args().any(|a| a == flag);
+    if asked("--json") {
+        out!("{}", serde_json::json!(version::of_this_program(features())));
+    } else if asked("--version") {
+        out!("{}", version::of_this_program(features()).words());
+    } else {
+        out!("muprime {}", env!("CARGO_PKG_VERSION"));
+    }
+    ExitCode::from(cli::DONE)
+}
+
+fn main() -> ExitCode {
+    // Places are named in records, catalogues and JSON, all of which are text.
+    let unreadable =
+        std::env::args_os().chain(std::env::var_os("MUPRIME_RUNS")).find(|a| a.to_str().is_none());
+    if let Some(argument) = unreadable {
+        say!("{} is not text in UTF-8: give the file or folder another name", argument.display());
+        return ExitCode::from(cli::REFUSED);
+    }
+    let cli = match parsed(std::env::args_os()) {
+        Ok(cli) => cli,
+        Err(error) => {
+            if error.kind() == ErrorKind::DisplayVersion {
+                return say_version();
+            }
+            if error.use_stderr() && std::env::args().any(|a| a == "--json") {
+                let said = error.to_string();
+                out!(
+                    "{}",
+                    serde_json::json!({ "error": said.lines().next().unwrap_or_default(), "status": cli::REFUSED })
+                );
+            }
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { cli::REFUSED } else { cli::DONE });
+        }
+    };
+    let wanted = std::env::var("MUPRIME_LOG").unwrap_or_else(|_| "warn".into());
+    let filter: Targets = match wanted.parse() {
+        Ok(filter) => filter,
+        Err(error) => {
+            say!("MUPRIME_LOG={wanted}: {error}; a level, or as in 'warn,muprime_drivers=debug'");
+            return ExitCode::from(cli::REFUSED);
+        }
+    };
+    let colours = std::io::stderr().is_terminal();
+    tracing_subscriber::registry()
+        .with(tracing_subscriber::fmt::layer().with_ansi(colours).with_writer(|| Remarks))
+        .with(filter)
+        .init();
+    runs::setup::look_in(cli.profiles);
+    let json = cli.json;
+    let code = runs::leave::until_the_end(move || run(cli.verb, json), cli::INTERNAL);
+    // Whoever leaves at once leaves others no time for it.
+    rig::terminal::give_back();
+    cli::keep_unread();
+    code
+}
+
+fn run(verb: Verb, json: bool) -> ExitCode {
+    // A panic is a fault of this program: status 3, after the threads have put the rig in its safe state.
+    let outcome = std::panic::catch_unwind(|| match verb {
+        Verb::Run(args) => cli::run::run(args, json),
+        Verb::VirtualRig(args) => cli::virtual_rig::run(args, json),
+        Verb::Calibrate(args) => cli::calibrate::run(args, json),
+        Verb::Check(args) => cli::check::run(args, json),
+        Verb::Doctor(args) => cli::doctor::run(args, json),
+        Verb::Diagnose(args) => cli::diagnose::run(args, json),
+        Verb::Blind(args) => cli::blind::run(args, json),
+        Verb::Faults(args) => cli::faults::run(args, json),
+        #[cfg(feature = "parquet")]
+        Verb::Cases(args) => cli::cases::run(args, json),
+        #[cfg(feature = "parquet")]
+        Verb::Case(args) => cli::case::run(args, json),
+        #[cfg(feature = "parquet")]
+        Verb::Submit(args) => cli::submit::run(args, json),
+        #[cfg(feature = "parquet")]
+        Verb::Gather(args) => cli::gather::run(args, json),
+        Verb::Model(args) => cli::model::run(args, json),
+        Verb::Import(args) => cli::import::run(args, json),
+        Verb::Report(args) => cli::report::run(args, json),
+        Verb::Compare(args) => cli::compare::run(&args, json),
+        Verb::Replay(args) => cli::replay::run(args, json),
+        Verb::Export(args) => cli::export::run(args, json),
+        Verb::Recover(args) => cli::recover::run(args, json),
+        Verb::Runs(args) => cli::runs::run(args, json),
+        Verb::Dashboard(args) => cli::dashboard::run(args, json),
+        Verb::Watch(args) => cli::watch::run(args, json),
+        Verb::Schema(args) => cli::schema::run(&args),
+        Verb::Init(args) => cli::init::run(&args),
+        Verb::Show(args) => cli::show::run(&args, json),
+        Verb::Doc(args) => cli::doc::run(&args, json),
+        Verb::Man(args) => cli::man::run(&args, &command()),
+        Verb::Completions(args) => cli::completions::run(&args, &mut command()),
+    });
+    match outcome {
+        Ok(Ok(code)) => code,
+        Ok(Err(report)) => {
+            let status = cli::status_of(&report);
+            if json {
+                let causes: Vec<String> = report.chain().skip(1).map(ToString::to_string).collect();
+                let help = report.help().map(|h| h.to_string());
+                out!(
+                    "{}",
+                    serde_json::json!({ "error": report.to_string(), "causes": causes, "help": help, "status": status })
+                );
+            }
+            say!("{report:?}");
+            ExitCode::from(status)
+        }
+        Err(_) => ExitCode::from(cli::INTERNAL),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn leaves(command: &clap::Command, path: &str, into: &mut Vec<String>) {
+        let subs: Vec<_> = command.get_subcommands().filter(|s| s.get_name() != "help").collect();
+        if subs.is_empty() {
+            assert!(
+                command.get_after_help().is_some(),
+                "{path}: no example under --help; add one in cli/examples.rs"
+            );
+            into.push(path.to_string());
+        }
+        for sub in subs {
+            leaves(sub, format!("{path} {}", sub.get_name()).trim(), into);
+        }
+    }
+
+    /// Words of a line as a shell parts them, quotes taken off.
+    fn words(line: &str) -> Vec<std::ffi::OsString> {
+        let (mut all, mut now, mut quoted) = (Vec::new(), String::new(), false);
+        for c in line.chars() {
+            match c {
+                '\'' => quoted = !quoted,
+                ' ' if !quoted => all.push(std::mem::take(&mut now)),
+                c => now.push(c),
+            }
+        }
+        all.push(now);
+        all.into_iter().filter(|w| !w.is_empty()).map(Into::into).collect()
+    }
+
+    fn pages(command: &mut clap::Command, pages: &mut Vec<String>) {
+        pages.push(command.render_long_help().to_string());
+        pages.push(command.render_help().to_string());
+        for sub in command.get_subcommands_mut() {
+            self::pages(sub, pages);
+        }
+    }
+
+    #[test]
+    fn every_help_page_fits_80_columns() {
+        let mut all = Vec::new();
+        let mut whole = command();
+        whole.build();
+        pages(&mut whole, &mut all);
+        assert!(all.len() > 60, "{}", all.len());
+        let long: Vec<&str> = all.iter().flat_map(|p| p.lines()).filter(|l| l.chars().count() > 80).collect();
+        assert!(long.is_empty(), "{long:#?}");
+    }
+
+    #[test]
+    fn every_command_has_an_example_and_each_example_parses() {
+        let mut there = Vec::new();
+        leaves(&command(), "", &mut there);
+        for (path, lines) in cli::examples::EXAMPLES {
+            assert!(there.iter().any(|p| p == path), "{path}: no such command");
+            for line in lines.lines().map(str::trim) {
+                assert!(line.starts_with(&format!("muprime {path}")), "{line}");
+                if let Err(error) = parsed(words(line)) {
+                    panic!("{line}: {error}");
+                }
+            }
+        }
+    }
+}

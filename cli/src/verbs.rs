@@ -1,0 +1,105 @@
+//! One file a subcommand. Add one: a file here, a line in this list, a variant and a line in `main.rs`.
+#![allow(clippy::disallowed_methods, reason = "people wait in wall-clock time")]
+
+pub mod blind;
+pub mod calibrate;
+#[cfg(feature = "parquet")]
+pub mod case;
+#[cfg(feature = "parquet")]
+pub mod cases;
+pub mod check;
+pub mod compare;
+pub mod completions;
+pub mod dashboard;
+pub mod diagnose;
+pub mod doc;
+pub mod doctor;
+pub mod examples;
+pub mod export;
+pub mod faults;
+#[cfg(feature = "parquet")]
+pub mod gather;
+pub mod import;
+pub mod init;
+pub mod man;
+pub mod model;
+pub mod recover;
+pub mod replay;
+pub mod report;
+pub mod run;
+pub mod runs;
+pub mod schema;
+pub mod show;
+#[cfg(feature = "parquet")]
+pub mod submit;
+pub mod virtual_rig;
+pub mod watch;
+
+use miette::IntoDiagnostic;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::OnceLock;
+
+/// Done, also when the model has left the measurement or the verdict is unknown.
+pub const DONE: u8 = 0;
+/// Done, but the answer is a failure: a safety trip ended the run, a check fell short.
+pub const FAILED: u8 = 1;
+/// Refused: nothing was touched.
+pub const REFUSED: u8 = 2;
+/// A fault of this program.
+pub const INTERNAL: u8 = 3;
+
+/// The status of an error: refused, unless a run had begun.
+pub fn status_of(error: &miette::Report) -> u8 {
+    use ::runs::session::Unfinished;
+    match error.downcast_ref::<Unfinished>() {
+        Some(Unfinished::NotKept | Unfinished::Interrupted | Unfinished::NotOff) => FAILED,
+        Some(Unfinished::Internal) => INTERNAL,
+        None => REFUSED,
+    }
+}
+
+/// Name of the file in a run's folder with what its readers did not take.
+const UNREAD: &str = "unread.txt";
+/// The folder of the run that this process leads.
+static RUN: OnceLock<PathBuf> = OnceLock::new();
+
+/// A rig is driven from now on: nobody waits for a reader of standard output or standard error, and what they do not take stands in
+/// the run's folder afterwards.
+///
+/// # Errors
+/// The system gives no thread.
+pub fn tell_beside(run: &Path) -> miette::Result<()> {
+    let _ = RUN.set(run.into());
+    ::runs::print::beside().into_diagnostic()
+}
+
+/// Waits a moment for those who read, and keeps what they did not take. A folder that was refused stays as it is.
+pub fn keep_unread() {
+    let unread = ::runs::print::end();
+    if let Some(run) = RUN.get().filter(|run| !unread.is_empty() && ::runs::run_dir::has_begun(run)) {
+        let _ = ::runs::files::write_plain(&run.join(UNREAD), unread);
+    }
+}
+
+/// A status as the process's exit code.
+pub fn exit(status: u8) -> miette::Result<ExitCode> {
+    Ok(ExitCode::from(status))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::runs::session::Unfinished;
+
+    #[test]
+    fn refused_means_that_nothing_was_touched() {
+        let full = || miette::miette!("No space left on device");
+        assert_eq!(status_of(&full()), REFUSED);
+        assert_eq!(status_of(&full().wrap_err(Unfinished::NotKept)), FAILED);
+        assert_eq!(status_of(&full().wrap_err(Unfinished::Internal)), INTERNAL);
+        assert_eq!(status_of(&full().wrap_err(Unfinished::NotOff)), FAILED);
+        assert_eq!(status_of(&Unfinished::Interrupted.into()), FAILED);
+        assert_eq!(status_of(&full().wrap_err(Unfinished::NotKept).wrap_err("and more")), FAILED);
+    }
+}

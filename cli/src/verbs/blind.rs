@@ -1,0 +1,189 @@
+//! `muprime blind`: the diagnosis scored on sealed sets.
+
+mod studies;
+
+use ::studies::progress::Study;
+use ::studies::validation::blind::distance::by_cause;
+use ::studies::validation::blind::reliability::{diagram, told};
+use ::studies::validation::blind::{Scored, confusion, figures, run as score_all};
+use diagnosis::constants::Constants;
+use diagnosis::hypotheses::Options;
+use miette::IntoDiagnostic;
+use runs::{out, say};
+use sim::sealed::Stratum;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+/// Score the diagnosis on sealed sets of the independent simulation.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Number of sets.
+    #[arg(long, default_value_t = 100)]
+    pub sets: usize,
+    /// Seed of the first set.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// One stratum only: none, single, pair, alias or outside; all in their shares without it.
+    #[arg(long)]
+    pub stratum: Option<String>,
+    /// Try single effects only.
+    #[arg(long)]
+    pub no_pairs: bool,
+    /// Leave an effect out of the library (may be repeated).
+    #[arg(long, value_name = "EFFECT")]
+    pub without: Vec<String>,
+    /// Write the sets to this folder (open and sealed parts apart) for other diagnosers; none is scored.
+    #[arg(long, value_name = "DIR")]
+    pub write: Option<std::path::PathBuf>,
+    /// Instead: how often the intervals of the size cover on sets of the library's own forms.
+    #[arg(long, conflicts_with_all = ["further", "write", "stratum"])]
+    pub same_form: bool,
+    /// Instead: designed next experiments against random ones.
+    #[arg(long, conflicts_with_all = ["write", "stratum"])]
+    pub further: bool,
+    /// Instead: sets whose scatter is not what rig.toml states: gaussian, heavy, serial, gross, understated, runs, or all; so
+    /// many of each truth (none, a squeeze film, friction that depends on load, an offset).
+    #[arg(long, value_name = "KIND", conflicts_with_all = ["further", "write", "same_form", "stratum"])]
+    pub noise: Option<String>,
+    /// Set a constant of the diagnosis for this study (may be repeated); docs/diagnosis/constants.md lists them.
+    #[arg(long, value_name = "NAME=VALUE", hide = true)]
+    pub constant: Vec<String>,
+    /// Instead: the verdicts with each constant halved and doubled. `fit`, `decision` or a name restricts it.
+    #[arg(long, value_name = "WHICH", num_args = 0..=1, default_missing_value = "all", hide = true,
+          conflicts_with_all = ["further", "write", "same_form"])]
+    pub sensitivity: Option<String>,
+    /// Instead: the table of constants, as docs/diagnosis/constants.md has it.
+    #[arg(long, hide = true)]
+    pub constants: bool,
+    /// Print one line a set on stderr.
+    #[arg(long)]
+    pub verbose: bool,
+}
+
+/// Makes, diagnoses and scores the sets.
+///
+/// # Errors
+/// An unknown stratum.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let stratum = match args.stratum.as_deref() {
+        None => None,
+        Some("none") => Some(Stratum::None),
+        Some("single") => Some(Stratum::Single),
+        Some("pair") => Some(Stratum::Pair),
+        Some("alias") => Some(Stratum::Alias),
+        Some("outside") => Some(Stratum::Outside),
+        Some(other) => miette::bail!("--stratum {other}: none, single, pair, alias or outside is needed"),
+    };
+    if let Some(folder) = &args.write {
+        let (sets, to) = (args.sets, folder.display().to_string());
+        let study = Study::begin(sets as u64, "sets", move |_: Vec<()>, done| {
+            if json {
+                out!("{}", serde_json::json!({ "partial": true, "written": done, "sets": sets }));
+            } else {
+                out!("partial: {done} of {sets} sets are in {to}");
+            }
+        })?;
+        for set in ::studies::validation::blind::sets(args.seed, sets, stratum) {
+            let name = format!("{:06}", set.label.seed % 1_000_003);
+            set.write(&folder.join("open").join(&name), &folder.join("sealed").join(&name))
+                .into_diagnostic()?;
+            study.done(None);
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    if args.constants {
+        out!("{}", diagnosis::constants::markdown().trim_end());
+        return Ok(ExitCode::SUCCESS);
+    }
+    if args.same_form {
+        return studies::same_form(&args, json);
+    }
+    if args.further {
+        return studies::further(&args, json);
+    }
+    let mut constants = Constants::default();
+    for setting in &args.constant {
+        let (name, value) = setting
+            .split_once('=')
+            .ok_or_else(|| miette::miette!("--constant {setting}: NAME=VALUE is needed"))?;
+        constants.set(name.trim(), value).map_err(|e| miette::miette!("--constant {setting}: {e}"))?;
+    }
+    let options = Options {
+        constants: Arc::new(constants),
+        pairs: !args.no_pairs,
+        without: args.without.clone(),
+        ..Options::default()
+    };
+    if let Some(kind) = args.noise.as_deref() {
+        return studies::rough(&args, kind, &options, json);
+    }
+    if let Some(asked) = args.sensitivity.as_deref() {
+        return studies::sensitivity(&args, asked, stratum, &options, json);
+    }
+    let (seed, sets) = (args.seed, args.sets);
+    let study = Study::begin(sets as u64, "sets", move |scored: Vec<Scored>, done| {
+        if !json {
+            out!("partial: {done} of {sets} sets");
+        }
+        if let Err(why) = tell(&scored, seed, sets, true, json) {
+            say!("{why}");
+        }
+    })?;
+    let scored = score_all(seed, sets, stratum, &options, |s| {
+        if args.verbose {
+            study.bar.suspend(|| say!("{}", serde_json::to_string(s).unwrap_or_default()));
+        }
+        study.done(Some(s.clone()));
+    })?;
+    drop(study);
+    tell(&scored, seed, sets, false, json)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Figures and answers of the sets that were scored.
+fn tell(scored: &[Scored], seed: u64, sets: usize, partial: bool, json: bool) -> miette::Result<()> {
+    let figures = figures(scored);
+    let confusion = confusion(scored);
+    if json {
+        let mut document = serde_json::json!({
+            "schema": "muprime.blind/1", "seed": seed, "sets": sets,
+            "figures": figures, "reliability": diagram(scored.iter()),
+            "reliability_of_what_can_be_told": diagram(scored.iter().filter(|s| told(s))),
+            "distances": by_cause(scored), "confusion": confusion, "scored": scored,
+        });
+        if partial {
+            document["partial"] = true.into();
+        }
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        return Ok(());
+    }
+    out!("{:52} {:>8}  {:>17}  {:>5}  target", "figure", "value", "95 % interval", "n");
+    for f in &figures {
+        let value = f.value.map_or_else(|| "-".to_string(), |v| format!("{v:.3}"));
+        let ci = f.ci95.map_or_else(|| "-".to_string(), |c| format!("[{:.3}, {:.3}]", c[0], c[1]));
+        out!("{:52} {value:>8}  {ci:>17}  {:>5}  {}", f.name, f.n, f.target);
+    }
+    out!("\ntruth -> answers");
+    for (truth, answers) in &confusion {
+        let list: Vec<String> = answers.iter().map(|(a, n)| format!("{a} {n}")).collect();
+        out!("  {truth:40} {}", list.join("; "));
+    }
+    out!("\ncause: distance from the library's nearest law, median (sets)");
+    for (cause, (distance, sets)) in by_cause(scored) {
+        out!("  {cause:28} {distance:.3} ({sets})");
+    }
+    let told_only = diagram(scored.iter().filter(|s| told(s)));
+    for (title, bins) in [("all sets", diagram(scored.iter())), ("what can be told", told_only)] {
+        out!("\nentries of the lists, {title}: stated probability, share that is right");
+        for b in bins {
+            let ([from, to], [low, high]) = (b.from_to, b.ci95);
+            out!(
+                "  {from:5.3} to {to:5.3}  {:.4}  {:.4} [{low:.4}, {high:.4}]  n {}",
+                b.stated,
+                b.observed,
+                b.entries
+            );
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,99 @@
+//! `muprime calibrate force|amplitude|latency|phase|finger|creep|gravity|noise|step|tap ...`: data in, a certificate out.
+
+use calibration::certificate::Certificate;
+use miette::IntoDiagnostic;
+use rig::bench::AtTheBench;
+use runs::calibrate::{Issued, What, certified, verify};
+use runs::out;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Verb {
+    #[command(flatten)]
+    Certify(Box<What>),
+    /// Print what verified certificates leave open, as the [calibration] section of rig.toml
+    Priors(PriorsArgs),
+}
+
+/// Arguments of `priors`.
+#[derive(Debug, clap::Args)]
+struct PriorsArgs {
+    /// Certificates
+    #[arg(required = true)]
+    certificates: Vec<PathBuf>,
+}
+
+/// Calibrates.
+///
+/// # Errors
+/// Data that is unfit for a certificate, with the reason; files that cannot be read or written.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    match &args.verb {
+        Verb::Priors(args) => priors(args, json),
+        Verb::Certify(what) => write(&certified(what, &AtTheBench)?, json),
+    }
+}
+
+/// Writes the certificate and says what it says.
+fn write(issued: &Issued, json: bool) -> miette::Result<ExitCode> {
+    let out = &issued.out;
+    if out.exists() && !issued.overwrite {
+        miette::bail!("{} exists: give another --out, or --overwrite", out.display());
+    }
+    runs::files::write_whole(out, issued.certificate.to_toml())?;
+    if json {
+        let mut document = issued.document();
+        document["certificate"] = serde_json::json!(out);
+        out!("{document}");
+    } else {
+        show(&issued.certificate, out);
+    }
+    super::exit(super::DONE)
+}
+
+fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
+    let mut priors = models::rig_file::Calibration::default();
+    for path in &args.certificates {
+        let name = path.display().to_string();
+        let certificate = Certificate::from_toml(&runs::input::text_of(path)?)
+            .map_err(|e| miette::miette!("{name}: {e}"))?;
+        let verified = verify(&name, &certificate, certificate.kind, &certificate.instrument.serial)?;
+        calibration::prior::take(&mut priors, verified)
+            .map_err(|refusal| miette::miette!("{name}: {refusal}"))?;
+    }
+    if json {
+        out!("{}", serde_json::json!({ "calibration": priors }));
+    } else {
+        out!("[calibration]\n{}", toml::to_string(&priors).into_diagnostic()?.trim_end());
+    }
+    super::exit(super::DONE)
+}
+
+fn show(certificate: &Certificate, out: &Path) {
+    out!("{} certificate for {}: {}", certificate.kind, certificate.instrument.serial, out.display());
+    for p in &certificate.parameters {
+        out!(
+            "  {:<34} {:>14.6e} +- {:.1e} {}  95 %: {:.6e} to {:.6e}",
+            p.name,
+            p.value,
+            p.standard_uncertainty,
+            p.unit,
+            p.ci95[0],
+            p.ci95[1]
+        );
+    }
+    let r = &certificate.residuals;
+    out!("  residuals: {} of sd {:.3e}, largest {:.3e} {}", r.count, r.sd, r.largest, r.unit);
+    for remark in &certificate.remarks {
+        out!("  note: {remark}");
+    }
+    out!("  valid until {}", certificate.validity.until);
+}

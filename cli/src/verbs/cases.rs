@@ -1,0 +1,328 @@
+//! `muprime cases`: writes files of cases.
+
+use super::{DONE, exit};
+use miette::{Context, IntoDiagnostic};
+use models::ridge::Steady;
+use runs::out;
+use serde::Serialize;
+use serde_json::Value;
+use sim::sealed::Stratum;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use studies::cases::file::{self, Header, SCHEMA};
+use studies::cases::kinds::{self, blind, diagnose, faults, finger, noop, ridge, table};
+use studies::validation::faults::Pace;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Cases of the finite element model: from a table, or drawn evenly from a box
+    Ridge(Ridge),
+    /// The nodes of the surrogate's table, and those held out
+    Table(To),
+    /// Scenes of the fault bench, one a seed
+    Faults(Faults),
+    /// Sealed sets, to be diagnosed and scored
+    Blind(Blind),
+    /// Point tables or runs, to be diagnosed
+    Diagnose(Diagnose),
+    /// Phase tables of fingers, to be identified
+    Finger(Finger),
+    /// Cases that only hash: for measuring an engine
+    Noop(Noop),
+}
+
+#[derive(Debug, clap::Args)]
+struct To {
+    /// The file of cases
+    #[arg(long, short = 'o', value_name = "FILE")]
+    output: PathBuf,
+}
+
+#[derive(Debug, clap::Args)]
+struct Ridge {
+    #[command(flatten)]
+    to: To,
+    /// A table in CSV, a case a row: columns named as the variables of --span
+    #[arg(long, conflicts_with_all = ["draw", "span"], required_unless_present = "draw")]
+    from: Option<PathBuf>,
+    /// How many cases to draw from the spans
+    #[arg(long, requires = "span")]
+    draw: Option<u64>,
+    /// Number of the first draw: others are other cases
+    #[arg(long, default_value_t = 1)]
+    first: u64,
+    /// A variable from LOW to HIGH, with :log evenly in its logarithm (may be repeated)
+    #[arg(long, value_name = "NAME=LOW..HIGH[:log]")]
+    span: Vec<String>,
+    /// A variable that all cases share (may be repeated)
+    #[arg(long, value_name = "NAME=VALUE")]
+    set: Vec<String>,
+    /// Elements of each mesh, about
+    #[arg(long, default_value_t = models::ridge::case::ELEMENTS)]
+    elements: usize,
+    /// Tolerance on mu' at which the cycles count as steady
+    #[arg(long, default_value_t = 0.004)]
+    tolerance: f64,
+    /// Most cycles at full amplitude
+    #[arg(long, default_value_t = 300)]
+    at_most: usize,
+}
+
+#[derive(Debug, clap::Args)]
+struct Faults {
+    #[command(flatten)]
+    to: To,
+    /// How many seeds
+    #[arg(long, default_value_t = 2000)]
+    seeds: u64,
+    /// First seed
+    #[arg(long, default_value_t = 1)]
+    first: u64,
+    /// Two faults in each run
+    #[arg(long)]
+    pairs: bool,
+    /// At the limits that a setup has by default
+    #[arg(long)]
+    default_limits: bool,
+}
+
+#[derive(Debug, clap::Args)]
+struct Blind {
+    #[command(flatten)]
+    to: To,
+    /// Number of sets
+    #[arg(long, default_value_t = 100)]
+    sets: u64,
+    /// Seed of the benchmark
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// One stratum only: none, single, pair, alias or outside
+    #[arg(long, value_parser = stratum_of)]
+    stratum: Option<Stratum>,
+    /// Try single effects only
+    #[arg(long)]
+    no_pairs: bool,
+    /// Leave an effect out of the library (may be repeated)
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
+}
+
+#[derive(Debug, clap::Args)]
+struct Diagnose {
+    #[command(flatten)]
+    to: To,
+    /// Point tables, or folders of runs
+    data: Vec<PathBuf>,
+    /// A file that names further ones, a line each
+    #[arg(long, value_name = "FILE")]
+    list: Option<PathBuf>,
+    /// One rig.toml for all; without it, that beside each table
+    #[arg(long)]
+    rig: Option<PathBuf>,
+    /// Try single effects only
+    #[arg(long)]
+    no_pairs: bool,
+    /// Leave an effect out of the library (may be repeated)
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
+}
+
+#[derive(Debug, clap::Args)]
+struct Finger {
+    #[command(flatten)]
+    to: To,
+    /// Phase tables, one a finger
+    phases: Vec<PathBuf>,
+    /// A file that names further ones, a line each
+    #[arg(long, value_name = "FILE")]
+    list: Option<PathBuf>,
+    /// Frequency of tables without that column
+    #[arg(long)]
+    frequency_hz: Option<f64>,
+    /// Normal force of tables without that column
+    #[arg(long)]
+    normal_force_n: Option<f64>,
+    /// Identify the modulus alone
+    #[arg(long)]
+    modulus_only: bool,
+    /// Elements of the ridge's mesh, about
+    #[arg(long, default_value_t = models::ridge::case::ELEMENTS)]
+    elements: usize,
+}
+
+#[derive(Debug, clap::Args)]
+struct Noop {
+    #[command(flatten)]
+    to: To,
+    /// How many cases
+    #[arg(long)]
+    cases: u64,
+    /// Hashes of each: some five million a second
+    #[arg(long, default_value_t = 0)]
+    hashes: u64,
+}
+
+fn stratum_of(text: &str) -> Result<Stratum, String> {
+    serde_json::from_value(Value::String(text.into()))
+        .map_err(|_| "none, single, pair, alias or outside is needed".to_string())
+}
+
+/// Files that were named, absolute: a study may stand elsewhere.
+fn named(given: &[PathBuf], list: Option<&Path>) -> miette::Result<Vec<PathBuf>> {
+    let mut all = given.to_vec();
+    if let Some(list) = list {
+        let bytes = runs::input::bytes_of(list, runs::input::MAX_TABLE_BYTES)?;
+        let text = String::from_utf8(bytes).into_diagnostic().wrap_err_with(|| list.display().to_string())?;
+        all.extend(text.lines().map(str::trim).filter(|l| !l.is_empty()).map(PathBuf::from));
+    }
+    if all.is_empty() {
+        miette::bail!("no files: name them, or a file that lists them with --list");
+    }
+    let absolute = |p: PathBuf| p.canonicalize().into_diagnostic().wrap_err_with(|| p.display().to_string());
+    all.into_iter().map(absolute).collect()
+}
+
+/// The settings of `--set`.
+pub(crate) fn values(list: &[String]) -> miette::Result<BTreeMap<String, f64>> {
+    let parsed = |text: &String| {
+        let (name, value) = text.split_once('=')?;
+        Some((name.trim().to_string(), value.trim().parse().ok()?))
+    };
+    list.iter()
+        .map(|text| parsed(text).ok_or_else(|| miette::miette!("--set {text}: NAME=VALUE is needed")))
+        .collect()
+}
+
+/// The spans of `--span`.
+pub(crate) fn spans(list: &[String]) -> miette::Result<BTreeMap<String, ridge::Span>> {
+    let parsed = |text: &String| {
+        let (name, rest) = text.split_once('=')?;
+        let (ends, log) = rest.strip_suffix(":log").map_or((rest, false), |ends| (ends, true));
+        let (low, high) = ends.split_once("..")?;
+        let span = ridge::Span { low: low.trim().parse().ok()?, high: high.trim().parse().ok()?, log };
+        Some((name.trim().to_string(), span))
+    };
+    list.iter()
+        .map(|text| {
+            parsed(text).ok_or_else(|| {
+                miette::miette!("--span {text}: NAME=LOW..HIGH or NAME=LOW..HIGH:log is needed")
+            })
+        })
+        .collect()
+}
+
+/// The rows of a table of variables.
+fn rows(path: &Path) -> miette::Result<Vec<Value>> {
+    let bytes = runs::input::bytes_of(path, runs::input::MAX_TABLE_BYTES)?;
+    let mut reader = csv::Reader::from_reader(bytes.as_slice());
+    let mut all = Vec::new();
+    for row in reader.deserialize::<BTreeMap<String, f64>>() {
+        let row = row.into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        ridge::set(models::ridge::RidgeCase::paper(), &row).wrap_err_with(|| path.display().to_string())?;
+        all.push(serde_json::to_value(row).into_diagnostic()?);
+    }
+    Ok(all)
+}
+
+/// Writes the file, after its cases have been looked at as the worker will.
+fn write(
+    kind: &str,
+    to: &To,
+    cases: u64,
+    settings: &impl Serialize,
+    lines: Option<&[Value]>,
+    json: bool,
+) -> miette::Result<ExitCode> {
+    let kind = kinds::by_name(kind)?;
+    let header = Header {
+        schema: SCHEMA.into(),
+        kind: kind.name.into(),
+        version: kind.version(),
+        cases: lines.map_or(cases, |lines| lines.len() as u64),
+        listed: lines.is_some(),
+        line_bytes: None,
+        settings: serde_json::to_value(settings).into_diagnostic()?,
+    };
+    if header.cases == 0 {
+        miette::bail!("no cases");
+    }
+    let make = (kind.prepare)(&header, Path::new("/"))?;
+    match lines {
+        Some(lines) => (0..).zip(lines).try_for_each(|(i, line)| make(i, Some(line)).map(drop))?,
+        None => drop(make(header.cases - 1, None)?),
+    }
+    file::write(&to.output, header.clone(), lines)?;
+    if json {
+        out!("{}", serde_json::json!({ "file": to.output, "kind": kind.name, "cases": header.cases }));
+    } else {
+        out!("{}: {} cases: {}", to.output.display(), header.cases, kind.words);
+    }
+    exit(DONE)
+}
+
+/// Writes a file of cases.
+///
+/// # Errors
+/// What is no case, with the place.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let of =
+        |path: PathBuf, more: &dyn Fn(PathBuf) -> serde_json::Result<Value>| more(path).into_diagnostic();
+    match args.what {
+        What::Ridge(a) => {
+            let steady = Steady { tolerance: a.tolerance, at_most: a.at_most, ..Steady::default() };
+            let settings = ridge::Settings {
+                elements: a.elements,
+                steady,
+                base: values(&a.set)?,
+                spans: spans(&a.span)?,
+                first: a.first,
+            };
+            let lines = a.from.as_deref().map(rows).transpose()?;
+            write("ridge", &a.to, a.draw.unwrap_or(0), &settings, lines.as_deref(), json)
+        }
+        What::Table(to) => write("table", &to, table::points().len() as u64, &Value::Null, None, json),
+        What::Faults(a) => {
+            let pace = if a.default_limits { Pace::Default } else { Pace::Fast };
+            let settings = faults::Settings { first: a.first, pairs: a.pairs, pace };
+            write("faults", &a.to, a.seeds, &settings, None, json)
+        }
+        What::Blind(a) => {
+            let settings = blind::Settings {
+                seed: a.seed,
+                stratum: a.stratum,
+                no_pairs: a.no_pairs,
+                without: a.without,
+            };
+            write("blind", &a.to, a.sets, &settings, None, json)
+        }
+        What::Diagnose(a) => {
+            let rig = a.rig.map(|p| named(&[p], None)).transpose()?.and_then(|mut all| all.pop());
+            let line = |data| serde_json::to_value(diagnose::Line { data, rig: rig.clone() });
+            let lines = named(&a.data, a.list.as_deref())?.into_iter().map(|p| of(p, &line));
+            let lines: Vec<Value> = lines.collect::<miette::Result<_>>()?;
+            let settings = diagnose::Settings { no_pairs: a.no_pairs, without: a.without };
+            write("diagnose", &a.to, 0, &settings, Some(&lines), json)
+        }
+        What::Finger(a) => {
+            let (frequency_hz, normal_force_n) = (a.frequency_hz, a.normal_force_n);
+            let line = |phases| serde_json::to_value(finger::Line { phases, frequency_hz, normal_force_n });
+            let lines = named(&a.phases, a.list.as_deref())?.into_iter().map(|p| of(p, &line));
+            let lines: Vec<Value> = lines.collect::<miette::Result<_>>()?;
+            let settings = finger::Settings {
+                elements: a.elements,
+                modulus_only: a.modulus_only,
+                ..finger::Settings::default()
+            };
+            write("finger", &a.to, 0, &settings, Some(&lines), json)
+        }
+        What::Noop(a) => write("noop", &a.to, a.cases, &noop::Settings { hashes: a.hashes }, None, json),
+    }
+}

@@ -1,0 +1,97 @@
+//! `muprime check FILE...`: says what is wrong with files of any kind, and whether a plan can run on a setup.
+
+use runs::print::folded;
+use runs::setup::Setup;
+use runs::{out, say};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use tables::check::{Good, On, kind_of, problems_of};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Files of any kind, folders of runs, or bundled names: plans, setups, profiles, fingertips, rig.toml, point tables, models,
+    /// certificates, defects, verdicts, summaries, records
+    #[arg(required = true)]
+    files: Vec<String>,
+    /// Setup that the plans are to run on [default: the setup among the files, where there is one]
+    #[arg(long)]
+    setup: Option<String>,
+    /// Corrected model that they are to run with
+    #[arg(long)]
+    model: Option<PathBuf>,
+    /// Away from the bench: leave out whether the instruments' ports can be opened
+    #[arg(long)]
+    offline: bool,
+}
+
+/// Checks every file, and every plan against the setup; the status tells of the worst.
+///
+/// # Errors
+/// A setup or a model that was named and cannot be used; what is wrong with the files is the answer.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let helped = |name: &str| {
+        Setup::load(name).map_err(|why| tables::check::with_place_and_help(why, name, Some("setup")))
+    };
+    let named = args.setup.as_deref().map(helped).transpose()?;
+    let among = args.files.iter().filter(|f| kind_of(f).is_ok_and(|k| k == "setup"));
+    let setup = match (named, among.collect::<Vec<_>>().as_slice()) {
+        (Some(setup), _) => Some(setup),
+        // One that is wrong is told of by itself.
+        (None, [one]) => Setup::load(one).ok(),
+        (None, _) => None,
+    };
+    let model = match (&args.model, &setup) {
+        (None, _) => None,
+        (Some(path), Some(setup)) => {
+            let name = path.display().to_string();
+            Some(runs::model_file::load_for(setup, &name, &runs::input::text_of(path)?)?)
+        }
+        (Some(_), None) => miette::bail!(help = "name it with --setup", "--model is judged on a setup"),
+    };
+    let on = On { setup, model, ports: (!args.offline).then_some(rig::free_ports::free) };
+    let mut worst = super::DONE;
+    for file in &args.files {
+        let verdict = tables::check::file(file, &on);
+        if json {
+            let said = match &verdict {
+                Ok(good) => serde_json::json!({
+                    "file": file, "ok": true, "kind": good.kind, "passes": good.passes, "remarks": good.remarks,
+                }),
+                Err(e) => serde_json::json!({
+                    "file": file, "ok": false, "problem": format!("{e}"), "causes": causes(e),
+                    "help": e.help().map(|h| h.to_string()), "problems": problems_of(e),
+                }),
+            };
+            out!("{said}");
+        } else {
+            match &verdict {
+                Ok(good) => {
+                    say!("{}", folded(&format!("{file}: {}", words(good, on.setup.as_ref())), 2));
+                    for remark in &good.remarks {
+                        say!("{}", folded(&format!("  remark: {remark}"), 2));
+                    }
+                }
+                Err(e) => say!("{file}:\n{e:?}"),
+            }
+        }
+        if verdict.is_err() {
+            worst = super::REFUSED;
+        }
+    }
+    super::exit(worst)
+}
+
+fn causes(error: &miette::Report) -> Vec<String> {
+    error.chain().skip(1).map(ToString::to_string).collect()
+}
+
+fn words(good: &Good, setup: Option<&Setup>) -> String {
+    match (good.kind, good.passes, setup) {
+        ("plan", Some(passes), Some(setup)) => {
+            format!("a good plan: {passes} passes on {}", setup.file.name)
+        }
+        (kind, Some(passes), _) => format!("a good {kind} of {passes} passes"),
+        (kind, None, _) => format!("a good {kind}"),
+    }
+}

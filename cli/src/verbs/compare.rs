@@ -1,0 +1,107 @@
+//! `muprime compare RUN_A RUN_B`: two runs side by side.
+
+use runs::compare::Compared;
+use runs::out;
+use runs::print::folded;
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Conditions that are told, those furthest apart first.
+const TOLD: usize = 5;
+/// Longest value that is told of a difference, in characters.
+const SHOWN: usize = 24;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of the first run
+    run_a: PathBuf,
+    /// Folder of the second run
+    run_b: PathBuf,
+    /// Where a page with both of them goes (one HTML file)
+    #[arg(long)]
+    report: Option<PathBuf>,
+}
+
+/// Compares.
+///
+/// # Errors
+/// A folder that holds no run, a run without a pass without vibration, a page that cannot be written.
+pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+    let compared = Compared::of([&args.run_a, &args.run_b])?;
+    if let Some(page) = &args.report {
+        runs::files::write_whole(page, runs::report::comparison::page(&compared)?)?;
+    }
+    if json {
+        out!("{}", serde_json::json!(compared));
+    } else {
+        out!("{}", folded(&terminal(&compared), 2));
+    }
+    super::exit(super::DONE)
+}
+
+/// The comparison for people.
+fn terminal(Compared { comparison: result, warnings: warned, differences: differ, .. }: &Compared) -> String {
+    let mut text = String::new();
+    let w = &mut text;
+    for warning in warned {
+        let _ = writeln!(w, "Mind: {warning}");
+    }
+    match &result.judged {
+        None => w.push_str("cannot tell: the runs have no condition in common\n"),
+        Some(judged) => {
+            let [first, second] = judged.figures_words(&result.pairs);
+            let _ = writeln!(w, "{}\n{first}\n{second}", judged.answer_words(result.pairs.len()));
+        }
+    }
+    let [a, b] = result.references;
+    let _ = writeln!(
+        w,
+        "mu_0: {:.4} +- {:.4} and {:.4} +- {:.4}",
+        a.mu0,
+        a.mu0 * a.relative_sd,
+        b.mu0,
+        b.mu0 * b.relative_sd
+    );
+    let [left, right] = result.unpaired;
+    if left + right > 0 {
+        let _ = writeln!(w, "passes at conditions that the other run lacks: {left} and {right}");
+    }
+    let worst = result.furthest_first();
+    if !worst.is_empty() {
+        w.push_str("furthest apart (w peak-to-peak; second less first, in standard deviations):\n");
+    }
+    for p in worst.iter().take(TOLD) {
+        let _ = writeln!(
+            w,
+            "  {:6.3} um {:6.2} kHz {:6.1} mm/s {:.2} N  {:.3} {:.3}  {:+.3} ({:+.1})",
+            p.amplitude_pp_m * 1e6,
+            p.frequency_hz / 1e3,
+            p.speed_m_s * 1e3,
+            p.normal_force_n,
+            p.a.mu_relative,
+            p.b.mu_relative,
+            p.difference,
+            p.deviations()
+        );
+    }
+    let _ = writeln!(
+        w,
+        "what differed: {}",
+        if differ.is_empty() { "nothing that the records tell" } else { "" }
+    );
+    let shown = |value: &Option<String>| value.as_ref().map_or("none".to_string(), |v| shortened(v, SHOWN));
+    for d in differ {
+        let _ = writeln!(w, "  {}: {} and {}", d.what, shown(&d.a), shown(&d.b));
+    }
+    text
+}
+
+/// A text of so many characters at most.
+fn shortened(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.into(),
+    }
+}

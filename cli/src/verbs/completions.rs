@@ -1,0 +1,23 @@
+//! `muprime completions SHELL`.
+
+use clap_complete::Shell;
+use runs::out;
+use std::process::ExitCode;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The shell.
+    shell: Shell,
+}
+
+/// Prints the script.
+///
+/// # Errors
+/// None.
+pub fn run(args: &Args, command: &mut clap::Command) -> miette::Result<ExitCode> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, command, "muprime", &mut script);
+    out!("{}", String::from_utf8_lossy(&script).trim_end());
+    super::exit(super::DONE)
+}

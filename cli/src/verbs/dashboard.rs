@@ -1,0 +1,66 @@
+//! `muprime dashboard`: the rig, the catalogue and the reports in a browser.
+
+use rig::dashboard::{Dashboard, LISTEN, Options};
+use runs::catalogue::runs_folder;
+use runs::{out, say};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of the runs [default: $MUPRIME_RUNS or ./runs]
+    #[arg(long)]
+    folder: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
+}
+
+/// Where and for whom to serve.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Place {
+    /// Address to listen on; port 0 takes a free one
+    #[arg(long, default_value = LISTEN, value_name = "ADDRESS")]
+    pub listen: SocketAddr,
+    /// A further name that browsers ask for it by, with its port, as rig-1.lab:8417 (may be repeated)
+    #[arg(long = "host", value_name = "NAME:PORT")]
+    pub hosts: Vec<String>,
+    /// Runs may be paused and told to go on from a browser; a stop may always be asked for
+    #[arg(long)]
+    pub allow_control: bool,
+}
+
+impl Place {
+    /// A dashboard of a folder of runs there.
+    ///
+    /// # Errors
+    /// The address cannot be had.
+    pub fn serve(self, runs: PathBuf) -> miette::Result<Dashboard> {
+        let Place { listen, hosts, allow_control } = self;
+        Dashboard::start(Options { runs, listen, hosts, control: allow_control })
+    }
+}
+
+/// Serves until it is interrupted.
+///
+/// # Errors
+/// No such folder, or the address cannot be had.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let folder = args.folder.unwrap_or_else(runs_folder);
+    if !folder.is_dir() {
+        miette::bail!(help = "give --folder, or make a run first", "{} is no folder", folder.display());
+    }
+    let dashboard = args.place.serve(folder)?;
+    if json {
+        out!("{}", serde_json::json!({ "dashboard": dashboard.link(), "address": dashboard.address }));
+    } else {
+        out!("{}", dashboard.link());
+        say!(
+            "open it in a browser on this machine; the token in it is a key: keep it. Ctrl-C ends the dashboard, and no run"
+        );
+    }
+    loop {
+        std::thread::park();
+    }
+}

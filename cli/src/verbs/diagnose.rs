@@ -1,0 +1,206 @@
+//! `muprime diagnose`: where the gap lies, which effect causes it, how far it shrinks.
+
+use calibration::certificate::sha256_hex;
+use clap::Args as ClapArgs;
+use diagnosis::data::Table;
+use diagnosis::document::{document, predictions};
+use diagnosis::hypotheses::Options;
+use diagnosis::progress::{Progress, Stage};
+use diagnosis::verdict::diagnose;
+use indicatif::ProgressBar;
+use miette::{Context, IntoDiagnostic};
+use models::pass::Pass;
+use runs::input::{MAX_TABLE_BYTES, bytes_of};
+use runs::print::folded;
+use runs::report::about;
+use runs::{out, say};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::{Arc, Mutex, PoisonError};
+use tables::passes::parse_passes;
+
+/// Parts of the operating space that are told in words, the largest first.
+const TOLD: usize = 6;
+
+/// Say where simulation and reality part on a table of passes, which effect causes it, and how far it shrinks.
+#[derive(Debug, ClapArgs)]
+pub struct Args {
+    /// A point table (CSV or Parquet), or a run's folder with points.csv and rig.toml.
+    pub data: PathBuf,
+    /// What the rig's calibration states; without it, the rig.toml beside the table.
+    #[arg(long)]
+    pub rig: Option<PathBuf>,
+    /// Conditions to predict (a point table without lateral_force_n).
+    #[arg(long, requires = "predictions")]
+    pub predict: Option<PathBuf>,
+    /// Where the predictions go.
+    #[arg(long, requires = "predict")]
+    pub predictions: Option<PathBuf>,
+    /// Where the corrected model goes, for `muprime run --model`.
+    #[arg(long)]
+    pub save_model: Option<PathBuf>,
+    /// Where the report goes (one HTML page).
+    #[arg(long)]
+    pub report: Option<PathBuf>,
+    /// Where a plan of the best next experiment goes, for `muprime run`.
+    #[arg(long)]
+    pub save_plan: Option<PathBuf>,
+    /// Try single effects only.
+    #[arg(long)]
+    pub no_pairs: bool,
+    /// Leave an effect out of the library (may be repeated).
+    #[arg(long, value_name = "EFFECT")]
+    pub without: Vec<String>,
+}
+
+/// Reads, diagnoses, writes what was asked for.
+///
+/// # Errors
+/// Files that cannot be read or written, tables and rigs that are refused; nothing is written then.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let (table_path, beside) = if args.data.is_dir() {
+        (args.data.join("points.csv"), args.data.join("rig.toml"))
+    } else {
+        let folder = args.data.parent().unwrap_or(Path::new("."));
+        (args.data.clone(), folder.join("rig.toml"))
+    };
+    let rig_path = args.rig.as_deref().unwrap_or(&beside);
+    let rig = runs::input::rig_file(rig_path)
+        .wrap_err_with(|| format!("the rig's calibration {} (name it with --rig)", rig_path.display()))?;
+    let damage = if args.data.is_dir() { runs::run_dir::damage_in(&args.data)? } else { Vec::new() };
+    let bytes = bytes_of(&table_path, MAX_TABLE_BYTES)
+        .wrap_err_with(|| format!("cannot read the table {}", table_path.display()))?;
+    let passes = parse_passes(&table_path, &bytes)?;
+    let table =
+        Table::measured(&passes).into_diagnostic().wrap_err_with(|| table_path.display().to_string())?;
+    for name in &args.without {
+        if effects::by_name(name).is_none() {
+            miette::bail!("--without {name}: no such effect; `muprime model effects` lists them");
+        }
+    }
+    let conditions = match &args.predict {
+        Some(path) => {
+            let rows = read_table(path)?;
+            let origin = table.origin(&passes);
+            Some(
+                Table::conditions(&rows, &origin)
+                    .into_diagnostic()
+                    .wrap_err_with(|| path.display().to_string())?,
+            )
+        }
+        None => None,
+    };
+    let bar = studies::progress::bar(1000, "per mille");
+    let progress = follow(&bar, json)?;
+    let options =
+        Options { pairs: !args.no_pairs, without: args.without.clone(), progress, ..Options::default() };
+    let result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
+    bar.finish_and_clear();
+    if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
+        write_text(out, &predictions(&result, conditions))?;
+    }
+    if let Some(out) = &args.save_model {
+        match result.saved_model() {
+            Some(model) => write_text(out, &toml::to_string(&model).into_diagnostic()?)?,
+            None => {
+                say!("no model written to {}: no effect of the library causes most of the gap", out.display())
+            }
+        }
+    }
+    if let Some(out) = &args.save_plan {
+        match result.report.next_experiment.iter().find(|e| !e.conditions.is_empty()) {
+            Some(experiment) => write_text(out, &runs::verdict::plan(experiment))?,
+            None => say!("no plan written to {}: no conditions would tell more", out.display()),
+        }
+    }
+    if let Some(out) = &args.report {
+        let about = if args.data.is_dir() {
+            about::of_run(
+                &args.data,
+                &runs::run_dir::record_facts(&args.data).unwrap_or_default(),
+                Some(&rig),
+            )
+        } else {
+            let named =
+                vec![("table", table_path.display().to_string()), ("rig", rig_path.display().to_string())];
+            [named, about::of_rig(&rig)].concat()
+        };
+        let page = runs::report::diagnosis::page(&result, &table, &about)?;
+        write_text(out, &page)?;
+        keep_in_run(&args.data, out, &page);
+    }
+    if json {
+        out!("{}", document(&result, &rig, &damage).into_diagnostic()?);
+    } else {
+        damage.iter().for_each(|d| say!("{}", folded(&format!("damaged: {d}"), 4)));
+        out!("{}", folded(runs::verdict::words(&result, &rig).trim_end(), 4));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A run's page that was written elsewhere, once more in the run's folder, where the dashboard lists it. A folder that takes no file, or a
+/// table without a run, keeps nothing.
+fn keep_in_run(run: &Path, page: &Path, text: &str) {
+    let inside = || Some(page.canonicalize().ok()?.parent()? == run.canonicalize().ok()?);
+    if run.is_dir() && inside() == Some(false) {
+        let copy = run.join("diagnosis.html");
+        if let Err(why) = write_text(&copy, text) {
+            say!("the dashboard will not list this page: {why}");
+        }
+    }
+}
+
+/// A bar that follows a diagnosis; on Ctrl-C the effects that lead so far are told.
+fn follow(bar: &ProgressBar, json: bool) -> miette::Result<Progress> {
+    let reached: Arc<Mutex<Option<Stage>>> = Arc::default();
+    let kept = Arc::clone(&reached);
+    studies::progress::on_interrupt(bar, move |_| {
+        let stage = reached.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        tell_partial(stage.as_ref(), json);
+    })?;
+    let bar = bar.clone();
+    Ok(Progress::to(move |stage| {
+        // A second look at the table begins anew: the bar stays where it was.
+        bar.set_position(bar.position().max((1e3 * stage.share) as u64));
+        bar.set_message(stage.doing);
+        let mut reached = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let leading = reached.take().map(|before| before.leading).filter(|_| stage.leading.is_empty());
+        *reached = Some(Stage { leading: leading.unwrap_or(stage.leading), ..stage });
+    }))
+}
+
+/// What a diagnosis that was stopped knew.
+fn tell_partial(stage: Option<&Stage>, json: bool) {
+    let leading: &[_] = stage.map_or(&[], |stage| &stage.leading);
+    let (doing, share) = stage.map_or(("reading", 0.0), |stage| (stage.doing, stage.share));
+    if json {
+        let leading: Vec<_> = leading
+            .iter()
+            .map(
+                |(effects, nats)| serde_json::json!({ "effects": effects, "log_evidence_over_no_gap": nats }),
+            )
+            .collect();
+        out!(
+            "{}",
+            serde_json::json!({ "partial": true, "doing": doing, "share": share, "leading": leading })
+        );
+        return;
+    }
+    out!("partial: stopped at {:.0} % ({doing}); no verdict", 100.0 * share);
+    if leading.is_empty() {
+        out!("  no effect was fitted yet");
+    }
+    for (effects, nats) in leading.iter().take(TOLD) {
+        out!("  {:+9.1} nats over no gap  {}", nats, effects.join(" + "));
+    }
+}
+
+fn read_table(path: &Path) -> miette::Result<Vec<Pass>> {
+    let bytes =
+        bytes_of(path, MAX_TABLE_BYTES).wrap_err_with(|| format!("cannot read {}", path.display()))?;
+    parse_passes(path, &bytes)
+}
+
+fn write_text(path: &Path, text: &str) -> miette::Result<()> {
+    runs::files::write_whole(path, text)
+}

@@ -1,0 +1,38 @@
+//! `muprime export RUN --to csv|parquet|arrow|hdf5|mcap|ro-crate`.
+
+use runs::{out, say};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use tables::export::facts::Stated;
+use tables::export::{Format, export};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of the run
+    run: PathBuf,
+    /// Format
+    #[arg(long, value_enum)]
+    to: Format,
+    /// Where to write it [default: passes.csv and the like, in the run's folder]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    stated: Stated,
+}
+
+/// Converts.
+///
+/// # Errors
+/// A folder that holds no run, or a place that cannot be written.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let run = runs::report::read(&args.run)?;
+    let out = export(&args.run, &run, args.to, &args.stated, args.out.as_deref())?;
+    if json {
+        out!("{}", serde_json::json!({ "file": out, "passes": run.passes.len(), "damage": run.damage }));
+    } else {
+        say!("{} passes: {}", run.passes.len(), out.display());
+        run.damage.iter().for_each(|d| say!("{d}"));
+    }
+    super::exit(super::DONE)
+}

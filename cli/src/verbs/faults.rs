@@ -1,0 +1,121 @@
+//! `muprime faults`: the fault list in virtual time, from seeds.
+
+use miette::IntoDiagnostic;
+use runs::out;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::{Arc, Mutex, PoisonError};
+use studies::validation::faults::Pace;
+use studies::validation::faults::bench::{Scene, run as run_scene};
+use studies::validation::faults::search::{Search, Tally, search};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// How many seeds to run; each is one fault of the list in one phase
+    #[arg(long, default_value_t = 2000)]
+    seeds: u64,
+    /// First seed
+    #[arg(long, default_value_t = 1)]
+    first: u64,
+    /// Two faults in each run
+    #[arg(long)]
+    pairs: bool,
+    /// Every seed twice: equal hashes, and its rows replayed to equal decisions
+    #[arg(long)]
+    twice: bool,
+    /// At the limits that a setup has by default (links held up for 20 ms), not at those of fast links
+    #[arg(long)]
+    default_limits: bool,
+    /// Run one scene again, as a failure printed it
+    #[arg(long, value_name = "SCENE.json")]
+    scene: Option<PathBuf>,
+}
+
+/// Runs the seeds.
+///
+/// # Errors
+/// A scene that cannot be read.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    if let Some(path) = &args.scene {
+        let text = runs::input::text_of(path)?;
+        let scene: Scene = serde_json::from_str(&text).into_diagnostic()?;
+        if scene.strikes.iter().any(|s| s.row >= studies::validation::faults::ROWS.len()) {
+            miette::bail!("{}: a strike's row is beyond the list", path.display());
+        }
+        let found = run_scene(&scene, true);
+        out!("{}", serde_json::to_string(&found).into_diagnostic()?);
+        return super::exit(if found.wrong.is_empty() { super::DONE } else { super::FAILED });
+    }
+    let Args { seeds, first, pairs, twice, default_limits, .. } = args;
+    let pace = if default_limits { Pace::Default } else { Pace::Fast };
+    let (begun, cpu_ns) = (std::time::Instant::now(), realtime::pacing::process_cpu_ns());
+    let bar = studies::progress::bar(seeds, "scenes");
+    let so_far: Arc<Mutex<Tally>> = Arc::default();
+    let kept = Arc::clone(&so_far);
+    studies::progress::on_interrupt(&bar, move |_| {
+        let tally = so_far.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if json {
+            match document(&tally, None, true) {
+                Ok(text) => out!("{text}"),
+                Err(why) => runs::say!("{why}"),
+            }
+        } else {
+            studies::validation::faults::table(&tally);
+            out!(
+                "partial: {} of {seeds} runs, {} over a bound or otherwise wrong",
+                tally.scenes,
+                tally.failed
+            );
+        }
+    })?;
+    let tally = search(Search { first, seeds, pairs, twice, pace }, |chunk| {
+        bar.inc(chunk.scenes);
+        let mut so_far = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        *so_far = std::mem::take(&mut *so_far).with(chunk.clone());
+    });
+    bar.finish_and_clear();
+    let cpu_s = (realtime::pacing::process_cpu_ns() - cpu_ns) as f64 * 1e-9;
+    let simulated_s = tally.cycles as f64 * studies::validation::faults::bench::T.seconds();
+    let speed = simulated_s / cpu_s.max(1e-9);
+    if json {
+        out!("{}", document(&tally, Some(speed), false)?);
+    } else {
+        studies::validation::faults::table(&tally);
+        out!(
+            "{} runs in {:.0} s, {} over a bound or otherwise wrong",
+            tally.scenes,
+            begun.elapsed().as_secs_f64(),
+            tally.failed
+        );
+        out!(
+            "{simulated_s:.0} s simulated in {cpu_s:.0} s of processor time: {speed:.0} times real time per core"
+        );
+        for failure in &tally.failures {
+            out!("seed {}: {}", failure.seed, failure.wrong.join("; "));
+            out!("  again: muprime faults --scene FILE, with {}", json_of(&failure.smallest)?);
+        }
+    }
+    super::exit(if tally.failed == 0 { super::DONE } else { super::FAILED })
+}
+
+fn json_of(value: &impl serde::Serialize) -> miette::Result<String> {
+    serde_json::to_string(value).into_diagnostic()
+}
+
+fn document(tally: &Tally, speed: Option<f64>, partial: bool) -> miette::Result<String> {
+    let rows: Vec<_> = tally
+        .reactions
+        .iter()
+        .map(|((number, name, moment), r)| {
+            serde_json::json!({ "number": number, "fault": name, "phase": moment, "reactions": r })
+        })
+        .collect();
+    let mut document = serde_json::json!({
+        "runs": tally.scenes, "simulated_seconds_per_core_second": speed, "failed": tally.failed, "rows": rows, "failures": tally.failures
+    });
+    if partial {
+        document["partial"] = true.into();
+    }
+    json_of(&document)
+}

@@ -1,0 +1,51 @@
+//! `muprime gather`: the results of a study as one table.
+
+use super::{DONE, exit};
+use miette::IntoDiagnostic;
+use runs::{out, say};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use studies::cases::gather::gather;
+use studies::cases::study::Study;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of the results
+    dir: PathBuf,
+    /// The table, in Parquet [default: DIR/gathered.parquet]
+    #[arg(long, short = 'o', value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// The file of cases, where it was moved
+    #[arg(long, value_name = "FILE")]
+    cases: Option<PathBuf>,
+    /// Take results of several builds of this version
+    #[arg(long)]
+    any_build: bool,
+}
+
+/// Gathers.
+///
+/// # Errors
+/// Holes, duplicates that differ, mixed versions or builds: no table is written.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let study = Study::in_folder(&args.dir, args.cases.as_deref())?;
+    let to = args.output.unwrap_or_else(|| study.out.join("gathered.parquet"));
+    let gathered = gather(&study, &to, args.any_build)?;
+    if json {
+        out!("{}", serde_json::to_string(&gathered).into_diagnostic()?);
+    } else {
+        if gathered.parts > 0 {
+            say!("{} unfinished files in parts/: of workers at work, or killed", gathered.parts);
+        }
+        out!(
+            "{}: {} cases of {} shards, {} without a result\nSHA-256 {}",
+            gathered.file.display(),
+            gathered.cases,
+            gathered.shards,
+            gathered.failed,
+            gathered.sha256
+        );
+    }
+    exit(DONE)
+}

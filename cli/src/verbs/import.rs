@@ -1,0 +1,221 @@
+//! `muprime import FILE --map '...' -o DIR`: a foreign table made into a point table.
+
+use miette::IntoDiagnostic;
+use runs::files::{make_folder, write_whole};
+use runs::input::{MAX_TABLE_BYTES, bytes_of};
+use runs::{ask, out, say};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use tables::import::guess::guess;
+use tables::import::map::Map;
+use tables::import::{Cut, Grid, Imported, Marks, Wanted, guessed_lines, import, read};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The table: delimited text, Excel or OpenDocument, Parquet, NumPy
+    file: PathBuf,
+    /// What is what: HEADER=TARGET:UNIT, parted by commas; may be repeated; docs/reference.md lists targets and units [default: guessed
+    /// from the headers and shown]
+    #[arg(long)]
+    map: Vec<String>,
+    /// Constants for what has no column: NAME=VALUE[:UNIT], parted by commas; may be repeated
+    #[arg(long)]
+    set: Vec<String>,
+    /// Sheet of a workbook [default: the only one]
+    #[arg(long)]
+    sheet: Option<String>,
+    /// Delimiter of a text [default: found out]
+    #[arg(long, value_parser = mark)]
+    delimiter: Option<char>,
+    /// Decimal mark of a text, . or , [default: found out]
+    #[arg(long, value_parser = ["." , ","])]
+    decimal: Option<String>,
+    /// The rows are samples of a time series: cut it into passes at reversals and steps of velocity
+    #[arg(long)]
+    series: bool,
+    /// s left out at the beginning of a steady stretch [default: a fifth of it]
+    #[arg(long, requires = "series")]
+    settle_s: Option<f64>,
+    /// s that a pass lasts at most: longer stretches are several passes [default: a stretch is a pass]
+    #[arg(long, requires = "series")]
+    window_s: Option<f64>,
+    /// A rig.toml that is known [default: written, with what was assumed]
+    #[arg(long, conflicts_with = "tip")]
+    rig: Option<PathBuf>,
+    /// What is right although it looks wrong: padding (rows of zeros at the end), unsorted (rows that are not in the order of time)
+    #[arg(long, value_parser = ["padding", "unsorted"])]
+    accept: Vec<String>,
+    /// Fingertip of the library whose stiffnesses rig.toml gets
+    #[arg(long)]
+    tip: Option<String>,
+    /// Take the guessed map without asking
+    #[arg(long)]
+    yes: bool,
+    /// Folder for points.csv, rig.toml and import.json
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+fn mark(text: &str) -> Result<char, String> {
+    match text {
+        "tab" | "\\t" => Ok('\t'),
+        "space" => Ok(' '),
+        _ => {
+            let mut all = text.chars();
+            let first = all.next().filter(|c| c.is_ascii() && all.next().is_none());
+            first.ok_or_else(|| "one character, 'tab' or 'space'".into())
+        }
+    }
+}
+
+/// Imports.
+///
+/// # Errors
+/// A source or a map that is refused; a folder that holds a table already. Nothing is written then.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    for name in ["points.csv", "rig.toml", "import.json"] {
+        let path = args.out.join(name);
+        if path.exists() {
+            miette::bail!(
+                help = "give another folder, or remove it first",
+                "{} is there already",
+                path.display()
+            );
+        }
+    }
+    for (flag, value) in [("--settle-s", args.settle_s), ("--window-s", args.window_s)] {
+        if value.is_some_and(|v| !(v.is_finite() && v >= 0.0)) || flag == "--window-s" && value == Some(0.0) {
+            miette::bail!("{flag}: a number of seconds above zero is needed");
+        }
+    }
+    let bytes = bytes_of(&args.file, MAX_TABLE_BYTES)?;
+    let marks =
+        Marks { delimiter: args.delimiter, decimal: args.decimal.as_ref().and_then(|d| d.chars().next()) };
+    let wanted = Map::headers(&args.map);
+    let grid = read(&args.file, &bytes, args.sheet.as_deref(), marks, &wanted)?;
+    let map = map_of(&args, &grid)?;
+    let rig = match &args.rig {
+        Some(path) => {
+            runs::input::rig_file(path)?;
+            Some(runs::input::text_of(path)?)
+        }
+        None => None,
+    };
+    let series = args.series.then_some(Cut { settle_s: args.settle_s, window_s: args.window_s });
+    let accepts = |what: &str| args.accept.iter().any(|a| a == what);
+    let wanted = Wanted {
+        map,
+        set: args.set.clone(),
+        series,
+        rig,
+        tip: args.tip.as_deref(),
+        padding: accepts("padding"),
+        unsorted: accepts("unsorted"),
+    };
+    let source = args.file.file_name().unwrap_or_default().to_string_lossy();
+    let Imported { table, rig, log } = import(&source, &bytes, &grid, &wanted)?;
+    make_folder(&args.out)?;
+    write_whole(&args.out.join("points.csv"), &table)?;
+    write_whole(&args.out.join("rig.toml"), &rig)?;
+    let written = serde_json::to_string_pretty(&log).into_diagnostic()?;
+    write_whole(&args.out.join("import.json"), &written)?;
+    if json {
+        out!("{}", serde_json::to_string(&log).into_diagnostic()?);
+        return super::exit(super::DONE);
+    }
+    say!("{source}: {}; {} rows", log.format, log.rows);
+    for range in &log.ranges {
+        let [low, median, high] = range.low_median_high;
+        say!("  {:<22} {} to {}, median {}", range.column, short(low), short(high), short(median));
+    }
+    log.notes.iter().for_each(|note| say!("note: {note}"));
+    log.assumed.iter().for_each(|what| say!("assumed in rig.toml: {what}"));
+    if let Some(series) = &log.series {
+        let t = &series.told;
+        say!(
+            "of {} samples {} are in passes; left out: {} of changing speed, load or vibration, {} at beginnings, {} in short stretches; {} reversals",
+            t.samples,
+            t.in_passes,
+            t.changing,
+            t.settling,
+            t.too_short,
+            t.reversals
+        );
+    }
+    if !log.dropped.is_empty() {
+        say!(
+            "{} rows were left out; each stands in import.json with its reason. The first:",
+            log.dropped.len()
+        );
+        for d in log.dropped.iter().take(3) {
+            say!("  row {}: {} '{}': {}", d.row, d.column, d.text, d.reason);
+        }
+    }
+    log.remarks.iter().for_each(|remark| say!("remark: {remark}"));
+    say!(
+        "{} passes: {}; next: muprime diagnose {}",
+        log.passes,
+        args.out.join("points.csv").display(),
+        args.out.display()
+    );
+    super::exit(super::DONE)
+}
+
+/// Four digits, with a power of ten where the number is far from one.
+fn short(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 {
+        return "0".into();
+    }
+    if (1e-3..1e5).contains(&size) {
+        let digits = (3.0 - size.log10().floor()).clamp(0.0, 6.0);
+        return format!("{value:.*}", digits as usize);
+    }
+    format!("{value:.3e}")
+}
+
+/// The map that was stated, or the guessed one once it is confirmed.
+fn map_of(args: &Args, grid: &Grid) -> miette::Result<Map> {
+    let mut map = Map::default();
+    let mut wrong = map.set(&args.set).err().unwrap_or_default();
+    match Map::stated(grid, &args.map) {
+        Ok(columns) => map.columns = columns,
+        Err(more) => wrong.extend(more),
+    }
+    if !wrong.is_empty() {
+        miette::bail!("{}", wrong.join("\n"));
+    }
+    if !args.map.is_empty() {
+        return Ok(map);
+    }
+    map.columns = guess(grid);
+    // What is set is not guessed as well.
+    map.columns.retain(|c| {
+        let column = tables::import::targets::TARGETS[c.target].column;
+        !map.constants.iter().any(|k| tables::import::targets::TARGETS[k.target].column == column)
+    });
+    say!("The map, guessed from the headers:");
+    guessed_lines(&map).iter().for_each(|line| say!("{line}"));
+    if args.yes {
+        return Ok(map);
+    }
+    let lacks = map.lacks(args.series);
+    if !lacks.is_empty() {
+        // Told by the import itself, with everything that is missing.
+        return Ok(map);
+    }
+    if std::io::stdin().is_terminal() && std::io::stderr().is_terminal() {
+        ask!("Take it? [y/N] ");
+        let mut answer = String::new();
+        std::io::stdin().read_line(&mut answer).into_diagnostic()?;
+        if matches!(answer.trim(), "y" | "Y" | "yes") {
+            return Ok(map);
+        }
+    }
+    miette::bail!(
+        help = format!("pass --yes, or the map with what you correct in it: --map '{}'", map.written()),
+        "a guessed map must be confirmed"
+    )
+}

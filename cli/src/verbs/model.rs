@@ -1,0 +1,72 @@
+//! `muprime model`: evaluates the models.
+
+#[cfg(feature = "parquet")]
+mod adapt;
+mod amplitude_for;
+mod conditions;
+mod effects;
+mod patch;
+mod point;
+mod reproduce;
+mod ridge;
+mod stiffness;
+mod table;
+
+use clap::{Args, Subcommand};
+use runs::say;
+use std::process::ExitCode;
+
+/// Arguments of `muprime model`.
+#[derive(Args)]
+pub struct ModelArgs {
+    #[command(subcommand)]
+    verb: ModelVerb,
+}
+
+#[derive(Subcommand)]
+enum ModelVerb {
+    /// One condition through the spring-slider, the empirical law or the surrogate.
+    Point(point::PointArgs),
+    /// One case of the finite element ridge, to its steady state.
+    Ridge(ridge::RidgeArgs),
+    /// What one ridge in plane strain leaves out: several ridges, and one of finite length.
+    Patch(patch::PatchArgs),
+    /// Static stiffnesses of the ridge across and along the plate, and their ratio.
+    Stiffness(stiffness::StiffnessArgs),
+    /// A parametric study on all cores: Fig. 9, or the surrogate's table. Stop it and start it again at will.
+    Table(table::TableArgs),
+    /// A surrogate over up to ten variables, its nodes chosen in rounds where the error is.
+    #[cfg(feature = "parquet")]
+    Adapt(Box<adapt::AdaptArgs>),
+    /// The paper's figures recomputed, as CSV and SVG with a line of comparison each.
+    Reproduce(reproduce::ReproduceArgs),
+    /// The candidate effects: place, parameters, units, zero, prior, source, covariates needed.
+    Effects(effects::EffectsArgs),
+    /// The amplitude (and relative drive power) for a wanted friction: open-loop control.
+    AmplitudeFor(amplitude_for::AmplitudeForArgs),
+}
+
+/// Runs the subcommand. Bad input is refused with exit status 2.
+///
+/// # Errors
+/// What could not be done for an inner reason, such as a file that cannot be written.
+pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
+    match args.verb {
+        ModelVerb::Point(args) => point::run(&args, json),
+        ModelVerb::Ridge(args) => ridge::run(&args, json),
+        ModelVerb::Patch(args) => patch::run(&args, json),
+        ModelVerb::Stiffness(args) => stiffness::run(&args, json),
+        ModelVerb::Table(args) => table::run(&args, json),
+        #[cfg(feature = "parquet")]
+        ModelVerb::Adapt(args) => adapt::run(&args, json),
+        ModelVerb::Reproduce(args) => reproduce::run(&args, json),
+        ModelVerb::Effects(args) => effects::run(&args, json),
+        ModelVerb::AmplitudeFor(args) => amplitude_for::run(&args, json),
+    }
+}
+
+/// Bad input: says why and gives its exit status (docs/contract.md).
+fn refused(why: impl std::fmt::Display) -> miette::Result<ExitCode> {
+    say!("refused: {why}");
+    Ok(ExitCode::from(2))
+}

@@ -1,0 +1,56 @@
+//! `muprime model effects`: the library of candidate effects.
+
+use clap::Args;
+use miette::IntoDiagnostic;
+use runs::out;
+use std::process::ExitCode;
+
+/// Arguments.
+#[derive(Args)]
+pub struct EffectsArgs {
+    /// One effect only
+    name: Option<String>,
+}
+
+/// Lists place, parameters with unit, zero, prior and bounds, source and needed covariates of every effect.
+///
+/// # Errors
+/// Only if the listing cannot be written as JSON.
+pub fn run(args: &EffectsArgs, json: bool) -> miette::Result<ExitCode> {
+    let mut entries = effects::listing::entries();
+    if let Some(name) = &args.name {
+        let known: Vec<_> = entries.iter().map(|e| e.name).collect();
+        if !known.contains(&name.as_str()) {
+            return super::refused(format!("there is no effect '{name}'; known: {}", known.join(", ")));
+        }
+        entries.retain(|e| e.name == name);
+    }
+    if json {
+        out!("{}", serde_json::to_string(&entries).into_diagnostic()?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    for entry in entries {
+        out!("{} ({})", entry.name, word(&entry.place)?);
+        out!("  {}", entry.summary);
+        out!("  source: {}", entry.source);
+        let needs: Vec<_> = entry.needs.iter().map(word).collect::<miette::Result<_>>()?;
+        if !needs.is_empty() {
+            out!("  needs: {}", needs.join(", "));
+        }
+        for law in entry.laws {
+            out!("  law: {}", law.name);
+            for p in law.parameters {
+                let zero = p.zero.map_or_else(|| "none (a shape)".into(), |z| z.to_string());
+                let (unit, prior) = (p.unit, serde_json::to_string(&p.prior).into_diagnostic()?);
+                out!("    {} [{unit}]: zero {zero}, prior {prior}, {} to {}", p.name, p.lower, p.upper);
+            }
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A unit variant as the JSON writes it.
+fn word(value: &impl serde::Serialize) -> miette::Result<String> {
+    let text = serde_json::to_value(value).into_diagnostic()?;
+    Ok(text.as_str().map_or_else(|| text.to_string(), str::to_string))
+}

@@ -1,0 +1,181 @@
+//! `muprime model point`: one condition through a law that answers at once.
+
+use super::conditions::ConditionArgs;
+use super::refused;
+use clap::{Args, ValueEnum};
+use miette::IntoDiagnostic;
+use models::finger::Finger;
+use models::prediction::{EmpiricalPsi, FrictionModel};
+use models::psi::{PsiEq16, PsiEq17};
+use models::reading::Reading;
+use models::spring_slider;
+use models::surrogate::Surrogate;
+use runs::out;
+use serde::Serialize;
+use std::process::ExitCode;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Law {
+    SpringSlider,
+    Psi,
+    Surrogate,
+}
+
+/// Arguments of `muprime model point`.
+#[derive(Args)]
+pub struct PointArgs {
+    #[command(flatten)]
+    condition: ConditionArgs,
+    /// Which law
+    #[arg(long, value_enum, default_value = "spring-slider")]
+    model: Law,
+    /// Normal stiffness of the finger in N/m
+    #[arg(long, default_value_t = 3.9e6, allow_negative_numbers = true)]
+    normal_stiffness_n_per_m: f64,
+    /// Lateral stiffness of the finger in N/m
+    #[arg(long, default_value_t = 1.5e6, allow_negative_numbers = true)]
+    lateral_stiffness_n_per_m: f64,
+    /// Speed of the skin's lateral recovery in m/s (infinite if left out)
+    #[arg(long, allow_negative_numbers = true)]
+    lateral_recovery_m_per_s: Option<f64>,
+    /// Young's modulus of the stratum corneum in Pa (surrogate)
+    #[arg(long, default_value_t = 28.3e6, allow_negative_numbers = true)]
+    young_modulus_pa: f64,
+}
+
+/// The law under one reading.
+#[derive(Serialize)]
+struct Read {
+    reading: Reading,
+    psi_star: f64,
+    psi_star_sd: f64,
+    mu_relative: f64,
+    mu_relative_sd: f64,
+}
+
+#[derive(Serialize)]
+struct Answer {
+    model: String,
+    mu_relative: f64,
+    mu_relative_sd: f64,
+    lateral_force_n: f64,
+    mean_reaction_force_n: f64,
+    contact_fraction: f64,
+    phase_shift_deg: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    touch_down_deg: Option<f64>,
+    regime: models::prediction::Regime,
+    /// Of the law 'psi': what each reading of the paper's w says.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    readings: Vec<Read>,
+    psi_eq16: f64,
+    psi_eq17: f64,
+    validity: models::prediction::Validity,
+}
+
+/// Answers, or refuses a condition outside the law's domain.
+pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
+    if let Err(why) = args.condition.check() {
+        return refused(why);
+    }
+    let condition = args.condition.condition();
+    let finger = Finger {
+        normal_stiffness_n_per_m: args.normal_stiffness_n_per_m,
+        lateral_stiffness_n_per_m: args.lateral_stiffness_n_per_m,
+        poisson_ratio: args.condition.poisson_ratio,
+        young_modulus_pa: Some(args.young_modulus_pa),
+        lateral_recovery_m_per_s: args.lateral_recovery_m_per_s.filter(|v| v.is_nan() || *v < f64::INFINITY),
+        ..Finger::paper()
+    };
+    let cycle = match spring_slider::solve(&condition, &finger) {
+        Ok(cycle) => cycle,
+        Err(why) => return refused(why),
+    };
+    let surrogate = Surrogate::shipped().into_diagnostic()?.for_finger(&finger);
+    let slider;
+    let empirical;
+    let mut readings = Vec::new();
+    let law: &dyn FrictionModel = match args.model {
+        Law::SpringSlider => {
+            slider = match models::prediction::SpringSlider::new(finger) {
+                Ok(law) => law,
+                Err(why) => return refused(why),
+            };
+            &slider
+        }
+        Law::Psi => {
+            empirical = match EmpiricalPsi::paper(finger) {
+                Ok(law) => law,
+                Err(why) => return refused(why),
+            };
+            for reading in Reading::ALL {
+                let (mu_relative, mu_relative_sd) = match empirical.under(&condition, reading) {
+                    Ok(under) => under,
+                    Err(why) => return refused(why),
+                };
+                let (psi_star, psi_star_sd) = reading.psi_star();
+                readings.push(Read { reading, psi_star, psi_star_sd, mu_relative, mu_relative_sd });
+            }
+            &empirical
+        }
+        Law::Surrogate => &surrogate,
+    };
+    let prediction = match law.predict(&condition) {
+        Ok(prediction) => prediction,
+        Err(why) => return refused(why),
+    };
+    let mut answer = Answer {
+        model: law.name().to_string(),
+        mu_relative: prediction.mu_relative,
+        mu_relative_sd: prediction.mu_relative_sd,
+        lateral_force_n: prediction.lateral_force_n,
+        mean_reaction_force_n: cycle.mean_reaction_force_n,
+        contact_fraction: cycle.contact_fraction,
+        phase_shift_deg: cycle.phase_shift_deg,
+        touch_down_deg: Some(cycle.touch_down_deg),
+        regime: prediction.regime,
+        readings,
+        psi_eq16: PsiEq16::at(&condition, &finger).0,
+        psi_eq17: PsiEq17::at(&condition, finger.poisson_ratio).0,
+        validity: prediction.validity,
+    };
+    if args.model == Law::Surrogate {
+        let c = &condition;
+        let at = surrogate.at(
+            c.amplitude,
+            c.frequency_hz,
+            c.speed_m_s / c.mu0,
+            c.normal_force_n,
+            args.young_modulus_pa,
+        );
+        answer.contact_fraction = at.contact_fraction;
+        answer.phase_shift_deg = at.phase_shift_deg.rem_euclid(360.0);
+        answer.touch_down_deg = None;
+    }
+    if json {
+        out!("{}", serde_json::to_string(&answer).into_diagnostic()?);
+    } else {
+        // A law without an error of its own says nothing of how far off it is: no uncertainty is not an uncertainty of zero.
+        let sd = match answer.mu_relative_sd {
+            sd if sd > 0.0 => format!(" +- {sd:.4}"),
+            _ => String::new(),
+        };
+        out!(
+            "{}: mu' = {:.4}{sd}, lateral force {:.5} N, contact {:.1} % of the time, phase shift {:.1} deg",
+            answer.model,
+            answer.mu_relative,
+            answer.lateral_force_n,
+            100.0 * answer.contact_fraction,
+            answer.phase_shift_deg
+        );
+        for read in &answer.readings {
+            out!(
+                "  where {}: mu' = {:.4} +- {:.4}",
+                read.reading.words(),
+                read.mu_relative,
+                read.mu_relative_sd
+            );
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}

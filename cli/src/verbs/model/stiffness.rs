@@ -1,0 +1,275 @@
+//! `muprime model stiffness`: static stiffnesses of the ridge across and along the plate, and what their ratio says of Psi*.
+
+use super::refused;
+use clap::Args;
+use miette::IntoDiagnostic;
+use models::reading::Reading;
+use models::ridge::short_study;
+use models::ridge::static_stiffness::{HeldAt, StaticStiffness, of_case};
+use models::ridge::{FrictionRule, RidgeCase, RidgeError, RidgeProfile, Strain, case};
+use runs::out;
+use serde::Serialize;
+use std::process::ExitCode;
+
+/// Arguments of `muprime model stiffness`.
+#[derive(Args)]
+pub struct StiffnessArgs {
+    /// Elements of the mesh, about (of the survey's too, whose default is 200)
+    #[arg(long)]
+    elements: Option<usize>,
+    /// Mean pressure at 0.25 N in Pa
+    #[arg(long, default_value_t = case::MEAN_PRESSURE_AT_QUARTER_NEWTON_PA, allow_negative_numbers = true)]
+    mean_pressure_pa: f64,
+    /// Poisson's ratio of the skin
+    #[arg(long, default_value_t = 0.33, allow_negative_numbers = true)]
+    poisson_ratio: f64,
+    /// Young's modulus of the stratum corneum in Pa
+    #[arg(long, default_value_t = 28.3e6, allow_negative_numbers = true)]
+    young_modulus_pa: f64,
+    /// Contact penalty over the stratum corneum's modulus
+    #[arg(long, default_value_t = case::PENALTY_RATIO, allow_negative_numbers = true)]
+    penalty_ratio: f64,
+    /// Contact penalty along the plate over that across it, up to 1
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+    tangential_penalty_ratio: f64,
+    /// A layer that yields along the plate, in series with the penalty: traction over slip in Pa/m
+    #[arg(long, allow_negative_numbers = true)]
+    tangential_stiffness_pa_m: Option<f64>,
+    /// The ridges of a survey instead, each with its ratio and its Psi* (a minute or two of CPU)
+    #[arg(long)]
+    survey: bool,
+}
+
+impl StiffnessArgs {
+    fn base(&self) -> RidgeCase {
+        RidgeCase {
+            elements: self.elements.unwrap_or(if self.survey { 200 } else { case::ELEMENTS }),
+            mean_pressure_pa: self.mean_pressure_pa,
+            poisson_ratio: self.poisson_ratio,
+            young_modulus_pa: self.young_modulus_pa,
+            penalty_ratio: self.penalty_ratio,
+            tangential_penalty_ratio: self.tangential_penalty_ratio,
+            tangential_stiffness_pa_m: self.tangential_stiffness_pa_m,
+            ..RidgeCase::paper()
+        }
+    }
+}
+
+/// Loads in multiples of the mean one: in a cycle the contact carries several times the mean.
+const LOADS: [f64; 3] = [1.0, 3.0, 10.0];
+
+/// What a line is about, and the case.
+struct Row {
+    what: String,
+    case: RidgeCase,
+}
+
+/// What is varied in the table: shape, moduli, thickness, Poisson's ratio, contact.
+fn table(base: RidgeCase) -> Vec<Row> {
+    let row = |what: &str, case: RidgeCase| Row { what: what.into(), case };
+    let shaped = |profile| {
+        let mut case = base;
+        case.geometry.profile = profile;
+        case
+    };
+    let corneum = |inner_corneum_m: f64| {
+        let mut case = base;
+        case.geometry.inner_corneum_m = inner_corneum_m;
+        case
+    };
+    let ridge = |ridge_height_m: f64| {
+        let mut case = base;
+        case.geometry.ridge_height_m = ridge_height_m;
+        case
+    };
+    vec![
+        row("as given", base),
+        row("ellipse", shaped(RidgeProfile::Ellipse)),
+        row("flat slab", shaped(RidgeProfile::Flat)),
+        row("ridge 50 um high", ridge(50e-6)),
+        row("inner corneum 30 um", corneum(30e-6)),
+        row("inner corneum 300 um", corneum(300e-6)),
+        row("modulus 20 MPa", RidgeCase { young_modulus_pa: 20e6, ..base }),
+        row("modulus 200 MPa", RidgeCase { young_modulus_pa: 200e6, ..base }),
+        row("Poisson's ratio 0.2", RidgeCase { poisson_ratio: 0.2, ..base }),
+        row("Poisson's ratio 0.45", RidgeCase { poisson_ratio: 0.45, ..base }),
+        row("pressure 3.5 kPa", RidgeCase { mean_pressure_pa: 3.5e3, ..base }),
+        row("pressure 13 kPa", RidgeCase { mean_pressure_pa: 13e3, ..base }),
+        row("penalty 33 E_sc", RidgeCase { penalty_ratio: 33.0, ..base }),
+        row("tangential penalty 0.1 k", RidgeCase { tangential_penalty_ratio: 0.1, ..base }),
+        row("tangential penalty 0.03 k", RidgeCase { tangential_penalty_ratio: 0.03, ..base }),
+        row("layer 1e13 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(1e13), ..base }),
+        row("layer 3e12 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(3e12), ..base }),
+        row("layer 1e12 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(1e12), ..base }),
+        row("layer 5e11 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(5e11), ..base }),
+        row("layer 2e11 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(2e11), ..base }),
+    ]
+}
+
+/// What statics do not know: the kernel's other measure of strain, the other friction rule, less damping.
+fn dynamic(base: RidgeCase) -> Vec<Row> {
+    let row = |what: &str, case: RidgeCase| Row { what: what.into(), case };
+    vec![
+        row("small strain", RidgeCase { strain: Strain::Small, ..base }),
+        row("local friction", RidgeCase { friction: FrictionRule::Local, ..base }),
+        row("damping 3.5e5 /s", RidgeCase { mass_damping_per_s: 3.5e5, ..base }),
+    ]
+}
+
+#[derive(Serialize)]
+struct Answer {
+    what: String,
+    held_at: HeldAt,
+    load_over_mean: f64,
+    /// Newtons on the whole finger for each N/m on the ridge.
+    finger_per_ridge_m: f64,
+    #[serde(flatten)]
+    found: StaticStiffness,
+}
+
+#[derive(Serialize)]
+struct Surveyed {
+    what: String,
+    lateral_over_normal: f64,
+    lateral_over_normal_at_3_loads: f64,
+    psi_star: Option<f64>,
+    psi_star_sd: Option<f64>,
+    rmse: Option<f64>,
+    points: usize,
+    /// Psi* of the massless slider with the ridge's own static springs.
+    slider_psi_star: Option<f64>,
+    /// Psi* in the units of Eq. 16, with the ridge's own ratio: Psi* (1 + nu) k_l/k_n.
+    psi_star_eq16: Option<f64>,
+}
+
+fn answers(args: &StiffnessArgs) -> Result<Vec<Answer>, RidgeError> {
+    let base = args.base();
+    let mut all = Vec::new();
+    let mut ask = |row: &Row, held_at: HeldAt, load_over_mean: f64| -> Result<(), RidgeError> {
+        let found = of_case(&row.case, load_over_mean * row.case.line_load_n_m(), held_at)?;
+        let (what, finger_per_ridge_m) = (row.what.clone(), row.case.finger_per_ridge_m());
+        all.push(Answer { what, held_at, load_over_mean, finger_per_ridge_m, found });
+        Ok(())
+    };
+    let rows = table(base);
+    for held_at in HeldAt::ALL {
+        for load in LOADS {
+            ask(&rows[0], held_at, load)?;
+        }
+    }
+    for row in &rows[1..] {
+        ask(row, HeldAt::CorneumBase, 1.0)?;
+        ask(row, HeldAt::CorneumBase, 3.0)?;
+    }
+    Ok(all)
+}
+
+fn survey(args: &StiffnessArgs) -> Result<Vec<Surveyed>, RidgeError> {
+    let of = |row: Row| -> Result<Surveyed, RidgeError> {
+        let load = row.case.line_load_n_m();
+        let ratio = of_case(&row.case, load, HeldAt::CorneumBase)?.lateral_over_normal;
+        let at_3 = of_case(&row.case, 3.0 * load, HeldAt::CorneumBase)?.lateral_over_normal;
+        let fit = short_study::psi_star(row.case, Reading::PeakToPeak)?;
+        let slider = short_study::slider_psi_star(row.case, Reading::PeakToPeak)?;
+        Ok(Surveyed {
+            what: row.what,
+            lateral_over_normal: ratio,
+            lateral_over_normal_at_3_loads: at_3,
+            psi_star: fit.map(|f| f.psi_star),
+            psi_star_sd: fit.map(|f| f.psi_star_sd),
+            rmse: fit.map(|f| f.rmse),
+            points: fit.map_or(0, |f| f.points),
+            slider_psi_star: slider.map(|f| f.psi_star),
+            psi_star_eq16: fit.map(|f| f.psi_star * (1.0 + row.case.poisson_ratio) * at_3),
+        })
+    };
+    table(args.base()).into_iter().chain(dynamic(args.base())).map(of).collect()
+}
+
+/// Runs the solve or the survey; refuses bad input.
+///
+/// # Errors
+/// An answer that cannot be written.
+pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
+    if args.survey {
+        let rows = match survey(args) {
+            Ok(rows) => rows,
+            Err(why) => return refused(why),
+        };
+        if json {
+            out!("{}", serde_json::to_string(&rows).into_diagnostic()?);
+            return Ok(ExitCode::SUCCESS);
+        }
+        out!(
+            "{:<28} {:>8} {:>8} {:>16} {:>7} {:>9} {:>8}",
+            "",
+            "k_l/k_n",
+            "at 3 F",
+            "Psi*",
+            "rmse",
+            "slider's",
+            "Eq. 16"
+        );
+        for r in rows {
+            let number = |v: Option<f64>| v.map_or("none".into(), |v| format!("{v:.3}"));
+            out!(
+                "{:<28} {:>8.3} {:>8.3} {:>16} {:>7} {:>9} {:>8}",
+                r.what,
+                r.lateral_over_normal,
+                r.lateral_over_normal_at_3_loads,
+                format!("{} +- {}", number(r.psi_star), number(r.psi_star_sd)),
+                number(r.rmse),
+                number(r.slider_psi_star),
+                number(r.psi_star_eq16)
+            );
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    let rows = match answers(args) {
+        Ok(rows) => rows,
+        Err(why) => return refused(why),
+    };
+    if json {
+        out!("{}", serde_json::to_string(&rows).into_diagnostic()?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    let nu = args.poisson_ratio;
+    out!(
+        "closed forms of k_l/k_n at nu {nu}: wide slab bonded at its base {:.3}, G/E {:.3}, Mindlin's circle on a half space {:.3}; Eq. 17 has {:.3}",
+        (1.0 - 2.0 * nu) / (2.0 * (1.0 - nu)),
+        0.5 / (1.0 + nu),
+        2.0 * (1.0 - nu) / (2.0 - nu),
+        1.0 / (1.0 + nu)
+    );
+    out!(
+        "{:<28} {:<13} {:>5} {:>9} {:>11} {:>11} {:>11} {:>8}",
+        "",
+        "held at",
+        "load",
+        "width um",
+        "k_n MN/m",
+        "secant",
+        "k_l MN/m",
+        "k_l/k_n"
+    );
+    for r in &rows {
+        let finger = 1e-6 * r.finger_per_ridge_m;
+        let held = match r.held_at {
+            HeldAt::CorneumBase => "corneum base",
+            HeldAt::DermisBase => "dermis base",
+            HeldAt::Top => "top",
+        };
+        out!(
+            "{:<28} {:<13} {:>5} {:>9.2} {:>11.4} {:>11.4} {:>11.4} {:>8.3}",
+            r.what,
+            held,
+            r.load_over_mean,
+            1e6 * r.found.contact_width_m,
+            finger * r.found.normal_pa,
+            finger * r.found.normal_secant_pa,
+            finger * r.found.lateral_pa,
+            r.found.lateral_over_normal
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,141 @@
+//! `muprime model table`: the study of Fig. 9, or the surrogate's table.
+
+mod phases;
+
+use super::{refused, reproduce};
+use clap::Args;
+use miette::{IntoDiagnostic, WrapErr};
+use models::ridge::study::content_key;
+use models::ridge::{RidgeCase, case};
+use models::surrogate::{Grid, GridPoint, InterpolationError, Surrogate, TableResult};
+use runs::{out, say};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+use studies::figures::Study;
+use studies::figures::reading::{self, Reading};
+use studies::figures::store::{self, Kept};
+
+/// Cases that are not in the table, on which its interpolation is judged.
+const HELD_OUT: usize = 200;
+
+/// Arguments of `muprime model table`.
+#[derive(Args)]
+pub struct TableArgs {
+    /// Folder for results; a study that stands there goes on
+    #[arg(long, default_value = "studies")]
+    out: PathBuf,
+    /// Compute the surrogate's table instead of the study of Fig. 9
+    #[arg(long)]
+    surrogate: bool,
+    /// Elements of each mesh in the study of Fig. 9, about
+    #[arg(long, default_value_t = case::ELEMENTS)]
+    elements: usize,
+    /// How the paper's w is read
+    #[arg(long, value_parser = reading::parser(), default_value = "peak-to-peak")]
+    reading: Reading,
+    /// At rest, for the phase shift: frequencies, moduli and forces
+    #[arg(long)]
+    at_rest: bool,
+    /// 20 amplitudes from 0.3 to 5 um instead of 12 from 0.1
+    #[arg(long)]
+    fine: bool,
+    /// Mean pressure at 0.25 N in Pa
+    #[arg(long, default_value_t = case::MEAN_PRESSURE_AT_QUARTER_NEWTON_PA)]
+    mean_pressure_pa: f64,
+    /// Mass damping in 1/s
+    #[arg(long, default_value_t = case::MASS_DAMPING_PER_S)]
+    mass_damping_per_s: f64,
+    /// Threads (all cores if left out)
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+impl TableArgs {
+    fn study(&self) -> Study {
+        let paper = RidgeCase::paper();
+        let base = RidgeCase {
+            elements: self.elements,
+            mean_pressure_pa: self.mean_pressure_pa,
+            mass_damping_per_s: self.mass_damping_per_s,
+            speed_m_s: if self.at_rest { 0.0 } else { paper.speed_m_s },
+            ..paper
+        };
+        Study { base, reading: self.reading, w_m: reproduce::ladder(self.fine) }
+    }
+}
+
+/// Runs what is missing of the study and writes its table.
+pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
+    if args.threads == Some(0) {
+        return refused("--threads 0: at least one is needed");
+    }
+    if let Err(why) = args.study().base.check() {
+        return refused(why);
+    }
+    std::fs::create_dir_all(&args.out)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot make the folder {}", args.out.display()))?;
+    let pool =
+        rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0)).build().into_diagnostic()?;
+    let start = Instant::now();
+    let (file, cases, failed) = pool.install(|| {
+        if args.surrogate { surrogate(&args.out) } else { fig_9_study(&args.out, args.study()) }
+    })?;
+    let seconds = start.elapsed().as_secs_f64();
+    if json {
+        out!(
+            "{}",
+            serde_json::json!({"file": file, "cases": cases, "failed": failed, "wall_seconds": seconds})
+        );
+    } else {
+        out!("{}: {cases} cases, {failed} failed, {seconds:.1} s", file.display());
+    }
+    Ok(ExitCode::from(u8::from(failed > 0)))
+}
+
+fn fig_9_study(out: &Path, study: Study) -> miette::Result<(PathBuf, usize, usize)> {
+    let (results, failed) = study.results(out)?;
+    let name = if study.base.speed_m_s == 0.0 { "fig9_at_rest" } else { "fig9" };
+    let file = out.join(format!("{}.csv", reading::file(study.reading, name)));
+    reproduce::write_fig_9_table(&file, study, &results)?;
+    let points = study.points();
+    if study.base.speed_m_s == 0.0 {
+        for line in phases::lines(study, &results) {
+            say!("{line}");
+        }
+    }
+    Ok((file, points.len(), failed))
+}
+
+fn surrogate(out: &Path) -> miette::Result<(PathBuf, usize, usize)> {
+    let grid = Grid::SHIPPED;
+    let (points, held_out) = (grid.points(), grid.held_out(HELD_OUT));
+    let cases = points.iter().chain(&held_out).map(|p| p.case);
+    let settings = Grid::settings();
+    let (results, failed) = store::complete(&out.join("surrogate.jsonl"), cases, &settings)?;
+    let result = |p: &GridPoint| results.get(&content_key(&p.case, &settings)).map(table_result);
+    // Twice: the error is that of the table as it is read.
+    let bare = Surrogate::table_text(&grid, result, InterpolationError::default()).into_diagnostic()?;
+    let judged = held_out.iter().filter_map(|p| result(p).map(|r| (p, r)));
+    let error = Surrogate::from_text(&bare).into_diagnostic()?.measure_error(judged);
+    let file = out.join("ridge_table.txt");
+    let text = Surrogate::table_text(&grid, result, error).into_diagnostic()?;
+    runs::files::write_whole(&file, text)?;
+    say!(
+        "interpolation error on {} held-out cases: mu' rms {:.4}, worst {:.4}; phase rms {:.1} deg",
+        error.cases,
+        error.mu_rms,
+        error.mu_max,
+        error.phase_rms_deg
+    );
+    Ok((file, points.len() + held_out.len(), failed))
+}
+
+fn table_result(kept: &Kept) -> TableResult {
+    TableResult {
+        mu_relative: kept.mu_relative,
+        phase_shift_deg: kept.phase_shift_deg.unwrap_or(0.0),
+        contact_fraction: kept.contact_fraction,
+    }
+}

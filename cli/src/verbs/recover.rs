@@ -1,0 +1,101 @@
+//! `muprime recover FILE`: makes a cut or damaged record whole in place, and keeps the original beside it.
+
+use miette::{IntoDiagnostic, WrapErr};
+use realtime::recorder::{self, Integrity, Recovery};
+use runs::files::{self, Placed};
+use runs::{out, say};
+use std::fs::{self, File};
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A record (.mcap)
+    file: PathBuf,
+}
+
+/// Recovers.
+///
+/// # Errors
+/// A file that is not there, or that holds nothing of a record; nothing is written then.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let file = &args.file;
+    let shown = || file.display().to_string();
+    if !fs::metadata(file).into_diagnostic().wrap_err_with(shown)?.is_file() {
+        miette::bail!(help = "give a record, run-1.mcap and the like", "{} is no ordinary file", shown());
+    }
+    let damaged = BufReader::new(File::open(file).into_diagnostic().wrap_err_with(shown)?);
+    let part = files::beside(file);
+    let whole = Placed::fresh(&part)?;
+    let disk = whole.handle()?;
+    let found = recorder::recover(damaged, whole);
+    let found = found.into_diagnostic().and_then(|found| disk.sync().map(|()| found));
+    match found {
+        Ok(Recovery::Rewritten { messages, found }) => {
+            let original = put_in_place(file, &part)?;
+            if json {
+                let said = serde_json::json!({ "recovered": true, "messages": messages, "original": original,
+                    "damaged": found.damaged_places, "because": found.sentences().join("; "), "integrity": found });
+                out!("{said}");
+            } else {
+                say!("{}: {messages} messages saved; the original is {}", shown(), original.display());
+                tell(&found);
+            }
+            super::exit(super::DONE)
+        }
+        other => {
+            fs::remove_file(&part).into_diagnostic()?;
+            match other? {
+                Recovery::Nothing { found } => {
+                    miette::bail!(
+                        "{}: nothing of a record can be read: {}",
+                        shown(),
+                        found.sentences().join("; ")
+                    )
+                }
+                Recovery::Whole(found) | Recovery::Rewritten { found, .. } => {
+                    if json {
+                        out!(
+                            "{}",
+                            serde_json::json!({ "recovered": false, "whole": true, "integrity": found })
+                        );
+                    } else {
+                        say!("{}: whole, nothing to do", shown());
+                        tell(&found);
+                    }
+                    super::exit(super::DONE)
+                }
+            }
+        }
+    }
+}
+
+fn tell(found: &Integrity) {
+    for sentence in found.sentences() {
+        say!("  {sentence}");
+    }
+}
+
+/// Moves the whole record to its place. The original keeps a name at every instant: it is linked beside first.
+fn put_in_place(file: &Path, part: &Path) -> miette::Result<PathBuf> {
+    let mut original = file.with_extension("mcap.original");
+    let mut n = 1;
+    // A name that leads nowhere is taken too.
+    while original.symlink_metadata().is_ok() {
+        n += 1;
+        original = file.with_extension(format!("mcap.original-{n}"));
+    }
+    fs::hard_link(file, &original)
+        .or_else(|_| {
+            let mut copy = files::fresh(&original)?;
+            std::io::copy(&mut File::open(file)?, &mut copy).and_then(|_| copy.sync_all())
+        })
+        .and_then(|()| files::sync_folder_of(file))
+        .and_then(|()| fs::rename(part, file))
+        .and_then(|()| files::sync_folder_of(file))
+        .into_diagnostic()
+        .wrap_err_with(|| file.display().to_string())?;
+    Ok(original)
+}

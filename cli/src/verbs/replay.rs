@@ -1,0 +1,121 @@
+//! `muprime replay`: a recorded run through the same cycle again.
+
+use miette::{IntoDiagnostic, WrapErr};
+use models::prediction::{FrictionModel, SpringSlider};
+use realtime::recorder::{CYCLES, Entry, Integrity, Reader, inspect};
+use realtime::replay::{Replay, replay};
+use runs::run_dir::{missing_records, records_in};
+use runs::session::{REPLAYABLE, Replayable};
+use runs::{out, say};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of a run, or one of its records
+    run: PathBuf,
+}
+
+/// What a replay of one record came to.
+#[derive(serde::Serialize)]
+struct Found {
+    record: PathBuf,
+    replay: Replay,
+    /// What the record has lost, and where.
+    integrity: Integrity,
+    /// Every cycle that was written is there, and was decided as recorded.
+    holds: bool,
+}
+
+/// Runs every cycle of every record of a run again, and compares its decisions with those recorded, bit for bit. It holds only
+/// where the record is whole: of what is missing nothing is known.
+///
+/// # Errors
+/// A record that cannot be read, or that lacks what a replay needs.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let (records, gone) = if args.run.is_dir() {
+        (records_in(&args.run)?, missing_records(&args.run)?)
+    } else {
+        (vec![args.run.clone()], Vec::new())
+    };
+    if records.is_empty() {
+        miette::bail!("{} holds no record", args.run.display());
+    }
+    let mut holds = gone.is_empty();
+    for path in records {
+        let found = again(path)?;
+        holds &= found.holds;
+        if json {
+            out!("{}", serde_json::to_string(&found).into_diagnostic()?);
+        } else {
+            tell(&found);
+        }
+    }
+    for sentence in gone {
+        say!("{sentence}");
+    }
+    super::exit(if holds { super::DONE } else { super::FAILED })
+}
+
+fn tell(found: &Found) {
+    let Replay { cycles, equal, missing, first_difference } = &found.replay;
+    out!("{}: {equal} of {cycles} cycles decide as recorded", found.record.display());
+    for sentence in found.integrity.sentences() {
+        out!("  {sentence}");
+    }
+    if *missing > found.integrity.missing(CYCLES) {
+        out!("  {missing} cycles are missing from the record");
+    }
+    if *missing > 0 {
+        out!("  what follows missing cycles cannot be expected to agree");
+    }
+    if let Some(cycle) = first_difference {
+        out!("  the first that differs is cycle {cycle}");
+    }
+}
+
+fn again(path: PathBuf) -> miette::Result<Found> {
+    let shown = path.display().to_string();
+    let reader = || {
+        let file = File::open(&path).into_diagnostic().wrap_err_with(|| shown.clone())?;
+        Ok::<_, miette::Report>(Reader::new(BufReader::new(file)).only(CYCLES))
+    };
+    // The files come first: what follows the first row holds none.
+    let files: Vec<(String, Vec<u8>)> = reader()?
+        .take_while(|entry| !matches!(entry, Entry::Message { .. }))
+        .filter_map(|entry| match entry {
+            Entry::File { name, bytes, .. } => Some((name, bytes)),
+            _ => None,
+        })
+        .collect();
+    let Some((_, built)) = files.iter().find(|f| f.0 == REPLAYABLE) else {
+        let found = inspect(BufReader::new(File::open(&path).into_diagnostic()?)).sentences().join("; ");
+        miette::bail!("{shown}: the record holds no {REPLAYABLE}, which a replay needs ({found})");
+    };
+    let built: Replayable = serde_json::from_slice(built)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("{REPLAYABLE} in {shown}"))?;
+    let model = model_of(&files, &built)?;
+    let mut entries = reader()?;
+    let rows = entries.by_ref().filter_map(|entry| match entry {
+        Entry::Message { text, .. } => serde_json::from_slice(&text).ok(),
+        _ => None,
+    });
+    let mut replayed = replay(&built.config, &*model, rows);
+    let integrity = entries.integrity().clone();
+    // Cycles that the last words count and that never came stand behind the last that did.
+    replayed.missing = replayed.missing.max(integrity.missing(CYCLES));
+    let holds = replayed.holds() && integrity.complete();
+    Ok(Found { record: path, replay: replayed, integrity, holds })
+}
+
+fn model_of(files: &[(String, Vec<u8>)], built: &Replayable) -> miette::Result<Arc<dyn FrictionModel>> {
+    match files.iter().find(|f| f.0 == "model.toml") {
+        Some((name, text)) => runs::model_file::load(name, &String::from_utf8_lossy(text)),
+        None => Ok(Arc::new(SpringSlider::new(built.finger).into_diagnostic()?)),
+    }
+}

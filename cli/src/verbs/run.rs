@@ -1,0 +1,366 @@
+//! `muprime run`: an automated friction sweep.
+
+use super::dashboard::Place;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use miette::IntoDiagnostic;
+use models::prediction::{FrictionModel, SpringSlider};
+use realtime::ports::Nanos;
+use rig::dashboard::LISTEN;
+use rig::live::{self, Feed};
+use rig::publish::{Broker, Publisher};
+use rig::watch::{Lead, Watch};
+use runs::catalogue::runs_folder;
+use runs::plan::Plan;
+use runs::print::{self, clean, folded};
+use runs::sequence::{Event, Outcome};
+use runs::session::{Job, Notes, Signals, Summary, Update, unix_ns};
+use runs::setup::Setup;
+use runs::supervisor::MAY_BE_ON;
+use runs::{out, say};
+use std::io::IsTerminal;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// Lines on standard error.
+macro_rules! told {
+    ($($text:tt)*) => { say!("{}", fitted(format!($($text)*))) };
+}
+
+/// Within the columns of a page for a person; as it is for a log, which is searched by lines.
+fn fitted(text: String) -> String {
+    if std::io::stderr().is_terminal() { folded(&text, 2) } else { text }
+}
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Plan: a file, or a bundled name (first-sweep, fig9-artificial, part2-validation, psi-reading)
+    #[arg(default_value = "first-sweep")]
+    plan: String,
+    /// Setup: a file, or a bundled name (virtual, virtual-ideal)
+    #[arg(long, default_value = "virtual")]
+    setup: String,
+    /// Folder of the run; an unfinished run there is taken up again [default: a new one in ./runs]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// A corrected model, as 'muprime diagnose --save-model' writes it
+    #[arg(long)]
+    model: Option<PathBuf>,
+    /// Seed of the order (and of the virtual rig) [default: the plan's]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Defects of the virtual rig, in place of its own
+    #[arg(long)]
+    defects: Option<PathBuf>,
+    /// In virtual time: a minute's sweep in a second or so
+    #[arg(long)]
+    fast: bool,
+    /// Who leads the run, for its record and report
+    #[arg(long, value_name = "NAME")]
+    operator: Option<String>,
+    /// Whose finger it is (a code, no name, where the data are published): exposure is counted under it, whatever the rig [default: the operator]
+    #[arg(long, value_name = "CODE")]
+    subject: Option<String>,
+    /// What is measured, for its record and report: the fingertip, its preparation, the plate
+    #[arg(long, value_name = "WORDS")]
+    sample: Option<String>,
+    /// Licence of the data, for its record and exports: an SPDX identifier (CC-BY-4.0) or an address
+    #[arg(long, value_name = "ID")]
+    licence: Option<String>,
+    /// Answers of the person at the rig, one a line, for a machine without a person
+    #[arg(long, value_name = "FILE")]
+    answers: Option<PathBuf>,
+    /// Show the run live on the whole terminal, as 'muprime watch' does
+    #[arg(long)]
+    tui: bool,
+    /// Publish states, passes, trips and progress by MQTT, read only: mqtt://[user@]host[:port]/prefix
+    #[arg(long, value_name = "BROKER")]
+    publish: Option<Broker>,
+    /// Serve this run in a browser while it goes on, and the folder that it stands in: at the address, or on 127.0.0.1:8417
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = LISTEN, conflicts_with = "tui")]
+    dashboard: Option<SocketAddr>,
+    /// The run may be paused and told to go on from the browser; a stop may always be asked for
+    #[arg(long, requires = "dashboard")]
+    allow_control: bool,
+}
+
+/// Runs the sweep.
+///
+/// # Errors
+/// A refusal: bad input, a busy rig, an instrument that does not answer.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let (broker, tui) = (args.publish.clone(), args.tui);
+    if tui && json {
+        miette::bail!(
+            help = "leave out one of them",
+            "--tui shows a picture, --json prints documents: not both"
+        );
+    }
+    let browsers =
+        args.dashboard.map(|listen| Place { listen, hosts: Vec::new(), allow_control: args.allow_control });
+    let job = job(args)?;
+    if !job.fast {
+        // In virtual time nothing is driven, and a slow reader gets every line.
+        super::tell_beside(&job.out)?;
+    }
+    if job.setup.hand_at_key() {
+        if job.fast {
+            miette::bail!(
+                help = "leave out --fast",
+                "the dead-man key is held in wall-clock time: no hand is that fast"
+            );
+        }
+        say!(
+            "dead-man key: let go of it, then hold the space bar down to arm and to go on; let go, or press any other key, and the drive is off"
+        );
+    }
+    if job.asks_at_the_terminal() && (tui || job.setup.hand_at_key()) {
+        let taken = if tui { "--tui" } else { "the dead-man key" };
+        miette::bail!(
+            help = "give the answers beforehand with --answers FILE (one a line)",
+            "the plan asks a person for answers at the terminal, and {taken} takes its keys"
+        );
+    }
+    let signals = Signals::default();
+    watch_signals(&signals)?;
+    let planned = job.points()?.len();
+    if let Some(place) = browsers {
+        // An address that is taken is a refusal: nothing was touched yet, and nobody was told of a run.
+        let runs = job.out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        told!("dashboard: {}", place.serve(runs.to_path_buf())?.link());
+    }
+    // Up before anything moves, and down before the summary is told. What is said meanwhile is held and said then.
+    let watch = match tui {
+        true => Some(Watch::begin(&job.out, Lead::Own(signals.clone()), job.setup.hand_at_key())?),
+        false => None,
+    };
+    let bar = progress_bar(json || tui, planned as u64);
+    // Looked at once: while it is drawn, whoever asks it anything waits for the terminal.
+    let hidden = bar.is_hidden();
+    let say = |text: String| {
+        let (text, bar) = (clean(&fitted(text)).into_owned(), bar.clone());
+        if hidden { say!("{text}") } else { print::draw(&text.clone(), move || bar.println(text)) }
+    };
+    if !json {
+        let clock = if job.fast { "virtual time" } else { "wall-clock time" };
+        say(format!(
+            "{} on {}: {planned} passes in {clock}, into {}",
+            job.plan.file.name,
+            job.setup.file.name,
+            job.out.display()
+        ));
+    }
+    let mut publisher = broker.as_ref().map(Publisher::start).transpose()?;
+    let mut publish = |name: &str, message: &dyn Fn() -> serde_json::Value| {
+        if let Some(publisher) = &mut publisher {
+            publisher.publish(name, &message());
+        }
+    };
+    let of = serde_json::json!({ "plan": job.plan.file.name, "setup": job.setup.file.name, "planned": planned, "guards": job.setup.guards() });
+    let began = |state: &str| {
+        let mut run = of.clone();
+        run["state"] = state.into();
+        run
+    };
+    publish("run", &|| began("running"));
+    let before = runs::run_dir::passes_in(&job.out).unwrap_or_default();
+    let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, &signals);
+    let summary = rig::session::run(job, &signals, &mut |news| {
+        feed.news(&news);
+        match news {
+            Update::Pass(pass) => {
+                publish("pass", &|| serde_json::json!(pass));
+                if json {
+                    out!("{}", serde_json::json!({ "pass": pass }));
+                }
+            }
+            Update::Event(event) => {
+                publish("event", &|| serde_json::json!(event));
+                if let Event::Tripped(trip) = event {
+                    publish("trip", &|| tripped(trip));
+                }
+                if json {
+                    out!("{}", serde_json::json!({ "event": event }));
+                } else {
+                    say(runs::report::events::describe(event));
+                }
+            }
+            Update::State(glimpse) => publish("state", &|| serde_json::json!(live::State::of(glimpse))),
+            Update::Progress(made, all, left_s) => {
+                publish(
+                    "progress",
+                    &|| serde_json::json!({ "made": made, "planned": all, "remaining_s": left_s }),
+                );
+                let bar = bar.clone();
+                print::draw("", move || {
+                    bar.set_position((planned.saturating_sub(all) + made) as u64);
+                    bar.set_message(format!("{left_s:.0} s to go"));
+                });
+            }
+            Update::Off(off) if !off.read_back => {
+                print::urgent(&fitted(off.words()));
+                publish("off", &|| serde_json::json!(off));
+                if json {
+                    out!("{}", serde_json::json!({ "off": off }));
+                }
+            }
+            Update::Off(_) => {}
+        }
+    });
+    print::draw("", move || bar.finish_and_clear());
+    drop(watch);
+    if let Ok(summary) = &summary {
+        tell(summary, json);
+    }
+    feed.end(live::Ended::of(&summary));
+    publish("run", &|| {
+        let mut ended = began("ended");
+        ended["summary"] = summary.as_ref().map_or_else(
+            |why| serde_json::json!({ "error": why.to_string() }),
+            |summary| serde_json::json!({ "passes": summary.passes, "outcome": summary.outcome, "off": summary.off }),
+        );
+        ended
+    });
+    if let (Some(publisher), Some(broker)) = (publisher, &broker)
+        && let Some(missing) = publisher.end()
+    {
+        told!("{}:{}: {missing}", broker.host, broker.port);
+    }
+    let summary = summary?;
+    super::exit(match summary.outcome {
+        Outcome::Complete if summary.off.read_back => super::DONE,
+        _ => super::FAILED,
+    })
+}
+
+/// A trip for whoever follows from afar.
+fn tripped(trip: &realtime::safety::Trip) -> serde_json::Value {
+    serde_json::json!({
+        "cause": trip.cause, "value": Some(trip.value).filter(|v| v.is_finite()), "bound": trip.bound, "unit": trip.unit.symbol(),
+        "at_s": trip.at.seconds(), "requirement": trip.cause.requirement(), "remedy": trip.cause.remedy(),
+    })
+}
+
+fn job(args: Args) -> miette::Result<Job> {
+    let setup = Setup::load(&args.setup)?;
+    let plan = Plan::load(&args.plan)?;
+    let defects = match &args.defects {
+        None => None,
+        Some(path) => {
+            if setup.file.virtual_rig.is_none() {
+                miette::bail!("--defects belongs to a virtual rig; '{}' is a real one", setup.file.name);
+            }
+            let text = runs::input::text_of(path)?;
+            let defects = sim::defects::Defects::parse(&text);
+            Some(defects.map_err(|e| miette::miette!("{}: {e}", path.display()))?)
+        }
+    };
+    let model_file = match &args.model {
+        None => None,
+        Some(path) => Some(("model.toml".to_string(), runs::input::text_of(path)?)),
+    };
+    let model: Arc<dyn FrictionModel> = match &model_file {
+        None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
+        Some((_, text)) => {
+            let path = args.model.as_ref().map_or_else(String::new, |p| p.display().to_string());
+            runs::model_file::load_for(&setup, &path, text)?
+        }
+    };
+    let seed = args.seed.unwrap_or(plan.file.seed);
+    let out = args.out.unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
+    let notes =
+        Notes { operator: args.operator, subject: args.subject, sample: args.sample, licence: args.licence };
+    let (fast, answers) = (args.fast, args.answers);
+    Ok(Job { setup, plan, seed, model, model_file, defects, out, fast, notes, answers })
+}
+
+/// Name of a new run: UTC date and time, and the plan.
+fn new_name(plan: &str) -> String {
+    let now = calibration::certificate::date::format((unix_ns() / 1_000_000_000) as i64);
+    format!("{}-{plan}", now.replace(['-', ':', 'Z'], "").replace('T', "-"))
+}
+
+/// SIGINT, SIGTERM and SIGHUP ask for a stop; a second one leaves within two seconds whatever happens.
+fn watch_signals(signals: &Signals) -> miette::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let stops = Arc::clone(&signals.stops);
+    let mut caught = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]).into_diagnostic()?;
+    std::thread::Builder::new()
+        .name("signals".into())
+        .spawn(move || {
+            for (i, _) in caught.forever().enumerate() {
+                stops.fetch_add(1, Ordering::Relaxed);
+                if i > 0 {
+                    // A terminal that takes nothing keeps nobody from leaving.
+                    std::thread::spawn(|| say!("leaving at once: {MAY_BE_ON}"));
+                    // The first one has sent the stop; nobody can wait here for what was read back.
+                    std::thread::sleep(std::time::Duration::from_millis(1500));
+                    runs::leave::leave_now(super::FAILED);
+                }
+            }
+        })
+        .into_diagnostic()?;
+    Ok(())
+}
+
+/// A bar that was not drawn yet: the first line of it too may find a terminal that takes nothing.
+fn progress_bar(json: bool, planned: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(planned), ProgressDrawTarget::stderr());
+    if json || !std::io::stderr().is_terminal() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} passes, {msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}
+
+fn tell(summary: &Summary, json: bool) {
+    if json {
+        out!("{}", serde_json::json!({ "summary": summary }));
+        return;
+    }
+    if !summary.off.read_back {
+        told!("{}", summary.off.words());
+    }
+    if summary.finished_before {
+        told!("every pass of this run was made before: nothing was driven, nothing was recorded");
+    }
+    told!("{} of {} passes", summary.passes, summary.planned);
+    if let Some(report) = &summary.loop_report {
+        let [p50, _, p99, _, max] = report.lateness_ns.map(|ns| ns as f64 / 1e3);
+        told!(
+            "loop: {} cycles, lateness median {p50:.0} us, 99 % {p99:.0} us, worst {max:.0} us; {} overruns, {} rows lost; CPUs {}",
+            report.cycles,
+            report.overruns,
+            summary.record_lost,
+            if report.grants.cpus_kept_awake { "kept out of deep sleep" } else { "allowed to sleep deeply" }
+        );
+    }
+    if let Some(held) = summary.held.filter(|held| held.share >= 0.01) {
+        told!("{held}");
+    }
+    if let (Outcome::Tripped(trip), Some(stalls)) = (&summary.outcome, &summary.stalls)
+        && let Some(stall) = stalls.within(Nanos(trip.at.0.saturating_sub(100_000_000)), trip.at)
+    {
+        told!(
+            "just before the trip this machine kept its programs from running for {:.0} ms: see 'muprime doctor'",
+            stall.lasted.seconds() * 1e3
+        );
+    }
+    if let (Outcome::WouldNotArm { blocking: Some(cause) }, Some(remedy)) =
+        (&summary.outcome, &summary.remedy)
+    {
+        told!("the rig would not arm: {cause:?} stands in the way\n  {remedy}");
+    }
+    if summary.passes < summary.planned {
+        told!("the same command with --out {} goes on", summary.folder.display());
+    }
+    told!("{}", summary.agreement);
+    if summary.model_departed {
+        told!("'muprime diagnose {}' says where and why", summary.folder.display());
+    }
+    told!("report: {}", summary.folder.join("report.html").display());
+}

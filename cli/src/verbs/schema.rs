@@ -1,0 +1,22 @@
+//! `muprime schema KIND`: the JSON Schema of a kind of file.
+
+use miette::IntoDiagnostic;
+use runs::out;
+use std::process::ExitCode;
+use tables::schemas::schema::Kind;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Kind of file
+    kind: Kind,
+}
+
+/// Prints the schema.
+///
+/// # Errors
+/// None.
+pub fn run(args: &Args) -> miette::Result<ExitCode> {
+    out!("{}", serde_json::to_string_pretty(&args.kind.schema()).into_diagnostic()?);
+    super::exit(super::DONE)
+}

@@ -1,0 +1,94 @@
+//! `muprime watch RUN`: follows a run, at a terminal with the live view, else line by line from its journal.
+
+use miette::{IntoDiagnostic, WrapErr};
+use rig::watch::{Lead, Watch};
+use runs::catalogue::{Catalogue, runs_folder};
+use runs::out;
+use runs::sequence::MeasuredPass;
+use std::io::{BufRead, BufReader, IsTerminal};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of the run [default: the newest of the catalogue]
+    run: Option<PathBuf>,
+}
+
+/// Shows a run until somebody leaves it; with `--json`, or where no terminal is, prints passes as they come until the run has ended.
+///
+/// # Errors
+/// No run there.
+pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    let run = match args.run {
+        Some(run) => run,
+        None => {
+            let folder = runs_folder();
+            let newest = Catalogue::existing(&folder)?.all()?.into_iter().next();
+            folder.join(newest.ok_or_else(|| miette::miette!("there is no run yet"))?.folder)
+        }
+    };
+    let journal = run.join("passes.jsonl");
+    let file = std::fs::File::open(&journal)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("{} holds no run", run.display()))?;
+    if !json && std::io::stdout().is_terminal() && rig::terminal::has_keys().is_ok() {
+        leave_on_signals()?;
+        Watch::begin(&run, Lead::Other, false)?.wait();
+        return super::exit(super::DONE);
+    }
+    let mut reader = BufReader::new(file);
+    let mut line = String::new();
+    loop {
+        // Looked at before reading: what was written before the lock went is still printed.
+        let running = runs::run_dir::is_held(&run);
+        while reader.read_line(&mut line).into_diagnostic()? > 0 {
+            if !line.ends_with('\n') {
+                break;
+            }
+            show(&line, json);
+            line.clear();
+        }
+        if !running {
+            return super::exit(super::DONE);
+        }
+        std::thread::sleep(Duration::from_millis(200));
+    }
+}
+
+/// A signal takes the view down, and nothing else: the run is another process's.
+fn leave_on_signals() -> miette::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let mut caught = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]).into_diagnostic()?;
+    let leave = move || {
+        if caught.forever().next().is_some() {
+            runs::leave::leave_now(super::DONE);
+        }
+    };
+    std::thread::Builder::new().name("signals".into()).spawn(leave).into_diagnostic()?;
+    Ok(())
+}
+
+fn show(line: &str, json: bool) {
+    if json {
+        out!("{}", line.trim_end());
+        return;
+    }
+    let Ok(p) = serde_json::from_str::<MeasuredPass>(line) else { return };
+    let c = p.comparison;
+    let number = |v: Option<f64>| v.map_or("  --".to_string(), |v| format!("{v:.3}"));
+    out!(
+        "point {:4}  w {:6.3} um  f {:6.2} kHz  U {:6.1} mm/s  Fn {:.3} N  mu' {} predicted {} z {}{}",
+        p.pass.point,
+        p.pass.amplitude.micrometres(),
+        p.pass.frequency_hz / 1e3,
+        p.pass.speed_m_s * 1e3,
+        p.pass.normal_force_n,
+        number(c.and_then(|c| c.mu_relative)),
+        number(c.map(|c| c.predicted)),
+        number(c.map(|c| c.z)),
+        if c.is_some_and(|c| c.departed) { "  MODEL DEPARTED" } else { "" }
+    );
+}

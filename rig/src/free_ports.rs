@@ -1,0 +1,123 @@
+//! Whether a run could open what its setup names: serial lines, sockets, CAN interfaces, and the claim of the rig. Each is opened and
+//! closed again; nothing is sent.
+
+#![allow(clippy::disallowed_methods, reason = "a socket is waited for in wall-clock time")]
+
+use crate::rig_lock::RigClaim;
+use drivers::InstrumentSetup;
+use drivers::modbus_tcp::resolve;
+use instruments::schema::LinkKind;
+use runs::input::Problems;
+use runs::setup::Setup;
+use std::collections::BTreeSet;
+use std::fs::OpenOptions;
+use std::net::{TcpListener, TcpStream};
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::path::Path;
+use std::time::Duration;
+
+/// How long a device may take to accept.
+const ACCEPTS_WITHIN: Duration = Duration::from_secs(1);
+
+/// Everything that cannot be opened, with the place of its address in the setup.
+///
+/// # Errors
+/// All of it.
+pub fn free(setup: &Setup) -> miette::Result<()> {
+    let mut wrong = Problems::of(&setup.origin, &setup.text);
+    let served = setup.file.virtual_rig.is_some();
+    let mut tried = BTreeSet::new();
+    for (table, instrument) in setup.by_table() {
+        // One line or one device server may carry several.
+        if !tried.insert(instrument.address.clone()) {
+            continue;
+        }
+        if let Err((problem, remedy)) = if served { can_be_served(instrument) } else { opens(instrument) } {
+            let problem = format!("{table} `{}` at {}: {problem}", instrument.profile, instrument.address);
+            let place: &[&str] = if table == "force" { &["force"] } else { &[table, "address"] };
+            wrong.add(place, problem, Some(remedy.to_string()));
+        }
+    }
+    if wrong.is_empty()
+        && !served
+        && let Err(held) = RigClaim::take(setup)
+    {
+        let remedy = held.help().map(|h| h.to_string());
+        wrong.add(&["name"], format!("{held}: {}", held.root_cause()), remedy);
+    }
+    wrong.end()
+}
+
+type Closed = (String, &'static str);
+
+const PLUG: &str = "plug it in or correct the address; `--offline` leaves the ports out";
+
+/// Whether an emulator can listen where the virtual rig is to.
+fn can_be_served(instrument: &InstrumentSetup) -> Result<(), Closed> {
+    let remedy = "end the program that has it, or state port 0: any free one is taken";
+    match kind(instrument) {
+        Some((LinkKind::ModbusTcp | LinkKind::Scpi, port)) if !instrument.address.starts_with("rtu:") => {
+            let address = resolve(&instrument.address, port).map_err(|e| (e, "correct the address"))?;
+            TcpListener::bind(address).map(drop).map_err(|e| (format!("cannot be served there: {e}"), remedy))
+        }
+        Some((LinkKind::Can | LinkKind::Canopen, _)) if !instrument.address.starts_with("slcan:") => {
+            opens(instrument)
+        }
+        _ => Ok(()),
+    }
+}
+
+fn kind(instrument: &InstrumentSetup) -> Option<(LinkKind, Option<u16>)> {
+    let link = instrument.description().ok()?.description.link;
+    Some((link.kind, link.port))
+}
+
+/// Whether the instrument's address can be opened.
+fn opens(instrument: &InstrumentSetup) -> Result<(), Closed> {
+    let Some((kind, port)) = kind(instrument) else { return Ok(()) };
+    let address = instrument.address.as_str();
+    let socket = |address: &str| {
+        let found = resolve(address, port)
+            .map_err(|e| (e, "correct the address; `--offline` leaves the ports out"))?;
+        let accepted = TcpStream::connect_timeout(&found, ACCEPTS_WITHIN);
+        accepted.map(drop).map_err(|e| {
+            (
+                format!("nobody accepts there: {e}"),
+                "switch it on, look at cable and address; `--offline` leaves the ports out",
+            )
+        })
+    };
+    match kind {
+        LinkKind::ModbusTcp if !address.starts_with("rtu:") => socket(address),
+        LinkKind::Scpi => socket(address.strip_prefix("tcp:").unwrap_or(address)),
+        LinkKind::Serial if address.starts_with("tcp:") => socket(&address[4..]),
+        LinkKind::Can | LinkKind::Canopen if !address.starts_with("slcan:") => {
+            let there = Path::new("/sys/class/net").join(address).exists();
+            let remedy = "bring the interface up, as in `ip link set can0 up type can bitrate 1000000`; `--offline` leaves the ports out";
+            if there { Ok(()) } else { Err(("there is no such CAN interface".into(), remedy)) }
+        }
+        _ => line(Path::new(address.split_once(':').map_or(address, |(_, path)| path))),
+    }
+}
+
+fn line(path: &Path) -> Result<(), Closed> {
+    let flags = libc::O_NOCTTY | libc::O_NONBLOCK;
+    let opened = OpenOptions::new().read(true).write(true).custom_flags(flags).open(path);
+    match opened {
+        Ok(file) => {
+            let is_line = file.metadata().is_ok_and(|m| m.file_type().is_char_device());
+            if is_line {
+                Ok(())
+            } else {
+                Err(("that is no serial line".into(), "name the device, as in /dev/ttyUSB0"))
+            }
+        }
+        Err(e) if e.kind() == std::io::ErrorKind::PermissionDenied => {
+            Err((format!("cannot be opened: {e}"), "give the user the group that owns it, mostly `dialout`"))
+        }
+        Err(e) if e.raw_os_error() == Some(libc::EBUSY) => {
+            Err((format!("cannot be opened: {e}"), "another program holds it: end that"))
+        }
+        Err(e) => Err((format!("cannot be opened: {e}"), PLUG)),
+    }
+}

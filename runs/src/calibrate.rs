@@ -1,0 +1,329 @@
+//! Certificates from data: force, amplitude, latency, phase, finger, creep, gravity, noise, step, tap.
+//!
+//! The options of `muprime calibrate` are the types here; what only instruments can give comes through a [`Bench`].
+#![allow(clippy::disallowed_methods, reason = "a certificate is dated, and is valid for a time")]
+
+mod amplitude;
+mod creep;
+mod dynamics;
+mod finger;
+mod force;
+mod gravity;
+pub mod inverse;
+mod latency;
+mod noise;
+mod phase;
+mod tables;
+
+use crate::setup::Setup;
+use calibration::certificate::{Certificate, Instrument, Kind, Occasion, Outcome, RawData, date};
+use drivers::vibrometer::Settings;
+use miette::IntoDiagnostic;
+use models::quantity::PeakToPeak;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// What only instruments at a bench can give.
+pub trait Bench {
+    /// A dead-weight series, taken with an operator; as CSV.
+    ///
+    /// # Errors
+    /// No instruments here, or what went wrong with them.
+    fn series(&self, options: &SeriesOptions<'_>) -> miette::Result<String>;
+
+    /// A table of set-points and amplitudes, driven and read; as CSV.
+    ///
+    /// # Errors
+    /// As [`Bench::series`].
+    fn amplitudes(&self, setup: &Setup, table: &LiveTable<'_>) -> miette::Result<String>;
+
+    /// The settings of the vibrometer's controller, read back now; they cover the drive's frequency.
+    ///
+    /// # Errors
+    /// As [`Bench::series`].
+    fn vibrometer(&self, setup: &Setup, frequency_hz: f64) -> miette::Result<Settings>;
+}
+
+/// No bench: whatever would open an instrument is refused.
+pub struct FilesAlone;
+
+impl FilesAlone {
+    fn refused() -> miette::Report {
+        miette::miette!(
+            help = "`muprime calibrate` does that, with the operator at the bench",
+            "from files alone: a series, a table or waveforms are needed, and no setup whose instruments would be opened"
+        )
+    }
+}
+
+impl Bench for FilesAlone {
+    fn series(&self, _: &SeriesOptions<'_>) -> miette::Result<String> {
+        Err(Self::refused())
+    }
+
+    fn amplitudes(&self, _: &Setup, _: &LiveTable<'_>) -> miette::Result<String> {
+        Err(Self::refused())
+    }
+
+    fn vibrometer(&self, _: &Setup, _: f64) -> miette::Result<Settings> {
+        Err(Self::refused())
+    }
+}
+
+/// How a dead-weight series is taken and where it is kept.
+pub struct SeriesOptions<'a> {
+    /// Setup whose force instruments are read; without one the operator types the counts.
+    pub setup: Option<&'a str>,
+    /// Averaging time of a reading in s.
+    pub average_s: f64,
+    /// How long a link that went down is waited for, in s.
+    pub reconnect_s: f64,
+    /// Where the series will be kept; until it is whole, each reading stands in the `.part` file beside.
+    pub keep: &'a Path,
+}
+
+/// Set-points that are driven for a table of amplitudes.
+pub struct LiveTable<'a> {
+    /// Set-points, peak-to-peak, in m.
+    pub set_points_pp_m: &'a [f64],
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+    /// Passes through the set-points, up and down by turns.
+    pub passes: u32,
+    /// Wait at a set-point before the reading, in s.
+    pub settle_s: f64,
+}
+
+/// Largest amplitude of a decoder's output in V: full scale is taken as 20 V peak-to-peak.
+const FULL_SCALE_V: f64 = 10.0;
+
+/// Which calibration, with its options.
+#[derive(Debug, clap::Subcommand)]
+pub enum What {
+    /// Dead weights to the force sensor's matrix; without a series, guided at the terminal
+    Force(force::Args),
+    /// A vibrometer's tables to the plate's amplitude
+    Amplitude(amplitude::Args),
+    /// Edges and time stamps to delays, jitter and clock drift
+    Latency(latency::Args),
+    /// Vibrometer waveforms of plate and skin to the contact phase shift (Eq. 1)
+    Phase(phase::Args),
+    /// Stiffness, friction and (from a phase table) modulus, penalty and retardation time of a fingertip
+    Finger(finger::Args),
+    /// Creep of a force channel under a standing load
+    Creep(creep::Args),
+    /// Direction of the force sensor's axes, by gravity at known tilts
+    Gravity(gravity::Args),
+    /// Spectrum, quantisation and frozen-value rule of the force sensor at rest
+    Noise(noise::Args),
+    /// Bandwidth and dead time of a channel from steps of force
+    Step(dynamics::Args),
+    /// Resonance of the sensor's mount from taps
+    Tap(dynamics::Args),
+}
+
+/// What every calibration asks of its operator.
+#[derive(Debug, clap::Args)]
+pub struct Common {
+    /// Who calibrates
+    #[arg(long)]
+    operator: String,
+    /// Serial number of the instrument (or name of the fingertip): the certificate holds for it alone
+    #[arg(long)]
+    serial: String,
+    /// What the instrument is, for people
+    #[arg(long, default_value = "")]
+    instrument: String,
+    /// When, as 2026-03-01T12:00:00Z [default: now]
+    #[arg(long)]
+    date: Option<String>,
+    /// For how many days the certificate holds
+    #[arg(long, default_value_t = 180.0)]
+    valid_days: f64,
+    /// The certificate's file [default: KIND-SERIAL.toml]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Write over an existing certificate
+    #[arg(long)]
+    overwrite: bool,
+}
+
+/// The certificate that a calibration comes to; `bench` gives what only instruments can. Nothing is written but what the
+/// options name (a series that was taken, a phase table, a spectrum).
+///
+/// # Errors
+/// Data that is unfit for a certificate, with the reason; files that cannot be read or written.
+pub fn certified(what: &What, bench: &dyn Bench) -> miette::Result<Issued> {
+    match what {
+        What::Force(args) => force::certified(args, bench),
+        What::Amplitude(args) => amplitude::certified(args, bench),
+        What::Latency(args) => latency::certified(args),
+        What::Phase(args) => phase::certified(args, bench),
+        What::Finger(args) => finger::certified(args),
+        What::Creep(args) => creep::certified(args),
+        What::Gravity(args) => gravity::certified(args),
+        What::Noise(args) => noise::certified(args),
+        What::Step(args) => dynamics::step(args),
+        What::Tap(args) => dynamics::tap(args),
+    }
+}
+
+/// The certificate that a command line of `muprime calibrate` comes to (`words` begin after `calibrate`), from files alone: what would
+/// open instruments is refused. Nothing is written but what the words name (phase table, spectrum). `--out` is not looked at.
+///
+/// # Errors
+/// As [`certified`]; words that the command does not take, in its own words.
+pub fn from_files(words: &[String]) -> miette::Result<Issued> {
+    #[derive(clap::Parser)]
+    #[command(name = "calibrate", no_binary_name = true, disable_help_flag = true)]
+    struct Line {
+        #[command(subcommand)]
+        what: What,
+    }
+    let line = <Line as clap::Parser>::try_parse_from(words).map_err(|e| {
+        let said = e.to_string();
+        let first = said.lines().take_while(|l| !l.is_empty() && !l.starts_with("Usage")).collect::<Vec<_>>();
+        miette::miette!("{}", first.join(" ").trim_start_matches("error: "))
+    })?;
+    certified(&line.what, &FilesAlone)
+}
+
+/// Peak-to-peak displacement of a sine whose velocity shows as so many volts, zero to peak.
+///
+/// # Errors
+/// No amplitude, or one at the rail of the decoder's output.
+pub fn displacement(volts: f64, range_m_s_per_v: f64, frequency_hz: f64) -> Result<PeakToPeak, String> {
+    if !(volts.is_finite() && volts > 0.0) {
+        return Err(format!("{volts} V is no amplitude: a number above zero is needed, zero to peak"));
+    }
+    if volts >= FULL_SCALE_V {
+        return Err(format!(
+            "{volts} V is at the rail of the decoder's output ({FULL_SCALE_V} V): choose a larger range and begin anew"
+        ));
+    }
+    // v = 2 pi f (w/2), so w = v / (pi f).
+    Ok(PeakToPeak::from_metres(volts * range_m_s_per_v / (std::f64::consts::PI * frequency_hz)))
+}
+
+/// What `--json` says of a certificate.
+pub fn document(certificate: &Certificate) -> serde_json::Value {
+    let parameters: Vec<serde_json::Value> = certificate
+        .parameters
+        .iter()
+        .map(|p| {
+            serde_json::json!({
+                "name": p.name, "value": p.value, "unit": p.unit,
+                "standard_uncertainty": p.standard_uncertainty, "ci95": p.ci95,
+            })
+        })
+        .collect();
+    serde_json::json!({
+        "kind": certificate.kind, "serial": certificate.instrument.serial,
+        "content_sha256": certificate.content_sha256, "valid_until": certificate.validity.until,
+        "parameters": parameters, "remarks": certificate.remarks,
+    })
+}
+
+/// A certificate that was made and not yet written.
+#[derive(Debug)]
+pub struct Issued {
+    /// The certificate.
+    pub certificate: Certificate,
+    /// What the fit says beyond it: keys of the JSON document, and their values.
+    pub more: Vec<(&'static str, serde_json::Value)>,
+    /// Where it goes.
+    pub out: PathBuf,
+    /// Whether a certificate that is there may be written over.
+    pub overwrite: bool,
+}
+
+impl Issued {
+    /// The document of `--json` without its key `certificate` (the file).
+    pub fn document(&self) -> serde_json::Value {
+        let mut document = document(&self.certificate);
+        for (key, value) in &self.more {
+            document[*key] = value.clone();
+        }
+        document
+    }
+}
+
+/// Checks a certificate's text: its shape, its hash, what its numbers can be, and whether its time is over.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn check(name: &str, text: &str) -> miette::Result<Kind> {
+    let certificate = Certificate::from_toml(text).map_err(|e| miette::miette!("{name}: {e}"))?;
+    let own_serial = certificate.instrument.serial.clone();
+    verify(name, &certificate, certificate.kind, &own_serial)?;
+    Ok(certificate.kind)
+}
+
+/// Verifies a certificate for an instrument, now.
+///
+/// # Errors
+/// Why it does not hold.
+pub fn verify<'a>(
+    name: &str,
+    certificate: &'a Certificate,
+    kind: Kind,
+    serial: &str,
+) -> miette::Result<calibration::certificate::Verified<'a>> {
+    let at = calibration::certificate::Circumstances {
+        kind,
+        serial,
+        now_unix_s: now_unix_s()?,
+        temperature_c: None,
+    };
+    certificate.verify(&at).map_err(|refusal| miette::miette!("{name}: {refusal}"))
+}
+
+fn now_unix_s() -> miette::Result<i64> {
+    Ok(SystemTime::now().duration_since(UNIX_EPOCH).into_diagnostic()?.as_secs() as i64)
+}
+
+impl Common {
+    fn occasion(&self, raw_data: RawData) -> miette::Result<Occasion> {
+        let unix_s = match &self.date {
+            None => now_unix_s()?,
+            Some(text) => date::parse(text).ok_or_else(|| {
+                miette::miette!("--date {text}: a date like 2026-03-01T12:00:00Z is needed")
+            })?,
+        };
+        if self.serial.trim().is_empty() || self.operator.trim().is_empty() {
+            miette::bail!(
+                "--serial and --operator must not be empty: a certificate is for one instrument, by one person"
+            );
+        }
+        if !(self.valid_days > 0.0 && self.valid_days <= 3_660.0) {
+            miette::bail!("--valid-days {}: more than 0 and at most 3660", self.valid_days);
+        }
+        Ok(Occasion {
+            unix_s,
+            operator: self.operator.clone(),
+            instrument: Instrument { name: self.instrument.clone(), serial: self.serial.clone() },
+            raw_data,
+            valid_days: self.valid_days,
+        })
+    }
+
+    /// Makes the certificate.
+    fn certify(&self, outcome: Outcome, raw: RawData) -> miette::Result<Issued> {
+        self.certify_with(outcome, raw, [])
+    }
+
+    /// The same with more to say in JSON.
+    fn certify_with(
+        &self,
+        outcome: Outcome,
+        raw: RawData,
+        more: impl IntoIterator<Item = (&'static str, serde_json::Value)>,
+    ) -> miette::Result<Issued> {
+        let certificate = outcome.certify(&self.occasion(raw)?);
+        let safe: String =
+            self.serial.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+        let out =
+            self.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}-{safe}.toml", certificate.kind)));
+        Ok(Issued { certificate, more: more.into_iter().collect(), out, overwrite: self.overwrite })
+    }
+}

@@ -1,0 +1,375 @@
+//! Two runs side by side: passes paired by their condition, and whether they differ by more than their uncertainty explains.
+//!
+//! The passes of a run are divided by one `mu_0`, so their errors are not independent: an error of the reference moves all of
+//! them in proportion. Differences therefore carry a full covariance, the scatter of passes on its diagonal and a term of rank one
+//! for the references of both runs. Calibration that both runs share (gains, stiffnesses) cancels in a difference and is left out.
+
+use crate::report::RunData;
+use crate::report::human::p_value;
+use models::pass::Pass;
+use models::quantity::PeakToPeak;
+use models::rig_file::PassNoise;
+use realtime::compare::VISIBLE_DEPARTURE;
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+pub mod differences;
+mod folders;
+
+pub use folders::Compared;
+
+/// Level of the whole answer: shift and scatter are each tested at half of it.
+pub const LEVEL: f64 = 0.05;
+/// Conditions in common below which nothing is said about agreement.
+pub const ENOUGH_CONDITIONS: usize = 5;
+/// Relative distances within which two passes have the same condition: amplitude, frequency, speed, load.
+const SAME: [f64; 4] = [0.03, 0.01, 0.03, 0.10];
+
+/// `mu_0` of a run with its relative standard uncertainty from the scatter of its passes without vibration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Reference {
+    /// Friction coefficient without vibration.
+    pub mu0: f64,
+    /// Its relative standard uncertainty; calibration that both runs share is not in it.
+    pub relative_sd: f64,
+}
+
+/// One side of a comparison.
+#[derive(Clone, Debug)]
+pub struct Side<'a> {
+    /// The passes.
+    pub passes: Vec<&'a Pass>,
+    /// How passes of that rig repeat.
+    pub noise: PassNoise,
+}
+
+/// The mean of a run's passes at one condition.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Mean {
+    /// Relative friction.
+    pub mu_relative: f64,
+    /// Standard uncertainty from pass to pass; that of the reference is not in it.
+    pub sd: f64,
+    /// Passes.
+    pub passes: usize,
+}
+
+/// A condition that both runs have.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Paired {
+    /// Peak-to-peak amplitude in m.
+    pub amplitude_pp_m: f64,
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+    /// Speed in m/s.
+    pub speed_m_s: f64,
+    /// Direction of sliding.
+    pub direction: i8,
+    /// Normal force in N.
+    pub normal_force_n: f64,
+    /// The first run.
+    pub a: Mean,
+    /// The second run.
+    pub b: Mean,
+    /// Second less first.
+    pub difference: f64,
+    /// Its standard uncertainty, with that of both references.
+    pub difference_sd: f64,
+}
+
+impl Paired {
+    /// The condition in words.
+    pub fn setting(&self) -> String {
+        format!(
+            "{:.2} um pp, {:.1} kHz, {:.1} mm/s, {:.2} N",
+            self.amplitude_pp_m * 1e6,
+            self.frequency_hz / 1e3,
+            self.speed_m_s * f64::from(self.direction) * 1e3,
+            self.normal_force_n
+        )
+    }
+
+    /// The difference in standard deviations.
+    pub fn deviations(&self) -> f64 {
+        self.difference / self.difference_sd
+    }
+}
+
+/// What the comparison comes to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answer {
+    /// The runs differ by more than their uncertainty explains.
+    Differ,
+    /// No difference was seen, and one of [`VISIBLE_DEPARTURE`] would have been.
+    NoDifferenceSeen,
+    /// Too few conditions in common, or too uncertain ones.
+    CannotTell,
+    /// One run is the other one again, or both have one seed on the virtual rig: that they are alike proves nothing.
+    NotIndependent,
+}
+
+impl Comparison {
+    /// The pairs, those furthest apart first.
+    pub fn furthest_first(&self) -> Vec<&Paired> {
+        let mut pairs: Vec<&Paired> = self.pairs.iter().collect();
+        pairs.sort_by(|x, y| y.deviations().abs().total_cmp(&x.deviations().abs()));
+        pairs
+    }
+
+    /// The same for two runs whose noise is one: a difference stands, likeness says nothing.
+    pub fn of_one_noise(mut self) -> Self {
+        if let Some(judged) = self.judged.as_mut().filter(|judged| judged.answer == Answer::NoDifferenceSeen)
+        {
+            judged.answer = Answer::NotIndependent;
+        }
+        self
+    }
+}
+
+/// The statistics of the paired differences.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Judged {
+    /// Shift of `mu'` that all conditions have in common, second less first (generalised least squares).
+    pub shift: f64,
+    /// Its standard uncertainty, references included.
+    pub shift_sd: f64,
+    /// Bounds of its interval of 95 %.
+    pub shift_interval_95: [f64; 2],
+    /// Two-sided p-value of no shift.
+    pub shift_p: f64,
+    /// Chi-square of the differences about that shift.
+    pub scatter_chi2: f64,
+    /// Its degrees of freedom.
+    pub scatter_degrees: usize,
+    /// p-value of scatter no larger than stated.
+    pub scatter_p: f64,
+    /// Shift that would have been seen with a probability of 90 %.
+    pub visible_shift: f64,
+    /// The answer.
+    pub answer: Answer,
+}
+
+impl Judged {
+    /// The answer in words, for so many conditions in common.
+    pub fn answer_words(&self, conditions: usize) -> String {
+        match self.answer {
+            Answer::Differ => "the runs differ by more than their uncertainty explains".into(),
+            Answer::NoDifferenceSeen => format!(
+                "no difference seen; a shift of mu' by {:.3} would have been, with a probability of 90 %",
+                self.visible_shift
+            ),
+            Answer::NotIndependent => "cannot tell: the runs are not independent of each other".into(),
+            Answer::CannotTell => format!(
+                "cannot tell: {conditions} conditions in common, and only a shift of mu' by {:.3} would have been seen",
+                self.visible_shift
+            ),
+        }
+    }
+
+    /// Whether the differences vary from condition to condition by more than their uncertainty: then no shift describes them.
+    pub fn varies(&self) -> bool {
+        self.scatter_p < LEVEL / 2.0
+    }
+
+    /// The figures behind it in words, what decides first: the shift and the scatter about it, or, where the differences vary, from where to
+    /// where, and only then their mean.
+    pub fn figures_words(&self, pairs: &[Paired]) -> [String; 2] {
+        let ([low, high], conditions) = (self.shift_interval_95, pairs.len());
+        let shift = format!("{:+.4}, 95 % interval {low:+.4} to {high:+.4}", self.shift);
+        let scatter = format!(
+            "chi2 {:.1} at {} degrees of freedom, {}",
+            self.scatter_chi2,
+            self.scatter_degrees,
+            p_value(self.scatter_p)
+        );
+        let by_difference = |a: &&Paired, b: &&Paired| a.difference.total_cmp(&b.difference);
+        match (pairs.iter().min_by(by_difference), pairs.iter().max_by(by_difference)) {
+            (Some(least), Some(most)) if self.varies() => [
+                format!(
+                    "the difference of mu' varies over {conditions} conditions, from {:+.3} +- {:.3} at {} to {:+.3} +- {:.3} at {} ({scatter})",
+                    least.difference,
+                    least.difference_sd,
+                    least.setting(),
+                    most.difference,
+                    most.difference_sd,
+                    most.setting()
+                ),
+                format!("no single shift describes that: their weighted mean is {shift}"),
+            ],
+            _ => [
+                format!("{conditions} conditions: mu' shifts by {shift} ({})", p_value(self.shift_p)),
+                format!("scatter about it: {scatter}"),
+            ],
+        }
+    }
+}
+
+/// A comparison of two runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// References of the first and the second run.
+    pub references: [Reference; 2],
+    /// Conditions in common, in the order of the first run.
+    pub pairs: Vec<Paired>,
+    /// Passes with vibration of either run whose condition the other one lacks.
+    pub unpaired: [usize; 2],
+    /// The statistics; none without a condition in common.
+    pub judged: Option<Judged>,
+}
+
+impl<'a> Side<'a> {
+    /// The passes of a run.
+    pub fn of(run: &'a RunData, noise: PassNoise) -> Self {
+        Side { passes: run.passes.iter().map(|p| &p.pass).collect(), noise }
+    }
+
+    /// `mu_0` by least squares over the passes without vibration; `None` where there is none.
+    pub fn reference(&self) -> Option<Reference> {
+        let (mut top, mut bottom, mut rows) = (0.0, 0.0, Vec::new());
+        for pass in self.passes.iter().filter(|p| p.amplitude == PeakToPeak::ZERO) {
+            let Some(friction) = pass.friction_force_n() else { continue };
+            top += friction * pass.normal_force_n;
+            bottom += pass.normal_force_n.powi(2);
+            rows.push(pass.normal_force_n);
+        }
+        let mu0 = top / bottom;
+        if !(mu0.is_finite() && mu0 > 0.0) {
+            return None;
+        }
+        let variance: f64 =
+            rows.iter().map(|n| (n * n / bottom).powi(2) * self.relative_variance(1.0, mu0, *n)).sum();
+        Some(Reference { mu0, relative_sd: variance.sqrt() })
+    }
+
+    /// Variance of one pass's `mu'` from pass to pass, at `mu_relative`.
+    fn relative_variance(&self, mu_relative: f64, mu0: f64, normal_force_n: f64) -> f64 {
+        let force = self.noise.force_sd_n / (mu0 * normal_force_n);
+        // The normal force is measured too; its error moves mu' by mu' times mu_0.
+        force * force * (1.0 + (mu_relative * mu0).powi(2))
+            + (self.noise.pass_relative_sd * mu_relative).powi(2)
+    }
+
+    fn vibrating(&self) -> impl Iterator<Item = &'a Pass> + '_ {
+        self.passes.iter().copied().filter(|p| {
+            p.amplitude > PeakToPeak::ZERO && p.normal_force_n > 0.0 && p.lateral_force_n.is_some()
+        })
+    }
+
+    fn mean(&self, passes: &[&Pass], reference: Reference) -> Mean {
+        let n = passes.len() as f64;
+        let mu = |p: &Pass| p.friction_force_n().unwrap_or(f64::NAN) / (reference.mu0 * p.normal_force_n);
+        let mu_relative = passes.iter().map(|p| mu(p)).sum::<f64>() / n;
+        let one = |p: &&Pass| self.relative_variance(mu_relative, reference.mu0, p.normal_force_n);
+        Mean { mu_relative, sd: passes.iter().map(one).sum::<f64>().sqrt() / n, passes: passes.len() }
+    }
+}
+
+fn settings(p: &Pass) -> [f64; 4] {
+    [p.amplitude.metres(), p.frequency_hz, p.speed_m_s, p.normal_force_n]
+}
+
+fn same(a: &Pass, b: &Pass) -> bool {
+    let near = |((x, y), within): ((f64, f64), f64)| (x - y).abs() <= within * x.abs().max(y.abs());
+    a.direction == b.direction && settings(a).into_iter().zip(settings(b)).zip(SAME).all(near)
+}
+
+/// Passes of one condition, of the first and of the second run.
+type Group<'a> = [Vec<&'a Pass>; 2];
+
+/// Pairs the passes of two runs and judges their differences; `None` where a run has no pass without vibration.
+pub fn compare(a: &Side<'_>, b: &Side<'_>) -> Option<Comparison> {
+    let references = [a.reference()?, b.reference()?];
+    let mut groups: Vec<(&Pass, Group<'_>)> = Vec::new();
+    for (side, passes) in [a, b].into_iter().enumerate() {
+        for pass in passes.vibrating() {
+            match groups.iter_mut().find(|(first, _)| same(first, pass)) {
+                Some((_, group)) => group[side].push(pass),
+                None => {
+                    let mut group: Group<'_> = [Vec::new(), Vec::new()];
+                    group[side].push(pass);
+                    groups.push((pass, group));
+                }
+            }
+        }
+    }
+    let (mut pairs, mut unpaired) = (Vec::new(), [0, 0]);
+    for (first, [of_a, of_b]) in groups {
+        if of_a.is_empty() || of_b.is_empty() {
+            unpaired[0] += of_a.len();
+            unpaired[1] += of_b.len();
+            continue;
+        }
+        let means = [a.mean(&of_a, references[0]), b.mean(&of_b, references[1])];
+        let shared = shared_variance(&references) * level(&means).powi(2);
+        pairs.push(Paired {
+            amplitude_pp_m: first.amplitude.metres(),
+            frequency_hz: first.frequency_hz,
+            speed_m_s: first.speed_m_s,
+            direction: i8::from(first.direction),
+            normal_force_n: first.normal_force_n,
+            a: means[0],
+            b: means[1],
+            difference: means[1].mu_relative - means[0].mu_relative,
+            difference_sd: (means[0].sd.powi(2) + means[1].sd.powi(2) + shared).sqrt(),
+        });
+    }
+    let judged = judge(&pairs, shared_variance(&references));
+    Some(Comparison { references, pairs, unpaired, judged })
+}
+
+fn shared_variance(references: &[Reference; 2]) -> f64 {
+    references.iter().map(|r| r.relative_sd.powi(2)).sum()
+}
+
+fn level(means: &[Mean; 2]) -> f64 {
+    0.5 * (means[0].mu_relative + means[1].mu_relative)
+}
+
+/// Generalised least squares of a common shift under `diag(v) + shared m m'`, by the formula of Sherman and Morrison.
+fn judge(pairs: &[Paired], shared: f64) -> Option<Judged> {
+    let own: Vec<f64> = pairs.iter().map(|p| p.a.sd.powi(2) + p.b.sd.powi(2)).collect();
+    if pairs.is_empty() || own.iter().any(|v| !(v.is_finite() && *v > 0.0)) {
+        return None;
+    }
+    let m: Vec<f64> = pairs.iter().map(|p| level(&[p.a, p.b])).collect();
+    let d: Vec<f64> = pairs.iter().map(|p| p.difference).collect();
+    let plain = |x: &[f64], y: &[f64]| x.iter().zip(y).zip(&own).map(|((x, y), v)| x * y / v).sum::<f64>();
+    let down = 1.0 + shared * plain(&m, &m);
+    let product = |x: &[f64], y: &[f64]| plain(x, y) - shared * plain(x, &m) * plain(&m, y) / down;
+    let ones = vec![1.0; pairs.len()];
+    let information = product(&ones, &ones);
+    let shift = product(&ones, &d) / information;
+    let shift_sd = information.recip().sqrt();
+    let normal = Normal::standard();
+    let z95 = normal.inverse_cdf(0.975);
+    let scatter_degrees = pairs.len() - 1;
+    let scatter_chi2 = (product(&d, &d) - shift * shift * information).max(0.0);
+    let scatter_p = match scatter_degrees {
+        0 => 1.0,
+        n => ChiSquared::new(n as f64).map_or(f64::NAN, |law| law.sf(scatter_chi2)),
+    };
+    let shift_p = 2.0 * normal.sf((shift / shift_sd).abs());
+    let visible_shift = (normal.inverse_cdf(1.0 - LEVEL / 4.0) + normal.inverse_cdf(0.9)) * shift_sd;
+    let answer = if shift_p.min(scatter_p) < LEVEL / 2.0 {
+        Answer::Differ
+    } else if pairs.len() >= ENOUGH_CONDITIONS && visible_shift <= VISIBLE_DEPARTURE {
+        Answer::NoDifferenceSeen
+    } else {
+        Answer::CannotTell
+    };
+    Some(Judged {
+        shift,
+        shift_sd,
+        shift_interval_95: [shift - z95 * shift_sd, shift + z95 * shift_sd],
+        shift_p,
+        scatter_chi2,
+        scatter_degrees,
+        scatter_p,
+        visible_shift,
+        answer,
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,309 @@
+//! Files that outlive a power cut: written beside their place, synced, moved there, and their folder synced, because a name
+//! too is only safe once its folder is (POSIX `fsync`; ext4, XFS and Btrfs give more, none promises it).
+
+use miette::{Context, IntoDiagnostic};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+
+/// What the name of a file ends with while it is being written.
+pub const PART: &str = ".new";
+
+/// Where a file is written before it is moved to its place.
+pub fn beside(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(PART);
+    PathBuf::from(name)
+}
+
+/// Opens a file in a folder that others may write to: no link is followed, nothing waits, and nothing is taken but a plain file that has
+/// no other name. `options` must not truncate: what a link leads to would be empty before anybody looks.
+///
+/// # Errors
+/// Whatever the file system says, or something else stands there.
+pub fn open_plain(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
+    let file = options.custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK).open(path)?;
+    let found = file.metadata()?;
+    if found.is_file() && found.nlink() == 1 {
+        return Ok(file);
+    }
+    Err(io::Error::other("it is no plain file of its own: a link, a pipe or a device stands there"))
+}
+
+/// Refuses a place where a link, a pipe or a file with another name stands; nothing may stand there.
+///
+/// # Errors
+/// Something of that kind.
+pub fn refuse_planted(path: &Path) -> miette::Result<()> {
+    if fs::symlink_metadata(path).is_ok_and(|found| !(found.is_file() && found.nlink() == 1)) {
+        miette::bail!(
+            help = "see what it is, and remove it",
+            "{} is no plain file of its own",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
+/// Makes a new file, to be written beside its place. What an earlier program left under that name, or somebody planted there, loses the
+/// name and is not touched.
+///
+/// # Errors
+/// Whatever the file system says.
+pub fn fresh(path: &Path) -> io::Result<File> {
+    let new = || open_plain(path, OpenOptions::new().create_new(true).read(true).write(true));
+    match new() {
+        Err(why) if why.kind() == io::ErrorKind::AlreadyExists => fs::remove_file(path).and_then(|()| new()),
+        made => made,
+    }
+}
+
+/// The folder that holds a file or folder of that name.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Makes the names in the folder of `path` safe.
+///
+/// # Errors
+/// Whatever the file system says.
+pub fn sync_folder_of(path: &Path) -> io::Result<()> {
+    File::open(folder_of(path))?.sync_all()
+}
+
+/// Writes a file that a person named, whole or not at all: after a crash or a power cut either the old one is there or the new one.
+/// What is there and is no ordinary file, such as a terminal or a pipe, is written to as it is. A link of this user stays a link.
+///
+/// # Errors
+/// Whatever the file system says, with the file's name; a link that another user has put there.
+pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
+    let written = named(path).and_then(|path| {
+        if fs::metadata(&path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+            return fs::write(path, bytes.as_ref());
+        }
+        put(&path, bytes.as_ref())
+    });
+    written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
+/// Writes a file of a run's or a study's folder, to which others may write, in the same way; a link that stands there is replaced, and what
+/// it leads to is not touched.
+///
+/// # Errors
+/// Whatever the file system says, with the file's name.
+pub fn write_plain(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
+    put(path, bytes.as_ref()).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
+/// What a path leads to, through links of this user and of root.
+fn named(path: &Path) -> io::Result<PathBuf> {
+    let link = fs::symlink_metadata(path)
+        .is_ok_and(|there| there.is_symlink() && there.uid() != 0 && !is_own(&there));
+    if link {
+        return Err(io::Error::other("another user has put a link there"));
+    }
+    Ok(fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()))
+}
+
+/// Whether a file is this user's.
+pub fn is_own(file: &fs::Metadata) -> bool {
+    fs::metadata("/proc/self").is_ok_and(|own| own.uid() == file.uid())
+}
+
+fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let part = beside(path);
+    let moved = fresh(&part)
+        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()).map(|()| file))
+        .and_then(|file| Placed { file, path: part.clone() }.still_there().map_err(io::Error::other))
+        .and_then(|()| fs::rename(&part, path));
+    if let Err(why) = moved {
+        let _ = fs::remove_file(&part);
+        return Err(why);
+    }
+    sync_folder_of(path)
+}
+
+/// Makes a folder with all that lead to it, their names safe. Returns those that were not there, the outermost first.
+///
+/// # Errors
+/// Whatever the file system says, with the folder's name.
+pub fn make_folder(path: &Path) -> miette::Result<Vec<PathBuf>> {
+    let wrong = || format!("cannot make {}", path.display());
+    let missing = path.ancestors().filter(|p| !p.as_os_str().is_empty() && !p.exists());
+    let mut made: Vec<PathBuf> = missing.map(Path::to_path_buf).collect();
+    made.reverse();
+    fs::create_dir_all(path).into_diagnostic().wrap_err_with(wrong)?;
+    for folder in &made {
+        sync_folder_of(folder).into_diagnostic().wrap_err_with(wrong)?;
+    }
+    Ok(made)
+}
+
+/// An open file that knows its place: another program may remove or replace it at any time, and what is then written goes
+/// nowhere.
+#[derive(Debug)]
+pub struct Placed {
+    file: File,
+    path: PathBuf,
+}
+
+impl Placed {
+    /// Opens a file as [`open_plain`] does; the name of a new one is safe when this returns.
+    ///
+    /// # Errors
+    /// Whatever the file system says, with the file's name.
+    pub fn open(path: &Path, options: &mut OpenOptions) -> miette::Result<Self> {
+        Self::of(path, || open_plain(path, options))
+    }
+
+    /// A new file, as [`fresh`] makes it.
+    ///
+    /// # Errors
+    /// Whatever the file system says, with the file's name.
+    pub fn fresh(path: &Path) -> miette::Result<Self> {
+        Self::of(path, || fresh(path))
+    }
+
+    fn of(path: &Path, open: impl FnOnce() -> io::Result<File>) -> miette::Result<Self> {
+        let open = || {
+            let new = !path.exists();
+            let file = open()?;
+            if new {
+                sync_folder_of(path)?;
+            }
+            Ok::<_, io::Error>(file)
+        };
+        let file = open().into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        Ok(Placed { file, path: path.to_path_buf() })
+    }
+
+    /// The open file.
+    pub fn file(&mut self) -> &mut File {
+        &mut self.file
+    }
+
+    /// Another handle of the same open file.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn handle(&self) -> miette::Result<Placed> {
+        Ok(Placed { file: self.file.try_clone().into_diagnostic()?, path: self.path.clone() })
+    }
+
+    /// Makes the contents safe, and looks whether they are still where they belong.
+    ///
+    /// # Errors
+    /// What was written is not safe: the disk failed, or the file was removed or replaced.
+    pub fn sync(&self) -> miette::Result<()> {
+        self.file.sync_data().into_diagnostic().wrap_err_with(|| self.path.display().to_string())?;
+        self.still_there()
+    }
+
+    /// Looks whether the file is still at its place.
+    ///
+    /// # Errors
+    /// It was removed, moved or replaced.
+    pub fn still_there(&self) -> miette::Result<()> {
+        let ours = self.file.metadata().into_diagnostic()?;
+        if fs::metadata(&self.path).is_ok_and(|there| (there.dev(), there.ino()) == (ours.dev(), ours.ino()))
+        {
+            return Ok(());
+        }
+        miette::bail!("{} was removed or replaced while it was being written", self.path.display())
+    }
+}
+
+impl Read for Placed {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        self.file.read(into)
+    }
+}
+
+impl Write for Placed {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for Placed {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(name: &str) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("muprime-files-{name}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir(&path).unwrap();
+        path
+    }
+
+    #[test]
+    fn a_file_is_replaced_whole_and_nothing_is_left_beside_it() {
+        let folder = folder("whole");
+        let (path, link) = (folder.join("report.html"), folder.join("link"));
+        write_whole(&path, b"first").unwrap();
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        write_whole(&link, b"second").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"second");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        // A folder is in the way: the old file stays, and nothing else does.
+        fs::create_dir_all(folder.join("taken/by/files")).unwrap();
+        assert!(write_whole(&folder.join("taken"), b"third").unwrap_err().to_string().contains("taken"));
+        let mut names: Vec<_> = fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, ["link", "report.html", "taken"]);
+        write_whole(Path::new("/dev/null"), b"a device stays one").unwrap();
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// Links of both kinds, and a pipe: nothing is followed, waited for or emptied, and what is written lands in the folder.
+    #[test]
+    fn nothing_that_is_planted_is_followed() {
+        let folder = folder("planted");
+        let (victim, path) = (folder.join("victim"), folder.join("summary.json"));
+        let plants: [fn(&Path, &Path); 2] = [
+            |victim, place| std::os::unix::fs::symlink(victim, place).unwrap(),
+            |victim, place| fs::hard_link(victim, place).unwrap(),
+        ];
+        for plant in plants {
+            fs::write(&victim, "precious").unwrap();
+            for place in [beside(&path), path.clone()] {
+                plant(&victim, &place);
+                assert!(open_plain(&place, OpenOptions::new().append(true)).is_err());
+                write_plain(&path, "ours").unwrap();
+                assert_eq!(fs::read_to_string(&victim).unwrap(), "precious");
+                assert_eq!(fs::read_to_string(&path).unwrap(), "ours");
+                fs::remove_file(&path).unwrap();
+            }
+        }
+        let pipe = std::process::Command::new("mkfifo").arg(&path).status().unwrap();
+        assert!(pipe.success() && open_plain(&path, OpenOptions::new().read(true)).is_err());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_file_that_was_removed_or_replaced_is_noticed() {
+        let folder = folder("placed");
+        let path = folder.join("run-1.mcap");
+        let open = || Placed::open(&path, OpenOptions::new().create(true).append(true)).unwrap();
+        let mut file = open();
+        file.write_all(b"row").unwrap();
+        file.sync().unwrap();
+        fs::rename(&path, folder.join("away")).unwrap();
+        assert!(file.sync().unwrap_err().to_string().contains("removed or replaced"));
+        fs::write(&path, b"row").unwrap();
+        assert!(file.sync().is_err(), "the same name is not the same file");
+        open().sync().unwrap();
+        fs::remove_dir_all(folder).unwrap();
+    }
+}

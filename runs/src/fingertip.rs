@@ -1,0 +1,144 @@
+//! The fingertip library: size, material, moduli, springs, each with its source.
+
+use crate::input;
+use models::finger::Finger;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A fingertip as its file describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FingertipFile {
+    /// Name in the library.
+    pub name: String,
+    /// `human`, `artificial` or `probe`.
+    pub kind: Kind,
+    /// What it is made of.
+    pub material: String,
+    /// Radius of the tip in m.
+    pub radius_m: f64,
+    /// Coulomb friction coefficient to expect on the plate, for planning and as a first guess.
+    pub mu0: f64,
+    /// Springs and moduli.
+    pub finger: Finger,
+    /// Where the numbers come from; each key is a number's name.
+    pub source: std::collections::BTreeMap<String, String>,
+}
+
+/// What kind of tip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// A person's finger: dead-man input and exposure limits apply.
+    Human,
+    /// An artificial fingertip.
+    Artificial,
+    /// A probe of simple shape.
+    Probe,
+}
+
+/// How a setup names its fingertip: `tip = "name"`, with numbers of its own where a calibration has better ones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FingertipSetup {
+    /// Name in the library, or path of a file, relative to the setup.
+    pub tip: String,
+    /// The numbers of a human fingertip are used and nobody touches the plate: the guards for a finger are off. It stands in the
+    /// record, the report and on every page of a run.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub nobody_touches_the_plate: bool,
+    /// Overrides, N/m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_stiffness_n_per_m: Option<f64>,
+    /// Overrides, N/m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lateral_stiffness_n_per_m: Option<f64>,
+    /// Overrides, relative.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness_relative_sd: Option<f64>,
+    /// Overrides.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mu0: Option<f64>,
+}
+
+/// A fingertip, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fingertip {
+    /// Name.
+    pub name: String,
+    /// Kind.
+    pub kind: Kind,
+    /// Friction coefficient to expect.
+    pub mu0: f64,
+    /// Springs and moduli.
+    pub finger: Finger,
+}
+
+/// Name and text of every bundled fingertip. Add one: a file in `runs/fingertips/` and a line here.
+pub const BUNDLED: &[(&str, &str)] = &[
+    ("artificial-silicone", include_str!("../fingertips/artificial-silicone.toml")),
+    ("human-index-moist", include_str!("../fingertips/human-index-moist.toml")),
+    ("human-index-dry", include_str!("../fingertips/human-index-dry.toml")),
+    ("probe-pmma-sphere", include_str!("../fingertips/probe-pmma-sphere.toml")),
+];
+
+impl FingertipFile {
+    /// What of it cannot be used: table and key (or the whole), and the problem.
+    pub fn problems(&self) -> Vec<(Vec<&'static str>, String)> {
+        let above = |v: f64| v.is_finite() && v > 0.0;
+        let mut wrong = Vec::new();
+        if !above(self.mu0) {
+            wrong.push((vec!["mu0"], format!("mu0 = {}; a number above zero is needed", self.mu0)));
+        }
+        if !(above(self.radius_m) && self.radius_m <= RADIUS_MAX_M) {
+            let needed = format!("above 0, to {RADIUS_MAX_M}, in m");
+            wrong.push((vec!["radius_m"], format!("radius_m = {}; {needed} is needed", self.radius_m)));
+        }
+        if let Err(error) = self.finger.check() {
+            wrong.push((vec!["finger", error.name], error.to_string()));
+        }
+        wrong
+    }
+}
+
+/// Largest radius of a tip, m: a fist.
+const RADIUS_MAX_M: f64 = 0.2;
+
+impl Fingertip {
+    /// The tip that a setup names, with the setup's overrides.
+    ///
+    /// # Errors
+    /// A tip that is not there or not usable, in words.
+    pub fn resolve(setup: &FingertipSetup, folder: &Path) -> Result<Self, String> {
+        let bundled =
+            BUNDLED.iter().find(|(name, _)| *name == setup.tip).map(|(_, text)| (*text).to_string());
+        let text = match bundled {
+            Some(text) => text,
+            None => input::text_of(&folder.join(&setup.tip)).map_err(|e| {
+                let known: Vec<_> = BUNDLED.iter().map(|(name, _)| *name).collect();
+                format!("no fingertip '{}' ({e}); bundled: {}", setup.tip, known.join(", "))
+            })?,
+        };
+        let file: FingertipFile =
+            toml::from_str(&text).map_err(|e| format!("fingertip '{}': {e}", setup.tip))?;
+        if let Some((_, problem)) = file.problems().into_iter().next() {
+            return Err(format!("fingertip '{}': {problem}", setup.tip));
+        }
+        let finger = Finger {
+            normal_stiffness_n_per_m: setup
+                .normal_stiffness_n_per_m
+                .unwrap_or(file.finger.normal_stiffness_n_per_m),
+            lateral_stiffness_n_per_m: setup
+                .lateral_stiffness_n_per_m
+                .unwrap_or(file.finger.lateral_stiffness_n_per_m),
+            stiffness_relative_sd: setup.stiffness_relative_sd.unwrap_or(file.finger.stiffness_relative_sd),
+            ..file.finger
+        };
+        finger.check().map_err(|e| format!("fingertip '{}': {e}", setup.tip))?;
+        let mu0 = setup.mu0.unwrap_or(file.mu0);
+        if !(mu0.is_finite() && mu0 > 0.0) {
+            return Err(format!("fingertip '{}': mu0 = {mu0}; a number above zero is needed", setup.tip));
+        }
+        Ok(Fingertip { name: file.name, kind: file.kind, mu0, finger })
+    }
+}

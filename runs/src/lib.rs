@@ -1,0 +1,56 @@
+//! A friction sweep without an instrument: what people write, the order of the passes, virtual time, the run's folder, the report.
+//!
+//! Nothing here needs one system, a socket or a wall clock. The crate `rig` leads the same sweep over instruments.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`input`], [`files`], [`mod@print`], [`leave`] | files that people wrote, refused with their place; how files are written; how the program prints, and ends |
+//! | [`setup`], [`plan`], [`fingertip`] | rigs, plans, fingertips, all checked with the place in the file |
+//! | [`calibrate`] | certificates from data; what only instruments give comes through a bench |
+//! | [`certificates`], [`model_file`] | a setup's certificates, verified and applied once; a corrected model from its file to the loop |
+//! | [`rehearsal`] | a profile tried before any instrument is |
+//! | [`sequence`] | the order of a sweep: a pure state machine over the loop's rows |
+//! | [`supervisor`] | the one way to lead a loop: stop first, switch off, read back; and the loop in virtual time |
+//! | [`session`] | a sweep from its job to its summary, in virtual time |
+//! | [`ambient`] | levels of the air: who sets them, who reads them, who answers at the rig |
+//! | [`run_dir`], [`catalogue`] | a run's folder and its reader; the catalogue of runs |
+//! | [`report`], [`compare`] | the pages of a run and of a verdict; two runs side by side |
+//! | [`verdict`] | a verdict for people at a terminal, and the plan of the next experiment |
+//! | [`version`] | what this program is: the build, and the models that it holds |
+//!
+//! ```
+//! use muprime_runs::plan::Plan;
+//! use muprime_runs::setup::Setup;
+//!
+//! let setup = Setup::load("virtual-ideal")?;
+//! assert!(!setup.instruments().force.is_empty());
+//! // Bad input is refused with its place and the remedy, and nothing is touched.
+//! let refused = Plan::parse("plan.toml", "name = 'p'\nspeed = 1").err().unwrap();
+//! assert!(format!("{refused:?}").contains("speed"));
+//! # Ok::<(), miette::Report>(())
+//! ```
+
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
+pub mod ambient;
+pub mod calibrate;
+pub mod catalogue;
+pub mod certificates;
+pub mod compare;
+pub mod exposure_left;
+pub mod files;
+pub mod fingertip;
+pub mod input;
+pub mod leave;
+pub mod model_file;
+pub mod plan;
+pub mod print;
+pub mod rehearsal;
+pub mod report;
+pub mod run_dir;
+pub mod sequence;
+pub mod session;
+pub mod setup;
+pub mod supervisor;
+pub mod verdict;
+pub mod version;

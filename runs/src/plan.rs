@@ -1,0 +1,285 @@
+//! A plan: which passes to make, in which order, and how each is made.
+
+mod bundled;
+mod points;
+mod reach;
+mod steps;
+mod visible;
+
+use crate::input::{self, Problems};
+use models::condition::Condition;
+use models::covariate::{self, Covariate};
+use models::quantity::PeakToPeak;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+pub use bundled::{BUNDLED, text as bundled_text};
+pub(crate) use points::series_place;
+pub use points::{PlanProblem, Point, Resolution};
+pub use reach::{Reach, times};
+pub use steps::{Action, Step, When};
+pub use visible::{COUNTS_MIN, LateralChannel};
+
+/// A plan file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanFile {
+    /// Name, for records and reports.
+    pub name: String,
+    /// What the plan is for.
+    #[serde(default)]
+    pub about: String,
+    /// Seed of the order. `--seed` overrides it.
+    #[serde(default)]
+    pub seed: u64,
+    /// Whether the order of conditions is randomised.
+    #[serde(default = "yes")]
+    pub randomise: bool,
+    /// Repeats of every condition.
+    #[serde(default = "one")]
+    pub replicates: u32,
+    /// Directions of every condition, in turn: 1, -1 or both.
+    #[serde(default = "both")]
+    pub directions: Vec<i8>,
+    /// A reference without vibration before every so many conditions, and at the end; 0 for none.
+    #[serde(default = "eight")]
+    pub reference_every: u32,
+    /// How a pass is made.
+    #[serde(default)]
+    pub pass: PassTimes,
+    /// Values of everything that a series does not vary.
+    pub base: Base,
+    /// Series: each is the product of its lists, everything else at its base value.
+    #[serde(default)]
+    pub series: Vec<Series>,
+    /// How close the air must be to the levels of the series, and how long a run waits for them.
+    #[serde(default)]
+    pub tolerances: crate::ambient::Tolerances,
+    /// What a person does before the passes, between groups of them and after; the rig is disarmed meanwhile.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub step: Vec<Step>,
+    /// Preparation and environment, as section 2.2 of the paper records them: copied into the record.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    pub protocol: BTreeMap<String, toml::Value>,
+}
+
+/// Passes that one plan may ask for: a pass takes half a second, so this is half a day, and what a run keeps of its passes
+/// fits into memory.
+pub const MAX_PASSES: u64 = 100_000;
+
+impl PlanFile {
+    /// Passes that the plan asks for, references left out, counted without making them.
+    fn passes(&self) -> u64 {
+        let of_series = |s: &Series| {
+            let lists = [
+                s.amplitude_pp_m.len(),
+                s.frequency_hz.len(),
+                s.speed_m_s.len(),
+                s.normal_force_n.len(),
+                s.position_m.len(),
+                s.ambient_pressure_pa.len(),
+                s.temperature_c.len(),
+                s.relative_humidity_pct.len(),
+            ];
+            let directions = if s.directions.is_empty() { &self.directions } else { &s.directions };
+            let conditions = lists.iter().fold(1u64, |all, n| all.saturating_mul((*n).max(1) as u64));
+            conditions.saturating_mul(directions.len() as u64)
+        };
+        let conditions = self.series.iter().map(of_series).fold(0, u64::saturating_add);
+        conditions.saturating_mul(u64::from(self.replicates))
+    }
+}
+
+/// Times of a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PassTimes {
+    /// s from loading and starting until the average begins.
+    pub settle_s: f64,
+    /// s that are averaged.
+    pub measure_s: f64,
+    /// m/s of the lifted travel to the start of a pass. Left out: 0.15, or what the stage takes where that is less.
+    pub approach_speed_m_s: f64,
+}
+
+impl Default for PassTimes {
+    fn default() -> Self {
+        PassTimes { settle_s: 0.15, measure_s: 0.25, approach_speed_m_s: 0.15 }
+    }
+}
+
+/// Base values of a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Base {
+    /// m, peak-to-peak.
+    pub amplitude_pp_m: f64,
+    /// Hz.
+    pub frequency_hz: f64,
+    /// m/s.
+    pub speed_m_s: f64,
+    /// N.
+    pub normal_force_n: f64,
+    /// m, where the middle of every pass lies.
+    #[serde(default)]
+    pub position_m: f64,
+}
+
+/// One series: the product of its lists.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Series {
+    /// Name, for reports.
+    pub name: String,
+    /// m, peak-to-peak.
+    pub amplitude_pp_m: Vec<f64>,
+    /// Hz.
+    pub frequency_hz: Vec<f64>,
+    /// m/s.
+    pub speed_m_s: Vec<f64>,
+    /// N.
+    pub normal_force_n: Vec<f64>,
+    /// m.
+    pub position_m: Vec<f64>,
+    /// Pa: somebody sets it, a chamber or the operator; passes are grouped by the levels of the air.
+    pub ambient_pressure_pa: Vec<f64>,
+    /// deg C: likewise.
+    pub temperature_c: Vec<f64>,
+    /// Per cent: likewise.
+    pub relative_humidity_pct: Vec<f64>,
+    /// Directions of this series alone, 1 and -1; empty for the plan's.
+    pub directions: Vec<i8>,
+}
+
+impl Base {
+    /// The base as a condition; what it does not say is the paper's.
+    pub fn condition(&self) -> Condition {
+        Condition {
+            amplitude: PeakToPeak::from_metres(self.amplitude_pp_m),
+            frequency_hz: self.frequency_hz,
+            speed_m_s: self.speed_m_s,
+            normal_force_n: self.normal_force_n,
+            position_m: self.position_m,
+            mu0: 1.0,
+            ..Condition::paper()
+        }
+    }
+}
+
+impl Series {
+    /// What the series varies, slowest first; an empty list stands for the base's value.
+    pub fn lists(&self) -> [(&'static Covariate, &[f64]); 8] {
+        [
+            (&covariate::AMBIENT_PRESSURE, &self.ambient_pressure_pa),
+            (&covariate::TEMPERATURE, &self.temperature_c),
+            (&covariate::RELATIVE_HUMIDITY, &self.relative_humidity_pct),
+            (&covariate::FREQUENCY, &self.frequency_hz),
+            (&covariate::SPEED, &self.speed_m_s),
+            (&covariate::NORMAL_FORCE, &self.normal_force_n),
+            (&covariate::POSITION, &self.position_m),
+            (&covariate::AMPLITUDE, &self.amplitude_pp_m),
+        ]
+    }
+}
+
+const fn yes() -> bool {
+    true
+}
+const fn one() -> u32 {
+    1
+}
+const fn eight() -> u32 {
+    8
+}
+fn both() -> Vec<i8> {
+    vec![1, -1]
+}
+
+/// A plan that was read.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The file's contents.
+    pub file: PlanFile,
+    /// The file's text, for the record.
+    pub text: String,
+    /// Where it came from.
+    pub origin: String,
+}
+
+impl Plan {
+    /// The bundled plan of that name, or the file at that path.
+    ///
+    /// # Errors
+    /// What is wrong, with the place in the file.
+    pub fn load(name_or_path: &str) -> miette::Result<Self> {
+        if let Some(text) = bundled::text(name_or_path) {
+            return Self::parse(name_or_path, text);
+        }
+        let path = Path::new(name_or_path);
+        if !path.exists() {
+            let known: Vec<_> = BUNDLED.iter().map(|(name, _)| *name).collect();
+            miette::bail!(
+                help = format!("bundled plans: {}", known.join(", ")),
+                "there is no plan '{name_or_path}', neither bundled nor as a file"
+            );
+        }
+        Self::parse(name_or_path, &input::text_of(path)?)
+    }
+
+    /// Parses and checks a plan by itself. Against limits it is checked by [`Plan::points`].
+    ///
+    /// # Errors
+    /// What is wrong, with the place in the file.
+    pub fn parse(origin: &str, text: &str) -> miette::Result<Self> {
+        let file: PlanFile = input::parse_toml(origin, text)?;
+        let mut wrong = Problems::of(origin, text);
+        if file.series.is_empty() {
+            wrong.add(
+                &["name"],
+                "a plan needs at least one [[series]]",
+                "add [[series]] with a list, as in amplitude_pp_m = [1e-6, 2e-6]".to_string(),
+            );
+        }
+        let listed = file.directions.iter().chain(file.series.iter().flat_map(|s| &s.directions));
+        if file.directions.is_empty() || listed.into_iter().any(|d| *d != 1 && *d != -1) {
+            wrong.add(&["directions"], "directions are 1, -1 or both", None);
+        }
+        if !(1..=1000).contains(&file.replicates) {
+            wrong.add(&["replicates"], "replicates are 1 to 1000", None);
+        }
+        let passes = file.passes();
+        if passes > MAX_PASSES {
+            let problem =
+                format!("the plan asks for {passes} passes; at most {MAX_PASSES} are made in one run");
+            wrong.add(&["series"], problem, "shorten the lists, or make several plans of it".to_string());
+        }
+        let times = [
+            ("settle_s", file.pass.settle_s),
+            ("measure_s", file.pass.measure_s),
+            ("approach_speed_m_s", file.pass.approach_speed_m_s),
+        ];
+        for (name, value) in times {
+            if !(value.is_finite() && value > 0.0 && value < 3600.0) {
+                wrong.add(&["pass", name], format!("{name} = {value}: a number above zero is needed"), None);
+            }
+        }
+        file.tolerances.check(&mut wrong);
+        file.step.iter().for_each(|step| step.check(&mut wrong));
+        wrong.end()?;
+        Ok(Plan { file, text: text.to_string(), origin: origin.to_string() })
+    }
+
+    /// What `[protocol]` states; what is left empty states nothing.
+    pub fn protocol(&self) -> BTreeMap<String, toml::Value> {
+        let stated = |value: &toml::Value| value.as_str().is_none_or(|text| !text.trim().is_empty());
+        self.file.protocol.iter().filter(|(_, v)| stated(v)).map(|(k, v)| (k.clone(), v.clone())).collect()
+    }
+
+    /// Amplitudes of the plan, for axes of figures.
+    pub fn amplitudes(&self) -> Vec<PeakToPeak> {
+        let listed = self.file.series.iter().flat_map(|s| s.amplitude_pp_m.iter().copied());
+        listed.chain([self.file.base.amplitude_pp_m]).map(PeakToPeak::from_metres).collect()
+    }
+}

@@ -1,0 +1,14 @@
+//! Plans that come with the program.
+
+/// Name and text of every bundled plan. Add one: a file in `runs/plans/` and a line here.
+pub const BUNDLED: &[(&str, &str)] = &[
+    ("first-sweep", include_str!("../../plans/first-sweep.toml")),
+    ("fig9-artificial", include_str!("../../plans/fig9-artificial.toml")),
+    ("part2-validation", include_str!("../../plans/part2-validation.toml")),
+    ("psi-reading", include_str!("../../plans/psi-reading.toml")),
+];
+
+/// Text of the bundled plan of that name.
+pub fn text(name: &str) -> Option<&'static str> {
+    BUNDLED.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
+}

@@ -1,0 +1,103 @@
+//! The report of a run: one self-contained HTML page. Nothing comes from elsewhere, and without JavaScript it says the same.
+
+pub mod about;
+pub mod comparison;
+pub mod diagnosis;
+pub mod events;
+mod explore;
+pub mod html;
+pub mod human;
+mod page;
+pub mod plots;
+mod traces;
+
+use crate::run_dir::{differences, missing_records, of_file, passes_in, records_in};
+use crate::sequence::MeasuredPass;
+use crate::session::Summary;
+use miette::{IntoDiagnostic, WrapErr};
+use models::finger::Finger;
+use realtime::recorder::{self, Entry, Reader};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+pub use explore::{FIGURES, UPLOT, UPLOT_STYLE};
+pub use html::escape;
+
+/// Everything a report is made of, read from a run's folder.
+pub struct RunData {
+    /// What is known of the run, for the top of a page.
+    pub about: Vec<(&'static str, String)>,
+    /// Facts of the record's first words.
+    pub facts: BTreeMap<String, String>,
+    /// Files that the record holds, by name: setup, plan, rig.toml, certificates, model, profiles.
+    pub files: BTreeMap<String, Vec<u8>>,
+    /// The passes with their comparisons.
+    pub passes: Vec<MeasuredPass>,
+    /// Events with loop time in s.
+    pub events: Vec<(f64, serde_json::Value)>,
+    /// How it ended; `None` for a run that was killed or is still going.
+    pub summary: Option<Summary>,
+    /// The finger of rig.toml.
+    pub finger: Finger,
+    /// What is damaged or missing in the run's folder.
+    pub damage: Vec<String>,
+}
+
+/// Reads a run's folder.
+///
+/// # Errors
+/// A folder that holds no run.
+pub fn read(folder: &Path) -> miette::Result<RunData> {
+    let passes = passes_in(folder).wrap_err_with(|| format!("{} holds no run", folder.display()))?;
+    let mut facts = BTreeMap::new();
+    let mut files = BTreeMap::new();
+    let mut events = Vec::new();
+    let mut damage = missing_records(folder)?;
+    for path in records_in(folder)? {
+        let file = File::open(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        let mut start = 0u64;
+        // Entry by entry: the rows of hours would not fit into memory.
+        let mut reader = Reader::new(BufReader::new(file)).only(recorder::EVENTS);
+        for entry in &mut reader {
+            match entry {
+                Entry::Facts { name, facts: found } if name == recorder::HEADER => {
+                    start = found.get("start_unix_ns").and_then(|s| s.parse().ok()).unwrap_or(0);
+                    facts = found;
+                }
+                Entry::Message { log_time, text, .. } => {
+                    if let Ok(event) = serde_json::from_slice(&text) {
+                        events.push((log_time.saturating_sub(start) as f64 * 1e-9, event));
+                    }
+                }
+                Entry::File { name, bytes, .. } => drop(files.insert(name, bytes)),
+                Entry::Facts { .. } => {}
+            }
+        }
+        damage.extend(reader.integrity().sentences().iter().map(|s| of_file(&path, s)));
+    }
+    damage.extend(differences(folder, &passes)?);
+    let summary =
+        std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
+    let rig = crate::input::rig_file(&folder.join("rig.toml"))?;
+    let about = about::of_run(folder, &facts, Some(&rig));
+    Ok(RunData { about, facts, files, passes, events, summary, finger: rig.finger, damage })
+}
+
+/// The report of a run as HTML.
+///
+/// # Errors
+/// A folder that holds no run.
+pub fn html(folder: &Path) -> miette::Result<String> {
+    Ok(html_and_damage(folder)?.0)
+}
+
+/// The same, and what is damaged or missing in the folder.
+///
+/// # Errors
+/// A folder that holds no run.
+pub fn html_and_damage(folder: &Path) -> miette::Result<(String, Vec<String>)> {
+    let run = read(folder)?;
+    Ok((page::page(&run, &traces::of(folder)?)?, run.damage))
+}

@@ -1,0 +1,152 @@
+//! The page of two runs side by side.
+
+use super::html::{escape, glossary, list, note, shell, table};
+use super::plots;
+use crate::compare::{Answer, Compared, Comparison, Mean, Paired};
+use std::fmt::Write;
+use std::path::Path;
+
+/// The page.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn page(compared: &Compared) -> miette::Result<String> {
+    let result = &compared.comparison;
+    let name = |run: &Path| {
+        escape(&run.file_name().map_or_else(|| run.display().to_string(), |n| n.to_string_lossy().into()))
+    };
+    let [a, b] = [name(&compared.runs[0]), name(&compared.runs[1])];
+    let mut html = format!("<h1>{a} and {b}</h1>\n");
+    let w = &mut html;
+    w.push_str(&about(compared, &a, &b));
+    let conditions = result.pairs.len();
+    match &result.judged {
+        None => w.push_str(
+            "<div class=\"verdict undecided\"><p>Cannot tell: the runs have no condition in common.</p></div>",
+        ),
+        Some(judged) => {
+            let [first, second] = judged.figures_words(&result.pairs);
+            let class = match judged.answer {
+                Answer::Differ => " departed",
+                Answer::NoDifferenceSeen => "",
+                Answer::CannotTell | Answer::NotIndependent => " undecided",
+            };
+            let _ = write!(
+                w,
+                "<div class=\"verdict{class}\"><p><strong>{}</strong></p><p>{}<br>{}</p></div>",
+                escape(&judged.answer_words(conditions)),
+                escape(&first),
+                escape(&second)
+            );
+        }
+    }
+    if !compared.warnings.is_empty() {
+        let _ = write!(w, "<h2>Mind</h2>{}", list(&compared.warnings, ""));
+    }
+    let [left, right] = result.unpaired;
+    if left + right > 0 {
+        w.push_str(&note(&format!("Passes at conditions that the other run lacks: {left} of the first, {right} of the second. They take no part.")));
+    }
+    if conditions > 0 {
+        let _ = write!(
+            w,
+            "<h2>Relative friction of both</h2>{}<h2>Differences</h2>{}",
+            plots::comparison::overlay(result)?,
+            plots::comparison::differences(result)?
+        );
+        w.push_str(&pairs(result));
+    }
+    w.push_str(&differences(compared));
+    w.push_str(&glossary());
+    Ok(shell(&format!("{a} and {b}"), &html))
+}
+
+/// What is known of both, in one table: a fact a row.
+fn about(compared: &Compared, a: &str, b: &str) -> String {
+    let [first, second] = &compared.about;
+    let mut names: Vec<&str> = first.iter().chain(second).map(|(name, _)| *name).collect();
+    let mut seen = std::collections::BTreeSet::new();
+    names.retain(|name| seen.insert(*name));
+    let all = |side: &[(&str, String)], name: &str| -> String {
+        let found: Vec<String> = side.iter().filter(|(n, _)| *n == name).map(|(_, v)| escape(v)).collect();
+        if found.is_empty() { "none".into() } else { found.join("<br>") }
+    };
+    let rows: String = names
+        .into_iter()
+        .map(|name| {
+            let sides = [all(first, name), all(second, name)];
+            format!(
+                "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td></tr>\n",
+                escape(name),
+                sides[0],
+                sides[1]
+            )
+        })
+        .collect();
+    let head =
+        format!("<th scope=\"col\">of the run</th><th scope=\"col\">{a}</th><th scope=\"col\">{b}</th>");
+    table("Both runs", &head, &rows)
+}
+
+/// Deviations from which a row stands out.
+const STANDS_OUT: f64 = 3.0;
+
+fn pairs(result: &Comparison) -> String {
+    let column = |name: &str| format!("<th scope=\"col\" class=\"n\">{name}</th>");
+    let head: String =
+        ["w, um", "f, kHz", "U, mm/s", "load, N", "\u{3bc}' first", "\u{3bc}' second", "difference", "in sd"]
+            .map(column)
+            .concat();
+    let single = result.pairs.iter().all(|p| p.a.passes == 1 && p.b.passes == 1);
+    let mean = |m: &Mean| match single {
+        true => format!("{:.3}", m.mu_relative),
+        false => format!("{:.3} ({})", m.mu_relative, m.passes),
+    };
+    let row = |p: &&Paired| {
+        let out = if p.deviations().abs() > STANDS_OUT { " class=\"out\"" } else { "" };
+        let speed = p.speed_m_s * f64::from(p.direction) * 1e3;
+        format!(
+            "<tr{out}><td class=\"n\">{:.3}</td><td class=\"n\">{:.2}</td><td class=\"n\">{speed:+.1}</td><td class=\"n\">{:.2}</td>\
+             <td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{:+.3} &plusmn; {:.3}</td>\
+             <td class=\"n\">{:+.1}</td></tr>\n",
+            p.amplitude_pp_m * 1e6,
+            p.frequency_hz / 1e3,
+            p.normal_force_n,
+            mean(&p.a),
+            mean(&p.b),
+            p.difference,
+            p.difference_sd,
+            p.deviations()
+        )
+    };
+    let rows: String = result.furthest_first().iter().map(row).collect();
+    let passes = if single { "" } else { " In brackets: passes." };
+    format!(
+        "<h2>Condition by condition</h2>{}{}",
+        note(&format!(
+            "Those furthest apart first; in bold what is more than {STANDS_OUT} standard deviations apart.{passes}"
+        )),
+        table("Conditions in common", &head, &rows)
+    )
+}
+
+fn differences(compared: &Compared) -> String {
+    if compared.differences.is_empty() {
+        return "<h2>What differed</h2><p>Nothing that the records tell.</p>".into();
+    }
+    let value = |v: &Option<String>| escape(v.as_deref().unwrap_or("none"));
+    let rows: String = compared
+        .differences
+        .iter()
+        .map(|d| {
+            format!(
+                "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td></tr>\n",
+                escape(&d.what),
+                value(&d.a),
+                value(&d.b)
+            )
+        })
+        .collect();
+    let head = "<th scope=\"col\">what</th><th scope=\"col\">first run</th><th scope=\"col\">second run</th>";
+    format!("<h2>What differed</h2>{}", table("What differed", head, &rows))
+}

@@ -1,0 +1,209 @@
+//! One self-contained HTML page of a verdict: what was measured and what the models say, where the gap lies, which cause, how far it
+//! shrinks, what is uncertain, what to do next.
+
+mod causes;
+mod gap_map;
+mod next;
+mod overlay;
+
+use super::html::{bar, escape, glossary, head, list, note, shell, table};
+use super::human::number;
+use super::plots::verdict::{Seen, errors_against};
+use diagnosis::Verdict;
+use diagnosis::data::Table;
+use diagnosis::predict::Forecast;
+use diagnosis::verdict::{Diagnosis, probability};
+use models::covariate;
+
+/// Parts of the operating space that are told in words, the largest first.
+const TOLD: usize = 3;
+
+/// The page; `about` is what is known of the table's run, and stands first.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn page(result: &Diagnosis, table: &Table, about: &[(&str, String)]) -> miette::Result<String> {
+    let r = &result.report;
+    let forecasts = result.predict(table);
+    let overlay = overlay::Overlay::new(result, table, &forecasts);
+    let departed = r.verdict != Verdict::NoGap;
+    let body = [
+        "<h1>Diagnosis</h1>".into(),
+        head(about),
+        format!("<p class=\"verdict{}\">{}</p>", if departed { " departed" } else { "" }, escape(&r.text)),
+        how_far(result),
+        overlay.section()?,
+        causes::section(result),
+        location(result, table, &overlay.errors()),
+        next::section(result),
+        uncertain(result),
+        residuals(result, table, &forecasts)?,
+        glossary(),
+        format!("<p class=\"note\">{} passes, SHA-256 {}</p>", r.data.points, escape(&r.data.sha256)),
+    ];
+    Ok(shell("Diagnosis", &body.concat()))
+}
+
+fn how_far(result: &Diagnosis) -> String {
+    let g = &result.report.gap;
+    let stages = [
+        ("baseline as calibrated", g.before_rmse),
+        ("recalibrated baseline", g.recalibrated_rmse),
+        ("verdict's model", g.after_rmse),
+        ("repeatability", g.noise_floor_rmse),
+    ];
+    let largest = stages.iter().filter_map(|(_, v)| *v).fold(1e-12, f64::max);
+    let rows: String = stages
+        .iter()
+        .filter_map(|(name, value)| Some((name, (*value)?)))
+        .map(|(name, value)| {
+            format!(
+                "<tr><th scope=\"row\">{name}</th><td class=\"n\">{}</td><td>{}</td></tr>",
+                number(value),
+                bar(260.0 * value / largest)
+            )
+        })
+        .collect();
+    let words = match (g.shrinkage, g.shrinkage_ci95) {
+        (Some(s), Some([low, high])) => format!(
+            "The removable gap {} by {:.0} % (95 % interval {:.0} to {:.0} %).",
+            if s < 0.0 { "grows" } else { "shrinks" },
+            100.0 * s.abs(),
+            100.0 * if s < 0.0 { -high } else { low },
+            100.0 * if s < 0.0 { -low } else { high }
+        ),
+        _ if g.before_rmse.is_none() => "The table is too short to hold passes out.".to_string(),
+        _ => "The recalibrated baseline is within its own sampling error of repeatability: no gap to shrink."
+            .to_string(),
+    };
+    let columns = "<th scope=\"col\">left by</th><th scope=\"col\" class=\"n\">error</th><td></td>";
+    format!(
+        "<h2>How far the gap shrinks</h2><p>{words}</p>{}{}",
+        table("Errors on held-out passes", columns, &rows),
+        note("Root mean square error on held-out passes, in units of full friction \u{3bc}0 Fn.")
+    )
+}
+
+fn location(result: &Diagnosis, table: &Table, errors: &[(f64, f64)]) -> String {
+    let r = &result.report;
+    let told: Vec<&str> = r
+        .location
+        .regions
+        .iter()
+        .filter(|g| g.share_of_gap >= 0.01)
+        .take(TOLD)
+        .map(|g| g.text.as_str())
+        .collect();
+    let rest = r.location.regions.len() - told.len();
+    let more = if rest > 0 {
+        note(&format!("And {rest} smaller parts, in the JSON document."))
+    } else {
+        String::new()
+    };
+    let places: Vec<String> = r
+        .location
+        .place
+        .iter()
+        .filter(|(_, p)| **p >= 0.005)
+        .map(|(place, p)| format!("{place} {}", probability(*p)))
+        .collect();
+    let closed: Vec<String> = r
+        .left_out
+        .regions
+        .iter()
+        .map(|(name, closed)| match closed {
+            Some(c) => format!("{name}: {:.0} % of the gap closed", 100.0 * c),
+            None => format!("{name}: no gap there, or nothing that judges"),
+        })
+        .collect();
+    format!(
+        "<h2>Where the gap lies</h2>{}{}{more}<p>In which part of the rig, by probability: {}.</p>\
+         <details><summary>The model on regions that were left out of its fit</summary>{}</details>",
+        gap_map::section(table, errors),
+        list(told, "No part stands out."),
+        escape(&places.join(", ")),
+        list(closed, "No region was left out.")
+    )
+}
+
+/// Suspects, what cannot be seen, what would have been seen, and the remarks.
+fn uncertain(result: &Diagnosis) -> String {
+    let r = &result.report;
+    let mut text = String::from("<h2>What is uncertain</h2>");
+    if !r.scatter.suspects.is_empty() {
+        let rows: String = r
+            .scatter
+            .suspects
+            .iter()
+            .map(|s| {
+                format!(
+                    "<tr><th scope=\"row\">{}</th><td class=\"n\">{} mN</td><td class=\"n\">{:+.1}</td><td class=\"n\">{:.3}</td></tr>",
+                    s.point,
+                    number(1e3 * s.residual_n),
+                    s.deviations,
+                    s.probability
+                )
+            })
+            .collect();
+        let head = "<th scope=\"col\">point</th><th scope=\"col\" class=\"n\">off by</th><th scope=\"col\" class=\"n\">deviations</th>\
+                    <th scope=\"col\" class=\"n\">probability not to belong</th>";
+        text += &format!("<h3>Suspect passes</h3>{}", table("Suspect passes", head, &rows));
+        if let Some(with) = &r.with_suspects {
+            let name = if with.effects.is_empty() { "no gap".into() } else { with.effects.join(" + ") };
+            text += &format!(
+                "<p>With them counted as any other the leading answer is {} (probability {}).</p>",
+                escape(&name),
+                probability(with.probability)
+            );
+        }
+    }
+    text += &list(&r.remarks, "There is nothing to remark.");
+    let unseen = r.not_testable.iter().map(|n| format!("{}: {}", n.effect, n.because));
+    let unseen = list(unseen, "Every effect of the library can be seen on this table.");
+    text += &format!(
+        "<details><summary>Not testable on this table ({})</summary>{unseen}</details>",
+        r.not_testable.len()
+    );
+    text
+}
+
+/// Scatter of the error in deviations against each covariate, before and after.
+fn residuals(result: &Diagnosis, table: &Table, forecasts: &[Forecast]) -> miette::Result<String> {
+    let problem = &result.fitted.problem;
+    let suspects: Vec<usize> = result.report.scatter.suspects.iter().map(|s| s.row).collect();
+    let z: Vec<(f64, f64)> = forecasts
+        .iter()
+        .enumerate()
+        .map(|(i, f)| {
+            let sd = (problem.whole_variance(i) / result.fitted.scatter.inflation[i]).sqrt();
+            let d = table.passes[i].direction.sign();
+            (d * (table.lateral[i] - f.recalibrated) / sd, d * (table.lateral[i] - f.corrected) / sd)
+        })
+        .collect();
+    let limit = z.iter().fold(4.0f64, |a, (b, _)| a.max(b.abs())).min(40.0);
+    let mut figures = String::new();
+    for c in covariate::TOLD {
+        let all: Option<Vec<f64>> = table.passes.iter().map(|p| c.of(p).map(|v| c.shown.0 * v)).collect();
+        let Some(x) = all else { continue };
+        let (low, high) =
+            x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        if high - low <= 1e-12 * high.abs().max(1e-12) {
+            continue;
+        }
+        let points: Vec<Seen> = x
+            .iter()
+            .zip(&z)
+            .enumerate()
+            .map(|(i, (x, z))| Seen { x: *x, before: z.0, after: z.1, suspect: suspects.contains(&i) })
+            .collect();
+        figures += &errors_against(c, limit, &points)?;
+    }
+    let cut = if limit >= 40.0 { " Errors beyond 40 stand at the end of the axis." } else { "" };
+    Ok(format!(
+        "<h2>Residuals</h2>{}<div class=\"panels\">{figures}</div>",
+        note(&format!(
+            "Error along the motion in standard deviations of a pass. Hollow squares: recalibrated baseline. Discs: verdict's model. \
+             Suspect passes are ringed.{cut}"
+        ))
+    ))
+}

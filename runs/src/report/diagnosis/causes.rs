@@ -1,0 +1,103 @@
+//! Which cause: the ranking, and each cause that is left with its mechanism, its source and its size.
+
+use crate::report::html::{bar, escape, table};
+use crate::report::human::with_interval;
+use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
+
+/// Probability from which a hypothesis is listed, and from which its effects are explained.
+const LISTED: f64 = 0.002;
+const EXPLAINED: f64 = 0.05;
+
+fn name(h: &Hypothesis) -> String {
+    if h.effects.is_empty() { "no gap".into() } else { h.effects.join(" + ") }
+}
+
+/// The section.
+pub fn section(result: &Diagnosis) -> String {
+    let listed: Vec<&Hypothesis> =
+        result.report.hypotheses.iter().filter(|h| h.probability > LISTED).take(12).collect();
+    let rows: String = listed
+        .iter()
+        .map(|h| {
+            let alias = match h.alias_class.get(1..) {
+                Some(others) if !others.is_empty() => {
+                    format!("<br><small>not told from {}</small>", escape(&others.join(", ")))
+                }
+                _ => String::new(),
+            };
+            format!(
+                "<tr><th scope=\"row\">{}{alias}</th><td class=\"n\">{}</td><td>{}</td></tr>",
+                escape(&name(h)),
+                probability(h.probability),
+                bar(160.0 * h.probability)
+            )
+        })
+        .collect();
+    let head = "<th scope=\"col\">hypothesis</th><th scope=\"col\" class=\"n\">probability</th><td></td>";
+    let class: Vec<&str> = result
+        .report
+        .hypotheses
+        .first()
+        .map_or(Vec::new(), |h| h.alias_class.iter().flat_map(|name| name.split('+')).collect());
+    let mut told: Vec<&str> = Vec::new();
+    let mut cards = String::new();
+    for h in listed {
+        let cause = h.probability > EXPLAINED || h.effects.iter().any(|e| class.contains(&e.as_str()));
+        if !cause || h.effects.iter().all(|e| told.contains(&e.as_str())) {
+            continue;
+        }
+        cards += &card(h);
+        told.extend(h.effects.iter().map(String::as_str));
+    }
+    format!("<h2>Which cause</h2>{}{cards}", table("Hypotheses", head, &rows))
+}
+
+/// What a hypothesis says, effect by effect, with its parameters.
+fn card(h: &Hypothesis) -> String {
+    if h.effects.is_empty() {
+        return String::new();
+    }
+    let of = |effect: &String| {
+        match effects::by_name(effect) {
+        Some(known) => format!(
+            "<p><strong>{}</strong> (in the {}): {}</p><p class=\"note\">Source: {}</p>",
+            escape(effect),
+            known.place().name(),
+            escape(known.summary()),
+            escape(known.source())
+        ),
+        None => "<p>A cause that the library does not have: a smooth map over the operating space stands for it.</p>".into(),
+    }
+    };
+    let words: String = h.effects.iter().map(of).collect();
+    let rows: String = h
+        .parameters
+        .iter()
+        .map(|p| {
+            format!(
+                "<tr><th scope=\"row\">{}</th><td>{}</td></tr>",
+                escape(&p.name.replace('_', " ")),
+                escape(&with_interval(p.value, p.ci95, p.unit))
+            )
+        })
+        .collect();
+    let laws = if h.laws.is_empty() {
+        String::new()
+    } else {
+        format!("<p>Law: {}.</p>", escape(&h.laws.join(" + ")))
+    };
+    let sizes = if rows.is_empty() {
+        String::new()
+    } else {
+        table(
+            &format!("Parameters of {}", name(h)),
+            "<th scope=\"col\">parameter</th><th scope=\"col\">value [95 % interval]</th>",
+            &rows,
+        )
+    };
+    format!(
+        "<div class=\"card\"><h3>{}, probability {}</h3>{words}{laws}{sizes}</div>",
+        escape(&name(h)),
+        probability(h.probability)
+    )
+}

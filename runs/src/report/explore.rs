@@ -1,0 +1,67 @@
+//! The part of a run's page that is worked with: the script, the library that draws, and the data, all in the page itself. Without JavaScript it
+//! stays hidden, and the figures below say the same.
+
+use super::RunData;
+use super::events::describe;
+use super::traces::Trace;
+use models::quantity::PeakToPeak;
+
+/// The figures of the dashboard and of a run's page, a module.
+pub const FIGURES: &str = include_str!("assets/plots.js");
+/// The library that draws them.
+pub const UPLOT: &str = include_str!("assets/uPlot.iife.min.js");
+/// Its style.
+pub const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
+
+/// The section, hidden until the script shows it; nothing for a run without a pass.
+pub(super) fn section(run: &RunData, traces: &[Trace]) -> String {
+    if run.passes.is_empty() {
+        return String::new();
+    }
+    // No markup can begin within the data.
+    let data = data(run, traces).to_string().replace('<', "\\u003c");
+    // The dashboard's figures are a module; a page that is opened as a file can import none.
+    let figures = FIGURES.replace("\nexport ", "\n");
+    format!(
+        "<section id=\"explore\" hidden></section><style>{}</style>\
+         <script type=\"application/json\" id=\"run-data\">{data}</script>\n<script>{}\ndocument.addEventListener(\"DOMContentLoaded\", () => {{\n{figures}\n{}\n}});</script>\n",
+        UPLOT_STYLE,
+        UPLOT,
+        include_str!("explore.js")
+    )
+}
+
+fn data(run: &RunData, traces: &[Trace]) -> serde_json::Value {
+    let passes: Vec<_> = run
+        .passes
+        .iter()
+        .map(|p| {
+            let (c, pass) = (p.comparison, &p.pass);
+            let friction = pass.friction_force_n();
+            let still = pass.amplitude == PeakToPeak::ZERO;
+            serde_json::json!({
+                "point": pass.point, "time_s": pass.time_s, "w_um": pass.amplitude.micrometres(), "f_khz": pass.frequency_hz / 1e3,
+                "u_mm_s": pass.speed_m_s * 1e3, "direction": i8::from(pass.direction), "normal_n": pass.normal_force_n,
+                "lateral_n": pass.lateral_force_n, "psi": p.psi_eq17,
+                "mu": c.and_then(|c| c.mu_relative), "mu_sd": c.and_then(|c| c.mu_relative_sd),
+                "predicted": c.map(|c| c.predicted), "predicted_sd": c.map(|c| c.predicted_sd), "surprise": c.map(|c| c.z),
+                "mu0": friction.filter(|_| still).map(|f| f / pass.normal_force_n),
+            })
+        })
+        .collect();
+    let events: Vec<_> = run
+        .events
+        .iter()
+        .filter_map(|(at_s, event)| Some((at_s, describe(&serde_json::from_value(event.clone()).ok()?))))
+        .collect();
+    let limits =
+        run.files.get("setup.toml").and_then(|text| std::str::from_utf8(text).ok()).and_then(|text| {
+            // The limits that the run had are in its own setup; without its certificates' files that cannot always be read again.
+            crate::setup::Setup::parse("setup.toml", text, std::path::Path::new(".")).ok()
+        });
+    let limits = limits.map(|setup| {
+        let limits = &setup.config.limits;
+        serde_json::json!({ "lateral_n": limits.lateral_force_max_n, "normal_n": limits.normal_force_max_n })
+    });
+    serde_json::json!({ "passes": passes, "traces": traces, "events": events, "limits": limits })
+}

@@ -1,0 +1,227 @@
+//! The page: words and tables around the figures.
+
+use super::RunData;
+use super::html::{escape, glossary, head, note, shell, table};
+use super::human::number;
+use super::traces::Trace;
+use super::{events, explore, plots};
+use crate::ambient::{AIR, LevelsFound, levels_of};
+use crate::sequence::Outcome;
+use std::fmt::Write;
+
+pub(super) fn page(run: &RunData, traces: &[Trace]) -> miette::Result<String> {
+    let fact = |name: &str| escape(run.facts.get(name).map_or("unknown", String::as_str));
+    let mut html = String::new();
+    let w = &mut html;
+    let title = format!("{} on {}", fact("plan"), fact("setup"));
+    let _ = writeln!(w, "<h1>{title}</h1>{}", head(&run.about));
+    verdict(w, run);
+    w.push_str(&explore::section(run, traces));
+    let _ = write!(
+        w,
+        "<h2>Relative friction against amplitude</h2>{}{}\
+         <h2>Relative friction against &Psi;</h2>{}{}\
+         <h2>Surprise of each pass</h2>{}{}",
+        plots::run::mu_against_amplitude(run)?,
+        note(
+            "Marks: measured passes with one standard uncertainty. Lines and bands: the spring-slider alone at the \
+                 base condition of each speed, with twice its standard uncertainty. What the run was compared with, a corrected model \
+                 too, stands as a short stroke at each pass. w is peak-to-peak."
+        ),
+        plots::run::mu_against_psi(run)?,
+        note(
+            "&Psi; = U / (w f &mu;<sub>0</sub> (1+&nu;)), Eq. 17. Lines and bands: Eq. 20 with the paper's &Psi;* = 2.38 &plusmn; 0.21, \
+             below where its w is the whole stroke, above where it is the sine's amplitude (1.19 of the stroke)."
+        ),
+        plots::run::residuals(run)?,
+        note(
+            "How far the force of each pass lies from what the model and the passes before it let expect, in standard deviations, in the \
+             order of measurement. While the model holds it is independent from pass to pass. Dashed: &plusmn;1.96."
+        ),
+    );
+    w.push_str(&levels(run));
+    timing(w, run)?;
+    w.push_str(&events::section(&run.events));
+    passes(w, run);
+    facts(w, run);
+    w.push_str(&glossary());
+    Ok(shell(&title, &html))
+}
+
+fn verdict(w: &mut String, run: &RunData) {
+    let departed = run.passes.iter().any(|p| p.comparison.is_some_and(|c| c.departed));
+    let made = run.passes.len();
+    let outcome = match &run.summary {
+        None => "The run has no ending: it was killed, or is still going.".to_string(),
+        Some(s) => {
+            let planned = s.planned;
+            match &s.outcome {
+                Outcome::Complete => format!("Complete: {made} of {planned} passes."),
+                Outcome::Tripped(trip) => format!(
+                    "Ended early after {made} of {planned} passes: tripped, {}.<br>{}",
+                    escape(&trip.to_string()),
+                    escape(trip.cause.remedy())
+                ),
+                Outcome::WouldNotArm { blocking: Some(cause) } => format!(
+                    "The rig would not arm: {cause:?} stood in the way.<br>{}",
+                    escape(cause.remedy())
+                ),
+                outcome => {
+                    format!("Ended early after {made} of {planned} passes: {}.", escape(&outcome.words()))
+                }
+            }
+        }
+    };
+    let finding = if departed {
+        let first = run.passes.iter().find(|p| p.comparison.is_some_and(|c| c.departed));
+        let at = first.map_or(0, |p| p.pass.point);
+        format!(
+            "<strong>The model has left the measurement</strong> (first at point {at}). \
+                 Run <code>muprime diagnose</code> on this folder to learn where and why."
+        )
+    } else {
+        let complete = run.summary.as_ref().is_some_and(|s| s.outcome == Outcome::Complete);
+        let last = run.passes.iter().rev().find_map(|p| p.comparison.as_ref());
+        escape(&format!("Finding: {}.", realtime::compare::Agreement::of(last, complete)))
+    };
+    let class = if departed { "verdict departed" } else { "verdict" };
+    let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}</p>");
+    if !run.damage.is_empty() {
+        let items: String = run.damage.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
+        let _ = writeln!(
+            w,
+            "<div class=\"verdict departed\"><strong>The records of this run are not whole</strong><ul>{items}</ul></div>"
+        );
+    }
+    let flagged = run.passes.iter().filter(|p| !p.temperature_flags.is_empty()).count();
+    if let Some(flag) = run.passes.iter().find_map(|p| p.temperature_flags.first()) {
+        let _ = writeln!(
+            w,
+            "<p class=\"verdict departed\">{flagged} of {made} passes began at a temperature at which a certificate \
+             does not hold (first: {}). They are marked * below; nothing was corrected.</p>",
+            escape(&flag.to_string())
+        );
+    }
+}
+
+/// What was found of the air and typed at the rig; nothing where the plan asks for nothing.
+fn levels(run: &RunData) -> String {
+    let found = levels_of(&run.passes);
+    if found.is_empty() {
+        return String::new();
+    }
+    let row = |f: &LevelsFound| {
+        let known = AIR.iter().find(|(covariate, _)| covariate.name == f.quantity);
+        let (name, (factor, unit)) =
+            known.map_or((f.quantity.as_str(), (1.0, "")), |(c, _)| (c.words, c.shown));
+        let value = |v: f64| number(v * factor);
+        format!(
+            "<tr><td>{}</td><td>{unit}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
+             <td class=\"n\">{} to {}</td><td>{}</td><td class=\"n\">{:.0}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>\n",
+            escape(name),
+            f.planned.map_or("&ndash;".into(), value),
+            value(f.mean),
+            value(f.range[0]),
+            value(f.range[1]),
+            f.source,
+            f.oldest_s,
+            f.passes,
+            f.lost
+        )
+    };
+    let rows: String = found.iter().map(row).collect();
+    let head = "<th scope=\"col\">quantity</th><th scope=\"col\">unit</th><th scope=\"col\">planned</th>\
+        <th scope=\"col\">found</th><th scope=\"col\">range</th><th scope=\"col\">how</th>\
+        <th scope=\"col\">oldest reading, s</th><th scope=\"col\">passes</th><th scope=\"col\">level lost</th>";
+    format!("<h2>Air and protocol</h2>{}", table("Air and protocol", head, &rows))
+}
+
+fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
+    let Some(report) = run.summary.as_ref().and_then(|s| s.loop_report.as_ref()) else {
+        let _ = writeln!(w, "<h2>Loop</h2><p>No loop timing: virtual time, or no ending.</p>");
+        return Ok(());
+    };
+    let us = |ns: u64| format!("{:.0} us", ns as f64 / 1e3);
+    let [p50, _, p99, p999, max] = report.lateness_ns;
+    let granted = &report.grants;
+    let class = match &granted.policy_refused {
+        None => format!("{} priority {}", escape(&granted.policy), granted.priority),
+        Some(why) => format!("{} (SCHED_FIFO refused: {})", escape(&granted.policy), escape(why)),
+    };
+    let locked = if granted.memory_locked { "memory locked" } else { "memory not locked" };
+    let _ = write!(
+        w,
+        "<h2>Loop</h2>{}{}<p>{} cycles of {} us. Lateness: median {}, 99 % {}, 99.9 % {}, worst {}. \
+         {} deadlines missed. Scheduling: {class}, {locked}. Page faults in the loop: {} minor, {} major. \
+         Rows lost: {}.{}</p>",
+        plots::run::lateness(report)?,
+        note("How late the loop was at each deadline, missed ones included. Both axes logarithmic."),
+        report.cycles,
+        report.period_ns / 1000,
+        us(p50),
+        us(p99),
+        us(p999),
+        us(max),
+        report.overruns,
+        report.minor_faults,
+        report.major_faults,
+        run.summary.as_ref().map_or(0, |s| s.record_lost),
+        run.summary.as_ref().and_then(|s| s.held).map_or_else(String::new, |held| format!(" {held}.")),
+    );
+    Ok(())
+}
+
+fn passes(w: &mut String, run: &RunData) {
+    const HEAD: &str = "<th scope=\"col\">point</th><th scope=\"col\">w um</th><th scope=\"col\">f kHz</th><th scope=\"col\">U mm/s</th>\
+         <th scope=\"col\">dir</th><th scope=\"col\">F<sub>n</sub> N</th><th scope=\"col\">L N</th><th scope=\"col\">&mu;'</th>\
+         <th scope=\"col\">&plusmn;</th><th scope=\"col\">predicted</th><th scope=\"col\">&plusmn;</th><th scope=\"col\">difference</th>\
+         <th scope=\"col\">surprise, sd</th>";
+    let mut rows = String::new();
+    for p in &run.passes {
+        let c = p.comparison;
+        let number =
+            |v: Option<f64>, digits: usize| v.map_or("&ndash;".to_string(), |v| format!("{v:.digits$}"));
+        let signed =
+            |v: Option<f64>, digits: usize| v.map_or("&ndash;".to_string(), |v| format!("{v:+.digits$}"));
+        let _ = writeln!(
+            rows,
+            "<tr><td class=\"n\">{}{}</td><td class=\"n\">{:.3}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td>\
+             <td class=\"n\">{}</td><td class=\"n\">{:.4}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
+             <td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>",
+            p.pass.point,
+            if p.temperature_flags.is_empty() { "" } else { "*" },
+            p.pass.amplitude.micrometres(),
+            p.pass.frequency_hz / 1e3,
+            p.pass.speed_m_s * 1e3,
+            i8::from(p.pass.direction),
+            p.pass.normal_force_n,
+            number(p.pass.lateral_force_n, 4),
+            number(c.and_then(|c| c.mu_relative), 3),
+            number(c.and_then(|c| c.mu_relative_sd), 3),
+            number(c.map(|c| c.predicted), 3),
+            number(c.map(|c| c.predicted_sd), 3),
+            signed(c.and_then(|c| Some(c.mu_relative? - c.predicted)), 3),
+            signed(c.map(|c| c.z), 1),
+        );
+    }
+    let all = table("All passes", HEAD, &rows);
+    let _ = writeln!(
+        w,
+        "<details><summary>All {} passes</summary>{}{all}</details>",
+        run.passes.len(),
+        note(
+            "Difference: measured less predicted &mu;', at the stiffnesses that the setup states. Surprise: the force of the pass against \
+             what the model lets expect after the passes before it, which have corrected its stiffnesses and &mu;<sub>0</sub> within what \
+             the setup leaves open. So the two can differ, in sign too; the surprise is what the finding rests on."
+        )
+    );
+}
+
+fn facts(w: &mut String, run: &RunData) {
+    let row = |(name, value): (&String, &String)| {
+        format!("<tr><th scope=\"row\">{}</th><td><code>{}</code></td></tr>\n", escape(name), escape(value))
+    };
+    let rows: String = run.facts.iter().map(row).collect();
+    let all = table("The record", "<th scope=\"col\">fact</th><th scope=\"col\">value</th>", &rows);
+    let _ = writeln!(w, "<details><summary>The record</summary>{all}</details>");
+}

@@ -1,0 +1,325 @@
+//! The figures, as SVG text: what all of them share. Each is drawn twice, wide for a page and narrow for a telephone, with its own
+//! letters in both; the page shows one of them. Series differ by mark and dash as well as by colour.
+
+pub mod comparison;
+pub mod run;
+pub mod verdict;
+
+use super::html::escape;
+use plotters::coord::combinators::LogCoord;
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
+use plotters::element::{Drawable, PointCollection};
+use plotters::prelude::*;
+use plotters_backend::{BackendCoord, DrawingErrorKind};
+use std::ops::Range;
+
+/// Colours that stay apart on white, also for colour-blind readers (after Okabe and Ito, the yellow darkened).
+pub const COLOURS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(190, 130, 0),
+    RGBColor(0, 0, 0),
+    RGBColor(130, 130, 130),
+];
+const GREY: RGBColor = RGBColor(90, 90, 90);
+/// Width and height of a figure across the page, and of one on a telephone, px.
+const WIDE: (u32, u32) = (900, 460);
+const NARROW: (u32, u32) = (360, 320);
+/// The same for one of several side by side.
+const PANEL: (u32, u32) = (400, 280);
+
+fn wrong(e: impl std::fmt::Display) -> miette::Report {
+    miette::miette!("a figure: {e}")
+}
+
+/// One axis from end to end.
+#[derive(Clone, Copy, Debug)]
+pub struct Span {
+    low: f64,
+    high: f64,
+    logarithmic: bool,
+}
+
+impl Span {
+    fn linear(range: Range<f64>) -> Self {
+        Span { low: range.start, high: range.end, logarithmic: false }
+    }
+
+    fn logarithmic(range: Range<f64>) -> Self {
+        Span { low: range.start, high: range.end, logarithmic: true }
+    }
+
+    /// From zero on, over all of these values.
+    pub fn from_zero(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = values.fold((0.0f64, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+        Span::linear(low..high + 0.05 * (high - low).max(1e-300))
+    }
+
+    /// Over all of these values with a margin, logarithmic where it may be and they span more than a decade: within one such an
+    /// axis has a single label.
+    fn over(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        if logarithmic && low > 0.0 && high > 10.0 * low {
+            let margin = (high / low).powf(0.04);
+            return Span::logarithmic(low / margin..high * margin);
+        }
+        let margin = 0.04 * (high - low).max(1e-12 * high.abs().max(1e-300));
+        Span::linear(low - margin..high + margin)
+    }
+
+    /// So many places along it, the lower end left out.
+    pub fn places(&self, n: u32) -> impl Iterator<Item = f64> + use<> {
+        let Span { low, high, logarithmic } = *self;
+        (1..=n).map(move |k| {
+            let share = f64::from(k) / f64::from(n);
+            if logarithmic { low * (high / low).powf(share) } else { low + share * (high - low) }
+        })
+    }
+
+    fn axis(&self) -> Axis {
+        let range = self.low..self.high;
+        if self.logarithmic {
+            Axis::Logarithmic(range.log_scale().into())
+        } else {
+            Axis::Linear(range.into())
+        }
+    }
+}
+
+/// The same as the drawing library has it.
+enum Axis {
+    Linear(RangedCoordf64),
+    Logarithmic(LogCoord<f64>),
+}
+
+impl Ranged for Axis {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        match self {
+            Axis::Linear(axis) => axis.map(value, limit),
+            Axis::Logarithmic(axis) => axis.map(value, limit),
+        }
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        match self {
+            Axis::Linear(axis) => axis.key_points(hint),
+            Axis::Logarithmic(axis) => axis.key_points(hint),
+        }
+    }
+
+    fn range(&self) -> Range<f64> {
+        match self {
+            Axis::Linear(axis) => axis.range(),
+            Axis::Logarithmic(axis) => axis.range(),
+        }
+    }
+}
+
+impl ValueFormatter<f64> for Axis {
+    fn format_ext(&self, value: &f64) -> String {
+        match self {
+            Axis::Linear(axis) => axis.format_ext(value),
+            Axis::Logarithmic(axis) => axis.format_ext(value),
+        }
+    }
+}
+
+type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
+
+/// What a figure is: its sizes, its axes with their titles, and what it shows in one sentence for who cannot see it.
+struct Frame<'a> {
+    sizes: [(u32, u32); 2],
+    x: (Span, &'a str),
+    y: (Span, &'a str),
+    alt: &'a str,
+}
+
+/// A figure as SVG, wide and narrow; `draw` puts the curves in and is told the size of a mark.
+fn figure(
+    frame: &Frame<'_>,
+    draw: impl for<'a> Fn(&mut Chart<'a>, u32) -> miette::Result<()>,
+) -> miette::Result<String> {
+    let mut text = String::new();
+    for (class, size) in ["wide", "narrow"].iter().zip(frame.sizes) {
+        let mut svg = String::new();
+        {
+            let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+            let letters = if size.0 < WIDE.0 / 2 { 13 } else { 15 };
+            let mut chart = ChartBuilder::on(&area)
+                .margin(10)
+                .x_label_area_size(3 * letters)
+                .y_label_area_size(4 * letters)
+                .build_cartesian_2d(frame.x.0.axis(), frame.y.0.axis())
+                .map_err(wrong)?;
+            chart
+                .configure_mesh()
+                .light_line_style(TRANSPARENT)
+                .bold_line_style(BLACK.mix(0.12))
+                .x_labels((size.0 / 75) as usize)
+                .y_labels((size.1 / 45) as usize)
+                .x_desc(frame.x.1)
+                .y_desc(frame.y.1)
+                .label_style(("sans-serif", letters))
+                .draw()
+                .map_err(wrong)?;
+            draw(&mut chart, if size.0 < WIDE.0 { 3 } else { 4 })?;
+            area.present().map_err(wrong)?;
+        }
+        let svg =
+            svg.replacen("<svg ", &format!("<svg role=\"img\" aria-label=\"{}\" ", escape(frame.alt)), 1);
+        text.push_str(&format!("<div class=\"{class}\">{svg}</div>"));
+    }
+    Ok(text)
+}
+
+/// How many marks there are that are told apart by their shape alone.
+const MARKS: usize = 5;
+
+/// A mark whose shape is the series': disc, square, triangle, diamond, cross; hollow where it is not filled.
+pub fn mark<C>(series: usize, at: C, size: u32, colour: RGBColor, filled: bool) -> Mark<C> {
+    Mark {
+        series: series % MARKS,
+        at,
+        size: size as i32,
+        style: colour.stroke_width(if filled { 2 } else { 1 }),
+        filled,
+    }
+}
+
+/// A mark of a series, drawn so that series differ without colour.
+pub struct Mark<C> {
+    series: usize,
+    at: C,
+    size: i32,
+    style: ShapeStyle,
+    filled: bool,
+}
+
+impl<'a, C> PointCollection<'a, C> for &'a Mark<C> {
+    type Point = &'a C;
+    type IntoIter = std::iter::Once<&'a C>;
+
+    fn point_iter(self) -> Self::IntoIter {
+        std::iter::once(&self.at)
+    }
+}
+
+impl<C, DB: DrawingBackend> Drawable<DB> for Mark<C> {
+    fn draw<I: Iterator<Item = BackendCoord>>(
+        &self,
+        mut places: I,
+        backend: &mut DB,
+        _: (u32, u32),
+    ) -> Result<(), DrawingErrorKind<DB::ErrorType>> {
+        let Some((x, y)) = places.next() else { return Ok(()) };
+        let r = self.size;
+        let corners: &[(i32, i32)] = match self.series {
+            0 => return backend.draw_circle((x, y), r as u32, &self.style, self.filled),
+            1 => &[(-r, -r), (r, -r), (r, r), (-r, r), (-r, -r)],
+            2 => &[(0, -r - 1), (r + 1, r), (-r - 1, r), (0, -r - 1)],
+            3 => &[(0, -r - 1), (r + 1, 0), (0, r + 1), (-r - 1, 0), (0, -r - 1)],
+            _ => {
+                backend.draw_line((x - r, y - r), (x + r, y + r), &self.style)?;
+                return backend.draw_line((x - r, y + r), (x + r, y - r), &self.style);
+            }
+        };
+        let outline = corners.iter().map(|(dx, dy)| (x + dx, y + dy));
+        if self.filled {
+            backend.fill_polygon(outline, &self.style)
+        } else {
+            backend.draw_path(outline, &self.style)
+        }
+    }
+}
+
+/// A line, whole or in dashes of so many pixels.
+fn line(
+    chart: &mut Chart<'_>,
+    points: Vec<(f64, f64)>,
+    colour: RGBColor,
+    dash: Option<i32>,
+) -> miette::Result<()> {
+    match dash {
+        None => chart.draw_series(LineSeries::new(points, colour.stroke_width(2))).map_err(wrong)?,
+        Some(dash) => chart
+            .draw_series(DashedLineSeries::new(points, dash, dash, colour.stroke_width(2)))
+            .map_err(wrong)?,
+    };
+    Ok(())
+}
+
+/// A band between two lines of points.
+fn band(
+    chart: &mut Chart<'_>,
+    low: &[(f64, f64)],
+    high: &[(f64, f64)],
+    colour: RGBColor,
+) -> miette::Result<()> {
+    let around: Vec<(f64, f64)> = high.iter().chain(low.iter().rev()).copied().collect();
+    if around.len() > 2 {
+        chart.draw_series([Polygon::new(around, colour.mix(0.16))]).map_err(wrong)?;
+    }
+    Ok(())
+}
+
+/// A mark with its error bar, cut at the ends of the axis.
+fn measured(
+    chart: &mut Chart<'_>,
+    series: usize,
+    size: u32,
+    colour: RGBColor,
+    points: &[(f64, f64, f64)],
+    [low, high]: [f64; 2],
+) -> miette::Result<()> {
+    let bars = points.iter().map(|(x, y, sd)| {
+        let ends = [(y - sd).clamp(low, high), (y + sd).clamp(low, high)];
+        PathElement::new(vec![(*x, ends[0]), (*x, ends[1])], colour.stroke_width(1))
+    });
+    chart.draw_series(bars).map_err(wrong)?;
+    let series = series.min(SERIES - 1);
+    let filled = filled(series);
+    let marks = points.iter().map(|(x, y, _)| mark(series, (*x, y.clamp(low, high)), size, colour, filled));
+    chart.draw_series(marks).map_err(wrong)?;
+    Ok(())
+}
+
+/// How many series a figure can tell apart: the marks, and those that are not crosses once more, hollow.
+pub(crate) const SERIES: usize = 2 * MARKS - 1;
+
+/// Whether the marks of a series are filled.
+pub(crate) fn filled(series: usize) -> bool {
+    series < MARKS
+}
+
+/// Which mark stands for which value, for a caption: values beyond the last mark share it, and all of them are named.
+pub(crate) fn series_key(values: &[String], unit: &str) -> String {
+    let of = |series: usize| match series + 1 {
+        SERIES => values[series..].join(", "),
+        _ => values[series].clone(),
+    };
+    let marks = (0..values.len().min(SERIES)).map(|i| format!("{}: {} {unit}", mark_name(i), of(i)));
+    marks.collect::<Vec<_>>().join("; ")
+}
+
+/// The shape of a series in a caption, as text; those beyond the last one share it.
+pub fn mark_name(series: usize) -> &'static str {
+    const NAMES: [&str; SERIES] = [
+        "discs",
+        "squares",
+        "triangles",
+        "diamonds",
+        "crosses",
+        "hollow discs",
+        "hollow squares",
+        "hollow triangles",
+        "hollow diamonds",
+    ];
+    NAMES[series.min(SERIES - 1)]
+}

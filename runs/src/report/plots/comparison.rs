@@ -1,0 +1,131 @@
+//! The figures of two runs.
+
+use super::{
+    COLOURS, Frame, GREY, NARROW, SERIES, Span, WIDE, band, figure, line, mark_name, measured, series_key,
+};
+use crate::compare::{Comparison, Mean, Paired};
+use crate::report::human::number;
+
+/// Both runs' `mu'` against amplitude, at the conditions that they have in common; a line joins the two of each condition.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn overlay(result: &Comparison) -> miette::Result<String> {
+    let widest = widest(result);
+    let highest =
+        result.pairs.iter().flat_map(|p| [p.a, p.b]).map(|m| m.mu_relative + m.sd).fold(1.0, f64::max);
+    let mu = [0.0, 1.05 * highest];
+    let alt = format!(
+        "Relative friction of two runs against amplitude, {} conditions in common: {} the first, {} the second.",
+        result.pairs.len(),
+        mark_name(0),
+        mark_name(1)
+    );
+    let frame = Frame {
+        sizes: [WIDE, NARROW],
+        x: (Span::linear(0.0..widest), "amplitude w, um peak to peak"),
+        y: (Span::linear(mu[0]..mu[1]), "relative friction \u{3bc}'"),
+        alt: &alt,
+    };
+    // A little beside each other, so that no mark hides the other one.
+    let place =
+        |p: &Paired, m: Mean, aside: f64| (p.amplitude_pp_m * 1e6 + aside * widest, m.mu_relative, m.sd);
+    let (first, second) = (|p: &Paired| place(p, p.a, -0.003), |p: &Paired| place(p, p.b, 0.003));
+    let svg = figure(&frame, |chart, size| {
+        for p in &result.pairs {
+            let ends = [first(p), second(p)].map(|(x, y, _)| (x, y));
+            line(chart, ends.to_vec(), GREY, None)?;
+        }
+        measured(chart, 0, size, COLOURS[0], &result.pairs.iter().map(first).collect::<Vec<_>>(), mu)?;
+        measured(chart, 1, size, COLOURS[1], &result.pairs.iter().map(second).collect::<Vec<_>>(), mu)
+    })?;
+    Ok(format!(
+        "<figure>{svg}<figcaption>{}: the first run; {}: the second, joined to the first at the same condition. Bars: one standard \
+         uncertainty from pass to pass. All speeds, frequencies and loads that both have.</figcaption></figure>",
+        capital(mark_name(0)),
+        mark_name(1)
+    ))
+}
+
+/// What conditions can differ in besides the amplitude: name, unit, value.
+type Factor = (&'static str, &'static str, fn(&Paired) -> f64);
+
+const FACTORS: [Factor; 3] = [
+    ("speed", "mm/s", |p| p.speed_m_s * 1e3),
+    ("frequency", "kHz", |p| p.frequency_hz / 1e3),
+    ("normal force", "N", |p| p.normal_force_n),
+];
+
+/// Levels of a factor, rising: values within a tenth of each other are one, named by its least.
+fn levels(pairs: &[Paired], of: fn(&Paired) -> f64) -> Vec<f64> {
+    let mut values: Vec<f64> = pairs.iter().map(of).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup_by(|next, first| *next <= 1.1 * *first);
+    values
+}
+
+/// The differences against amplitude, a mark a level of the factor that varies most, with the shift that they have in common unless they
+/// vary by more than their uncertainty.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn differences(result: &Comparison) -> miette::Result<String> {
+    let widest = widest(result);
+    let ends =
+        result.pairs.iter().flat_map(|p| [p.difference - p.difference_sd, p.difference + p.difference_sd]);
+    let (low, high) = ends.fold((-0.01, 0.01), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
+    let [low, high] = [low - 0.05 * (high - low), high + 0.05 * (high - low)];
+    let (name, unit, of) = FACTORS
+        .into_iter()
+        .rev()
+        .max_by_key(|(.., of)| levels(&result.pairs, *of).len())
+        .unwrap_or(FACTORS[0]);
+    let levels = levels(&result.pairs, of);
+    let alt = format!(
+        "Difference of relative friction, second run less first, against amplitude: {} conditions, by {name}.",
+        result.pairs.len()
+    );
+    let frame = Frame {
+        sizes: [WIDE, NARROW],
+        x: (Span::linear(0.0..widest), "amplitude w, um peak to peak"),
+        y: (Span::linear(low..high), "difference of \u{3bc}', second less first"),
+        alt: &alt,
+    };
+    let level_of = |p: &Paired| levels.iter().rposition(|level| *level <= of(p)).unwrap_or(0).min(SERIES - 1);
+    let along = |value: f64| vec![(0.0, value), (widest, value)];
+    let shift = result.judged.filter(|judged| !judged.varies());
+    let svg = figure(&frame, |chart, size| {
+        if let Some(judged) = &shift {
+            let [from, to] = judged.shift_interval_95.map(|v| v.clamp(low, high));
+            band(chart, &along(from), &along(to), COLOURS[2])?;
+            line(chart, along(judged.shift.clamp(low, high)), COLOURS[2], None)?;
+        }
+        line(chart, along(0.0), GREY, Some(4))?;
+        for series in 0..levels.len().min(SERIES) {
+            let of_level = result.pairs.iter().filter(|p| level_of(p) == series);
+            let points: Vec<(f64, f64, f64)> =
+                of_level.map(|p| (p.amplitude_pp_m * 1e6, p.difference, p.difference_sd)).collect();
+            measured(chart, series, size, COLOURS[series % COLOURS.len()], &points, [low, high])?;
+        }
+        Ok(())
+    })?;
+    let common = match shift {
+        Some(_) => "Line and band: the shift that all have in common, with its interval of 95 %.",
+        None => "No shift is drawn: the differences vary by more than their uncertainty.",
+    };
+    let key = series_key(&levels.iter().map(|level| number(*level)).collect::<Vec<_>>(), unit);
+    Ok(format!(
+        "<figure>{svg}<figcaption>By {name}. {}, each condition with one standard uncertainty, the references' included. {common} \
+         Dashed: no difference.</figcaption></figure>",
+        capital(&key)
+    ))
+}
+
+fn widest(result: &Comparison) -> f64 {
+    1.05 * result.pairs.iter().map(|p| p.amplitude_pp_m * 1e6).fold(0.1, f64::max)
+}
+
+fn capital(word: &str) -> String {
+    let mut all = word.chars();
+    all.next().map_or_else(String::new, |first| first.to_uppercase().chain(all).collect())
+}

@@ -1,0 +1,238 @@
+//! The figures of a run.
+
+use super::{
+    COLOURS, Frame, GREY, NARROW, Span, WIDE, band, figure, line, mark, measured, series_key, wrong,
+};
+use crate::report::RunData;
+use crate::report::html::escape;
+use crate::report::human::number;
+use crate::sequence::MeasuredPass;
+use models::condition::Condition;
+use models::prediction::{FrictionModel, SpringSlider};
+use models::psi::{self, PsiEq17};
+use models::quantity::PeakToPeak;
+use models::reading::Reading;
+use plotters::prelude::*;
+use realtime::pacing::LoopReport;
+
+/// Where the axis of `mu'` ends.
+const MU: [f64; 2] = [0.0, 1.15];
+
+/// A measured `mu'` of a pass with vibration: amplitude in um, value, sd.
+fn value(p: &MeasuredPass) -> Option<(f64, f64, f64)> {
+    let c = p.comparison?;
+    (p.pass.amplitude > PeakToPeak::ZERO).then_some(())?;
+    Some((p.pass.amplitude.micrometres(), c.mu_relative?, c.mu_relative_sd?))
+}
+
+/// A number with so many significant digits.
+fn round(v: f64, digits: i32) -> String {
+    let scale = 10f64.powi(digits - 1 - v.abs().max(1e-12).log10().floor() as i32);
+    format!("{}", (v * scale).round() / scale)
+}
+
+/// Nominal conditions, rounded so that passes of one setting fall together.
+fn setting(p: &MeasuredPass) -> (String, String, String) {
+    (round(p.pass.speed_m_s * 1e3, 2), round(p.pass.frequency_hz / 1e3, 3), round(p.pass.normal_force_n, 1))
+}
+
+/// The most common frequency and load: the base condition of the figure by speed.
+fn base(passes: &[MeasuredPass]) -> Option<(String, String)> {
+    let mut counts = std::collections::BTreeMap::<(String, String), usize>::new();
+    for p in passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO) {
+        let (_, f, n) = setting(p);
+        *counts.entry((f, n)).or_default() += 1;
+    }
+    counts.into_iter().max_by_key(|(_, n)| *n).map(|(key, _)| key)
+}
+
+/// Relative friction against amplitude: a mark a speed, the spring-slider as a line with its band, and what was predicted for each
+/// pass (by a corrected model too) as a short stroke.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
+    let Some((f, n)) = base(&run.passes) else { return Ok("<p>No pass with vibration.</p>".into()) };
+    let at_base = |p: &&MeasuredPass| {
+        let (_, pf, pn) = setting(p);
+        p.pass.amplitude > PeakToPeak::ZERO && pf == f && pn == n
+    };
+    let chosen: Vec<&MeasuredPass> = run.passes.iter().filter(at_base).collect();
+    let mut speeds: Vec<String> = chosen.iter().map(|p| setting(p).0).collect();
+    speeds.sort_by(|a, b| a.parse::<f64>().unwrap_or(0.0).total_cmp(&b.parse().unwrap_or(0.0)));
+    speeds.dedup();
+    let widest = chosen.iter().map(|p| p.pass.amplitude.micrometres()).fold(1.0, f64::max) * 1.05;
+    let model = SpringSlider::new(run.finger).map_err(wrong)?;
+    let mu0 =
+        models::pass::coulomb_coefficient(&run.passes.iter().map(|p| p.pass.clone()).collect::<Vec<_>>());
+    let alt = format!(
+        "Relative friction against amplitude at {f} kHz: {} passes at {} speeds, measured and predicted.",
+        chosen.len(),
+        speeds.len()
+    );
+    let frame = Frame {
+        sizes: [WIDE, NARROW],
+        x: (Span::linear(0.0..widest), "amplitude w, um peak to peak"),
+        y: (Span::linear(MU[0]..MU[1]), "relative friction \u{3bc}'"),
+        alt: &alt,
+    };
+    let svg = figure(&frame, |chart, size| {
+        for (i, speed) in speeds.iter().enumerate() {
+            let colour = COLOURS[i % COLOURS.len()];
+            let of_speed: Vec<&&MeasuredPass> = chosen.iter().filter(|p| setting(p).0 == *speed).collect();
+            if let (Some(mu0), Some(first)) = (mu0, of_speed.first()) {
+                let at = |w: f64| {
+                    let amplitude = PeakToPeak::from_metres(w * 1e-6);
+                    model.predict(&Condition { amplitude, ..first.pass.condition(mu0) }).ok()
+                };
+                let grid = (1..=200).map(|k| widest * f64::from(k) / 200.0);
+                let curve: Vec<(f64, f64, f64)> =
+                    grid.filter_map(|w| at(w).map(|p| (w, p.mu_relative, p.mu_relative_sd))).collect();
+                let edge = |k: f64| -> Vec<(f64, f64)> {
+                    curve.iter().map(|(w, m, s)| (*w, (m + k * s).clamp(MU[0], MU[1]))).collect()
+                };
+                band(chart, &edge(-2.0), &edge(2.0), colour)?;
+                line(chart, edge(0.0), colour, (i > 0).then_some(3 * i as i32))?;
+            }
+            // Asked of the model of the run itself, at the conditions that were measured.
+            let strokes = of_speed.iter().filter_map(|p| {
+                let (w, predicted) = (value(p)?.0, p.comparison?.predicted.clamp(MU[0], MU[1]));
+                let half = 0.012 * widest;
+                Some(PathElement::new(
+                    vec![(w - half, predicted), (w + half, predicted)],
+                    BLACK.stroke_width(2),
+                ))
+            });
+            chart.draw_series(strokes).map_err(wrong)?;
+            let points: Vec<_> = of_speed.iter().filter_map(|p| value(p)).collect();
+            measured(chart, i, size, colour, &points, MU)?;
+        }
+        Ok(())
+    })?;
+    // Loads fall together by one digit, which is no word on what the load was.
+    let load_n = chosen.iter().map(|p| p.pass.normal_force_n).sum::<f64>() / chosen.len() as f64;
+    let load = round(load_n, 2);
+    let driven = run.passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO).count();
+    let elsewhere = match driven - chosen.len() {
+        0 => String::new(),
+        n => format!(" {n} passes at other frequencies or loads are in the table, not in this figure."),
+    };
+    Ok(format!(
+        "<figure>{svg}<figcaption>at {f} kHz and {load} N. {}. Short strokes: what was predicted for each pass.{elsewhere}</figcaption></figure>",
+        escape(&series_key(&speeds, "mm/s"))
+    ))
+}
+
+/// Relative friction against Psi (Eq. 17) with Eq. 20 and its stated uncertainty.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
+    let points: Vec<(f64, f64, f64)> =
+        run.passes.iter().filter_map(|p| Some((p.psi_eq17?, value(p)?.1, value(p)?.2))).collect();
+    if points.is_empty() {
+        return Ok("<p>No pass with a &Psi;.</p>".into());
+    }
+    let lowest = points.iter().map(|p| p.0).fold(0.1, f64::min) * 0.8;
+    let highest = points.iter().map(|p| p.0).fold(10.0, f64::max) * 1.2;
+    let alt = format!(
+        "Relative friction against Psi from {lowest:.2} to {highest:.1}: {} passes and the curves of Eq. 20 under both readings of w.",
+        points.len()
+    );
+    let frame = Frame {
+        sizes: [WIDE, NARROW],
+        x: (Span::logarithmic(lowest..highest), "\u{3a8} of Eq. 17"),
+        y: (Span::linear(MU[0]..MU[1]), "relative friction \u{3bc}'"),
+        alt: &alt,
+    };
+    let svg = figure(&frame, |chart, size| {
+        let grid = || (0..=200).map(|k| lowest * (highest / lowest).powf(f64::from(k) / 200.0));
+        let law = |star: f64| -> Vec<(f64, f64)> {
+            grid().map(|p| (p, psi::relative_friction(PsiEq17(p), star))).collect()
+        };
+        for reading in Reading::ALL {
+            let (star, sd) = reading.psi_star();
+            band(chart, &law(star + sd), &law(star - sd), GREY)?;
+            line(chart, law(star), GREY, None)?;
+        }
+        measured(chart, 0, size, COLOURS[0], &points, MU)
+    })?;
+    Ok(format!("<figure>{svg}</figure>"))
+}
+
+/// How far each pass lies from what was expected after those before it, in the order of measurement.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn residuals(run: &RunData) -> miette::Result<String> {
+    let points: Vec<(f64, f64, bool)> = run
+        .passes
+        .iter()
+        .filter_map(|p| Some((p.pass.time_s, p.comparison?.z, p.reference)))
+        .filter(|(_, z, _)| z.is_finite())
+        .collect();
+    if points.is_empty() {
+        return Ok("<p>No pass was judged.</p>".into());
+    }
+    let end = points.iter().map(|p| p.0).fold(1.0, f64::max) * 1.02;
+    let worst = points.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
+    let most = worst.clamp(3.0, 40.0) * 1.1;
+    let alt = format!(
+        "Surprise of {} passes against time, the largest of {} standard deviations.",
+        points.len(),
+        number(worst)
+    );
+    let frame = Frame {
+        sizes: [(WIDE.0, 340), NARROW],
+        x: (Span::linear(0.0..end), "time, s"),
+        y: (Span::linear(-most..most), "surprise, standard deviations"),
+        alt: &alt,
+    };
+    let svg = figure(&frame, |chart, size| {
+        for level in [-1.96, 1.96] {
+            line(chart, vec![(0.0, level), (end, level)], GREY, Some(6))?;
+        }
+        let marks = points.iter().map(|(t, z, reference)| {
+            let colour = if *reference { GREY } else { COLOURS[1] };
+            mark(usize::from(*reference), (*t, z.clamp(-most, most)), size, colour, !reference)
+        });
+        chart.draw_series(marks).map_err(wrong)?;
+        Ok(())
+    })?;
+    let cut = if worst > most { " Those beyond the axis stand at its end." } else { "" };
+    Ok(format!(
+        "<figure>{svg}<figcaption>Hollow squares: references without vibration.{cut}</figcaption></figure>"
+    ))
+}
+
+/// Histogram of the loop's lateness.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn lateness(report: &LoopReport) -> miette::Result<String> {
+    let bars: Vec<(f64, f64)> = report
+        .histogram
+        .iter()
+        .filter(|(_, n)| *n > 0)
+        .map(|(ns, n)| (*ns as f64 / 1e3, *n as f64))
+        .collect();
+    if bars.is_empty() {
+        return Ok("<p>No cycle was timed.</p>".into());
+    }
+    let highest = bars.iter().map(|b| b.0).fold(10.0, f64::max) * 2.0;
+    let most = bars.iter().map(|b| b.1).fold(10.0, f64::max) * 2.0;
+    let frame = Frame {
+        sizes: [(WIDE.0, 300), NARROW],
+        x: (Span::logarithmic(0.5..highest), "lateness, us"),
+        y: (Span::logarithmic(0.7..most), "deadlines"),
+        alt: "Histogram of the lateness of the loop's cycles; the figures below say the same.",
+    };
+    let svg = figure(&frame, |chart, _| {
+        let bar = |(upper, n): &(f64, f64)| {
+            Rectangle::new([(upper / 2.0, 0.7), (*upper, *n)], COLOURS[0].mix(0.6).filled())
+        };
+        chart.draw_series(bars.iter().map(bar)).map_err(wrong)?;
+        Ok(())
+    })?;
+    Ok(format!("<figure>{svg}</figure>"))
+}

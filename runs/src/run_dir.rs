@@ -1,0 +1,381 @@
+//! A run's folder: the record, the point table, rig.toml, the report; and how a killed run is taken up again.
+//!
+//! A pass is acknowledged (on stdout, in the catalogue) only after its line is in `points.csv` and synced.
+
+mod damage;
+mod lines;
+mod lock;
+mod record_facts;
+
+use crate::files::{self, Placed, write_plain};
+use crate::plan::Point;
+use crate::sequence::MeasuredPass;
+use crate::session::Notes;
+pub use damage::{damage_in, differences, missing_records, of_file};
+use lines::{whole_passes, whole_table};
+pub use lock::{claim, holder, is_held};
+use miette::{Context, IntoDiagnostic};
+use models::pass::{self, Pass};
+pub use record_facts::{RecordFacts, record_facts};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What a run is of: written when it begins, compared when it is taken up again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Identity {
+    /// SHA-256 of the setup's text.
+    pub setup_sha256: String,
+    /// SHA-256 of the plan's text.
+    pub plan_sha256: String,
+    /// Seed of the order.
+    pub seed: u64,
+    /// SHA-256 of the model file, or the model's name.
+    pub model: String,
+    /// The setup names a human fingertip, and says that nobody touches the plate.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub nobody_touches_the_plate: bool,
+    /// Who runs it, and on what: another session may say something else.
+    #[serde(default)]
+    pub notes: Notes,
+    /// The plan's `[protocol]`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub protocol: BTreeMap<String, toml::Value>,
+}
+
+/// One session of a run: from its start until its end, a stop or a crash. A run that is taken up again has several.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Session {
+    /// Number, from 1. The session's record is `run-NUMBER.mcap`.
+    pub session: u64,
+    /// Wall clock at its start, in ns since 1970.
+    pub start_unix_ns: u64,
+    /// Time of the run at its start in s: 0 for the first. `time_s` of its passes goes on from there.
+    pub start_s: f64,
+}
+
+/// A run's folder, held by this process alone.
+pub struct RunDir {
+    path: PathBuf,
+    points: Placed,
+    journal: Placed,
+    /// Held, and so locked, for as long as this lives: the system frees it with the process, whatever ends that.
+    _lock: File,
+    /// Passes that an earlier session has made.
+    pub made: Vec<Pass>,
+    sessions: Vec<Session>,
+    planned: Option<Session>,
+    identity: Identity,
+    /// A pass could not be kept: half a line may stand at the end, and nothing may follow it.
+    failed: bool,
+    new: New,
+}
+
+/// What this process has put into the file system, and takes back where nothing comes of it.
+#[derive(Default)]
+struct New {
+    paths: Vec<PathBuf>,
+    begun: bool,
+}
+
+impl Drop for New {
+    fn drop(&mut self) {
+        if self.begun {
+            return;
+        }
+        for path in self.paths.iter().rev() {
+            // Only an empty folder goes: another process may have put something there.
+            let _ = if path.is_dir() { fs::remove_dir(path) } else { fs::remove_file(path) };
+        }
+    }
+}
+
+const IDENTITY: &str = "run.toml";
+const POINTS: &str = "points.csv";
+/// The journal in a run's folder: a line a pass, safe on the disk before the next one begins.
+pub const JOURNAL: &str = "passes.jsonl";
+const SESSIONS: &str = "sessions.jsonl";
+
+impl RunDir {
+    /// Makes a new folder, or takes up one that an earlier session of the same plan, setup, seed and model left.
+    ///
+    /// # Errors
+    /// A folder of another run, or one that a living process holds. Nothing is left behind then, nor where this is dropped
+    /// before [`RunDir::begin`].
+    pub fn open(path: &Path, identity: &Identity) -> miette::Result<Self> {
+        let shown = path.display();
+        let file = path.join(IDENTITY);
+        let mut before_notes = Notes::default();
+        if file.exists() {
+            let text = crate::input::text_of(&file)?;
+            let before: Identity =
+                toml::from_str(&text).map_err(|e| miette::miette!("{shown}/{IDENTITY}: {e}"))?;
+            let parts = [
+                ("setup", before.setup_sha256 == identity.setup_sha256),
+                ("plan", before.plan_sha256 == identity.plan_sha256),
+                ("seed", before.seed == identity.seed),
+                ("model", before.model == identity.model),
+            ];
+            let other: Vec<_> = parts.iter().filter(|(_, same)| !same).map(|(name, _)| *name).collect();
+            if !other.is_empty() {
+                miette::bail!(
+                    help = "give another --out, or the same plan, setup, seed and model to go on with it",
+                    "{shown} holds a run with another {}",
+                    other.join(" and ")
+                );
+            }
+            before_notes = before.notes;
+        } else if path.exists() && holds_something(path)? {
+            miette::bail!(
+                help = "give an empty or new folder as --out",
+                "{shown} is not empty and holds no run"
+            );
+        }
+        let mut new = New { paths: files::make_folder(path)?, begun: false };
+        let lock_file = path.join(lock::NAME);
+        if !lock_file.exists() {
+            new.paths.push(lock_file.clone());
+        }
+        let lock = claim(&lock_file)?;
+        let notes = identity.notes.clone().or(&before_notes);
+        Self::open_locked(path, Identity { notes, ..identity.clone() }, lock, new)
+    }
+
+    fn open_locked(path: &Path, identity: Identity, lock: File, mut new: New) -> miette::Result<Self> {
+        let mut header = Vec::new();
+        pass::write_passes(&[], &mut header).into_diagnostic()?;
+        let text = toml::to_string(&identity).into_diagnostic()?;
+        // The journal before the table: where there is a table, there is a journal.
+        for (name, bytes) in [(IDENTITY, text.as_bytes()), (JOURNAL, b""), (POINTS, &header)] {
+            let file = path.join(name);
+            if !file.exists() {
+                new.paths.push(file.clone());
+                write_plain(&file, bytes)?;
+            }
+        }
+        let sessions = sessions_in(path)?;
+        let open = |name: &str| {
+            let file = Placed::open(&path.join(name), OpenOptions::new().read(true).append(true))?;
+            let bytes = fs::read(path.join(name)).into_diagnostic().wrap_err_with(|| name.to_string())?;
+            Ok::<_, miette::Report>((file, bytes))
+        };
+        let (mut points, table) = open(POINTS)?;
+        if !table.starts_with(&header) {
+            miette::bail!(
+                help = "give another --out: this table can be read, but not gone on with",
+                "{}: the columns of {POINTS} are those of another version",
+                path.display()
+            );
+        }
+        let (made, whole) = whole_table(&table).wrap_err("points.csv of an earlier session")?;
+        cut_torn(&mut points, whole, table.len(), POINTS)?;
+        let (mut journal, lines) = open(JOURNAL)?;
+        let (_, whole) = whole_passes(&lines).wrap_err(JOURNAL)?;
+        cut_torn(&mut journal, whole, lines.len(), JOURNAL)?;
+        let path = path.to_path_buf();
+        let (planned, failed) = (None, false);
+        Ok(RunDir { path, points, journal, _lock: lock, made, sessions, planned, identity, failed, new })
+    }
+
+    /// Keeps the folder, whatever comes.
+    pub fn stay(&mut self) {
+        self.new.begun = true;
+    }
+
+    /// Plans the session that comes now. In wall-clock time the run's time has gone on since its first session began; in virtual
+    /// time (`fast`) it goes on where the last pass that was kept had ended, `pass_s` after its `time_s`.
+    pub fn plan_session(&mut self, now_unix_ns: u64, pass_s: f64, fast: bool) -> Session {
+        let session = 1 + self.sessions.iter().map(|s| s.session).max().unwrap_or(0);
+        // A clock that was set back meanwhile does not put a pass before one that was made.
+        let measured = self.made.iter().map(|p| p.time_s + pass_s).fold(0.0, f64::max);
+        let passed = self.sessions.first().map_or(0, |first| now_unix_ns.saturating_sub(first.start_unix_ns));
+        let start_s = if fast { measured } else { measured.max(passed as f64 * 1e-9) };
+        let session = Session { session, start_unix_ns: now_unix_ns, start_s };
+        self.planned = Some(session);
+        session
+    }
+
+    /// Begins the session that was planned: from here on the folder stays, whatever comes.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn begin(&mut self) -> miette::Result<()> {
+        self.sessions.extend(self.planned.take());
+        let mut text = Vec::new();
+        for session in &self.sessions {
+            serde_json::to_writer(&mut text, session).into_diagnostic()?;
+            text.push(b'\n');
+        }
+        self.stay();
+        // What this session says of itself goes beside what the run is of.
+        let identity = toml::to_string(&self.identity).into_diagnostic()?;
+        write_plain(&self.path.join(IDENTITY), identity.as_bytes())?;
+        write_plain(&self.path.join(SESSIONS), &text)
+    }
+
+    /// Who runs it, and on what: as this session says, else as an earlier one did.
+    pub fn notes(&self) -> &Notes {
+        &self.identity.notes
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The points that are still to be made.
+    pub fn left_of(&self, points: Vec<Point>) -> Vec<Point> {
+        let made = |p: &Point| self.made.iter().any(|m| m.point == u64::from(p.number));
+        points.into_iter().filter(|p| !made(p)).collect()
+    }
+
+    /// The record file of the session that has begun.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn new_record(&self) -> miette::Result<Placed> {
+        let number = self.sessions.last().map_or(1, |s| s.session);
+        let path = self.path.join(format!("run-{number}.mcap"));
+        Placed::open(&path, OpenOptions::new().create_new(true).read(true).write(true))
+    }
+
+    /// The record files, oldest first.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn records(&self) -> miette::Result<Vec<PathBuf>> {
+        records_in(&self.path)
+    }
+
+    /// Puts a pass into the point table and the journal, synced: after this it is never lost.
+    ///
+    /// # Errors
+    /// Whatever the file system says, or a file that was removed meanwhile; the sweep must stop then.
+    pub fn keep(&mut self, measured: &MeasuredPass) -> miette::Result<()> {
+        if self.failed {
+            miette::bail!("point {} is not kept: an earlier pass could not be", measured.pass.point);
+        }
+        let kept = self.append(measured);
+        self.failed = kept.is_err();
+        kept
+    }
+
+    fn append(&mut self, measured: &MeasuredPass) -> miette::Result<()> {
+        let mut table = Vec::new();
+        pass::write_passes(std::slice::from_ref(&measured.pass), &mut table).into_diagnostic()?;
+        let header = table.iter().position(|b| *b == b'\n').map_or(0, |i| i + 1);
+        let mut line = serde_json::to_vec(measured).into_diagnostic()?;
+        line.push(b'\n');
+        // The journal first: a pass that is in the table is in the journal too.
+        self.journal.write_all(&line).into_diagnostic().wrap_err(JOURNAL)?;
+        self.journal.sync()?;
+        self.points.write_all(&table[header..]).into_diagnostic().wrap_err(POINTS)?;
+        self.points.sync()
+    }
+
+    /// Writes a file of the run whole or not at all.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> miette::Result<()> {
+        write_plain(&self.path.join(name), bytes)
+    }
+}
+
+/// The record files of a run's folder, oldest first.
+///
+/// # Errors
+/// Whatever the file system says.
+pub fn records_in(path: &Path) -> miette::Result<Vec<PathBuf>> {
+    let mut found: Vec<PathBuf> = fs::read_dir(path)
+        .into_diagnostic()
+        .wrap_err_with(|| path.display().to_string())?
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|p| is_record(p))
+        .collect();
+    found.sort_by_key(|p| (p.as_os_str().len(), p.clone()));
+    Ok(found)
+}
+
+/// Whether it is named as a session's record: `run-NUMBER.mcap`. What else ends so was exported into the folder.
+fn is_record(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let number = name.strip_prefix("run-").and_then(|rest| rest.strip_suffix(".mcap"));
+    number.is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Whether a session of a run has begun in a folder.
+pub fn has_begun(path: &Path) -> bool {
+    path.join(SESSIONS).exists()
+}
+
+/// The sessions of a run's folder, oldest first; none where the first has not begun.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn sessions_in(path: &Path) -> miette::Result<Vec<Session>> {
+    let file = path.join(SESSIONS);
+    if !file.exists() {
+        return Ok(Vec::new());
+    }
+    let read = |(i, line): (usize, &str)| {
+        serde_json::from_str(line).map_err(|e| miette::miette!("{}: line {}: {e}", file.display(), i + 1))
+    };
+    crate::input::text_of(&file)?.lines().enumerate().map(read).collect()
+}
+
+/// The passes of a run with their comparisons, each point once: a pass whose table line was lost with a power cut is
+/// not counted, one that was journalled twice counts once.
+///
+/// # Errors
+/// A folder that holds no run, or a table or journal that is damaged.
+pub fn passes_in(path: &Path) -> miette::Result<Vec<MeasuredPass>> {
+    let read = |name: &str| {
+        let file = path.join(name);
+        fs::read(&file).into_diagnostic().wrap_err_with(|| file.display().to_string())
+    };
+    let (kept, _) = whole_table(&read(POINTS)?).wrap_err_with(|| path.join(POINTS).display().to_string())?;
+    let (journal, _) =
+        whole_passes(&read(JOURNAL)?).wrap_err_with(|| path.join(JOURNAL).display().to_string())?;
+    let in_table: BTreeSet<u64> = kept.iter().map(|k| k.point).collect();
+    let last: BTreeMap<u64, usize> = journal.iter().enumerate().map(|(i, p)| (p.pass.point, i)).collect();
+    let counts = |i: usize, p: &MeasuredPass| in_table.contains(&p.pass.point) && last[&p.pass.point] == i;
+    let passes = journal.into_iter().enumerate().filter(|(i, p)| counts(*i, p)).map(|(_, p)| p).collect();
+    match kept.iter().find(|k| !last.contains_key(&k.point)) {
+        None => Ok(passes),
+        Some(k) => miette::bail!(
+            "{}: point {} is in {POINTS} and not in {JOURNAL}: one of them is damaged",
+            path.display(),
+            k.point
+        ),
+    }
+}
+
+/// A power cut may leave part of a line at the end: it was never acknowledged and is cut off.
+fn cut_torn(file: &mut Placed, whole: usize, length: usize, name: &str) -> miette::Result<()> {
+    if whole == length {
+        return Ok(());
+    }
+    tracing::warn!("{name}: the last line is torn and is left out; its pass was not acknowledged");
+    let file = file.file();
+    file.set_len(whole as u64)
+        .and_then(|()| file.sync_all())
+        .into_diagnostic()
+        .wrap_err_with(|| name.to_string())
+}
+
+/// Whether a folder holds more than what a session leaves that died before it wrote its identity.
+fn holds_something(path: &Path) -> miette::Result<bool> {
+    let part = files::beside(Path::new(IDENTITY));
+    for entry in fs::read_dir(path).into_diagnostic()? {
+        let name = entry.into_diagnostic()?.file_name();
+        if name != lock::NAME && name != part.as_os_str() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}

@@ -1,0 +1,673 @@
+//! The order of a sweep: a pure state machine that eats rows and gives commands. It runs in virtual time and in
+//! wall-clock time alike, beside the loop, never in it.
+//!
+//! ```text
+//! Arm -> Zero -> [ Approach -> Settle -> Measure ]* -> Zero -> Done
+//!  any -> Failed(trip)      Stopped by request at any time
+//!  before a pass: Paused, by request; disarmed, and armed again when it is to go on
+//!  before the first, before one whose level of the air is not there, after the last: at the rig (see `at_rig`)
+//! ```
+
+mod arming;
+mod at_rig;
+mod events;
+
+pub use at_rig::Question;
+pub use events::{Event, MeasuredPass, Outcome};
+
+use crate::ambient::Level;
+use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
+use crate::exposure_left::Left;
+use crate::plan::{PassTimes, Point};
+use crate::setup::Guards;
+use arming::{Arming, Next};
+use at_rig::AtRig;
+use models::condition::{Ambient, Condition};
+use models::pass::Pass;
+use models::prediction::FrictionModel;
+use models::psi::PsiEq17;
+use models::quantity::PeakToPeak;
+use models::rig_file::PassNoise;
+use realtime::compare::{Agreement, Comparator, PassComparison};
+use realtime::cycle::{Command, Marker, Phase};
+use realtime::estimate::Moments;
+use realtime::ports::{Nanos, NoData};
+use realtime::safety::{Cause, ChannelTiming, Limits, Request};
+use realtime::turn::Row;
+use std::sync::Arc;
+
+/// What a row led to.
+#[derive(Debug, Default)]
+pub struct Reaction {
+    /// For the loop, in this order.
+    pub commands: Vec<Command>,
+    /// A pass that was finished.
+    pub pass: Option<MeasuredPass>,
+    /// Events.
+    pub events: Vec<Event>,
+    /// The end.
+    pub outcome: Option<Outcome>,
+    /// A quantity of the air (its place in [`crate::ambient::AIR`]) that is to be set, and the level.
+    pub set_level: Option<(usize, f64)>,
+    /// Something is asked of whoever stands at the rig; the words are among the events.
+    pub question: Option<Question>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Arm,
+    AtRig,
+    Zero {
+        since: Option<Nanos>,
+        after: bool,
+    },
+    /// Since when, and when the rig was last seen off, at rest and lifted off.
+    Paused {
+        since: Nanos,
+        quiet: Nanos,
+    },
+    Approach {
+        since: Nanos,
+    },
+    Settle {
+        since: Nanos,
+    },
+    Measure {
+        since: Nanos,
+    },
+    Over,
+}
+
+/// Length of a zero reading.
+const ZERO_FOR: Nanos = Nanos(200_000_000);
+/// Time that a plate may ring on after the zero began: left out of the zero.
+const ZERO_SETTLE: Nanos = Nanos(150_000_000);
+/// Time to wait for a start position.
+const APPROACH_WITHIN: Nanos = Nanos(20_000_000_000);
+/// Longest pause, where a setup does not say.
+pub const PAUSE_MAX_S: f64 = 600.0;
+/// A paused rig shows itself off, at rest and lifted off, no longer ago than this.
+const QUIET_WITHIN: Nanos = Nanos(2_500_000_000);
+/// A stage that stands, in m/s, and what a sensor may show with the finger lifted off, in N (as SR-43 has it).
+const STANDS_M_S: f64 = 2e-3;
+const LIFTED_N: f64 = 0.3;
+/// A pass without contact is made again so often before the sweep gives up.
+const TRIES: u32 = 3;
+
+/// How a start position is approached: velocity in proportion to the way that is left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Approach {
+    /// Cycles from one command to the next.
+    every: u64,
+    /// Velocity over way, 1/s.
+    gain: f64,
+}
+
+impl Approach {
+    /// Where the loop and the stage are fast: a command every five milliseconds.
+    const FASTEST: Approach = Approach { every: 5, gain: 25.0 };
+
+    /// For a loop and a stage of these periods. A command acts on a position that is as old as the stage's sample, the time
+    /// since the last command and a cycle: a gain well beyond one over that would swing about the goal and never arrive.
+    fn at(cycle: Nanos, stage: &ChannelTiming) -> Self {
+        let every = (5e-3 / cycle.seconds()).round().max(1.0);
+        let old = (every + 1.0) * cycle.seconds() + stage.period.seconds();
+        Approach { every: every as u64, gain: (0.7 / old).min(Self::FASTEST.gain) }
+    }
+}
+
+/// Sums over the steady part of a pass.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    lateral: Moments,
+    normal: Moments,
+    amplitude: Moments,
+    speed: Moments,
+    position: Moments,
+    temperature: Moments,
+    lateral_sequence: Option<u32>,
+    frequency_hz: f64,
+}
+
+/// The sweep.
+pub struct Sequence {
+    points: Vec<Point>,
+    next: usize,
+    times: PassTimes,
+    stage: Stage,
+    arming: Arming,
+    sums: Sums,
+    tries: u32,
+    model: Arc<dyn FrictionModel>,
+    comparator: Comparator,
+    stopping: bool,
+    paused: bool,
+    departed: bool,
+    /// Of the last pass that could be compared, of earlier sessions too.
+    last_comparison: Option<PassComparison>,
+    approach: Approach,
+    started: bool,
+    poisson_ratio: f64,
+    temperature_ranges: Vec<TemperatureRange>,
+    temperature_flags: Vec<TemperatureFlag>,
+    /// What the setup states of the air, and what the loop was last told of it.
+    ambient: Ambient,
+    ambient_sent: Ambient,
+    at_rig: AtRig,
+    has_watchdog: bool,
+    guards: Guards,
+    exposure_left: Option<Left>,
+    /// How each arming begins.
+    unarmed: Arming,
+    load_commanded: bool,
+    pause_max: Nanos,
+    /// The stop of a pause is on its way: the trip that shows it ends nothing.
+    pausing: bool,
+    session: Option<u64>,
+    start_s: f64,
+}
+
+impl Sequence {
+    /// A sweep over `points` (those of a resumed run that are still to be made).
+    pub fn new(
+        points: Vec<Point>,
+        times: PassTimes,
+        model: Arc<dyn FrictionModel>,
+        tip: &crate::fingertip::Fingertip,
+        noise: PassNoise,
+    ) -> Self {
+        let comparator = Comparator::new(&*model, tip.mu0, noise);
+        Sequence {
+            points,
+            next: 0,
+            times,
+            stage: Stage::Arm,
+            arming: Arming::new(),
+            sums: Sums::default(),
+            tries: 0,
+            model,
+            comparator,
+            stopping: false,
+            paused: false,
+            departed: false,
+            last_comparison: None,
+            approach: Approach::FASTEST,
+            started: false,
+            poisson_ratio: tip.finger.poisson_ratio,
+            temperature_ranges: Vec::new(),
+            temperature_flags: Vec::new(),
+            ambient: Ambient::default(),
+            ambient_sent: Ambient::default(),
+            at_rig: AtRig::default(),
+            has_watchdog: true,
+            guards: Guards::default(),
+            exposure_left: None,
+            unarmed: Arming::new(),
+            load_commanded: true,
+            pause_max: Nanos::from_seconds(PAUSE_MAX_S),
+            pausing: false,
+            session: None,
+            start_s: 0.0,
+        }
+    }
+
+    /// The same in air of which the setup states this; what a plan or a channel says of it goes first.
+    pub fn in_air(self, ambient: Ambient) -> Self {
+        Sequence { ambient, ..self }
+    }
+
+    /// The same, as a session of a run that had begun `start_s` before the loop's time zero, in s: passes tell the run's time.
+    pub fn in_session(self, session: u64, start_s: f64) -> Self {
+        Sequence { session: Some(session), start_s, ..self }
+    }
+
+    /// The same, with certificates that are held against the amplifier's temperature at the start of each pass.
+    pub fn watching(self, temperature_ranges: &[TemperatureRange]) -> Self {
+        Sequence { temperature_ranges: temperature_ranges.to_vec(), ..self }
+    }
+
+    /// The same, with the limits of the rig that is armed: what guards are missing is told then.
+    pub fn guarded_by(self, limits: &Limits) -> Self {
+        Sequence {
+            has_watchdog: limits.amplifier_watchdog || limits.supply_watchdog,
+            arming: self.arming.guarded_by(limits),
+            unarmed: self.unarmed.guarded_by(limits),
+            load_commanded: limits.load_commanded,
+            approach: Approach::at(limits.timing.cycle, &limits.timing.stage),
+            ..self
+        }
+    }
+
+    /// The same, with what is told of its guards at each arming, and the longest pause in s.
+    pub fn on_rig(self, guards: Guards, pause_max_s: f64) -> Self {
+        Sequence { guards, pause_max: Nanos::from_seconds(pause_max_s), ..self }
+    }
+
+    /// What is left to a human finger of the hour is told at the first arming.
+    pub fn exposure_left(&mut self, left: Left) {
+        self.exposure_left = Some(left);
+    }
+
+    /// Takes in a pass of an earlier session of the same run: `mu_0` and the evidence go on from there.
+    pub fn remember(&mut self, pass: &Pass) {
+        if let Some(friction) = pass.friction_force_n() {
+            let condition = pass.condition(1.0).within(&self.ambient);
+            // A condition outside the model's domain has no comparison, now as then.
+            if let Ok(comparison) = self.comparator.pass(&*self.model, &condition, friction) {
+                self.last_comparison = Some(comparison);
+            }
+            self.departed = self.comparator.departed();
+        }
+    }
+
+    /// Passes made and to be made.
+    pub fn progress(&self) -> (usize, usize) {
+        (self.next, self.points.len())
+    }
+
+    /// Time that the rest should take in s, by the plan.
+    pub fn remaining_s(&self) -> f64 {
+        let each = self.times.settle_s + self.times.measure_s + 0.15;
+        each * (self.points.len() - self.next) as f64
+    }
+
+    /// Asks for a stop: the rig goes to its safe state with the next row.
+    pub fn stop(&mut self) {
+        self.stopping = true;
+    }
+
+    /// Has the sweep rest before the next pass, without drive and lifted off, or go on. A pass that slides already is made first.
+    pub fn pause(&mut self, paused: bool) {
+        self.paused = paused;
+    }
+
+    /// What the passes say of the model, for a sweep that came to its end or did not.
+    pub fn agreement(&self, complete: bool) -> Agreement {
+        Agreement::of(self.last_comparison.as_ref(), complete)
+    }
+
+    /// Takes a row.
+    pub fn on_row(&mut self, row: &Row) -> Reaction {
+        let mut out = Reaction::default();
+        if self.stage == Stage::Over {
+            return out;
+        }
+        let stopped = row.tripped.is_some_and(|trip| trip.cause == Cause::Stopped);
+        if stopped && std::mem::take(&mut self.pausing) {
+            return out;
+        }
+        // The stop before a person comes to the rig is the sweep's own.
+        let own = stopped && self.stage == Stage::AtRig && self.at_rig.is_disarmed();
+        if let Some(trip) = row.tripped.filter(|_| !own && (stopped || self.stage != Stage::Arm)) {
+            out.events.push(Event::Tripped(trip));
+            self.finish(&mut out, if stopped { Outcome::Stopped } else { Outcome::Tripped(trip) });
+            return out;
+        }
+        if self.stopping {
+            (self.stopping, self.pausing) = (false, false);
+            out.events.push(Event::StopRequested);
+            out.commands.push(Command::Stop);
+            if !row.armed {
+                self.finish(&mut out, Outcome::Stopped);
+            }
+            return out;
+        }
+        match self.stage {
+            Stage::Arm => self.arm(row, &mut out),
+            Stage::Zero { since, after } => self.zero(row, since, after, &mut out),
+            Stage::Paused { since, quiet } => self.rest(row, since, quiet, &mut out),
+            Stage::AtRig => self.wait_at_rig(row, &mut out),
+            Stage::Approach { .. } if self.paused => self.begin_next(row, &mut out),
+            Stage::Approach { since } => self.approach(row, since, &mut out),
+            Stage::Settle { since } => self.settle(row, since, &mut out),
+            Stage::Measure { since } => self.measure(row, since, &mut out),
+            Stage::Over => {}
+        }
+        out
+    }
+
+    fn finish(&mut self, out: &mut Reaction, outcome: Outcome) {
+        self.stage = Stage::Over;
+        out.outcome = Some(outcome);
+    }
+
+    /// Arming is one act: a reset once nothing stands in the way, and the proof of the second channel after it.
+    fn arm(&mut self, row: &Row, out: &mut Reaction) {
+        if self.first_steps(row, out) {
+            return;
+        }
+        match self.arming.row(row) {
+            Next::Wait => {}
+            Next::Ask(event) => {
+                out.events.extend(event);
+                out.commands.push(Command::Reset);
+            }
+            Next::Again(event) => out.events.push(event),
+            Next::Armed => self.armed(row, out),
+            Next::GiveUp(outcome) => {
+                if let Outcome::Tripped(trip) = outcome {
+                    out.events.push(Event::Tripped(trip));
+                }
+                self.finish(out, outcome);
+            }
+        }
+    }
+
+    /// Armed: says what guards are missing, and reads the zeros.
+    fn armed(&mut self, row: &Row, out: &mut Reaction) {
+        let seen = &row.inputs.seen;
+        out.events.push(Event::Armed);
+        if seen.supply == Err(NoData::NotFitted) {
+            out.events.push(Event::NoSecondChannel);
+        }
+        if !self.has_watchdog {
+            out.events.push(Event::NoWatchdog);
+        }
+        out.events.extend(self.exposure_left.take().map(Event::ExposureLeft));
+        if self.guards.nobody_touches_the_plate {
+            out.events.push(Event::NobodyTouches);
+        }
+        if !self.guards.not_wired.is_empty() {
+            out.events.push(Event::NotWired { contacts: self.guards.not_wired.clone() });
+        }
+        if seen.amplifier.is_ok_and(|a| a.temperature_c == Err(NoData::NotFitted)) {
+            let certificates = self.temperature_ranges.iter().map(|range| range.certificate.clone());
+            out.events.extend(certificates.map(|certificate| Event::TemperatureUnwatched { certificate }));
+        }
+        out.commands.push(Command::Set(Request::default(), self.marker(Phase::Zero)));
+        self.stage = Stage::Zero { since: None, after: false };
+    }
+
+    fn zero(&mut self, row: &Row, since: Option<Nanos>, after: bool, out: &mut Reaction) {
+        let since = since.unwrap_or(row.now);
+        self.stage = Stage::Zero { since: Some(since), after };
+        if row.marker.phase != Phase::Zero || row.now.since(since) < ZERO_SETTLE {
+            return;
+        }
+        self.take(row);
+        if row.now.since(since) < Nanos(ZERO_SETTLE.0 + ZERO_FOR.0) {
+            return;
+        }
+        let event =
+            Event::Zeros { lateral_n: self.sums.lateral.mean(), normal_n: self.sums.normal.mean(), after };
+        out.events.push(event);
+        self.sums = Sums::default();
+        if after {
+            if !self.last_steps(row, out) {
+                out.commands.push(Command::Stop);
+                self.finish(out, Outcome::Complete);
+            }
+        } else {
+            self.begin_next(row, out);
+        }
+    }
+
+    fn marker(&self, phase: Phase) -> Marker {
+        Marker { point: self.points.get(self.next).map_or(u32::MAX, |p| p.number), phase }
+    }
+
+    /// Length of the stroke of a pass in m, half of it either side of its position.
+    fn half_stroke_m(&self, c: &Condition) -> f64 {
+        0.5 * (c.speed_m_s * (self.times.settle_s + self.times.measure_s) * 1.05)
+    }
+
+    fn begin_next(&mut self, row: &Row, out: &mut Reaction) {
+        if self.next == self.points.len() {
+            self.sums = Sums::default();
+            out.commands.push(Command::Set(Request::default(), self.marker(Phase::Zero)));
+            self.stage = Stage::Zero { since: None, after: true };
+            return;
+        }
+        if self.paused {
+            out.events.push(Event::Paused { point: self.points[self.next].number });
+            out.commands.push(Command::Set(Request::default(), self.marker(Phase::Idle)));
+            out.commands.push(Command::Stop);
+            self.pausing = true;
+            self.stage = Stage::Paused { since: row.now, quiet: row.now };
+            return;
+        }
+        if self.waits_at_rig(row, out) {
+            return;
+        }
+        self.sums = Sums::default();
+        let ambient = self.at_rig.air(&self.ambient, row.now);
+        if ambient != self.ambient_sent {
+            self.ambient_sent = ambient;
+            out.commands.push(Command::Ambient(ambient));
+        }
+        self.stage = Stage::Approach { since: row.now };
+        self.approach(row, row.now, out);
+    }
+
+    /// Waits until it is to go on, not armed. It goes on by arming: the second channel is proved again, and a hand at the dead-man
+    /// device must let go and grip again.
+    fn rest(&mut self, row: &Row, since: Nanos, quiet: Nanos, out: &mut Reaction) {
+        let loud = self.loud(row);
+        let quiet = if loud.is_none() { row.now } else { quiet };
+        self.stage = Stage::Paused { since, quiet };
+        if let Some(cause) = loud.filter(|_| row.now.since(quiet) > QUIET_WITHIN) {
+            out.events.push(Event::PauseNotQuiet { cause });
+            self.finish(out, Outcome::WouldNotArm { blocking: Some(cause) });
+        } else if row.now.since(since) > self.pause_max {
+            out.events.push(Event::PauseTooLong { bound: self.pause_max.seconds() });
+            self.finish(out, Outcome::Stopped);
+        } else if !self.paused && !row.armed {
+            out.events.push(Event::Resumed);
+            self.arming = self.unarmed;
+            self.stage = Stage::Arm;
+        }
+    }
+
+    /// The rule that a paused rig breaks: it is not seen off, at rest and lifted off. Weights that load the finger are not lifted.
+    fn loud(&self, row: &Row) -> Option<Cause> {
+        let seen = &row.inputs.seen;
+        let (Ok(amplifier), Ok(stage)) = (&seen.amplifier, &seen.stage) else {
+            return Some(if seen.stage.is_ok() { Cause::AmplifierStale } else { Cause::StageStale });
+        };
+        let force = seen.forces.normal.as_ref().map_or(f64::INFINITY, |reading| reading.value.abs());
+        let all = [
+            (amplifier.output_on, Cause::RefusesOff),
+            (stage.velocity_m_s.abs() > STANDS_M_S, Cause::StageNotFollowing),
+            (self.load_commanded && force > LIFTED_N, Cause::LoadImplausible),
+        ];
+        all.into_iter().find(|(is, _)| *is).map(|(_, cause)| cause)
+    }
+
+    fn approach(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
+        let point = self.points[self.next];
+        let c = &point.condition;
+        let Ok(stage) = row.inputs.seen.stage else { return };
+        let start = c.position_m - c.direction.sign() * self.half_stroke_m(c);
+        let away = start - stage.position_m;
+        // Close enough, or already past the start in the sense of the pass but not by more than a millimetre.
+        if away.abs() < 2e-4 {
+            let request = Request {
+                amplitude: c.amplitude,
+                frequency_hz: if c.amplitude > PeakToPeak::ZERO { c.frequency_hz } else { 0.0 },
+                velocity_m_s: c.direction.sign() * c.speed_m_s,
+                normal_force_n: c.normal_force_n,
+            };
+            out.commands.push(Command::Set(request, self.marker(Phase::Settle)));
+            self.stage = Stage::Settle { since: row.now };
+            return;
+        }
+        if row.now.since(since) > APPROACH_WITHIN {
+            // The stop that follows is an orderly one; why it comes is said here.
+            tracing::warn!(
+                "point {}: the stage did not come to its start position within {} s: the sweep stops",
+                point.number,
+                APPROACH_WITHIN.seconds()
+            );
+            self.stopping = true;
+            return;
+        }
+        // Slow down towards the goal: the stage has its own acceleration, the way here is a first-order approach.
+        let fast = self.times.approach_speed_m_s;
+        let velocity = (away * self.approach.gain).clamp(-fast, fast);
+        let velocity = if velocity.abs() < 2e-3 { 2e-3 * away.signum() } else { velocity };
+        let request = Request { velocity_m_s: velocity, ..Request::default() };
+        // Only news goes to the loop, and not more often than it can matter.
+        if !self.started || row.cycle.is_multiple_of(self.approach.every) {
+            self.started = true;
+            out.commands.push(Command::Set(request, self.marker(Phase::Approach)));
+        }
+    }
+
+    fn settle(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
+        if row.now.since(since) < Nanos::from_seconds(self.times.settle_s) {
+            return;
+        }
+        let c = self.points[self.next].condition;
+        let request = Request {
+            amplitude: c.amplitude,
+            frequency_hz: if c.amplitude > PeakToPeak::ZERO { c.frequency_hz } else { 0.0 },
+            velocity_m_s: c.direction.sign() * c.speed_m_s,
+            normal_force_n: c.normal_force_n,
+        };
+        out.commands.push(Command::Set(request, self.marker(Phase::Measure)));
+        self.sums = Sums::default();
+        self.at_rig.begin_pass();
+        self.check_temperature(row, out);
+        self.stage = Stage::Measure { since: row.now };
+    }
+
+    /// Holds the amplifier's temperature against the certificates; what is new is told.
+    fn check_temperature(&mut self, row: &Row, out: &mut Reaction) {
+        let temperature_c = match &row.inputs.seen.amplifier {
+            Ok(amplifier) => amplifier.temperature_c,
+            Err(reason) => Err(*reason),
+        };
+        let flags: Vec<TemperatureFlag> =
+            self.temperature_ranges.iter().filter_map(|range| range.flag(&temperature_c)).collect();
+        let before = std::mem::take(&mut self.temperature_flags);
+        let point = self.points[self.next].number;
+        let fresh = flags.iter().filter(|flag| !before.iter().any(|b| b.certificate == flag.certificate));
+        let told = fresh.map(|flag| Event::TemperatureBeyondCertificate { point, flag: flag.clone() });
+        out.events.extend(told);
+        self.temperature_flags = flags;
+    }
+
+    /// Adds a row's fresh samples to the sums.
+    fn take(&mut self, row: &Row) {
+        let seen = &row.inputs.seen;
+        if let (true, Ok(lateral), Ok(normal)) = (row.usable, &seen.forces.lateral, &seen.forces.normal)
+            && self.sums.lateral_sequence != Some(lateral.sequence)
+        {
+            self.sums.lateral_sequence = Some(lateral.sequence);
+            self.sums.lateral.push(lateral.value);
+            self.sums.normal.push(normal.value);
+        }
+        if let Ok(amplifier) = &seen.amplifier {
+            if let Ok(amplitude) = &amplifier.amplitude {
+                self.sums.amplitude.push(amplitude.value);
+            }
+            if let Ok(temperature) = &amplifier.temperature_c {
+                self.sums.temperature.push(temperature.value);
+            }
+            self.sums.frequency_hz = amplifier.echoed_frequency_hz;
+        }
+        if let Ok(stage) = &seen.stage {
+            self.sums.speed.push(stage.velocity_m_s.abs());
+            self.sums.position.push(stage.position_m);
+        }
+    }
+
+    fn measure(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
+        if row.marker.phase == Phase::Measure {
+            self.take(row);
+            self.at_rig.during_pass();
+        }
+        if row.now.since(since) < Nanos::from_seconds(self.times.measure_s) {
+            return;
+        }
+        let point = self.points[self.next];
+        let normal = self.sums.normal.mean().unwrap_or(0.0);
+        // A pass that was never in contact says nothing about friction.
+        if normal < 0.3 * point.condition.normal_force_n {
+            self.tries += 1;
+            if self.tries >= TRIES {
+                out.commands.push(Command::Stop);
+                self.finish(out, Outcome::NoContact { point: point.number });
+                return;
+            }
+            out.events.push(Event::PassRepeated { point: point.number });
+            self.begin_next(row, out);
+            return;
+        }
+        self.tries = 0;
+        let (pass, levels) = self.pass_of(&point, since, normal, row.now);
+        let lost = levels.iter().filter_map(|level| level.planned.filter(|_| level.lost).map(|w| (level, w)));
+        out.events.extend(lost.map(|(level, wanted)| Event::LevelLost {
+            point: point.number,
+            quantity: level.quantity.clone(),
+            wanted,
+            range: level.range,
+        }));
+        let measured = MeasuredPass { levels, ..self.compare(pass, point.reference) };
+        if let Some(comparison) = &measured.comparison {
+            if let Some(mu0) = self.comparator.mu0() {
+                out.commands.push(Command::Mu0(mu0));
+            }
+            if comparison.departed && !self.departed {
+                self.departed = true;
+                let log_evidence = comparison.log_evidence;
+                out.events.push(Event::ModelDeparted { point: measured.pass.point, log_evidence });
+            }
+        }
+        out.pass = Some(measured);
+        self.next += 1;
+        self.begin_next(row, out);
+    }
+
+    fn pass_of(&self, point: &Point, since: Nanos, normal: f64, now: Nanos) -> (Pass, Vec<Level>) {
+        let sums = &self.sums;
+        let still = point.condition.amplitude == PeakToPeak::ZERO;
+        let measured = sums.amplitude.mean().unwrap_or(point.condition.amplitude.metres());
+        // What was planned of the air is not what was there.
+        let mut air = Condition {
+            ambient_pressure_pa: None,
+            temperature_c: None,
+            relative_humidity_pct: None,
+            ..point.condition
+        };
+        let levels = self.at_rig.levels(&point.condition, &mut air, now);
+        let condition = Condition {
+            amplitude: if still { PeakToPeak::ZERO } else { PeakToPeak::from_metres(measured.max(0.0)) },
+            frequency_hz: if still { point.condition.frequency_hz } else { sums.frequency_hz },
+            speed_m_s: sums.speed.mean().unwrap_or(point.condition.speed_m_s),
+            position_m: sums.position.mean().unwrap_or(point.condition.position_m),
+            normal_force_n: normal,
+            time_s: self.start_s + since.seconds(),
+            ..air.within(&self.ambient)
+        };
+        let pass = Pass {
+            normal_force_sd_n: sums.normal.sd(),
+            lateral_force_sd_n: sums.lateral.sd(),
+            samples: Some(sums.lateral.count()),
+            // The channel's, or none: two thermometers in one column would look like a change.
+            temperature_c: if self.at_rig.holds(1) { air.temperature_c } else { sums.temperature.mean() },
+            replicate: Some(u64::from(point.replicate)),
+            session: self.session,
+            ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
+        };
+        (pass, levels)
+    }
+
+    fn compare(&mut self, pass: Pass, reference: bool) -> MeasuredPass {
+        let mu0 = self.comparator.mu0().map_or(1.0, |m| m.value);
+        let condition = pass.condition(mu0).within(&self.ambient);
+        let comparison =
+            pass.friction_force_n().and_then(|f| self.comparator.pass(&*self.model, &condition, f).ok());
+        self.last_comparison = comparison.or(self.last_comparison);
+        let regime = self.model.predict(&condition).ok().map(|p| p.regime);
+        let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
+        let psi_eq17 =
+            known.map(|m| PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0);
+        let temperature_flags = self.temperature_flags.clone();
+        let levels = Vec::new();
+        MeasuredPass { pass, reference, comparison, regime, psi_eq17, temperature_flags, levels }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,150 @@
+//! The way to armed, as a sweep goes it: a reset once nothing stands in the way, the proof of the second channel after it.
+//!
+//! A machine that is short of time disturbs this in two ways, and nothing is driven in either. A board that is not heard for
+//! its age limit is a silent emergency stop: the supply is cut, and stays cut until it is proved. Its amplifier then shows a fault for
+//! as long as its supply is open: that is no reason to wait, since the proof is what closes it. And a proof in which the loop was held
+//! up is broken off: it is made again, so often as a reset is asked for at all. Both are told. With a human finger no proof is made
+//! again: the hand at the dead-man device must let go and grip anew, and a person starts anew.
+
+use super::events::{Event, Outcome};
+use realtime::ports::Nanos;
+use realtime::safety::{Cause, Limits, Trip, Unit};
+use realtime::turn::Row;
+
+/// Time to wait for the rig to arm.
+const ARM_WITHIN: Nanos = Nanos(10_000_000_000);
+/// Nothing may have stood in the way for this long before a reset is asked for.
+const CLEAR_FOR: Nanos = Nanos(50_000_000);
+/// A reset that found something in its way is asked for again, so often in all. Each waits until nothing stands in the way.
+const ASKS: u32 = 3;
+/// Time that the loop has to answer a reset.
+const ANSWER_WITHIN: Nanos = Nanos(200_000_000);
+
+/// What a row leads to, before the rig is armed.
+#[derive(Debug)]
+pub(super) enum Next {
+    /// Nothing yet.
+    Wait,
+    /// A reset is asked for; something may have to be told.
+    Ask(Option<Event>),
+    /// A proof was disturbed and is to be made again: this is told.
+    Again(Event),
+    /// The rig is armed.
+    Armed,
+    /// It does not arm.
+    GiveUp(Outcome),
+}
+
+/// One arming.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Arming {
+    since: Option<Nanos>,
+    clear_since: Option<Nanos>,
+    asked: Option<Nanos>,
+    asks: u32,
+    /// What stood in the way last.
+    in_the_way: Option<Cause>,
+    /// The trip that disturbed a proof last.
+    disturbed: Option<Trip>,
+    /// Longest lateness of a cycle since a reset was last asked for.
+    held_up: Nanos,
+    /// Lateness of a cycle from which on it is an overrun by itself.
+    overrun: Nanos,
+    human_contact: bool,
+    /// That the supply was cut was told already.
+    cut_told: bool,
+    /// The last cycle that was seen to prove the second channel.
+    proving: Option<u64>,
+}
+
+impl Arming {
+    pub(super) const fn new() -> Self {
+        Arming {
+            since: None,
+            clear_since: None,
+            asked: None,
+            asks: 0,
+            in_the_way: None,
+            disturbed: None,
+            held_up: Nanos(0),
+            overrun: Nanos(3_000_000),
+            human_contact: false,
+            cut_told: false,
+            proving: None,
+        }
+    }
+
+    /// The same, with the limits of the rig.
+    pub(super) fn guarded_by(self, limits: &Limits) -> Self {
+        let overrun = Nanos(u64::from(limits.late_in_a_row_max) * limits.timing.cycle.0);
+        Arming { overrun, human_contact: limits.human_contact, ..self }
+    }
+
+    /// The same rig, to be armed once more after a person was at it: its supply is open on purpose, which is no news.
+    pub(super) fn afresh(self) -> Self {
+        let Arming { overrun, human_contact, .. } = self;
+        Arming { overrun, human_contact, cut_told: true, ..Arming::new() }
+    }
+
+    /// Takes a row.
+    pub(super) fn row(&mut self, row: &Row) -> Next {
+        let since = *self.since.get_or_insert(row.now);
+        self.held_up = self.held_up.max(row.inputs.seen.lateness);
+        if row.armed {
+            return Next::Armed;
+        }
+        if let Some(trip) = row.tripped {
+            self.clear_since = None;
+            // A row that was lost may have armed the rig: then nothing is begun again without a person.
+            let broke_off_a_proof = self.proving.is_some_and(|cycle| cycle + 1 == row.cycle);
+            if !(broke_off_a_proof && self.is_made_again_after(&trip)) {
+                return Next::GiveUp(Outcome::Tripped(trip));
+            }
+            self.disturbed = Some(trip);
+            self.cut_told = trip.cause == Cause::EmergencyStop;
+            return Next::Again(self.disturbed_by(trip.cause));
+        }
+        self.proving = row.proving.then_some(row.cycle).or(self.proving);
+        // The second channel has not shown yet what it was told.
+        let unproved = row.proving.then_some(Cause::SupplySwitch);
+        if row.now.since(since) > ARM_WITHIN {
+            let last = self.disturbed.filter(|_| row.waits_for.is_none());
+            let blocking = row.waits_for.or(unproved).or(self.in_the_way);
+            return Next::GiveUp(last.map_or(Outcome::WouldNotArm { blocking }, Outcome::Tripped));
+        }
+        self.in_the_way = row.waits_for.or(self.in_the_way);
+        self.clear_since = if row.waits_for.is_none() { self.clear_since.or(Some(row.now)) } else { None };
+        let clear = self.clear_since.is_some_and(|at| row.now.since(at) >= CLEAR_FOR);
+        let unanswered = self.asked.is_none_or(|at| row.now.since(at) > ANSWER_WITHIN) && !row.proving;
+        if !(clear && unanswered && self.asks < ASKS) {
+            return Next::Wait;
+        }
+        // What was cut before anything was armed, and needs no person, was cut for a silent emergency stop.
+        let event = (row.supply_cut && !self.cut_told).then(|| self.disturbed_by(Cause::EmergencyStop));
+        (self.asked, self.held_up, self.cut_told) = (Some(row.now), Nanos(0), false);
+        self.asks += 1;
+        Next::Ask(event)
+    }
+
+    fn disturbed_by(&self, cause: Cause) -> Event {
+        Event::ArmingDisturbed { cause, held_up: self.held_up }
+    }
+
+    /// Whether the proof is made again after a trip that broke it off: the loop itself was late, or was held up while something that
+    /// only grows old grew too old. A relay that does not do what it is told is not among these, nor anything that an instrument says.
+    fn is_made_again_after(&self, trip: &Trip) -> bool {
+        let by_itself = matches!(trip.cause, Cause::Overrun | Cause::Suspended);
+        let grew_old = match trip.cause {
+            Cause::LateralStale | Cause::NormalStale | Cause::LateralInvalid | Cause::NormalInvalid => true,
+            Cause::AmplifierStale | Cause::StageStale => true,
+            // An age: silent. A flag: pressed, or open.
+            Cause::EmergencyStop | Cause::Interlock => trip.unit == Unit::Second,
+            _ => false,
+        };
+        let held_up = self.held_up >= self.overrun;
+        !self.human_contact && self.asks < ASKS && (by_itself || (grew_old && held_up))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,366 @@
+//! A sweep from beginning to end: opens the rig, runs the loop, keeps what comes of it.
+//!
+//! Two ways, one sequence: in wall-clock time with the loop on a thread of its own and instruments behind drivers, or in
+//! virtual time in this thread with the virtual rig's ports.
+
+mod fast;
+pub mod keeper;
+mod telemetry;
+
+pub use fast::{Rehearsal, rehearse, words};
+pub use keeper::{Keeper, REPLAYABLE, Replayable, unix_ns};
+pub use telemetry::{Extremes, Snapshot, Snapshots};
+
+use crate::ambient::{Answers, LevelsFound};
+use crate::plan::{Plan, Point, Resolution};
+use crate::run_dir::{Identity, RunDir};
+use crate::sequence::{Event, MeasuredPass, Outcome, PAUSE_MAX_S, Sequence};
+use crate::setup::{Guards, Setup};
+use crate::supervisor::OffReport;
+use calibration::certificate::sha256_hex;
+use models::prediction::FrictionModel;
+use realtime::clock::HeldBack;
+use realtime::compare::Agreement;
+use realtime::pacing::LoopReport;
+use realtime::witness::StallReport;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
+
+/// What is to be run.
+pub struct Job {
+    /// The rig.
+    pub setup: Setup,
+    /// The passes.
+    pub plan: Plan,
+    /// Seed of the order and of the virtual world.
+    pub seed: u64,
+    /// The model to compare with.
+    pub model: Arc<dyn FrictionModel>,
+    /// Text and name of the model file, where one was given.
+    pub model_file: Option<(String, String)>,
+    /// Defects of the virtual rig in place of its own.
+    pub defects: Option<sim::defects::Defects>,
+    /// Folder of the run.
+    pub out: PathBuf,
+    /// In virtual time.
+    pub fast: bool,
+    /// Who runs it, and on what: for the record.
+    pub notes: Notes,
+    /// A file with the answers of the person at the rig.
+    pub answers: Option<PathBuf>,
+}
+
+/// What a person says of a run. It stands in the record and on the report, and changes nothing.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Notes {
+    /// Who leads the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub operator: Option<String>,
+    /// Whose finger it is: what it was exposed to is counted under this name, whatever the rig.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub subject: Option<String>,
+    /// What is measured: the fingertip, its preparation, the plate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample: Option<String>,
+    /// Licence of the data: an SPDX identifier or an address.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub licence: Option<String>,
+}
+
+impl Notes {
+    /// These, and where they say nothing those of an earlier session.
+    #[must_use]
+    pub fn or(self, before: &Notes) -> Notes {
+        let or = |now: Option<String>, before: &Option<String>| now.or_else(|| before.clone());
+        Notes {
+            operator: or(self.operator, &before.operator),
+            subject: or(self.subject, &before.subject),
+            sample: or(self.sample, &before.sample),
+            licence: or(self.licence, &before.licence),
+        }
+    }
+}
+
+/// What happened, for whoever watches.
+pub enum Update<'a> {
+    /// A pass was kept: it is safe on the disk.
+    Pass(&'a MeasuredPass),
+    /// Something worth a line.
+    Event(&'a Event),
+    /// Passes made, planned, s to go.
+    Progress(usize, usize, f64),
+    /// A cycle ten times a second, and the extremes of all cycles since the last one.
+    State(&'a Snapshot),
+    /// The rig was switched off for the last time; comes before anything else is done, in wall-clock time.
+    Off(&'a OffReport),
+}
+
+/// What a run comes to. Its JSON form is what `muprime run --json` ends with.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Summary {
+    /// How it ended.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+    /// Requirement (`SR-..`) whose rule ended it or kept it from being armed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub requirement: Option<String>,
+    /// What to do about that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remedy: Option<String>,
+    /// Folder of the run.
+    pub folder: PathBuf,
+    /// Passes made in all sessions.
+    pub passes: usize,
+    /// Passes planned.
+    pub planned: usize,
+    /// Whether the model has left the measurement.
+    pub model_departed: bool,
+    /// What the comparison of all passes says.
+    #[serde(default = "nothing_said")]
+    pub agreement: Agreement,
+    /// The loop; `None` in virtual time.
+    pub loop_report: Option<LoopReport>,
+    /// When the machine kept ordinary threads from running; `None` in virtual time.
+    #[serde(default)]
+    pub stalls: Option<StallReport>,
+    /// Time that the clock of a virtual rig was held back while the computer kept threads of the run from
+    /// running; `None` where the clock cannot be held.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held: Option<HeldBack>,
+    /// Rows that the record lost.
+    pub record_lost: u64,
+    /// What the links counted, by instrument.
+    pub links: BTreeMap<String, serde_json::Value>,
+    /// Whether the rig was read back off in the end.
+    #[serde(default)]
+    pub off: OffReport,
+    /// Who ran it, and on what.
+    #[serde(default)]
+    pub notes: Notes,
+    /// The plan's `[protocol]`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub protocol: BTreeMap<String, toml::Value>,
+    /// What was found of the air, and typed at the rig.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<LevelsFound>,
+    /// Every pass had been made before: nothing was driven.
+    #[serde(default)]
+    pub finished_before: bool,
+    /// What is to be known of the rig's guards.
+    #[serde(default)]
+    pub guards: Guards,
+}
+
+/// The finding of a summary that was written before it had one.
+fn nothing_said() -> Agreement {
+    Agreement::of(None, false)
+}
+
+/// Why a run that had begun did not come to an orderly end. Anything else that goes wrong is a refusal: it comes before
+/// the rig or the folder of the run is touched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error, miette::Diagnostic)]
+pub enum Unfinished {
+    /// The sweep ran, and its record could not be kept.
+    #[error("the sweep had begun, and what came of it could not be kept")]
+    NotKept,
+    /// A thread hangs or has panicked: a fault of this program.
+    #[error("the sweep had begun; the instruments' own watchdogs switch off; what was measured is kept")]
+    Internal,
+    /// A signal ended it.
+    #[error("stopped by a signal")]
+    Interrupted,
+    /// The drive was not read back off.
+    #[error("the output may still be on: switch the supply off")]
+    NotOff,
+}
+
+/// What a run looks at while it goes on: what was asked of it from outside.
+#[derive(Clone, Debug, Default)]
+pub struct Signals {
+    /// How often a stop was asked for: SIGINT, SIGTERM, SIGHUP, or somebody who watches.
+    pub stops: Arc<AtomicUsize>,
+    /// Whether the sweep is to rest before its next pass. In virtual time nothing waits.
+    pub paused: Arc<AtomicBool>,
+}
+
+/// A run whose folder is open and whose passes are ordered.
+pub struct Begun {
+    /// The run's folder.
+    pub dir: RunDir,
+    /// The passes that are left, in their order.
+    pub sequence: Sequence,
+    /// Passes of the whole plan.
+    pub planned: usize,
+    /// Where this session begins on the run's clock in s.
+    pub start_s: f64,
+    /// Who answers for the person at the rig.
+    pub answers: Answers,
+}
+
+impl Begun {
+    /// Whether all passes were made in earlier sessions.
+    pub fn is_complete(&self) -> bool {
+        self.sequence.progress().1 == 0
+    }
+
+    /// The summary of a run that is complete: nothing is driven.
+    ///
+    /// # Errors
+    /// Whatever file system and SQLite say.
+    pub fn finish(self, job: &Job) -> miette::Result<Summary> {
+        Keeper::finish(job, self.dir, self.planned, self.sequence.agreement(true))
+    }
+}
+
+impl Job {
+    /// What the run is of.
+    pub fn identity(&self) -> Identity {
+        let model = self
+            .model_file
+            .as_ref()
+            .map_or_else(|| self.model.name().to_string(), |(_, text)| sha256_hex(text.as_bytes()));
+        Identity {
+            setup_sha256: self.setup.sha256(),
+            plan_sha256: sha256_hex(self.plan.text.as_bytes()),
+            seed: self.seed,
+            model,
+            nobody_touches_the_plate: self.setup.file.finger.nobody_touches_the_plate,
+            notes: self.notes.clone(),
+            protocol: self.plan.protocol(),
+        }
+    }
+
+    /// The passes of the plan, checked.
+    ///
+    /// # Errors
+    /// The values that the rig cannot do, or the first series whose expected change of force its sensor cannot
+    /// see, with their places in the plan.
+    pub fn points(&self) -> miette::Result<Vec<Point>> {
+        self.points_seen(None)
+    }
+
+    /// The same, with the noise in N that the lateral channel was found to have.
+    ///
+    /// # Errors
+    /// As [`Job::points`].
+    pub fn points_seen(&self, noise_n: Option<f64>) -> miette::Result<Vec<Point>> {
+        let resolution = self.resolution()?;
+        let points = self.plan.points(self.seed, &self.setup.config.limits, &resolution)?;
+        self.plan.check_ambient(&self.setup)?;
+        self.plan.check_reach(&self.setup.reaches()?)?;
+        if let Some(mut channel) = self.setup.lateral_channel()? {
+            channel.noise_n = noise_n.or(channel.noise_n);
+            let mu0 = self.setup.tip.mu0;
+            self.plan.check_visible(&points, &resolution, &*self.model, mu0, &channel)?;
+        }
+        Ok(points)
+    }
+
+    /// What the setup's amplifier can set, by its profile.
+    fn resolution(&self) -> miette::Result<Resolution> {
+        let amplifier = &self.setup.file.amplifier;
+        let profile = amplifier.description().map_err(|e| miette::miette!("{e}"))?;
+        let step = |name: &str| {
+            profile.set(name).map_or(0.0, |set| {
+                let described = &profile.description.set[set.0];
+                let per_unit = amplifier.amplitude_m_per_unit.filter(|_| name == "amplitude");
+                described.scale * per_unit.unwrap_or(described.si.factor)
+            })
+        };
+        Ok(Resolution { amplitude_pp_m: step("amplitude"), frequency_hz: step("frequency") })
+    }
+
+    /// Opens the run's folder and orders the passes that are left. Nothing is commanded, and nothing is written yet.
+    ///
+    /// # Errors
+    /// A refusal: passes that the rig cannot do, a folder of another run or of a living one.
+    pub fn begin(&mut self) -> miette::Result<Begun> {
+        let points = self.points()?;
+        let planned = points.len();
+        let answers = self.setup.answers(self.answers.as_deref(), self.asks_a_person())?;
+        let mut dir = RunDir::open(&self.out, &self.identity())?;
+        self.notes = dir.notes().clone();
+        let left = dir.left_of(points);
+        let session = dir.plan_session(keeper::unix_ns(), self.plan.file.pass.measure_s, self.fast);
+        let mut sequence = Sequence::new(
+            left,
+            crate::plan::times(&self.setup.reaches()?, self.plan.file.pass),
+            Arc::clone(&self.model),
+            &self.setup.tip,
+            self.setup.file.noise,
+        )
+        .watching(&self.setup.certificates.temperature_ranges)
+        .in_air(self.setup.ambient())
+        .at_rig(&self.plan, &self.setup)
+        .guarded_by(&self.setup.config.limits)
+        .on_rig(self.setup.guards(), self.setup.file.limits.pause_max_s.unwrap_or(PAUSE_MAX_S))
+        // In virtual time the loop's own time goes on from session to session.
+        .in_session(session.session, if self.fast { 0.0 } else { session.start_s });
+        for pass in &dir.made {
+            sequence.remember(pass);
+        }
+        Ok(Begun { dir, sequence, planned, start_s: session.start_s, answers })
+    }
+
+    /// Whether the run waits for a person at the rig.
+    pub fn asks_a_person(&self) -> bool {
+        let means = self.setup.file.means();
+        let air = self.plan.sets_air().into_iter().zip(means);
+        let sets = air.into_iter().any(|(sets, by)| sets && by.is_some_and(|by| by.needs_a_person()));
+        sets || !self.plan.file.step.is_empty()
+    }
+
+    /// Whether that person answers at the terminal.
+    pub fn asks_at_the_terminal(&self) -> bool {
+        self.asks_a_person() && self.answers.is_none() && self.setup.file.virtual_rig.is_none()
+    }
+
+    /// Runs the job in virtual time, as fast as it computes.
+    ///
+    /// # Errors
+    /// A refusal before anything was written (a rig with instruments among them), or a fault of this program.
+    pub fn run_in_virtual_time(
+        mut self,
+        signals: &Signals,
+        update: &mut dyn FnMut(Update<'_>),
+    ) -> miette::Result<Summary> {
+        let begun = self.begin()?;
+        if begun.is_complete() {
+            return begun.finish(&self);
+        }
+        fast::run(self, begun, signals, update)
+    }
+
+    /// The world of the virtual rig.
+    ///
+    /// # Errors
+    /// What a world cannot be.
+    pub fn world(&self) -> miette::Result<sim::world::World> {
+        let virtual_rig = self.setup.file.virtual_rig.clone().unwrap_or_default();
+        let mut config = virtual_rig.world();
+        // What the setup states of the air is so in its world.
+        let (air, room) = (self.setup.ambient(), &mut config.room);
+        room.ambient_pressure_pa = air.ambient_pressure_pa.unwrap_or(room.ambient_pressure_pa);
+        room.temperature_c = air.temperature_c.unwrap_or(room.temperature_c);
+        room.relative_humidity_pct = air.relative_humidity_pct.unwrap_or(room.relative_humidity_pct);
+        if let Some(defects) = &self.defects {
+            config.defects = defects.clone();
+        }
+        // The finger is the rig's: it stays the same from run to run, and only noise and order follow the seed.
+        let wrong = |e: sim::world::ConfigError| miette::miette!("the virtual rig: {e}");
+        let finger = sim::world::World::new(&config, virtual_rig.finger_seed).map_err(wrong)?.true_finger();
+        config.finger.normal_stiffness_n_per_m = finger.normal_stiffness_n_per_m;
+        config.finger.lateral_stiffness_n_per_m = finger.lateral_stiffness_n_per_m;
+        config.finger.stiffness_relative_sd = 0.0;
+        let mut world = sim::world::World::new(&config, self.seed).map_err(wrong)?;
+        if virtual_rig.hand_holds {
+            let holds_dead_man_from = Some(realtime::ports::Nanos(200_000_000));
+            world.set_operator(sim::world::Operator { holds_dead_man_from, ..world.operator() });
+        }
+        Ok(world)
+    }
+}

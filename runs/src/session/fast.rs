@@ -1,0 +1,195 @@
+//! A sweep in virtual time: one thread, no clock, the same bytes for the same seed.
+
+use super::keeper::{self, Keeper};
+use super::telemetry::Snapshots;
+use super::{Begun, Job, Signals, Summary, Update};
+use crate::ambient::{Answers, Bench, World};
+use crate::files::Placed;
+use crate::plan::{Plan, Resolution};
+use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
+use crate::setup::Setup;
+use crate::supervisor::{self, Asked, End, OffReport, VirtualLoop};
+use miette::{IntoDiagnostic, WrapErr};
+use models::prediction::FrictionModel;
+use realtime::compare::Agreement;
+use realtime::ports::Nanos;
+use realtime::recorder::Recorder;
+use realtime::turn::{Ports, Row};
+use sim::virtual_rig::{SharedRig, VirtualRig};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// A record in virtual time starts at this wall-clock time (2000-01-01), so that equal seeds give equal files.
+const EPOCH_UNIX_NS: u64 = 946_684_800_000_000_000;
+/// Rows between two flushes of the record: 50 ms at 1 kHz.
+const FLUSH_EVERY: u64 = 50;
+
+/// Runs a job in virtual time.
+pub fn run(
+    job: Job,
+    begun: Begun,
+    signals: &Signals,
+    news: &mut dyn FnMut(Update<'_>),
+) -> miette::Result<Summary> {
+    let Begun { dir, mut sequence, planned, start_s, answers } = begun;
+    if job.setup.file.virtual_rig.is_none() {
+        miette::bail!(
+            help = "leave --fast out, or give the setup a [virtual] section",
+            "'{}' is a real rig: it cannot run in virtual time",
+            job.setup.file.name
+        );
+    }
+    let world = VirtualRig::of(job.world()?).split();
+    let air = World::Virtual(world[0].clone());
+    let mut bench = Bench::open(&sequence, None, Some(air), answers)?;
+    let ports = ports_of(&job, world);
+    let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
+    let mut kept = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
+    let rig =
+        VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports).from(Nanos::from_seconds(start_s));
+    let record = kept.new_record().and_then(|file| {
+        let disk = file.handle()?;
+        Ok((Recorder::begin(file, preamble).into_diagnostic()?, disk))
+    });
+    let (swept, off) = match record {
+        Ok(record) => sweep(rig, record, &mut kept, (&mut sequence, &mut bench), signals, news),
+        // Before the first row nothing has been driven.
+        Err(why) => (Err(why), OffReport::off()),
+    };
+    let outcome = swept.unwrap_or_else(|why| {
+        tracing::error!("the record could not be kept: the sweep was stopped: {why:#}");
+        Outcome::RecordLost
+    });
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(kept.end(outcome, agreement, None, 0, BTreeMap::new(), off))
+}
+
+/// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
+fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> Ports {
+    let force = job.setup.certificates.calibrated(Box::new(force));
+    let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
+    let mut ports = Ports::new(force, amplifier, Box::new(stage.clone()));
+    if job.setup.file.supply_relay.is_some() {
+        ports = ports.with_supply(Box::new(stage.clone()));
+    }
+    if job.setup.file.safety_inputs.is_some() {
+        ports = ports.with_contacts(Box::new(stage));
+    }
+    ports
+}
+
+/// Sweeps, and ends the record; says what became of the output too.
+fn sweep(
+    mut rig: VirtualLoop,
+    (mut recorder, disk): (Recorder<Placed>, Placed),
+    kept: &mut Keeper,
+    (sequence, bench): (&mut Sequence, &mut Bench),
+    signals: &Signals,
+    news: &mut dyn FnMut(Update<'_>),
+) -> (miette::Result<Outcome>, OffReport) {
+    // What cannot be kept ends the sweep.
+    let unkept = RefCell::new(None);
+    let mut knows = false;
+    let mut ask = || {
+        // In virtual time there is nothing to wait for: a pause would only fill the record.
+        let ends = |end| Asked { end, pause: false };
+        if !knows && unkept.borrow().is_some() {
+            knows = true;
+            return ends(Some(End::NotKept));
+        }
+        ends((signals.stops.swap(0, Ordering::Relaxed) > 0).then_some(End::Asked))
+    };
+    let mut snapshots = Snapshots::default();
+    let mut keep = |row: &Row, sequence: &Sequence, reaction: Reaction| -> miette::Result<()> {
+        recorder.row(row).into_diagnostic()?;
+        if let Some(snapshot) = snapshots.take(row) {
+            news(Update::State(&snapshot));
+        }
+        keeper::record(&mut recorder, row.now, &reaction.events, reaction.pass.as_ref())?;
+        kept.keep(&reaction.events, reaction.pass.as_ref(), news)?;
+        if reaction.pass.is_some() {
+            disk.still_there()?;
+            let (done, all) = sequence.progress();
+            news(Update::Progress(done, all, sequence.remaining_s()));
+        }
+        if row.cycle.is_multiple_of(FLUSH_EVERY) {
+            recorder.flush().into_diagnostic()?;
+        }
+        Ok(())
+    };
+    let outcome = supervisor::sweep(&mut rig, sequence, &mut ask, &mut |row, sequence, reaction| {
+        bench.serve(row.now, sequence, &reaction);
+        if unkept.borrow().is_none() {
+            *unkept.borrow_mut() = keep(row, sequence, reaction).err();
+        }
+    });
+    // The stop reaches the rig, so that the record shows the safe state; kept or not, off comes first.
+    let mut recorded = Ok(());
+    let off = rig.end(&mut |row| {
+        if recorded.is_ok() {
+            recorded = recorder.row(row);
+        }
+    });
+    let ended = || {
+        unkept.into_inner().map_or(Ok(()), Err)?;
+        recorded.into_diagnostic()?;
+        let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
+        recorder.end(last).into_diagnostic().wrap_err("the record")?;
+        disk.sync()?;
+        Ok(outcome)
+    };
+    (ended(), off)
+}
+
+/// What a sweep in memory comes to.
+#[derive(Clone, Debug)]
+pub struct Rehearsal {
+    /// The passes.
+    pub passes: Vec<MeasuredPass>,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// What they say of the model in the end.
+    pub agreement: Agreement,
+    /// Cycles run.
+    pub cycles: u64,
+}
+
+/// Runs a plan on a world in virtual time and keeps nothing: for statistics, and to see beforehand what a plan shows.
+///
+/// # Errors
+/// A plan that the limits do not allow, or a world that cannot be.
+pub fn rehearse(
+    setup: &Setup,
+    plan: &Plan,
+    seed: u64,
+    world: &sim::world::WorldConfig,
+    model: Arc<dyn FrictionModel>,
+) -> miette::Result<Rehearsal> {
+    let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
+    let points = plan.points(seed, &setup.config.limits, &resolution)?;
+    let mut sequence =
+        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
+            .in_air(setup.ambient())
+            .at_rig(plan, setup);
+    let [force, amplifier, stage] =
+        VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
+    let air = World::Virtual(force.clone());
+    let mut bench = Bench::open(&sequence, None, Some(air), Answers::Simulated)?;
+    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
+    let mut rig = VirtualLoop::new(setup.config, model, ports);
+    let mut passes = Vec::new();
+    let outcome =
+        supervisor::sweep(&mut rig, &mut sequence, &mut Asked::default, &mut |row, sequence, reaction| {
+            bench.serve(row.now, sequence, &reaction);
+            passes.extend(reaction.pass);
+        });
+    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    Ok(Rehearsal { passes, outcome, agreement, cycles: rig.cycles() })
+}
+
+/// An outcome as JSON, for the record's last words.
+pub fn words(outcome: &Outcome) -> miette::Result<String> {
+    serde_json::to_string(outcome).into_diagnostic()
+}

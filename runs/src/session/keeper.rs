@@ -1,0 +1,288 @@
+//! Keeps what a sweep yields: record, point table, catalogue. It runs beside the loop and may touch files.
+#![allow(clippy::disallowed_methods, reason = "a run says when it began")]
+
+use super::{Job, Notes, Summary, Unfinished, Update};
+use crate::ambient::levels_of;
+use crate::catalogue::{Catalogue, RunEntry};
+use crate::files::Placed;
+use crate::run_dir::RunDir;
+use crate::sequence::{Event, MeasuredPass, Outcome};
+use crate::setup::Guards;
+use crate::supervisor::OffReport;
+use miette::{IntoDiagnostic, WrapErr};
+use models::finger::Finger;
+use realtime::clock::HeldBack;
+use realtime::compare::Agreement;
+use realtime::cycle::Config;
+use realtime::pacing::LoopReport;
+use realtime::ports::Nanos;
+use realtime::recorder::Preamble;
+use realtime::safety::Cause;
+use realtime::witness::StallReport;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Name of the file that says how a run ended.
+const SUMMARY: &str = "summary.json";
+/// Name of the file in a record that a replay needs.
+pub const REPLAYABLE: &str = "loop.json";
+
+/// What the loop was built from, so that its rows can be run again; the model is that of the finger where the record holds
+/// no model file.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Replayable {
+    /// Limits, timing, estimate.
+    pub config: Config,
+    /// The finger of the baseline model.
+    pub finger: Finger,
+}
+
+/// The open files of a run.
+pub struct Keeper {
+    dir: RunDir,
+    catalogue: Catalogue,
+    folder: String,
+    passes: usize,
+    planned: usize,
+    protocol: BTreeMap<String, toml::Value>,
+    departed: bool,
+    /// The catalogue could not be written: it is left alone until the end.
+    unnoted: bool,
+    guards: Guards,
+}
+
+/// The wall clock, in ns since 1970.
+pub fn unix_ns() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64)
+}
+
+/// What goes first into the record of a job.
+pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
+    let identity = job.identity();
+    let facts = [
+        ("muprime_version", env!("CARGO_PKG_VERSION").to_string()),
+        ("setup", job.setup.file.name.clone()),
+        ("setup_sha256", identity.setup_sha256),
+        ("plan", job.plan.file.name.clone()),
+        ("plan_sha256", identity.plan_sha256),
+        ("seed", identity.seed.to_string()),
+        ("model", job.model.name().to_string()),
+        ("model_identity", identity.model),
+        ("fingertip", job.setup.tip.name.clone()),
+        ("clock", if job.fast { "virtual" } else { "monotonic" }.to_string()),
+        ("start_unix_ns", start_unix_ns.to_string()),
+        ("amplitude_convention", "w is peak-to-peak everywhere".to_string()),
+    ];
+    let mut files = vec![
+        ("setup.toml".to_string(), job.setup.text.clone()),
+        ("plan.toml".to_string(), job.plan.text.clone()),
+        ("rig.toml".to_string(), job.setup.rig_file().to_toml().into_diagnostic()?),
+    ];
+    let replayed = Replayable { config: job.setup.config, finger: job.setup.tip.finger };
+    files.push((REPLAYABLE.to_string(), serde_json::to_string_pretty(&replayed).into_diagnostic()?));
+    files.extend(job.model_file.clone());
+    files.extend(job.setup.certificates.files.iter().cloned());
+    files.extend(job.setup.profiles().into_iter().map(|(name, text)| (format!("profiles/{name}"), text)));
+    let Notes { operator, subject, sample, licence } = &job.notes;
+    let notes = [("operator", operator), ("subject", subject), ("sample", sample), ("licence", licence)];
+    let notes = notes.into_iter().filter_map(|(k, v)| Some((k, v.clone()?)));
+    let facts = facts.into_iter().chain(job.setup.guards().facts()).chain(notes);
+    let words = |value: &toml::Value| value.as_str().map_or_else(|| value.to_string(), String::from);
+    let protocol = identity.protocol.iter().map(|(key, value)| (format!("protocol.{key}"), words(value)));
+    let facts = facts.map(|(k, v)| (k.to_string(), v)).chain(protocol).collect();
+    Ok(Preamble { start_unix_ns, facts, files })
+}
+
+impl Keeper {
+    /// Opens the catalogue, begins a session of the run and enters it.
+    ///
+    /// # Errors
+    /// Whatever file system and SQLite say: a refusal as long as nothing stays behind.
+    pub fn begin(job: &Job, mut dir: RunDir, planned: usize, start_unix_ns: u64) -> miette::Result<Self> {
+        let catalogue = Self::catalogue(&dir)?;
+        dir.begin().wrap_err(Unfinished::NotKept)?;
+        Self::enter(job, dir, catalogue, planned, start_unix_ns).wrap_err(Unfinished::NotKept)
+    }
+
+    /// The end of a run whose passes were all made in earlier sessions: nothing is driven. What an earlier session wrote at its
+    /// end stays; where none came so far, it is written now.
+    ///
+    /// # Errors
+    /// Whatever file system and SQLite say.
+    pub fn finish(
+        job: &Job,
+        mut dir: RunDir,
+        planned: usize,
+        agreement: Agreement,
+    ) -> miette::Result<Summary> {
+        dir.stay();
+        let written = std::fs::read(dir.path().join(SUMMARY)).ok();
+        let written: Option<Summary> = written.and_then(|text| serde_json::from_slice(&text).ok());
+        if let Some(summary) = written.filter(|s| s.outcome == Outcome::Complete && s.passes == planned) {
+            return Ok(Summary { folder: dir.path().to_path_buf(), finished_before: true, ..summary });
+        }
+        let catalogue = Self::catalogue(&dir)?;
+        let kept = Self::enter(job, dir, catalogue, planned, unix_ns()).wrap_err(Unfinished::NotKept)?;
+        Ok(Summary {
+            finished_before: true,
+            ..kept.end(Outcome::Complete, agreement, None, 0, BTreeMap::new(), OffReport::off())
+        })
+    }
+
+    fn catalogue(dir: &RunDir) -> miette::Result<Catalogue> {
+        let runs = dir
+            .path()
+            .parent()
+            .filter(|p| !p.as_os_str().is_empty())
+            .map_or_else(|| std::path::PathBuf::from("."), std::path::Path::to_path_buf);
+        Catalogue::open(&runs)
+    }
+
+    fn enter(
+        job: &Job,
+        dir: RunDir,
+        catalogue: Catalogue,
+        planned: usize,
+        start_unix_ns: u64,
+    ) -> miette::Result<Self> {
+        dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())?;
+        let folder = dir.path().file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let passes = dir.made.len();
+        catalogue.begin(&RunEntry {
+            folder: folder.clone(),
+            plan: job.plan.file.name.clone(),
+            setup: job.setup.file.name.clone(),
+            started_unix_s: start_unix_ns as f64 * 1e-9,
+            outcome: String::new(),
+            passes: passes as i64,
+            planned: planned as i64,
+            departed: false,
+        })?;
+        let guards = job.setup.guards();
+        let (protocol, departed, unnoted) = (job.plan.protocol(), false, false);
+        Ok(Keeper { dir, catalogue, folder, passes, planned, protocol, departed, unnoted, guards })
+    }
+
+    /// Keeps what a row led to and passes it on. Returns the pass, once it is safe.
+    ///
+    /// # Errors
+    /// Whatever file system and SQLite say: the sweep must stop then. Passes that come until it has stopped may still be given
+    /// here: they are kept where they can be.
+    pub fn keep(
+        &mut self,
+        events: &[Event],
+        pass: Option<&MeasuredPass>,
+        news: &mut dyn FnMut(Update<'_>),
+    ) -> miette::Result<()> {
+        for event in events {
+            self.departed |= matches!(event, Event::ModelDeparted { .. });
+            news(Update::Event(event));
+        }
+        if let Some(pass) = pass {
+            self.dir.keep(pass)?;
+            self.passes += 1;
+            let noted = if self.unnoted { Ok(()) } else { self.note() };
+            self.unnoted |= noted.is_err();
+            news(Update::Pass(pass));
+            return noted;
+        }
+        Ok(())
+    }
+
+    fn note(&self) -> miette::Result<()> {
+        self.catalogue.progress(&self.folder, self.passes as i64, self.departed)
+    }
+
+    /// Ends the run: catalogue, summary, report. What cannot be written is said, and makes a sweep that went well one whose
+    /// record is lost; the summary is returned all the same.
+    pub fn end(
+        mut self,
+        outcome: Outcome,
+        agreement: Agreement,
+        machine: Option<(LoopReport, StallReport, Option<HeldBack>)>,
+        record_lost: u64,
+        links: BTreeMap<String, serde_json::Value>,
+        off: OffReport,
+    ) -> Summary {
+        let (loop_report, stalls, held) =
+            machine.map_or((None, None, None), |(report, stalls, held)| (Some(report), Some(stalls), held));
+        let mut summary = Summary {
+            requirement: outcome.cause().and_then(Cause::requirement).map(String::from),
+            remedy: outcome.cause().map(|cause| cause.remedy().to_string()),
+            outcome,
+            folder: self.dir.path().to_path_buf(),
+            passes: self.passes,
+            planned: self.planned,
+            model_departed: agreement == Agreement::Departed,
+            agreement,
+            loop_report,
+            stalls,
+            held,
+            record_lost,
+            links,
+            off,
+            notes: self.dir.notes().clone(),
+            protocol: self.protocol.clone(),
+            // As far as it can be read: a table that cannot is said below.
+            levels: crate::run_dir::passes_in(self.dir.path()).map_or_else(|_| Vec::new(), |p| levels_of(&p)),
+            finished_before: false,
+            guards: self.guards.clone(),
+        };
+        self.departed |= summary.model_departed;
+        // The catalogue last: what it calls complete has its summary and its report.
+        let written = [self.write_end(&summary), self.note_end(&summary)];
+        let mut kept = true;
+        for why in written.iter().filter_map(|w| w.as_ref().err()) {
+            kept = false;
+            tracing::error!("the end of the run could not be kept: {why:#}");
+        }
+        if !kept && matches!(summary.outcome, Outcome::Complete | Outcome::Stopped) {
+            summary.outcome = Outcome::RecordLost;
+            // As far as it goes: one of the two has just failed.
+            let _ = (self.write_end(&summary), self.note_end(&summary));
+        }
+        summary
+    }
+
+    fn write_end(&self, summary: &Summary) -> miette::Result<()> {
+        let text = serde_json::to_vec_pretty(summary).into_diagnostic()?;
+        self.dir.write(SUMMARY, &text).wrap_err("the summary")?;
+        let html = crate::report::html(self.dir.path()).wrap_err("the report")?;
+        self.dir.write("report.html", html.as_bytes()).wrap_err("the report")
+    }
+
+    fn note_end(&self, summary: &Summary) -> miette::Result<()> {
+        let word = serde_json::to_value(&summary.outcome).into_diagnostic()?;
+        let word = word.get("outcome").and_then(|o| o.as_str()).unwrap_or("?").to_string();
+        self.note()?;
+        self.catalogue.end(&self.folder, &word)
+    }
+
+    /// A new record file of the run.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn new_record(&self) -> miette::Result<Placed> {
+        self.dir.new_record().wrap_err(Unfinished::NotKept)
+    }
+}
+
+/// Writes what a row led to into a record.
+///
+/// # Errors
+/// Whatever the file says.
+pub fn record<W: std::io::Write>(
+    recorder: &mut realtime::recorder::Recorder<W>,
+    at: Nanos,
+    events: &[crate::sequence::Event],
+    pass: Option<&MeasuredPass>,
+) -> miette::Result<()> {
+    for event in events {
+        recorder.event(at, event).into_diagnostic()?;
+    }
+    if let Some(pass) = pass {
+        recorder.pass(at, pass).into_diagnostic()?;
+    }
+    Ok(())
+}

@@ -1,0 +1,195 @@
+//! Who touches the plate, what a person's finger needs, and what a setup says twice.
+//!
+//! Each fact is stated in one place: who touches the plate by the fingertip's kind, what an instrument has by its profile. A key
+//! that says something else is refused: the harmless one of two statements never wins.
+
+use super::SetupFile;
+use crate::fingertip::{Fingertip, Kind};
+use crate::input::Problems;
+use drivers::InstrumentSetup;
+use instruments::Profile;
+use std::net::SocketAddr;
+
+/// Whether a person's finger is on the plate, so that its guards apply. A virtual rig vibrates nobody: there `human_contact` asks
+/// for a rehearsal of the guards.
+pub(super) fn person(file: &SetupFile, tip: Option<&Fingertip>) -> bool {
+    let human = tip.is_some_and(|tip| tip.kind == Kind::Human);
+    let rehearsed = file.limits.human_contact == Some(true);
+    human && !file.finger.nobody_touches_the_plate && (rehearsed || file.virtual_rig.is_none())
+}
+
+/// Whether the profile of an instrument has a signal.
+fn has(instrument: &InstrumentSetup, signal: &str) -> bool {
+    instrument.description().is_ok_and(|profile| profile.signal(signal).is_some())
+}
+
+/// Whether a setup has a safety contact with a device on it.
+pub(super) fn is_wired(file: &SetupFile, contact: &str) -> bool {
+    file.safety_inputs.as_ref().is_some_and(|board| board.is_wired(contact) && has(board, contact))
+}
+
+/// Contacts that the board has and the setup declares to have no device.
+pub(super) fn not_wired(file: &SetupFile) -> Vec<String> {
+    let Some(board) = &file.safety_inputs else { return Vec::new() };
+    let named = ["emergency_stop", "interlock", "dead_man"].into_iter();
+    named.filter(|name| has(board, name) && !board.is_wired(name)).map(String::from).collect()
+}
+
+/// How long an instrument waits for a heartbeat, in ms: none where it has no watchdog, and none inside where its profile does not say.
+fn waits(instrument: &InstrumentSetup) -> Option<Option<u32>> {
+    let profile = instrument.description().ok()?;
+    profile.heartbeat().map(|heartbeat| heartbeat.timeout_ms)
+}
+
+/// Whether the amplifier, and whether its supply's switch, falls by itself when this program dies.
+pub(super) fn watchdogs(file: &SetupFile) -> (bool, bool) {
+    (waits(&file.amplifier).is_some(), file.supply_relay.as_ref().and_then(waits).is_some())
+}
+
+/// What happens to output and stage when this program dies, in words; nothing of a virtual rig, which ends with it.
+pub(super) fn if_this_program_dies(file: &SetupFile) -> String {
+    if file.virtual_rig.is_some() {
+        return String::new();
+    }
+    let within = |ms: Option<u32>| ms.map_or_else(String::new, |ms| format!(" within {ms} ms"));
+    let output = match (waits(&file.amplifier), file.supply_relay.as_ref().and_then(waits)) {
+        (Some(ms), _) => format!("the amplifier switches off by itself{}", within(ms)),
+        (None, Some(ms)) => format!("the supply relay opens by itself{}", within(ms)),
+        (None, None) => "the output stays on".into(),
+    };
+    match waits(&file.stage) {
+        Some(ms) => format!("{output}; the stage stops by itself{}", within(ms)),
+        None => format!("{output}; the stage goes on as it was told"),
+    }
+}
+
+/// Puts in what a person's finger lacks.
+pub(super) fn guarded(file: &SetupFile, tip: Option<&Fingertip>, wrong: &mut Problems<'_>) {
+    if !person(file, tip) {
+        return;
+    }
+    let (amplifier, supply) = watchdogs(file);
+    let hand = is_wired(file, "dead_man") || file.limits.dead_man_key == Some(true);
+    let needs = [
+        (file.supply_relay.is_some(), "a second switch-off channel ([supply_relay])"),
+        (is_wired(file, "emergency_stop"), "an emergency stop ([safety_inputs])"),
+        (hand, "a dead-man device ([safety_inputs])"),
+        (has(&file.amplifier, "temperature"), "an amplifier whose temperature is read (temperature_fitted)"),
+        (
+            amplifier || supply || file.virtual_rig.is_some(),
+            "a watchdog at the amplifier or at its supply relay (a profile with `heartbeat`, such as wago-750-watchdog): without one \
+             the output stays on if this program dies",
+        ),
+    ];
+    let missing: Vec<&str> = needs.iter().filter(|(there, _)| !there).map(|(_, what)| *what).collect();
+    if !missing.is_empty() {
+        let tip = tip.map_or("", |tip| tip.name.as_str());
+        wrong.add(
+            &["finger", "tip"],
+            format!(
+                "the fingertip '{tip}' is a person's (kind = \"human\"): it needs {}",
+                missing.join(", and ")
+            ),
+            "fit what is missing; where nobody touches the plate and only the numbers are wanted, write \
+             nobody_touches_the_plate = true in [finger]"
+                .to_string(),
+        );
+    }
+}
+
+/// Puts in every key that contradicts what the fingertip, a profile or an address says.
+pub(super) fn contradictions(file: &SetupFile, tip: Option<&Fingertip>, wrong: &mut Problems<'_>) {
+    if let Some(tip) = tip {
+        who_touches(file, tip, wrong);
+    }
+    let limits = &file.limits;
+    if limits.temperature_fitted == Some(false) && has(&file.amplifier, "temperature") {
+        wrong.add(
+            &["limits", "temperature_fitted"],
+            format!(
+                "temperature_fitted = false, and the amplifier's profile `{}` reads a temperature",
+                file.amplifier.profile
+            ),
+            "leave temperature_fitted out; where the profile is wrong, copy it and take the temperature out"
+                .to_string(),
+        );
+    }
+    let loads = |profile: &Profile| profile.set("load").is_some();
+    if file.stage.dead_weight_n.is_some() && file.stage.description().is_ok_and(|profile| loads(&profile)) {
+        wrong.add(
+            &["stage", "dead_weight_n"],
+            format!("dead_weight_n, and the stage's profile `{}` loads the finger itself", file.stage.profile),
+            "leave dead_weight_n out; where weights do load the finger, copy the profile and take `load` out of it".to_string(),
+        );
+    }
+    if limits.dead_man_key == Some(true) && is_wired(file, "dead_man") {
+        wrong.add(
+            &["limits", "dead_man_key"],
+            "dead_man_key = true, and a dead-man device is wired ([safety_inputs])",
+            "leave dead_man_key out; where no device is on that contact, name the others in `wired`"
+                .to_string(),
+        );
+    }
+    if file.virtual_rig.is_some() {
+        real_addresses(file, wrong);
+    }
+}
+
+/// The keys that speak of a person, against the fingertip.
+fn who_touches(file: &SetupFile, tip: &Fingertip, wrong: &mut Problems<'_>) {
+    let (nobody, contact) = (file.finger.nobody_touches_the_plate, file.limits.human_contact);
+    let human = tip.kind == Kind::Human;
+    let say_nobody = "leave human_contact out; where nobody touches the plate, write nobody_touches_the_plate = true in [finger]";
+    let (path, problem, remedy): (&[&str], _, _) = match (human, nobody, contact) {
+        (false, true, _) => (
+            &["finger", "nobody_touches_the_plate"],
+            format!("nobody_touches_the_plate, and the fingertip '{}' is no person's", tip.name),
+            "leave it out",
+        ),
+        (false, _, Some(true)) => (
+            &["limits", "human_contact"],
+            format!("human_contact = true, and the fingertip '{}' is no person's", tip.name),
+            "who touches the plate is said by the fingertip: name one of kind = \"human\" as finger.tip",
+        ),
+        (true, true, Some(true)) => (
+            &["limits", "human_contact"],
+            "human_contact = true, and nobody_touches_the_plate = true in [finger]".to_string(),
+            "leave one of them out",
+        ),
+        (true, false, Some(false)) if file.virtual_rig.is_none() => (
+            &["limits", "human_contact"],
+            format!("human_contact = false, and the fingertip '{}' is a person's", tip.name),
+            say_nobody,
+        ),
+        _ => return,
+    };
+    wrong.add(path, problem, remedy.to_string());
+}
+
+/// A virtual rig serves its instruments itself: an address that something else may have is none of its.
+fn real_addresses(file: &SetupFile, wrong: &mut Problems<'_>) {
+    use instruments::schema::LinkKind;
+    for (table, instrument) in super::profiles::all_of(file) {
+        let address = instrument.address.as_str();
+        let Ok(profile) = instrument.description() else { continue };
+        let served = match profile.description.link.kind {
+            LinkKind::Can | LinkKind::Canopen => address.starts_with("slcan:") || address.starts_with("vcan"),
+            LinkKind::Sysfs | LinkKind::Serial | LinkKind::ModbusRtu => true,
+            LinkKind::ModbusTcp if address.starts_with("rtu:") => true,
+            LinkKind::ModbusTcp | LinkKind::Scpi | LinkKind::Tcp | LinkKind::Udp => {
+                address.parse::<SocketAddr>().is_ok_and(|socket| socket.ip().is_loopback())
+            }
+        };
+        if !served {
+            let place = if table == "force" { vec![table] } else { vec![table, "address"] };
+            wrong.add(
+                &place,
+                format!(
+                    "[virtual], and `{}` at {address}, which the virtual rig does not serve",
+                    instrument.profile
+                ),
+                "take [virtual] out for a real rig; a virtual one has 127.0.0.1:0, pty or vcan0".to_string(),
+            );
+        }
+    }
+}

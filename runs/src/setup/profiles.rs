@@ -1,0 +1,370 @@
+//! A setup's instruments against their profiles: what is named exists, and fits what it is named for.
+
+use super::{Setup, SetupFile};
+use calibration::certificate::sha256_hex;
+use drivers::endpoint::Endpoint;
+use drivers::library::{Library, Source};
+use drivers::ports::compose;
+use drivers::{InstrumentSetup, bundled};
+use instruments::schema::LinkKind;
+use instruments::traffic::LineSetup;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+/// A folder that the command line names.
+static NAMED: OnceLock<PathBuf> = OnceLock::new();
+
+/// Profiles are looked for in this folder too, from now on. The first call counts.
+pub fn look_in(folder: Option<PathBuf>) {
+    if let Some(folder) = folder {
+        let _ = NAMED.set(folder);
+    }
+}
+
+/// The named folder and the user's own, `~/.config/muprime/profiles`.
+pub fn library() -> Library {
+    let home = || std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".config"));
+    let config =
+        std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).filter(|p| p.is_absolute()).or_else(home);
+    let own = config.map(|config| config.join("muprime/profiles"));
+    Library::of(NAMED.get().cloned().into_iter().chain(own).collect())
+}
+
+/// Where a problem stands in the setup, as a path of keys, and what it is.
+type Problem = (Vec<&'static str>, String);
+
+/// Reads the profiles that do not come with the program, and puts each beside its instrument. Returns those that cannot be read.
+pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Vec<Problem> {
+    let library = library();
+    let mut read: BTreeMap<String, Arc<Source>> = BTreeMap::new();
+    let mut problems = Vec::new();
+    let mut one = |name: &mut String, source: &mut Option<Arc<Source>>, place: Vec<&'static str>| {
+        let found = match library.find(name, folder) {
+            Ok(Some(found)) => found,
+            Ok(None) => return,
+            Err(error) => return problems.push((place, error.to_string())),
+        };
+        let kept = read.entry(found.id.clone()).or_insert_with(|| Arc::clone(&found));
+        if kept.text != found.text || kept.files != found.files {
+            let (a, b) = (kept.origin.display(), found.origin.display());
+            let problem =
+                format!("{a} and {b} are two profiles of one id, `{}`: give one another `id`", found.id);
+            return problems.push((place, problem));
+        }
+        name.clone_from(&kept.id);
+        *source = Some(Arc::clone(kept));
+    };
+    for instrument in &mut file.force {
+        one(&mut instrument.profile, &mut instrument.source, vec!["force"]);
+    }
+    let SetupFile { amplifier, stage, supply_relay, safety_inputs, chamber, vibrometer, .. } = file;
+    for (table, instrument) in [("amplifier", Some(amplifier)), ("stage", Some(stage))]
+        .into_iter()
+        .chain([("supply_relay", supply_relay.as_mut()), ("safety_inputs", safety_inputs.as_mut())])
+        .chain([("chamber", chamber.as_mut())])
+    {
+        if let Some(instrument) = instrument {
+            one(&mut instrument.profile, &mut instrument.source, vec![table, "profile"]);
+        }
+    }
+    if let Some(vibrometer) = vibrometer {
+        one(&mut vibrometer.profile, &mut vibrometer.source, vec!["vibrometer", "profile"]);
+    }
+    problems
+}
+
+/// The instruments of a setup with the table in which each stands.
+pub(super) fn all_of(file: &SetupFile) -> Vec<(&'static str, &InstrumentSetup)> {
+    let force = file.force.iter().map(|instrument| ("force", instrument));
+    let relay = file.supply_relay.iter().map(|instrument| ("supply_relay", instrument));
+    let inputs = file.safety_inputs.iter().map(|instrument| ("safety_inputs", instrument));
+    force.chain([("amplifier", &file.amplifier), ("stage", &file.stage)]).chain(relay).chain(inputs).collect()
+}
+
+/// Whether every instrument can be what the setup names it for, on the line that the setup states: all that do not.
+pub(super) fn fit(file: &SetupFile) -> Vec<Problem> {
+    let all = all_of(file);
+    let mut problems = Vec::new();
+    for &(table, instrument) in &all {
+        let place = |key: &'static str| if table == "force" { vec![table] } else { vec![table, key] };
+        if let Err((key, problem)) = one_fits(table, instrument) {
+            let problem = format!("instrument `{}` at {}: {problem}", instrument.profile, instrument.address);
+            problems.push((place(key), problem));
+            continue;
+        }
+        if file.virtual_rig.is_some() && instrument.address.starts_with("tcp:") {
+            let said = "the virtual rig serves a serial line as `pty` or at a path, not over TCP";
+            problems.push((place("address"), said.into()));
+            continue;
+        }
+        if file.virtual_rig.is_some() {
+            let served = instrument.description().map_err(|error| error.to_string());
+            let served = served.and_then(|profile| {
+                sim::wire::device::Device::new(profile).map(drop).map_err(|error| error.to_string())
+            });
+            problems.extend(served.err().map(|problem| (place("profile"), problem)));
+        }
+    }
+    if problems.is_empty() {
+        problems.extend(twice(&all));
+        problems.extend(share_lines(&all).err());
+    }
+    problems
+}
+
+/// Instruments of different profiles at one place, where only one of them can be. One board may be named for two things.
+fn twice(all: &[(&'static str, &InstrumentSetup)]) -> Vec<Problem> {
+    let place = |instrument: &InstrumentSetup| {
+        let link = instrument.description().ok()?.description.link;
+        let number = match link.kind {
+            LinkKind::ModbusTcp | LinkKind::ModbusRtu => {
+                format!("unit {}", instrument.unit.or(link.unit).unwrap_or(1))
+            }
+            LinkKind::Canopen => format!("node {}", instrument.base.or(link.node.map(u32::from))?),
+            LinkKind::Scpi if !instrument.address.ends_with(":0") => "that port".to_string(),
+            _ => return None,
+        };
+        Some((instrument.address.clone(), number))
+    };
+    let mut seen: BTreeMap<(String, String), &str> = BTreeMap::new();
+    let mut problems = Vec::new();
+    for (table, instrument) in all {
+        let Some(at) = place(instrument) else { continue };
+        let (address, number) = at.clone();
+        let first = *seen.entry(at).or_insert(&instrument.profile);
+        if first != instrument.profile {
+            let problem = format!(
+                "`{first}` and `{}` are both at {address}, {number}: correct an `address`, or give one another `unit`",
+                instrument.profile
+            );
+            problems.push((if *table == "force" { vec!["force"] } else { vec![*table, "address"] }, problem));
+        }
+    }
+    problems
+}
+
+/// Whether instruments at one serial line can share it: sensors with Modbus RTU can.
+fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> {
+    let line = |instrument: &InstrumentSetup| {
+        let path = instrument.address.split_once(':').map_or(instrument.address.as_str(), |(_, path)| path);
+        let kind = instrument.description().ok()?.description.link.kind;
+        let over_rtu = instrument.address.starts_with("rtu:");
+        let serial = over_rtu || matches!(kind, LinkKind::ModbusRtu | LinkKind::Serial);
+        // Each `pty` is a line of its own.
+        // A line that is not plugged in is one line all the same.
+        let path =
+            Some(path).filter(|path| serial && *path != "pty" && !instrument.address.starts_with("tcp:"))?;
+        let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
+        Some((path, over_rtu || kind == LinkKind::ModbusRtu))
+    };
+    let mut lines: BTreeMap<PathBuf, Vec<(&'static str, &InstrumentSetup, bool)>> = BTreeMap::new();
+    for &(table, instrument) in all {
+        if let Some((path, rtu)) = line(instrument) {
+            lines.entry(path).or_default().push((table, instrument, rtu));
+        }
+    }
+    for (path, shared) in lines.into_iter().filter(|(_, shared)| shared.len() > 1) {
+        let place = |table: &'static str| if table == "force" { vec![table] } else { vec![table, "address"] };
+        let mut share = 0.0;
+        for (table, instrument, rtu) in shared {
+            let profile = instrument.description().map_err(|error| (place(table), error.to_string()))?;
+            let said = if !rtu || profile.description.stream.is_some() {
+                "only units that are asked by Modbus RTU can share a line"
+            } else if !matches!(table, "force" | "safety_inputs") {
+                "what takes set-points needs a line of its own: another unit's silence would hold up an 'off'"
+            } else {
+                let setup = LineSetup {
+                    over_rtu: true,
+                    baud: instrument.baud,
+                    rate_hz: instrument.rate_hz,
+                    ..LineSetup::default()
+                };
+                share += profile.line_share(setup).unwrap_or(0.0);
+                continue;
+            };
+            return Err((place(table), format!("`{}` at {}: {said}", instrument.profile, path.display())));
+        }
+        if share > 1.0 {
+            let said = format!(
+                "the units at {} take {:.0} % of its capacity together; state a lower `rate_hz`",
+                path.display(),
+                share * 1e2
+            );
+            return Err((vec!["force"], said));
+        }
+    }
+    Ok(())
+}
+
+/// Roles, signals and set-points, then the line's capacity; with the key that is to blame.
+fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static str, String)> {
+    let profile = instrument.description().map_err(|error| ("profile", error.to_string()))?;
+    let line = LineSetup {
+        over_rtu: instrument.address.starts_with("rtu:"),
+        over_tcp: instrument.address.starts_with("tcp:"),
+        baud: instrument.baud,
+        rate_hz: instrument.rate_hz,
+    };
+    if line.over_tcp && profile.description.link.kind != LinkKind::Serial {
+        return Err(("address", "`tcp:` is for serial lines behind a device server; leave it out".into()));
+    }
+    let share = profile.line_share(line);
+    match table {
+        "force" => Endpoint::force(profile, instrument).map(drop),
+        "amplifier" => Endpoint::amplifier(profile, instrument).map(drop),
+        "stage" => Endpoint::stage(profile, instrument).map(drop),
+        "supply_relay" => Endpoint::supply(profile).map(drop),
+        _ => Endpoint::contacts(profile, instrument).map(drop),
+    }
+    .map_err(|problem| ("profile", problem))?;
+    match share {
+        Some(share) if share > 1.0 => Err((
+            if instrument.rate_hz.is_some() { "rate_hz" } else { "profile" },
+            format!(
+                "its samples take {:.0} % of the line's capacity; state a lower `rate_hz` or a higher `baud`",
+                share * 1e2
+            ),
+        )),
+        _ => Ok(()),
+    }
+}
+
+impl Setup {
+    /// Its instruments, each with the table in which it stands.
+    pub fn by_table(&self) -> Vec<(&'static str, &InstrumentSetup)> {
+        all_of(&self.file)
+    }
+
+    /// Whether the force instruments together give each axis once, as a run needs it; a look at one instrument does not.
+    ///
+    /// # Errors
+    /// What is missing, or given twice.
+    pub fn has_both_axes(&self) -> Result<(), String> {
+        let port = |instrument: &InstrumentSetup| {
+            let profile = instrument.description().map_err(|error| error.to_string())?;
+            Endpoint::force(profile, instrument).map(|(_, port)| port)
+        };
+        compose(self.file.force.iter().map(port).collect::<Result<_, _>>()?).map(drop)
+    }
+
+    /// The profiles of its instruments, and the files that they name, by file name: for the record.
+    #[must_use]
+    pub fn profiles(&self) -> Vec<(String, String)> {
+        let mut files = BTreeMap::new();
+        for instrument in self.instruments().all() {
+            match &instrument.source {
+                Some(source) => {
+                    files.insert(format!("{}.toml", source.id), source.text.clone());
+                    files.extend(source.files.iter().cloned());
+                }
+                None => {
+                    let text = bundled::text(&instrument.profile).map(String::from);
+                    files.extend(text.map(|text| (format!("{}.toml", instrument.profile), text)));
+                }
+            }
+        }
+        files.into_iter().collect()
+    }
+
+    /// What identifies the setup: its text, and the texts of profiles that do not come with the program.
+    #[must_use]
+    pub fn sha256(&self) -> String {
+        let mut bytes = self.text.clone().into_bytes();
+        for source in self.instruments().all().filter_map(|instrument| instrument.source.as_ref()) {
+            let files = source.files.iter().map(|(_, text)| text);
+            files
+                .chain([&source.text])
+                .for_each(|text| bytes.extend(sha256_hex(text.as_bytes()).into_bytes()));
+        }
+        sha256_hex(&bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The ideal virtual rig with one line changed.
+    fn changed(from: &str, to: &str) -> Result<Setup, String> {
+        let text = Setup::load("virtual-ideal").unwrap().text;
+        assert!(text.contains(from), "{text}");
+        Setup::parse("changed", &text.replacen(from, to, 1), Path::new(".")).map_err(|e| format!("{e:?}"))
+    }
+
+    #[test]
+    fn a_profile_that_does_not_exist_is_refused_with_what_there_is() {
+        let said = changed("profile = \"muprime-force2\"", "profile = \"no-such-thing\"").unwrap_err();
+        assert!(
+            said.contains("no-such-thing") && said.contains("hbk-wtx110") && said.contains("profiles"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn an_instrument_that_cannot_be_what_it_is_named_for_is_refused() {
+        let said = changed("profile = \"muprime-amplifier\"", "profile = \"muprime-stage\"").unwrap_err();
+        assert!(said.contains("echo_amplitude"), "{said}");
+    }
+
+    #[test]
+    fn samples_that_do_not_fit_the_line_are_refused() {
+        let rtu = |baud: u32| {
+            let one = "profile = \"muprime-force2\"\naddress = \"127.0.0.1:0\"";
+            let other =
+                format!("profile = \"muprime-force2\"\naddress = \"rtu:pty\"\nbaud = {baud}\nrate_hz = 100");
+            changed(one, &other)
+        };
+        let said = rtu(9600).unwrap_err();
+        assert!(said.contains("capacity"), "{said}");
+        rtu(115_200).unwrap();
+    }
+
+    #[test]
+    fn sensors_share_a_line_and_what_takes_set_points_does_not() {
+        let line = std::env::temp_dir().join(format!("muprime-line-{}", std::process::id()));
+        std::fs::write(&line, "").unwrap();
+        let axis = |axis: &str, unit: u8, rate_hz: f64| {
+            format!(
+                "[[force]]\nprofile = \"robotiq-ft300\"\naddress = \"{}\"\nunit = {unit}\nrate_hz = {rate_hz}\n\
+                 {axis} = {{ signal = \"fz\" }}\n",
+                line.display()
+            )
+        };
+        let both = |rate_hz: f64| {
+            let one = "[[force]]\nprofile = \"muprime-force2\"\naddress = \"127.0.0.1:0\"";
+            changed(one, &format!("{}{}", axis("lateral", 9, rate_hz), axis("normal", 10, rate_hz)))
+        };
+        let (good, full) = (both(25.0), both(50.0));
+        let stage = "profile = \"muprime-stage\"\naddress = \"127.0.0.1:0\"";
+        let shared = format!(
+            "profile = \"muprime-stage\"\naddress = \"rtu:{}\"\nbaud = 19200\nrate_hz = 20",
+            line.display()
+        );
+        let text = good.as_ref().unwrap().text.replacen(stage, &shared, 1);
+        let moved = Setup::parse("changed", &text, Path::new(".")).map_err(|e| format!("{e:?}"));
+        std::fs::remove_file(&line).unwrap();
+        let full = full.unwrap_err();
+        assert!(full.contains("together"), "{full}");
+        let moved = moved.unwrap_err();
+        assert!(moved.contains("of its own"), "{moved}");
+    }
+
+    #[test]
+    fn a_profile_beside_the_setup_is_used_kept_and_part_of_its_identity() {
+        let folder = std::env::temp_dir().join(format!("muprime-beside-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let own = bundled::text("muprime-force2").unwrap().replacen("\"muprime-force2\"", "\"own-cell\"", 1);
+        std::fs::write(folder.join("cell.toml"), &own).unwrap();
+        let text =
+            Setup::load("virtual-ideal").unwrap().text.replacen("\"muprime-force2\"", "\"cell.toml\"", 1);
+        let parsed = Setup::parse("own", &text, &folder).unwrap();
+        std::fs::write(folder.join("cell.toml"), own.replacen("maker = \"", "maker = \"other ", 1)).unwrap();
+        let later = Setup::parse("own", &text, &folder).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(parsed.file.force[0].profile, "own-cell");
+        assert!(parsed.profiles().contains(&("own-cell.toml".into(), own)));
+        assert_eq!(parsed.instruments().force[0].description().unwrap().id(), "own-cell");
+        assert_ne!(parsed.sha256(), later.sha256(), "another profile is another setup");
+    }
+}

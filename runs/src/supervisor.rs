@@ -1,0 +1,196 @@
+//! The one supervisor of the loop: whoever drives a rig, in wall-clock or in virtual time, drives it from here.
+//!
+//! A supervisor owns ports, queue, lifeline, rings and links. Whatever ends it (an orderly end, an error, a panic, a signal)
+//! the stop goes to the loop first, then the links switch off and read back. 'The drive is off' is said only of what was read
+//! back off.
+
+mod virtual_time;
+
+pub use virtual_time::VirtualLoop;
+
+use crate::sequence::{Outcome, Reaction, Sequence};
+use drivers::{Closed, LinkEnd, Role};
+use realtime::cycle::Command;
+use realtime::turn::Row;
+use serde::{Deserialize, Serialize};
+
+/// What is said where the drive was not read back off.
+pub const MAY_BE_ON: &str = "the output may still be on: switch the supply off";
+
+/// A loop at work, in whichever time it runs.
+pub trait Loop {
+    /// The next row; `None` where none has come yet.
+    fn next_row(&mut self) -> Option<Row>;
+
+    /// Hands a command over. False: the loop does not live any more.
+    fn send(&mut self, command: Command) -> bool;
+
+    /// Stops at once: the stop waits behind nothing that can be thrown away.
+    fn stop(&mut self);
+
+    /// Whether nothing was heard of the loop for so long that it counts as lost.
+    fn is_lost(&self) -> bool;
+}
+
+/// Why a sweep is to end before its plan does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// Somebody asked for it.
+    Asked,
+    /// What comes of it cannot be kept.
+    NotKept,
+    /// What the finger is exposed to cannot be written.
+    ExposureNotKept,
+}
+
+/// What whoever leads a sweep asks of it now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Asked {
+    /// It is to end before its plan does.
+    pub end: Option<End>,
+    /// It is to rest before the next pass.
+    pub pause: bool,
+}
+
+/// Feeds a sequence with the loop's rows and sends its commands, until it ends. `ask` says what is asked of the sweep; `each` takes
+/// every row with what it led to, after the commands have left.
+pub fn sweep(
+    rig: &mut impl Loop,
+    sequence: &mut Sequence,
+    ask: &mut dyn FnMut() -> Asked,
+    each: &mut dyn FnMut(&Row, &mut Sequence, Reaction),
+) -> Outcome {
+    let mut instead = None;
+    loop {
+        let asked = ask();
+        if let Some(end) = asked.end {
+            // Safe state first: the command goes out before anything else is looked at.
+            rig.stop();
+            sequence.stop();
+            let why = match end {
+                End::Asked => None,
+                End::NotKept => Some(Outcome::RecordLost),
+                End::ExposureNotKept => Some(Outcome::ExposureNotKept),
+            };
+            instead = instead.or(why);
+        }
+        sequence.pause(asked.pause);
+        let Some(row) = rig.next_row() else {
+            if rig.is_lost() {
+                return Outcome::LoopLost;
+            }
+            continue;
+        };
+        let mut reaction = sequence.on_row(&row);
+        for command in reaction.commands.drain(..) {
+            if !rig.send(command) {
+                return Outcome::LoopLost;
+            }
+        }
+        let outcome = reaction.outcome.clone();
+        each(&row, sequence, reaction);
+        match outcome {
+            Some(Outcome::Stopped) => return instead.unwrap_or(Outcome::Stopped),
+            Some(outcome) => return outcome,
+            None => {}
+        }
+    }
+}
+
+/// Whether the rig was seen off in the end.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OffReport {
+    /// Whether every drive and stage showed, after it was switched off for the last time, that it is off.
+    pub read_back: bool,
+    /// The instruments that did not show it, each with the reason.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_read_back: Vec<NotOff>,
+}
+
+/// An instrument that did not show that it is off.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NotOff {
+    /// Id of its profile.
+    pub instrument: String,
+    /// Whether it drives the plate; else it moves the finger.
+    pub drives: bool,
+    /// What was seen last.
+    pub why: String,
+}
+
+impl OffReport {
+    /// A rig that was read back off.
+    #[must_use]
+    pub fn off() -> Self {
+        OffReport { read_back: true, not_read_back: Vec::new() }
+    }
+
+    /// From how the links were closed. A supply that was read back open switches the drive off, whatever its amplifier shows; one
+    /// that was not takes nothing from an amplifier that was read back off.
+    #[must_use]
+    pub fn of(ends: &[LinkEnd]) -> Self {
+        let cut = ends.iter().any(|end| end.role == Role::Supply && end.closed == Closed::ReadBackOff);
+        let not_off = |end: &LinkEnd| match &end.closed {
+            Closed::NothingToSwitch | Closed::ReadBackOff => None,
+            Closed::NotReadBack(_) if end.role == Role::Supply || (cut && end.role == Role::Amplifier) => {
+                None
+            }
+            Closed::NotReadBack(why) => Some(NotOff {
+                instrument: end.name.clone(),
+                drives: end.role == Role::Amplifier,
+                why: why.clone(),
+            }),
+        };
+        let not_read_back: Vec<NotOff> = ends.iter().filter_map(not_off).collect();
+        OffReport { read_back: not_read_back.is_empty(), not_read_back }
+    }
+
+    /// What is to be said to whoever stands at the rig.
+    #[must_use]
+    pub fn words(&self) -> String {
+        if self.read_back {
+            return "the drive is off: read back".into();
+        }
+        let line = |one: &NotOff| {
+            let what = if one.drives { MAY_BE_ON } else { "the stage may still move: switch its supply off" };
+            format!("{what} ({}: {})", one.instrument, one.why)
+        };
+        self.not_read_back.iter().map(line).collect::<Vec<_>>().join("\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn end(role: Role, closed: Closed) -> LinkEnd {
+        LinkEnd { name: "x".into(), role, closed }
+    }
+
+    #[test]
+    fn off_is_said_only_of_what_was_read_back() {
+        let off = OffReport::of(&[
+            end(Role::Force, Closed::NothingToSwitch),
+            end(Role::Amplifier, Closed::ReadBackOff),
+        ]);
+        assert!(off.read_back && off.words().contains("is off"));
+        let on = OffReport::of(&[
+            end(Role::Stage, Closed::ReadBackOff),
+            end(Role::Amplifier, Closed::NotReadBack("silent".into())),
+        ]);
+        assert!(!on.read_back && on.words().contains(MAY_BE_ON) && on.words().contains("silent"), "{on:?}");
+        let cut = OffReport::of(&[
+            end(Role::Amplifier, Closed::NotReadBack("dead".into())),
+            end(Role::Supply, Closed::ReadBackOff),
+        ]);
+        assert!(cut.read_back, "an open supply is off: {cut:?}");
+        let welded = OffReport::of(&[
+            end(Role::Amplifier, Closed::NotReadBack("dead".into())),
+            end(Role::Supply, Closed::NotReadBack("welded".into())),
+        ]);
+        assert!(!welded.read_back && welded.words().contains(MAY_BE_ON), "{welded:?}");
+        let moves = OffReport::of(&[end(Role::Stage, Closed::NotReadBack("silent".into()))]);
+        assert!(!moves.words().contains("is off") && moves.words().contains("may still move"), "{moves:?}");
+        assert!(!OffReport::default().read_back, "nothing known is not 'off'");
+    }
+}

@@ -1,0 +1,175 @@
+//! A verdict for people: what a terminal shows, and the plan of the experiment that tells most.
+
+use diagnosis::certificates;
+use diagnosis::verdict::{Diagnosis, probability};
+use models::condition::Condition;
+use models::covariate::{self, Covariate};
+use models::rig_file::RigFile;
+
+/// Parts of the operating space that are named, the largest first.
+const PARTS: usize = 6;
+
+/// The verdict for a person, certificates included.
+pub fn words(result: &Diagnosis, rig: &RigFile) -> String {
+    let mut text = terminal(result);
+    let faults = certificates::at_fault(result, rig);
+    let doubts = certificates::in_doubt(rig, &result.report.stiffness_pulls);
+    for more in faults.iter().map(|f| f.text()).chain(doubts.iter().map(|d| d.text())) {
+        text.push_str(&more);
+        text.push('\n');
+    }
+    text
+}
+
+/// The plan of a designed experiment, one series a condition: those that tell most first, grouped by pressure, since
+/// a chamber is changed once.
+pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
+    let mut conditions = experiment.conditions.clone();
+    let pressure = |c: &Condition| c.ambient_pressure_pa.unwrap_or(0.0);
+    conditions.sort_by(|a, b| pressure(b).total_cmp(&pressure(a)));
+    let Some(base) = conditions.first() else { return String::new() };
+    let about = toml::Value::String(experiment.text.clone());
+    // Every plan has the settings that every table has, but the direction; a series names what the base cannot.
+    let based = |c: &&Covariate| covariate::REQUIRED.iter().any(|r| r.name == c.name);
+    let of = |c: &Condition, k: &Covariate| k.of(c).map(|v| (k.name, v));
+    let listed = |k: &&Covariate| k.name != covariate::DIRECTION.name;
+    let mut text = format!(
+        "name = \"next-experiment\"\nabout = {about}\nrandomise = false\n\n[base]\n{}",
+        covariate::planned()
+            .filter(|k| listed(k) && based(k))
+            .filter_map(|k| of(base, k))
+            .map(|(name, value)| format!("{name} = {value:e}\n"))
+            .collect::<String>()
+    );
+    for c in &conditions {
+        text.push_str(&format!("\n[[series]]\ndirections = [{}]\n", i8::from(c.direction)));
+        for (name, value) in covariate::planned().filter(listed).filter_map(|k| of(c, k)) {
+            text.push_str(&format!("{name} = [{value:e}]\n"));
+        }
+    }
+    text
+}
+
+/// What a terminal shows.
+pub fn terminal(result: &Diagnosis) -> String {
+    let r = &result.report;
+    let mut text = format!("{}\n\nHypotheses\n", r.text);
+    for h in r.hypotheses.iter().filter(|h| h.probability > 0.005).take(8) {
+        let name = if h.effects.is_empty() { "no gap".to_string() } else { h.effects.join(" + ") };
+        text.push_str(&format!("  {:>7}  {name}", probability(h.probability)));
+        if h.alias_class.len() > 1 {
+            text.push_str(&format!("  (not told from {})", h.alias_class[1..].join(", ")));
+        }
+        text.push('\n');
+        if h.probability > 0.05 {
+            for p in &h.parameters {
+                let value = crate::report::human::with_interval(p.value, p.ci95, p.unit);
+                text.push_str(&format!("         {} = {value}\n", p.name));
+            }
+        }
+    }
+    let g = &r.gap;
+    let told = |rmse: Option<f64>| {
+        rmse.map_or_else(|| "- (too short to hold passes out)".to_string(), |v| format!("{v:.4}"))
+    };
+    text.push_str(&format!(
+        "\nGap on held-out passes, in units of full friction\n  nominal baseline      {}\n  recalibrated baseline {}\n  verdict's model       {}\n  repeatability         {}\n",
+        told(g.before_rmse), told(g.recalibrated_rmse), told(g.after_rmse), told(g.noise_floor_rmse)
+    ));
+    if let (Some(s), Some([low, high])) = (g.shrinkage, g.shrinkage_ci95) {
+        text.push_str(&format!(
+            "  the removable gap {} by {:.0} % [{:.0}, {:.0}]\n",
+            if s < 0.0 { "grows" } else { "shrinks" },
+            100.0 * s.abs(),
+            100.0 * if s < 0.0 { -high } else { low },
+            100.0 * if s < 0.0 { -low } else { high }
+        ));
+    }
+    if !r.location.regions.is_empty() {
+        text.push_str("\nWhere\n");
+        let told = r.location.regions.iter().filter(|g| g.share_of_gap >= 0.01).count().min(PARTS);
+        for region in r.location.regions.iter().take(told) {
+            text.push_str(&format!("  {}\n", region.text));
+        }
+        let rest = r.location.regions.len() - told;
+        if rest > 0 {
+            text.push_str(&format!("  and {rest} further parts, in the JSON document\n"));
+        }
+    }
+    if !r.next_experiment.is_empty() {
+        text.push_str("\nNext\n");
+        for e in r.next_experiment.iter().take(4) {
+            text.push_str(&format!("  {}", e.text));
+            if e.conditions.is_empty() {
+                let [a, b] = &e.separates;
+                text.push_str(&format!(" (parts {a} from {b}: {:.1} nats)", e.expected_nats));
+            }
+            text.push('\n');
+        }
+    }
+    if !r.not_testable.is_empty() {
+        text.push_str("\nNot testable on this table\n");
+        for n in &r.not_testable {
+            text.push_str(&format!("  {}: {}\n", n.effect, n.because));
+        }
+    }
+    for remark in &r.remarks {
+        text.push_str(&format!("\n{remark}\n"));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plan;
+    use crate::plan::{Plan, Resolution};
+    use diagnosis::next::Experiment;
+    use models::condition::Condition;
+    use models::quantity::{Direction, PeakToPeak};
+    use realtime::ports::Nanos;
+    use realtime::safety::Limits;
+
+    #[test]
+    fn a_saved_plan_asks_for_the_designed_passes() {
+        let one = Condition {
+            amplitude: PeakToPeak::from_metres(3e-6),
+            direction: Direction::Backward,
+            normal_force_n: 0.4,
+            position_m: 0.001,
+            ambient_pressure_pa: Some(101_325.0),
+            ..Condition::paper()
+        };
+        let thin = Condition { ambient_pressure_pa: Some(20_000.0), direction: Direction::Forward, ..one };
+        let conditions = vec![thin, one, Condition { speed_m_s: 0.01, ..thin }, one];
+        let experiment = Experiment {
+            conditions: conditions.clone(),
+            separates: ["a".to_string(), "b".to_string()],
+            expected_nats: 3.0,
+            text: "4 passes that part \"a\" from b".to_string(),
+        };
+        let plan = Plan::parse("next.toml", &plan(&experiment)).expect("a plan that can be read");
+        let resolution = Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
+        let points =
+            plan.points(1, &Limits::paper(Nanos(1_000_000)), &resolution).expect("a plan within limits");
+        let mut asked: Vec<[f64; 4]> = points
+            .iter()
+            .filter(|p| !p.reference)
+            .map(|p| {
+                let c = &p.condition;
+                [c.speed_m_s, c.direction.sign(), c.position_m, c.ambient_pressure_pa.unwrap_or(0.0)]
+            })
+            .collect();
+        let mut wanted: Vec<[f64; 4]> = conditions
+            .iter()
+            .map(|c| [c.speed_m_s, c.direction.sign(), c.position_m, c.ambient_pressure_pa.unwrap_or(0.0)])
+            .collect();
+        let order = |a: &[f64; 4], b: &[f64; 4]| a.partial_cmp(b).expect("finite settings");
+        asked.sort_by(order);
+        wanted.sort_by(order);
+        assert_eq!(asked, wanted);
+        // Each pressure is set once.
+        let mut pressures: Vec<_> = points.iter().map(|p| p.condition.ambient_pressure_pa).collect();
+        pressures.dedup();
+        assert_eq!(pressures.len(), 2);
+    }
+}

@@ -1,0 +1,120 @@
+//! What this program is: its version, the very build, and the models that it holds, so that two results can be said to come from the same.
+
+use calibration::certificate::sha256_hex;
+use models::ridge::study::MODEL_VERSION;
+use models::surrogate::DEFAULT_TABLE;
+use serde::Serialize;
+
+/// The commit of a build that was told (`MUPRIME_COMMIT` when it was compiled, as `packaging/build` has it). A program that asked git itself would
+/// have to be compiled anew at every commit, or tell an old one.
+const COMMIT: Option<&str> = option_env!("MUPRIME_COMMIT");
+
+/// Version, build and models.
+#[derive(Clone, Debug, Serialize)]
+pub struct Version {
+    /// Of the package.
+    pub version: &'static str,
+    /// The build.
+    pub build: Build,
+    /// The models.
+    pub models: Models,
+}
+
+/// The very build.
+#[derive(Clone, Debug, Serialize)]
+pub struct Build {
+    /// SHA-256 of the program's own file; `None` where it cannot be read.
+    pub program_sha256: Option<String>,
+    /// The commit that it was told when it was compiled; `None` where it was told none.
+    pub commit: Option<&'static str>,
+    /// Architecture, system and C library.
+    pub target: String,
+    /// `release`, or `debug` with the assertions of a debug build.
+    pub profile: &'static str,
+    /// The features that are in.
+    pub features: Vec<&'static str>,
+}
+
+/// What the answers of the models come from. A hash that differs is another model.
+#[derive(Clone, Debug, Serialize)]
+pub struct Models {
+    /// Version of the finite element ridge, raised whenever its results change.
+    pub ridge_version: u32,
+    /// SHA-256 of the table that the surrogate interpolates.
+    pub surrogate_table_sha256: String,
+    /// Number of candidate effects.
+    pub effects: usize,
+    /// SHA-256 of `muprime model effects --json`: their forms, parameters and priors.
+    pub effects_sha256: String,
+}
+
+/// Of the models that are compiled in.
+pub fn models() -> Models {
+    let effects = effects::listing::entries();
+    let listed = serde_json::to_string(&effects).unwrap_or_default();
+    Models {
+        ridge_version: MODEL_VERSION,
+        surrogate_table_sha256: sha256_hex(DEFAULT_TABLE.as_bytes()),
+        effects: effects.len(),
+        effects_sha256: sha256_hex(listed.as_bytes()),
+    }
+}
+
+/// Of this program, built with these features; its file is read for its hash.
+pub fn of_this_program(features: Vec<&'static str>) -> Version {
+    let own = std::env::current_exe().and_then(std::fs::read);
+    let libc = match () {
+        () if cfg!(target_env = "gnu") => "-gnu",
+        () if cfg!(target_env = "musl") => "-musl",
+        () if cfg!(target_env = "msvc") => "-msvc",
+        () => "",
+    };
+    Version {
+        version: env!("CARGO_PKG_VERSION"),
+        build: Build {
+            program_sha256: own.ok().map(|bytes| sha256_hex(&bytes)),
+            commit: COMMIT.filter(|told| !told.is_empty()),
+            target: format!("{}-{}{libc}", std::env::consts::ARCH, std::env::consts::OS),
+            profile: if cfg!(debug_assertions) { "debug" } else { "release" },
+            features,
+        },
+        models: models(),
+    }
+}
+
+impl Version {
+    /// For a terminal: the first line is what `-V` says.
+    pub fn words(&self) -> String {
+        let (build, models) = (&self.build, &self.models);
+        let features = if build.features.is_empty() { "none".to_string() } else { build.features.join(" ") };
+        format!(
+            "muprime {}\nbuild    {}\n  commit   {}\n  target   {}, {}\n  features {features}\nmodels\n  ridge    version {}\n  surrogate {}\n  effects  {} of them, {}",
+            self.version,
+            build.program_sha256.as_deref().unwrap_or("the program's file cannot be read"),
+            build.commit.unwrap_or("not told (MUPRIME_COMMIT, when it was compiled)"),
+            build.target,
+            build.profile,
+            models.ridge_version,
+            models.surrogate_table_sha256,
+            models.effects,
+            models.effects_sha256,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hashes_are_of_what_they_say() {
+        let told = of_this_program(Vec::new());
+        let own = std::fs::read(std::env::current_exe().unwrap()).unwrap();
+        assert_eq!(told.build.program_sha256.as_deref(), Some(sha256_hex(&own).as_str()));
+        assert!(told.words().starts_with(concat!("muprime ", env!("CARGO_PKG_VERSION"), "\n")));
+        // The surrogate is read from the very text that is hashed.
+        let read = models::surrogate::Surrogate::from_text(DEFAULT_TABLE).unwrap();
+        assert_eq!(read.inputs_hash, models::surrogate::Surrogate::shipped().unwrap().inputs_hash);
+        assert_eq!(told.models.effects, effects::library().len());
+    }
+}

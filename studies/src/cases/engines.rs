@@ -1,0 +1,153 @@
+//! Engines that stand at institutes. Add one: a file here, and a line in [`ENGINES`]. What an engine is asked for is little: to run
+//! commands, to say whether they may still come to something, to end them. What is done is seen in the folder alone.
+
+pub mod python;
+pub mod slurm;
+
+use miette::{Context, IntoDiagnostic};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::process::Child;
+
+/// All engines but this machine itself.
+pub const ENGINES: [&Engine; 3] = [&slurm::ENGINE, &python::HYPERQUEUE, &python::DASK];
+
+/// An engine.
+pub struct Engine {
+    /// Name.
+    pub name: &'static str,
+    /// Hands the tasks over.
+    pub submit: fn(&Path, &Job) -> miette::Result<Handed>,
+    /// Takes up a job that an earlier command handed over.
+    pub again: fn(&Path, &Job) -> miette::Result<Handed>,
+    /// Whether tasks may still be run.
+    pub alive: fn(&mut Handed) -> bool,
+    /// Ends what runs and what waits.
+    pub cancel: fn(&Job) -> miette::Result<()>,
+}
+
+/// `job.json` in a job's folder: what was handed over, to whom, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Job {
+    /// Name of the engine.
+    pub engine: String,
+    /// The engine's own names of the job.
+    pub ids: Vec<String>,
+    /// Name of the study's kind.
+    pub kind: String,
+    /// The worker's command but for its range.
+    pub command: Vec<String>,
+    /// Ranges, one a task.
+    pub ranges: Vec<Range<u64>>,
+    /// Time that a task may take, s.
+    pub limit_s: f64,
+    /// Tasks at one time at most; as many as the engine gives if left out.
+    pub workers: Option<u64>,
+    /// Address or folder of the engine's server, where it has one.
+    pub server: Option<String>,
+    /// Python of the engines that are spoken to in it.
+    pub python: String,
+    /// Passed on to the engine as they are.
+    pub options: Vec<String>,
+}
+
+/// What an engine has taken.
+pub struct Handed {
+    /// Its names.
+    pub ids: Vec<String>,
+    /// The process that stands between, where there is one.
+    pub child: Option<Child>,
+}
+
+impl Job {
+    /// Reads `job.json`.
+    ///
+    /// # Errors
+    /// A folder without one, one of another version, or one that another user wrote.
+    pub fn read(folder: &Path) -> miette::Result<Job> {
+        let path = folder.join("job.json");
+        let shown = || path.display().to_string();
+        let file = runs::files::open_plain(&path, std::fs::OpenOptions::new().read(true));
+        let file = file.into_diagnostic().wrap_err_with(shown)?;
+        if !runs::files::is_own(&file.metadata().into_diagnostic()?) {
+            miette::bail!(
+                help = "whoever handed it over follows and cancels it",
+                "{}: another user's job",
+                shown()
+            );
+        }
+        let bytes = std::io::read_to_string(file).into_diagnostic().wrap_err_with(shown)?;
+        serde_json::from_str(&bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())
+    }
+
+    /// Writes `job.json`.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn write(&self, folder: &Path) -> miette::Result<()> {
+        runs::files::write_plain(&folder.join("job.json"), serde_json::to_vec_pretty(self).into_diagnostic()?)
+    }
+}
+
+/// The engine of that name; none for this machine itself.
+///
+/// # Errors
+/// There is none.
+pub fn by_name(name: &str) -> miette::Result<Option<&'static Engine>> {
+    if name == "local" {
+        return Ok(None);
+    }
+    ENGINES.into_iter().find(|e| e.name == name).map(Some).ok_or_else(|| {
+        let names: Vec<&str> = ENGINES.iter().map(|e| e.name).collect();
+        miette::miette!("--engine {name}: local, {} is needed", names.join(", "))
+    })
+}
+
+/// The folders of jobs, the oldest first.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn folders(out: &Path) -> miette::Result<Vec<PathBuf>> {
+    let jobs = out.join("jobs");
+    if !jobs.exists() {
+        return Ok(Vec::new());
+    }
+    let entries = std::fs::read_dir(&jobs).into_diagnostic()?;
+    let mut all: Vec<PathBuf> =
+        entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.join("job.json").exists()).collect();
+    all.sort();
+    Ok(all)
+}
+
+/// The names of a job, where each is a number: anything else could be an option of the program that gets it.
+///
+/// # Errors
+/// One that is none.
+pub fn numbers(ids: &[String]) -> miette::Result<&[String]> {
+    match ids.iter().find(|id| id.is_empty() || !id.bytes().all(|b| b.is_ascii_digit())) {
+        None => Ok(ids),
+        Some(id) => miette::bail!("a job's name is a number, and {id:?} is none"),
+    }
+}
+
+/// A word as a shell takes it.
+pub fn quoted(word: &str) -> String {
+    format!("'{}'", word.replace('\'', "'\\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn a_shell_gives_back_what_was_quoted() {
+        for word in ["plain", "with space", "it's", "$HOME `x` \"y\" \\", ""] {
+            let said = std::process::Command::new("sh")
+                .arg("-c")
+                .arg(format!("printf %s {}", quoted(word)))
+                .output();
+            assert_eq!(said.unwrap().stdout, word.as_bytes());
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! HyperQueue and Dask, spoken to in Python by their own packages, with the script `hand_over.py` beside this file: it hands the tasks
+//! over and stays until they have ended. HyperQueue goes on without it; a Dask scheduler drops what waits when its client leaves.
+
+use super::{Engine, Handed, Job, numbers};
+use miette::{Context, IntoDiagnostic, miette};
+use runs::files;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// HyperQueue.
+pub const HYPERQUEUE: Engine = Engine { name: "hq", submit, again, alive, cancel };
+/// Dask.distributed.
+pub const DASK: Engine = Engine { name: "dask", submit, again: gone, alive, cancel };
+
+/// What speaks to them.
+const SCRIPT: &str = include_str!("hand_over.py");
+
+fn submit(folder: &Path, job: &Job) -> miette::Result<Handed> {
+    job.write(folder)?;
+    begun(folder, job, &[])
+}
+
+fn again(folder: &Path, job: &Job) -> miette::Result<Handed> {
+    begun(folder, job, numbers(&job.ids)?)
+}
+
+fn gone(_: &Path, job: &Job) -> miette::Result<Handed> {
+    Ok(Handed { ids: job.ids.clone(), child: None })
+}
+
+/// Starts the script; its first line names the job, or what is wrong.
+fn begun(folder: &Path, job: &Job, ids: &[String]) -> miette::Result<Handed> {
+    let mut options = std::fs::OpenOptions::new();
+    let log = files::open_plain(&folder.join("log.txt"), options.create(true).append(true));
+    let log = log.into_diagnostic().wrap_err("log.txt")?;
+    let mut child = Command::new(&job.python)
+        // Nothing of the folder is run or trusted: the script is this program's, and the job comes by its standard input.
+        .args(["-c", SCRIPT])
+        .arg(folder)
+        .args(ids)
+        // What it says of an error is for people: no frames of other programs.
+        .env("RUST_BACKTRACE", "0")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(log)
+        .spawn()
+        .into_diagnostic()
+        .wrap_err_with(|| format!("{} cannot be run: name a Python with --python", job.python))?;
+    if let Some(mut to) = child.stdin.take() {
+        // One that ends at once says why below.
+        let _ = to.write_all(&serde_json::to_vec(job).into_diagnostic()?);
+    }
+    let mut line = String::new();
+    if let Some(said) = child.stdout.take() {
+        BufReader::new(said).read_line(&mut line).into_diagnostic()?;
+    }
+    let named: Option<Vec<String>> = serde_json::from_str(&line).ok();
+    let Some(ids) = named else {
+        let _ = child.kill();
+        let _ = child.wait();
+        let log = std::fs::read_to_string(folder.join("log.txt")).unwrap_or_default();
+        let last = log.lines().rev().find(|l| l.contains("Error")).unwrap_or("it said nothing").to_string();
+        return Err(miette!(
+            "{} takes no tasks: {last} (all of it: {})",
+            job.engine,
+            folder.join("log.txt").display()
+        ));
+    };
+    Ok(Handed { ids, child: Some(child) })
+}
+
+fn alive(handed: &mut Handed) -> bool {
+    handed.child.as_mut().is_some_and(|child| matches!(child.try_wait(), Ok(None)))
+}
+
+/// Their workers look for the file `cancelled` in the job's folder, which is there by now: those that wait end at once, those at work
+/// after their portion.
+fn cancel(_: &Job) -> miette::Result<()> {
+    Ok(())
+}

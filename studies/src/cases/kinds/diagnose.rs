@@ -1,0 +1,120 @@
+//! The diagnosis of one table a case: a laboratory's archive. The key holds the contents of table and rig.toml, not their names.
+
+use super::{Case, Cell, Kind, count, joined, line, number, text};
+use crate::cases::file::Header;
+use calibration::certificate::sha256_hex;
+use diagnosis::data::Table;
+use diagnosis::document::document;
+use diagnosis::hypotheses::Options;
+use diagnosis::verdict::diagnose;
+use miette::Context;
+use runs::input::{MAX_TABLE_BYTES, bytes_of, rig_text, text_of};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use tables::passes::parse_passes;
+
+/// The kind.
+pub const KIND: Kind = Kind {
+    name: "diagnose",
+    words: "the diagnosis of a point table or of a run's folder, as `muprime diagnose` makes it",
+    model: 1,
+    columns: &[
+        text("verdict", "named, ambiguous, unknown or no_gap"),
+        text("leading", "effects of the first hypothesis, joined by +; empty for no gap"),
+        number("probability", "its probability"),
+        number("shrinkage", "shrinkage of the removable gap"),
+        number("unexplained_share", "share of the gap that is left"),
+        count("points", "passes of the table"),
+        text("document", "the verdict as `muprime diagnose --json` has it"),
+    ],
+    prepare,
+};
+
+/// A line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Line {
+    /// A point table, or a run's folder; relative paths are to the file of cases.
+    pub data: PathBuf,
+    /// What the rig's calibration states; the rig.toml beside the table if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rig: Option<PathBuf>,
+}
+
+/// What all cases share.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Try single effects only.
+    pub no_pairs: bool,
+    /// Effects that are left out of the library.
+    pub without: Vec<String>,
+}
+
+impl Line {
+    /// The table and the rig.toml of a line.
+    fn files(&self, folder: &Path) -> (PathBuf, PathBuf) {
+        let data = folder.join(&self.data);
+        let (table, beside) = if data.is_dir() {
+            (data.join("points.csv"), data.join("rig.toml"))
+        } else {
+            let beside = data.parent().unwrap_or(folder).join("rig.toml");
+            (data, beside)
+        };
+        (table, self.rig.as_ref().map_or(beside, |rig| folder.join(rig)))
+    }
+}
+
+fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
+    let settings: Settings = super::settings(header)?;
+    for name in &settings.without {
+        if effects::by_name(name).is_none() {
+            miette::bail!("without {name}: no such effect; `muprime model effects` lists them");
+        }
+    }
+    let said = serde_json::to_string(&settings).unwrap_or_default();
+    let folder = folder.to_path_buf();
+    Ok(Box::new(move |index, given| {
+        let asked: Line = line(index, given)?;
+        let (table_path, rig_path) = asked.files(&folder);
+        // What cannot be read is no answer about the table: the case is not run, and another try may read it.
+        let bytes = bytes_of(&table_path, MAX_TABLE_BYTES)
+            .wrap_err_with(|| format!("case {index}: cannot read the table {}", table_path.display()))?;
+        let rig = text_of(&rig_path)
+            .wrap_err_with(|| format!("case {index}: cannot read the rig's calibration"))?;
+        let damage = if folder.join(&asked.data).is_dir() {
+            runs::run_dir::damage_in(&folder.join(&asked.data))?
+        } else {
+            Vec::new()
+        };
+        let inputs = format!("{} {} {said} {damage:?}", sha256_hex(&bytes), sha256_hex(rig.as_bytes()));
+        let settings = settings.clone();
+        let run = move || {
+            // The file's own name says nothing of its contents: a reason holds none.
+            let plain =
+                |why: miette::Report| why.chain().map(ToString::to_string).collect::<Vec<_>>().join(": ");
+            let rig = rig_text("rig.toml", &rig).map_err(plain)?;
+            let passes = parse_passes(&table_path, &bytes)
+                .map_err(|why| plain(why).replace(&table_path.display().to_string(), "table"))?;
+            let table = Table::measured(&passes).map_err(|why| why.to_string())?;
+            let options = Options {
+                pairs: !settings.no_pairs,
+                without: settings.without.clone(),
+                ..Options::default()
+            };
+            let result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
+            let first = result.report.hypotheses.first();
+            let verdict = serde_json::to_value(result.report.verdict).map_err(|e| e.to_string())?;
+            Ok(vec![
+                verdict.as_str().map(str::to_string).into(),
+                first.map(|h| joined(&h.effects)).into(),
+                first.map(|h| h.probability).into(),
+                result.report.gap.shrinkage.into(),
+                result.report.gap.unexplained_share.into(),
+                Cell::Count(passes.len() as u64),
+                document(&result, &rig, &damage).map_err(|why| why.to_string())?.into(),
+            ])
+        };
+        Ok(Case { inputs, run: Box::new(run) })
+    }))
+}

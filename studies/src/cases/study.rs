@@ -1,0 +1,213 @@
+//! A file of cases and the folder of its results. `study.json` in the folder says of which cases they are; `shards/` holds them,
+//! `parts/` what is being written, `jobs/` what was handed to engines.
+
+use super::crash_points;
+use super::file::CaseFile;
+use super::kinds::{self, Case, Kind, Make};
+use calibration::certificate::sha256_hex;
+use miette::{Context, IntoDiagnostic};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fs;
+use std::io::Write;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Schema of `study.json`.
+const SCHEMA: &str = "muprime.study/1";
+
+/// `study.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Told {
+    schema: String,
+    /// The file of cases, absolute.
+    pub cases: PathBuf,
+    /// SHA-256 of its header.
+    pub header: String,
+    kind: String,
+    version: String,
+}
+
+/// An open study.
+pub struct Study {
+    /// The cases.
+    pub file: CaseFile,
+    /// What they are.
+    pub kind: &'static Kind,
+    /// Folder of the results, absolute.
+    pub out: PathBuf,
+    make: Make,
+}
+
+impl Study {
+    /// Opens a file of cases alone.
+    ///
+    /// # Errors
+    /// A file that this program does not take, or that another version wrote.
+    fn of(cases: &Path, out: PathBuf) -> miette::Result<Study> {
+        let file = CaseFile::open(cases)?;
+        let kind = kinds::by_name(&file.header.kind)?;
+        if file.header.version != kind.version() {
+            miette::bail!(
+                help = "write the cases again with this version, and let it run them all",
+                "{}: cases of '{}', and this is '{}'",
+                cases.display(),
+                file.header.version,
+                kind.version()
+            );
+        }
+        let folder = file.path.parent().unwrap_or(Path::new("/")).to_path_buf();
+        let make = (kind.prepare)(&file.header, &folder).wrap_err_with(|| cases.display().to_string())?;
+        Ok(Study { file, kind, out, make })
+    }
+
+    /// Opens a study to work on it: a folder that is not there is made.
+    ///
+    /// # Errors
+    /// As the file of cases; a folder that holds another study, or that cannot be written.
+    pub fn begin(cases: &Path, out: &Path) -> miette::Result<Study> {
+        let study = Study::of(cases, out.to_path_buf())?;
+        runs::files::make_folder(out)?;
+        let out = out.canonicalize().into_diagnostic()?;
+        let study = Study { out, ..study };
+        let told = Told {
+            schema: SCHEMA.into(),
+            cases: study.file.path.clone(),
+            header: study.file.digest.clone(),
+            kind: study.kind.name.into(),
+            version: study.kind.version(),
+        };
+        let place = study.out.join("study.json");
+        match fs::read(&place) {
+            Ok(bytes) => study.same(&bytes)?,
+            Err(why) if why.kind() == std::io::ErrorKind::NotFound => {
+                let (part, mut file) = study.part("study.json")?;
+                let text = serde_json::to_vec(&told).into_diagnostic()?;
+                file.write_all(&text)
+                    .and_then(|()| file.sync_all())
+                    .into_diagnostic()
+                    .wrap_err("study.json")?;
+                crash_points::here("study-written");
+                // Whoever was first with another study is found by the keys of its shards.
+                fs::rename(&part, &place).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
+                crash_points::here("study-moved");
+                runs::files::sync_folder_of(&place).into_diagnostic()?;
+            }
+            Err(why) => return Err(why).into_diagnostic().wrap_err_with(|| place.display().to_string()),
+        }
+        runs::files::make_folder(&study.shards())?;
+        Ok(study)
+    }
+
+    /// Opens the study that stands in a folder, to read it.
+    ///
+    /// # Errors
+    /// No study, or its file of cases is gone or changed.
+    pub fn in_folder(out: &Path, cases: Option<&Path>) -> miette::Result<Study> {
+        let place = out.join("study.json");
+        let bytes = fs::read(&place)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("{}: no study: {} cannot be read", out.display(), place.display()))?;
+        let told: Told =
+            serde_json::from_slice(&bytes).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
+        let study = Study::of(cases.unwrap_or(&told.cases), out.canonicalize().into_diagnostic()?)?;
+        study.same(&bytes)?;
+        Ok(study)
+    }
+
+    /// Refuses a folder whose `study.json` is of other cases.
+    fn same(&self, told: &[u8]) -> miette::Result<()> {
+        let there: Told = serde_json::from_slice(told)
+            .into_diagnostic()
+            .wrap_err_with(|| self.out.join("study.json").display().to_string())?;
+        if (there.schema.as_str(), &there.header) == (SCHEMA, &self.file.digest) {
+            return Ok(());
+        }
+        miette::bail!(
+            help = "give another folder: results of two studies do not mix",
+            "{} holds the study of {} ({}), whose first line is another than that of {} ({})",
+            self.out.display(),
+            there.cases.display(),
+            there.version,
+            self.file.path.display(),
+            self.kind.version()
+        )
+    }
+
+    /// Folder of the shards.
+    pub fn shards(&self) -> PathBuf {
+        self.out.join("shards")
+    }
+
+    /// Where the shard of a range stands.
+    pub fn shard(&self, range: &Range<u64>) -> PathBuf {
+        self.shards().join(format!("{:012}-{:012}.parquet", range.start, range.end))
+    }
+
+    /// The ranges of which there is a shard, by their beginning, the longer first. Names alone are looked at.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn ranges_there(&self) -> miette::Result<Vec<Range<u64>>> {
+        let mut there = Vec::new();
+        let entries = match fs::read_dir(self.shards()) {
+            Ok(entries) => entries,
+            Err(why) if why.kind() == std::io::ErrorKind::NotFound => return Ok(there),
+            Err(why) => {
+                return Err(why).into_diagnostic().wrap_err_with(|| self.shards().display().to_string());
+            }
+        };
+        for entry in entries {
+            let name = entry.into_diagnostic()?.file_name();
+            let range = name.to_str().and_then(|name| {
+                let (a, b) = name.strip_suffix(".parquet")?.split_once('-')?;
+                Some(a.parse().ok()?..b.parse().ok()?)
+            });
+            there.extend(range);
+        }
+        there.sort_by_key(|r: &Range<u64>| (r.start, std::cmp::Reverse(r.end)));
+        Ok(there)
+    }
+
+    /// A new file in `parts/` that no other worker has, on whatever machine: its name is drawn by the kernel, not made of a clock.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn part(&self, name: &str) -> miette::Result<(PathBuf, fs::File)> {
+        let folder = self.out.join("parts");
+        runs::files::make_folder(&folder)?;
+        let unique = fs::read_to_string("/proc/sys/kernel/random/uuid").into_diagnostic()?;
+        let path = folder.join(format!("{name}.{}", unique.trim()));
+        let file = fs::OpenOptions::new().write(true).create_new(true).open(&path);
+        Ok((path.clone(), file.into_diagnostic().wrap_err_with(|| path.display().to_string())?))
+    }
+
+    /// The case of a line.
+    ///
+    /// # Errors
+    /// A line that is not what the kind takes, or a file that it names and that cannot be read.
+    pub fn case(&self, index: u64, line: Option<&Value>) -> miette::Result<Case> {
+        (self.make)(index, line)
+    }
+
+    /// The keys of a range.
+    ///
+    /// # Errors
+    /// As [`Study::case`].
+    pub fn keys(&self, range: Range<u64>) -> miette::Result<impl Iterator<Item = miette::Result<[u8; 32]>>> {
+        let lines = self.file.lines(range)?;
+        Ok(lines.map(|line| {
+            let (index, line) = line?;
+            Ok(self.kind.key(&self.case(index, line.as_ref())?.inputs))
+        }))
+    }
+}
+
+/// SHA-256 of the running program: two builds of one version are two programs.
+///
+/// # Errors
+/// The program's file cannot be read.
+pub fn program() -> miette::Result<String> {
+    let exe = std::env::current_exe().into_diagnostic()?;
+    Ok(sha256_hex(&fs::read(exe).into_diagnostic()?))
+}

@@ -1,0 +1,316 @@
+//! Hands what is missing to an engine and follows what comes into the folder. The same call again goes on: a job that is still at
+//! work is followed, and only what is missing then is handed over.
+#![allow(clippy::disallowed_methods, reason = "somebody waits in wall-clock time")]
+
+use super::engines::{self, Engine, Handed, Job};
+use super::gather::holes;
+use super::plan::{self, Pilot, Plan};
+use super::study::{Study, program};
+use super::worker::{Done, work};
+use crate::progress;
+use indicatif::ProgressBar;
+use miette::{Context, IntoDiagnostic};
+use rayon::prelude::*;
+use runs::say;
+use runs::session::Unfinished;
+use serde::Serialize;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// How often the folder is looked at.
+const LOOK: Duration = Duration::from_millis(500);
+/// How often the engine is asked whether it is still at work: schedulers do not like to be asked.
+const ASK: Duration = Duration::from_secs(5);
+/// How often what an engine left undone is handed over again, where something came of the last time, or of the one before.
+const ROUNDS: usize = 4;
+
+/// How to submit.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Name of the engine, or `local`.
+    pub engine: String,
+    /// Tasks at one time; on this machine its cores if left out.
+    pub workers: Option<u64>,
+    /// Time that a task is meant to take, s.
+    pub task_s: f64,
+    /// Time that a task may take, s; from the pilot if left out.
+    pub limit_s: Option<f64>,
+    /// Cases of the pilot at most.
+    pub pilot: usize,
+    /// Time of a case where it is known, s: no pilot then.
+    pub case_s: Option<f64>,
+    /// Do not wait.
+    pub detach: bool,
+    /// Address or folder of the engine's server.
+    pub server: Option<String>,
+    /// Python for HyperQueue and Dask.
+    pub python: String,
+    /// Passed on to the engine.
+    pub options: Vec<String>,
+}
+
+/// What a submission came to.
+#[derive(Clone, Debug, Serialize)]
+pub struct Submitted {
+    /// Folder of the study.
+    pub out: PathBuf,
+    /// Engine.
+    pub engine: String,
+    /// Cases of the study.
+    pub cases: u64,
+    /// Cases that had a result before.
+    pub there: u64,
+    /// Cases without a result now.
+    pub missing: u64,
+    /// What the pilot measured.
+    pub pilot: Option<Pilot>,
+    /// Tasks handed over, in all rounds.
+    pub tasks: usize,
+    /// Cases of a task.
+    pub cases_a_task: u64,
+    /// Time limit of a task, s.
+    pub limit_s: f64,
+    /// The engine's names of the jobs.
+    pub ids: Vec<String>,
+    /// Time from beginning to end, s.
+    pub wall_seconds: f64,
+}
+
+fn length(ranges: &[Range<u64>]) -> u64 {
+    ranges.iter().map(|r| r.end - r.start).sum()
+}
+
+/// Submits what is missing of a study.
+///
+/// # Errors
+/// An engine that takes nothing; on this machine whatever the worker says.
+pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
+    let begun = Instant::now();
+    let engine = engines::by_name(&options.engine)?;
+    let cases = study.file.header.cases;
+    let missing = || Ok::<_, miette::Report>(holes(&study.ranges_there()?, cases));
+    let first = length(&missing()?);
+    let bar = progress::bar(cases, "cases");
+    bar.set_position(cases - first);
+    let (out, asked) = (study.out.display().to_string(), options.engine.clone());
+    // Once: several studies may be submitted by one command.
+    static ASKED: std::sync::Once = std::sync::Once::new();
+    let first_time = !ASKED.is_completed();
+    ASKED.call_once(|| ());
+    let told = move |done| {
+        let goes_on =
+            if asked == "local" || asked == "dask" { "is over" } else { "goes on without this command" };
+        say!("{done} of {cases} cases are in {out}; what was at work {goes_on}");
+        say!("the same command goes on from there; `muprime submit --cancel --out {out}` ends what runs");
+    };
+    if first_time {
+        progress::on_interrupt(&bar, told)?;
+    }
+    let mut said = Submitted {
+        out: study.out.clone(),
+        engine: options.engine.clone(),
+        cases,
+        there: cases - first,
+        missing: first,
+        pilot: None,
+        tasks: 0,
+        cases_a_task: 0,
+        limit_s: 0.0,
+        ids: Vec::new(),
+        wall_seconds: 0.0,
+    };
+    for (folder, job) in at_work(&study.out)? {
+        match engine.filter(|engine| engine.name == job.engine) {
+            Some(engine) => {
+                // The folder says which job it is; programs and their options come from the command line.
+                let (server, python) = (options.server.clone(), options.python.clone());
+                let job = Job { server, python, command: Vec::new(), options: Vec::new(), ..job };
+                let Ok(handed) = (engine.again)(&folder, &job) else { continue };
+                follow(study, engine, &folder, handed, &bar)?;
+            }
+            None => say!("{}: handed to another engine; --engine says which one to follow", folder.display()),
+        }
+    }
+    let (mut before, mut in_vain) = (u64::MAX, 0);
+    for _ in 0..ROUNDS {
+        let holes = missing()?;
+        said.missing = length(&holes);
+        in_vain += u32::from(said.missing >= before);
+        if holes.is_empty() || in_vain > 1 {
+            break;
+        }
+        before = said.missing;
+        if said.pilot.is_none() {
+            said.pilot = Some(match options.case_s {
+                Some(mean_s) => Pilot { cases: 0, mean_s, longest_s: mean_s },
+                None => plan::measure(study, &holes, options.pilot, Duration::from_secs(20))?,
+            });
+        }
+        let Some(pilot) = said.pilot else { break };
+        let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
+        let plan =
+            plan::cut(&holes, &pilot, options.workers.unwrap_or(cores), options.task_s, options.limit_s);
+        said.tasks += plan.ranges.len();
+        (said.cases_a_task, said.limit_s) = (plan.cases_a_task, plan.limit_s);
+        match engine {
+            None => here(study, &plan, options.workers.unwrap_or(cores), &bar)?,
+            Some(engine) => {
+                let (folder, handed) = hand_over(study, engine, &plan, options)?;
+                said.ids.extend(handed.ids.clone());
+                if options.detach {
+                    break;
+                }
+                follow(study, engine, &folder, handed, &bar)?;
+            }
+        }
+        said.missing = length(&missing()?);
+    }
+    bar.finish_and_clear();
+    said.wall_seconds = begun.elapsed().as_secs_f64();
+    Ok(said)
+}
+
+/// Runs a plan on this machine: the same worker, on the threads of a pool. A case that cannot be made leaves its range undone and
+/// the others not; a disk that is full ends it.
+fn here(study: &Study, plan: &Plan, threads: u64, bar: &ProgressBar) -> miette::Result<()> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build().into_diagnostic()?;
+    let program = program()?;
+    let first = Mutex::new(None);
+    pool.install(|| {
+        plan.ranges.par_iter().try_for_each(|range| match work(study, range.clone(), &program, None) {
+            Ok(Done::There | Done::Made { .. } | Done::Cancelled) => {
+                bar.inc(range.end - range.start);
+                Ok(())
+            }
+            Err(why) if why.downcast_ref::<Unfinished>().is_some() => Err(why),
+            Err(why) => {
+                bar.suspend(|| say!("cases {}..{}: {why:?}", range.start, range.end));
+                first.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(why);
+                Ok(())
+            }
+        })
+    })?;
+    first.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner).map_or(Ok(()), Err)
+}
+
+/// Makes a job's folder and hands its tasks over.
+fn hand_over(
+    study: &Study,
+    engine: &Engine,
+    plan: &Plan,
+    options: &Options,
+) -> miette::Result<(PathBuf, Handed)> {
+    let folder = new_folder(&study.out.join("jobs"))?;
+    let exe = std::env::current_exe().into_diagnostic()?;
+    let text = |path: &Path| path.display().to_string();
+    let command = [
+        text(&exe),
+        "case".into(),
+        "--cases".into(),
+        text(&study.file.path),
+        "--out".into(),
+        text(&study.out),
+        "--threads".into(),
+        "1".into(),
+        "--job".into(),
+        text(&folder),
+    ];
+    let mut job = Job {
+        engine: engine.name.into(),
+        ids: Vec::new(),
+        kind: study.kind.name.into(),
+        command: command.into(),
+        ranges: plan.ranges.clone(),
+        limit_s: plan.limit_s,
+        workers: options.workers,
+        server: options.server.clone(),
+        python: options.python.clone(),
+        options: options.options.clone(),
+    };
+    job.write(&folder)?;
+    let handed = match (engine.submit)(&folder, &job) {
+        Ok(handed) => handed,
+        Err(why) => {
+            runs::files::write_plain(&folder.join("ended"), "")?;
+            return Err(why);
+        }
+    };
+    job.ids.clone_from(&handed.ids);
+    job.write(&folder)?;
+    Ok((folder, handed))
+}
+
+/// A folder of a new job, which nobody else has made.
+fn new_folder(jobs: &Path) -> miette::Result<PathBuf> {
+    runs::files::make_folder(jobs)?;
+    let wrong = || format!("cannot make a folder in {}", jobs.display());
+    if jobs.symlink_metadata().into_diagnostic()?.is_symlink() {
+        miette::bail!("{} is a link", jobs.display());
+    }
+    let mut number = 1;
+    loop {
+        let folder = jobs.join(format!("{number:04}"));
+        match std::fs::create_dir(&folder) {
+            Ok(()) => {
+                runs::files::sync_folder_of(&folder).into_diagnostic().wrap_err_with(wrong)?;
+                return Ok(folder);
+            }
+            Err(why) if why.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
+            Err(why) => return Err(why).into_diagnostic().wrap_err_with(wrong),
+        }
+    }
+}
+
+/// Looks at the folder until nothing is missing or the engine has nothing left to run.
+fn follow(
+    study: &Study,
+    engine: &Engine,
+    folder: &Path,
+    mut handed: Handed,
+    bar: &ProgressBar,
+) -> miette::Result<()> {
+    let (cases, mut asked) = (study.file.header.cases, Instant::now());
+    let mut over = false;
+    loop {
+        let missing = length(&holes(&study.ranges_there()?, cases));
+        bar.set_position(cases - missing);
+        if missing == 0 || over {
+            break;
+        }
+        std::thread::sleep(LOOK);
+        if asked.elapsed() >= ASK || handed.child.is_some() {
+            // What ended a moment ago may not be seen in the folder yet: it is looked at once more.
+            over = !(engine.alive)(&mut handed);
+            asked = Instant::now();
+        }
+    }
+    if let Some(child) = &mut handed.child {
+        let _ = child.wait();
+    }
+    runs::files::write_plain(&folder.join("ended"), "")
+}
+
+/// Jobs that nobody has seen the end of.
+fn at_work(out: &Path) -> miette::Result<Vec<(PathBuf, Job)>> {
+    let open = |f: &PathBuf| !f.join("ended").exists() && !f.join("cancelled").exists();
+    engines::folders(out)?.into_iter().filter(open).map(|f| Job::read(&f).map(|job| (f, job))).collect()
+}
+
+/// Cancels the jobs of a folder that have not ended. Returns the engine's names of them.
+///
+/// # Errors
+/// An engine that cannot be asked.
+pub fn cancel(out: &Path) -> miette::Result<Vec<String>> {
+    let mut ids = Vec::new();
+    for (folder, job) in at_work(out)? {
+        // First the word for the workers, then the engine: a task that starts between sees it.
+        runs::files::write_plain(&folder.join("cancelled"), "")?;
+        if let Some(engine) = engines::by_name(&job.engine)? {
+            (engine.cancel)(&job).wrap_err_with(|| folder.display().to_string())?;
+        }
+        ids.extend(job.ids);
+    }
+    Ok(ids)
+}

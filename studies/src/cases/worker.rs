@@ -1,0 +1,176 @@
+//! The worker: one range of cases becomes one shard, once. Killed at any step it leaves either no shard or a whole one, and
+//! called again it does what is left to do. It asks no clock, no scheduler and no other worker.
+
+use super::crash_points;
+use super::file::hex;
+use super::kinds::{Case, Outcome};
+use super::shard::{Entry, Facts, ROWS, Reader, Writer};
+use super::study::Study;
+use miette::{Context, IntoDiagnostic};
+use rayon::prelude::*;
+use runs::say;
+use runs::session::Unfinished;
+use sha2::{Digest, Sha256};
+use std::fs;
+use std::io::BufWriter;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// What a worker found or made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Done {
+    /// The shard was there.
+    There,
+    /// It was made; so many of its cases failed, with their reasons.
+    Made {
+        /// Cases without a result.
+        failed: u64,
+    },
+    /// The study was cancelled before it was made.
+    Cancelled,
+}
+
+/// Runs a range on the threads of the pool that it is called in.
+///
+/// # Errors
+/// Cases that cannot be made, a shard of other cases at its place, a disk that is full: then there is no shard.
+pub fn work(study: &Study, range: Range<u64>, program: &str, job: Option<&Path>) -> miette::Result<Done> {
+    crash_points::here("start");
+    if range.is_empty() {
+        miette::bail!("cases {}..{}: an empty range", range.start, range.end);
+    }
+    let cancelled = || job.is_some_and(|job| job.join("cancelled").exists());
+    if cancelled() {
+        return Ok(Done::Cancelled);
+    }
+    let place = study.shard(&range);
+    if place.exists() && stands(study, &range, &place)? {
+        return Ok(Done::There);
+    }
+    let name = place.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let (part, file) = study.part(&name)?;
+    crash_points::here("part-made");
+    let written = write(study, &range, program, BufWriter::new(file), &cancelled);
+    let moved = written.and_then(|failed| match failed {
+        None => Ok(None),
+        Some(failed) => {
+            fs::rename(&part, &place).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
+            Ok(Some(failed))
+        }
+    });
+    match moved {
+        Ok(Some(failed)) => {
+            crash_points::here("moved");
+            runs::files::sync_folder_of(&place).into_diagnostic().wrap_err(Unfinished::NotKept)?;
+            crash_points::here("folder-synced");
+            Ok(Done::Made { failed })
+        }
+        Ok(None) => {
+            let _ = fs::remove_file(&part);
+            Ok(Done::Cancelled)
+        }
+        Err(why) => {
+            let _ = fs::remove_file(&part);
+            Err(why)
+        }
+    }
+}
+
+/// Whether the shard at a range's place is that of its cases. One that cannot be read is set aside, with a word.
+fn stands(study: &Study, range: &Range<u64>, place: &Path) -> miette::Result<bool> {
+    let reader = match Reader::open(study.kind, place) {
+        Ok(reader) if reader.rows == range.end - range.start => reader,
+        Ok(_) | Err(_) => {
+            let mut aside = place.as_os_str().to_owned();
+            aside.push(".damaged");
+            say!("{}: no whole shard; it is set aside as .damaged, and its cases are run", place.display());
+            fs::rename(place, aside).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
+            return Ok(false);
+        }
+    };
+    let mut keys = Sha256::new();
+    for key in study.keys(range.clone())? {
+        keys.update(key?);
+    }
+    if reader.facts.get("keys").is_some_and(|there| *there == hex(&keys.finalize())) {
+        return Ok(true);
+    }
+    miette::bail!(
+        help =
+            "the cases or what they name were changed after it was made: remove it, or give another folder",
+        "{} is of other cases than those of {}",
+        place.display(),
+        study.file.path.display()
+    )
+}
+
+/// Runs the cases in portions and writes them; `None` where the study was cancelled meanwhile.
+fn write(
+    study: &Study,
+    range: &Range<u64>,
+    program: &str,
+    to: BufWriter<fs::File>,
+    cancelled: &dyn Fn() -> bool,
+) -> miette::Result<Option<u64>> {
+    let mut writer = Writer::new(study.kind, to).wrap_err(Unfinished::NotKept)?;
+    let (mut keys, mut failed, mut lines) = (Sha256::new(), 0, study.file.lines(range.clone())?);
+    let portion = ROWS.min(8 * rayon::current_num_threads());
+    loop {
+        let cases: Vec<(u64, Case)> = lines
+            .by_ref()
+            .take(portion)
+            .map(|line| line.and_then(|(index, line)| Ok((index, study.case(index, line.as_ref())?))))
+            .collect::<miette::Result<_>>()?;
+        if cases.is_empty() {
+            break;
+        }
+        if cancelled() {
+            return Ok(None);
+        }
+        let entries: Vec<Entry> =
+            cases.into_par_iter().map(|(index, case)| entry(study, index, case)).collect();
+        for entry in entries {
+            keys.update(entry.key);
+            failed += u64::from(entry.outcome.is_err());
+            writer.push(entry).wrap_err(Unfinished::NotKept)?;
+        }
+        crash_points::here("half-written");
+    }
+    let facts = facts(study, range, program, hex(&keys.finalize()));
+    let to = writer.end(&facts).wrap_err(Unfinished::NotKept)?;
+    let file = to.into_inner().map_err(std::io::IntoInnerError::into_error).into_diagnostic();
+    let file = file.wrap_err(Unfinished::NotKept)?;
+    crash_points::here("written");
+    file.sync_all().into_diagnostic().wrap_err(Unfinished::NotKept)?;
+    crash_points::here("synced");
+    Ok(Some(failed))
+}
+
+/// Runs one case. A fault of the program in one case is that case's reason: the others stand.
+pub fn entry(study: &Study, index: u64, case: Case) -> Entry {
+    let key = study.kind.key(&case.inputs);
+    let ran = catch_unwind(AssertUnwindSafe(case.run));
+    let outcome: Outcome = ran.unwrap_or_else(|panic| {
+        let said =
+            panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+        Err(format!("a fault of the program: {}", said.unwrap_or("it says no more")))
+    });
+    Entry { index, key, outcome }
+}
+
+/// What a shard says of itself: of which study it is, then who made it.
+fn facts(study: &Study, range: &Range<u64>, program: &str, keys: String) -> Facts {
+    let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let fact = |name: &str, value: &str| (name.to_string(), value.trim().to_string());
+    Facts::from([
+        fact("schema", "muprime.shard/1"),
+        fact("version", &study.kind.version()),
+        fact("header", &study.file.digest),
+        fact("range", &format!("{}..{}", range.start, range.end)),
+        fact("keys", &keys),
+        fact("program", program),
+        fact("made_on", &host),
+        fact("platform", &format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS)),
+    ])
+}

@@ -1,0 +1,99 @@
+//! Long computations at a terminal: a bar with the time that is left, and what there is so far where somebody presses Ctrl-C.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use miette::IntoDiagnostic;
+use runs::leave::leave_now;
+use runs::say;
+use std::io::IsTerminal;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Status of what Ctrl-C ended: 128 and the number of the signal.
+pub const INTERRUPTED: u8 = 130;
+
+/// A bar on standard error with the time that is left, hidden where that is no terminal: a log holds no bars.
+pub fn bar(length: u64, what: &str) -> ProgressBar {
+    let target = if std::io::stderr().is_terminal() {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
+    let bar = ProgressBar::with_draw_target(Some(length), target);
+    let template = format!("{{bar:30}} {{pos}}/{{len}} {what}, {{eta}} to go {{msg}}");
+    if let Ok(style) = ProgressStyle::with_template(&template) {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// On Ctrl-C the bar goes, `partial` says what there is so far (it gets the bar's position), and the program ends with [`INTERRUPTED`]. A second Ctrl-C waits for
+/// nothing.
+///
+/// # Errors
+/// The system gives no thread or no signals.
+pub fn on_interrupt(bar: &ProgressBar, partial: impl FnOnce(u64) + Send + 'static) -> miette::Result<()> {
+    let mut caught = signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT]).into_diagnostic()?;
+    let bar = bar.clone();
+    let mut partial = Some(partial);
+    std::thread::Builder::new()
+        .name("signals".into())
+        .spawn(move || {
+            for _ in caught.forever() {
+                let Some(partial) = partial.take() else {
+                    leave_now(INTERRUPTED);
+                    return;
+                };
+                let position = bar.position();
+                bar.finish_and_clear();
+                say!("stopped by Ctrl-C: what follows is partial");
+                // Saying it may take long, or fail: the next Ctrl-C does not wait for it.
+                let said = std::thread::Builder::new().name("partial".into()).spawn(move || {
+                    partial(position);
+                    leave_now(INTERRUPTED);
+                });
+                if said.is_err() {
+                    leave_now(INTERRUPTED);
+                }
+            }
+        })
+        .into_diagnostic()?;
+    Ok(())
+}
+
+/// A study of many parts at a terminal: how many are done, and what they found, for who presses Ctrl-C.
+pub struct Study<T> {
+    /// Its bar.
+    pub bar: ProgressBar,
+    found: Arc<Mutex<Vec<T>>>,
+}
+
+impl<T: Clone + Send + 'static> Study<T> {
+    /// Of so many parts. On Ctrl-C `partial` gets what was found, and how many parts were done.
+    ///
+    /// # Errors
+    /// As [`on_interrupt`].
+    pub fn begin(
+        parts: u64,
+        what: &str,
+        partial: impl FnOnce(Vec<T>, u64) + Send + 'static,
+    ) -> miette::Result<Self> {
+        let (bar, found) = (bar(parts, what), Arc::<Mutex<Vec<T>>>::default());
+        let kept = Arc::clone(&found);
+        on_interrupt(&bar, move |done| {
+            let so_far = kept.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            partial(so_far, done);
+        })?;
+        Ok(Study { bar, found })
+    }
+
+    /// One part more, and what it found.
+    pub fn done(&self, found: Option<T>) {
+        self.found.lock().unwrap_or_else(PoisonError::into_inner).extend(found);
+        self.bar.inc(1);
+    }
+}
+
+impl<T> Drop for Study<T> {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

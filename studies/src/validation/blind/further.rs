@@ -1,0 +1,237 @@
+//! Designed next experiments against random ones: how many further passes until the cause is named.
+//!
+//! A sealed set is thinned until it hardly tells its cause; then batches of passes are measured on the same sealed rig,
+//! once as the diagnosis asks for them and once at conditions drawn evenly from the grid that designs choose from, until
+//! the truth has a probability of 0.9 or the passes run out. Both sides meet the same stream of noise.
+
+use super::{Figure, median, share, statistic};
+use diagnosis::data::{RigFile, Table};
+use diagnosis::hypotheses::Options;
+use diagnosis::next;
+use diagnosis::verdict::diagnose;
+use models::condition::Condition;
+use models::covariate;
+use models::pass::Pass;
+use rayon::prelude::*;
+use serde::Serialize;
+use sim::noise::Noise;
+use sim::sealed::{Ask, Stratum, generate_with_rig};
+
+/// Passes that a thinned set keeps: the most of these at which its cause is open. A sixth with the plate still. Most causes
+/// that the whole set tells are plain from two dozen passes.
+const KEPT: [usize; 5] = [48, 36, 24, 16, 12];
+/// Passes of a batch, and batches. Causes are often found within six passes: larger batches would not show who was
+/// sooner.
+const BATCH: usize = 2;
+const BATCHES: usize = 32;
+/// Passes at which a race is broken off: who has not arrived counts with so many.
+pub const LIMIT: usize = BATCH * BATCHES;
+/// Probability at which a cause counts as found.
+const FOUND: f64 = 0.9;
+/// Probability below which a cause is open. Where it is likelier than not at the start, any further pass may end the race.
+const OPEN: f64 = 0.5;
+/// chi2 by which the whole set tells its cause from the recalibrated baseline: 100 and more enters.
+const TOLD: f64 = 100.0;
+
+/// What the diagnosis said after a batch.
+#[derive(Debug, Clone, Serialize)]
+pub struct Step {
+    /// Further passes so far.
+    pub passes: usize,
+    /// Probability of the truth.
+    pub truth: f64,
+    /// Probability of the open set.
+    pub unknown: f64,
+    /// The likeliest hypothesis.
+    pub leader: String,
+    /// Share of the gap that it closed on left-out regions.
+    pub closure: f64,
+}
+
+/// What it took to name the cause of one set.
+#[derive(Debug, Clone, Serialize)]
+pub struct Race {
+    /// Seed of the set.
+    pub seed: u64,
+    /// The cause.
+    pub truth: String,
+    /// Passes that were kept.
+    pub kept: usize,
+    /// Probability of the truth before any further pass.
+    pub before: f64,
+    /// Further passes as designed; none where they did not suffice.
+    pub designed: Option<usize>,
+    /// Further passes at random.
+    pub random: Option<usize>,
+    /// Batch by batch as designed.
+    pub designed_steps: Vec<Step>,
+    /// Batch by batch at random.
+    pub random_steps: Vec<Step>,
+}
+
+/// Races over `count` sets, each told to `each` as it ends; those whose cause leads from the start are left out.
+///
+/// # Errors
+/// A set that the diagnosis refuses.
+pub fn run(seed: u64, count: usize, each: &(dyn Fn(Option<&Race>) + Sync)) -> miette::Result<Vec<Race>> {
+    let all: miette::Result<Vec<Option<Race>>> = (0..count as u64)
+        .into_par_iter()
+        .map(|k| {
+            let race = one(seed.wrapping_mul(1_000_003).wrapping_add(k))?;
+            each(race.as_ref());
+            Ok(race)
+        })
+        .collect();
+    Ok(all?.into_iter().flatten().collect())
+}
+
+fn one(seed: u64) -> miette::Result<Option<Race>> {
+    let set = generate_with_rig(seed, Stratum::Single, Ask::Imitators).0;
+    if set.label.chi2_gain < TOLD || !set.label.decidable() {
+        return Ok(None);
+    }
+    let truth = set.label.causes[0].name.clone();
+    let rig: RigFile = RigFile::parse(&set.rig_toml).map_err(|e| miette::miette!("rig.toml: {e}"))?;
+    let Some((kept, start, first)) = thin(&set.passes, &rig, &truth)? else { return Ok(None) };
+    let grid = grid(&start)?;
+    let race = |designed: bool| -> miette::Result<Vec<Step>> {
+        // Each side has the rig to itself: the same finger, the same stream of further noise.
+        let mut sealed = generate_with_rig(seed, Stratum::Single, Ask::Gain).1;
+        let mut chance = Noise::new(seed, "random experiments");
+        let (mut passes, mut asked) = (start.clone(), first.asked.clone());
+        let mut steps = Vec::new();
+        for batch in 1..=BATCHES {
+            let wanted = if designed && !asked.is_empty() {
+                std::mem::take(&mut asked)
+            } else {
+                (0..BATCH).map(|_| grid[chance.below(grid.len())]).collect()
+            };
+            let mut further = sealed.measure(&wanted);
+            for pass in &mut further {
+                pass.run = Some(format!("further {batch}"));
+            }
+            passes.extend(further);
+            let said = says(&passes, &rig, &truth)?;
+            asked = said.asked;
+            steps.push(Step { passes: batch * BATCH, ..said.step });
+            if said.found >= FOUND {
+                break;
+            }
+        }
+        Ok(steps)
+    };
+    let (designed_steps, random_steps) = (race(true)?, race(false)?);
+    let arrived = |steps: &[Step]| steps.last().filter(|s| s.truth >= FOUND).map(|s| s.passes);
+    Ok(Some(Race {
+        seed,
+        truth,
+        kept,
+        before: first.found,
+        designed: arrived(&designed_steps),
+        random: arrived(&random_steps),
+        designed_steps,
+        random_steps,
+    }))
+}
+
+/// Figures of races: who arrived, and the ratio of passes where at least one side did.
+pub fn figures(races: &[Race]) -> Vec<Figure> {
+    let passes = |n: Option<usize>| n.unwrap_or(LIMIT) as f64;
+    let decided = races.iter().filter(|r| r.designed.is_some() || r.random.is_some());
+    let both: Vec<[f64; 2]> = decided.map(|r| [passes(r.designed), passes(r.random)]).collect();
+    let ratios: Vec<f64> = both.iter().map(|[designed, random]| designed / random).collect();
+    // A ratio of two small numbers of passes is coarse; that of the medians is not.
+    let of_medians = |sample: &mut [[f64; 2]]| {
+        let side = |k: usize| median(&mut sample.iter().map(|r| r[k]).collect::<Vec<f64>>());
+        side(0) / side(1)
+    };
+    let of = |name, side: fn(&Race) -> Option<usize>| {
+        let list: Vec<f64> = races.iter().map(|r| passes(side(r))).collect();
+        statistic(name, "", &list, median)
+    };
+    let geometric = |v: &mut [f64]| (v.iter().map(|x| x.ln()).sum::<f64>() / v.len() as f64).exp();
+    vec![
+        share("designed: arrived", "", races.iter().map(|r| r.designed.is_some()).collect()),
+        share("random: arrived", "", races.iter().map(|r| r.random.is_some()).collect()),
+        of("designed: median passes", |r| r.designed),
+        of("random: median passes", |r| r.random),
+        statistic("median of the designed over that of the random", "0.5", &both, of_medians),
+        statistic("passes designed over random, race by race, median", "0.5", &ratios, median),
+        statistic("passes designed over random, race by race, geometric mean", "", &ratios, geometric),
+    ]
+}
+
+/// The largest thinned set that does not tell its cause, with what the diagnosis says of it.
+fn thin(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Option<(usize, Vec<Pass>, Said)>> {
+    for kept in KEPT {
+        let start = thinned(passes, kept);
+        let said = says(&start, rig, truth)?;
+        if said.found < OPEN {
+            return Ok(Some((kept, start, said)));
+        }
+    }
+    Ok(None)
+}
+
+/// Every so many passes of a set, as if the sweep had been broken off.
+fn thinned(passes: &[Pass], keep: usize) -> Vec<Pass> {
+    let (still, moving): (Vec<&Pass>, Vec<&Pass>) = passes.iter().partition(|p| p.amplitude.metres() == 0.0);
+    let some = |list: &[&Pass], count: usize| -> Vec<Pass> {
+        let step = list.len().div_ceil(count.max(1)).max(1);
+        list.iter().step_by(step).map(|p| (*p).clone()).collect()
+    };
+    let mut kept = some(&still, keep / 6);
+    kept.extend(some(&moving, keep - keep / 6));
+    for pass in &mut kept {
+        pass.run = Some(pass.run.take().unwrap_or_else(|| "first".to_string()));
+    }
+    kept
+}
+
+/// What the diagnosis says of some passes.
+struct Said {
+    /// Probability of the truth.
+    found: f64,
+    step: Step,
+    /// The conditions asked for next, a batch of them.
+    asked: Vec<Condition>,
+}
+
+fn says(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Said> {
+    let options = Options { pairs: false, ..Options::default() };
+    let report = diagnose(&table(passes)?, rig, &options, String::new()).report;
+    let of = |name: &str| -> f64 {
+        report.hypotheses.iter().filter(|h| h.effects == [name]).map(|h| h.probability).sum()
+    };
+    let asked = report.next_experiment.iter().find(|e| !e.conditions.is_empty());
+    let asked = asked.map_or_else(Vec::new, |e| e.conditions.iter().take(BATCH).map(settings).collect());
+    let found = of(truth);
+    let step = Step {
+        passes: 0,
+        truth: found,
+        unknown: of("unknown"),
+        leader: report.hypotheses[0].effects.join("+"),
+        closure: report.left_out.pooled_closure,
+    };
+    Ok(Said { found, step, asked })
+}
+
+fn table(passes: &[Pass]) -> miette::Result<Table> {
+    Table::measured(passes).map_err(|e| miette::miette!("table of a sealed set: {e}"))
+}
+
+/// The conditions that a design of these passes may choose from.
+fn grid(passes: &[Pass]) -> miette::Result<Vec<Condition>> {
+    Ok(next::grid::conditions(&table(passes)?).iter().map(settings).collect())
+}
+
+/// What a plan sets of a condition, and nothing of its time and climate.
+fn settings(c: &Condition) -> Condition {
+    let mut set = Condition::paper();
+    for covariate in covariate::planned() {
+        if let Some(value) = covariate.of(c) {
+            covariate.put(&mut set, value);
+        }
+    }
+    set
+}

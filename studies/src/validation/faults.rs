@@ -1,0 +1,36 @@
+//! Controller, virtual rig and faults in virtual time, from one seed: each fault of the list strikes in each phase, and
+//! the reaction is held against its bound.
+//!
+//! `rows` is the list, `bench` runs one scene, `search` runs many seeds over all cores and makes a failure small.
+
+pub mod bench;
+pub mod rows;
+pub mod search;
+mod tamper;
+
+pub use bench::{Core, Found, Scene, Strike, run, run_with};
+pub use rows::{ELSEWHERE, Expect, FaultRow, Moment, Pace, ROWS};
+pub use search::{Search, Tally, search};
+
+use runs::out;
+
+/// Worst reactions beside their bounds, in cycles of 1 ms.
+pub fn table(tally: &Tally) {
+    out!("  # fault                          phase    runs  command off / bound  measured off / bound (ms)");
+    for ((number, name, moment), r) in &tally.reactions {
+        let moment = format!("{moment:?}").to_lowercase();
+        let cells = match r.command_bound {
+            None => "no trip due".to_string(),
+            Some(bound) => {
+                let cell = |n: Option<u64>| n.map_or_else(|| "-".into(), |n| n.to_string());
+                format!(
+                    "{:>11} / {bound:<5} {:>14} / {}",
+                    cell(r.command_off),
+                    cell(r.measured_off),
+                    r.measured_bound
+                )
+            }
+        };
+        out!("{number:>3} {name:<30} {moment:<7} {:>6}  {cells}", r.runs);
+    }
+}

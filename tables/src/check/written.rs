@@ -1,0 +1,117 @@
+//! What the program itself wrote: tables, records, journals, run folders, verdicts.
+
+use super::place::{problems_of, remedy};
+use super::{Good, On, judge, kind_of, read_json, shape};
+use crate::import::remarks;
+use crate::schemas::schema::Kind;
+use miette::{IntoDiagnostic, WrapErr};
+use models::pass::read_passes;
+use runs::input::{MAX_TABLE_BYTES, Problems, bytes_of};
+use std::path::Path;
+
+/// A point table, as a diagnosis would take it; one of conditions has no lateral force.
+pub(super) fn table(path: &Path) -> miette::Result<Good> {
+    let bytes = bytes_of(path, MAX_TABLE_BYTES)?;
+    let passes = if bytes.starts_with(b"PAR1") {
+        read_passes(crate::import::parquet_as_csv(path)?.as_bytes())
+    } else {
+        read_passes(&bytes[..])
+    };
+    let help = remedy(Some("table"));
+    let passes = passes.map_err(|e| miette::miette!(help = help.clone(), "{e}"))?;
+    let columns: Vec<&'static str> = models::covariate::REQUIRED
+        .iter()
+        .chain(models::covariate::OPTIONAL.iter())
+        .map(|c| c.name)
+        .collect();
+    let mut good = Good { kind: "table", passes: Some(passes.len()), remarks: Vec::new() };
+    if passes.iter().all(|p| p.lateral_force_n.is_none()) {
+        passes.iter().try_for_each(diagnosis::data::check).into_diagnostic()?;
+        good.kind = "table of conditions";
+    } else {
+        diagnosis::data::Table::measured(&passes).into_diagnostic()?;
+        good.remarks = remarks::remarks(&passes, &columns);
+    }
+    Ok(good)
+}
+
+/// A record, from its first byte to its last.
+pub(super) fn record(path: &Path) -> miette::Result<()> {
+    let file = std::fs::File::open(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+    let found = realtime::recorder::inspect(std::io::BufReader::new(file));
+    match found.sentences().as_slice() {
+        [] => Ok(()),
+        said => miette::bail!(help = remedy(Some("record")), "{}: {}", path.display(), said.join("; ")),
+    }
+}
+
+/// The journals of a run's folder, line by line.
+pub(super) fn journal(path: &Path) -> miette::Result<Option<usize>> {
+    let text = String::from_utf8(bytes_of(path, MAX_TABLE_BYTES)?).into_diagnostic()?;
+    let sessions = path.file_name().is_some_and(|n| n == "sessions.jsonl");
+    for (i, line) in text.lines().enumerate() {
+        let read = if sessions {
+            serde_json::from_str::<runs::run_dir::Session>(line).map(drop)
+        } else {
+            serde_json::from_str::<runs::sequence::MeasuredPass>(line).map(drop)
+        };
+        read.map_err(|e| {
+            let what = if sessions { "session" } else { "pass" };
+            miette::miette!("{}: line {}: no {what}: {e}", path.display(), i + 1)
+        })?;
+    }
+    Ok((!sessions).then(|| text.lines().count()))
+}
+
+/// A run's folder: everything in it that is known, and whether its parts agree.
+pub(super) fn run_folder(path: &Path) -> miette::Result<usize> {
+    const PARTS: [&str; 6] =
+        ["run.toml", "points.csv", "rig.toml", "summary.json", "passes.jsonl", "sessions.jsonl"];
+    if !path.join("run.toml").exists() {
+        miette::bail!(
+            help = "name a folder that `muprime run --out` made",
+            "{} holds no run",
+            path.display()
+        );
+    }
+    let mut passes = 0;
+    let mut said = Vec::new();
+    for part in PARTS.iter().map(|part| path.join(part)).filter(|part| part.exists()) {
+        let name = part.display().to_string();
+        match kind_of(&name).and_then(|kind| judge(kind, &name, &On::default(), None)) {
+            Ok(good) => passes = good.passes.unwrap_or(passes),
+            // A run that has just begun has too few passes for a diagnosis; what is wrong with its table is told below.
+            Err(_) if part.ends_with("points.csv") => {}
+            Err(why) => said.extend(problems_of(&why).into_iter().map(|p| p.problem)),
+        }
+    }
+    said.extend(runs::run_dir::damage_in(path)?);
+    if said.is_empty() {
+        return Ok(passes);
+    }
+    Err(miette::miette!(
+        help = "`muprime recover` repairs records; `muprime report` says what a damaged run still tells",
+        "{}",
+        said.join("; ")
+    ))
+}
+
+/// A verdict as `diagnose --json` prints it.
+pub(super) fn verdict(name: &str) -> miette::Result<()> {
+    let document = read_json(name)?;
+    let text = runs::input::text_of(Path::new(name))?;
+    let mut wrong = Problems::of(name, &text);
+    if document["schema"] != "muprime.verdict/1" {
+        let problem = format!("its schema is {}; this version reads muprime.verdict/1", document["schema"]);
+        let remedy = "diagnose the data again with this version".to_string();
+        wrong.add_at(text.find("\"schema\"").map(|at| at..at), problem, remedy);
+    }
+    shape::json(&Kind::Verdict.schema(), &document, &mut wrong);
+    let probabilities = document["hypotheses"].as_array().into_iter().flatten();
+    let sum: f64 = probabilities.filter_map(|h| h["probability"].as_f64()).sum();
+    if wrong.is_empty() && (sum - 1.0).abs() > 1e-6 {
+        let place = text.find("\"hypotheses\"").map(|at| at..at);
+        wrong.add_at(place, format!("the probabilities of its hypotheses sum to {sum}, not to 1"), None);
+    }
+    wrong.end()
+}

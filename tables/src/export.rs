@@ -1,0 +1,120 @@
+//! Conversions of a run for other programs. Each is made beside its goal, synced and moved there: never half a file.
+//!
+//! All but CSV carry what the numbers are: the unit and the meaning of every column or topic, and the facts of the run
+//! ([`facts`]): operator, sample, instruments, certificates, versions, seed, licence.
+
+#[cfg(feature = "arrow")]
+mod arrow;
+mod columns;
+mod crate_of_run;
+mod csv;
+pub mod facts;
+#[cfg(feature = "matlab")]
+mod hdf5;
+mod mcap;
+#[cfg(feature = "parquet")]
+mod parquet;
+pub mod unit;
+
+/// Stands in where the feature is off: every call says how to get it.
+#[cfg(not(feature = "arrow"))]
+mod arrow {
+    pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
+        Err(super::absent("arrow"))
+    }
+}
+
+/// Stands in where the feature is off: every call says how to get it.
+#[cfg(not(feature = "matlab"))]
+mod hdf5 {
+    pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
+        Err(super::absent("matlab"))
+    }
+}
+
+/// Stands in where the feature is off: every call says how to get it.
+#[cfg(not(feature = "parquet"))]
+mod parquet {
+    pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
+        Err(super::absent("parquet"))
+    }
+}
+
+use clap::ValueEnum;
+use runs::report::RunData;
+use std::path::{Path, PathBuf};
+
+/// A format to export to. Add one: a file in `export/`, a variant, and a line in [`export`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// The point table with the comparison's columns, as CSV.
+    Csv,
+    /// The same as Parquet, with units and facts.
+    Parquet,
+    /// The same as an Arrow IPC file, with units and facts.
+    Arrow,
+    /// The same as HDF5 in the manner of NeXus, with units and facts.
+    Hdf5,
+    /// Every cycle as flat topics that viewers plot at once.
+    Mcap,
+    /// A description of the run's folder for repositories (RO-Crate), with sizes and checksums.
+    RoCrate,
+}
+
+impl Format {
+    /// Name of the file, unless another is asked for.
+    pub const fn file(self) -> &'static str {
+        match self {
+            Format::Csv => "passes.csv",
+            Format::Parquet => "passes.parquet",
+            Format::Arrow => "passes.arrow",
+            Format::Hdf5 => "passes.h5",
+            Format::Mcap => "signals.mcap",
+            Format::RoCrate => crate_of_run::FILE,
+        }
+    }
+}
+
+#[cfg(not(all(feature = "arrow", feature = "matlab", feature = "parquet")))]
+fn absent(feature: &str) -> miette::Report {
+    miette::miette!(
+        help = "build it with `cargo install --path rig` (the feature is on by default), or take CSV",
+        "this muprime was built without its feature `{feature}`"
+    )
+}
+
+/// The passes of a run as an Arrow IPC file in memory, with units and facts.
+///
+/// # Errors
+/// Whatever the format's library says; a build without Arrow.
+pub fn arrow_bytes(run: &RunData) -> miette::Result<Vec<u8>> {
+    arrow::bytes(&columns::of(&run.passes), &facts::of(run, &facts::Stated::default()))
+}
+
+/// Exports the run in `folder` and returns where it stands: `to`, or the format's own name in the folder. A licence
+/// that is stated now stands in place of the one that the run was made with.
+///
+/// # Errors
+/// Whatever the file system or the format's library says; a crate of a run without a licence, or at another place than the
+/// run's folder.
+pub fn export(
+    folder: &Path,
+    run: &RunData,
+    format: Format,
+    stated: &facts::Stated,
+    to: Option<&Path>,
+) -> miette::Result<PathBuf> {
+    let facts = facts::of(run, stated);
+    let table = columns::of(&run.passes);
+    let place = to.map_or_else(|| folder.join(format.file()), Path::to_path_buf);
+    let bytes = match format {
+        Format::Csv => csv::bytes(&table)?,
+        Format::Parquet => parquet::bytes(&table, &facts)?,
+        Format::Arrow => arrow::bytes(&table, &facts)?,
+        Format::Hdf5 => hdf5::bytes(&table, &facts)?,
+        Format::Mcap => return mcap::write(folder, run, &facts, &place).map(|()| place),
+        Format::RoCrate => crate_of_run::bytes(folder, run, &facts, &place)?,
+    };
+    runs::files::write_whole(&place, &bytes)?;
+    Ok(place)
+}

@@ -1,0 +1,227 @@
+//! A run's record as viewers plot it at once: MCAP with a flat topic for every quantity, its unit at the end of the topic's name,
+//! and a schema that says what it is. A message is `{"value": NUMBER}`; where there is no value there is no message.
+//!
+//! `/force/..`, `/friction/..`, `/drive/..`, `/stage/..`, `/loop/..`, `/safety/..` and `/sweep/..` follow the cycles: what is measured
+//! has a message a cycle, what holds from one change to the next (set-points, echoes, flags) one before and one at each change;
+//! `/pass/COLUMN` one a pass, for every column of the point table and of the comparison that holds numbers; `/event` holds the
+//! events as they are in the record. The record itself keeps everything that a cycle saw, nested: it is what a replay reads.
+
+mod signals;
+
+use super::columns::{self, Cells, Column};
+use super::facts::Facts;
+use super::unit;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, Compression, WriteOptions, Writer};
+use miette::{Context, IntoDiagnostic};
+use realtime::recorder::{EVENTS, Entry, HEADER, PASSES, Reader};
+use realtime::turn::Row;
+use runs::files::{beside, fresh, sync_folder_of};
+use runs::report::RunData;
+use runs::run_dir::records_in;
+use runs::sequence::MeasuredPass;
+use serde_json::json;
+use signals::{SIGNALS, Signal};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Write as _};
+use std::path::Path;
+
+/// Writes the records of all sessions of the run in `folder` to `to`, entry by entry: memory stays the same however long they are.
+///
+/// # Errors
+/// Whatever the file system or the format's library says. Nothing is left behind then.
+pub fn write(folder: &Path, run: &RunData, facts: &Facts, to: &Path) -> miette::Result<()> {
+    let part = beside(to);
+    let written = fresh(&part).into_diagnostic().and_then(|file| {
+        let mut flat = Flat::begin(BufWriter::new(file), run, facts).into_diagnostic()?;
+        for path in records_in(folder)? {
+            let file = File::open(&path).into_diagnostic()?;
+            flat.record(BufReader::new(file)).wrap_err_with(|| path.display().to_string())?;
+        }
+        let mut file = flat.end().into_diagnostic()?;
+        file.flush().into_diagnostic()?;
+        file.get_ref().sync_all().into_diagnostic()
+    });
+    let placed =
+        written.and_then(|()| std::fs::rename(&part, to).and_then(|()| sync_folder_of(to)).into_diagnostic());
+    if placed.is_err() {
+        let _ = std::fs::remove_file(&part);
+    }
+    placed.wrap_err_with(|| format!("cannot write {}", to.display()))
+}
+
+/// The file that is being written.
+struct Flat {
+    to: Writer<BufWriter<File>>,
+    signals: Vec<(Signal, Topic, Held)>,
+    passes: Vec<Topic>,
+    events: Topic,
+    text: Vec<u8>,
+}
+
+/// A quantity that holds from one change to the next. The last cycle before a change is told too: so a line from message to
+/// message is the step that it was.
+#[derive(Default)]
+struct Held {
+    value: Option<Option<f64>>,
+    /// The last cycle that had this value, where it was not written.
+    unwritten: Option<(u64, f64)>,
+}
+
+impl Held {
+    /// Whether a cycle's value is another than the one before it.
+    fn changes(&mut self, at: u64, value: Option<f64>) -> bool {
+        let changes = self.value != Some(value);
+        if !changes {
+            self.unwritten = value.map(|value| (at, value));
+        }
+        self.value = Some(value);
+        changes
+    }
+}
+
+/// A topic of the file: its channel, and how many messages it has.
+struct Topic {
+    channel: u16,
+    written: u32,
+}
+
+impl Flat {
+    fn begin(to: BufWriter<File>, run: &RunData, facts: &Facts) -> mcap::McapResult<Self> {
+        let options = WriteOptions::new().compression(Some(Compression::Lz4)).library("muprime");
+        let mut to = options.create(to)?;
+        to.write_metadata(&Metadata { name: HEADER.into(), metadata: facts.clone() })?;
+        let start = facts.get("start_unix_ns").and_then(|ns| ns.parse().ok()).unwrap_or(0);
+        for (name, bytes) in &run.files {
+            to.attach(&Attachment {
+                log_time: start,
+                create_time: start,
+                name: name.clone(),
+                media_type: "text/plain".into(),
+                data: Cow::Borrowed(bytes),
+            })?;
+        }
+        let mut signals = Vec::new();
+        for signal in SIGNALS {
+            let topic = curve(&mut to, signal.topic, signal.words)?;
+            signals.push((signal, topic, Held::default()));
+        }
+        let of_passes = columns::of(&[]);
+        let passes = of_passes
+            .iter()
+            .filter(|column| column.unit().is_some())
+            .map(|column| curve(&mut to, &format!("/pass/{}", column.name), column.words));
+        let passes = passes.collect::<Result<_, _>>()?;
+        let events = topic(
+            &mut to,
+            EVENTS,
+            &json!({
+                "title": EVENTS, "type": "object", "required": ["event"],
+                "description": "trips, arming, zeros, pauses and what else is worth a line",
+                "properties": { "event": { "type": "string", "description": "what happened" } },
+            }),
+        )?;
+        Ok(Flat { to, signals, passes, events, text: Vec::with_capacity(64) })
+    }
+
+    /// One session's record.
+    fn record(&mut self, from: BufReader<File>) -> miette::Result<()> {
+        for entry in Reader::new(from) {
+            let Entry::Message { topic, log_time, text, .. } = entry else { continue };
+            match topic {
+                EVENTS => self.events.put(&mut self.to, log_time, &text).into_diagnostic()?,
+                PASSES => self.pass(log_time, &serde_json::from_slice(&text).into_diagnostic()?)?,
+                _ => self.row(log_time, &serde_json::from_slice(&text).into_diagnostic()?)?,
+            }
+        }
+        for (_, topic, held) in &mut self.signals {
+            if let Some((at, value)) = std::mem::take(held).unwritten {
+                topic.value(&mut self.to, at, Some(value), &mut self.text).into_diagnostic()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn row(&mut self, log_time: u64, row: &Row) -> miette::Result<()> {
+        let Flat { to, signals, text, .. } = self;
+        for (signal, topic, held) in signals {
+            let value = (signal.of)(row);
+            if !signal.holds {
+                topic.value(to, log_time, value, text).into_diagnostic()?;
+            } else if held.changes(log_time, value) {
+                if let Some((at, before)) = held.unwritten.take() {
+                    topic.value(to, at, Some(before), text).into_diagnostic()?;
+                }
+                topic.value(to, log_time, value, text).into_diagnostic()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn pass(&mut self, log_time: u64, pass: &MeasuredPass) -> miette::Result<()> {
+        let table = columns::of(std::slice::from_ref(pass));
+        let value = |column: &Column| match &column.cells {
+            Cells::Numbers(v) => Some(v[0]),
+            Cells::Counts(v) => Some(v[0].map(|count| count as f64)),
+            Cells::Texts(_) => None,
+        };
+        for (value, topic) in table.iter().filter_map(value).zip(&mut self.passes) {
+            topic.value(&mut self.to, log_time, value, &mut self.text).into_diagnostic()?;
+        }
+        Ok(())
+    }
+
+    fn end(mut self) -> mcap::McapResult<BufWriter<File>> {
+        self.to.finish()?;
+        Ok(self.to.into_inner())
+    }
+}
+
+impl Topic {
+    fn put(&mut self, to: &mut Writer<BufWriter<File>>, log_time: u64, text: &[u8]) -> mcap::McapResult<()> {
+        self.written = self.written.wrapping_add(1);
+        let (channel_id, sequence) = (self.channel, self.written);
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        to.write_to_known_channel(&header, text)
+    }
+
+    /// A value, where there is one that JSON has a word for.
+    fn value(
+        &mut self,
+        to: &mut Writer<BufWriter<File>>,
+        log_time: u64,
+        value: Option<f64>,
+        text: &mut Vec<u8>,
+    ) -> mcap::McapResult<()> {
+        let Some(value) = value.filter(|value| value.is_finite()) else { return Ok(()) };
+        text.clear();
+        write!(text, "{{\"value\":{value:?}}}")?;
+        self.put(to, log_time, text)
+    }
+}
+
+/// A topic of `{"value": NUMBER}`.
+fn curve(to: &mut Writer<BufWriter<File>>, name: &str, words: &str) -> mcap::McapResult<Topic> {
+    let unit = unit::of(name);
+    topic(
+        to,
+        name,
+        &json!({
+            "title": name, "type": "object", "required": ["value"], "additionalProperties": false,
+            "description": format!("{words}, in {}", if unit == "1" { "numbers without a unit" } else { unit }),
+            "properties": { "value": { "type": "number", "description": words, "unit": unit } },
+        }),
+    )
+}
+
+fn topic(
+    to: &mut Writer<BufWriter<File>>,
+    name: &str,
+    schema: &serde_json::Value,
+) -> mcap::McapResult<Topic> {
+    let named = format!("muprime{}", name.replace('/', "."));
+    let schema = to.add_schema(&named, "jsonschema", schema.to_string().as_bytes())?;
+    Ok(Topic { channel: to.add_channel(schema, name, "json", &BTreeMap::new())?, written: 0 })
+}

@@ -1,0 +1,481 @@
+//! Foreign tables made into point tables: what is in them is found out or stated, every number is brought to SI once, and
+//! nothing is repaired, dropped or assumed without being told.
+
+#[cfg(feature = "matlab")]
+mod arrays;
+mod binary;
+mod clock;
+mod grid;
+pub mod guess;
+#[cfg(feature = "matlab")]
+mod hdf5;
+mod head;
+pub mod map;
+#[cfg(feature = "matlab")]
+mod mat;
+pub(crate) mod remarks;
+mod series;
+pub mod targets;
+mod text;
+mod units;
+mod values;
+#[cfg(feature = "excel")]
+mod workbook;
+mod write;
+
+use calibration::certificate::sha256_hex;
+use map::Map;
+use miette::{IntoDiagnostic, WrapErr};
+use models::pass::{Pass, read_passes};
+use serde::Serialize;
+use std::path::Path;
+use targets::{Id, Kind, TARGETS};
+use values::{Dropped, Values};
+
+pub use grid::Grid;
+pub use remarks::Range;
+pub use series::{Cut, Told};
+pub use text::Marks;
+
+/// Refuses: built without MAT and HDF5.
+#[cfg(not(feature = "matlab"))]
+mod mat {
+    /// Refuses.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn read(_: &[u8], _: Option<&str>, _: &[String]) -> miette::Result<super::Grid> {
+        miette::bail!(
+            help = "build it with `cargo install --path rig` (the feature is on by default), or take CSV",
+            "this muprime was built without its feature `matlab`"
+        )
+    }
+}
+#[cfg(not(feature = "matlab"))]
+use mat as hdf5;
+
+/// Refuses: built without workbooks.
+#[cfg(not(feature = "excel"))]
+mod workbook {
+    /// Refuses.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn read(_: &[u8], _: Option<&str>) -> miette::Result<super::Grid> {
+        miette::bail!(
+            help = "build it with `cargo install --path rig` (the feature is on by default), or save the sheet as CSV",
+            "this muprime was built without its feature `excel`"
+        )
+    }
+}
+
+/// How a column was taken.
+#[derive(Clone, Debug, Serialize)]
+pub struct MappedColumn {
+    /// Column of the source.
+    pub from: String,
+    /// Column of the point table.
+    pub column: &'static str,
+    /// What it was taken for.
+    pub target: &'static str,
+    /// Its unit.
+    pub unit: String,
+    /// `SI = number * factor + offset`; powers of ten move the decimal point.
+    pub factor: f64,
+    /// Added after the factor.
+    pub offset: f64,
+}
+
+/// The log of an import, `import.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Log {
+    /// `muprime.import/1`.
+    pub schema: &'static str,
+    /// Version of the program.
+    pub version: &'static str,
+    /// The file that was read.
+    pub source: String,
+    /// Its SHA-256.
+    pub sha256: String,
+    /// Its format, in words.
+    pub format: String,
+    /// Columns that were taken.
+    pub map: Vec<MappedColumn>,
+    /// The same as `--map` takes it.
+    pub map_argument: String,
+    /// Columns of the source that were not taken.
+    pub not_taken: Vec<String>,
+    /// Constants, as `--set` had them.
+    pub set: Vec<String>,
+    /// What was passed over or assumed.
+    pub notes: Vec<String>,
+    /// What was assumed in rig.toml.
+    pub assumed: Vec<String>,
+    /// Rows of data in the source.
+    pub rows: usize,
+    /// Passes in the table.
+    pub passes: usize,
+    /// Rows that were left out, each with its reason.
+    pub dropped: Vec<Dropped>,
+    /// How a series was cut.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub series: Option<SeriesLog>,
+    /// Ranges in SI.
+    pub ranges: Vec<Range>,
+    /// What looks wrong.
+    pub remarks: Vec<String>,
+}
+
+/// How a series was cut, and what became of its samples.
+#[derive(Clone, Debug, Serialize)]
+pub struct SeriesLog {
+    /// As it was asked for.
+    pub cut: Cut,
+    /// What became of it.
+    #[serde(flatten)]
+    pub told: Told,
+}
+
+/// What an import makes.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    /// points.csv.
+    pub table: String,
+    /// rig.toml.
+    pub rig: String,
+    /// import.json.
+    pub log: Log,
+}
+
+/// What is wanted of a source.
+#[derive(Clone, Debug, Default)]
+pub struct Wanted<'a> {
+    /// What is taken from where.
+    pub map: Map,
+    /// As `--set` had it, for the log.
+    pub set: Vec<String>,
+    /// Present: the source is a time series.
+    pub series: Option<Cut>,
+    /// The text of a rig.toml that is known.
+    pub rig: Option<String>,
+    /// A fingertip of the library.
+    pub tip: Option<&'a str>,
+    /// Rows of zeros at the end are room that a record did not fill.
+    pub padding: bool,
+    /// A time that goes back is right: rows are sorted otherwise.
+    pub unsorted: bool,
+}
+
+/// A Parquet point table as CSV text: one reader judges both formats.
+///
+/// # Errors
+/// A file that is no Parquet table.
+pub fn parquet_as_csv(path: &Path) -> miette::Result<String> {
+    binary::parquet(path)?.csv()
+}
+
+/// Cells that a source of so many bytes can hold in earnest: what says more is damaged or hostile, and is refused before
+/// memory is taken for it.
+pub(crate) const fn most_cells(bytes: usize) -> usize {
+    4 * bytes + 1_000_000
+}
+
+/// The refusal of a source that says more than [`most_cells`].
+pub(crate) fn too_many(what: &str, cells: usize, bytes: usize) -> miette::Report {
+    miette::miette!(
+        help = "export the part that holds numbers, as CSV",
+        "{what} says that it has {cells} cells, in {bytes} bytes: it is damaged, or almost all of it is empty"
+    )
+}
+
+/// Reads a source of any known format; `wanted` are the columns that will be taken, where they are known.
+///
+/// # Errors
+/// A format that is not read, with the remedy; what its reader says.
+pub fn read(
+    path: &Path,
+    bytes: &[u8],
+    sheet: Option<&str>,
+    marks: Marks,
+    wanted: &[String],
+) -> miette::Result<Grid> {
+    let shown = path.display();
+    // Damaged files can drive the libraries that read binary formats into a panic: that is a refusal of the file.
+    let grid = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+        read_known(path, bytes, sheet, marks, wanted)
+    }))
+    .unwrap_or_else(|_| Err(miette::miette!(help = "export it again, or as CSV", "the file is damaged")));
+    let grid = grid.wrap_err_with(|| shown.to_string())?;
+    if grid.rows.is_empty() {
+        let notes = grid.notes.join("\n");
+        miette::bail!("{shown}: no rows of numbers\n{notes}");
+    }
+    Ok(grid)
+}
+
+fn read_known(
+    path: &Path,
+    bytes: &[u8],
+    sheet: Option<&str>,
+    marks: Marks,
+    wanted: &[String],
+) -> miette::Result<Grid> {
+    let shown = path.display();
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    let workbook = ["xlsx", "xlsm", "xlsb", "xls", "ods"].contains(&ending.as_str());
+    if bytes.starts_with(b"PAR1") {
+        binary::parquet(path)
+    } else if bytes.starts_with(b"ARROW1") {
+        binary::arrow(bytes)
+    } else if bytes.starts_with(b"\x93NUMPY") {
+        binary::npy(bytes)
+    } else if bytes.starts_with(b"MATLAB 5.0 MAT-file") {
+        mat::read(bytes, sheet, wanted)
+    } else if bytes.starts_with(b"\x89HDF\r\n") || bytes.starts_with(b"MATLAB 7.3 MAT-file") {
+        hdf5::read(bytes, sheet, wanted)
+    } else if workbook || bytes.starts_with(b"\xd0\xcf\x11\xe0") {
+        workbook::read(bytes, sheet)
+    } else if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"\x1f\x8b") {
+        miette::bail!(help = "unpack it first; of .npz, save one array as .npy", "{shown} is packed")
+    } else {
+        text::read(bytes, marks)
+    }
+}
+
+/// Makes a point table of a source.
+///
+/// # Errors
+/// Columns that are missing or given twice, all at once; fewer than half of the rows that can be taken; a series without steady
+/// stretches. Nothing is written.
+pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> miette::Result<Imported> {
+    let map = &wanted.map;
+    let lacks = map.lacks(wanted.series.is_some());
+    let not_taken: Vec<String> = (0..grid.header.len())
+        .filter(|k| !map.columns.iter().any(|c| c.index == *k))
+        .map(|k| grid.header[k].clone())
+        .collect();
+    if !lacks.is_empty() {
+        let left = if not_taken.is_empty() {
+            String::new()
+        } else {
+            format!("\ncolumns of {source} that are not taken: {}", not_taken.join(", "))
+        };
+        let across = across(grid).unwrap_or_default();
+        miette::bail!(help = format!("state it with --map and --set{left}{across}"), "{}", lacks.join("\n"));
+    }
+    let mut notes = grid.notes.clone();
+    let mut maps = vec![Some(map.clone())];
+    for block in &grid.blocks {
+        let under = map::under(map, grid, block).map_err(|e| {
+            miette::miette!(help = "make a file of each part, or give them the same columns", "{source}: {e}")
+        })?;
+        if under.is_none() {
+            notes.push(format!("row {} heads another table: its rows were not taken", block.place));
+        }
+        maps.push(under);
+    }
+    let clocks = match map.columns.iter().find(|c| c.target == Id::Time as usize) {
+        Some(column) => {
+            let (times, said) = clock::times(grid, column.index, &column.unit_text)
+                .map_err(|e| miette::miette!("{source}: {e}"))?;
+            notes.extend(said);
+            times
+        }
+        None => Vec::new(),
+    };
+    if map.time_by_rows {
+        notes.push("time_s is the number of the row, a second each".into());
+    }
+    let left_out = |(row, text, reason): &(u64, String, String)| Dropped {
+        row: *row,
+        column: String::new(),
+        text: text.clone(),
+        reason: reason.clone(),
+    };
+    let mut dropped: Vec<Dropped> = grid.left_out.iter().map(left_out).collect();
+    let full = grid.rows.iter().rposition(|r| !is_padding(r)).map_or(0, |k| k + 1);
+    let padded = grid.rows.len() - full;
+    let mut values = Vec::new();
+    for (number, row) in grid.rows.iter().enumerate() {
+        let Some(map) = &maps[row.block] else { continue };
+        if wanted.padding && number >= full {
+            let reason = "zeros at the end: room that was not filled".to_string();
+            dropped.push(Dropped { row: row.place, column: String::new(), text: "0".into(), reason });
+            continue;
+        }
+        match Values::read(grid, map, row, number, clocks.get(number).copied().flatten()) {
+            Ok(v) => values.push(v),
+            Err(why) => dropped.push(why),
+        }
+    }
+    let mut series = None;
+    let mut spreads = Vec::new();
+    if let Some(cut) = wanted.series {
+        let twice = series::last_twice(&mut values);
+        dropped.extend(twice);
+        let (passes, of_each, told) =
+            series::cut(&values, &cut).map_err(|e| miette::miette!("{source}: {e}"))?;
+        (values, spreads) = (passes, of_each);
+        series = Some(SeriesLog { cut, told });
+    }
+    let states_frequency = map.has(Id::Frequency);
+    if !states_frequency && values.iter().any(|v| v.amplitude().is_some_and(|a| a > 0.0)) {
+        miette::bail!(
+            help = "HEADER=frequency:kHz in --map, or --set frequency_hz=27500",
+            "frequency_hz is missing, and the plate vibrates"
+        );
+    }
+    let (mut passes, candidates): (Vec<Pass>, usize) = (Vec::new(), values.len());
+    let mut taken = Vec::new();
+    for (k, value) in values.iter().enumerate() {
+        match value.pass(k as u64 + 1) {
+            Ok(mut pass) => {
+                if let Some(spread) = spreads.get(k) {
+                    spread.put(&mut pass);
+                }
+                passes.push(pass);
+                taken.push(value);
+            }
+            Err(why) => dropped.push(why),
+        }
+    }
+    dropped.sort_by_key(|d| d.row);
+    if 2 * passes.len() < candidates.max(1) || passes.is_empty() {
+        return Err(mostly_dropped(source, grid, &dropped, passes.len(), padded));
+    }
+    if series.is_none() {
+        let back = clock::order(&taken, wanted.unsorted).map_err(|e| {
+            miette::miette!(
+                help = "if that column restarts with each step, map the column that numbers the steps (HEADER=run), or import each step \
+                        by itself; if the rows are sorted otherwise and the times are those of one clock: --accept unsorted",
+                "{source}: {e}{}",
+                grid.notes.iter().filter(|n| n.contains("header again")).map(|n| format!("\n{n}")).collect::<String>()
+            )
+        })?;
+        notes.extend(back);
+    }
+    let columns = write::columns(map, series.is_some());
+    let table = write::table(&passes, &columns)?;
+    // What is written must be what was meant: it is read back as a diagnosis would.
+    let mut back = read_passes(table.as_bytes()).into_diagnostic().wrap_err("the table that was made")?;
+    if !states_frequency {
+        back.iter_mut().zip(&passes).for_each(|(b, p)| b.frequency_hz = p.frequency_hz);
+    }
+    if back != passes {
+        miette::bail!(
+            "the table that was made does not read back as it was written: please report this file"
+        );
+    }
+    let (rig, assumed) = match &wanted.rig {
+        Some(text) => (text.clone(), Vec::new()),
+        None => write::rig(&passes, source, wanted.tip)?,
+    };
+    let mapped = |c: &map::Taken| MappedColumn {
+        from: c.header.clone(),
+        column: TARGETS[c.target].column,
+        target: TARGETS[c.target].name,
+        unit: c.unit_text.clone(),
+        factor: c.unit.factor(),
+        offset: c.unit.offset(),
+    };
+    let log = Log {
+        schema: "muprime.import/1",
+        version: env!("CARGO_PKG_VERSION"),
+        source: source.into(),
+        sha256: sha256_hex(bytes),
+        format: grid.format.clone(),
+        map: map.columns.iter().map(mapped).collect(),
+        map_argument: map.written(),
+        not_taken,
+        set: wanted.set.clone(),
+        notes,
+        assumed,
+        rows: grid.rows.len(),
+        passes: passes.len(),
+        series,
+        ranges: remarks::ranges(&passes, &columns),
+        remarks: remarks::remarks(&passes, &columns),
+        dropped,
+    };
+    Ok(Imported { table, rig, log })
+}
+
+/// Whether a row holds nothing but zeros.
+fn is_padding(row: &grid::Row) -> bool {
+    row.cells.iter().all(|c| {
+        matches!(c, grid::Cell::Empty) || c.digits(false).is_some_and(|d| d.parse::<f64>() == Ok(0.0))
+    })
+}
+
+/// Columns whose names are values with a unit, as of a table with a factor down and another across.
+fn across(grid: &Grid) -> Option<String> {
+    let value = |name: &&String| {
+        let digits = name.bytes().take_while(|b| b.is_ascii_digit() || b".,".contains(b)).count();
+        digits > 0 && (units::is_unit(&name[digits..]) || digits == name.len())
+    };
+    let values: Vec<&str> = grid.header.iter().filter(value).map(String::as_str).collect();
+    (values.len() > 1).then(|| {
+        format!(
+            "\nthe names {} are values: one row a pass is needed, with that value in a column of its own (in Python: pandas.melt; in R: \
+             tidyr::pivot_longer)",
+            values.join(", ")
+        )
+    })
+}
+
+/// The refusal of a table of which less than half can be taken: that is a wrong map, not a few bad rows.
+fn mostly_dropped(
+    source: &str,
+    grid: &Grid,
+    dropped: &[Dropped],
+    passes: usize,
+    padded: usize,
+) -> miette::Report {
+    let rows = grid.rows.len();
+    let mut reasons: Vec<(String, usize, &Dropped)> = Vec::new();
+    for d in dropped {
+        let what = format!("{}: {}", d.column, d.reason);
+        match reasons.iter_mut().find(|(w, ..)| *w == what) {
+            Some((_, n, _)) => *n += 1,
+            None => reasons.push((what, 1, d)),
+        }
+    }
+    reasons.sort_by_key(|(_, n, _)| std::cmp::Reverse(*n));
+    let told: Vec<String> = reasons
+        .iter()
+        .take(4)
+        .map(|(what, n, first)| format!("{n} rows: {what} (first in row {}: '{}')", first.row, first.text))
+        .collect();
+    let negative = dropped.iter().filter(|d| d.column == "normal_force_n" && d.text.starts_with('-')).count();
+    let help = if 2 * negative > dropped.len() {
+        "compression is positive: turn the column with a minus before its unit, as in normal_force:-N"
+            .to_string()
+    } else if 2 * padded > dropped.len() {
+        format!("the last {padded} rows are zeros in every column: --accept padding leaves them out")
+    } else if grid.format.starts_with("text") {
+        "look at the map and its units; --decimal and --delimiter say how text is read".to_string()
+    } else {
+        "look at the map and its units".to_string()
+    };
+    miette::miette!(help = help, "{source}: {passes} passes of {rows} rows can be taken\n{}", told.join("\n"))
+}
+
+/// The map that the headers suggest, as text for people and whether anything was assumed.
+pub fn guessed_lines(map: &Map) -> Vec<String> {
+    let line = |c: &map::Taken| {
+        let target = &TARGETS[c.target];
+        let assumed = if c.assumed { " (no unit stated: SI assumed)" } else { "" };
+        let peak = if c.target == Id::AmplitudePp as usize && !targets::plain(&c.header).contains("pp") {
+            " (taken as peak to peak: amplitude_peak is half of it)"
+        } else {
+            ""
+        };
+        let unit = if matches!(target.kind, Kind::Number(_)) {
+            format!(" in {}", c.unit_text)
+        } else {
+            String::new()
+        };
+        format!("  {} -> {}{unit}: {}{assumed}{peak}", c.header, target.name, target.words)
+    };
+    map.columns.iter().map(line).collect()
+}

@@ -1,0 +1,165 @@
+//! A table of any format as cells. `head` finds where its headers are.
+
+use super::units::Unit;
+
+/// A cell.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// Nothing.
+    Empty,
+    /// A number of a binary format.
+    Number(f64),
+    /// A clock's reading in s from some day.
+    Clock(f64),
+    /// A ratio that a workbook shows in per cent.
+    Percent(f64),
+    /// Text, numbers of text formats with it.
+    Text(String),
+}
+
+impl Cell {
+    /// Text as a cell: blanks are taken off, marks of missing values are empty.
+    pub fn of(text: &str) -> Self {
+        let text = text.trim();
+        match text {
+            "" | "NA" | "N/A" | "NaN" | "nan" | "NAN" | "null" | "NULL" | "-" | "--" => Cell::Empty,
+            _ => Cell::Text(text.to_string()),
+        }
+    }
+
+    /// What stands there, for people.
+    pub fn shown(&self) -> String {
+        match self {
+            Cell::Empty => String::new(),
+            Cell::Number(v) | Cell::Clock(v) => v.to_string(),
+            Cell::Percent(v) => format!("{} %", v * 100.0),
+            Cell::Text(text) => text.clone(),
+        }
+    }
+
+    /// The number as it is written, with a point: a binary number has the fewest digits that stand for it.
+    pub fn digits(&self, comma: bool) -> Option<String> {
+        match self {
+            Cell::Number(v) if v.is_finite() => Some(format!("{v:e}")),
+            Cell::Text(text) if comma && !text.contains('.') => Some(text.replacen(',', ".", 1)),
+            Cell::Text(text) if !comma => Some(text.clone()),
+            _ => None,
+        }
+    }
+
+    /// The ratio of a cell in per cent, as it is written with a point.
+    pub fn ratio(&self, comma: bool) -> Option<f64> {
+        match self {
+            Cell::Percent(v) => Some(*v),
+            Cell::Text(text) => {
+                let number = Cell::Text(text.strip_suffix('%')?.trim_end().into());
+                Unit::PER_CENT.apply(&number.digits(comma)?)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether it is a number, a time or a percentage.
+    pub fn is_number(&self, comma: bool) -> bool {
+        let written = || self.digits(comma).is_some_and(|d| Unit::SI.apply(&d).is_some());
+        matches!(self, Cell::Clock(_))
+            || written()
+            || self.ratio(comma).is_some()
+            || super::clock::is_time(self)
+    }
+}
+
+/// A row, and where it stands in the source.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Line or row, from 1.
+    pub place: u64,
+    /// Its cells.
+    pub cells: Vec<Cell>,
+    /// Which header holds for it: 0 is the table's, others stand in [`Grid::blocks`] from 1.
+    pub block: usize,
+}
+
+impl Row {
+    /// A row under the table's own header.
+    pub fn new(place: u64, cells: Vec<Cell>) -> Self {
+        Row { place, cells, block: 0 }
+    }
+
+    /// Cells that hold something.
+    pub fn filled(&self) -> usize {
+        self.cells.iter().filter(|c| **c != Cell::Empty).count()
+    }
+
+    /// Cells up to the last that holds something.
+    pub fn width(&self) -> usize {
+        self.cells.iter().rposition(|c| *c != Cell::Empty).map_or(0, |k| k + 1)
+    }
+}
+
+/// A later part of the source under a header of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Block {
+    /// Line or row of that header.
+    pub place: u64,
+    /// Its names.
+    pub header: Vec<String>,
+    /// Its units, where a row of their own states them.
+    pub units: Vec<String>,
+    /// For each column of the table, its place under this header.
+    pub columns: Vec<Option<usize>>,
+}
+
+/// A table that was read.
+#[derive(Clone, Debug, Default)]
+pub struct Grid {
+    /// Format in words, with the sheet, the delimiter, the encoding.
+    pub format: String,
+    /// Whether the decimal mark is a comma.
+    pub comma: bool,
+    /// Names of the columns; their numbers from 1 where the source has none.
+    pub header: Vec<String>,
+    /// Units that a row of their own states.
+    pub units: Vec<String>,
+    /// The rows of data.
+    pub rows: Vec<Row>,
+    /// The group that all columns are in, with what separates it from their names; empty where they are in several.
+    pub within: String,
+    /// Later headers, and what they say.
+    pub blocks: Vec<Block>,
+    /// Rows that are no rows of the table: line, what is there, why it was left out.
+    pub left_out: Vec<(u64, String, String)>,
+    /// What was passed over or assumed while it was read.
+    pub notes: Vec<String>,
+}
+
+impl Grid {
+    /// A table whose columns have names already.
+    pub fn named(format: String, header: Vec<String>, rows: Vec<Row>) -> Self {
+        Grid { format, header, rows, ..Grid::default() }
+    }
+
+    /// The cell of a row under a column of the table, wherever that column is under the row's own header.
+    pub fn cell<'a>(&self, row: &'a Row, column: usize) -> Option<&'a Cell> {
+        let at = match row.block.checked_sub(1) {
+            None => column,
+            Some(block) => self.blocks.get(block)?.columns.get(column).copied().flatten()?,
+        };
+        row.cells.get(at)
+    }
+
+    /// The table as CSV, numbers with the fewest digits that stand for them.
+    pub fn csv(&self) -> miette::Result<String> {
+        use miette::IntoDiagnostic;
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&self.header).into_diagnostic()?;
+        let shown = |cell: &Cell| match cell {
+            Cell::Number(v) => format!("{v:e}"),
+            cell => cell.shown(),
+        };
+        for row in &self.rows {
+            writer.write_record(row.cells.iter().map(shown)).into_diagnostic()?;
+        }
+        String::from_utf8(writer.into_inner().into_diagnostic()?).into_diagnostic()
+    }
+}

@@ -1,0 +1,171 @@
+//! What headers usually mean, and the units that they state.
+
+use super::grid::{Cell, Grid};
+use super::map::Taken;
+use super::targets::{Id, Kind, TARGETS, plain};
+use super::units::{Dimension, Unit};
+
+/// The numbers of a column as they are written.
+fn column_of(grid: &Grid, index: usize) -> Vec<f64> {
+    let number = |r| Unit::SI.apply(&grid.cell(r, index)?.digits(grid.comma)?);
+    grid.rows.iter().filter_map(number).collect()
+}
+
+/// A map from the headers: names that usually mean one thing, with the units that the headers state. A header that two columns
+/// answer to is left to the reader.
+pub fn guess(grid: &Grid) -> Vec<Taken> {
+    let mut taken: Vec<Taken> = Vec::new();
+    for (index, header) in grid.header.iter().enumerate() {
+        let row_of_units = grid.units.get(index).map(String::as_str).filter(|u| !u.is_empty());
+        // Structures and recorders put their own name before a point.
+        let inner = || header.split_once('.').filter(|(_, name)| name.len() > 1);
+        let found = meant(header, row_of_units).or_else(|| meant(inner()?.1, row_of_units));
+        let Some((target, unit)) = found else { continue };
+        let signed = |c: &Cell| c.digits(grid.comma).is_some_and(|d| d.starts_with('-'));
+        let negative = grid.rows.iter().any(|r| grid.cell(r, index).is_some_and(signed));
+        let target = match target {
+            t if t == Id::Speed as usize && negative => Id::Velocity as usize,
+            t if t == Id::FrictionForce as usize && negative => Id::LateralForce as usize,
+            t => t,
+        };
+        let dimension = match TARGETS[target].kind {
+            Kind::Number(dimension) => Some(dimension),
+            _ => None,
+        };
+        let stated = unit.is_some();
+        let (unit_text, unit) = match (dimension, unit) {
+            (Some(d), None) => (d.si().to_string(), Unit::SI),
+            (_, Some((text, unit))) => (text, unit),
+            (None, None) => (String::new(), Unit::SI),
+        };
+        let assumed = dimension.is_some_and(|d| d != Dimension::Ratio) && !stated;
+        // A letter without a unit is not enough for a value that no rig has.
+        if assumed
+            && plain(header).len() <= 2
+            && !super::remarks::usual(TARGETS[target].column, &column_of(grid, index))
+        {
+            continue;
+        }
+        taken.push(Taken { index, header: header.clone(), target, unit_text, unit, assumed });
+    }
+    // A force that is read goes before a coefficient that was made of it.
+    let forces = |t: &Taken| TARGETS[t.target].column == "lateral_force_n";
+    if taken.iter().any(|t| forces(t) && t.target != Id::FrictionCoefficient as usize) {
+        taken.retain(|t| t.target != Id::FrictionCoefficient as usize);
+    }
+    let twice = |t: &Taken, all: &[Taken]| {
+        all.iter().filter(|o| TARGETS[o.target].column == TARGETS[t.target].column).count() > 1
+    };
+    let all = taken.clone();
+    taken.retain(|t| !twice(t, &all));
+    taken
+}
+
+/// A name without the unit behind it, case, blanks and marks.
+pub fn name_of(header: &str) -> String {
+    let cut =
+        ["[", "(", "{", "/", ", ", " in "].iter().filter_map(|mark| header.find(mark)).filter(|at| *at > 0);
+    plain(&header[..cut.min().unwrap_or(header.len())])
+}
+
+/// Whether a text usually heads a column.
+pub fn heads(text: &str) -> bool {
+    text != "N" && meant(text, None).is_some()
+}
+
+/// Words that say how an amplitude is counted.
+const STROKES: [(&str, Id); 22] = [
+    ("peak-to-peak", Id::AmplitudePp),
+    ("peak to peak", Id::AmplitudePp),
+    ("peak_to_peak", Id::AmplitudePp),
+    ("peaktopeak", Id::AmplitudePp),
+    ("peak-peak", Id::AmplitudePp),
+    ("peak peak", Id::AmplitudePp),
+    ("pk to pk", Id::AmplitudePp),
+    ("pk pk", Id::AmplitudePp),
+    ("zero-to-peak", Id::AmplitudePeak),
+    ("zero to peak", Id::AmplitudePeak),
+    ("pk-pk", Id::AmplitudePp),
+    ("pk_pk", Id::AmplitudePp),
+    ("p-p", Id::AmplitudePp),
+    ("pkpk", Id::AmplitudePp),
+    ("p2p", Id::AmplitudePp),
+    ("ptp", Id::AmplitudePp),
+    ("pp", Id::AmplitudePp),
+    ("0-pk", Id::AmplitudePeak),
+    ("0-p", Id::AmplitudePeak),
+    ("peak", Id::AmplitudePeak),
+    ("pk", Id::AmplitudePeak),
+    ("rms", Id::AmplitudeRms),
+];
+
+/// A header without the word for how an amplitude is counted, and which amplitude that is.
+fn without_stroke(header: &str) -> Option<(String, Id)> {
+    let small = header.to_ascii_lowercase();
+    STROKES.iter().find_map(|(words, id)| {
+        let at = small.find(words)?;
+        let apart = |c: Option<char>| c.is_none_or(|c| !c.is_alphanumeric());
+        let end = at + words.len();
+        let alone = apart(small[..at].chars().next_back()) && apart(small[end..].chars().next());
+        alone.then(|| (format!("{} {}", &header[..at], &header[end..]), *id))
+    })
+}
+
+/// What a header means, and the unit that it states: in brackets, after a slash or a comma, or as its last words.
+fn meant(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(String, Unit)>)> {
+    let amplitude = |at: usize| TARGETS[at].column == Id::AmplitudePp.target().column;
+    if let Some((rest, id)) = without_stroke(header) {
+        let unit =
+            |units: Option<&str>| Some(without_stroke(units?).map_or(units?.to_string(), |(unit, _)| unit));
+        match named(rest.trim(), unit(row_of_units).as_deref()) {
+            Some((at, unit)) if amplitude(at) => return Some((id as usize, unit)),
+            _ => {}
+        }
+    } else if let Some((unit, id)) = row_of_units.and_then(without_stroke) {
+        return named(header, Some(&unit))
+            .filter(|(at, _)| amplitude(*at))
+            .map(|(_, unit)| (id as usize, unit));
+    }
+    named(header, row_of_units)
+}
+
+fn named(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(String, Unit)>)> {
+    let find = |name: &str| {
+        let name = plain(name);
+        TARGETS.iter().position(|t| t.is_headed(&name))
+    };
+    let with_unit = |name: &str, text: &str| {
+        let at = find(name)?;
+        let Kind::Number(dimension) = TARGETS[at].kind else { return None };
+        Some((at, Some(Unit::guess(dimension, text)?)))
+    };
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        let bracketed =
+            header.split_once(open).and_then(|(name, rest)| Some((name, rest.split(close).next()?)));
+        if let Some(found) = bracketed.and_then(|(name, unit)| with_unit(name, unit)) {
+            return Some(found);
+        }
+    }
+    for mark in [" / ", ", ", " in ", "/"] {
+        if let Some(found) = header.split_once(mark).and_then(|(name, unit)| with_unit(name, unit)) {
+            return Some(found);
+        }
+    }
+    if let Some(found) = row_of_units.and_then(|unit| with_unit(header, unit)) {
+        return Some(found);
+    }
+    let words: Vec<&str> = header.split(['_', ' ', '.', '-']).filter(|w| !w.is_empty()).collect();
+    for tail in [2, 1] {
+        let Some(cut) = words.len().checked_sub(tail).filter(|cut| *cut > 0) else { continue };
+        if let Some(found) = with_unit(&words[..cut].join("_"), &words[cut..].join("/")) {
+            return Some(found);
+        }
+    }
+    let at = find(header)?;
+    // A unit that is none of this quantity says that the column is something else, or needs more than a name.
+    if row_of_units.is_some() && matches!(TARGETS[at].kind, Kind::Number(_)) {
+        return None;
+    }
+    // Force or frequency, amplitude or amplifier: only a unit tells.
+    (!["f", "amp", "ampl"].contains(&plain(header).as_str())).then_some((at, None))
+}

@@ -1,0 +1,412 @@
+//! Which column of the source is what: stated by `--map` and `--set`, or guessed from the headers.
+
+use super::grid::{Block, Grid};
+use super::targets::{Id, Kind, TARGETS, Target};
+use super::units::{Dimension, Unit};
+use models::covariate;
+
+/// A column of the source that is taken.
+#[derive(Clone, Debug)]
+pub struct Taken {
+    /// Place in the source.
+    pub index: usize,
+    /// Its header.
+    pub header: String,
+    /// Place of its target in [`TARGETS`].
+    pub target: usize,
+    /// Its unit as stated; empty for what has none.
+    pub unit_text: String,
+    /// Its unit.
+    pub unit: Unit,
+    /// The SI unit was assumed: the header states none.
+    pub assumed: bool,
+}
+
+/// A value that holds for every row.
+#[derive(Clone, Debug)]
+pub struct Constant {
+    /// Place of its target in [`TARGETS`].
+    pub target: usize,
+    /// As it was written.
+    pub text: String,
+    /// SI; NaN for text.
+    pub value: f64,
+}
+
+/// What is taken from where.
+#[derive(Clone, Debug, Default)]
+pub struct Map {
+    /// Columns.
+    pub columns: Vec<Taken>,
+    /// Constants.
+    pub constants: Vec<Constant>,
+    /// Time is the number of the row, in s.
+    pub time_by_rows: bool,
+}
+
+impl Map {
+    /// Whether a target is mapped or set.
+    pub fn has(&self, id: Id) -> bool {
+        let at = id as usize;
+        self.columns.iter().any(|c| c.target == at) || self.constants.iter().any(|c| c.target == at)
+    }
+
+    /// Whether a column of the point table is mapped or set.
+    pub fn gives(&self, column: &str) -> bool {
+        let targets = self.columns.iter().map(|c| c.target).chain(self.constants.iter().map(|c| c.target));
+        targets.into_iter().any(|t| TARGETS[t].column == column)
+    }
+
+    /// The map as `--map` takes it.
+    pub fn written(&self) -> String {
+        let entry = |c: &Taken| {
+            let special = c.header.contains([',', '=', '"', ' ', '\'']);
+            let header = if special { format!("\"{}\"", c.header) } else { c.header.clone() };
+            let unit = if c.unit_text.is_empty() { String::new() } else { format!(":{}", c.unit_text) };
+            format!("{header}={}{unit}", TARGETS[c.target].name)
+        };
+        self.columns.iter().map(entry).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The headers that entries of `--map` name.
+    pub fn headers(entries: &[String]) -> Vec<String> {
+        let header = |e: String| Some(e.rsplit_once('=')?.0.trim().to_string());
+        entries.iter().flat_map(|e| parted(e)).filter_map(header).collect()
+    }
+
+    /// Reads the entries of `--map`: `HEADER=TARGET[:UNIT]`, parted by commas; a header with a comma in double quotes; `#3` is
+    /// the third column.
+    ///
+    /// # Errors
+    /// Everything that is wrong with them at once.
+    pub fn stated(grid: &Grid, entries: &[String]) -> Result<Vec<Taken>, Vec<String>> {
+        let (mut taken, mut wrong) = (Vec::new(), Vec::new());
+        for entry in entries.iter().flat_map(|e| parted(e)) {
+            match column(grid, &entry) {
+                Ok(column) => taken.push(column),
+                Err(why) => wrong.push(why),
+            }
+        }
+        if wrong.is_empty() { Ok(taken) } else { Err(wrong) }
+    }
+
+    /// Reads `--set NAME=VALUE[:UNIT]`, into the map.
+    ///
+    /// # Errors
+    /// Everything that is wrong at once.
+    pub fn set(&mut self, entries: &[String]) -> Result<(), Vec<String>> {
+        let mut wrong = Vec::new();
+        for entry in entries.iter().flat_map(|e| parted(e)) {
+            match constant(&entry) {
+                Ok(None) => self.time_by_rows = true,
+                Ok(Some(constant)) => self.constants.push(constant),
+                Err(why) => wrong.push(why),
+            }
+        }
+        if wrong.is_empty() { Ok(()) } else { Err(wrong) }
+    }
+
+    /// What stands in the way of a table: columns that are given twice, and all that are missing with what would give each. The
+    /// position of a series says speed and direction as well.
+    pub fn lacks(&self, series: bool) -> Vec<String> {
+        let mut wrong = Vec::new();
+        let all: Vec<usize> =
+            self.columns.iter().map(|c| c.target).chain(self.constants.iter().map(|c| c.target)).collect();
+        for (k, target) in TARGETS.iter().enumerate() {
+            let same = |t: &&usize| TARGETS[**t].column == target.column;
+            let first = TARGETS.iter().position(|t| t.column == target.column);
+            if first == Some(k) && all.iter().filter(same).count() > 1 {
+                wrong.push(format!("{} is given more than once", target.column));
+            }
+        }
+        if self.has(Id::Velocity) && self.has(Id::Direction) {
+            wrong.push("the sign of `velocity` is the direction: map one of velocity and direction".into());
+        }
+        if self.time_by_rows && self.has(Id::Time) {
+            wrong.push("time_s is mapped and set".into());
+        }
+        let gives = |column: &str| all.iter().any(|t| TARGETS[*t].column == column);
+        let mut missing = |column: &str, there: bool, how: &str| {
+            if !there {
+                wrong.push(format!("{column} is missing: {how}"));
+            }
+        };
+        let by_path = series && gives("position_m");
+        let column_of = |c: &covariate::Covariate| gives(c.name);
+        missing(
+            "time_s",
+            column_of(&covariate::TIME) || self.time_by_rows,
+            "HEADER=time:s, or --set time_s=rows (row after row, a second each)",
+        );
+        missing(
+            "amplitude_pp_m",
+            column_of(&covariate::AMPLITUDE),
+            "HEADER=amplitude_pp:um (or amplitude_peak, amplitude_rms), or --set amplitude_pp_m=0 where nothing vibrates",
+        );
+        missing(
+            "speed_m_s",
+            column_of(&covariate::SPEED) || by_path,
+            "HEADER=speed:mm/s, HEADER=velocity:mm/s (with a sign), or --set speed_m_s=0.01",
+        );
+        missing(
+            "direction",
+            column_of(&covariate::DIRECTION) || self.has(Id::Velocity) || by_path,
+            "HEADER=direction, a velocity with a sign, or --set direction=1",
+        );
+        missing(
+            "normal_force_n",
+            column_of(&covariate::NORMAL_FORCE),
+            "HEADER=normal_force:N, or --set normal_force_n=0.25",
+        );
+        missing(
+            "lateral_force_n",
+            gives("lateral_force_n"),
+            "HEADER=lateral_force:N (with a sign), friction_force:N or friction_coefficient (magnitudes)",
+        );
+        wrong
+    }
+}
+
+/// Entries at commas outside of double quotes.
+fn parted(text: &str) -> Vec<String> {
+    let (mut all, mut now, mut quoted) = (Vec::new(), String::new(), false);
+    for c in text.chars() {
+        match c {
+            '"' => quoted = !quoted,
+            ',' if !quoted => all.push(std::mem::take(&mut now)),
+            c => now.push(c),
+        }
+    }
+    all.push(now);
+    all.iter().map(|e| e.trim().to_string()).filter(|e| !e.is_empty()).collect()
+}
+
+fn names() -> String {
+    TARGETS.iter().map(|t| t.name).collect::<Vec<_>>().join(", ")
+}
+
+/// The target and the unit of `TARGET[:UNIT]`. The name of a column of the point table states its unit.
+fn target_of(text: &str) -> Result<(usize, Unit, String), String> {
+    let (name, unit_text) =
+        text.split_once(':').map_or((text.trim(), None), |(n, u)| (n.trim(), Some(u.trim())));
+    let at = Target::named(name).ok_or_else(|| format!("'{name}' is no target; there are {}", names()))?;
+    let target = &TARGETS[at];
+    let Kind::Number(dimension) = target.kind else {
+        return match unit_text {
+            Some(unit) => Err(format!("'{name}' has no unit ('{unit}')")),
+            None => Ok((at, Unit::SI, String::new())),
+        };
+    };
+    let by_column = name == target.column && name != target.name;
+    let bare = matches!(dimension, Dimension::Ratio) || by_column;
+    match unit_text {
+        Some(text) => {
+            let unit = Unit::parse(dimension, text)
+                .ok_or_else(|| format!("'{text}' is no unit of {name}; there are {}", dimension.known()))?;
+            Ok((at, unit, text.to_string()))
+        }
+        None if bare => Ok((at, Unit::SI, dimension.si().to_string())),
+        None => Err(format!(
+            "'{name}' needs a unit, as in {name}:{}; there are {}",
+            dimension.si(),
+            dimension.known()
+        )),
+    }
+}
+
+fn column(grid: &Grid, entry: &str) -> Result<Taken, String> {
+    let (header, rest) =
+        entry.rsplit_once('=').ok_or_else(|| format!("'{entry}': HEADER=TARGET:UNIT is needed"))?;
+    let header = header.trim();
+    // Within the one group that is read its columns have short names.
+    let last = header.rsplit('/').next().unwrap_or(header);
+    let header =
+        if !grid.within.is_empty() && *header == format!("{}{last}", grid.within) { last } else { header };
+    let (target, unit, unit_text) = target_of(rest)?;
+    let numbered = header.strip_prefix('#').and_then(|n| n.parse::<usize>().ok());
+    let exact: Vec<usize> = (0..grid.header.len()).filter(|k| grid.header[*k] == header).collect();
+    // A map that was copied from a terminal may be broken over lines within a header.
+    let squeezed = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let wanted = squeezed(header);
+    let alike: Vec<usize> =
+        (0..grid.header.len()).filter(|k| squeezed(&grid.header[*k]).eq_ignore_ascii_case(&wanted)).collect();
+    let index = match (&exact[..], &alike[..], numbered) {
+        ([one], ..) | ([], [one], _) => *one,
+        ([], [], Some(n)) if (1..=grid.header.len()).contains(&n) => n - 1,
+        ([], [], _) => {
+            let there = grid.header.iter().map(|h| format!("'{h}'")).collect::<Vec<_>>().join(", ");
+            return Err(format!("the table has no column '{header}'; it has {there}"));
+        }
+        _ => return Err(format!("several columns are called '{header}'; name them by number, as in #3")),
+    };
+    Ok(Taken { index, header: grid.header[index].clone(), target, unit_text, unit, assumed: false })
+}
+
+fn constant(entry: &str) -> Result<Option<Constant>, String> {
+    let (name, text) = entry.split_once('=').ok_or_else(|| format!("--set {entry}: NAME=VALUE is needed"))?;
+    let (name, text) = (name.trim(), text.trim());
+    let (number, unit) = text.split_once(':').map_or((text, None), |(n, u)| (n.trim(), Some(u)));
+    let at =
+        Target::named(name).ok_or_else(|| format!("--set {name}: no such target; there are {}", names()))?;
+    let target = &TARGETS[at];
+    if at == Id::Time as usize && number == "rows" {
+        return Ok(None);
+    }
+    let bad = || format!("--set {name}: '{number}' cannot be read");
+    let value = match target.kind {
+        Kind::Text => f64::NAN,
+        Kind::Way => way(number).ok_or_else(bad)?,
+        Kind::Count => return Err(format!("--set {name}: a count differs from row to row")),
+        Kind::Number(dimension) => {
+            // A value without a unit is SI, as the columns of the point table are.
+            let unit_text = unit.unwrap_or(dimension.si());
+            let unit = Unit::parse(dimension, unit_text).ok_or_else(|| {
+                format!("--set {name}: '{unit_text}' is no unit; there are {}", dimension.known())
+            })?;
+            unit.apply(number).ok_or_else(bad)?
+        }
+    };
+    Ok(Some(Constant { target: at, text: text.to_string(), value }))
+}
+
+/// A direction as people write it.
+pub fn way(text: &str) -> Option<f64> {
+    match text.trim().to_lowercase().as_str() {
+        "forward" | "fwd" | "f" | "trace" => return Some(1.0),
+        "backward" | "bwd" | "b" | "retrace" | "reverse" | "rev" => return Some(-1.0),
+        _ => {}
+    }
+    let value = Unit::SI.apply(text)?;
+    (value.abs() == 1.0).then_some(value)
+}
+
+/// The map under another header of the source: the same columns, wherever they are there and whatever their units. `None` where
+/// that header has none of them.
+///
+/// # Errors
+/// In words: a column that is missing there, units that are not stated in both places.
+pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, String> {
+    let there = |c: &Taken| block.columns.get(c.index).copied().flatten();
+    let here = map.columns.iter().filter(|c| there(c).is_some()).count();
+    if here == 0 {
+        return Ok(None);
+    }
+    let mut own = map.clone();
+    for column in &mut own.columns {
+        let place = block.place;
+        let index = there(column)
+            .ok_or_else(|| format!("row {place} is a second header, without a column '{}'", column.header))?;
+        let unit_row = |units: &[String], at: usize| units.get(at).filter(|u| !u.is_empty()).cloned();
+        let (was, is) = (unit_row(&grid.units, column.index), unit_row(&block.units, index));
+        if grid.header[column.index] != block.header[index] || was != is {
+            let Kind::Number(dimension) = TARGETS[column.target].kind else {
+                column.index = index;
+                continue;
+            };
+            let stated = |header: &str, row: Option<&str>| match (stated(header), row) {
+                (Some(unit), None) | (None, Some(unit)) => Unit::guess(dimension, unit),
+                _ => None,
+            };
+            let first = stated(&grid.header[column.index], was.as_deref());
+            let second = stated(&block.header[index], is.as_deref());
+            match (first, second) {
+                (Some((_, first)), Some((_, second))) if first == column.unit => column.unit = second,
+                (Some((_, first)), Some((_, second))) if first == second => {}
+                _ => {
+                    return Err(format!(
+                        "row {place} is a second header, with another unit of '{}' ('{}')",
+                        column.header, block.header[index]
+                    ));
+                }
+            }
+        }
+        column.index = index;
+    }
+    Ok(Some(own))
+}
+
+/// The unit that a header states in brackets, or after a slash, a comma or 'in'.
+fn stated(header: &str) -> Option<&str> {
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some((_, rest)) = header.split_once(open) {
+            return rest.split(close).next();
+        }
+    }
+    [" / ", ", ", " in ", "/"].iter().find_map(|mark| header.split_once(mark)).map(|(_, unit)| unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::guess::guess;
+    use super::super::text::{Marks, read};
+    use super::*;
+
+    fn guessed(text: &str) -> String {
+        let grid = read(text.as_bytes(), Marks::default()).unwrap();
+        Map { columns: guess(&grid), ..Map::default() }.written()
+    }
+
+    #[test]
+    fn headers_say_what_and_in_which_unit() {
+        assert_eq!(
+            guessed("t [s];w pp [µm];Freq (kHz);V_mm_s;dir;FN / mN;Ft N\n0;1,5;27,5;10;1;250;0,1\n"),
+            "\"t [s]\"=time:s, \"w pp [µm]\"=amplitude_pp:um, \"Freq (kHz)\"=frequency:kHz, V_mm_s=speed:mm/s, \
+             dir=direction, \"FN / mN\"=normal_force:mN, \"Ft N\"=lateral_force:N"
+        );
+        assert_eq!(
+            guessed("TIME,AMP_UM,FREQ_KHZ,VEL_MM_S,LOAD_MN,FX_MN,COF\n0,1,27.5,-10,250,-100,0.4\n"),
+            "TIME=time:s, AMP_UM=amplitude_pp:um, FREQ_KHZ=frequency:kHz, VEL_MM_S=velocity:mm/s, LOAD_MN=normal_force:mN, FX_MN=lateral_force:mN"
+        );
+        assert_eq!(guessed("fx,lateral,fn\n1,2,3\n"), "fn=normal_force:N", "two lateral forces");
+    }
+
+    #[test]
+    fn entries_may_hold_commas_and_numbers_of_columns() {
+        let grid = read(b"\"F, raw\",b\n1,2\n", Marks::default()).unwrap();
+        let taken = Map::stated(&grid, &["\"F, raw\"=lateral_force:-mN, #2=speed_m_s".into()]).unwrap();
+        assert_eq!((taken[0].index, taken[1].index), (0, 1));
+        assert_eq!(taken[0].unit.apply("5"), Some(-0.005));
+        // As a terminal breaks it.
+        let broken = Map::stated(&grid, &["\"F,\n        raw\"=lateral_force:mN,\n  b=speed_m_s".into()]);
+        assert_eq!(broken.unwrap().iter().map(|t| t.index).collect::<Vec<_>>(), [0, 1]);
+        let wrong = Map::stated(&grid, &["c=speed:mm/s, b=speed, b=pace:s, b=speed:N".into()]).unwrap_err();
+        assert_eq!(wrong.len(), 4, "{wrong:?}");
+    }
+
+    #[test]
+    fn strokes_and_bare_letters() {
+        for (header, said) in [
+            ("Amplitude (µm p-p)", "amplitude_pp:um"),
+            ("Amplitude [um pp]", "amplitude_pp:um"),
+            ("peak-to-peak amplitude (um)", "amplitude_pp:um"),
+            ("Amplitude peak to peak / um", "amplitude_pp:um"),
+            ("Amplitude peak-peak (um)", "amplitude_pp:um"),
+            ("Amplitude (um, 0-p)", "amplitude_peak:um"),
+            ("Amplitude (um rms)", "amplitude_rms:um"),
+            ("Amplitude peak (um)", "amplitude_peak:um"),
+            ("amp_um", "amplitude_pp:um"),
+            ("f (kHz)", "frequency:kHz"),
+        ] {
+            let found = guessed(&format!("\"{header}\";b\n1;2\n"));
+            assert!(found.ends_with(&format!("={said}")), "{header}: {found}");
+        }
+        for header in ["F", "amp", "F (N)", "w", "Peak load (N)", "speed;rpm"] {
+            let units = header.split_once(';').map_or(String::new(), |(_, unit)| format!("{unit};N\n"));
+            let name = header.split(';').next().unwrap();
+            assert_eq!(
+                guessed(&format!("{name};Fn (N)\n{units}2;5\n")),
+                "\"Fn (N)\"=normal_force:N",
+                "{header}"
+            );
+        }
+    }
+
+    #[test]
+    fn all_that_is_missing_is_told_at_once() {
+        let mut map = Map::default();
+        assert_eq!(map.lacks(false).len(), 6);
+        map.set(&["time_s=rows, direction=forward, speed=10:mm/s".into()]).unwrap();
+        assert_eq!(map.constants[1].value, 0.01);
+        assert_eq!(map.lacks(false).len(), 3, "{:?}", map.lacks(false));
+    }
+}

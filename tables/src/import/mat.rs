@@ -1,0 +1,235 @@
+//! MAT files of version 5 (the form that MATLAB writes with `-v7` and `-v6`, and scipy.io.savemat): numeric arrays, also within structures.
+//! 'MAT-File Format', The MathWorks, chapter 1. Version 7.3 is HDF5.
+
+use super::arrays::{Array, Beside, number, single, table};
+use super::grid::{Cell, Grid};
+use flate2::read::ZlibDecoder;
+use std::io::Read;
+
+/// Structures within structures that are followed.
+const DEPTH: usize = 4;
+
+/// Numbers of the format: types of data, classes of arrays.
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+const STRUCTURE: u8 = 2;
+const CHARACTERS: u8 = 4;
+const OPAQUE: u8 = 17;
+const COMPLEX: u8 = 0x08;
+
+/// Reads a file.
+///
+/// # Errors
+/// A file that is cut or is none, and what [`table`] says.
+pub fn read(bytes: &[u8], sheet: Option<&str>, wanted: &[String]) -> miette::Result<Grid> {
+    let cut =
+        || miette::miette!(help = "save it anew, with `save -v7`", "the MAT file is cut short or damaged");
+    let big = match bytes.get(126..128) {
+        Some(b"IM") => false,
+        Some(b"MI") => true,
+        _ => return Err(cut()),
+    };
+    let (mut arrays, mut beside) = (Vec::new(), Beside::default());
+    // What all compressed arrays together may unfold to: a number has eight bytes at most.
+    let mut most = 8 * super::most_cells(bytes.len());
+    let mut rest = &bytes[128..];
+    while rest.len() >= 8 {
+        let element = Element::next(&mut rest, big).ok_or_else(cut)?;
+        let unfolded = match element.kind {
+            COMPRESSED => {
+                let mut unfolded = Vec::new();
+                let read = ZlibDecoder::new(element.data).take(most as u64).read_to_end(&mut unfolded);
+                read.map_err(|_| cut())?;
+                most -= unfolded.len();
+                if most == 0 {
+                    return Err(super::too_many("the MAT file", unfolded.len() / 8, bytes.len()));
+                }
+                unfolded
+            }
+            _ => Vec::new(),
+        };
+        let mut inside = &unfolded[..];
+        let element =
+            if unfolded.is_empty() { element } else { Element::next(&mut inside, big).ok_or_else(cut)? };
+        if element.kind == MATRIX {
+            matrix(element.data, big, "", 0, &mut arrays, &mut beside).ok_or_else(cut)?;
+            let cells: usize = arrays.iter().map(|a| a.cells.len()).sum();
+            if cells > super::most_cells(bytes.len()) {
+                return Err(super::too_many("the MAT file", cells, bytes.len()));
+            }
+        }
+    }
+    table("MAT", arrays, sheet, wanted, beside)
+}
+
+/// A piece of data with its type.
+struct Element<'a> {
+    kind: u32,
+    data: &'a [u8],
+}
+
+fn word(bytes: &[u8], big: bool) -> Option<u32> {
+    let four: [u8; 4] = bytes.get(..4)?.try_into().ok()?;
+    Some(if big { u32::from_be_bytes(four) } else { u32::from_le_bytes(four) })
+}
+
+impl<'a> Element<'a> {
+    /// Takes the next element off.
+    fn next(rest: &mut &'a [u8], big: bool) -> Option<Self> {
+        let first = word(rest, big)?;
+        // Up to four bytes stand within the tag.
+        if first >> 16 != 0 {
+            let data = rest.get(4..)?.get(..(first >> 16) as usize).filter(|d| d.len() <= 4)?;
+            *rest = rest.get(8..)?;
+            return Some(Element { kind: first & 0xffff, data });
+        }
+        let length = word(rest.get(4..)?, big)? as usize;
+        let data = rest.get(8..)?.get(..length)?;
+        // Everything but what is compressed fills up to eight bytes; the last of a file may not.
+        let filled = if first == COMPRESSED { length } else { length.div_ceil(8) * 8 };
+        *rest = rest.get(8 + filled..).unwrap_or_default();
+        Some(Element { kind: first, data })
+    }
+
+    /// Its codes as text: bytes, UTF-16 or UTF-8 by the type.
+    fn codes(&self, big: bool) -> Option<String> {
+        match self.kind {
+            1 | 2 | 16 => Some(String::from_utf8_lossy(self.data).into_owned()),
+            4 | 17 => {
+                let code = |c: &[u8]| {
+                    if big { u16::from_be_bytes([c[0], c[1]]) } else { u16::from_le_bytes([c[0], c[1]]) }
+                };
+                Some(String::from_utf16_lossy(&self.data.chunks_exact(2).map(code).collect::<Vec<_>>()))
+            }
+            _ => None,
+        }
+    }
+
+    /// Its numbers as cells.
+    fn cells(&self, big: bool) -> Option<Vec<Cell>> {
+        macro_rules! numbers {
+            ($type:ty, $cell:expr) => {
+                self.data
+                    .chunks_exact(size_of::<$type>())
+                    .map(|chunk| {
+                        let bytes = chunk.try_into().expect("a chunk of that size");
+                        let value =
+                            if big { <$type>::from_be_bytes(bytes) } else { <$type>::from_le_bytes(bytes) };
+                        $cell(value)
+                    })
+                    .collect()
+            };
+        }
+        Some(match self.kind {
+            1 => numbers!(i8, |v| number(f64::from(v))),
+            2 => numbers!(u8, |v| number(f64::from(v))),
+            3 => numbers!(i16, |v| number(f64::from(v))),
+            4 => numbers!(u16, |v| number(f64::from(v))),
+            5 => numbers!(i32, |v| number(f64::from(v))),
+            6 => numbers!(u32, |v| number(f64::from(v))),
+            7 => numbers!(f32, single),
+            9 => numbers!(f64, number),
+            12 => numbers!(i64, |v| number(v as f64)),
+            13 => numbers!(u64, |v| number(v as f64)),
+            _ => return None,
+        })
+    }
+}
+
+/// Takes the arrays out of a matrix; `None` where it is cut.
+fn matrix(
+    mut rest: &[u8],
+    big: bool,
+    around: &str,
+    depth: usize,
+    arrays: &mut Vec<Array>,
+    beside: &mut Beside,
+) -> Option<()> {
+    if rest.is_empty() {
+        return Some(());
+    }
+    let flags = word(Element::next(&mut rest, big)?.data, big)?;
+    let (class, marks) = (flags as u8, (flags >> 8) as u8);
+    if class == OPAQUE {
+        let name = String::from_utf8_lossy(Element::next(&mut rest, big)?.data).into_owned();
+        let kind = Element::next(&mut rest, big).and_then(|_| Element::next(&mut rest, big));
+        let kind = kind.map(|e| String::from_utf8_lossy(e.data).into_owned()).unwrap_or_default();
+        beside.notes.push(unread(&name, &kind, ""));
+        return Some(());
+    }
+    let sizes = Element::next(&mut rest, big)?;
+    let sizes: Vec<usize> =
+        sizes.data.chunks_exact(4).map(|c| word(c, big).map_or(0, |n| n as usize)).collect();
+    let own = String::from_utf8_lossy(Element::next(&mut rest, big)?.data).into_owned();
+    let name = match (around.is_empty(), own.is_empty()) {
+        (true, _) => own,
+        (false, true) => around.to_string(),
+        (false, false) => format!("{around}.{own}"),
+    };
+    let count = sizes.iter().try_fold(1usize, |all, n| all.checked_mul(*n))?;
+    match class {
+        STRUCTURE if count == 1 && depth < DEPTH => {
+            let width = word(Element::next(&mut rest, big)?.data, big)? as usize;
+            let names = Element::next(&mut rest, big)?.data;
+            for field in names.chunks_exact(width.max(1)) {
+                let field = String::from_utf8_lossy(field.split(|b| *b == 0).next()?).into_owned();
+                let element = Element::next(&mut rest, big)?;
+                matrix(element.data, big, &format!("{name}.{field}"), depth + 1, arrays, beside)?;
+            }
+        }
+        6..=15 if sizes.len() == 2 && marks & COMPLEX == 0 => {
+            let cells = Element::next(&mut rest, big)?.cells(big)?;
+            if cells.len() != count {
+                return None;
+            }
+            let name = name.trim_start_matches('.').to_string();
+            // What objects refer to has no name.
+            if count > 0 && !name.is_empty() {
+                arrays.push(Array { name, rows: sizes[0], columns: sizes[1], cells, ..Array::default() });
+            }
+        }
+        CHARACTERS => {
+            let text = Element::next(&mut rest, big)?;
+            let short = count <= 64 && sizes.first() == Some(&1);
+            if let (true, Some(cells)) = (short, text.codes(big)) {
+                beside.texts.insert(name.clone(), cells);
+            }
+            beside.notes.push(format!("{name} is text: passed over"));
+        }
+        _ => {
+            let kind = match class {
+                1 => "cell",
+                STRUCTURE => "struct",
+                3 => "object",
+                5 => "sparse",
+                6..=15 if marks & COMPLEX != 0 => "complex",
+                6..=15 => "array",
+                16 => "function_handle",
+                _ => "unknown",
+            };
+            let size = sizes.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ");
+            beside.notes.push(unread(&name, kind, &size));
+        }
+    }
+    Some(())
+}
+
+/// What an array that is not read is, and the line of MATLAB that makes it one that is.
+pub fn unread(name: &str, kind: &str, size: &str) -> String {
+    let size = if size.is_empty() { String::new() } else { format!(" ({size})") };
+    let (what, line) = match kind {
+        "cell" => ("a cell array", format!("writematrix({name}{{1}}, '{name}1.csv')")),
+        "struct" => ("an array of structures", format!("writetable(struct2table({name}), '{name}.csv')")),
+        "table" => ("a table object", format!("writetable({name}, '{name}.csv')")),
+        "timetable" => ("a timetable object", format!("writetimetable({name}, '{name}.csv')")),
+        "categorical" => ("a categorical array", format!("{name} = double({name})")),
+        "string" => ("a string array", format!("{name} = char({name})")),
+        "datetime" => ("an array of dates", format!("{name} = posixtime({name})")),
+        "duration" => ("an array of durations", format!("{name} = seconds({name})")),
+        "sparse" => ("a sparse matrix", format!("{name} = full({name})")),
+        "complex" => ("an array of complex numbers", format!("{name} = real({name})")),
+        "array" => ("an array of more than two dimensions", format!("{name} = {name}(:,:,1)")),
+        _ => ("an object", format!("{name} = double({name})")),
+    };
+    format!("{name} is {what}{size}, which is not read; in MATLAB: {line}")
+}

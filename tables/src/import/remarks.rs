@@ -1,0 +1,126 @@
+//! What is remarked of a table: ranges in SI, units that look slipped, signs that look wrong. Nothing is repaired.
+
+use diagnosis::data::{DataError, Table};
+use models::condition::Condition;
+use models::covariate::{self, Covariate};
+use models::pass::Pass;
+use serde::Serialize;
+
+/// A column's range, in SI.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Range {
+    /// Column of the point table.
+    pub column: &'static str,
+    /// Smallest, median and largest value.
+    pub low_median_high: [f64; 3],
+}
+
+/// What tribometers do, from rock friction at nanometres a second to pin on disk: values beyond are another unit more often than
+/// another machine.
+const USUAL: [(&Covariate, [f64; 2]); 6] = [
+    (&covariate::AMPLITUDE, [1e-8, 1e-4]),
+    (&covariate::FREQUENCY, [1e3, 1e6]),
+    (&covariate::SPEED, [1e-8, 20.0]),
+    (&covariate::NORMAL_FORCE, [1e-4, 1e3]),
+    (&covariate::POSITION, [1e-9, 1.0]),
+    (&covariate::AMBIENT_PRESSURE, [1e2, 1e6]),
+];
+/// Lateral over normal force: from well lubricated to soft rubber.
+const RATIO: [f64; 2] = [2e-3, 20.0];
+/// Largest speed of a vibrating plate in m/s, `pi f w`.
+const PLATE_SPEED: f64 = 10.0;
+
+/// Whether values are those of a tribometer, as far as a range is known for the column.
+pub fn usual(column: &str, values: &[f64]) -> bool {
+    let sizes = sorted(values.iter().map(|v| v.abs()).filter(|v| *v > 0.0));
+    let within = |[low, high]: [f64; 2]| sizes.get(sizes.len() / 2).is_none_or(|v| (low..=high).contains(v));
+    USUAL.iter().find(|(c, _)| c.name == column).is_none_or(|(_, range)| within(*range))
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut all: Vec<f64> = values.collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+fn lateral(passes: &[Pass]) -> impl Iterator<Item = f64> {
+    passes.iter().filter_map(|p| p.lateral_force_n)
+}
+
+/// The range of every column that the table has.
+pub fn ranges(passes: &[Pass], columns: &[&'static str]) -> Vec<Range> {
+    let of = |c: &Covariate| sorted(passes.iter().filter_map(|p| c.of(&p.condition(1.0))));
+    let lists = covariate::REQUIRED.iter().chain(covariate::OPTIONAL.iter()).map(|c| (c.name, of(c)));
+    let all = lists.chain([("lateral_force_n", sorted(lateral(passes)))]);
+    all.filter(|(name, v)| columns.contains(name) && !v.is_empty())
+        .map(|(column, v)| Range { column, low_median_high: [v[0], v[v.len() / 2], v[v.len() - 1]] })
+        .collect()
+}
+
+/// A factor of a thousand or a million that brings a value among the usual ones.
+fn slip(value: f64, [low, high]: [f64; 2]) -> Option<&'static str> {
+    let within = |v: f64| v >= low && v <= high;
+    if value <= 0.0 || within(value) {
+        return None;
+    }
+    [
+        (1e-3, "a thousand times too large"),
+        (1e-6, "a million times too large"),
+        (1e3, "a thousand times too small"),
+        (1e6, "a million times too small"),
+    ]
+    .into_iter()
+    .find_map(|(factor, words)| within(value * factor).then_some(words))
+}
+
+/// Everything that looks wrong, in sentences.
+pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
+    let mut said = Vec::new();
+    let conditions: Vec<Condition> = passes.iter().map(|p| p.condition(1.0)).collect();
+    for (c, usual) in USUAL.iter().filter(|(c, _)| columns.contains(&c.name)) {
+        let sizes = sorted(conditions.iter().filter_map(|q| c.of(q)).map(f64::abs).filter(|v| *v > 0.0));
+        // Places are judged by the largest: a table may lie about zero.
+        let typical =
+            if c.name == covariate::POSITION.name { sizes.last() } else { sizes.get(sizes.len() / 2) };
+        let Some(typical) = typical else { continue };
+        if let Some(words) = slip(*typical, *usual) {
+            said.push(format!(
+                "{} is {typical:.3e}, {words} for a tribometer ({:.0e} to {:.0e}): is its unit right?",
+                c.name, usual[0], usual[1]
+            ));
+        }
+    }
+    let ratios = sorted(passes.iter().filter_map(|p| Some((p.lateral_force_n? / p.normal_force_n).abs())));
+    if let Some(words) = ratios.get(ratios.len() / 2).and_then(|r| slip(*r, RATIO).map(|w| (r, w))) {
+        said.push(format!(
+            "lateral_force_n over normal_force_n is {:.3e}, {} for friction: is the unit of one of them wrong?",
+            words.0, words.1
+        ));
+    }
+    let fastest = conditions.iter().map(|c| std::f64::consts::PI * c.frequency_hz * c.amplitude.metres());
+    let fastest = fastest.fold(0.0, f64::max);
+    if fastest > PLATE_SPEED {
+        said.push(format!(
+            "the plate would move at {fastest:.3e} m/s (pi f w); no actuator does: is the unit of the amplitude or of the frequency right?"
+        ));
+    }
+    match Table::measured(passes) {
+        Err(DataError::Unsigned) => said.push(
+            "the lateral force has one sign in both directions, and the same size: friction turns with the direction. If these are \
+             magnitudes, map the column as friction_force in place of lateral_force; as it is, diagnose refuses the table"
+                .into(),
+        ),
+        Err(error) => said.push(format!("diagnose will refuse the table: {error}")),
+        Ok(_) => {
+            let against = passes.iter().filter(|p| p.friction_force_n().is_some_and(|f| f < 0.0)).count();
+            if 2 * against > passes.len() {
+                said.push(format!(
+                    "friction pushes along the sliding in {against} of {} passes: does the sensor's axis or the sign of the direction point \
+                     the other way? A minus before the unit turns a column (lateral_force:-N)",
+                    passes.len()
+                ));
+            }
+        }
+    }
+    said
+}

@@ -1,0 +1,221 @@
+//! A row of the source in SI: what each target has there, and why a row cannot be taken.
+
+use super::grid::{Cell, Grid, Row};
+use super::map::{Map, way};
+use super::targets::{COUNT, Id, Kind, TARGETS};
+use super::units::{Dimension, Unit};
+use models::condition::Condition;
+use models::covariate;
+use models::pass::Pass;
+use models::quantity::PeakToPeak;
+use serde::Serialize;
+
+/// A row that is left out, and why.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Dropped {
+    /// Line or row of the source, from 1.
+    pub row: u64,
+    /// Column of the source or of the point table.
+    pub column: String,
+    /// What stands there.
+    pub text: String,
+    /// Why that is not taken.
+    pub reason: String,
+}
+
+/// What a row says, in SI, by the places of [`TARGETS`].
+#[derive(Clone, Debug)]
+pub struct Values {
+    /// Line or row of the source.
+    pub place: u64,
+    /// NaN for nothing: a series has many of these.
+    numbers: [f64; COUNT],
+    /// The name of the run.
+    pub run: Option<String>,
+}
+
+/// Mean of a value over the rows that have it.
+pub fn mean(rows: &[Values], of: impl Fn(&Values) -> Option<f64>) -> Option<f64> {
+    let known: Vec<f64> = rows.iter().filter_map(of).collect();
+    (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+}
+
+impl Values {
+    /// The value of a target.
+    pub fn get(&self, id: Id) -> Option<f64> {
+        Some(self.numbers[id as usize]).filter(|v| !v.is_nan())
+    }
+
+    /// Reads a row. `number` is its place among the data, `clock` its time where a clock says it.
+    ///
+    /// # Errors
+    /// The first cell that cannot be read.
+    pub fn read(
+        grid: &Grid,
+        map: &Map,
+        row: &Row,
+        number: usize,
+        clock: Option<f64>,
+    ) -> Result<Self, Dropped> {
+        let mut values = Values { place: row.place, numbers: [f64::NAN; COUNT], run: None };
+        for constant in &map.constants {
+            if TARGETS[constant.target].kind == Kind::Text {
+                values.run = Some(constant.text.clone());
+            } else {
+                values.numbers[constant.target] = constant.value;
+            }
+        }
+        if map.time_by_rows {
+            values.numbers[Id::Time as usize] = number as f64;
+        }
+        for column in &map.columns {
+            let Some(cell) = row.cells.get(column.index).filter(|c| **c != Cell::Empty) else { continue };
+            let drop = |reason: &str| Dropped {
+                row: row.place,
+                column: column.header.clone(),
+                text: cell.shown(),
+                reason: reason.into(),
+            };
+            let number = || match (cell.ratio(grid.comma), TARGETS[column.target].kind) {
+                (None, _) => cell.digits(grid.comma).and_then(|d| column.unit.apply(&d)),
+                // A minus before a unit turns these too.
+                (Some(ratio), Kind::Number(Dimension::Ratio)) => Some(ratio * column.unit.factor().signum()),
+                // Through the decimal digits: a hundred times 0.07 is not 7.
+                (Some(ratio), Kind::Number(Dimension::Percentage)) => {
+                    Unit::parse(Dimension::Percentage, "1")?.apply(&format!("{ratio:e}"))
+                }
+                _ => None,
+            };
+            let value = match TARGETS[column.target].kind {
+                Kind::Text => {
+                    values.run = Some(cell.shown());
+                    continue;
+                }
+                Kind::Way => {
+                    let text = cell.digits(grid.comma).unwrap_or_default();
+                    way(&text).ok_or_else(|| drop("no direction: 1, -1, forward or backward is needed"))?
+                }
+                Kind::Count => {
+                    let whole = |v: &f64| v.fract() == 0.0 && (0.0..9e15).contains(v);
+                    number().filter(whole).ok_or_else(|| drop("no whole number"))?
+                }
+                Kind::Number(_) if column.target == Id::Time as usize => {
+                    clock.or_else(number).ok_or_else(|| drop("neither a number nor a time of day"))?
+                }
+                Kind::Number(_) => number().ok_or_else(|| drop("no number"))?,
+            };
+            values.numbers[column.target] = value;
+        }
+        Ok(values)
+    }
+
+    /// Takes means over rows in place of the values of one; time stays.
+    pub fn average(&mut self, rows: &[Values]) {
+        for k in (0..COUNT).filter(|k| *k != Id::Time as usize) {
+            self.numbers[k] = mean(rows, |v| Some(v.numbers[k]).filter(|v| !v.is_nan())).unwrap_or(f64::NAN);
+        }
+    }
+
+    /// States the motion and the lateral force of a stretch, whatever they were had from.
+    pub fn put_motion(&mut self, speed_m_s: f64, direction: f64, lateral_n: Option<f64>) {
+        for id in [Id::Velocity, Id::FrictionForce, Id::FrictionCoefficient, Id::Point] {
+            self.numbers[id as usize] = f64::NAN;
+        }
+        self.numbers[Id::Speed as usize] = speed_m_s;
+        self.numbers[Id::Direction as usize] = direction;
+        self.numbers[Id::LateralForce as usize] = lateral_n.unwrap_or(f64::NAN);
+    }
+
+    /// Peak-to-peak amplitude, m.
+    pub fn amplitude(&self) -> Option<f64> {
+        let peak = || self.get(Id::AmplitudePeak).map(|a| 2.0 * a);
+        let rms = || self.get(Id::AmplitudeRms).map(|a| 2.0 * std::f64::consts::SQRT_2 * a);
+        self.get(Id::AmplitudePp).or_else(peak).or_else(rms)
+    }
+
+    /// Direction of sliding: stated, or the sign of the velocity.
+    pub fn direction(&self) -> Option<f64> {
+        let sign = || self.get(Id::Velocity).filter(|v| *v != 0.0).map(f64::signum);
+        self.get(Id::Direction).or_else(sign)
+    }
+
+    /// Sliding speed, m/s.
+    pub fn speed(&self) -> Option<f64> {
+        self.get(Id::Speed).or_else(|| self.get(Id::Velocity).map(f64::abs))
+    }
+
+    /// Lateral force in the sensor's frame, N, for a direction of sliding.
+    pub fn lateral(&self, direction: f64) -> Option<f64> {
+        let friction = || self.get(Id::FrictionForce).map(|f| direction * f);
+        let coefficient =
+            || Some(direction * self.get(Id::FrictionCoefficient)? * self.get(Id::NormalForce)?);
+        self.get(Id::LateralForce).or_else(friction).or_else(coefficient)
+    }
+
+    fn drop(&self, column: &str, value: Option<f64>, reason: &str) -> Dropped {
+        let text = value.map(|v| v.to_string()).unwrap_or_default();
+        Dropped { row: self.place, column: column.into(), text, reason: reason.into() }
+    }
+
+    /// The row as a pass.
+    ///
+    /// # Errors
+    /// What is missing, or what no pass can have.
+    pub fn pass(&self, number: u64) -> Result<Pass, Dropped> {
+        let need = |column: &str, value: Option<f64>| value.ok_or_else(|| self.drop(column, None, "empty"));
+        let amplitude = need("amplitude_pp_m", self.amplitude())?;
+        let frequency = match self.get(Id::Frequency) {
+            Some(frequency) => frequency,
+            None if amplitude == 0.0 => Condition::paper().frequency_hz,
+            None => return Err(self.drop("frequency_hz", None, "empty, and the plate vibrates")),
+        };
+        let direction = match self.direction() {
+            Some(direction) => direction,
+            None if self.get(Id::Velocity) == Some(0.0) => {
+                return Err(self.drop("speed_m_s", Some(0.0), "nothing slides, so there is no direction"));
+            }
+            None => return Err(self.drop("direction", None, "empty")),
+        };
+        let mut condition = Condition::paper();
+        condition.amplitude = PeakToPeak::from_metres(amplitude);
+        for (covariate, value) in [
+            (&covariate::TIME, need("time_s", self.get(Id::Time))?),
+            (&covariate::FREQUENCY, frequency),
+            (&covariate::SPEED, need("speed_m_s", self.speed())?),
+            (&covariate::DIRECTION, direction),
+            (&covariate::POSITION, self.get(Id::Position).unwrap_or(0.0)),
+            (&covariate::NORMAL_FORCE, need("normal_force_n", self.get(Id::NormalForce))?),
+        ] {
+            covariate.put(&mut condition, value);
+        }
+        let air = [
+            (&covariate::AMBIENT_PRESSURE, Id::Pressure),
+            (&covariate::TEMPERATURE, Id::Temperature),
+            (&covariate::RELATIVE_HUMIDITY, Id::Humidity),
+        ];
+        for (covariate, id) in air {
+            if let Some(value) = self.get(id) {
+                covariate.put(&mut condition, value);
+            }
+        }
+        let lateral = need("lateral_force_n", self.lateral(direction))?;
+        let count = |id| self.get(id).map(|v| v as u64);
+        let pass = Pass {
+            normal_force_sd_n: self.get(Id::NormalForceSd),
+            lateral_force_sd_n: self.get(Id::LateralForceSd),
+            samples: count(Id::Samples),
+            phase_shift_deg: self.get(Id::PhaseShift),
+            replicate: count(Id::Replicate),
+            run: self.run.clone(),
+            session: count(Id::Session),
+            ..Pass::at(count(Id::Point).unwrap_or(number), &condition, Some(lateral))
+        };
+        diagnosis::data::check(&pass).map_err(|error| match error {
+            diagnosis::data::DataError::BadValue { column, value, needed, .. } => {
+                self.drop(column, Some(value), &format!("{needed} is needed"))
+            }
+            other => self.drop("", None, &other.to_string()),
+        })?;
+        Ok(pass)
+    }
+}

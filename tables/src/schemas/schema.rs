@@ -1,0 +1,139 @@
+//! A JSON Schema for every kind of file, from the types that read it.
+
+use crate::import::targets::{Kind as Cell, TARGETS};
+use models::covariate;
+use schemars::generate::SchemaSettings;
+use serde_json::{Map, Value, json};
+
+/// A kind of file or document.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Kind {
+    /// A plan of passes
+    Plan,
+    /// A rig: instruments, limits, fingertip
+    Setup,
+    /// A fingertip of the library
+    Fingertip,
+    /// rig.toml: what is known of a rig beside a table
+    Rig,
+    /// A row of a point table
+    Table,
+    /// A calibration's certificate
+    Certificate,
+    /// MODEL.toml of a diagnosis
+    Model,
+    /// An instrument's description
+    Profile,
+    /// What `muprime diagnose --json` prints
+    Verdict,
+}
+
+impl Kind {
+    /// Every kind.
+    pub const ALL: [Kind; 9] = [
+        Kind::Plan,
+        Kind::Setup,
+        Kind::Fingertip,
+        Kind::Rig,
+        Kind::Table,
+        Kind::Certificate,
+        Kind::Model,
+        Kind::Profile,
+        Kind::Verdict,
+    ];
+
+    /// Its name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Kind::Plan => "plan",
+            Kind::Setup => "setup",
+            Kind::Fingertip => "fingertip",
+            Kind::Rig => "rig",
+            Kind::Table => "table",
+            Kind::Certificate => "certificate",
+            Kind::Model => "model",
+            Kind::Profile => "profile",
+            Kind::Verdict => "verdict",
+        }
+    }
+
+    /// What it is and where it is used.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Kind::Plan => "A plan of passes (TOML), for `muprime run PLAN`.",
+            Kind::Setup => {
+                "A rig (TOML), for `--setup`; the defaults and hard ranges of its limits stand in setup.md as well."
+            }
+            Kind::Fingertip => "A fingertip (TOML), for `[finger] tip` of a setup.",
+            Kind::Rig => "`rig.toml` beside a point table, for `muprime diagnose`.",
+            Kind::Table => "A row of a point table (CSV or Parquet), for `muprime diagnose`.",
+            Kind::Certificate => {
+                "What `muprime calibrate` writes (TOML) and a setup names under `certificates`."
+            }
+            Kind::Model => {
+                "MODEL.toml, what `muprime diagnose --save-model` writes and `muprime run --model` reads."
+            }
+            Kind::Profile => "An instrument's description (TOML), for `profile` of an instrument in a setup.",
+            Kind::Verdict => "What `muprime diagnose --json` prints (JSON).",
+        }
+    }
+
+    /// The schema, JSON Schema 2020-12.
+    pub fn schema(self) -> Value {
+        let reads = || SchemaSettings::draft2020_12().into_generator();
+        let schema = match self {
+            Kind::Plan => reads().into_root_schema_for::<runs::plan::PlanFile>(),
+            Kind::Setup => reads().into_root_schema_for::<runs::setup::SetupFile>(),
+            Kind::Fingertip => reads().into_root_schema_for::<runs::fingertip::FingertipFile>(),
+            Kind::Rig => reads().into_root_schema_for::<models::rig_file::RigFile>(),
+            Kind::Table => return table(),
+            Kind::Certificate => reads().into_root_schema_for::<calibration::certificate::Certificate>(),
+            Kind::Model => reads().into_root_schema_for::<effects::corrected::SavedModel>(),
+            Kind::Profile => instruments::schema::json_schema(),
+            Kind::Verdict => {
+                let writes = SchemaSettings::draft2020_12().for_serialize();
+                writes.into_generator().into_root_schema_for::<diagnosis::verdict::Report>()
+            }
+        };
+        schema.to_value()
+    }
+}
+
+/// The row of a point table: its columns by the targets of the import, which have words for all of them, with the ranges of the
+/// covariates.
+fn table() -> Value {
+    let mut properties = Map::new();
+    for target in TARGETS {
+        let covariate = covariate::by_name(target.column);
+        if properties.contains_key(target.column) {
+            continue;
+        }
+        let kind = match target.kind {
+            Cell::Text => "string",
+            Cell::Count | Cell::Way => "integer",
+            Cell::Number(_) => "number",
+        };
+        let unit = match target.kind {
+            Cell::Number(dimension) => format!(", in {}", dimension.si()),
+            _ => String::new(),
+        };
+        let needed = covariate.map_or(String::new(), |c| format!(": {}", c.needed));
+        let mut property = json!({ "type": kind, "description": format!("{}{unit}{needed}.", target.words) });
+        if let Some(c) = covariate {
+            property["minimum"] = json!(c.range[0]);
+            property["maximum"] = json!(c.range[1]);
+        }
+        properties.insert(target.column.into(), property);
+    }
+    let may_lack = ["position_m", "frequency_hz"];
+    let required = covariate::REQUIRED.iter().map(|c| c.name).filter(|c| !may_lack.contains(c));
+    let required: Vec<&str> = std::iter::once("point").chain(required).collect();
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "PointTable",
+        "description": "One row a steady pass. A table of one place leaves position_m out, a plate that stands still frequency_hz; further columns are ignored.",
+        "type": "object",
+        "properties": properties,
+        "required": required,
+    })
+}

@@ -1,0 +1,97 @@
+//! The pages: every command that any page names exists with its flags, every page is in the book, every link leads somewhere.
+//!
+//! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test docs` writes docs/commands.md. The book itself: tests/peers/book.rs.
+
+#[path = "docs/words.rs"]
+mod words;
+
+use std::path::PathBuf;
+use tests::file;
+
+/// Pages of docs/ that stand in the table of contents.
+fn listed() -> Vec<PathBuf> {
+    let summary = std::fs::read_to_string(file("docs/SUMMARY.md")).unwrap();
+    let links = summary.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    links.map(|link| file("docs").join(link)).collect()
+}
+
+/// Every `muprime ...` in any page, listing or not, is a command with flags that there are.
+#[test]
+fn every_command_that_a_page_names_exists() {
+    let commands = words::commands();
+    let mut pages = words::markdown(&file("docs"));
+    pages.extend(["README.md", "CONTRIBUTING.md", "python/README.md"].map(file));
+    let (mut named, mut wrong) = (0, Vec::new());
+    for path in &pages {
+        let text = std::fs::read_to_string(path).unwrap();
+        for (line, call) in words::calls(&text) {
+            named += 1;
+            if let Err(why) = words::exists(&call, &commands) {
+                wrong.push(format!("{}:{line}: `{call}`: {why}", path.display()));
+            }
+        }
+    }
+    println!("{named} calls of muprime in {} pages", pages.len());
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(named > 150, "{named}");
+    // It can fail.
+    assert!(words::exists("muprime rum --fast", &commands).is_err());
+    assert!(words::exists("muprime run --fastest", &commands).is_err());
+    assert!(words::exists("muprime model pointt", &commands).is_err());
+}
+
+/// docs/commands.md is what the program's own help says.
+#[test]
+fn the_page_of_commands_is_that_of_the_program() {
+    let (path, now) = (file("docs/commands.md"), words::page(&words::commands()));
+    if std::env::var_os("MUPRIME_UPDATE").is_some() {
+        std::fs::write(&path, &now).unwrap();
+    }
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        written == now,
+        "docs/commands.md is old: MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test docs"
+    );
+}
+
+/// Every page of docs/ stands in the table of contents.
+#[test]
+fn every_page_is_in_the_book() {
+    let listed: Vec<PathBuf> = listed()
+        .iter()
+        .map(|p| p.canonicalize().unwrap_or_else(|e| panic!("{}: {e}", p.display())))
+        .collect();
+    let missing: Vec<PathBuf> = words::markdown(&file("docs"))
+        .into_iter()
+        .filter(|p| !p.ends_with("SUMMARY.md") && !listed.contains(&p.canonicalize().unwrap()))
+        .collect();
+    assert!(missing.is_empty(), "not in docs/SUMMARY.md: {missing:?}");
+}
+
+/// Links of the files beside the book.
+#[test]
+fn every_link_of_the_pages_beside_the_book_leads_somewhere() {
+    let mut wrong = Vec::new();
+    let mut pages = words::markdown(&file("docs"));
+    pages.extend(
+        [
+            "README.md",
+            "CONTRIBUTING.md",
+            "ARCHITECTURE.md",
+            "BENCHMARKS.md",
+            "CHANGELOG.md",
+            "python/README.md",
+        ]
+        .map(file),
+    );
+    for path in &pages {
+        let text = std::fs::read_to_string(path).unwrap();
+        for target in text.split("](").skip(1).filter_map(|rest| rest.split([')', '#', ' ', '\n']).next()) {
+            let local = !target.is_empty() && !target.contains("://") && !target.contains('`');
+            if local && !path.parent().unwrap().join(target).exists() {
+                wrong.push(format!("{}: {target}", path.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

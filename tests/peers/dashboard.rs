@@ -1,0 +1,295 @@
+//! The dashboard, with the real program, a real Chromium, and an attacker.
+//!
+//! Where only what is shown matters, the run is one in virtual time whose news are held back to the pace of a clock: no busy machine trips it.
+//! `MUPRIME_PAGES=FOLDER` keeps the pictures there; `MUPRIME_DASHBOARD_SOAK_S=449` makes the soak
+//! as long as that; the run takes some eight minutes.
+
+use rig::live::{Ended, Feed, Run};
+use runs::plan::Plan;
+use runs::sequence::Event;
+use runs::session::{Job, Notes, Signals, Update};
+use runs::setup::Setup;
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::os::fd::AsRawFd;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tests::served::resident_bytes;
+use tests::{file, muprime, python, texts};
+
+/// Names as an attacker, or a careless hand, writes them.
+const OPERATOR: &str = "\"><img src=x onerror=alert(1)>";
+const SAMPLE: &str = "</p><script>alert(document.domain)</script><svg onload=alert(2)>";
+
+/// The pace of a clock.
+const CLOCK: Duration = Duration::from_millis(100);
+
+/// A `muprime dashboard` of a folder of runs.
+struct Served {
+    process: Child,
+    link: String,
+    place: String,
+}
+
+impl Served {
+    fn start(runs: &Path, more: &[&str]) -> Self {
+        let mut command = muprime();
+        command.args(["--json", "dashboard", "--listen", "127.0.0.1:0", "--folder"]).arg(runs).args(more);
+        let mut process = command.stdout(Stdio::piped()).spawn().unwrap();
+        let mut said = String::new();
+        BufReader::new(process.stdout.take().unwrap()).read_line(&mut said).unwrap();
+        let said: Value = serde_json::from_str(&said).unwrap();
+        let text = |key: &str| said[key].as_str().unwrap().to_string();
+        Served { process, link: text("dashboard"), place: text("address") }
+    }
+
+    fn token(&self) -> &str {
+        self.link.rsplit_once('=').unwrap().1
+    }
+
+    /// A live stream of a run, opened.
+    fn stream(&self, run: &str) -> TcpStream {
+        let mut stream = TcpStream::connect(&self.place).unwrap();
+        let key = "dGhlIHNhbXBsZSBub25jZQ==";
+        write!(
+            stream,
+            "GET /api/live/{run} HTTP/1.1\r\nHost: {}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
+             Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: {key}\r\nSec-WebSocket-Protocol: muprime, {}\r\n\r\n",
+            self.place,
+            self.token()
+        )
+        .unwrap();
+        let mut head = Vec::new();
+        while !head.ends_with(b"\r\n\r\n") {
+            let mut byte = [0];
+            stream.read_exact(&mut byte).unwrap();
+            head.push(byte[0]);
+        }
+        assert!(head.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&head));
+        stream
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// A run in virtual time, told at the pace of a clock, until it is over or this is dropped.
+struct Paced {
+    signals: Signals,
+    runs: Option<JoinHandle<usize>>,
+}
+
+impl Paced {
+    /// With so long from one state to the next: 100 ms are the pace of a clock.
+    fn start(out: &Path, pace: Duration) -> Self {
+        let setup = Setup::load("virtual-ideal").unwrap();
+        let model = Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
+        let plan = Plan::load("part2-validation").unwrap();
+        let job = Job {
+            seed: 5,
+            setup,
+            plan,
+            model,
+            model_file: None,
+            defects: None,
+            out: out.to_path_buf(),
+            fast: true,
+            notes: Notes { operator: Some(OPERATOR.into()), sample: Some(SAMPLE.into()), ..Notes::default() },
+            answers: None,
+        };
+        let signals = Signals::default();
+        let asked = signals.clone();
+        let runs = std::thread::spawn(move || {
+            let planned = job.points().unwrap().len();
+            let as_by_a_clock = Run { fast: false, ..Run::of(&job, planned, 0) };
+            let mut feed = Feed::new(as_by_a_clock, Vec::new(), &asked);
+            let summary = rig::session::run(job, &asked, &mut |news| {
+                feed.news(&news);
+                if matches!(news, Update::State(_)) {
+                    std::thread::sleep(pace);
+                }
+                let waits = || asked.paused.load(Ordering::Relaxed);
+                if matches!(news, Update::Pass(_)) && waits() {
+                    feed.news(&Update::Event(&Event::Paused { point: 0 }));
+                    while waits() && asked.stops.load(Ordering::Relaxed) == 0 {
+                        std::thread::sleep(Duration::from_millis(20));
+                    }
+                    feed.news(&Update::Event(&Event::Resumed));
+                }
+            });
+            feed.end(Ended::of(&summary));
+            summary.unwrap().passes
+        });
+        let began = Instant::now();
+        while rig::live::Viewer::connect(out).is_err() {
+            assert!(began.elapsed().as_secs() < 60 && !runs.is_finished(), "it is never told");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        Paced { signals, runs: Some(runs) }
+    }
+
+    fn passes(mut self) -> usize {
+        self.signals.stops.store(1, Ordering::Relaxed);
+        self.runs.take().unwrap().join().unwrap()
+    }
+}
+
+fn finished(out: &Path) {
+    let mut run = muprime();
+    run.args(["run", "--fast", "--seed", "3", "--operator", OPERATOR, "--sample", SAMPLE, "--out"]).arg(out);
+    let made = run.output().unwrap();
+    assert!(made.status.code().is_some_and(|code| code < 2), "{}", texts(&made).1);
+}
+
+fn browser(what: &str, pictures: &Path, served: &Served) -> Value {
+    let mut look = python();
+    look.arg(file("tests/peers/dashboard.py"))
+        .arg(what)
+        .arg(pictures)
+        .arg(&served.link)
+        .args(["live", "over"]);
+    let output = look.output().unwrap();
+    let (said, err) = texts(&output);
+    assert!(output.status.success(), "{err}");
+    serde_json::from_str(&said).unwrap()
+}
+
+fn pictures(folder: &Path) -> PathBuf {
+    let kept = std::env::var_os("MUPRIME_PAGES").map(PathBuf::from);
+    let out = kept.unwrap_or_else(|| folder.join("pictures"));
+    std::fs::create_dir_all(&out).unwrap();
+    out
+}
+
+#[test]
+fn every_page_in_a_real_browser() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = folder.path().join("runs");
+    finished(&runs.join("over"));
+    let live = Paced::start(&runs.join("live"), CLOCK);
+    let served = Served::start(&runs, &[]);
+    let seen = browser("views", &pictures(folder.path()), &served);
+    assert_eq!(seen["pictures"].as_array().unwrap().len(), 30, "five pages, three widths, light and dark");
+    for list in ["faults", "asked", "ran"] {
+        assert_eq!(seen[list], serde_json::json!([]), "{list}");
+    }
+    assert!(live.passes() > 3);
+}
+
+/// By the keyboard: pause, go on, stop. What a session does when it is told to rest is tried elsewhere, in wall-clock time.
+#[test]
+fn a_browser_pauses_and_stops_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = folder.path().join("runs");
+    finished(&runs.join("over"));
+    let live = Paced::start(&runs.join("live"), CLOCK);
+    let served = Served::start(&runs, &["--allow-control"]);
+    let seen = browser("keys", &pictures(folder.path()), &served);
+    assert_eq!(seen["faults"], serde_json::json!([]));
+    live.passes();
+    let summary = std::fs::read(runs.join("live/summary.json")).unwrap();
+    let summary: Value = serde_json::from_slice(&summary).unwrap();
+    assert_eq!(summary["outcome"], "stopped");
+}
+
+#[test]
+fn an_attacker_gets_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = folder.path().join("runs");
+    let live = Paced::start(&runs.join("live"), CLOCK);
+    let served = Served::start(&runs, &[]);
+    let mut attack = python();
+    attack.arg(file("tests/peers/attack.py")).args([&served.place, served.token(), "live"]);
+    let output = attack.output().unwrap();
+    let (said, err) = texts(&output);
+    assert!(output.status.success(), "{err}");
+    println!("{said}");
+    let said: Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(said["accepted"], serde_json::json!([]));
+    assert!(said["open_at_once"].as_u64().unwrap() <= 64, "{said}");
+    assert!(said["served_again_after_s"].as_f64().is_some_and(|s| s < 30.0), "{said}");
+    assert!(said["too_many"].as_u64().unwrap() >= 40, "{said}");
+    assert_eq!(live.signals.stops.load(Ordering::Relaxed), 0, "nobody may stop it");
+    assert!(!live.signals.paused.load(Ordering::Relaxed), "nobody may pause it");
+    assert!(live.passes() > 3, "it went on");
+}
+
+/// Leaves the other end so little room: what is not read waits there, and not in this machine's buffers.
+fn with_room(stream: TcpStream, bytes: libc::c_int) -> TcpStream {
+    // SAFETY: a socket that is open, and a value of the size that is said.
+    let set = unsafe {
+        let value = (&raw const bytes).cast();
+        let size = size_of::<libc::c_int>() as libc::socklen_t;
+        libc::setsockopt(stream.as_raw_fd(), libc::SOL_SOCKET, libc::SO_RCVBUF, value, size)
+    };
+    assert_eq!(set, 0);
+    stream
+}
+
+/// What a stream told: passes, states, and whether it told the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Told {
+    passes: usize,
+    states: usize,
+    end: bool,
+}
+
+/// Reads a stream to its end, so many bytes at once with a pause after each.
+fn read_all(mut stream: TcpStream, at_once: usize, pause: Duration) -> JoinHandle<Told> {
+    std::thread::spawn(move || {
+        let (mut buffer, mut all) = (vec![0; at_once], Vec::new());
+        while let Ok(more @ 1..) = stream.read(&mut buffer) {
+            all.extend_from_slice(&buffer[..more]);
+            std::thread::sleep(pause);
+        }
+        let text = String::from_utf8_lossy(&all);
+        let count = |about: &str| text.matches(&format!("{{\"about\":\"{about}\"")).count();
+        Told { passes: count("pass"), states: count("state"), end: count("ended") == 1 }
+    })
+}
+
+/// Six that read, a slow one and one that reads nothing: the run goes on, the server stays small, the slow one is told fewer states and no
+/// fewer passes, the deaf one is let go, and whoever comes again sees all. Ten times as fast as a clock, so that what waits is much.
+#[test]
+fn viewers_that_do_not_read_hold_nobody_up() {
+    let seconds: u64 = std::env::var("MUPRIME_DASHBOARD_SOAK_S").map_or(20, |s| s.parse().unwrap());
+    assert!((10..450).contains(&seconds), "the run is over after that");
+    let folder = tempfile::tempdir().unwrap();
+    let runs = folder.path().join("runs");
+    let live = Paced::start(&runs.join("live"), if seconds > 40 { CLOCK } else { CLOCK / 10 });
+    let served = Served::start(&runs, &[]);
+    let reader = |stream| read_all(stream, 1 << 16, Duration::ZERO);
+    let readers: Vec<_> = (0..6).map(|_| reader(served.stream("live"))).collect();
+    let slow = read_all(with_room(served.stream("live"), 1 << 15), 1 << 10, CLOCK / 2);
+    let mut deaf = with_room(served.stream("live"), 1);
+    std::thread::sleep(Duration::from_secs(seconds / 4));
+    let before = resident_bytes(served.process.id()).unwrap();
+    std::thread::sleep(Duration::from_secs(seconds - seconds / 4));
+    let after = resident_bytes(served.process.id()).unwrap();
+    assert!(after < before + (16 << 20), "{before} bytes, then {after}");
+    let again = reader(served.stream("live"));
+    std::thread::sleep(Duration::from_secs(2));
+    let passes = live.passes();
+    let told: Vec<Told> = readers.into_iter().map(|reader| reader.join().unwrap()).collect();
+    let (slow, again) = (slow.join().unwrap(), again.join().unwrap());
+    println!("{seconds} s: {told:?}, slowly {slow:?}, again {again:?}; {before} and {after} bytes resident");
+    for one in told.iter().chain([&slow, &again]) {
+        assert!(one.end && one.passes == passes, "{one:?} of {passes}");
+    }
+    if seconds <= 40 {
+        assert!(slow.states < told[0].states, "{slow:?} and {:?}", told[0]);
+        let mut held = Vec::new();
+        let _ = deaf.read_to_end(&mut held);
+        let held = String::from_utf8_lossy(&held).matches("\"about\"").count();
+        assert!(held < told[0].states / 2, "the deaf one is let go: {held} messages were held for it");
+    }
+}

@@ -1,0 +1,122 @@
+//! What the tests of safety in wall-clock time judge, in virtual time and to the cycle: a hand that lets go of the dead-man key, an 'off'
+//! that is read back, and one that is not. Their twins: tests/wall/dead_man_key.rs, off_leaves.rs and ends.rs.
+
+use models::prediction::SpringSlider;
+use models::quantity::PeakToPeak;
+use realtime::cycle::{Command, KEY_AGE, Marker};
+use realtime::ports::{Contacts, Nanos, NoData, SafetyInputs};
+use realtime::safety::{Cause, Request};
+use realtime::turn::{Ports, Row};
+use runs::setup::Setup;
+use runs::supervisor::{Loop, VirtualLoop};
+use sim::defects::Defects;
+use sim::virtual_rig::VirtualRig;
+use sim::world::WorldConfig;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A terminal repeats a held key some thirty times a second.
+const REPEAT: Nanos = Nanos(33_000_000);
+
+/// The rig's contacts without a dead-man device: the key takes its place.
+struct WithoutDevice<S>(S);
+
+impl<S: SafetyInputs> SafetyInputs for WithoutDevice<S> {
+    fn read(&mut self, now: Nanos) -> Contacts {
+        Contacts { dead_man: Err(NoData::NotFitted), ..self.0.read(now) }
+    }
+}
+
+/// A virtual rig with a relay, under a human finger whose hand is at a key; with these defects.
+fn rig(defects: &str) -> VirtualLoop {
+    let board = |table: &str| format!("[{table}]\nprofile = \"muprime-relay\"\naddress = \"127.0.0.1:0\"\n");
+    let text = Setup::load("virtual-ideal").unwrap().text;
+    let text = text.replace("artificial-silicone", "human-index-moist");
+    let text = text.replace("[limits]\n", "[limits]\nhuman_contact = true\ndead_man_key = true\n");
+    let text = format!(
+        "{text}\n{}{}wired = [\"emergency_stop\", \"interlock\"]\n",
+        board("supply_relay"),
+        board("safety_inputs")
+    );
+    let setup = Setup::parse("hand", &text, Path::new(".")).unwrap();
+    let world = WorldConfig { defects: Defects::parse(defects).unwrap(), ..WorldConfig::ideal() };
+    let [force, amplifier, stage] = VirtualRig::new(&world, 1).unwrap().split();
+    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()))
+        .with_supply(Box::new(stage.clone()))
+        .with_contacts(Box::new(WithoutDevice(stage)));
+    let model = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
+    VirtualLoop::new(setup.config, model, ports)
+}
+
+fn is_driven(row: &Row) -> bool {
+    row.armed && row.drive_pp_m > 0.0 && row.inputs.seen.amplifier.is_ok_and(|state| state.output_on)
+}
+
+/// Runs with the key held from `held_from` on until `done`, or for half a minute of the rig's time; asks for a drive as a sweep does.
+fn with_key(rig: &mut VirtualLoop, held_from: Nanos, done: impl Fn(&Row) -> bool) -> Option<Row> {
+    let request = Request {
+        amplitude: PeakToPeak::from_metres(2e-6),
+        frequency_hz: 27_500.0,
+        velocity_m_s: 0.005,
+        normal_force_n: 0.25,
+    };
+    let mut due = [held_from, Nanos(0)];
+    for _ in 0..30_000 {
+        let row = rig.cycle();
+        if done(&row) {
+            return Some(row);
+        }
+        if row.now >= due[0] {
+            rig.send(Command::DeadMan(true));
+            due[0] = row.now.plus(REPEAT);
+        }
+        if row.now >= due[1] {
+            rig.send(if row.armed { Command::Set(request, Marker::default()) } else { Command::Reset });
+            due[1] = row.now.plus(Nanos(60_000_000));
+        }
+    }
+    None
+}
+
+/// Held it drives, for longer than the key's own age; let go, the loop trips when the last repeat is that old, and not a cycle later.
+#[test]
+fn a_key_that_is_let_go_switches_off_to_the_cycle() {
+    let mut rig = rig("");
+    let driven = with_key(&mut rig, Nanos(1_500_000_000), is_driven).expect("a held key drives");
+    let later = driven.now.plus(Nanos(2 * KEY_AGE.0));
+    let last = with_key(&mut rig, Nanos(0), |row| row.now >= later).unwrap();
+    assert!(is_driven(&last), "the repeats count: {:?}", last.blocking);
+    // The key was repeated a moment ago at the latest: nobody holds it from now on.
+    let mut rows = (0..1000).map(|_| rig.cycle());
+    let off = rows.find(|row| row.tripped.is_some()).expect("a trip within a second");
+    assert_eq!(off.tripped.unwrap().cause, Cause::DeadMan);
+    let after = off.now.since(last.now);
+    assert!(after.0 <= KEY_AGE.0 + 2_000_000 && after.0 >= KEY_AGE.0 - REPEAT.0 - 2_000_000, "{after:?}");
+    assert_eq!((off.drive_pp_m, off.velocity_m_s), (0.0, 0.0));
+    let report = rig.end(&mut |_| {});
+    assert!(report.read_back, "{report:?}");
+}
+
+/// Something lies on the key before the rig is looked at: nobody has confirmed anything, and nothing is armed.
+#[test]
+fn a_key_that_is_held_from_the_beginning_arms_nothing() {
+    let mut rig = rig("");
+    assert_eq!(with_key(&mut rig, Nanos(0), |row| row.armed || row.drive_pp_m > 0.0), None);
+}
+
+/// An amplifier that ignores its enable is never said to be off where no relay cuts its supply; the same rig without the defect is.
+#[test]
+fn off_is_said_of_what_was_read_back_off_alone() {
+    for (defects, off) in [("", true), ("[[defect]]\nname = \"amplifier_refuses_off\"\nseed = 1\n", false)] {
+        let setup = Setup::load("virtual-ideal").unwrap();
+        let world = WorldConfig { defects: Defects::parse(defects).unwrap(), ..WorldConfig::ideal() };
+        let [force, amplifier, stage] = VirtualRig::new(&world, 1).unwrap().split();
+        let model = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
+        let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
+        let mut rig = VirtualLoop::new(setup.config, model, ports);
+        with_key(&mut rig, Nanos(0), is_driven).expect("an armed rig drives");
+        let report = rig.end(&mut |_| {});
+        assert_eq!(report.read_back, off, "{report:?}");
+        assert_eq!(report.words().contains("may still be on: switch the supply off"), !off, "{report:?}");
+    }
+}
