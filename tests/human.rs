@@ -54,6 +54,7 @@ fn run(tables: &str, limits: &str, hand: bool) -> (Outcome, usize, usize, Vec<Ev
         out: folder.path().join("run"),
         fast: true,
         notes: Default::default(),
+        answers: None,
     };
     let mut events = Vec::new();
     let mut news = |news: Update<'_>| {

@@ -99,6 +99,7 @@ fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {
                 out: out.clone(),
                 fast: true,
                 notes: Default::default(),
+                answers: None,
             };
             let (signals, mut made) = (Signals::default(), 0);
             let stops = Arc::clone(&signals.stops);

@@ -26,6 +26,7 @@ static RECORD: LazyLock<Vec<u8>> = LazyLock::new(|| {
         out: out.clone(),
         fast: true,
         notes: Default::default(),
+        answers: None,
     };
     rig::session::run(job, &Signals::default(), &mut |_| {}).unwrap();
     std::fs::read(out.join("run-1.mcap")).unwrap()

@@ -11,6 +11,7 @@ const PROFILES: &[(&str, &str)] = &[
     ("labjack-t7", include_str!("../profiles/labjack-t7.toml")),
     ("me-gsv4-can", include_str!("../profiles/me-gsv4-can.toml")),
     ("muprime-amplifier", include_str!("../profiles/muprime-amplifier.toml")),
+    ("muprime-chamber", include_str!("../profiles/muprime-chamber.toml")),
     ("muprime-force2", include_str!("../profiles/muprime-force2.toml")),
     ("muprime-relay", include_str!("../profiles/muprime-relay.toml")),
     ("muprime-stage", include_str!("../profiles/muprime-stage.toml")),

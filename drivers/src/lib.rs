@@ -52,6 +52,7 @@
 //! | [`text`] | the conversation in lines |
 //! | [`way`] | what carries lines and streams: a serial line, TCP, datagrams |
 //! | [`trace`] | every byte on its way, for whoever looks for a fault |
+//! | [`chamber`] | the air around the rig, set and read beside the loop |
 //! | [`canopen`] | the conversation with a CANopen drive of CiA 402 |
 //! | [`serial`] | serial lines |
 //! | [`stream`] | frames that come by themselves |
@@ -64,6 +65,7 @@
 pub mod bundled;
 pub mod can;
 pub mod canopen;
+pub mod chamber;
 pub mod endpoint;
 pub mod health;
 pub mod identity;

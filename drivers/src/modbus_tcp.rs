@@ -134,6 +134,19 @@ impl<'a> Tcp<'a> {
         };
         Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect())
     }
+
+    /// Writes neighbouring registers.
+    ///
+    /// # Errors
+    /// See [`Trouble`].
+    pub fn write_registers(&mut self, table: Table, address: u16, registers: &[u16]) -> Result<(), Trouble> {
+        let (runtime, limit) = (self.runtime, self.answer_ms);
+        if table.is_bits() {
+            let coils: Vec<bool> = registers.iter().map(|register| *register != 0).collect();
+            return part(within(runtime, limit, self.context.write_multiple_coils(address, &coils)));
+        }
+        part(within(runtime, limit, self.context.write_multiple_registers(address, registers)))
+    }
 }
 
 /// What is wrong with an answer whose head does not fit its question, in words.
@@ -196,12 +209,7 @@ impl Registers for Tcp<'_> {
         address: u16,
         registers: &[u16],
     ) -> Result<(), Trouble> {
-        let (runtime, limit) = (self.runtime, self.answer_ms);
-        if table.is_bits() {
-            let coils: Vec<bool> = registers.iter().map(|register| *register != 0).collect();
-            return part(within(runtime, limit, self.context.write_multiple_coils(address, &coils)));
-        }
-        part(within(runtime, limit, self.context.write_multiple_registers(address, registers)))
+        self.write_registers(table, address, registers)
     }
 
     fn wait_up_to(&mut self, answer_ms: u32) {

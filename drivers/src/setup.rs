@@ -22,6 +22,9 @@ pub struct InstrumentsSetup {
     /// Emergency stop, interlock and dead-man device, as digital inputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub safety_inputs: Option<InstrumentSetup>,
+    /// The chamber around the rig, or a gauge: beside the loop.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chamber: Option<InstrumentSetup>,
 }
 
 impl InstrumentsSetup {
@@ -32,7 +35,7 @@ impl InstrumentsSetup {
         amplifier: InstrumentSetup,
         stage: InstrumentSetup,
     ) -> Self {
-        Self { force, amplifier, stage, supply_relay: None, safety_inputs: None }
+        Self { force, amplifier, stage, supply_relay: None, safety_inputs: None, chamber: None }
     }
 
     /// Every instrument.
@@ -42,12 +45,14 @@ impl InstrumentsSetup {
             .chain([&self.amplifier, &self.stage])
             .chain(&self.supply_relay)
             .chain(&self.safety_inputs)
+            .chain(&self.chamber)
     }
 
     /// Every instrument, to be changed.
     pub fn all_mut(&mut self) -> impl Iterator<Item = &mut InstrumentSetup> {
-        let Self { force, amplifier, stage, supply_relay, safety_inputs } = self;
-        force.iter_mut().chain([amplifier, stage]).chain(supply_relay).chain(safety_inputs)
+        let Self { force, amplifier, stage, supply_relay, safety_inputs, chamber } = self;
+        let loops = force.iter_mut().chain([amplifier, stage]).chain(supply_relay).chain(safety_inputs);
+        loops.chain(chamber)
     }
 }
 

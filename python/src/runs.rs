@@ -97,5 +97,5 @@ fn job(
         Some((name, text)) => runs::model_file::load_for(&setup, name, text)?,
     };
     let seed = seed.unwrap_or(plan.file.seed);
-    Ok(Job { setup, plan, seed, model: law, model_file, defects, out, fast: true, notes })
+    Ok(Job { setup, plan, seed, model: law, model_file, defects, out, fast: true, notes, answers: None })
 }

@@ -52,6 +52,8 @@ pub enum Command {
     Reset,
     /// Stop and latch.
     Stop,
+    /// Stop, latch, and open the second switch-off channel until it is proved again: before a person reaches into the rig.
+    Disarm,
     /// The dead-man key of a trial: held, to be said again before [`KEY_AGE`] is over, or released.
     DeadMan(bool),
     /// `mu_0` as known now.
@@ -254,6 +256,7 @@ fn take_commands(state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Control
             }
             Command::Reset => controls.reset = true,
             Command::Stop => controls.stop = true,
+            Command::Disarm => (controls.stop, controls.open_supply) = (true, true),
             Command::DeadMan(held) => state.key_held_at = held.then_some(now),
             Command::Mu0(mu0) => state.mu0 = Some(*mu0),
             Command::Ambient(ambient) => state.ambient = *ambient,

@@ -185,6 +185,9 @@ pub struct Controls {
     pub dead_man: bool,
     /// A request came in this cycle.
     pub new_request: bool,
+    /// The second channel opens, where it is fitted, until it is proved again: somebody is about to reach into the rig.
+    #[serde(default)]
+    pub open_supply: bool,
 }
 
 /// Everything that safety looks at in a cycle.

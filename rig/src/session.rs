@@ -16,6 +16,7 @@ use realtime::pacing;
 use realtime::ports::Nanos;
 use realtime::turn::Ports;
 use realtime::witness::Witnesses;
+use runs::ambient::{Bench, World};
 use runs::exposure_left::Left;
 use runs::sequence::{Event, MeasuredPass, Outcome};
 use runs::session::keeper::{self, Keeper};
@@ -45,6 +46,7 @@ struct Note {
 /// # Errors
 /// Whatever prevents it before anything was commanded (a refusal), or a fault of this program.
 pub fn run(job: Job, signals: &Signals, update: &mut dyn FnMut(Update<'_>)) -> miette::Result<Summary> {
+    let mut job = job;
     if job.fast {
         return job.run_in_virtual_time(signals, update);
     }
@@ -62,7 +64,7 @@ fn over_instruments(
     signals: &Signals,
     news: &mut dyn FnMut(Update<'_>),
 ) -> miette::Result<Summary> {
-    let Begun { dir, mut sequence, planned, .. } = begun;
+    let Begun { dir, mut sequence, planned, answers, .. } = begun;
     let key = if job.setup.hand_at_key() { Some(DeadManKey::open()?) } else { None };
     let _claim = RigClaim::take(&job.setup)?;
     let ledger = Ledger::open(&job.setup, &job.notes)?;
@@ -76,7 +78,9 @@ fn over_instruments(
     let origin_ns = pacing::monotonic_ns();
     let start_unix_ns = keeper::unix_ns();
     let mut instruments = job.setup.instruments();
-    let _embedded = simulated.then(|| embed(&job, &mut instruments, clock.clone())).transpose()?;
+    let embedded = simulated.then(|| embed(&job, &mut instruments, clock.clone())).transpose()?;
+    let air = embedded.as_ref().map(|(_, plant)| World::Served(plant.clone()));
+    let mut bench = Bench::open(&sequence, instruments.chamber.as_ref(), air, answers)?;
     let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
         miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
     })?;
@@ -140,6 +144,7 @@ fn over_instruments(
             let mut ask = || Asked { end: ends(), pause: signals.paused.load(Ordering::Relaxed) };
             let mut snapshots = Snapshots::default();
             supervisor::sweep(&mut reins, following_sequence, &mut ask, &mut |row, sequence, reaction| {
+                bench.serve(row.now, sequence, &reaction);
                 let state = snapshots.take(row);
                 if state.is_some() || !reaction.events.is_empty() || reaction.pass.is_some() {
                     let (done, all) = sequence.progress();
@@ -248,7 +253,8 @@ fn embed(
     job: &Job,
     instruments: &mut drivers::InstrumentsSetup,
     clock: Clock,
-) -> miette::Result<crate::emulators::Embedded> {
+) -> miette::Result<(crate::emulators::Embedded, sim::wire::SharedPlant)> {
     let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), clock);
-    crate::emulators::embed(instruments, &plant, false).map_err(|problem| miette::miette!("{problem}"))
+    let embedded = crate::emulators::embed(instruments, &plant, false);
+    Ok((embedded.map_err(|problem| miette::miette!("{problem}"))?, plant))
 }

@@ -12,6 +12,7 @@
 //! | [`sequence`] | the order of a sweep: a pure state machine over the loop's rows |
 //! | [`supervisor`] | the one way to lead a loop: stop first, switch off, read back; and the loop in virtual time |
 //! | [`session`] | a sweep from its job to its summary, in virtual time |
+//! | [`ambient`] | levels of the air: who sets them, who reads them, who answers at the rig |
 //! | [`run_dir`], [`catalogue`] | a run's folder and its reader; the catalogue of runs |
 //! | [`report`], [`compare`] | the pages of a run and of a verdict; two runs side by side |
 //! | [`verdict`] | a verdict for people at a terminal, and the plan of the next experiment |
@@ -31,6 +32,7 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod ambient;
 pub mod calibrate;
 pub mod catalogue;
 pub mod certificates;

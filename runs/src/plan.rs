@@ -3,6 +3,7 @@
 mod bundled;
 mod points;
 mod reach;
+mod steps;
 mod visible;
 
 use crate::input::{self, Problems};
@@ -14,8 +15,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 pub use bundled::{BUNDLED, text as bundled_text};
+pub(crate) use points::series_place;
 pub use points::{PlanProblem, Point, Resolution};
 pub use reach::{Reach, times};
+pub use steps::{Action, Step, When};
 pub use visible::{COUNTS_MIN, LateralChannel};
 
 /// A plan file.
@@ -50,6 +53,12 @@ pub struct PlanFile {
     /// Series: each is the product of its lists, everything else at its base value.
     #[serde(default)]
     pub series: Vec<Series>,
+    /// How close the air must be to the levels of the series, and how long a run waits for them.
+    #[serde(default)]
+    pub tolerances: crate::ambient::Tolerances,
+    /// What a person does before the passes, between groups of them and after; the rig is disarmed meanwhile.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub step: Vec<Step>,
     /// Preparation and environment, as section 2.2 of the paper records them: copied into the record.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
@@ -71,6 +80,8 @@ impl PlanFile {
                 s.normal_force_n.len(),
                 s.position_m.len(),
                 s.ambient_pressure_pa.len(),
+                s.temperature_c.len(),
+                s.relative_humidity_pct.len(),
             ];
             let directions = if s.directions.is_empty() { &self.directions } else { &s.directions };
             let conditions = lists.iter().fold(1u64, |all, n| all.saturating_mul((*n).max(1) as u64));
@@ -132,8 +143,12 @@ pub struct Series {
     pub normal_force_n: Vec<f64>,
     /// m.
     pub position_m: Vec<f64>,
-    /// Pa: needs a chamber; passes are grouped by pressure.
+    /// Pa: somebody sets it, a chamber or the operator; passes are grouped by the levels of the air.
     pub ambient_pressure_pa: Vec<f64>,
+    /// deg C: likewise.
+    pub temperature_c: Vec<f64>,
+    /// Per cent: likewise.
+    pub relative_humidity_pct: Vec<f64>,
     /// Directions of this series alone, 1 and -1; empty for the plan's.
     pub directions: Vec<i8>,
 }
@@ -155,9 +170,11 @@ impl Base {
 
 impl Series {
     /// What the series varies, slowest first; an empty list stands for the base's value.
-    pub fn lists(&self) -> [(&'static Covariate, &[f64]); 6] {
+    pub fn lists(&self) -> [(&'static Covariate, &[f64]); 8] {
         [
             (&covariate::AMBIENT_PRESSURE, &self.ambient_pressure_pa),
+            (&covariate::TEMPERATURE, &self.temperature_c),
+            (&covariate::RELATIVE_HUMIDITY, &self.relative_humidity_pct),
             (&covariate::FREQUENCY, &self.frequency_hz),
             (&covariate::SPEED, &self.speed_m_s),
             (&covariate::NORMAL_FORCE, &self.normal_force_n),
@@ -248,8 +265,16 @@ impl Plan {
                 wrong.add(&["pass", name], format!("{name} = {value}: a number above zero is needed"), None);
             }
         }
+        file.tolerances.check(&mut wrong);
+        file.step.iter().for_each(|step| step.check(&mut wrong));
         wrong.end()?;
         Ok(Plan { file, text: text.to_string(), origin: origin.to_string() })
+    }
+
+    /// What `[protocol]` states; what is left empty states nothing.
+    pub fn protocol(&self) -> BTreeMap<String, toml::Value> {
+        let stated = |value: &toml::Value| value.as_str().is_none_or(|text| !text.trim().is_empty());
+        self.file.protocol.iter().filter(|(_, v)| stated(v)).map(|(k, v)| (k.clone(), v.clone())).collect()
     }
 
     /// Amplitudes of the plan, for axes of figures.

@@ -10,6 +10,7 @@ mod record_facts;
 use crate::files::{self, Placed, write_plain};
 use crate::plan::Point;
 use crate::sequence::MeasuredPass;
+use crate::session::Notes;
 pub use damage::{damage_in, differences, missing_records, of_file};
 use lines::{whole_passes, whole_table};
 pub use lock::{claim, holder, is_held};
@@ -23,7 +24,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// What a run is of: written when it begins, compared when it is taken up again.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
     /// SHA-256 of the setup's text.
@@ -37,6 +38,12 @@ pub struct Identity {
     /// The setup names a human fingertip, and says that nobody touches the plate.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub nobody_touches_the_plate: bool,
+    /// Who runs it, and on what: another session may say something else.
+    #[serde(default)]
+    pub notes: Notes,
+    /// The plan's `[protocol]`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub protocol: BTreeMap<String, toml::Value>,
 }
 
 /// One session of a run: from its start until its end, a stop or a crash. A run that is taken up again has several.
@@ -62,6 +69,7 @@ pub struct RunDir {
     pub made: Vec<Pass>,
     sessions: Vec<Session>,
     planned: Option<Session>,
+    identity: Identity,
     /// A pass could not be kept: half a line may stand at the end, and nothing may follow it.
     failed: bool,
     new: New,
@@ -101,24 +109,26 @@ impl RunDir {
     pub fn open(path: &Path, identity: &Identity) -> miette::Result<Self> {
         let shown = path.display();
         let file = path.join(IDENTITY);
+        let mut before_notes = Notes::default();
         if file.exists() {
             let text = crate::input::text_of(&file)?;
             let before: Identity =
                 toml::from_str(&text).map_err(|e| miette::miette!("{shown}/{IDENTITY}: {e}"))?;
-            if before != *identity {
-                let parts = [
-                    ("setup", before.setup_sha256 == identity.setup_sha256),
-                    ("plan", before.plan_sha256 == identity.plan_sha256),
-                    ("seed", before.seed == identity.seed),
-                    ("model", before.model == identity.model),
-                ];
-                let other: Vec<_> = parts.iter().filter(|(_, same)| !same).map(|(name, _)| *name).collect();
+            let parts = [
+                ("setup", before.setup_sha256 == identity.setup_sha256),
+                ("plan", before.plan_sha256 == identity.plan_sha256),
+                ("seed", before.seed == identity.seed),
+                ("model", before.model == identity.model),
+            ];
+            let other: Vec<_> = parts.iter().filter(|(_, same)| !same).map(|(name, _)| *name).collect();
+            if !other.is_empty() {
                 miette::bail!(
                     help = "give another --out, or the same plan, setup, seed and model to go on with it",
                     "{shown} holds a run with another {}",
                     other.join(" and ")
                 );
             }
+            before_notes = before.notes;
         } else if path.exists() && holds_something(path)? {
             miette::bail!(
                 help = "give an empty or new folder as --out",
@@ -131,15 +141,16 @@ impl RunDir {
             new.paths.push(lock_file.clone());
         }
         let lock = claim(&lock_file)?;
-        Self::open_locked(path, identity, lock, new)
+        let notes = identity.notes.clone().or(&before_notes);
+        Self::open_locked(path, Identity { notes, ..identity.clone() }, lock, new)
     }
 
-    fn open_locked(path: &Path, identity: &Identity, lock: File, mut new: New) -> miette::Result<Self> {
+    fn open_locked(path: &Path, identity: Identity, lock: File, mut new: New) -> miette::Result<Self> {
         let mut header = Vec::new();
         pass::write_passes(&[], &mut header).into_diagnostic()?;
-        let identity = toml::to_string(identity).into_diagnostic()?;
+        let text = toml::to_string(&identity).into_diagnostic()?;
         // The journal before the table: where there is a table, there is a journal.
-        for (name, bytes) in [(IDENTITY, identity.as_bytes()), (JOURNAL, b""), (POINTS, &header)] {
+        for (name, bytes) in [(IDENTITY, text.as_bytes()), (JOURNAL, b""), (POINTS, &header)] {
             let file = path.join(name);
             if !file.exists() {
                 new.paths.push(file.clone());
@@ -166,7 +177,8 @@ impl RunDir {
         let (_, whole) = whole_passes(&lines).wrap_err(JOURNAL)?;
         cut_torn(&mut journal, whole, lines.len(), JOURNAL)?;
         let path = path.to_path_buf();
-        Ok(RunDir { path, points, journal, _lock: lock, made, sessions, planned: None, failed: false, new })
+        let (planned, failed) = (None, false);
+        Ok(RunDir { path, points, journal, _lock: lock, made, sessions, planned, identity, failed, new })
     }
 
     /// Keeps the folder, whatever comes.
@@ -199,7 +211,15 @@ impl RunDir {
             text.push(b'\n');
         }
         self.stay();
+        // What this session says of itself goes beside what the run is of.
+        let identity = toml::to_string(&self.identity).into_diagnostic()?;
+        write_plain(&self.path.join(IDENTITY), identity.as_bytes())?;
         write_plain(&self.path.join(SESSIONS), &text)
+    }
+
+    /// Who runs it, and on what: as this session says, else as an earlier one did.
+    pub fn notes(&self) -> &Notes {
+        &self.identity.notes
     }
 
     /// The folder.

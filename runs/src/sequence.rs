@@ -5,18 +5,23 @@
 //! Arm -> Zero -> [ Approach -> Settle -> Measure ]* -> Zero -> Done
 //!  any -> Failed(trip)      Stopped by request at any time
 //!  before a pass: Paused, by request; disarmed, and armed again when it is to go on
+//!  before the first, before one whose level of the air is not there, after the last: at the rig (see `at_rig`)
 //! ```
 
 mod arming;
+mod at_rig;
 mod events;
 
+pub use at_rig::Question;
 pub use events::{Event, MeasuredPass, Outcome};
 
+use crate::ambient::Level;
 use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
 use crate::exposure_left::Left;
 use crate::plan::{PassTimes, Point};
 use crate::setup::Guards;
 use arming::{Arming, Next};
+use at_rig::AtRig;
 use models::condition::{Ambient, Condition};
 use models::pass::Pass;
 use models::prediction::FrictionModel;
@@ -42,11 +47,16 @@ pub struct Reaction {
     pub events: Vec<Event>,
     /// The end.
     pub outcome: Option<Outcome>,
+    /// A quantity of the air (its place in [`crate::ambient::AIR`]) that is to be set, and the level.
+    pub set_level: Option<(usize, f64)>,
+    /// Something is asked of whoever stands at the rig; the words are among the events.
+    pub question: Option<Question>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Arm,
+    AtRig,
     Zero {
         since: Option<Nanos>,
         after: bool,
@@ -143,6 +153,7 @@ pub struct Sequence {
     /// What the setup states of the air, and what the loop was last told of it.
     ambient: Ambient,
     ambient_sent: Ambient,
+    at_rig: AtRig,
     has_watchdog: bool,
     guards: Guards,
     exposure_left: Option<Left>,
@@ -187,6 +198,7 @@ impl Sequence {
             temperature_flags: Vec::new(),
             ambient: Ambient::default(),
             ambient_sent: Ambient::default(),
+            at_rig: AtRig::default(),
             has_watchdog: true,
             guards: Guards::default(),
             exposure_left: None,
@@ -284,7 +296,9 @@ impl Sequence {
         if stopped && std::mem::take(&mut self.pausing) {
             return out;
         }
-        if let Some(trip) = row.tripped.filter(|_| stopped || self.stage != Stage::Arm) {
+        // The stop before a person comes to the rig is the sweep's own.
+        let own = stopped && self.stage == Stage::AtRig && self.at_rig.is_disarmed();
+        if let Some(trip) = row.tripped.filter(|_| !own && (stopped || self.stage != Stage::Arm)) {
             out.events.push(Event::Tripped(trip));
             self.finish(&mut out, if stopped { Outcome::Stopped } else { Outcome::Tripped(trip) });
             return out;
@@ -302,6 +316,7 @@ impl Sequence {
             Stage::Arm => self.arm(row, &mut out),
             Stage::Zero { since, after } => self.zero(row, since, after, &mut out),
             Stage::Paused { since, quiet } => self.rest(row, since, quiet, &mut out),
+            Stage::AtRig => self.wait_at_rig(row, &mut out),
             Stage::Approach { .. } if self.paused => self.begin_next(row, &mut out),
             Stage::Approach { since } => self.approach(row, since, &mut out),
             Stage::Settle { since } => self.settle(row, since, &mut out),
@@ -318,6 +333,9 @@ impl Sequence {
 
     /// Arming is one act: a reset once nothing stands in the way, and the proof of the second channel after it.
     fn arm(&mut self, row: &Row, out: &mut Reaction) {
+        if self.first_steps(row, out) {
+            return;
+        }
         match self.arming.row(row) {
             Next::Wait => {}
             Next::Ask(event) => {
@@ -375,8 +393,10 @@ impl Sequence {
         out.events.push(event);
         self.sums = Sums::default();
         if after {
-            out.commands.push(Command::Stop);
-            self.finish(out, Outcome::Complete);
+            if !self.last_steps(row, out) {
+                out.commands.push(Command::Stop);
+                self.finish(out, Outcome::Complete);
+            }
         } else {
             self.begin_next(row, out);
         }
@@ -406,8 +426,11 @@ impl Sequence {
             self.stage = Stage::Paused { since: row.now, quiet: row.now };
             return;
         }
+        if self.waits_at_rig(row, out) {
+            return;
+        }
         self.sums = Sums::default();
-        let ambient = Ambient::of(&self.points[self.next].condition.within(&self.ambient));
+        let ambient = self.at_rig.air(&self.ambient, row.now);
         if ambient != self.ambient_sent {
             self.ambient_sent = ambient;
             out.commands.push(Command::Ambient(ambient));
@@ -503,6 +526,7 @@ impl Sequence {
         };
         out.commands.push(Command::Set(request, self.marker(Phase::Measure)));
         self.sums = Sums::default();
+        self.at_rig.begin_pass();
         self.check_temperature(row, out);
         self.stage = Stage::Measure { since: row.now };
     }
@@ -551,6 +575,7 @@ impl Sequence {
     fn measure(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
         if row.marker.phase == Phase::Measure {
             self.take(row);
+            self.at_rig.during_pass();
         }
         if row.now.since(since) < Nanos::from_seconds(self.times.measure_s) {
             return;
@@ -570,8 +595,15 @@ impl Sequence {
             return;
         }
         self.tries = 0;
-        let pass = self.pass_of(&point, since, normal);
-        let measured = self.compare(pass, point.reference);
+        let (pass, levels) = self.pass_of(&point, since, normal, row.now);
+        let lost = levels.iter().filter_map(|level| level.planned.filter(|_| level.lost).map(|w| (level, w)));
+        out.events.extend(lost.map(|(level, wanted)| Event::LevelLost {
+            point: point.number,
+            quantity: level.quantity.clone(),
+            wanted,
+            range: level.range,
+        }));
+        let measured = MeasuredPass { levels, ..self.compare(pass, point.reference) };
         if let Some(comparison) = &measured.comparison {
             if let Some(mu0) = self.comparator.mu0() {
                 out.commands.push(Command::Mu0(mu0));
@@ -587,10 +619,18 @@ impl Sequence {
         self.begin_next(row, out);
     }
 
-    fn pass_of(&self, point: &Point, since: Nanos, normal: f64) -> Pass {
+    fn pass_of(&self, point: &Point, since: Nanos, normal: f64, now: Nanos) -> (Pass, Vec<Level>) {
         let sums = &self.sums;
         let still = point.condition.amplitude == PeakToPeak::ZERO;
         let measured = sums.amplitude.mean().unwrap_or(point.condition.amplitude.metres());
+        // What was planned of the air is not what was there.
+        let mut air = Condition {
+            ambient_pressure_pa: None,
+            temperature_c: None,
+            relative_humidity_pct: None,
+            ..point.condition
+        };
+        let levels = self.at_rig.levels(&point.condition, &mut air, now);
         let condition = Condition {
             amplitude: if still { PeakToPeak::ZERO } else { PeakToPeak::from_metres(measured.max(0.0)) },
             frequency_hz: if still { point.condition.frequency_hz } else { sums.frequency_hz },
@@ -598,18 +638,19 @@ impl Sequence {
             position_m: sums.position.mean().unwrap_or(point.condition.position_m),
             normal_force_n: normal,
             time_s: self.start_s + since.seconds(),
-            ..point.condition.within(&self.ambient)
+            ..air.within(&self.ambient)
         };
-        Pass {
+        let pass = Pass {
             normal_force_sd_n: sums.normal.sd(),
             lateral_force_sd_n: sums.lateral.sd(),
             samples: Some(sums.lateral.count()),
             // The channel's, or none: two thermometers in one column would look like a change.
-            temperature_c: sums.temperature.mean(),
+            temperature_c: if self.at_rig.holds(1) { air.temperature_c } else { sums.temperature.mean() },
             replicate: Some(u64::from(point.replicate)),
             session: self.session,
             ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
-        }
+        };
+        (pass, levels)
     }
 
     fn compare(&mut self, pass: Pass, reference: bool) -> MeasuredPass {
@@ -623,7 +664,8 @@ impl Sequence {
         let psi_eq17 =
             known.map(|m| PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0);
         let temperature_flags = self.temperature_flags.clone();
-        MeasuredPass { pass, reference, comparison, regime, psi_eq17, temperature_flags }
+        let levels = Vec::new();
+        MeasuredPass { pass, reference, comparison, regime, psi_eq17, temperature_flags, levels }
     }
 }
 

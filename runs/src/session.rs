@@ -11,6 +11,7 @@ pub use fast::{Rehearsal, rehearse, words};
 pub use keeper::{Keeper, REPLAYABLE, Replayable, unix_ns};
 pub use telemetry::{Extremes, Snapshot, Snapshots};
 
+use crate::ambient::{Answers, LevelsFound};
 use crate::plan::{Plan, Point, Resolution};
 use crate::run_dir::{Identity, RunDir};
 use crate::sequence::{Event, MeasuredPass, Outcome, PAUSE_MAX_S, Sequence};
@@ -48,19 +49,40 @@ pub struct Job {
     pub fast: bool,
     /// Who runs it, and on what: for the record.
     pub notes: Notes,
+    /// A file with the answers of the person at the rig.
+    pub answers: Option<PathBuf>,
 }
 
 /// What a person says of a run. It stands in the record and on the report, and changes nothing.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Notes {
     /// Who leads the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub operator: Option<String>,
     /// Whose finger it is: what it was exposed to is counted under this name, whatever the rig.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub subject: Option<String>,
     /// What is measured: the fingertip, its preparation, the plate.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub sample: Option<String>,
     /// Licence of the data: an SPDX identifier or an address.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub licence: Option<String>,
+}
+
+impl Notes {
+    /// These, and where they say nothing those of an earlier session.
+    #[must_use]
+    pub fn or(self, before: &Notes) -> Notes {
+        let or = |now: Option<String>, before: &Option<String>| now.or_else(|| before.clone());
+        Notes {
+            operator: or(self.operator, &before.operator),
+            subject: or(self.subject, &before.subject),
+            sample: or(self.sample, &before.sample),
+            licence: or(self.licence, &before.licence),
+        }
+    }
 }
 
 /// What happened, for whoever watches.
@@ -116,6 +138,15 @@ pub struct Summary {
     /// Whether the rig was read back off in the end.
     #[serde(default)]
     pub off: OffReport,
+    /// Who ran it, and on what.
+    #[serde(default)]
+    pub notes: Notes,
+    /// The plan's `[protocol]`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub protocol: BTreeMap<String, toml::Value>,
+    /// What was found of the air, and typed at the rig.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<LevelsFound>,
     /// Every pass had been made before: nothing was driven.
     #[serde(default)]
     pub finished_before: bool,
@@ -166,6 +197,8 @@ pub struct Begun {
     pub planned: usize,
     /// Where this session begins on the run's clock in s.
     pub start_s: f64,
+    /// Who answers for the person at the rig.
+    pub answers: Answers,
 }
 
 impl Begun {
@@ -196,6 +229,8 @@ impl Job {
             seed: self.seed,
             model,
             nobody_touches_the_plate: self.setup.file.finger.nobody_touches_the_plate,
+            notes: self.notes.clone(),
+            protocol: self.plan.protocol(),
         }
     }
 
@@ -215,6 +250,7 @@ impl Job {
     pub fn points_seen(&self, noise_n: Option<f64>) -> miette::Result<Vec<Point>> {
         let resolution = self.resolution()?;
         let points = self.plan.points(self.seed, &self.setup.config.limits, &resolution)?;
+        self.plan.check_ambient(&self.setup)?;
         self.plan.check_reach(&self.setup.reaches()?)?;
         if let Some(mut channel) = self.setup.lateral_channel()? {
             channel.noise_n = noise_n.or(channel.noise_n);
@@ -242,10 +278,12 @@ impl Job {
     ///
     /// # Errors
     /// A refusal: passes that the rig cannot do, a folder of another run or of a living one.
-    pub fn begin(&self) -> miette::Result<Begun> {
+    pub fn begin(&mut self) -> miette::Result<Begun> {
         let points = self.points()?;
         let planned = points.len();
+        let answers = self.setup.answers(self.answers.as_deref(), self.asks_a_person())?;
         let mut dir = RunDir::open(&self.out, &self.identity())?;
+        self.notes = dir.notes().clone();
         let left = dir.left_of(points);
         let session = dir.plan_session(keeper::unix_ns(), self.plan.file.pass.measure_s, self.fast);
         let mut sequence = Sequence::new(
@@ -257,6 +295,7 @@ impl Job {
         )
         .watching(&self.setup.certificates.temperature_ranges)
         .in_air(self.setup.ambient())
+        .at_rig(&self.plan, &self.setup)
         .guarded_by(&self.setup.config.limits)
         .on_rig(self.setup.guards(), self.setup.file.limits.pause_max_s.unwrap_or(PAUSE_MAX_S))
         // In virtual time the loop's own time goes on from session to session.
@@ -264,7 +303,20 @@ impl Job {
         for pass in &dir.made {
             sequence.remember(pass);
         }
-        Ok(Begun { dir, sequence, planned, start_s: session.start_s })
+        Ok(Begun { dir, sequence, planned, start_s: session.start_s, answers })
+    }
+
+    /// Whether the run waits for a person at the rig.
+    pub fn asks_a_person(&self) -> bool {
+        let means = self.setup.file.means();
+        let air = self.plan.sets_air().into_iter().zip(means);
+        let sets = air.into_iter().any(|(sets, by)| sets && by.is_some_and(|by| by.needs_a_person()));
+        sets || !self.plan.file.step.is_empty()
+    }
+
+    /// Whether that person answers at the terminal.
+    pub fn asks_at_the_terminal(&self) -> bool {
+        self.asks_a_person() && self.answers.is_none() && self.setup.file.virtual_rig.is_none()
     }
 
     /// Runs the job in virtual time, as fast as it computes.
@@ -272,7 +324,7 @@ impl Job {
     /// # Errors
     /// A refusal before anything was written (a rig with instruments among them), or a fault of this program.
     pub fn run_in_virtual_time(
-        self,
+        mut self,
         signals: &Signals,
         update: &mut dyn FnMut(Update<'_>),
     ) -> miette::Result<Summary> {
@@ -290,6 +342,11 @@ impl Job {
     pub fn world(&self) -> miette::Result<sim::world::World> {
         let virtual_rig = self.setup.file.virtual_rig.clone().unwrap_or_default();
         let mut config = virtual_rig.world();
+        // What the setup states of the air is so in its world.
+        let (air, room) = (self.setup.ambient(), &mut config.room);
+        room.ambient_pressure_pa = air.ambient_pressure_pa.unwrap_or(room.ambient_pressure_pa);
+        room.temperature_c = air.temperature_c.unwrap_or(room.temperature_c);
+        room.relative_humidity_pct = air.relative_humidity_pct.unwrap_or(room.relative_humidity_pct);
         if let Some(defects) = &self.defects {
             config.defects = defects.clone();
         }

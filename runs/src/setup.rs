@@ -52,6 +52,12 @@ pub struct SetupFile {
     /// Emergency stop, interlock and dead-man device, as digital inputs. A human finger needs the first and the last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub safety_inputs: Option<InstrumentSetup>,
+    /// The chamber around the rig, or gauges of the air that only read. It takes no part in the loop.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chamber: Option<InstrumentSetup>,
+    /// What the operator sets of the air.
+    #[serde(default)]
+    pub ambient: crate::ambient::AmbientSetup,
     /// The vibrometer's controller, whose settings calibrations read back; it takes no part in a run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vibrometer: Option<VibrometerSetup>,
@@ -91,7 +97,7 @@ pub struct SetupFile {
 
 impl SetupFile {
     /// What the setup states of the air.
-    fn ambient(&self) -> Ambient {
+    fn stated_ambient(&self) -> Ambient {
         Ambient {
             ambient_pressure_pa: self.ambient_pressure_pa,
             temperature_c: self.temperature_c,
@@ -283,7 +289,7 @@ impl Setup {
         {
             wrong.add(&["virtual", "ridge_table_strokes"], problem.to_string(), None);
         }
-        let air = models::condition::Condition::paper().within(&file.ambient());
+        let air = models::condition::Condition::paper().within(&file.stated_ambient());
         for c in covariate::OPTIONAL {
             if let Some(value) = c.of(&air).filter(|v| !c.admits(*v)) {
                 let remedy = unit_meant(c.name, value, c.range);
@@ -296,6 +302,7 @@ impl Setup {
             unfit = profiles::fit(&file);
         }
         let described = unfit.is_empty();
+        file.check_ambient(&mut wrong);
         for (table, problem) in unfit {
             wrong.add(&table, problem, None);
         }
@@ -338,7 +345,7 @@ impl Setup {
 
     /// What the setup states of the air.
     pub fn ambient(&self) -> Ambient {
-        self.file.ambient()
+        self.file.stated_ambient()
     }
 
     /// Whether a key that is held at the terminal stands for the dead-man device: the setup says so, and none is wired.
@@ -362,13 +369,14 @@ impl Setup {
         // A certificate of the drive's current is what the setup would otherwise have to state.
         amplifier.amplitude_m_per_unit =
             self.certificates.amplitude_m_per_unit.or(amplifier.amplitude_m_per_unit);
-        let SetupFile { force, stage, supply_relay, safety_inputs, .. } = &self.file;
+        let SetupFile { force, stage, supply_relay, safety_inputs, chamber, .. } = &self.file;
         InstrumentsSetup {
             force: force.clone(),
             amplifier,
             stage: stage.clone(),
             supply_relay: supply_relay.clone(),
             safety_inputs: safety_inputs.clone(),
+            chamber: chamber.clone(),
         }
     }
 

@@ -58,7 +58,7 @@ pub fn sweep(
     rig: &mut impl Loop,
     sequence: &mut Sequence,
     ask: &mut dyn FnMut() -> Asked,
-    each: &mut dyn FnMut(&Row, &Sequence, Reaction),
+    each: &mut dyn FnMut(&Row, &mut Sequence, Reaction),
 ) -> Outcome {
     let mut instead = None;
     loop {

@@ -293,6 +293,8 @@ kinds! {
     amplitude_droop
     amplitude_miscalibration
     amplitude_saturation
+    chamber_stuck
+    chamber_vents
     contact_ageing
     contaminated_patch
     force_crosstalk

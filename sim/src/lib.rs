@@ -33,6 +33,7 @@ pub mod defects;
 pub mod finger;
 pub mod noise;
 pub mod plate;
+pub mod room;
 pub mod sealed;
 pub mod sensor;
 pub mod stage;

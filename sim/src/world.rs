@@ -13,7 +13,8 @@ mod steady;
 
 use realtime::ports::Nanos;
 
-pub use config::{ConfigError, ContactMode, RoomConfig, WorldConfig};
+pub use crate::room::RoomConfig;
+pub use config::{ConfigError, ContactMode, WorldConfig};
 use ridge_table::RidgeTable;
 pub use steady::{Point, steady_contact, steady_forces};
 
@@ -26,6 +27,7 @@ use crate::defects::{Forces, Surroundings};
 use crate::finger::{Finger, Pad};
 use crate::noise::Noise;
 use crate::plate::Plate;
+use crate::room::{Air, Room};
 use crate::sensor::{ForceSample, Sensor};
 use crate::stage::{Stage, StageInput, StageStatus};
 
@@ -87,6 +89,7 @@ pub struct World {
     amplifier: Amplifier,
     sensor: Sensor,
     stage: Stage,
+    room: Room,
     operator: Operator,
     averager: Averager,
     march: Option<March>,
@@ -131,6 +134,7 @@ impl World {
             amplifier: Amplifier::new(config.amplifier, config.room.temperature_c),
             sensor: Sensor::new(config.sensor, tick_s, seed),
             stage: Stage::new(config.stage, seed),
+            room: Room::new(&config.room),
             operator: Operator::default(),
             averager: Averager::default(),
             march: None,
@@ -189,7 +193,8 @@ impl World {
         self.now = Nanos(self.now.0 + self.config.tick_ns);
         self.ticks += 1;
         let dt = self.tick_s;
-        let room_c = self.config.room.temperature_c;
+        self.room.step(self.now.seconds(), dt);
+        let room_c = self.room.of(Air::Temperature);
         let (drive, frequency) = self.amplifier.step(self.now, room_c, self.plate.warming_k());
         let known_pp = self.plate.step(drive, frequency, dt);
         self.known_pp_m = known_pp;
@@ -208,7 +213,7 @@ impl World {
             direction: if velocity < 0.0 { -1.0 } else { 1.0 },
             frequency_hz: frequency,
             normal_force_n: normal,
-            ambient_pressure_pa: self.config.room.ambient_pressure_pa,
+            ambient_pressure_pa: self.room.of(Air::Pressure),
             temperature_c: room_c + self.plate.warming_k(),
         };
         let (pp, steady) = self.meet(&at, known_pp, velocity.abs(), dt);
@@ -358,20 +363,20 @@ impl World {
             direction: 1.0,
             frequency_hz: self.truth.frequency_hz,
             normal_force_n: 0.0,
-            ambient_pressure_pa: self.config.room.ambient_pressure_pa,
-            temperature_c: self.config.room.temperature_c,
+            ambient_pressure_pa: self.room.of(Air::Pressure),
+            temperature_c: self.room.of(Air::Temperature),
         };
         self.config.defects.plate(&at, self.known_pp_m)
     }
 
-    /// Sets the pressure around the rig (a chamber) (Pa).
-    pub fn set_ambient_pressure_pa(&mut self, pressure_pa: f64) {
-        self.config.room.ambient_pressure_pa = pressure_pa.max(0.0);
+    /// The air around the rig.
+    pub fn room(&self) -> &Room {
+        &self.room
     }
 
-    /// Pressure around the rig (Pa).
-    pub fn ambient_pressure_pa(&self) -> f64 {
-        self.config.room.ambient_pressure_pa
+    /// The air around the rig, to give its chamber a set-point.
+    pub fn room_mut(&mut self) -> &mut Room {
+        &mut self.room
     }
 
     /// Averages computed so far.

@@ -300,6 +300,7 @@ pub fn preflight(
         out,
         fast: false,
         notes: Default::default(),
+        answers: None,
     };
     Ok(job.points_seen(noise_n)?.len())
 }

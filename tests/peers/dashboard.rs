@@ -104,6 +104,7 @@ impl Paced {
             out: out.to_path_buf(),
             fast: true,
             notes: Notes { operator: Some(OPERATOR.into()), sample: Some(SAMPLE.into()), ..Notes::default() },
+            answers: None,
         };
         let signals = Signals::default();
         let asked = signals.clone();

@@ -78,6 +78,7 @@ impl Plant for BenchPlant {
                 Command::Velocity => Some(Quantity::VelocitySetPoint),
                 Command::NormalForce => Some(Quantity::LoadSetPoint),
                 Command::StageHeartbeat | Command::SupplyHeartbeat => None,
+                Command::AmbientPressure | Command::AirTemperature | Command::RelativeHumidity => None,
                 Command::CloseSupply => Some(Quantity::SupplyClosed),
             };
             if let Some(echo) = echo {

@@ -70,6 +70,9 @@ pub struct Args {
     /// Licence of the data, for its record and exports: an SPDX identifier (CC-BY-4.0) or an address
     #[arg(long, value_name = "ID")]
     licence: Option<String>,
+    /// Answers of the person at the rig, one a line, for a machine without a person
+    #[arg(long, value_name = "FILE")]
+    answers: Option<PathBuf>,
     /// Show the run live on the whole terminal, as 'muprime watch' does
     #[arg(long)]
     tui: bool,
@@ -112,6 +115,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         say!(
             "dead-man key: let go of it, then hold the space bar down to arm and to go on; let go, or press any other key, and the drive is off"
+        );
+    }
+    if job.asks_at_the_terminal() && (tui || job.setup.hand_at_key()) {
+        let taken = if tui { "--tui" } else { "the dead-man key" };
+        miette::bail!(
+            help = "give the answers beforehand with --answers FILE (one a line)",
+            "the plan asks a person for answers at the terminal, and {taken} takes its keys"
         );
     }
     let signals = Signals::default();
@@ -263,7 +273,8 @@ fn job(args: Args) -> miette::Result<Job> {
     let out = args.out.unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
     let notes =
         Notes { operator: args.operator, subject: args.subject, sample: args.sample, licence: args.licence };
-    Ok(Job { setup, plan, seed, model, model_file, defects, out, fast: args.fast, notes })
+    let (fast, answers) = (args.fast, args.answers);
+    Ok(Job { setup, plan, seed, model, model_file, defects, out, fast, notes, answers })
 }
 
 /// Name of a new run: UTC date and time, and the plan.

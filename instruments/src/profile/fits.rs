@@ -35,6 +35,7 @@ const COMMANDED: &[(Role, &[&str])] = &[
     (Role::MotionSlide, &["velocity", "enable", "heartbeat"]),
     (Role::MotionLoad, &["load", "heartbeat"]),
     (Role::SafetySupply, &["closed", "heartbeat"]),
+    (Role::AmbientChamber, &["pressure", "temperature", "humidity"]),
 ];
 
 /// Most samples per second.

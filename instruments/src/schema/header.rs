@@ -53,6 +53,9 @@ pub enum Role {
     /// Safety contacts: emergency stop, interlock, dead-man.
     #[serde(rename = "safety.contacts")]
     SafetyContacts,
+    /// A chamber around the rig, or gauges of the air: pressure, temperature, humidity; beside the loop.
+    #[serde(rename = "ambient.chamber")]
+    AmbientChamber,
     /// A vibrometer's controller, whose settings are read back for a calibration; it takes no part in a run.
     #[serde(rename = "measure.vibration")]
     MeasureVibration,

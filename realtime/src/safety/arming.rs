@@ -26,6 +26,8 @@ pub enum Proof {
 /// Why the second channel was cut for cause, the gravest last: it stays until the channel is proved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum CutFor {
+    /// Somebody is about to reach into the rig: the program asked for it, and asks for the proof afterwards.
+    Hands,
     /// Nothing was heard of the emergency stop: no person has done anything, and none has to undo it.
     Silence,
     /// The emergency stop was pressed.
@@ -38,7 +40,7 @@ impl CutFor {
     /// What a person must look at before anything is armed again; none where nothing but a link or the machine fell silent.
     const fn needs_a_person(self) -> Option<Cause> {
         match self {
-            Self::Silence => None,
+            Self::Hands | Self::Silence => None,
             Self::Pressed => Some(Cause::EmergencyStop),
             Self::Refusal => Some(Cause::RefusesOff),
         }

@@ -64,7 +64,8 @@ pub(super) fn cuts_the_supply(c: &Context<'_>) -> Option<CutFor> {
         Unit::Flag => CutFor::Pressed,
         _ => CutFor::Silence,
     });
-    c.watch.refuses_off(c.limits, c.now).then_some(CutFor::Refusal).max(stop)
+    let hands = c.controls.open_supply.then_some(CutFor::Hands);
+    c.watch.refuses_off(c.limits, c.now).then_some(CutFor::Refusal).max(stop).max(hands)
 }
 
 macro_rules! rules {

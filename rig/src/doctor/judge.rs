@@ -162,8 +162,12 @@ fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
     let mut said = vec![states.join(", "), format!("{:.0} samples a second", answers.samples_per_s)];
     said.retain(|part| !part.is_empty());
     said.extend(problems.iter().map(|(problem, _)| problem.clone()));
-    let mut advice: Vec<&str> = problems.iter().map(|(_, advice)| *advice).collect();
-    advice.dedup();
+    let mut advice: Vec<&str> = Vec::new();
+    for (_, one) in &problems {
+        if !advice.contains(one) {
+            advice.push(one);
+        }
+    }
     Finding {
         channels: found.channels.clone(),
         bad_answers_share: Some(answers.bad_share),

@@ -2,7 +2,7 @@
 
 use super::Plan;
 use crate::input::{self, BadInput, Problems, unit_meant};
-use models::condition::Condition;
+use models::condition::{Ambient, Condition};
 use models::covariate::Covariate;
 use models::quantity::{Direction, PeakToPeak};
 use rand::SeedableRng;
@@ -106,14 +106,24 @@ impl Plan {
         conditions.into_iter().map(set).flat_map(visits).collect()
     }
 
-    /// Repeats, shuffles within each pressure, interleaves references, and turns conditions into passes.
+    /// Repeats, shuffles within each state of the air, interleaves references, and turns conditions into passes.
     fn order(&self, conditions: &[Visit<'_>], seed: u64) -> Vec<Point> {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
-        let mut pressures: Vec<Option<f64>> = conditions.iter().map(|(c, _)| c.ambient_pressure_pa).collect();
-        pressures.dedup();
+        let mut states: Vec<Ambient> = Vec::new();
+        for (c, _) in conditions {
+            let state = Ambient::of(c);
+            if !states.contains(&state) {
+                states.push(state);
+            }
+        }
+        // What leaves the air as it is comes before anything is set.
+        let sets = |s: &Ambient| {
+            [s.ambient_pressure_pa, s.temperature_c, s.relative_humidity_pct].map(|v| v.is_some())
+        };
+        states.sort_by_key(|state| sets(state).contains(&true));
         let mut points = Vec::new();
-        for pressure in pressures {
-            let here = conditions.iter().filter(|(c, _)| c.ambient_pressure_pa == pressure);
+        for state in states {
+            let here = conditions.iter().filter(|(c, _)| Ambient::of(c) == state);
             let mut visits: Vec<(&Visit<'_>, u32)> =
                 here.flat_map(|c| (0..self.file.replicates).map(move |r| (c, r))).collect();
             if self.file.randomise {
@@ -219,8 +229,34 @@ fn allowed(covariate: &Covariate, limits: &Limits) -> [f64; 2] {
 /// Largest pressure that a plan may ask a chamber for, Pa.
 const CHAMBER_MAX_PA: f64 = 200_000.0;
 
-pub(super) fn series_place(text: &str, index: usize, name: &str) -> Option<std::ops::Range<usize>> {
+pub(crate) fn series_place(text: &str, index: usize, name: &str) -> Option<std::ops::Range<usize>> {
     let table = toml::de::DeTable::parse(text).ok()?;
     let series = table.get_ref().get("series")?.get_ref().as_array()?;
     series.get(index)?.get_ref().as_table()?.get(name).map(toml::Spanned::span)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two series that list the same pressures: each of their passes was made twice, and a pressure was visited again.
+    #[test]
+    fn series_that_share_their_pressures_are_grouped_by_pressure_and_made_once() {
+        let series = "[[series]]\nambient_pressure_pa = [101325, 50000]\n";
+        let text = format!(
+            "name = \"p\"\nreference_every = 0\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\n\
+             normal_force_n = 0.25\n{series}amplitude_pp_m = [1e-6, 2e-6]\n{series}speed_m_s = [0.01, 0.04]\n"
+        );
+        let plan = Plan::parse("p", &text).unwrap();
+        let limits = Limits::paper(realtime::ports::Nanos(1_000_000));
+        let points = plan.points(1, &limits, &Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 }).unwrap();
+        // Two pressures, four conditions each, both ways.
+        assert_eq!(points.len(), 16);
+        let pressures: Vec<_> = points.iter().map(|p| p.condition.ambient_pressure_pa.unwrap()).collect();
+        assert_eq!(pressures.windows(2).filter(|w| w[0] != w[1]).count(), 1, "{pressures:?}");
+        // A series that leaves the pressure as it is is measured before a chamber was ever set.
+        let plan = Plan::parse("p", &format!("{text}[[series]]\namplitude_pp_m = [3e-6]\n")).unwrap();
+        let points = plan.points(1, &limits, &Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 }).unwrap();
+        assert!(points[..2].iter().all(|p| p.condition.ambient_pressure_pa.is_none()), "{points:?}");
+    }
 }

@@ -29,6 +29,13 @@ pub fn of_run(
         ("operator", fact("operator").unwrap_or_else(|| not_stated("run --operator"))),
         ("sample", fact("sample").unwrap_or_else(|| not_stated("run --sample"))),
     ];
+    let protocol = facts.iter().filter_map(|(name, value)| {
+        Some(format!("{} {value}", name.strip_prefix("protocol.")?.replace('_', " ")))
+    });
+    let protocol: Vec<String> = protocol.collect();
+    if !protocol.is_empty() {
+        all.push(("protocol", protocol.join("; ")));
+    }
     let known = [
         ("subject", fact("subject")),
         ("fingertip", fact("fingertip")),

@@ -2,6 +2,7 @@
 
 use super::html::{escape, table};
 use super::human::number;
+use crate::ambient::AIR;
 use crate::sequence::Event;
 use realtime::safety::Cause;
 
@@ -69,6 +70,50 @@ pub fn describe(event: &Event) -> String {
             "{certificate} holds within a range of temperatures, and the amplifier reports none: only the setup's \
              temperature_c was checked"
         ),
+        _ => at_rig(event),
+    }
+}
+
+/// What happened at the rig between passes.
+fn at_rig(event: &Event) -> String {
+    let of = |quantity: &str, value: f64| {
+        let known = AIR.iter().find(|(covariate, _)| covariate.name == quantity);
+        known.map_or_else(
+            || format!("{quantity} {}", number(value)),
+            |(c, _)| format!("{} {} {}", c.words, number(value * c.shown.0), c.shown.1),
+        )
+    };
+    match event {
+        Event::Disarmed { supply_open: true } => {
+            "disarmed: the drive is off and its supply open, both read back; the stage is at rest".into()
+        }
+        Event::Disarmed { supply_open: false } => {
+            "disarmed: the drive was read back off; the stage is at rest".into()
+        }
+        Event::Asked { step, types: None } => format!("AT THE RIG: {step}; then press Enter"),
+        Event::Asked { step, types: Some(name) } => {
+            format!("AT THE RIG: {step}; then type {name} and press Enter")
+        }
+        Event::Answered { step, answer, answered_by, .. } => format!("{step}: {answer} ({answered_by})"),
+        Event::Waited { step, waited_s } => format!("{step}: waited {waited_s:.0} s"),
+        Event::LevelSet { quantity, wanted } => format!("set: {}", of(quantity, *wanted)),
+        Event::LevelReached { quantity, wanted, found, source, after_s } => format!(
+            "{} reached after {after_s:.1} s: {} ({source})",
+            of(quantity, *wanted),
+            of(quantity, *found)
+        ),
+        Event::LevelNotReached { quantity, wanted, last } => format!(
+            "{} was not reached: {}",
+            of(quantity, *wanted),
+            last.map_or_else(|| "nothing was read".into(), |last| format!("last {}", of(quantity, last)))
+        ),
+        Event::LevelLost { point, quantity, wanted, range: [low, high] } => format!(
+            "point {point}: {} was lost, {} to {}; the pass is marked",
+            of(quantity, *wanted),
+            of(quantity, *low),
+            of(quantity, *high)
+        ),
+        _ => String::new(),
     }
 }
 

@@ -2,8 +2,10 @@
 
 use super::RunData;
 use super::html::{escape, glossary, head, note, shell, table};
+use super::human::number;
 use super::traces::Trace;
 use super::{events, explore, plots};
+use crate::ambient::{AIR, LevelsFound, levels_of};
 use crate::sequence::Outcome;
 use std::fmt::Write;
 
@@ -37,6 +39,7 @@ pub(super) fn page(run: &RunData, traces: &[Trace]) -> miette::Result<String> {
              order of measurement. While the model holds it is independent from pass to pass. Dashed: &plusmn;1.96."
         ),
     );
+    w.push_str(&levels(run));
     timing(w, run)?;
     w.push_str(&events::section(&run.events));
     passes(w, run);
@@ -99,6 +102,38 @@ fn verdict(w: &mut String, run: &RunData) {
             escape(&flag.to_string())
         );
     }
+}
+
+/// What was found of the air and typed at the rig; nothing where the plan asks for nothing.
+fn levels(run: &RunData) -> String {
+    let found = levels_of(&run.passes);
+    if found.is_empty() {
+        return String::new();
+    }
+    let row = |f: &LevelsFound| {
+        let known = AIR.iter().find(|(covariate, _)| covariate.name == f.quantity);
+        let (name, (factor, unit)) =
+            known.map_or((f.quantity.as_str(), (1.0, "")), |(c, _)| (c.words, c.shown));
+        let value = |v: f64| number(v * factor);
+        format!(
+            "<tr><td>{}</td><td>{unit}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
+             <td class=\"n\">{} to {}</td><td>{}</td><td class=\"n\">{:.0}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>\n",
+            escape(name),
+            f.planned.map_or("&ndash;".into(), value),
+            value(f.mean),
+            value(f.range[0]),
+            value(f.range[1]),
+            f.source,
+            f.oldest_s,
+            f.passes,
+            f.lost
+        )
+    };
+    let rows: String = found.iter().map(row).collect();
+    let head = "<th scope=\"col\">quantity</th><th scope=\"col\">unit</th><th scope=\"col\">planned</th>\
+        <th scope=\"col\">found</th><th scope=\"col\">range</th><th scope=\"col\">how</th>\
+        <th scope=\"col\">oldest reading, s</th><th scope=\"col\">passes</th><th scope=\"col\">level lost</th>";
+    format!("<h2>Air and protocol</h2>{}", table("Air and protocol", head, &rows))
 }
 
 fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {

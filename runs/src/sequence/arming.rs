@@ -80,6 +80,12 @@ impl Arming {
         Arming { overrun, human_contact: limits.human_contact, ..self }
     }
 
+    /// The same rig, to be armed once more after a person was at it: its supply is open on purpose, which is no news.
+    pub(super) fn afresh(self) -> Self {
+        let Arming { overrun, human_contact, .. } = self;
+        Arming { overrun, human_contact, cut_told: true, ..Arming::new() }
+    }
+
     /// Takes a row.
     pub(super) fn row(&mut self, row: &Row) -> Next {
         let since = *self.since.get_or_insert(row.now);

@@ -1,5 +1,6 @@
 //! What a sweep tells: its passes, events and end, as the record, the catalogue and the report hold them.
 
+use crate::ambient::{AIR, Level, Source, shown};
 use crate::certificates::temperature::TemperatureFlag;
 use crate::exposure_left::Left;
 use models::pass::Pass;
@@ -25,6 +26,9 @@ pub struct MeasuredPass {
     /// Certificates that do not hold at the temperature that the pass began with. Nothing was corrected for it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub temperature_flags: Vec<TemperatureFlag>,
+    /// What was found of the air and typed at the rig, by whom and how old.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<Level>,
 }
 
 /// Something worth a line in the record and on the terminal.
@@ -104,6 +108,78 @@ pub enum Event {
         /// What does not hold.
         flag: TemperatureFlag,
     },
+    /// The rig was disarmed for a person and read back off, at rest.
+    Disarmed {
+        /// The second channel was read back open; false where none is fitted.
+        supply_open: bool,
+    },
+    /// Something is asked of whoever stands at the rig.
+    Asked {
+        /// What is to be done.
+        step: String,
+        /// Column or name of the number that is to be typed; none where a confirmation will do.
+        types: Option<String>,
+    },
+    /// It was answered.
+    Answered {
+        /// What was asked.
+        step: String,
+        /// The answer as it was given.
+        answer: String,
+        /// The number in it.
+        number: Option<f64>,
+        /// By whom.
+        answered_by: Source,
+        /// s after it was asked.
+        after_s: f64,
+    },
+    /// The timer of a step ran down.
+    Waited {
+        /// The step.
+        step: String,
+        /// Its length in s.
+        waited_s: f64,
+    },
+    /// A quantity of the air was given a set-point.
+    LevelSet {
+        /// Its column in the point table.
+        quantity: String,
+        /// The set-point.
+        wanted: f64,
+    },
+    /// It is within the plan's tolerance.
+    LevelReached {
+        /// Its column in the point table.
+        quantity: String,
+        /// The level that the plan asks for.
+        wanted: f64,
+        /// What was found.
+        found: f64,
+        /// By whom.
+        source: Source,
+        /// s after it was set.
+        after_s: f64,
+    },
+    /// It did not come within the plan's tolerance in time.
+    LevelNotReached {
+        /// Its column in the point table.
+        quantity: String,
+        /// The level that the plan asks for.
+        wanted: f64,
+        /// What was found last.
+        last: Option<f64>,
+    },
+    /// It left the plan's tolerance during a pass: the pass is kept, and marked.
+    LevelLost {
+        /// Which pass.
+        point: u32,
+        /// Its column in the point table.
+        quantity: String,
+        /// The level that the plan asks for.
+        wanted: f64,
+        /// Smallest and largest value during the pass.
+        range: [f64; 2],
+    },
     /// A certificate holds within a range of temperatures, and the amplifier reports none: only the setup's
     /// `temperature_c` was checked.
     TemperatureUnwatched {
@@ -131,6 +207,15 @@ pub enum Outcome {
     NoContact {
         /// At which point.
         point: u32,
+    },
+    /// A level of the air that the plan asks for was not reached in time.
+    LevelNotReached {
+        /// Its column in the point table.
+        quantity: String,
+        /// The level.
+        wanted: f64,
+        /// What was found last.
+        found: Option<f64>,
     },
     /// Nothing was heard of the loop.
     LoopLost,
@@ -161,6 +246,14 @@ impl Outcome {
             }
             Outcome::WouldNotArm { blocking: None } => "the rig would not arm".into(),
             Outcome::NoContact { point } => format!("no contact at point {point}"),
+            Outcome::LevelNotReached { quantity, wanted, found } => {
+                let at = AIR.iter().position(|(covariate, _)| covariate.name == quantity);
+                let words =
+                    |value: f64| at.map_or_else(|| format!("{quantity} {value}"), |at| shown(at, value));
+                let last =
+                    found.map_or_else(|| "nothing was read".into(), |found| format!("last {}", words(found)));
+                format!("{} was not reached: {last}", words(*wanted))
+            }
             Outcome::LoopLost => "nothing was heard of the loop".into(),
             Outcome::RecordLost => "the record could not be kept".into(),
             Outcome::ExposureNotKept => "the exposure of the finger could not be written in time".into(),
@@ -202,6 +295,26 @@ mod tests {
             Event::PassRepeated { point: 1 },
             Event::TemperatureBeyondCertificate { point: 1, flag },
             Event::TemperatureUnwatched { certificate: "c".into() },
+            Event::Disarmed { supply_open: true },
+            Event::Asked { step: "s".into(), types: Some("t".into()) },
+            Event::Answered {
+                step: "s".into(),
+                answer: "a".into(),
+                number: Some(1.0),
+                answered_by: Source::Operator,
+                after_s: 1.0,
+            },
+            Event::Waited { step: "s".into(), waited_s: 1.0 },
+            Event::LevelSet { quantity: "q".into(), wanted: 1.0 },
+            Event::LevelReached {
+                quantity: "q".into(),
+                wanted: 1.0,
+                found: 1.0,
+                source: Source::Instrument,
+                after_s: 1.0,
+            },
+            Event::LevelNotReached { quantity: "q".into(), wanted: 1.0, last: None },
+            Event::LevelLost { point: 1, quantity: "q".into(), wanted: 1.0, range: [1.0, 2.0] },
         ];
         for event in &all {
             match event {
@@ -211,7 +324,9 @@ mod tests {
                 Event::ArmingDisturbed { .. } | Event::Zeros { .. } | Event::Tripped(_) => {}
                 Event::ModelDeparted { .. } | Event::Paused { .. } | Event::Resumed => {}
                 Event::PassRepeated { .. } | Event::TemperatureBeyondCertificate { .. } => {}
-                Event::TemperatureUnwatched { .. } => {}
+                Event::TemperatureUnwatched { .. } | Event::Disarmed { .. } | Event::Asked { .. } => {}
+                Event::Answered { .. } | Event::Waited { .. } | Event::LevelSet { .. } => {}
+                Event::LevelReached { .. } | Event::LevelNotReached { .. } | Event::LevelLost { .. } => {}
             }
         }
         all

@@ -3,6 +3,7 @@
 use super::keeper::{self, Keeper};
 use super::telemetry::Snapshots;
 use super::{Begun, Job, Signals, Summary, Update};
+use crate::ambient::{Answers, Bench, World};
 use crate::files::Placed;
 use crate::plan::{Plan, Resolution};
 use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
@@ -14,7 +15,7 @@ use realtime::compare::Agreement;
 use realtime::ports::Nanos;
 use realtime::recorder::Recorder;
 use realtime::turn::{Ports, Row};
-use sim::virtual_rig::VirtualRig;
+use sim::virtual_rig::{SharedRig, VirtualRig};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -32,7 +33,7 @@ pub fn run(
     signals: &Signals,
     news: &mut dyn FnMut(Update<'_>),
 ) -> miette::Result<Summary> {
-    let Begun { dir, mut sequence, planned, start_s } = begun;
+    let Begun { dir, mut sequence, planned, start_s, answers } = begun;
     if job.setup.file.virtual_rig.is_none() {
         miette::bail!(
             help = "leave --fast out, or give the setup a [virtual] section",
@@ -40,7 +41,10 @@ pub fn run(
             job.setup.file.name
         );
     }
-    let ports = ports_of(&job, VirtualRig::of(job.world()?));
+    let world = VirtualRig::of(job.world()?).split();
+    let air = World::Virtual(world[0].clone());
+    let mut bench = Bench::open(&sequence, None, Some(air), answers)?;
+    let ports = ports_of(&job, world);
     let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
     let mut kept = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
     let rig =
@@ -50,7 +54,7 @@ pub fn run(
         Ok((Recorder::begin(file, preamble).into_diagnostic()?, disk))
     });
     let (swept, off) = match record {
-        Ok(record) => sweep(rig, record, &mut kept, &mut sequence, signals, news),
+        Ok(record) => sweep(rig, record, &mut kept, (&mut sequence, &mut bench), signals, news),
         // Before the first row nothing has been driven.
         Err(why) => (Err(why), OffReport::off()),
     };
@@ -63,8 +67,7 @@ pub fn run(
 }
 
 /// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
-fn ports_of(job: &Job, rig: VirtualRig) -> Ports {
-    let [force, amplifier, stage] = rig.split();
+fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> Ports {
     let force = job.setup.certificates.calibrated(Box::new(force));
     let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
     let mut ports = Ports::new(force, amplifier, Box::new(stage.clone()));
@@ -82,7 +85,7 @@ fn sweep(
     mut rig: VirtualLoop,
     (mut recorder, disk): (Recorder<Placed>, Placed),
     kept: &mut Keeper,
-    sequence: &mut Sequence,
+    (sequence, bench): (&mut Sequence, &mut Bench),
     signals: &Signals,
     news: &mut dyn FnMut(Update<'_>),
 ) -> (miette::Result<Outcome>, OffReport) {
@@ -117,6 +120,7 @@ fn sweep(
         Ok(())
     };
     let outcome = supervisor::sweep(&mut rig, sequence, &mut ask, &mut |row, sequence, reaction| {
+        bench.serve(row.now, sequence, &reaction);
         if unkept.borrow().is_none() {
             *unkept.borrow_mut() = keep(row, sequence, reaction).err();
         }
@@ -167,15 +171,20 @@ pub fn rehearse(
     let points = plan.points(seed, &setup.config.limits, &resolution)?;
     let mut sequence =
         Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
-            .in_air(setup.ambient());
+            .in_air(setup.ambient())
+            .at_rig(plan, setup);
     let [force, amplifier, stage] =
         VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
+    let air = World::Virtual(force.clone());
+    let mut bench = Bench::open(&sequence, None, Some(air), Answers::Simulated)?;
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let mut passes = Vec::new();
-    let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut Asked::default, &mut |_, _, reaction| {
-        passes.extend(reaction.pass);
-    });
+    let outcome =
+        supervisor::sweep(&mut rig, &mut sequence, &mut Asked::default, &mut |row, sequence, reaction| {
+            bench.serve(row.now, sequence, &reaction);
+            passes.extend(reaction.pass);
+        });
     let agreement = sequence.agreement(outcome == Outcome::Complete);
     Ok(Rehearsal { passes, outcome, agreement, cycles: rig.cycles() })
 }

@@ -2,6 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "a run says when it began")]
 
 use super::{Job, Notes, Summary, Unfinished, Update};
+use crate::ambient::levels_of;
 use crate::catalogue::{Catalogue, RunEntry};
 use crate::files::Placed;
 use crate::run_dir::RunDir;
@@ -44,6 +45,7 @@ pub struct Keeper {
     folder: String,
     passes: usize,
     planned: usize,
+    protocol: BTreeMap<String, toml::Value>,
     departed: bool,
     /// The catalogue could not be written: it is left alone until the end.
     unnoted: bool,
@@ -85,12 +87,10 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     let Notes { operator, subject, sample, licence } = &job.notes;
     let notes = [("operator", operator), ("subject", subject), ("sample", sample), ("licence", licence)];
     let notes = notes.into_iter().filter_map(|(k, v)| Some((k, v.clone()?)));
-    let facts = facts
-        .into_iter()
-        .chain(job.setup.guards().facts())
-        .chain(notes)
-        .map(|(k, v)| (k.to_string(), v))
-        .collect();
+    let facts = facts.into_iter().chain(job.setup.guards().facts()).chain(notes);
+    let words = |value: &toml::Value| value.as_str().map_or_else(|| value.to_string(), String::from);
+    let protocol = identity.protocol.iter().map(|(key, value)| (format!("protocol.{key}"), words(value)));
+    let facts = facts.map(|(k, v)| (k.to_string(), v)).chain(protocol).collect();
     Ok(Preamble { start_unix_ns, facts, files })
 }
 
@@ -160,7 +160,8 @@ impl Keeper {
             departed: false,
         })?;
         let guards = job.setup.guards();
-        Ok(Keeper { dir, catalogue, folder, passes, planned, departed: false, unnoted: false, guards })
+        let (protocol, departed, unnoted) = (job.plan.protocol(), false, false);
+        Ok(Keeper { dir, catalogue, folder, passes, planned, protocol, departed, unnoted, guards })
     }
 
     /// Keeps what a row led to and passes it on. Returns the pass, once it is safe.
@@ -221,6 +222,10 @@ impl Keeper {
             record_lost,
             links,
             off,
+            notes: self.dir.notes().clone(),
+            protocol: self.protocol.clone(),
+            // As far as it can be read: a table that cannot is said below.
+            levels: crate::run_dir::passes_in(self.dir.path()).map_or_else(|_| Vec::new(), |p| levels_of(&p)),
             finished_before: false,
             guards: self.guards.clone(),
         };

@@ -58,10 +58,11 @@ pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Vec<Problem> {
     for instrument in &mut file.force {
         one(&mut instrument.profile, &mut instrument.source, vec!["force"]);
     }
-    let SetupFile { amplifier, stage, supply_relay, safety_inputs, vibrometer, .. } = file;
+    let SetupFile { amplifier, stage, supply_relay, safety_inputs, chamber, vibrometer, .. } = file;
     for (table, instrument) in [("amplifier", Some(amplifier)), ("stage", Some(stage))]
         .into_iter()
         .chain([("supply_relay", supply_relay.as_mut()), ("safety_inputs", safety_inputs.as_mut())])
+        .chain([("chamber", chamber.as_mut())])
     {
         if let Some(instrument) = instrument {
             one(&mut instrument.profile, &mut instrument.source, vec![table, "profile"]);

@@ -78,6 +78,12 @@ named! {
         StageCount = "stage.count",
         /// When the stage took its state, in s.
         StageTime = "stage.time_s",
+        /// Pressure of the air around the rig, in Pa.
+        AmbientPressure = "air.pressure_pa",
+        /// Temperature of the air around the rig, in degrees Celsius.
+        AirTemperature = "air.temperature_c",
+        /// Relative humidity of the air around the rig, in per cent.
+        RelativeHumidity = "air.relative_humidity_pct",
         /// Whether the switch in the amplifier's supply is closed, by its mirror contact.
         SupplyClosed = "supply.closed",
         /// Whether the emergency stop's contact is closed: it is not pressed.
@@ -110,6 +116,12 @@ named! {
         NormalForce = "stage.normal_force_n",
         /// Heartbeat of the stage's watchdog.
         StageHeartbeat = "stage.heartbeat",
+        /// Pressure of the air around the rig, in Pa.
+        AmbientPressure = "air.pressure_pa",
+        /// Temperature of the air around the rig, in degrees Celsius.
+        AirTemperature = "air.temperature_c",
+        /// Relative humidity of the air around the rig, in per cent.
+        RelativeHumidity = "air.relative_humidity_pct",
         /// The switch in the amplifier's supply closed (1) or open (0).
         CloseSupply = "supply.closed",
         /// Heartbeat of the watchdog of that switch.

@@ -2,6 +2,7 @@
 
 use super::{Command, Plant, Quantity};
 use crate::amplifier::AmplifierInput;
+use crate::room::Air;
 use crate::stage::StageInput;
 use crate::world::World;
 use models::quantity::PeakToPeak;
@@ -177,6 +178,9 @@ impl Plant for WorldPlant {
                 let now = self.world.now();
                 truth(self.world.operator().holds_dead_man_from.is_some_and(|from| now >= from))
             }
+            Quantity::AmbientPressure => self.world.room().of(Air::Pressure),
+            Quantity::AirTemperature => self.world.room().of(Air::Temperature),
+            Quantity::RelativeHumidity => self.world.room().of(Air::Humidity),
             Quantity::DeviceTime => self.world.now().seconds(),
             // The emulator counts its own reads; the world knows nothing of them.
             Quantity::DeviceReads => 0.0,
@@ -199,13 +203,16 @@ impl Plant for WorldPlant {
                 Command::CloseSupply if value == 0.0 => self.world.cut_supply(),
                 Command::CloseSupply if self.supply_guard.lapsed => {}
                 Command::CloseSupply => self.world.close_supply(),
+                Command::AmbientPressure => self.world.room_mut().set(Air::Pressure, value),
+                Command::AirTemperature => self.world.room_mut().set(Air::Temperature, value),
+                Command::RelativeHumidity => self.world.room_mut().set(Air::Humidity, value),
             }
             let of_drive = matches!(
                 command,
                 Command::Amplitude | Command::Frequency | Command::Enable | Command::DriveHeartbeat
             );
             drives |= of_drive;
-            moves |= !of_drive && !matches!(command, Command::CloseSupply | Command::SupplyHeartbeat);
+            moves |= matches!(command, Command::Velocity | Command::NormalForce | Command::StageHeartbeat);
         }
         if drives {
             self.world.command_amplifier(self.drive);

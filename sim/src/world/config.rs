@@ -6,24 +6,9 @@ use crate::amplifier::AmplifierConfig;
 use crate::defects::Defects;
 use crate::finger::FingerConfig;
 use crate::plate::PlateConfig;
+use crate::room::RoomConfig;
 use crate::sensor::SensorConfig;
 use crate::stage::StageConfig;
-
-/// The room around the rig.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RoomConfig {
-    /// Ambient pressure (Pa).
-    pub ambient_pressure_pa: f64,
-    /// Temperature (deg C).
-    pub temperature_c: f64,
-}
-
-impl Default for RoomConfig {
-    fn default() -> Self {
-        Self { ambient_pressure_pa: 101_325.0, temperature_c: 22.0 }
-    }
-}
 
 /// Everything a world is built from, besides its seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -122,6 +107,7 @@ impl WorldConfig {
             ("amplifier.amplitude_step_m", self.amplifier.amplitude_step_m),
             ("amplifier.frequency_step_hz", self.amplifier.frequency_step_hz),
             ("amplifier.watchdog_s", self.amplifier.watchdog_s),
+            ("room.chamber.time_constant_s", self.room.chamber.time_constant_s),
             ("sensor.bandwidth_hz", self.sensor.bandwidth_hz),
             ("sensor.count_n", self.sensor.count_n),
             ("sensor.full_scale_n", self.sensor.full_scale_n),
@@ -145,6 +131,7 @@ impl WorldConfig {
             ("finger.ridge_table_strokes", self.finger.ridge_table_strokes),
             ("sensor.latency_s", self.sensor.latency_s),
             ("room.ambient_pressure_pa", self.room.ambient_pressure_pa),
+            ("room.chamber.leak_per_s", self.room.chamber.leak_per_s),
         ];
         for (field, value) in not_negative {
             if !(value.is_finite() && value >= 0.0) {

@@ -32,6 +32,12 @@ pub fn of(run: &RunData, stated: &Stated) -> Facts {
     let about = run.about.iter().filter(|(name, _)| about.contains(name));
     facts.extend(about.map(|(name, words)| (name.to_string(), words.clone())));
     facts.extend(run.summary.iter().map(|s| ("outcome".to_string(), outcome(s))));
+    let answered = run.events.iter().filter(|(_, event)| event["event"] == "answered");
+    for (n, (_, event)) in answered.enumerate() {
+        let part = |key: &str| event[key].as_str().unwrap_or_default();
+        let words = format!("{}: {} ({})", part("step"), part("answer"), part("answered_by"));
+        facts.insert(format!("at_rig.{:03}", n + 1), words);
+    }
     let stated = [("licence", &stated.licence), ("organisation", &stated.organisation)];
     facts.extend(stated.into_iter().filter_map(|(name, fact)| Some((name.to_string(), fact.clone()?))));
     facts.insert(

@@ -82,7 +82,18 @@ fn a_stop_on_request_is_told_as_one() {
     let plan = Plan::load("first-sweep").unwrap();
     let notes = Notes::default();
     let (model_file, defects) = (None, None);
-    let job = Job { seed: 3, setup, plan, model, model_file, defects, out: out.clone(), fast: true, notes };
+    let job = Job {
+        seed: 3,
+        setup,
+        plan,
+        model,
+        model_file,
+        defects,
+        out: out.clone(),
+        fast: true,
+        notes,
+        answers: None,
+    };
     let signals = Signals::default();
     let asked = signals.clone();
     let mut events = Vec::new();

@@ -3,7 +3,8 @@
 use super::*;
 use crate::ports::SupplyState;
 
-const RESET: Controls = Controls { reset: true, stop: false, dead_man: false, new_request: false };
+const RESET: Controls =
+    Controls { reset: true, stop: false, dead_man: false, new_request: false, open_supply: false };
 
 /// A rig with a relay that does what it is told so many cycles later.
 struct Relayed {
@@ -68,6 +69,23 @@ fn the_second_channel_is_opened_and_closed_before_every_arming() {
     let before = cuts(&rig);
     assert_eq!(rig.arm(100), (None, true));
     assert!(cuts(&rig) > before);
+}
+
+/// Before somebody reaches into the rig the supply opens, stays open however long that takes, and a reset proves it again.
+#[test]
+fn a_disarmed_rig_keeps_its_supply_open_until_the_channel_is_proved() {
+    let mut rig = Relayed::new(5, None);
+    assert_eq!(rig.arm(100), (None, true));
+    let disarm = Controls { stop: true, open_supply: true, ..Controls::default() };
+    let decision = rig.cycle(|_| {}, disarm);
+    assert_eq!(decision.tripped.map(|trip| trip.cause), Some(Cause::Stopped));
+    for _ in 0..5000 {
+        let decision = rig.cycle(|_| {}, Controls::default());
+        assert_eq!((decision.supply, decision.drive.enable()), (SupplyCommand::Cut, false));
+    }
+    assert_eq!(rig.cycle(|_| {}, Controls::default()).waits_for, None, "a program may ask for the reset");
+    assert_eq!(rig.arm(100), (None, true));
+    assert_eq!(rig.told.last(), Some(&SupplyCommand::Restore));
 }
 
 #[test]

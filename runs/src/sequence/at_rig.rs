@@ -1,0 +1,521 @@
+//! What a sweep waits for at the rig, outside the loop: levels of the air, and steps of a person.
+//!
+//! ```text
+//! before a pass whose level is not there, before the first pass and after the last:
+//!   no person:  drive off, lifted, armed ----------------------> set -> there -> next pass
+//!   a person:   Disarm -> read back off, supply open, at rest -> ask -> answer (-> timer, -> there) -> Arm -> Zero -> next pass
+//! ```
+//! Nothing vibrates and nothing moves while it waits. Answers and readings come from whoever serves the sweep
+//! ([`crate::ambient::Bench`]); this file only decides, so it runs in virtual time as in wall-clock time.
+
+use super::{Event, Outcome, QUIET_WITHIN, Reaction, Sequence, Stage, Sums};
+use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, Tolerances, shown};
+use crate::plan::{Step, When};
+use models::condition::{Ambient, Condition};
+use realtime::cycle::{Command, Phase};
+use realtime::estimate::Moments;
+use realtime::ports::{Nanos, NoData};
+use realtime::safety::{Cause, Request};
+use realtime::turn::Row;
+use std::collections::{BTreeMap, VecDeque};
+
+/// A level counts as reached once it was within its tolerance for this long.
+const HOLDS_FOR: Nanos = Nanos(1_000_000_000);
+/// Time within which a disarmed rig must be read back off.
+const OFF_WITHIN: Nanos = Nanos(5_000_000_000);
+/// Time in which the finger leaves the plate, and the plate rings down: no person is asked and no zero is read before.
+const LIFTED_AFTER: Nanos = Nanos(1_000_000_000);
+/// A stage slower than this stands still, m/s.
+const STILL_M_S: f64 = 1e-3;
+/// An operator who types a value beyond the tolerance is asked again so often.
+const ASKS: u32 = 5;
+/// The answer that has the step before done once more.
+const AGAIN: &str = "again";
+/// A reading older than this is none.
+const STALE_S: f64 = 10.0;
+
+/// One thing to wait for.
+#[derive(Clone, Debug, PartialEq)]
+enum Task {
+    /// A quantity of the air (its place in [`AIR`]) at a level.
+    Level(usize, f64),
+    /// A step of the protocol.
+    Step(Step),
+}
+
+/// What a task waits for now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Wait {
+    /// The rig to be read back off.
+    Off { since: Nanos },
+    /// The next task.
+    Begin,
+    /// An answer.
+    Answer { since: Nanos },
+    /// A level, and since when it is within its tolerance.
+    There { since: Nanos, within: Option<Nanos> },
+    /// A timer.
+    Timer { since: Nanos, until: Nanos },
+}
+
+/// What comes once everything was waited for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Then {
+    Pass,
+    End,
+}
+
+/// What is known of the rig's surroundings, and what is waited for there.
+#[derive(Default)]
+pub(super) struct AtRig {
+    means: OfAir<Option<Means>>,
+    tolerance: OfAir<f64>,
+    reached_within_s: f64,
+    steps: Vec<Step>,
+    simulated: bool,
+    found: OfAir<Option<Found>>,
+    /// The level that was set and reached last.
+    level: OfAir<Option<f64>>,
+    typed: BTreeMap<String, Found>,
+    answer: Option<(String, Source)>,
+    tasks: VecDeque<Task>,
+    previous: Option<Task>,
+    wait: Option<Wait>,
+    then: Option<Then>,
+    disarmed: bool,
+    asked_again: u32,
+    begun: bool,
+    /// When the rig was last seen off, at rest and lifted off while a person was at it.
+    quiet: Nanos,
+    over: OfAir<Span>,
+}
+
+/// What was read of a quantity during a pass.
+#[derive(Clone, Copy, Debug, Default)]
+struct Span {
+    moments: Moments,
+    range: Option<[f64; 2]>,
+    last: Option<Nanos>,
+}
+
+/// A question for whoever stands at the rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Question {
+    /// The number that is expected, where one is.
+    pub usual: Option<f64>,
+    /// The quantity of the air (its place in [`AIR`]) that the person sets, and the level.
+    pub level: Option<(usize, f64)>,
+}
+
+impl AtRig {
+    pub(super) fn of(
+        sets: OfAir<bool>,
+        means: OfAir<Option<Means>>,
+        tolerances: &Tolerances,
+        steps: &[Step],
+        simulated: bool,
+    ) -> Self {
+        let mut means = means;
+        for (means, sets) in means.iter_mut().zip(sets) {
+            *means = means.filter(|_| sets);
+        }
+        AtRig {
+            means,
+            tolerance: tolerances.of_air(),
+            reached_within_s: tolerances.reached_within_s,
+            steps: steps.to_vec(),
+            simulated,
+            ..AtRig::default()
+        }
+    }
+
+    fn steps(&self, when: When) -> impl Iterator<Item = Task> + '_ {
+        self.steps.iter().filter(move |step| step.when == when).cloned().map(Task::Step)
+    }
+
+    fn needs_a_person(&self, task: &Task) -> bool {
+        match task {
+            Task::Step(_) => true,
+            Task::Level(at, _) => self.means[*at].is_some_and(|means| means.needs_a_person()),
+        }
+    }
+
+    /// A reading that is fresh enough; what a person confirmed holds until another level is asked for.
+    fn reading(&self, at: usize, now: Nanos) -> Option<Found> {
+        let typed = |found: &Found| matches!(found.source, Source::Operator | Source::AnswersFile);
+        let by_hand = self.means[at].is_some_and(|means| means.reads == By::Operator);
+        self.found[at].filter(|f| by_hand || typed(f) || now.since(f.at).seconds() <= STALE_S)
+    }
+
+    /// Whether a quantity is where the pass wants it.
+    fn is_there(&self, at: usize, wanted: f64, now: Nanos) -> bool {
+        self.level[at] == Some(wanted) && self.within(at, wanted, now)
+    }
+
+    fn within(&self, at: usize, wanted: f64, now: Nanos) -> bool {
+        self.reading(at, now).is_some_and(|f| (f.value - wanted).abs() <= self.tolerance[at])
+    }
+
+    /// What has to be done before a pass at this condition.
+    fn before(&self, condition: &Condition, now: Nanos) -> VecDeque<Task> {
+        let mut tasks: VecDeque<Task> =
+            if self.begun { VecDeque::new() } else { self.steps(When::Before).collect() };
+        let mut changes = false;
+        for (at, (covariate, _)) in AIR.iter().enumerate() {
+            let Some(wanted) = covariate.of(condition).filter(|_| self.means[at].is_some()) else { continue };
+            if !self.is_there(at, wanted, now) {
+                changes |= self.level[at].is_some_and(|before| before != wanted);
+                tasks.push_back(Task::Level(at, wanted));
+            }
+        }
+        if changes {
+            tasks.extend(self.steps(When::Between));
+        }
+        tasks
+    }
+
+    /// The air as it was found, and as the setup states it where nobody looks.
+    pub(super) fn air(&self, stated: &Ambient, now: Nanos) -> Ambient {
+        let mut condition = Condition::paper().within(stated);
+        for (at, (covariate, _)) in AIR.iter().enumerate() {
+            if let Some(found) = self.reading(at, now) {
+                covariate.put(&mut condition, found.value);
+            }
+        }
+        Ambient::of(&condition)
+    }
+
+    pub(super) fn begin_pass(&mut self) {
+        self.over = OfAir::default();
+    }
+
+    /// Takes in what is read during a pass.
+    pub(super) fn during_pass(&mut self) {
+        for (found, span) in self.found.iter().zip(&mut self.over) {
+            if let Some(found) = found
+                && span.last != Some(found.at)
+            {
+                span.moments.push(found.value);
+                let [low, high] = span.range.unwrap_or([found.value; 2]);
+                (span.range, span.last) =
+                    (Some([low.min(found.value), high.max(found.value)]), Some(found.at));
+            }
+        }
+    }
+
+    /// Puts what was found into the condition of a pass, and says how each value came about.
+    pub(super) fn levels(&self, planned: &Condition, condition: &mut Condition, now: Nanos) -> Vec<Level> {
+        let mut levels = Vec::new();
+        for (at, (covariate, _)) in AIR.iter().enumerate() {
+            if self.means[at].is_none() {
+                continue;
+            }
+            let span = &self.over[at];
+            let wanted = covariate.of(planned);
+            let (Some(found), Some(value)) = (self.found[at], span.moments.mean()) else { continue };
+            covariate.put(condition, value);
+            let range = span.range.unwrap_or([value; 2]);
+            // A gauge that fell silent does not say that the level is still there.
+            let silent = self.reading(at, now).is_none();
+            let off = |w: f64| silent || range.iter().any(|v| (v - w).abs() > self.tolerance[at]);
+            levels.push(Level {
+                quantity: covariate.name.into(),
+                planned: wanted,
+                value,
+                range,
+                source: found.source,
+                age_s: now.since(found.at).seconds(),
+                lost: wanted.is_some_and(off),
+            });
+        }
+        levels.extend(self.typed.iter().map(|(name, found)| Level {
+            quantity: name.clone(),
+            planned: None,
+            value: found.value,
+            range: [found.value; 2],
+            source: found.source,
+            age_s: now.since(found.at).seconds(),
+            lost: false,
+        }));
+        levels
+    }
+
+    /// Whether the rig was disarmed for a person.
+    pub(super) fn is_disarmed(&self) -> bool {
+        self.disarmed
+    }
+
+    /// Whether a quantity's column is what somebody set and read, and no other channel's.
+    pub(super) fn holds(&self, at: usize) -> bool {
+        self.means[at].is_some()
+    }
+}
+
+impl Sequence {
+    /// The same, for a plan whose levels and steps are waited for at the rig.
+    pub fn at_rig(self, plan: &crate::plan::Plan, setup: &crate::setup::Setup) -> Self {
+        let simulated = setup.file.virtual_rig.is_some();
+        let (sets, means) = (plan.sets_air(), setup.file.means());
+        let at_rig = AtRig::of(sets, means, &plan.file.tolerances, &plan.file.step, simulated);
+        Sequence { at_rig, ..self }
+    }
+
+    /// Which quantities something has to read for this sweep: those that no person types.
+    pub fn reads_air(&self) -> OfAir<bool> {
+        self.at_rig.means.map(|means| means.is_some_and(|means| means.reads != By::Operator))
+    }
+
+    /// Whether the sweep sets any quantity of the air.
+    pub fn sets_air(&self) -> bool {
+        self.at_rig.means.iter().any(Option::is_some)
+    }
+
+    /// Takes in what was found of a quantity, by its place in [`AIR`].
+    pub fn found(&mut self, at: usize, found: Found) {
+        self.at_rig.found[at] = Some(found);
+    }
+
+    /// Takes in an answer to the question that is open.
+    pub fn answer(&mut self, text: String, source: Source) {
+        self.at_rig.answer = Some((text, source));
+    }
+
+    /// Before the first arming: steps of a person come while nothing was ever armed.
+    pub(super) fn first_steps(&mut self, row: &Row, out: &mut Reaction) -> bool {
+        let first = !self.at_rig.begun && self.at_rig.steps(When::Before).next().is_some();
+        if first && let Some(point) = self.points.get(self.next) {
+            let tasks = self.at_rig.before(&point.condition, row.now);
+            self.wait_for(tasks, Then::Pass, row, out);
+        }
+        self.at_rig.begun = true;
+        first
+    }
+
+    /// Whether something has to be waited for before the next pass; it is begun then.
+    pub(super) fn waits_at_rig(&mut self, row: &Row, out: &mut Reaction) -> bool {
+        let tasks = self.at_rig.before(&self.points[self.next].condition, row.now);
+        self.at_rig.begun = true;
+        let waits = !tasks.is_empty();
+        if waits {
+            self.wait_for(tasks, Then::Pass, row, out);
+        }
+        waits
+    }
+
+    /// After the last pass: steps, and then the end.
+    pub(super) fn last_steps(&mut self, row: &Row, out: &mut Reaction) -> bool {
+        let tasks: VecDeque<Task> = self.at_rig.steps(When::After).collect();
+        let waits = !tasks.is_empty();
+        if waits {
+            self.wait_for(tasks, Then::End, row, out);
+        }
+        waits
+    }
+
+    fn wait_for(&mut self, tasks: VecDeque<Task>, then: Then, row: &Row, out: &mut Reaction) {
+        let person = tasks.iter().any(|task| self.at_rig.needs_a_person(task));
+        // Neither a cycle nor a sample from here on belongs to the pass before.
+        out.commands.push(Command::Set(Request::default(), self.marker(Phase::Idle)));
+        self.sums = Sums::default();
+        let a = &mut self.at_rig;
+        (a.tasks, a.then, a.disarmed, a.answer) = (tasks, Some(then), person, None);
+        if person {
+            out.commands.push(Command::Disarm);
+            a.wait = Some(Wait::Off { since: row.now });
+        } else {
+            a.wait = Some(Wait::Begin);
+        }
+        self.stage = Stage::AtRig;
+    }
+
+    pub(super) fn wait_at_rig(&mut self, row: &Row, out: &mut Reaction) {
+        // While a person is at the rig it shows itself off, at rest and lifted off, as a paused one does.
+        if self.at_rig.disarmed && !matches!(self.at_rig.wait, Some(Wait::Off { .. })) {
+            let loud = self.loud(row);
+            let quiet = if loud.is_none() { row.now } else { self.at_rig.quiet };
+            self.at_rig.quiet = quiet;
+            if let Some(cause) = loud.filter(|_| row.now.since(quiet) > QUIET_WITHIN) {
+                out.events.push(Event::PauseNotQuiet { cause });
+                return self.finish(out, Outcome::WouldNotArm { blocking: Some(cause) });
+            }
+        }
+        match self.at_rig.wait {
+            None | Some(Wait::Begin) => self.next_task(row, out),
+            Some(Wait::Off { since }) => {
+                if is_off(row) && row.now.since(since) >= LIFTED_AFTER {
+                    self.at_rig.quiet = row.now;
+                    out.events.push(Event::Disarmed {
+                        supply_open: row.inputs.seen.supply.is_ok_and(|supply| supply.cut),
+                    });
+                    self.next_task(row, out);
+                } else if row.now.since(since) > OFF_WITHIN {
+                    self.finish(out, Outcome::WouldNotArm { blocking: Some(Cause::RefusesOff) });
+                }
+            }
+            Some(Wait::Answer { since }) => self.take_answer(row, since, out),
+            Some(Wait::There { since, within }) => self.look_at_level(row, since, within, out),
+            Some(Wait::Timer { since, until }) if row.now >= until => {
+                if let Some(Task::Step(step)) = self.at_rig.tasks.front() {
+                    let (step, waited_s) = (step.instruction().to_string(), row.now.since(since).seconds());
+                    out.events.push(Event::Waited { step, waited_s });
+                }
+                self.done(row, out);
+            }
+            Some(Wait::Timer { .. }) => {}
+        }
+    }
+
+    fn done(&mut self, row: &Row, out: &mut Reaction) {
+        self.at_rig.previous = self.at_rig.tasks.pop_front();
+        self.next_task(row, out);
+    }
+
+    /// Begins the first task that is left; with none, what comes then.
+    fn next_task(&mut self, row: &Row, out: &mut Reaction) {
+        let Some(task) = self.at_rig.tasks.front().cloned() else { return self.go_on(row, out) };
+        match task {
+            Task::Level(at, wanted) => {
+                let means = self.at_rig.means[at];
+                let quantity = AIR[at].0.name.to_string();
+                self.at_rig.level[at] = None;
+                if means.is_some_and(|means| means.needs_a_person()) {
+                    self.ask(row, Some(at), format!("set {}", shown(at, wanted)), Some(wanted), out);
+                }
+                if means.is_some_and(|means| means.sets != By::Operator) {
+                    out.set_level = Some((at, wanted));
+                    out.events.push(Event::LevelSet { quantity, wanted });
+                }
+                if means.is_none_or(|means| !means.needs_a_person()) {
+                    self.at_rig.wait = Some(Wait::There { since: row.now, within: None });
+                }
+            }
+            Task::Step(step) => {
+                self.ask(row, None, step.instruction().to_string(), step.usual_number(), out);
+            }
+        }
+    }
+
+    fn ask(&mut self, row: &Row, at: Option<usize>, step: String, usual: Option<f64>, out: &mut Reaction) {
+        let types = match (at, self.at_rig.tasks.front()) {
+            (Some(at), _) => {
+                let by_hand = |means: Means| means.reads == By::Operator;
+                self.at_rig.means[at].is_some_and(by_hand).then(|| AIR[at].0.name.to_string())
+            }
+            (None, Some(Task::Step(step))) => step.number_name().map(String::from),
+            _ => None,
+        };
+        let level = at.zip(usual);
+        out.question = Some(Question { usual: usual.filter(|_| types.is_some()), level });
+        out.events.push(Event::Asked { step, types });
+        self.at_rig.answer = None;
+        self.at_rig.wait = Some(Wait::Answer { since: row.now });
+    }
+
+    fn take_answer(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
+        let Some((text, source)) = self.at_rig.answer.take() else { return };
+        let Some(task) = self.at_rig.tasks.front().cloned() else { return };
+        let typed = text.trim().replace(',', ".");
+        let number = typed.parse::<f64>().ok().filter(|v| v.is_finite());
+        let (step, needs) = match &task {
+            Task::Level(at, wanted) => {
+                let by_hand = self.at_rig.means[*at].is_some_and(|m| m.reads == By::Operator);
+                (format!("set {}", shown(*at, *wanted)), by_hand)
+            }
+            Task::Step(step) => (step.instruction().to_string(), step.number_name().is_some()),
+        };
+        let after_s = row.now.since(since).seconds();
+        out.events.push(Event::Answered { step, answer: text, number, answered_by: source, after_s });
+        if typed.eq_ignore_ascii_case(AGAIN) {
+            // The step before comes once more, and then this one.
+            if let Some(previous) = self.at_rig.previous.take() {
+                self.at_rig.tasks.push_front(previous);
+            }
+            return self.next_task(row, out);
+        }
+        let fits = match (&task, number) {
+            (Task::Level(at, _), Some(v)) if needs => AIR[*at].0.admits(v),
+            (_, number) => !needs || number.is_some(),
+        };
+        if !fits {
+            // Asked again; what does not fit is in the record too.
+            return self.next_task(row, out);
+        }
+        let found = |value: f64| Found { value, at: row.now, source };
+        match task {
+            Task::Level(at, _) => {
+                if let Some(value) = number.filter(|_| needs) {
+                    self.at_rig.found[at] = Some(found(value));
+                }
+                self.at_rig.wait = Some(Wait::There { since: row.now, within: None });
+            }
+            Task::Step(step) => {
+                if let (Some(name), Some(value)) = (step.number_name(), number) {
+                    self.at_rig.typed.insert(name.into(), found(value));
+                }
+                // Nobody waits for a finger that is none.
+                if step.wait_s > 0.0 && !self.at_rig.simulated {
+                    let until = row.now.plus(Nanos::from_seconds(step.wait_s));
+                    self.at_rig.wait = Some(Wait::Timer { since: row.now, until });
+                } else {
+                    self.done(row, out);
+                }
+            }
+        }
+    }
+
+    fn look_at_level(&mut self, row: &Row, since: Nanos, within: Option<Nanos>, out: &mut Reaction) {
+        let Some(Task::Level(at, wanted)) = self.at_rig.tasks.front().cloned() else { return };
+        let quantity = AIR[at].0.name.to_string();
+        let by_hand = self.at_rig.means[at].is_some_and(|m| m.reads == By::Operator);
+        let after_s = row.now.since(since).seconds();
+        let now = self.at_rig.within(at, wanted, row.now).then(|| within.unwrap_or(row.now));
+        let found = self.at_rig.reading(at, row.now);
+        if let (Some(found), Some(from)) = (found, now)
+            && (by_hand || row.now.since(from) >= HOLDS_FOR)
+        {
+            let (value, source) = (found.value, found.source);
+            out.events.push(Event::LevelReached { quantity, wanted, found: value, source, after_s });
+            (self.at_rig.level[at], self.at_rig.asked_again) = (Some(wanted), 0);
+            return self.done(row, out);
+        }
+        let again = by_hand && self.at_rig.asked_again < ASKS;
+        if again {
+            // A gauge that shows something else: the operator is asked again.
+            self.at_rig.asked_again += 1;
+            return self.next_task(row, out);
+        }
+        if by_hand || after_s > self.at_rig.reached_within_s {
+            let found = found.map(|found| found.value);
+            out.events.push(Event::LevelNotReached { quantity: quantity.clone(), wanted, last: found });
+            out.commands.push(Command::Stop);
+            return self.finish(out, Outcome::LevelNotReached { quantity, wanted, found });
+        }
+        self.at_rig.wait = Some(Wait::There { since, within: now });
+    }
+
+    fn go_on(&mut self, row: &Row, out: &mut Reaction) {
+        self.at_rig.wait = None;
+        match self.at_rig.then.take() {
+            Some(Then::End) => self.finish(out, Outcome::Complete),
+            _ if self.at_rig.disarmed => {
+                self.at_rig.disarmed = false;
+                self.arming = self.unarmed.afresh();
+                self.stage = Stage::Arm;
+            }
+            _ => self.begin_next(row, out),
+        }
+    }
+}
+
+/// Whether the rig was read back off and at rest, its second channel open where it has one.
+fn is_off(row: &Row) -> bool {
+    let seen = &row.inputs.seen;
+    let open = match seen.supply {
+        Err(NoData::NotFitted) => None,
+        Ok(supply) => Some(supply.cut),
+        Err(_) => Some(false),
+    };
+    let drive_off = open.unwrap_or_else(|| seen.amplifier.is_ok_and(|a| !a.output_on));
+    let at_rest = seen.stage.is_ok_and(|stage| stage.velocity_m_s.abs() < STILL_M_S);
+    !row.armed && !row.proving && drive_off && at_rest
+}
