@@ -40,6 +40,20 @@ fn every_command_that_a_page_names_exists() {
     assert!(words::exists("muprime model pointt", &commands).is_err());
 }
 
+/// The front page is short, and its numbers are those of the code.
+#[test]
+fn the_front_page_is_short_and_its_counts_hold() {
+    let page = std::fs::read_to_string(file("README.md")).unwrap();
+    assert!(page.lines().count() < 80, "{} lines", page.lines().count());
+    for claim in [
+        format!("; {} are bundled", drivers::bundled::ids().count()),
+        format!("{} rules trip and latch", realtime::safety::RULES.len()),
+        format!("{} candidate causes", effects::library::library().len()),
+    ] {
+        assert!(page.contains(&claim), "README.md does not say '{claim}'");
+    }
+}
+
 /// docs/commands.md is what the program's own help says.
 #[test]
 fn the_page_of_commands_is_that_of_the_program() {

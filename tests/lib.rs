@@ -118,3 +118,22 @@ pub fn short_plan(folder: &Path) -> String {
     std::fs::write(&path, SHORT).expect("a folder that can be written");
     path.display().to_string()
 }
+
+/// Headings under which `muprime --help` lists verbs.
+const VERB_GROUPS: [&str; 6] = ["Measure", "Understand", "Calibrate", "Look", "Studies", "Develop"];
+
+/// The verbs that a help page lists: in groups for the program, below 'Commands' for a verb with verbs of its own.
+pub fn listed_verbs(help: &str) -> Vec<String> {
+    let mut listing = false;
+    let mut names = Vec::new();
+    for line in help.lines() {
+        if !line.starts_with(' ') {
+            // The program lists its verbs in groups, a verb lists its own below 'Commands'.
+            let group = line.strip_suffix(':').unwrap_or_default();
+            listing = group == "Commands" || VERB_GROUPS.contains(&group);
+        } else if let Some(name) = line.strip_prefix("  ").filter(|l| listing && !l.starts_with(' ')) {
+            names.extend(name.split(' ').next().filter(|n| *n != "help").map(str::to_string));
+        }
+    }
+    names
+}

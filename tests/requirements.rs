@@ -239,14 +239,8 @@ fn the_contract_names_the_commands_and_flags_that_there_are() {
     let rows = contract.lines().filter_map(|line| line.strip_prefix("| `muprime "));
     let named: BTreeSet<&str> = rows.filter_map(|row| row.split([' ', '`']).next()).collect();
     let all = help(&[]);
-    let listed = all.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
-    let there: BTreeSet<&str> = listed
-        // A command stands two spaces in, the rest of its words further.
-        .filter_map(|line| line.strip_prefix("  ").filter(|l| !l.starts_with(' ')))
-        .filter_map(|line| line.split(' ').next())
-        .filter(|command| *command != "help")
-        .collect();
-    assert_eq!(named, there);
+    let verbs = tests::listed_verbs(&all);
+    assert_eq!(named, verbs.iter().map(String::as_str).collect());
 
     let sections: Vec<(&str, &str)> =
         contract.split("\n### `muprime ").skip(1).filter_map(|s| s.split_once("`\n")).collect();

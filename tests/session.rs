@@ -33,12 +33,12 @@ fn the_story_of_the_readme_ends_with_a_model_that_agrees() {
         printed + &told
     };
     let first = said(&["run", "--fast", "--out", "first"]);
-    assert!(first.contains("the model has left the measurement"), "{first}");
+    assert!(first.contains("the measurement disagrees with the model"), "{first}");
     let verdict = said(&["diagnose", "first", "--save-model", "model.toml"]);
-    assert!(verdict.starts_with("squeeze_film causes most of the gap"), "{verdict}");
+    assert!(verdict.starts_with("Most likely cause: squeeze film (probability > 0.999)"), "{verdict}");
     for seed in ["2", "3"] {
         let corrected = said(&["run", "--fast", "--model", "model.toml", "--seed", seed, "--out", seed]);
-        assert!(corrected.contains("the measurement agrees with the model"), "{corrected}");
+        assert!(corrected.contains("agrees with the model"), "{corrected}");
         let compared = said(&["compare", "first", seed]);
         assert!(compared.starts_with("no difference seen") && compared.contains("  model: "), "{compared}");
     }
@@ -114,9 +114,12 @@ fn a_trip_is_told_with_its_unit_and_its_remedy() {
     let (_, stderr) = texts(&output);
     assert_eq!(output.status.code(), Some(1), "{stderr}");
     let remedy = realtime::safety::Cause::NormalOverforce.remedy();
-    let trip = stderr.lines().find(|line| line.starts_with("TRIP ")).unwrap_or_default();
-    assert!(trip.starts_with("TRIP NormalOverforce (SR-04): 0.25"), "{stderr}");
-    assert!(trip.contains(" N against 0.25 N, at ") && stderr.contains(remedy), "{stderr}");
+    let trip = stderr.lines().find(|line| line.starts_with("STOPPED for safety: ")).unwrap_or_default();
+    assert!(
+        trip.contains("the normal force is above its limit: 0.25") && trip.contains("[SR-04]"),
+        "{stderr}"
+    );
+    assert!(trip.contains(" N (limit 0.25 N), at ") && stderr.contains(remedy), "{stderr}");
     let summary = std::fs::read_to_string(out.join("summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     assert_eq!(
@@ -124,7 +127,7 @@ fn a_trip_is_told_with_its_unit_and_its_remedy() {
         (&"N".into(), &"SR-04".into(), &remedy.into())
     );
     let report = std::fs::read_to_string(out.join("report.html")).unwrap();
-    assert!(report.contains(remedy) && report.contains(" N against 0.25 N"), "{report}");
+    assert!(report.contains(remedy) && report.contains(" N (limit 0.25 N)"), "{report}");
 }
 
 #[test]

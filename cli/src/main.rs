@@ -20,15 +20,15 @@ use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 use verbs as cli;
 
-/// Controller of a hardware-in-the-loop tribometer: ultrasonic friction reduction, measured and explained.
+/// Runs friction sweeps on a tribometer with an ultrasonic plate and explains the results.
 #[derive(Parser)]
 #[command(name = "muprime", version, arg_required_else_help = true, max_term_width = 80)]
 struct Cli {
     /// Print one JSON document (or one per line where a command streams) on stdout and nothing else.
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Common options")]
     json: bool,
     /// Folder of instrument profiles, besides ~/.config/muprime/profiles and the bundled ones
-    #[arg(long, global = true, value_name = "DIR")]
+    #[arg(long, global = true, value_name = "DIR", help_heading = "Common options")]
     profiles: Option<std::path::PathBuf>,
     #[command(subcommand)]
     verb: Verb,
@@ -36,61 +36,61 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// An automated friction sweep; without arguments on the bundled virtual rig
+    /// Run a friction sweep; by default on the bundled virtual rig
     Run(cli::run::Args),
-    /// Serve the simulated rig behind real protocols until interrupted
+    /// Serve the simulated rig over real protocols until interrupted
     VirtualRig(cli::virtual_rig::Args),
-    /// Data in, a dated and hashed certificate with uncertainties out
+    /// Make calibration certificates with uncertainties from data
     Calibrate(cli::calibrate::Args),
-    /// Read setups, plans, profiles, certificates; say what is wrong, with the place in the file
+    /// Check setups, plans, profiles and certificates, line by line
     Check(cli::check::Args),
-    /// Judge this machine, and the instruments of a setup
+    /// Test this machine, and every channel of a setup's instruments
     Doctor(cli::doctor::Args),
-    /// Say where simulation and reality part, which effect causes it, and how far it shrinks
+    /// Find where measurement and model disagree, and the likely cause
     Diagnose(cli::diagnose::Args),
-    /// Score the diagnosis on sealed sets of an independent simulation
+    /// Score the diagnosis on labelled sets of an independent simulation
     Blind(cli::blind::Args),
-    /// Strike the virtual rig with every fault of the list, in virtual time, from seeds
+    /// Inject every known fault into the virtual rig, in virtual time
     Faults(cli::faults::Args),
-    /// Write a file of cases: a study for one machine or for many
+    /// Write a study as a file of cases, for one machine or many
     #[cfg(feature = "parquet")]
     Cases(cli::cases::Args),
-    /// Run one case of a study, or a range of them, once
+    /// Run one case of a study, or a range of them
     #[cfg(feature = "parquet")]
     Case(cli::case::Args),
-    /// Run what is missing of a study: here, or on Slurm, HyperQueue, Dask
+    /// Run a study's missing cases: here, on Slurm, HyperQueue or Dask
     #[cfg(feature = "parquet")]
     Submit(cli::submit::Args),
-    /// Make one table of a study's results
+    /// Collect the results of a study in one table
     #[cfg(feature = "parquet")]
     Gather(cli::gather::Args),
-    /// Evaluate the models: a point, a finite element case, a study, the paper's figures
+    /// Evaluate the friction models; recompute the paper's figures
     Model(cli::model::ModelArgs),
-    /// Make a point table of a foreign one: any delimiter, Excel, Parquet, NumPy, time series
+    /// Convert your own data into a table that 'diagnose' reads
     Import(cli::import::Args),
-    /// Write the report of a run
+    /// Write the report page of a run
     Report(cli::report::Args),
-    /// Two runs side by side: whether they differ beyond their uncertainty, and in what
+    /// Compare two runs: what differs beyond their uncertainty
     Compare(cli::compare::Args),
-    /// Run a recorded run's cycles again: the same decisions, bit for bit
+    /// Repeat the cycles of a record; compare decisions bit for bit
     Replay(cli::replay::Args),
-    /// Convert the passes of a run
+    /// Convert a run for other programs: HDF5, Parquet, MCAP, RO-Crate
     Export(cli::export::Args),
-    /// Make a cut record whole again
+    /// Repair a truncated record
     Recover(cli::recover::Args),
-    /// List the runs
+    /// List and search the runs
     Runs(cli::runs::Args),
-    /// Follow a run
+    /// Watch a run live in the terminal
     Watch(cli::watch::Args),
-    /// See the rig, the catalogue and the reports in a browser
+    /// Show the rig, the runs and their reports in a browser
     Dashboard(cli::dashboard::Args),
-    /// Print the JSON Schema of a kind of file, for editors and programs
+    /// Print the JSON Schema of a kind of file
     Schema(cli::schema::Args),
-    /// Print a commented file to begin with: a plan, a setup, a fingertip, a profile
+    /// Print a commented plan, setup, fingertip or profile to edit
     Init(cli::init::Args),
-    /// List what is bundled, or print one of it
+    /// List the bundled files, or print one
     Show(cli::show::Args),
-    /// Print a page on an instrument profile: what it reads and writes
+    /// Print a readable page about an instrument profile
     Doc(cli::doc::Args),
     /// Write manual pages
     Man(cli::man::Args),
@@ -100,7 +100,7 @@ enum Verb {
 
 /// The command line, with an example for every command.
 fn command() -> clap::Command {
-    cli::examples::with_examples(Cli::command())
+    cli::groups::grouped(cli::examples::with_examples(Cli::command()))
 }
 
 fn parsed(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Cli, clap::Error> {

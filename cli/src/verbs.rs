@@ -19,6 +19,7 @@ pub mod export;
 pub mod faults;
 #[cfg(feature = "parquet")]
 pub mod gather;
+pub mod groups;
 pub mod import;
 pub mod init;
 pub mod man;
@@ -40,7 +41,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
-/// Done, also when the model has left the measurement or the verdict is unknown.
+/// Done, also when the measurement disagrees with the model or the verdict is unknown.
 pub const DONE: u8 = 0;
 /// Done, but the answer is a failure: a safety trip ended the run, a check fell short.
 pub const FAILED: u8 = 1;

@@ -127,24 +127,31 @@ fn region(
         let (word, (scale, unit)) = (covariate.words, covariate.shown);
         let (low, high) = (low * scale, high * scale);
         words.push(match (b[0].is_finite(), b[1].is_finite()) {
-            (true, true) => format!("{word} {low:.3} to {high:.3} {unit}"),
-            (true, false) => format!("{word} above {low:.3} {unit}"),
-            _ => format!("{word} below {high:.3} {unit}"),
+            (true, true) => format!("{word} {} to {} {unit}", short(low), short(high)),
+            (true, false) => format!("{word} above {} {unit}", short(low)),
+            _ => format!("{word} below {} {unit}", short(high)),
         });
     }
-    let place = if words.is_empty() { "everywhere".to_string() } else { format!("at {}", words.join(", ")) };
+    let place = if words.is_empty() { "everywhere".to_string() } else { words.join(", ") };
     let percent = 100.0 * share;
     let text = match p_value {
         // A share of what was measured would be one of nothing.
         None => format!(
-            "nothing was measured {place}: the verdict's model alone puts {percent:.0} % of its gap there"
+            "nothing was measured at {place}; only the verdict's model puts {percent:.0} % of its gap there"
         ),
         // The test's distribution is not known so far out: smaller ones are not told apart.
-        Some(p) if p < 1e-6 => format!("{percent:.0} % of the gap lies {place} (p < 1e-6)"),
-        Some(p) if p < 0.01 => format!("{percent:.0} % of the gap lies {place} (p = {p:.1e})"),
-        Some(p) => format!("{percent:.0} % of the gap lies {place} (p = {p:.2})"),
+        Some(p) if p < 1e-6 => format!("{percent:.0} % of the gap: {place} (p < 1e-6)"),
+        Some(p) if p < 0.01 => format!("{percent:.0} % of the gap: {place} (p = {p:.1e})"),
+        Some(p) => format!("{percent:.0} % of the gap: {place} (p = {p:.2})"),
     };
     Region { bounds: named, share_of_gap: share, p_value: p_value.unwrap_or(1.0), text }
+}
+
+/// A number with two significant digits, and all digits before its point.
+fn short(value: f64) -> String {
+    let decimals = (1 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 9) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
 /// Conditions of the same design: what can be set is drawn independently, from the table's levels or from between
@@ -200,9 +207,9 @@ mod tests {
         let empty = region(&bounds, &passes, 0.08, None).text;
         assert_eq!(
             empty,
-            "nothing was measured at amplitude 2.000 to 3.000 um pp: the verdict's model alone puts 8 % of its gap there"
+            "nothing was measured at amplitude 2 to 3 um pp; only the verdict's model puts 8 % of its gap there"
         );
         let seen = region(&bounds, &passes, 0.08, Some(0.002)).text;
-        assert_eq!(seen, "8 % of the gap lies at amplitude 2.000 to 3.000 um pp (p = 2.0e-3)");
+        assert_eq!(seen, "8 % of the gap: amplitude 2 to 3 um pp (p = 2.0e-3)");
     }
 }

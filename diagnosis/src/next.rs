@@ -44,6 +44,15 @@ fn settings<S: Serializer>(conditions: &[Condition], serializer: S) -> Result<S:
 
 /// Passes of a designed experiment.
 pub const PASSES: usize = 12;
+/// Odds that are expected of an experiment.
+pub fn odds(nats: f64) -> String {
+    if nats > 6.0 * std::f64::consts::LN_10 {
+        "odds above 10^6".into()
+    } else {
+        format!("odds of {:.0} to 1", nats.exp())
+    }
+}
+
 /// Designs experiments for what a decision left open.
 pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Decision) -> Vec<Experiment> {
     let k = &fitted.problem.constants;
@@ -65,8 +74,10 @@ pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Dec
             list.push(Experiment {
                 conditions: chosen.iter().map(|&i| grid[i]).collect(),
                 text: format!(
-                    "{PASSES} passes that best part {} from {} and the other hypotheses; {nats:.1} nats expected",
-                    names[0], names[1]
+                    "{PASSES} more passes would separate {} from {} and the rest ({} expected)",
+                    names[0],
+                    names[1],
+                    odds(nats)
                 ),
                 separates: names,
                 expected_nats: nats,

@@ -73,18 +73,18 @@ pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<Stri
     if fitted.pure.variance_ratio.is_none() {
         let used = fitted.scatter.scale;
         let stands = if (used - 1.0).abs() < AS_STATED {
-            "the repeatability stated in rig.toml stands for pure error.".to_string()
+            "the repeatability is that of rig.toml.".to_string()
         } else {
             format!(
-                "the scatter about the recalibrated baseline stands for pure error, {used:.2} times what rig.toml states."
+                "the repeatability is the scatter about the recalibrated baseline, {used:.2} times what rig.toml states."
             )
         };
-        remarks.push(format!("No replicates lie close together: {stands}"));
+        remarks.push(format!("No repeats close in time: {stands}"));
     }
     let told = fitted.structure.as_ref().filter(|s| s.p < STRUCTURED && decision.verdict != Verdict::Named);
     remarks.extend(told.map(|s| {
         format!(
-            "What the recalibrated baseline leaves is not like scatter: {} stands out (p = {:.1e} over all that was looked at).",
+            "The residuals of the recalibrated baseline are not scatter: {} is conspicuous (p = {:.1e} over everything searched).",
             s.place, s.p
         )
     }));
@@ -174,11 +174,10 @@ pub fn of_scatter(fitted: &Fitted, decision: &Decision, with_suspects: Option<&W
     let mut remarks = Vec::new();
     if scatter.scale > k.misstated || scatter.scale < 1.0 / k.misstated {
         remarks.push(format!(
-            "Your stated repeatability is wrong by x{:.2}: so much the passes scatter of what rig.toml states, and so much was \
-             used.{}",
+            "Passes scatter {:.2} times as much as rig.toml states; the measured scatter was used.{}",
             scatter.scale,
             if fitted.pure.variance_ratio.is_none() {
-                " A departure that looks like scatter would do the same: repeat some conditions to tell."
+                " A deviation that looks like scatter would do the same: repeat some conditions to tell."
             } else {
                 ""
             }

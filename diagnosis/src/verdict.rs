@@ -218,48 +218,48 @@ pub fn probability(p: f64) -> String {
 }
 
 fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
-    let closed = gap.shrinkage.map_or_else(
-        || match gap.before_rmse {
-            Some(_) => "held-out passes leave no gap to shrink".to_string(),
-            None => "the table is too short to hold passes out".to_string(),
-        },
-        |s| {
-            let percent = 100.0 * s.abs();
-            // A share without its interval claims more than the passes can show.
-            let within = gap.shrinkage_ci95.map_or_else(String::new, |[low, high]| {
-                let [low, high] = if s < 0.0 { [-high, -low] } else { [low, high] };
-                format!(" (95 %: {:.0} to {:.0})", 100.0 * low, 100.0 * high)
-            });
-            if s < 0.0 {
-                format!("on held-out passes it closes nothing: the gap grows by {percent:.0} %{within}")
-            } else {
-                format!("the gap shrinks by {percent:.0} %{within} on held-out passes")
-            }
-        },
-    );
+    let closed = |with: &str| {
+        let Some(share) = gap.shrinkage else {
+            return match gap.before_rmse {
+                Some(_) => "passes that were not fitted show no gap".to_string(),
+                None => "the table is too short to keep passes out of the fit".to_string(),
+            };
+        };
+        // A share without its interval claims more than the passes can show.
+        let within = gap.shrinkage_ci95.map_or_else(String::new, |[low, high]| {
+            let [low, high] = if share < 0.0 { [-high, -low] } else { [low, high] };
+            format!(" (95 %: {:.0} to {:.0})", 100.0 * low, 100.0 * high)
+        });
+        let (verb, percent) = (if share < 0.0 { "grows" } else { "shrinks" }, 100.0 * share.abs());
+        format!("with {with} the gap {verb} by {percent:.0} %{within} on passes that were not fitted")
+    };
     let leader = decision.leader().unwrap_or_default();
+    let words = |candidate: usize| label(fitted, candidate).replace('_', " ");
     match decision.verdict {
-        Verdict::NoGap => "The recalibrated baseline explains the table: no gap.".to_string(),
+        Verdict::NoGap => "No gap: the recalibrated model explains the table.".to_string(),
         Verdict::Named => format!(
-            "{} causes most of the gap (probability {}); {closed}.",
-            label(fitted, leader),
-            probability(decision.probabilities[leader])
+            "Most likely cause: {} (probability {}); {}.",
+            words(leader),
+            probability(decision.probabilities[leader]),
+            closed("it")
         ),
         Verdict::Ambiguous if decision.class.len() == 1 => {
-            let name = label(fitted, leader);
+            let (name, closed) = (words(leader), closed("it"));
             if let Some(cause) = imitated(&fitted.candidates[leader].names()) {
                 format!(
-                    "{name} together, or {}, which is not in the library: this table cannot tell; {closed}.",
+                    "{name} together, or {}, which is not in the library: this table cannot separate them; {closed}.",
                     cause.words()
                 )
             } else {
                 let probability = probability(decision.probabilities[leader]);
-                format!("{name} leads with a probability of {probability}, too little to be named; {closed}.")
+                format!(
+                    "Most likely cause: {name}, but its probability of {probability} is too low to name it; {closed}."
+                )
             }
         }
         Verdict::Ambiguous => {
-            let names: Vec<String> = decision.class.iter().take(6).map(|&i| label(fitted, i)).collect();
-            format!("This table cannot tell {} apart; {closed}.", names.join(", "))
+            let names: Vec<String> = decision.class.iter().take(6).map(|&i| words(i)).collect();
+            format!("This table cannot separate {}; {}.", names.join(", "), closed("the first"))
         }
         Verdict::Unknown => {
             let known = fitted.unlisted.first().filter(|s| {
@@ -267,10 +267,12 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
                 s.log_evidence > fitted.discrepancy.log_evidence.max(leading)
             });
             let hint = known.map_or_else(String::new, |s| {
-                format!(" What comes nearest is not in the library: {}.", s.names().join("+"))
+                let names = s.names().join("+").replace('_', " ");
+                format!(" The nearest known effect is not in the library: {names}.")
             });
             format!(
-                "There is a gap, and no effect of the library causes most of it; {closed} with a smooth map.{hint}"
+                "There is a gap, and no effect of the library explains most of it; {}.{hint}",
+                closed("a smooth map")
             )
         }
     }

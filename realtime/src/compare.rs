@@ -35,7 +35,7 @@ pub struct PassComparison {
     pub z: f64,
     /// Natural logarithm of the evidence against the model so far (an e-process).
     pub log_evidence: f64,
-    /// Whether the model has left the measurement.
+    /// Whether the measurement disagrees with the model.
     pub departed: bool,
     /// Inside the law's range or not.
     pub validity: Validity,
@@ -89,7 +89,7 @@ impl Comparator {
         (sd < 0.2 * self.estimate[0]).then_some(Mu0 { value: self.estimate[0], sd })
     }
 
-    /// Whether the model has left the measurement.
+    /// Whether the measurement disagrees with the model.
     pub fn departed(&self) -> bool {
         self.test.alarmed()
     }

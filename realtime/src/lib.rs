@@ -6,7 +6,7 @@
 //! | [`cycle`] | pure `step`: commands, safety, estimate, comparison |
 //! | [`safety`] | limits, the state machine, the only maker of a [`safety::DriveCommand`] |
 //! | [`estimate`] | `mu`, `mu'` with uncertainty and age; means over a pass |
-//! | [`compare`] | residuals against the model; the test that says when it has left the measurement |
+//! | [`compare`] | residuals against the model; the test that says when they disagree |
 //! | [`turn`] | one turn of the loop over real ports; the row that it leaves behind |
 //! | [`pacing`] | the thread: absolute deadlines, lateness histogram; in `pacing/machine.rs` what it asks of the machine |
 //! | [`clock`] | time of drivers, loop and virtual world; a virtual rig's can be held |

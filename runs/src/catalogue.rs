@@ -23,7 +23,7 @@ pub struct RunEntry {
     pub passes: i64,
     /// Passes planned.
     pub planned: i64,
-    /// Whether the model has left the measurement.
+    /// Whether the measurement disagrees with the model.
     pub departed: bool,
 }
 

@@ -357,7 +357,8 @@ impl Sequence {
     fn armed(&mut self, row: &Row, out: &mut Reaction) {
         let seen = &row.inputs.seen;
         out.events.push(Event::Armed);
-        if seen.supply == Err(NoData::NotFitted) {
+        // A virtual rig has no mains that a person could cut.
+        if seen.supply == Err(NoData::NotFitted) && !self.at_rig.is_simulated() {
             out.events.push(Event::NoSecondChannel);
         }
         if !self.has_watchdog {

@@ -117,7 +117,7 @@ pub struct Summary {
     pub passes: usize,
     /// Passes planned.
     pub planned: usize,
-    /// Whether the model has left the measurement.
+    /// Whether the measurement disagrees with the model.
     pub model_departed: bool,
     /// What the comparison of all passes says.
     #[serde(default = "nothing_said")]

@@ -58,7 +58,7 @@ pub fn terminal(result: &Diagnosis) -> String {
         let name = if h.effects.is_empty() { "no gap".to_string() } else { h.effects.join(" + ") };
         text.push_str(&format!("  {:>7}  {name}", probability(h.probability)));
         if h.alias_class.len() > 1 {
-            text.push_str(&format!("  (not told from {})", h.alias_class[1..].join(", ")));
+            text.push_str(&format!("  (cannot be separated from {})", h.alias_class[1..].join(", ")));
         }
         text.push('\n');
         if h.probability > 0.05 {
@@ -70,10 +70,10 @@ pub fn terminal(result: &Diagnosis) -> String {
     }
     let g = &r.gap;
     let told = |rmse: Option<f64>| {
-        rmse.map_or_else(|| "- (too short to hold passes out)".to_string(), |v| format!("{v:.4}"))
+        rmse.map_or_else(|| "- (the table is too short)".to_string(), |v| format!("{v:.4}"))
     };
     text.push_str(&format!(
-        "\nGap on held-out passes, in units of full friction\n  nominal baseline      {}\n  recalibrated baseline {}\n  verdict's model       {}\n  repeatability         {}\n",
+        "\nGap on passes that were not fitted, as a share of full friction\n  nominal baseline      {}\n  recalibrated baseline {}\n  verdict's model       {}\n  repeatability         {}\n",
         told(g.before_rmse), told(g.recalibrated_rmse), told(g.after_rmse), told(g.noise_floor_rmse)
     ));
     if let (Some(s), Some([low, high])) = (g.shrinkage, g.shrinkage_ci95) {
@@ -93,7 +93,7 @@ pub fn terminal(result: &Diagnosis) -> String {
         }
         let rest = r.location.regions.len() - told;
         if rest > 0 {
-            text.push_str(&format!("  and {rest} further parts, in the JSON document\n"));
+            text.push_str(&format!("  and {rest} more in the JSON document (--json)\n"));
         }
     }
     if !r.next_experiment.is_empty() {
@@ -102,13 +102,16 @@ pub fn terminal(result: &Diagnosis) -> String {
             text.push_str(&format!("  {}", e.text));
             if e.conditions.is_empty() {
                 let [a, b] = &e.separates;
-                text.push_str(&format!(" (parts {a} from {b}: {:.1} nats)", e.expected_nats));
+                text.push_str(&format!(
+                    " (separates {a} from {b}: {} expected)",
+                    diagnosis::next::odds(e.expected_nats)
+                ));
             }
             text.push('\n');
         }
     }
     if !r.not_testable.is_empty() {
-        text.push_str("\nNot testable on this table\n");
+        text.push_str("\nThis table cannot test\n");
         for n in &r.not_testable {
             text.push_str(&format!("  {}: {}\n", n.effect, n.because));
         }

@@ -13,20 +13,13 @@ fn help(words: &[&str]) -> String {
     texts(&output).0
 }
 
-/// Commands below one, as its help lists them.
-fn below(help: &str) -> Vec<String> {
-    let listed = help.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
-    let names = listed.filter_map(|l| l.strip_prefix("  ").filter(|l| !l.starts_with(' ')));
-    names.filter_map(|l| l.split(' ').next()).filter(|n| *n != "help").map(str::to_string).collect()
-}
-
 /// All commands of the program.
 pub fn commands() -> Commands {
     let mut all = Commands::new();
     let mut open: Vec<Vec<String>> = vec![Vec::new()];
     while let Some(words) = open.pop() {
         let said = help(&words.iter().map(String::as_str).collect::<Vec<_>>());
-        open.extend(below(&said).into_iter().map(|name| [words.clone(), vec![name]].concat()));
+        open.extend(tests::listed_verbs(&said).into_iter().map(|name| [words.clone(), vec![name]].concat()));
         all.insert(words.join(" "), said);
     }
     all
@@ -105,7 +98,7 @@ pub fn exists(call: &str, commands: &Commands) -> Result<(), String> {
         let longer = if name.is_empty() { (*word).to_string() } else { format!("{name} {word}") };
         if commands.contains_key(&longer) {
             name = longer;
-        } else if name.is_empty() || !below(&commands[&name]).is_empty() {
+        } else if name.is_empty() || !tests::listed_verbs(&commands[&name]).is_empty() {
             let plain = word.chars().all(|c| c.is_ascii_lowercase() || c == '-');
             if plain && !word.starts_with('-') && *word != "help" {
                 return Err(format!("no command '{longer}'"));

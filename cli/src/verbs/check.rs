@@ -89,9 +89,9 @@ fn causes(error: &miette::Report) -> Vec<String> {
 fn words(good: &Good, setup: Option<&Setup>) -> String {
     match (good.kind, good.passes, setup) {
         ("plan", Some(passes), Some(setup)) => {
-            format!("a good plan: {passes} passes on {}", setup.file.name)
+            format!("OK: {passes} passes on {}", setup.file.name)
         }
-        (kind, Some(passes), _) => format!("a good {kind} of {passes} passes"),
-        (kind, None, _) => format!("a good {kind}"),
+        (kind, Some(passes), _) => format!("OK: {kind} of {passes} passes"),
+        (kind, None, _) => format!("OK: {kind}"),
     }
 }

@@ -46,7 +46,7 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     let mut text = String::new();
     let w = &mut text;
     for warning in warned {
-        let _ = writeln!(w, "Mind: {warning}");
+        let _ = writeln!(w, "note: {warning}");
     }
     match &result.judged {
         None => w.push_str("cannot tell: the runs have no condition in common\n"),
@@ -70,7 +70,8 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     }
     let worst = result.furthest_first();
     if !worst.is_empty() {
-        w.push_str("furthest apart (w peak-to-peak; second less first, in standard deviations):\n");
+        w.push_str("largest differences (w peak-to-peak; second minus first, in standard deviations):\n");
+        w.push_str("     w, um  f, kHz  U, mm/s  F, N  first second difference (sd)\n");
     }
     for p in worst.iter().take(TOLD) {
         let _ = writeln!(
@@ -86,11 +87,8 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
             p.deviations()
         );
     }
-    let _ = writeln!(
-        w,
-        "what differed: {}",
-        if differ.is_empty() { "nothing that the records tell" } else { "" }
-    );
+    let _ =
+        writeln!(w, "settings that differ: {}", if differ.is_empty() { "none in the records" } else { "" });
     let shown = |value: &Option<String>| value.as_ref().map_or("none".to_string(), |v| shortened(v, SHOWN));
     for d in differ {
         let _ = writeln!(w, "  {}: {} and {}", d.what, shown(&d.a), shown(&d.b));

@@ -103,7 +103,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         match result.saved_model() {
             Some(model) => write_text(out, &toml::to_string(&model).into_diagnostic()?)?,
             None => {
-                say!("no model written to {}: no effect of the library causes most of the gap", out.display())
+                say!(
+                    "no model written to {}: no effect of the library explains most of the gap",
+                    out.display()
+                )
             }
         }
     }

@@ -62,7 +62,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         out!("{}", serde_json::json!({ "good": good, "judgement": judgement }));
     } else {
         for f in judgement.findings.iter().chain(&judgement.instruments) {
-            let mark = if f.good { "good" } else { "POOR" };
+            let mark = if f.good { "OK" } else { "FIX" };
             out!("{}", folded(&format!("{mark}  {}: {}", f.subject, f.found), 6));
             if !f.good {
                 out!("{}", folded(&format!("      {}", f.advice), 0));

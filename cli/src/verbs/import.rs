@@ -146,8 +146,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     if !log.dropped.is_empty() {
         say!(
-            "{} rows were left out; each stands in import.json with its reason. The first:",
-            log.dropped.len()
+            "{} {} left out; import.json lists each with the reason. The first:",
+            log.dropped.len(),
+            if log.dropped.len() == 1 { "row was" } else { "rows were" }
         );
         for d in log.dropped.iter().take(3) {
             say!("  row {}: {} '{}': {}", d.row, d.column, d.text, d.reason);

@@ -68,7 +68,7 @@ pub struct Args {
     #[arg(long, value_name = "WORDS")]
     sample: Option<String>,
     /// Licence of the data, for its record and exports: an SPDX identifier (CC-BY-4.0) or an address
-    #[arg(long, value_name = "ID")]
+    #[arg(long, visible_alias = "license", value_name = "ID")]
     licence: Option<String>,
     /// Answers of the person at the rig, one a line, for a machine without a person
     #[arg(long, value_name = "FILE")]
@@ -326,7 +326,7 @@ fn tell(summary: &Summary, json: bool) {
         told!("{}", summary.off.words());
     }
     if summary.finished_before {
-        told!("every pass of this run was made before: nothing was driven, nothing was recorded");
+        told!("this run is already complete; nothing was measured");
     }
     told!("{} of {} passes", summary.passes, summary.planned);
     if let Some(report) = &summary.loop_report {
@@ -346,21 +346,21 @@ fn tell(summary: &Summary, json: bool) {
         && let Some(stall) = stalls.within(Nanos(trip.at.0.saturating_sub(100_000_000)), trip.at)
     {
         told!(
-            "just before the trip this machine kept its programs from running for {:.0} ms: see 'muprime doctor'",
+            "the computer itself stalled for {:.0} ms just before; see 'muprime doctor'",
             stall.lasted.seconds() * 1e3
         );
     }
     if let (Outcome::WouldNotArm { blocking: Some(cause) }, Some(remedy)) =
         (&summary.outcome, &summary.remedy)
     {
-        told!("the rig would not arm: {cause:?} stands in the way\n  {remedy}");
+        told!("the rig did not arm: {}\n  {remedy}", cause.words());
     }
     if summary.passes < summary.planned {
-        told!("the same command with --out {} goes on", summary.folder.display());
+        told!("to resume, repeat the command with --out {}", summary.folder.display());
     }
     told!("{}", summary.agreement);
     if summary.model_departed {
-        told!("'muprime diagnose {}' says where and why", summary.folder.display());
+        told!("next: muprime diagnose {}", summary.folder.display());
     }
     told!("report: {}", summary.folder.join("report.html").display());
 }

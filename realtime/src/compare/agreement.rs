@@ -21,7 +21,7 @@ const POWER_90: f64 = 1.281_551_565_544_600_4;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "finding", rename_all = "snake_case")]
 pub enum Agreement {
-    /// The model has left the measurement.
+    /// The measurement disagrees with the model.
     Departed,
     /// The residuals are what they should be, and a small departure would have been seen.
     Agrees {
@@ -91,21 +91,21 @@ impl Agreement {
 impl std::fmt::Display for Agreement {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Agreement::Departed => write!(f, "the model has left the measurement"),
+            Agreement::Departed => write!(f, "the measurement disagrees with the model"),
             Agreement::Agrees { judged, rms_z, visible_departure } => write!(
                 f,
-                "the measurement agrees with the model: {judged} passes with vibration, residuals of {rms_z:.2} standard \
-                 deviations (rms); a departure of mu' by {visible_departure:.3} would have been seen"
+                "agrees with the model ({judged} passes, residuals of {rms_z:.2} standard deviations rms); a deviation of mu' \
+                 above {visible_departure:.3} would have been detected"
             ),
             Agreement::TooLittle { why, judged, visible_departure } => {
-                write!(f, "too little to say whether model and measurement agree: ")?;
+                write!(f, "cannot tell whether measurement and model agree: ")?;
                 match why {
                     Lack::Passes => {
-                        write!(f, "{judged} passes with vibration were judged, {ENOUGH_PASSES} are needed")
+                        write!(f, "{judged} passes with vibration were compared; {ENOUGH_PASSES} are needed")
                     }
                     Lack::Power => {
                         let visible = visible_departure.unwrap_or(f64::INFINITY);
-                        write!(f, "only a departure of mu' by {visible:.2} or more would have been seen")
+                        write!(f, "only a deviation of mu' above {visible:.2} would have been detected")
                     }
                     Lack::Scatter => write!(f, "the residuals scatter more than the stated noise"),
                     Lack::Unfinished => {

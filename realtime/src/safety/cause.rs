@@ -107,12 +107,64 @@ impl Cause {
         RULES.iter().find(|rule| rule.cause == self).map(|rule| rule.id)
     }
 
+    /// What happened, in words.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::StartUp => "the rig has not been armed since it was started",
+            Self::Stopped => "stopped on request",
+            Self::DeadMan => "the dead-man device was released",
+            Self::Exposure => "vibration on the finger lasted too long without a rest",
+            Self::NormalOverforce => "the normal force is above its limit",
+            Self::LateralOverforce => "the lateral force is above its limit",
+            Self::ForceRate => "the normal force changes too fast",
+            Self::LateralStale => "the lateral force sensor sends no fresh samples",
+            Self::NormalStale => "the normal force sensor sends no fresh samples",
+            Self::LateralInvalid => "the lateral force sensor sends invalid values",
+            Self::NormalInvalid => "the normal force sensor sends invalid values",
+            Self::LateralSaturated => "the lateral force sensor is at the end of its range",
+            Self::NormalSaturated => "the normal force sensor is at the end of its range",
+            Self::LateralFrozen => "the lateral force sensor repeats one value",
+            Self::NormalFrozen => "the normal force sensor repeats one value",
+            Self::Noisy => "too many spikes in a force",
+            Self::AmplifierStale => "the amplifier's state is too old",
+            Self::AmplifierFault => "the amplifier reports a fault",
+            Self::AmplifierWatchdog => "the amplifier's watchdog switched it off",
+            Self::OverAmplitude => "the measured amplitude is above its limit",
+            Self::AmplitudeRunaway => "the measured amplitude is above the commanded one",
+            Self::AmplitudeRate => "the measured amplitude rises too fast",
+            Self::DriveNoResponse => "the plate does not respond to the drive",
+            Self::EchoMismatch => "the amplifier echoes another set-point than it was given",
+            Self::RefusesOff => "the amplifier stays on after 'off'",
+            Self::OverTemperature => "too hot, or the temperature is unknown",
+            Self::StageStale => "the stage's state is too old",
+            Self::StageFault => "the stage reports a fault",
+            Self::OverTravel => "the stage is outside its travel",
+            Self::Overrun => "the loop missed too many deadlines",
+            Self::RequestRefused => "a request is beyond the limits",
+            Self::Suspended => "the computer stopped the loop for too long",
+            Self::StageNotFollowing => "the stage does not follow its commanded speed",
+            Self::LateralLossy => "the lateral force channel loses most of its samples",
+            Self::NormalLossy => "the normal force channel loses most of its samples",
+            Self::EmergencyStop => "the emergency stop is pressed, or its contact is not heard",
+            Self::Interlock => "the guard is open, or its contact is not heard",
+            Self::SupplySwitch => "the supply relay does not do what it is commanded",
+            Self::Unguarded => "a guard that this rig needs is missing",
+            Self::ExposureDuty => "the finger was vibrated for too large a share of the last hour",
+            Self::ExposureDose => "the vibration of the last hour was too strong for the finger",
+            Self::AmplitudeSaturated => "the amplitude sensor is at the end of its range",
+            Self::AmplitudeFrozen => "the amplitude sensor repeats one value",
+            Self::LoadImplausible => "the normal force is not the commanded load",
+        }
+    }
+
     /// What a person at the rig does about it, in one sentence or two.
     pub const fn remedy(self) -> &'static str {
         match self {
             Self::StartUp => "Nothing is wrong: the rig waits to be armed.",
-            Self::Stopped => "Nothing is wrong: it was asked for. The same command goes on with the run.",
-            Self::DeadMan => "Let go of the dead-man device, grip it again, and start anew.",
+            Self::Stopped => {
+                "Nothing is wrong: a stop was requested. Repeat the command with the same --out to resume."
+            }
+            Self::DeadMan => "Release the dead-man device, grip it again, and start the run again.",
             Self::Exposure => {
                 "Take the finger off and rest as long as `exposure_rest_s` says; plan shorter passes."
             }
@@ -125,7 +177,7 @@ impl Cause {
                 "Look at the force sensor's cable and power, and at `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link."
             }
             Self::LateralInvalid | Self::NormalInvalid => {
-                "Look at the force sensor: it answers with what is no force. `muprime doctor --setup` shows the link."
+                "Look at the force sensor: its values are no forces. `muprime doctor --setup` shows the link."
             }
             Self::LateralSaturated | Self::NormalSaturated => {
                 "Unload and zero the force sensor, or use one with a larger range."
@@ -178,28 +230,28 @@ impl Cause {
                 "Let nothing stop this program or its machine during a run; `muprime doctor` shows how the machine stalls."
             }
             Self::StageNotFollowing => {
-                "Look for what blocks the stage or moves it from outside; look at the stage's drive."
+                "Find what blocks the stage or moves it from outside; check the stage's drive."
             }
             Self::LateralLossy | Self::NormalLossy => {
                 "Look at the force sensor's link: most samples are lost. State the true rate as `rate_hz`."
             }
             Self::EmergencyStop => {
-                "Make the rig safe, release the emergency stop and start anew; if it was not pressed, look at its wire and its input."
+                "Make the rig safe, release the emergency stop and start the run again; if it was not pressed, look at its wire and its input."
             }
             Self::Interlock => {
-                "Close the guard and start anew; if it was closed, look at its wire and its input."
+                "Close the guard and start the run again; if it was closed, look at its wire and its input."
             }
             Self::SupplySwitch => {
-                "Look at the relay in the supply, its mirror contact and their wires: it does not do what it is told."
+                "Look at the relay in the supply, its mirror contact and their wires: it does not follow its commands."
             }
             Self::Unguarded => {
                 "Fit what is missing and state it in the setup: [supply_relay], [safety_inputs]."
             }
             Self::ExposureDuty => {
-                "Take the finger off: the hour has had its share. Go on when enough of it is over."
+                "Remove the finger: the hourly limit of vibration is reached. Resume after a rest."
             }
             Self::ExposureDose => {
-                "Take the finger off: the hour has had its dose. Go on when enough of it is over, with less amplitude."
+                "Remove the finger: the hourly dose of vibration is reached. Resume after a rest, with less amplitude."
             }
             Self::AmplitudeSaturated => {
                 "Ask for less amplitude, or set a larger range of the amplitude's sensor."
@@ -299,17 +351,15 @@ const MISSING: [&str; 6] = [
 /// One line: cause, requirement, value and bound with their unit, time and cycle.
 impl fmt::Display for Trip {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:?}", self.cause)?;
-        if let Some(id) = self.cause.requirement() {
-            write!(f, " ({id})")?;
-        }
+        write!(f, "{}", self.cause.words())?;
         if self.cause == Cause::Unguarded {
             let missing = MISSING.get(self.value as usize).copied().unwrap_or_default();
             write!(f, ": there is no {missing}")?;
         }
         if self.unit != Unit::Flag {
-            write!(f, ": {} against {}", self.unit.of(self.value), self.unit.of(self.bound))?;
+            write!(f, ": {} (limit {})", self.unit.of(self.value), self.unit.of(self.bound))?;
         }
-        write!(f, ", at {:.3} s (cycle {})", self.at.seconds(), self.cycle)
+        write!(f, ", at {:.3} s", self.at.seconds())?;
+        self.cause.requirement().map_or(Ok(()), |id| write!(f, " [{id}]"))
     }
 }

@@ -189,9 +189,7 @@ fn state(page: &Page<'_>) -> (String, Style) {
     );
     match (s.armed, s.blocking) {
         (true, _) => (format!("ARMED: {at}"), look.strong(Color::Green)),
-        (false, Some(cause)) => {
-            (format!("NOT ARMED: {cause:?} stands in the way"), look.strong(Color::Yellow))
-        }
+        (false, Some(cause)) => (format!("NOT ARMED: {}", cause.words()), look.strong(Color::Yellow)),
         (false, None) => ("NOT ARMED".into(), look.strong(Color::Yellow)),
     }
 }
@@ -224,19 +222,18 @@ fn progress(page: &Page<'_>) -> String {
 /// What must not be overlooked: the trip with its remedy, how it ended, what is said of the output.
 fn urgent(view: &View) -> Vec<String> {
     let mut lines = Vec::new();
-    // A stop that was asked for is nothing to be mended.
+    // Whether the output is off comes first: from the end's words, or until they come from the last reading.
+    let off = view.ended.as_ref().map_or(view.not_off.as_deref(), |ended| ended.off.as_deref());
+    lines.extend(off.iter().flat_map(|off| off.lines()).map(plain));
+    // A stop on request is nothing to be mended.
     let trip = view.trip.as_ref().filter(|trip| trip.cause != Cause::Stopped);
     if let Some(trip) = trip {
-        lines.push(format!("TRIP {}", plain(&trip.to_string())));
+        lines.push(format!("STOPPED for safety: {}", plain(&trip.to_string())));
         lines.push(format!("remedy: {}", plain(trip.cause.remedy())));
     }
-    // Until the end is told, which holds the same words.
-    let not_off = view.not_off.as_deref().filter(|_| view.ended.is_none());
-    lines.extend(not_off.iter().flat_map(|off| off.lines()).map(plain));
     if let Some(ended) = &view.ended {
         let remedy = ended.remedy.as_ref().filter(|_| trip.is_none());
         lines.extend(remedy.map(|remedy| format!("remedy: {}", plain(remedy))));
-        lines.extend(ended.off.iter().flat_map(|off| off.lines()).map(plain));
         lines.extend(ended.agreement.as_deref().map(plain));
     }
     lines

@@ -232,7 +232,7 @@ fn eighty_by_twenty_four_holds_all_that_matters() {
             "lateral force, N, 60 s: -0.060..+0.060",
             "normal force, N, 60 s: +0.240..+0.260",
             "w, um peak-to-peak",
-            "0.3 s  armed",
+            "0.3 s  safety checks passed; drive enabled",
             "s stop  p pause  r resume  q leave",
         ],
     );
@@ -247,7 +247,9 @@ fn trips_ends_and_rests_are_told_with_what_to_do() {
             let page = text(&shown(&view, size, PLAIN));
             match name {
                 "paused" => has(&page, &["PAUSED", "r goes on", "left from when it goes on"]),
-                "tripped" => has(&page, &["TRIPPED", "TRIP NormalOverforce", "2 N", "remedy: "]),
+                "tripped" => {
+                    has(&page, &["TRIPPED", "STOPPED for safety: the normal force", "2 N", "remedy: "])
+                }
                 "ended" => {
                     has(
                         &page,
@@ -255,9 +257,14 @@ fn trips_ends_and_rests_are_told_with_what_to_do() {
                     );
                     assert!(!page.contains("output"), "the last cycle's output is no state of now: {page}");
                 }
-                "bare" => {
-                    has(&page, &["NOT ARMED: EmergencyStop", "lateral force none", "none: nothing slides"])
-                }
+                "bare" => has(
+                    &page,
+                    &[
+                        "NOT ARMED: the emergency stop is pressed",
+                        "lateral force none",
+                        "none: nothing slides",
+                    ],
+                ),
                 "nothing" => has(&page, &["WAITING for the first cycle", "none"]),
                 _ => has(&page, &["ARMED: measuring"]),
             }

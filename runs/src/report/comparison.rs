@@ -124,7 +124,7 @@ fn pairs(result: &Comparison) -> String {
     format!(
         "<h2>Condition by condition</h2>{}{}",
         note(&format!(
-            "Those furthest apart first; in bold what is more than {STANDS_OUT} standard deviations apart.{passes}"
+            "The largest differences come first; those above {STANDS_OUT} standard deviations are bold.{passes}"
         )),
         table("Conditions in common", &head, &rows)
     )

@@ -9,62 +9,63 @@ use realtime::safety::Cause;
 /// An event in words.
 pub fn describe(event: &Event) -> String {
     match event {
-        Event::Armed => "armed".into(),
+        Event::Armed => "safety checks passed; drive enabled".into(),
         Event::NoSecondChannel => {
-            "no second switch-off channel: what the amplifier refuses, only a hand at its supply switches off"
-                .into()
+            "warning: there is only one way to switch off. If the amplifier ignores 'off', cut its mains by hand; fit a supply relay \
+             ([supply_relay])"
+            .into()
         }
         Event::NoWatchdog => "warning: if this program dies the output stays on: neither the amplifier nor its supply has a watchdog. \
              Keep a hand at the mains switch, or fit a relay with a heartbeat (wago-750-watchdog)"
             .into(),
         Event::ExposureLeft(left) => format!(
-            "exposure left to the finger: {:.0} s of this hour, {:.1} m2/s of its dose, {:.0} s in one go",
+            "exposure left for the finger: {:.0} s of this hour, a dose of {:.1} m2/s, {:.0} s without a rest",
             left.hour_s, left.dose_m2_s, left.in_one_go_s
         ),
         Event::NobodyTouches => format!("warning: {}", crate::setup::NOBODY),
         Event::NotWired { contacts } => {
-            format!("warning: not watched, as the setup says that no device is on it: {}", contacts.join(", "))
+            format!("warning: not monitored, because the setup says that no device is connected: {}", contacts.join(", "))
         }
         Event::ArmingDisturbed { cause, held_up } => {
             let what = match cause {
                 Cause::EmergencyStop => {
-                    "nothing was heard of the emergency stop, and the supply was cut for it".into()
+                    "the emergency stop did not report, so the supply was cut".into()
                 }
-                cause => format!("the proof of the second channel was broken off ({cause:?})"),
+                cause => format!("the test of the supply relay was interrupted ({})", cause.words()),
             };
             let why = match held_up.seconds() * 1e3 {
                 ms if ms < 1.0 => String::new(),
                 ms => format!("; the loop was held up for {ms:.0} ms"),
             };
             format!(
-                "before arming {what}{why}: nothing was driven; the second channel is proved from the beginning"
+                "before arming {what}{why}: nothing was driven; the supply relay is tested again"
             )
         }
         Event::Zeros { lateral_n, normal_n, after } => {
             let mn = |v: &Option<f64>| v.map_or("none".into(), |v| format!("{:+.2} mN", v * 1e3));
             let when = if *after { "after" } else { "before" };
-            format!("force zeros {when} the sweep: lateral {}, normal {}", mn(lateral_n), mn(normal_n))
+            format!("force offset {when} the sweep, unloaded: lateral {}, normal {}", mn(lateral_n), mn(normal_n))
         }
         Event::Tripped(trip) if trip.cause == Cause::Stopped => {
             "stopped on request: drive off, stage at rest, finger lifted".into()
         }
-        Event::Tripped(trip) => format!("TRIP {trip}\n  {}", trip.cause.remedy()),
+        Event::Tripped(trip) => format!("STOPPED for safety: {trip}\n  {}", trip.cause.remedy()),
         Event::ModelDeparted { point, log_evidence } => {
-            let odds = (log_evidence / std::f64::consts::LN_10).floor();
-            format!("the model has left the measurement at point {point} (evidence beyond 10^{odds:.0} to 1)")
+            let odds = 10_f64.powf((log_evidence / std::f64::consts::LN_10).floor().min(9.0));
+            format!("the measurement disagrees with the model since pass {point} (odds above {odds:.0} to 1)")
         }
-        Event::StopRequested => "stopping: the rig goes to its safe state first".into(),
-        Event::Paused { point } => format!("paused before point {point}: drive off, lifted off, not armed"),
+        Event::StopRequested => "stopping: the rig is made safe first".into(),
+        Event::Paused { point } => format!("paused before pass {point}: drive off, lifted off, not armed"),
         Event::PauseTooLong { bound } => format!("the pause was longer than {bound:.0} s (pause_max_s): the run ends"),
         Event::PauseNotQuiet { cause } => {
-            format!("in the pause the rig was not seen off, at rest and lifted off ({cause:?}): the run ends\n  {}", cause.remedy())
+            format!("during the pause the rig was not off, at rest and lifted off ({}): the run ends\n  {}", cause.words(), cause.remedy())
         }
         Event::Resumed => "warning: resuming: the rig is armed again, then stage and plate move. Keep hands off; with a finger, \
-             let go of the dead-man device and grip it again"
+             release the dead-man device and grip it again"
             .into(),
-        Event::PassRepeated { point } => format!("point {point}: no contact, once more"),
+        Event::PassRepeated { point } => format!("pass {point}: no contact; repeating it"),
         Event::TemperatureBeyondCertificate { point, flag } => {
-            format!("point {point} and on: {flag}; the passes are flagged, nothing is corrected")
+            format!("from pass {point}: {flag}; the passes are flagged and not corrected")
         }
         Event::TemperatureUnwatched { certificate } => format!(
             "{certificate} holds within a range of temperatures, and the amplifier reports none: only the setup's \
@@ -120,7 +121,7 @@ fn at_rig(event: &Event) -> String {
 /// The events of a run as a table: loop time in s, and what happened.
 pub(super) fn section(events: &[(f64, serde_json::Value)]) -> String {
     if events.is_empty() {
-        return "<h2>Events</h2><p>None was recorded.</p>".into();
+        return "<h2>Events</h2><p>No event was recorded.</p>".into();
     }
     let row = |(at, event): &(f64, serde_json::Value)| {
         let words = match serde_json::from_value::<Event>(event.clone()) {

@@ -76,7 +76,7 @@ fn verdict(w: &mut String, run: &RunData) {
         let first = run.passes.iter().find(|p| p.comparison.is_some_and(|c| c.departed));
         let at = first.map_or(0, |p| p.pass.point);
         format!(
-            "<strong>The model has left the measurement</strong> (first at point {at}). \
+            "<strong>The measurement disagrees with the model</strong> (first at pass {at}). \
                  Run <code>muprime diagnose</code> on this folder to learn where and why."
         )
     } else {

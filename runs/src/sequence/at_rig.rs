@@ -240,6 +240,11 @@ impl AtRig {
         levels
     }
 
+    /// Whether the rig is a virtual one.
+    pub(super) fn is_simulated(&self) -> bool {
+        self.simulated
+    }
+
     /// Whether the rig was disarmed for a person.
     pub(super) fn is_disarmed(&self) -> bool {
         self.disarmed

@@ -69,7 +69,7 @@ pub enum Event {
     },
     /// Safety tripped.
     Tripped(Trip),
-    /// The model has left the measurement, after so many passes.
+    /// The measurement disagrees with the model, after so many passes.
     ModelDeparted {
         /// Point after which.
         point: u64,

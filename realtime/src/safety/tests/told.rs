@@ -45,19 +45,22 @@ fn a_trip_is_told_in_its_unit() {
     });
     assert_eq!(force.unit, Unit::Newton);
     let said = force.to_string();
-    assert!(said.starts_with("NormalOverforce (SR-04): 40 N against ") && said.contains(" N, at "), "{said}");
+    assert!(
+        said.starts_with("the normal force is above its limit: 40 N (limit ") && said.ends_with(" s [SR-04]"),
+        "{said}"
+    );
 
     let silent = tripped(slow, |seen| seen.forces.lateral = Err(NoData::Disconnected));
     let said = silent.to_string();
-    assert!(silent.unit == Unit::Second && said.contains("no data against 0.0"), "{said}");
+    assert!(silent.unit == Unit::Second && said.contains(": no data (limit 0.0"), "{said}");
 
     // One rule, several units: the trip has that of what broke it.
     let much = Request { amplitude: PeakToPeak::from_metres(9e-6), frequency_hz: 27_500.0, ..slow };
     let said = tripped(much, |_| {}).to_string();
-    assert!(said.contains("9 um against ") && said.contains("RequestRefused (SR-30)"), "{said}");
+    assert!(said.contains("9 um (limit ") && said.contains("[SR-30]"), "{said}");
     let high = Request { amplitude: PeakToPeak::from_metres(1e-6), frequency_hz: 2e6, ..slow };
     let said = tripped(high, |_| {}).to_string();
-    assert!(said.contains("2000000 Hz against "), "{said}");
+    assert!(said.contains("2000000 Hz (limit "), "{said}");
 }
 
 #[test]
