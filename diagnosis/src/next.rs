@@ -47,10 +47,11 @@ pub const PASSES: usize = 12;
 /// Odds that are expected of an experiment.
 pub fn odds(nats: f64) -> String {
     if nats > 6.0 * std::f64::consts::LN_10 {
-        "odds above 10^6".into()
-    } else {
-        format!("odds of {:.0} to 1", nats.exp())
+        return "odds above 10^6".into();
     }
+    // Two significant digits.
+    let unit = 10_f64.powf((nats / std::f64::consts::LN_10).floor() - 1.0).max(1.0);
+    format!("odds of {:.0} to 1", (nats.exp() / unit).round() * unit)
 }
 
 /// Designs experiments for what a decision left open.

@@ -176,11 +176,13 @@ pub fn parquet_as_csv(path: &Path) -> miette::Result<String> {
 
 /// Cells that a source of so many bytes can hold in earnest: what says more is damaged or hostile, and is refused before
 /// memory is taken for it.
+#[cfg(any(feature = "arrow", feature = "excel", feature = "matlab", feature = "parquet"))]
 pub(crate) const fn most_cells(bytes: usize) -> usize {
     4 * bytes + 1_000_000
 }
 
 /// The refusal of a source that says more than [`most_cells`].
+#[cfg(any(feature = "arrow", feature = "excel", feature = "matlab", feature = "parquet"))]
 pub(crate) fn too_many(what: &str, cells: usize, bytes: usize) -> miette::Report {
     miette::miette!(
         help = "export the part that holds numbers, as CSV",

@@ -43,6 +43,7 @@ pub async fn serve(listener: TcpListener, routes: Router) {
             let _ = stream.set_nodelay(true);
             let _ = rustix::net::sockopt::set_socket_send_buffer_size(&stream, HELD_BYTES);
             let _ = rustix::net::sockopt::set_tcp_user_timeout(&stream, TAKEN_WITHIN.as_millis() as u32);
+            let socket = rustix::io::dup(&stream);
             let service = TowerToHyperService::new(routes);
             let connection = hyper::server::conn::http1::Builder::new()
                 .timer(TokioTimer::new())
@@ -55,6 +56,9 @@ pub async fn serve(listener: TcpListener, routes: Router) {
             if tokio::time::timeout(WHOLE_WITHIN, connection.as_mut()).await.is_err() {
                 connection.as_mut().graceful_shutdown();
                 let _ = tokio::time::timeout(LAST_ANSWER_WITHIN, connection).await;
+            } else if let Ok(socket) = socket {
+                // What is left of it is a live stream, which has a bound of its own: a slow browser may take longer to make room.
+                let _ = rustix::net::sockopt::set_tcp_user_timeout(&socket, 0);
             }
         });
     }
