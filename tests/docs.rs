@@ -2,6 +2,10 @@
 //!
 //! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test docs` writes docs/commands.md. The book itself: tests/peers/book.rs.
 
+#[path = "docs/banned.rs"]
+mod banned;
+#[path = "docs/errors.rs"]
+mod errors;
 #[path = "docs/words.rs"]
 mod words;
 
@@ -66,6 +70,33 @@ fn the_page_of_commands_is_that_of_the_program() {
         written == now,
         "docs/commands.md is old: MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test docs"
     );
+}
+
+/// docs/how-to/errors.md is what the program answers, and its answers are words for people.
+#[test]
+fn the_page_of_errors_is_that_of_the_program() {
+    let (now, wrong) = errors::page();
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+    let path = file("docs/how-to/errors.md");
+    if std::env::var_os("MUPRIME_UPDATE").is_some() {
+        std::fs::write(&path, &now).unwrap();
+    }
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    println!("{} errors provoked", now.lines().filter(|l| l.starts_with("| `")).count() - 1);
+    assert!(
+        written == now,
+        "docs/how-to/errors.md is old: MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test docs"
+    );
+}
+
+/// No word of the banned list in the rooms that are clean.
+#[test]
+fn no_banned_word_is_told_to_people() {
+    let (read, wrong) = banned::look(&words::commands());
+    println!("{read} lines read in {} rooms, {} banned words in them", banned::ROOMS.len() + 3, wrong.len());
+    assert!(wrong.is_empty(), "{} of {read} lines:\n{}", wrong.len(), wrong.join("\n"));
+    assert!(read > 800, "{read}");
+    assert!(banned::in_line("each stands in import.json").is_some(), "it can fail");
 }
 
 /// Every page of docs/ stands in the table of contents.

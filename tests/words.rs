@@ -133,6 +133,35 @@ fn what_is_bundled_is_shown_as_it_is() {
     assert_eq!(none.status.code(), Some(2));
 }
 
+/// A sample is measured, its table is one that `diagnose` takes, and the foreign one is one that `import` takes.
+#[test]
+fn samples_can_be_diagnosed() {
+    let folder = tempfile::tempdir().unwrap();
+    let given = |words: &[&str]| {
+        let output =
+            muprime().args(words).current_dir(folder.path()).env_remove("MUPRIME_RUNS").output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{words:?}: {}", texts(&output).1);
+        texts(&output).0
+    };
+    for name in ["dry", "moist", "silicone"] {
+        given(&["show", "--sample", name]);
+        let checked = given(&["check", "--json", &format!("{name}/points.csv")]);
+        assert!(
+            checked.contains("\"passes\":98") && folder.path().join(name).join("rig.toml").exists(),
+            "{checked}"
+        );
+    }
+    assert!(given(&["diagnose", "silicone"]).to_lowercase().contains("squeeze"));
+    given(&["show", "--sample", "foreign", "--out", "theirs"]);
+    let foreign = std::fs::read_to_string(folder.path().join("theirs/foreign.csv")).unwrap();
+    assert!(
+        foreign.starts_with("Amplitude (um p-p);Frequency (kHz)") && foreign.lines().count() == 99,
+        "{foreign}"
+    );
+    given(&["import", "theirs/foreign.csv", "-o", "imported"]);
+    assert!(folder.path().join("imported/points.csv").exists());
+}
+
 #[test]
 fn every_command_has_a_manual_page() {
     let folder = tempfile::tempdir().unwrap();

@@ -100,7 +100,7 @@ enum Verb {
 
 /// The command line, with an example for every command.
 fn command() -> clap::Command {
-    cli::groups::grouped(cli::examples::with_examples(Cli::command()))
+    cli::groups::grouped(cli::examples::with_examples(cli::quantities::with_units(Cli::command())))
 }
 
 fn parsed(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Cli, clap::Error> {
@@ -149,13 +149,17 @@ fn main() -> ExitCode {
                 return say_version();
             }
             if error.use_stderr() && std::env::args().any(|a| a == "--json") {
-                let said = error.to_string();
+                let said = cli::plain(&error.to_string());
                 out!(
                     "{}",
                     serde_json::json!({ "error": said.lines().next().unwrap_or_default(), "status": cli::REFUSED })
                 );
             }
-            let _ = error.print();
+            let said = error.render().to_string();
+            match cli::plain(&said) {
+                better if better != said => say!("{}", better.trim_end()),
+                _ => drop(error.print()),
+            }
             return ExitCode::from(if error.use_stderr() { cli::REFUSED } else { cli::DONE });
         }
     };
@@ -222,14 +226,15 @@ fn run(verb: Verb, json: bool) -> ExitCode {
         Ok(Err(report)) => {
             let status = cli::status_of(&report);
             if json {
-                let causes: Vec<String> = report.chain().skip(1).map(ToString::to_string).collect();
+                let causes: Vec<String> =
+                    report.chain().skip(1).map(|c| cli::plain(&c.to_string())).collect();
                 let help = report.help().map(|h| h.to_string());
                 out!(
                     "{}",
-                    serde_json::json!({ "error": report.to_string(), "causes": causes, "help": help, "status": status })
+                    serde_json::json!({ "error": cli::plain(&report.to_string()), "causes": causes, "help": help, "status": status })
                 );
             }
-            say!("{report:?}");
+            say!("{}", cli::plain(&format!("{report:?}")));
             ExitCode::from(status)
         }
         Err(_) => ExitCode::from(cli::INTERNAL),

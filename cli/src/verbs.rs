@@ -24,6 +24,7 @@ pub mod import;
 pub mod init;
 pub mod man;
 pub mod model;
+pub mod quantities;
 pub mod recover;
 pub mod replay;
 pub mod report;
@@ -81,6 +82,52 @@ pub fn keep_unread() {
     if let Some(run) = RUN.get().filter(|run| !unread.is_empty() && ::runs::run_dir::has_begun(run)) {
         let _ = ::runs::files::write_plain(&run.join(UNREAD), unread);
     }
+}
+
+/// What a person named is there.
+///
+/// # Errors
+/// It is not: says what is beside it.
+pub fn there(path: &Path, what: &str) -> miette::Result<()> {
+    if path.exists() {
+        return Ok(());
+    }
+    let folder = ::runs::catalogue::runs_folder();
+    let mut runs: Vec<String> = std::fs::read_dir(&folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .filter(|entry| entry.path().join(::runs::run_dir::JOURNAL).exists())
+        .map(|entry| folder.join(entry.file_name()).display().to_string())
+        .collect();
+    runs.sort();
+    let help = match runs.as_slice() {
+        [] => format!("there are no runs in {}; muprime run makes one", folder.display()),
+        all => format!("runs here: {}", all.iter().rev().take(8).cloned().collect::<Vec<_>>().join(", ")),
+    };
+    Err(miette::miette!(help = help, "there is no {what} at '{}'", path.display()))
+}
+
+/// An error in words: without the numbers that a system counts its errors by, and without the language's own sentences.
+pub fn plain(error: &str) -> String {
+    const SENTENCES: [(&str, &str); 4] = [
+        ("invalid digit found in string", "a whole number is expected"),
+        ("cannot parse integer from empty string", "a whole number is expected"),
+        ("number too large to fit in target type", "the number is too large"),
+        ("invalid float literal", "a number is expected"),
+    ];
+    let error = SENTENCES.iter().fold(error.to_string(), |text, (from, to)| text.replace(from, to));
+    let mut rest = error.as_str();
+    let mut text = String::new();
+    while let Some((before, after)) = rest.split_once(" (os error ") {
+        let Some((number, behind)) = after.split_once(')') else { break };
+        if number.is_empty() || !number.chars().all(|c| c.is_ascii_digit()) {
+            break;
+        }
+        text.push_str(before);
+        rest = behind;
+    }
+    text + rest
 }
 
 /// A status as the process's exit code.

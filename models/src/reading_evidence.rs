@@ -81,8 +81,8 @@ impl fmt::Display for ReadingFinding {
         let (passes, nats) = (self.judged, self.nats.abs());
         write!(
             f,
-            "Psi* = {:.2} fits {passes} passes with vibration best, 95 % from {:.2} to {:.2}; nine of ten, each by itself, give {:.2} \
-             to {}; ",
+            "Psi* = {:.2} (95 %: {:.2} to {:.2}) fits {passes} passes with vibration best; single passes give {:.2} to {} \
+             (90 % of them); ",
             self.psi_star,
             self.psi_star_low,
             self.psi_star_high,
@@ -91,19 +91,31 @@ impl fmt::Display for ReadingFinding {
         )?;
         match self.decision {
             Decision::PeakToPeak => {
-                write!(f, "they favour by {nats:.1} nats that the paper's {}", Reading::PeakToPeak.words())
+                write!(f, "they support that the paper's {}, {}", Reading::PeakToPeak.words(), likelier(nats))
             }
             Decision::SineAmplitude => {
-                write!(f, "they favour by {nats:.1} nats that the paper's {}", Reading::SineAmplitude.words())
+                write!(f, "they support that the paper's {}, {}", Reading::SineAmplitude.words(), likelier(nats))
             }
             Decision::Between => {
-                f.write_str("that favours neither reading of the paper's w, between Psi* 1.19 and 2.38")
+                f.write_str("it lies between Psi* 1.19 and 2.38 and supports neither reading of the paper's w")
             }
             Decision::Neither => f.write_str("neither reading of the paper's w fits (Psi* 2.38 or 1.19)"),
             Decision::TooLittle => f.write_str(
-                "too little to favour a reading of the paper's w (Psi* 2.38 or 1.19): measure the plan 'psi-reading'",
+                "too little data to support a reading of the paper's w (Psi* 2.38 or 1.19): run the plan 'psi-reading'",
             ),
         }
+    }
+}
+
+/// Evidence in words: 'which is 60 times likelier'. Beyond a million the figure means nothing more.
+fn likelier(nats: f64) -> String {
+    match nats.exp() {
+        odds if odds > 1e6 => "which is more than a million times likelier".into(),
+        odds if odds >= 10.0 => {
+            let step = 10f64.powf(odds.log10().floor() - 1.0);
+            format!("which is {:.0} times likelier", (odds / step).round() * step)
+        }
+        odds => format!("which is {odds:.1} times likelier"),
     }
 }
 

@@ -126,6 +126,10 @@ pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String
     } else {
         [(1e3, "k"), (1e6, "M"), (1e-3, "m"), (1e-6, "u")]
     };
+    // A force a few times too large is a slip of another kind.
+    if unit == "N" && value.abs() > high && value.abs() < 50.0 * high {
+        return None;
+    }
     let (factor, prefix) = prefixes.into_iter().find(|(factor, _)| within(value * factor))?;
     // The prefix stands for the whole unit: N/um reads better than MN/m.
     let meant = match (unit, prefix) {
@@ -133,7 +137,42 @@ pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String
         ("N/m", "M") => "N/um".to_string(),
         _ => format!("{prefix}{unit}"),
     };
-    Some(format!("{value} {unit}: {meant} meant? Then write {:e}, in {unit}", value * factor))
+    Some(format!("{value} {unit}: {meant} meant? Then write {:e}, in {unit}", round(value * factor)))
+}
+
+/// Without the last digits, which only the arithmetic brings in.
+fn round(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
+}
+
+/// What TOML's reader says, in words for people: no types of the program.
+fn in_words(message: &str) -> String {
+    const TYPES: [(&[&str], &str); 6] = [
+        (&["u8", "u16", "u32", "u64", "usize"], "a whole number, 0 or more"),
+        (&["i8", "i16", "i32", "i64", "isize"], "a whole number"),
+        (&["f32", "f64"], "a number"),
+        (&["a boolean", "bool"], "true or false"),
+        (&["a sequence"], "a list in [brackets]"),
+        (&["a map"], "a table"),
+    ];
+    let Some((found, expected)) = message.split_once(", expected ") else {
+        return message
+            .replace("key with no value, expected `=`", "this is no 'key = value' (is it a TOML file?)");
+    };
+    let words = TYPES.iter().find(|(names, _)| names.contains(&expected)).map(|(_, words)| *words);
+    let words = words.map(str::to_string).unwrap_or_else(|| match expected.strip_prefix("struct ") {
+        Some(_) => "a table".to_string(),
+        None => expected.to_string(),
+    });
+    let found = found.trim_start_matches("invalid type: ").trim_start_matches("invalid value: ");
+    if message.starts_with("invalid ") && !found.contains("length") {
+        format!(
+            "{} was found, {words} is expected",
+            found.replace("floating point", "number").replace("string", "text")
+        )
+    } else {
+        message.replace("key with no value, expected `=`", "this is no 'key = value' (is it a TOML file?)")
+    }
 }
 
 /// The largest file that is read as configuration.
@@ -159,6 +198,9 @@ pub fn text_of(path: &Path) -> miette::Result<String> {
 pub fn bytes_of(path: &Path, most: u64) -> miette::Result<Vec<u8>> {
     let shown = path.display();
     let wrong = |e: std::io::Error| miette::miette!("{shown}: {e}");
+    if !path.try_exists().unwrap_or(true) {
+        miette::bail!("there is no file {shown}");
+    }
     let there = std::fs::metadata(path).map_err(wrong)?;
     if !there.is_file() {
         miette::bail!(help = "give an ordinary file", "{shown} is no ordinary file");
@@ -177,7 +219,7 @@ pub fn bytes_of(path: &Path, most: u64) -> miette::Result<Vec<u8>> {
 /// # Errors
 /// What TOML or the schema says, with the place. Unknown keys are errors wherever the schema says so.
 pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, BadInput> {
-    toml::from_str(text).map_err(|e| BadInput::new(name, text, e.span(), e.message().to_string(), None))
+    toml::from_str(text).map_err(|e| BadInput::new(name, text, e.span(), in_words(e.message()), None))
 }
 
 /// Reads a rig.toml.

@@ -45,6 +45,7 @@ pub mod leave;
 pub mod model_file;
 pub mod plan;
 pub mod print;
+pub mod quantity;
 pub mod rehearsal;
 pub mod report;
 pub mod run_dir;

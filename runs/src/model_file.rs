@@ -30,6 +30,10 @@ pub fn load_for(setup: &Setup, name: &str, text: &str) -> miette::Result<Arc<dyn
 }
 
 fn compiled(name: &str, text: &str) -> miette::Result<Corrected> {
-    let saved: SavedModel = crate::input::parse_toml(name, text)?;
+    let saved: SavedModel = crate::input::parse_toml(name, text).map_err(|why| {
+        miette::Report::new(why).wrap_err(format!(
+            "{name} is no model file; 'muprime diagnose DATA --save-model FILE' writes one"
+        ))
+    })?;
     Corrected::compile(&saved).map_err(|e| miette::miette!("{name}: {e}"))
 }

@@ -29,6 +29,8 @@ pub struct Args {
 /// # Errors
 /// A folder that holds no run, a run without a pass without vibration, a page that cannot be written.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
+    super::there(&args.run_a, "run")?;
+    super::there(&args.run_b, "run")?;
     let compared = Compared::of([&args.run_a, &args.run_b])?;
     if let Some(page) = &args.report {
         runs::files::write_whole(page, runs::report::comparison::page(&compared)?)?;

@@ -58,6 +58,7 @@ pub struct Args {
 /// # Errors
 /// Files that cannot be read or written, tables and rigs that are refused; nothing is written then.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    super::there(&args.data, "run or table")?;
     let (table_path, beside) = if args.data.is_dir() {
         (args.data.join("points.csv"), args.data.join("rig.toml"))
     } else {

@@ -85,7 +85,7 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ),
     ("schema", "muprime schema plan"),
     ("init", "muprime init setup"),
-    ("show", "muprime show\nmuprime show first-sweep"),
+    ("show", "muprime show\nmuprime show first-sweep\nmuprime show --sample moist --out moist"),
     ("doc profile", "muprime doc profile my-sensor.toml\nmuprime doc profile labjack-t"),
     ("man", "muprime man man1"),
     ("model point", "muprime model point --amplitude-pp-m 3e-6 --speed-m-s 0.01 --json"),

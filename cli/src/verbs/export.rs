@@ -26,6 +26,7 @@ pub struct Args {
 /// # Errors
 /// A folder that holds no run, or a place that cannot be written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    super::there(&args.run, "run")?;
     let run = runs::report::read(&args.run)?;
     let out = export(&args.run, &run, args.to, &args.stated, args.out.as_deref())?;
     if json {

@@ -16,11 +16,11 @@ use tables::import::{Cut, Grid, Imported, Marks, Wanted, guessed_lines, import, 
 pub struct Args {
     /// The table: delimited text, Excel or OpenDocument, Parquet, NumPy
     file: PathBuf,
-    /// What is what: HEADER=TARGET:UNIT, parted by commas; may be repeated; docs/reference.md lists targets and units [default: guessed
+    /// What is what: HEADER=TARGET:UNIT, separated by commas; may be repeated; docs/reference.md lists targets and units [default: guessed
     /// from the headers and shown]
     #[arg(long)]
     map: Vec<String>,
-    /// Constants for what has no column: NAME=VALUE[:UNIT], parted by commas; may be repeated
+    /// Constants for what has no column: NAME=VALUE[:UNIT], separated by commas; may be repeated
     #[arg(long)]
     set: Vec<String>,
     /// Sheet of a workbook [default: the only one]

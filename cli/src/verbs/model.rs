@@ -33,7 +33,7 @@ enum ModelVerb {
     Patch(patch::PatchArgs),
     /// Static stiffnesses of the ridge across and along the plate, and their ratio.
     Stiffness(stiffness::StiffnessArgs),
-    /// A parametric study on all cores: Fig. 9, or the surrogate's table. Stop it and start it again at will.
+    /// A parametric study on all cores: Fig. 9, or the surrogate's table. It can be stopped and resumed at any time.
     Table(table::TableArgs),
     /// A surrogate over up to ten variables, its nodes chosen in rounds where the error is.
     #[cfg(feature = "parquet")]

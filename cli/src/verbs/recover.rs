@@ -23,6 +23,7 @@ pub struct Args {
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let file = &args.file;
     let shown = || file.display().to_string();
+    super::there(file, "recording")?;
     if !fs::metadata(file).into_diagnostic().wrap_err_with(shown)?.is_file() {
         miette::bail!(help = "give a record, run-1.mcap and the like", "{} is no ordinary file", shown());
     }

@@ -37,6 +37,7 @@ struct Found {
 /// # Errors
 /// A record that cannot be read, or that lacks what a replay needs.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    super::there(&args.run, "run or recording")?;
     let (records, gone) = if args.run.is_dir() {
         (records_in(&args.run)?, missing_records(&args.run)?)
     } else {
@@ -94,7 +95,10 @@ fn again(path: PathBuf) -> miette::Result<Found> {
         .collect();
     let Some((_, built)) = files.iter().find(|f| f.0 == REPLAYABLE) else {
         let found = inspect(BufReader::new(File::open(&path).into_diagnostic()?)).sentences().join("; ");
-        miette::bail!("{shown}: the record holds no {REPLAYABLE}, which a replay needs ({found})");
+        miette::bail!(
+            help = "give a run's folder, or its run-1.mcap",
+            "{shown} is no recording of a run: it holds no {REPLAYABLE} ({found})"
+        );
     };
     let built: Replayable = serde_json::from_slice(built)
         .into_diagnostic()

@@ -19,6 +19,7 @@ pub struct Args {
 /// # Errors
 /// A folder that holds no run, or a place that cannot be written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    super::there(&args.run, "run")?;
     let (html, damage) = runs::report::html_and_damage(&args.run)?;
     let out = args.out.unwrap_or_else(|| args.run.join("report.html"));
     runs::files::write_whole(&out, html)?;

@@ -40,10 +40,10 @@ pub struct Args {
     /// Plan: a file, or a bundled name (first-sweep, fig9-artificial, part2-validation, psi-reading)
     #[arg(default_value = "first-sweep")]
     plan: String,
-    /// Setup: a file, or a bundled name (virtual, virtual-ideal)
+    /// Setup: a file, or a bundled name ('muprime show' lists all)
     #[arg(long, default_value = "virtual")]
     setup: String,
-    /// Folder of the run; an unfinished run there is taken up again [default: a new one in ./runs]
+    /// Folder of the run; an unfinished run there is resumed [default: a new one in ./runs]
     #[arg(long)]
     out: Option<PathBuf>,
     /// A corrected model, as 'muprime diagnose --save-model' writes it
@@ -58,10 +58,10 @@ pub struct Args {
     /// In virtual time: a minute's sweep in a second or so
     #[arg(long)]
     fast: bool,
-    /// Who leads the run, for its record and report
+    /// Operator's name, for record and report
     #[arg(long, value_name = "NAME")]
     operator: Option<String>,
-    /// Whose finger it is (a code, no name, where the data are published): exposure is counted under it, whatever the rig [default: the operator]
+    /// Code of the person whose finger is measured; exposure is counted for this code on every rig [default: the operator]
     #[arg(long, value_name = "CODE")]
     subject: Option<String>,
     /// What is measured, for its record and report: the fingertip, its preparation, the plate
@@ -79,10 +79,10 @@ pub struct Args {
     /// Publish states, passes, trips and progress by MQTT, read only: mqtt://[user@]host[:port]/prefix
     #[arg(long, value_name = "BROKER")]
     publish: Option<Broker>,
-    /// Serve this run in a browser while it goes on, and the folder that it stands in: at the address, or on 127.0.0.1:8417
+    /// Show this run and its folder of runs in a browser, at this address [without one: 127.0.0.1:8417]
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = LISTEN, conflicts_with = "tui")]
     dashboard: Option<SocketAddr>,
-    /// The run may be paused and told to go on from the browser; a stop may always be asked for
+    /// Allow pause and resume from the browser; stop is always allowed
     #[arg(long, requires = "dashboard")]
     allow_control: bool,
 }
@@ -114,7 +114,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             );
         }
         say!(
-            "dead-man key: let go of it, then hold the space bar down to arm and to go on; let go, or press any other key, and the drive is off"
+            "dead-man key: release it, then hold the space bar down to arm and to continue. Release it, or press any other key, and the drive is off"
         );
     }
     if job.asks_at_the_terminal() && (tui || job.setup.hand_at_key()) {
@@ -188,7 +188,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                     say(runs::report::events::describe(event));
                 }
             }
-            Update::State(glimpse) => publish("state", &|| serde_json::json!(live::State::of(glimpse))),
+            Update::State(snapshot) => publish("state", &|| serde_json::json!(live::State::of(snapshot))),
             Update::Progress(made, all, left_s) => {
                 publish(
                     "progress",
@@ -271,6 +271,9 @@ fn job(args: Args) -> miette::Result<Job> {
     };
     let seed = args.seed.unwrap_or(plan.file.seed);
     let out = args.out.unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
+    if out.exists() && !out.is_dir() {
+        miette::bail!(help = "give a folder, or a name that is free", "--out {} is a file", out.display());
+    }
     let notes =
         Notes { operator: args.operator, subject: args.subject, sample: args.sample, licence: args.licence };
     let (fast, answers) = (args.fast, args.answers);

@@ -35,7 +35,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     for r in runs {
         let outcome = if r.outcome.is_empty() { "no ending" } else { &r.outcome };
-        let departed = if r.departed { "  model departed" } else { "" };
+        let departed = if r.departed { "  disagrees" } else { "" };
         out!("{:40} {:>5}/{:<5} {outcome:12} {}{departed}", r.folder, r.passes, r.planned, r.setup);
     }
     super::exit(super::DONE)

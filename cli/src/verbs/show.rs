@@ -1,6 +1,10 @@
 //! `muprime show [NAME]`: what comes with the program.
 
-use runs::out;
+mod sample;
+
+use runs::{out, say};
+use sample::Sample;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use tables::schemas::bundled::all;
 
@@ -9,18 +13,35 @@ use tables::schemas::bundled::all;
 pub struct Args {
     /// Name of a plan, setup, fingertip or profile; without it all are listed
     name: Option<String>,
+    /// Write a sample table to try: measured now, on the virtual rig in virtual time
+    #[arg(long, value_enum, conflicts_with = "name")]
+    sample: Option<Sample>,
+    /// Folder of the sample [default: one of its name]
+    #[arg(long, requires = "sample")]
+    out: Option<PathBuf>,
 }
 
-/// Lists, or prints one file.
+/// Lists, or prints one file, or writes a sample.
 ///
 /// # Errors
-/// A name that nothing has.
+/// A name that nothing has, a folder that cannot be written.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let all = all();
-    match &args.name {
-        None if json => all.iter().for_each(|b| out!("{}", serde_json::json!(b))),
-        None => all.iter().for_each(|b| out!("{:<10} {:<26} {}", b.kind, b.name, b.about())),
-        Some(name) => {
+    match (&args.name, args.sample) {
+        (_, Some(sample)) => {
+            let folder = args.out.clone().unwrap_or_else(|| sample.name().into());
+            let table = sample::write(sample, &folder)?;
+            if json {
+                out!("{}", serde_json::json!({ "table": table }));
+            } else if sample == Sample::Foreign {
+                say!("{}; next: muprime import {} -o imported", table.display(), table.display());
+            } else {
+                say!("{}; next: muprime diagnose {}", table.display(), folder.display());
+            }
+        }
+        (None, _) if json => all.iter().for_each(|b| out!("{}", serde_json::json!(b))),
+        (None, _) => all.iter().for_each(|b| out!("{:<10} {:<26} {}", b.kind, b.name, b.about())),
+        (Some(name), _) => {
             let Some(found) = all.iter().find(|b| b.name == name) else {
                 miette::bail!(
                     help = "`muprime show` lists what there is",

@@ -84,6 +84,7 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
             (name, text.into_bytes())
         }
     };
+    has_columns(&name, &bytes)?;
     let readings = series::read(bytes.as_slice(), &weighing).map_err(|e| miette::miette!("{name}: {e}"))?;
     let options = Options {
         linearity: if args.quadratic { Linearity::Quadratic } else { Linearity::Linear },
@@ -94,4 +95,20 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
     let found =
         fit(&readings, &weighing, &options).map_err(|e| miette::miette!("{name}: no certificate: {e}"))?;
     args.common.certify(found.outcome(&weighing), sources.raw_data())
+}
+
+/// The columns that no series does without are there.
+fn has_columns(name: &str, bytes: &[u8]) -> miette::Result<()> {
+    const NEEDED: [&str; 4] = ["time_s", "axis", "lateral_counts", "normal_counts"];
+    let text = String::from_utf8_lossy(bytes);
+    let head = text.lines().find(|line| !line.trim_start().starts_with('#')).unwrap_or_default();
+    let there: Vec<&str> = head.split(',').map(|column| column.trim().trim_matches('"')).collect();
+    if NEEDED.iter().all(|column| there.contains(column)) {
+        return Ok(());
+    }
+    Err(miette::miette!(
+        help = "with mass_kg or load_n as well; docs/calibration.md shows such a table",
+        "{name}: needs the columns {}; its first line is: {head}",
+        NEEDED.join(", ")
+    ))
 }

@@ -55,6 +55,17 @@ pub fn with_interval(value: f64, [low, high]: [f64; 2], unit: &str) -> String {
     format!("{v} [{l}, {h}]{unit}")
 }
 
+/// A value with its unit, in the scale in which people read it: `100 um`.
+pub fn quantity(value: f64, unit: &str) -> String {
+    let (factor, shown) = scale(value.abs(), unit);
+    format!("{} {shown}", number(round_off(value * factor))).trim_end().to_string()
+}
+
+/// Without the last digits, which only the arithmetic brings in.
+fn round_off(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
+}
+
 /// The scale in which a size is read: the first listed that puts it between a tenth and a thousand, else the nearest to one.
 fn scale(size: f64, unit: &str) -> (f64, &str) {
     if unit == "1" {

@@ -170,7 +170,7 @@ fn a_point_that_no_rig_can_have_is_refused() {
     for (words, hint) in [
         (["point", "--amplitude-pp-m", "2"], "um meant? Then write 2e-6"),
         (["point", "--speed-m-s", "20"], "mm/s meant? Then write 2e-2"),
-        (["point", "--normal-force-n", "5000"], "at most 1e3"),
+        (["point", "--normal-force-n", "5000"], "0 to 1000 N"),
         (["ridge", "--amplitude-pp-m", "2"], "um meant?"),
     ] {
         let ended = point(&words);

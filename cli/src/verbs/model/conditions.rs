@@ -49,7 +49,11 @@ impl ConditionArgs {
             if value > largest {
                 let meant = unit_meant(key, value, [1e-6 * largest, largest]);
                 let hint = meant.map_or_else(String::new, |meant| format!(" ({meant})"));
-                return Err(format!("--{} {value}: at most {largest:e}{hint}", key.replace('_', "-")));
+                let most = runs::report::human::quantity(largest, runs::input::unit_of(key));
+                return Err(format!(
+                    "--{} {value}: no rig has that; give 0 to {most}{hint}",
+                    key.replace('_', "-")
+                ));
             }
         }
         Ok(())

@@ -71,7 +71,7 @@ async function catalogue() {
       el("td", {}, el("a", { href: `#/run/${part(run.folder)}` }, run.folder)),
       el("td", { class: "wide" }, began), el("td", { class: "wide" }, run.plan), el("td", { class: "wide" }, run.setup),
       el("td", { class: "n" }, `${run.passes} of ${run.planned}`),
-      el("td", {}, outcome + (run.departed ? ", model departed" : "")),
+      el("td", {}, outcome + (run.departed ? ", disagrees with the model" : "")),
       el("td", {}, ...pages.flatMap((page, i) => (i ? [", ", page] : [page]))));
   };
   const show = () => {

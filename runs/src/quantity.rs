@@ -1,0 +1,89 @@
+//! Quantities on the command line: `2um`, `27.5kHz`, `20mm/s`, `500mN`, or the bare number in SI.
+
+/// Prefixes of a unit.
+const PREFIXES: [(&str, i32); 9] =
+    [("", 0), ("n", -9), ("u", -6), ("\u{b5}", -6), ("\u{3bc}", -6), ("m", -3), ("k", 3), ("M", 6), ("G", 9)];
+
+/// The power of ten that `written`, such as `mm/s`, has over the SI unit, such as `m/s`.
+fn power(written: &str, unit: &str) -> Option<i32> {
+    let one = |written: &str, unit: &str| {
+        PREFIXES
+            .iter()
+            .find(|(prefix, _)| written.strip_prefix(prefix) == Some(unit))
+            .map(|(_, power)| *power)
+    };
+    match (written.split_once('/'), unit.split_once('/')) {
+        (Some((above, below)), Some((of, per))) => Some(one(above, of)? - one(below, per)?),
+        (None, None) => one(written, unit),
+        _ => None,
+    }
+}
+
+/// The value in SI of a text with or without a unit. `unit` is the SI unit.
+///
+/// # Errors
+/// What the text is not, and how the quantity is written.
+pub fn parse(text: &str, unit: &str) -> Result<f64, String> {
+    let text = text.trim();
+    if let Ok(value) = text.parse() {
+        return Ok(value);
+    }
+    let split = |at: usize| {
+        let (number, written) = text.split_at(at);
+        // In decimal digits, so that 2um is the very number that 2e-6 is.
+        let number = number.trim();
+        let power = power(written.trim(), unit)?;
+        number.parse::<f64>().ok()?;
+        match number.to_ascii_lowercase().split_once('e') {
+            None => format!("{number}e{power}").parse().ok(),
+            Some((digits, e)) => {
+                format!("{digits}e{}", e.parse::<i32>().ok()?.checked_add(power)?).parse().ok()
+            }
+        }
+    };
+    text.char_indices().skip(1).find_map(|(at, _)| split(at)).ok_or_else(|| {
+        let examples = match unit {
+            "m" => "2um, 0.5mm or 2e-6",
+            "Hz" => "27.5kHz or 27500",
+            "m/s" => "20mm/s or 0.02",
+            "N" => "250mN or 0.25",
+            "N/m" => "3.9N/um or 3.9e6",
+            "Pa" => "28.3MPa or 28.3e6",
+            "s" => "500ms or 0.5",
+            _ => "a number",
+        };
+        format!("not a quantity in {unit}; write {examples} (without a unit: {unit})")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse;
+
+    #[test]
+    fn units_lead_to_the_same_numbers_as_si() {
+        for (text, unit, value) in [
+            ("2um", "m", 2e-6),
+            ("2 \u{b5}m", "m", 2e-6),
+            ("1.2e1nm", "m", 1.2e-8),
+            ("3mm", "m", 3e-3),
+            ("1m", "m", 1.0),
+            ("27.5kHz", "Hz", 27_500.0),
+            ("20mm/s", "m/s", 0.02),
+            ("500mN", "N", 0.5),
+            ("3.9N/um", "N/m", 3.9e6),
+            ("28.3MPa", "Pa", 28.3e6),
+            ("-5ms", "s", -5e-3),
+            ("0.25", "N", 0.25),
+            ("inf", "m/s", f64::INFINITY),
+        ] {
+            assert_eq!(parse(text, unit), Ok(value), "{text}");
+        }
+        for (text, unit) in
+            [("2um", "N"), ("um", "m"), ("2 furlong", "m"), ("20mm", "m/s"), ("", "m"), ("\u{b5}", "m")]
+        {
+            let why = parse(text, unit).unwrap_err();
+            assert!(why.contains("write "), "{text}: {why}");
+        }
+    }
+}
