@@ -231,7 +231,9 @@ fn run(verb: Verb, json: bool) -> ExitCode {
                 let help = report.help().map(|h| h.to_string());
                 out!(
                     "{}",
-                    serde_json::json!({ "error": cli::plain(&report.to_string()), "causes": causes, "help": help, "status": status })
+                    serde_json::json!({
+                        "error": cli::plain(&report.to_string()), "causes": causes, "help": help, "status": status
+                    })
                 );
             }
             say!("{}", cli::plain(&format!("{report:?}")));

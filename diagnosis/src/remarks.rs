@@ -76,7 +76,8 @@ pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<Stri
             "the repeatability is that of rig.toml.".to_string()
         } else {
             format!(
-                "the repeatability is the scatter about the recalibrated baseline, {used:.2} times what rig.toml states."
+                "the repeatability is the scatter about the recalibrated baseline, {used:.2} times what rig.toml \
+                 states."
             )
         };
         remarks.push(format!("No repeats close in time: {stands}"));
@@ -84,7 +85,8 @@ pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<Stri
     let told = fitted.structure.as_ref().filter(|s| s.p < STRUCTURED && decision.verdict != Verdict::Named);
     remarks.extend(told.map(|s| {
         format!(
-            "The residuals of the recalibrated baseline are not scatter: {} is conspicuous (p = {:.1e} over everything searched).",
+            "The residuals of the recalibrated baseline are not scatter: {} is conspicuous (p = {:.1e} over everything \
+             searched).",
             s.place, s.p
         )
     }));

@@ -1,7 +1,8 @@
 //! A chamber around the rig, or a gauge that only reads: the air's pressure, temperature and humidity.
 //!
-//! It takes no part in the loop: air changes within seconds or minutes, and nothing that it shows switches anything off. A
-//! thread asks it a few times a second over Modbus TCP, hands set-points on, and connects again where the line went down.
+//! It takes no part in the loop: air changes within seconds or minutes, and nothing that it shows switches
+//! anything off. A thread reads it a few times a second over Modbus TCP, passes set-points on, and connects again
+//! after an outage.
 
 use super::InstrumentSetup;
 use super::modbus::{Blocks, Trouble};

@@ -52,7 +52,8 @@ pub enum Command {
     Reset,
     /// Stop and latch.
     Stop,
-    /// Stop, latch, and open the second switch-off channel until it is proved again: before a person reaches into the rig.
+    /// Stop, latch, and open the second switch-off channel until it is proved again:
+    /// before a person reaches into the rig.
     Disarm,
     /// The dead-man key of a trial: held, to be said again before [`KEY_AGE`] is over, or released.
     DeadMan(bool),

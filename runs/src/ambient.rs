@@ -1,7 +1,8 @@
 //! The air that a plan asks for: who sets it, who reads it, and what was found.
 //!
-//! A level of a plan is true only where somebody set it and somebody read it: a chamber behind its profile, the operator, or the
-//! world of a virtual rig. What a pass holds is what was found, with its source and its age, never what was planned.
+//! A level of a plan is true only where somebody set it and somebody read it: a chamber behind its profile,
+//! the operator, or the world of a virtual rig. What a pass holds is what was found, with its source and its
+//! age, never what was planned.
 
 mod bench;
 
@@ -15,7 +16,8 @@ use models::covariate::{self, Covariate};
 use realtime::ports::Nanos;
 use serde::{Deserialize, Serialize};
 
-/// The quantities of the air that a plan can ask for, with the names that profiles give their signals and set-points.
+/// The quantities of the air that a plan can ask for, with the names that profiles give their signals and
+/// set-points.
 pub static AIR: [(&Covariate, &str); 3] = [
     (&covariate::AMBIENT_PRESSURE, "pressure"),
     (&covariate::TEMPERATURE, "temperature"),
@@ -98,9 +100,9 @@ impl Means {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AmbientSetup {
-    /// Quantities that the operator sets when the run asks for them, by the columns of the point table: `ambient_pressure_pa`,
-    /// `temperature_c`, `relative_humidity_pct`. Where the chamber's profile reads one, its gauge confirms it; else the operator types
-    /// what the gauge shows.
+    /// Quantities that the operator sets when the run asks for them, by the columns of the point table:
+    /// `ambient_pressure_pa`, `temperature_c`, `relative_humidity_pct`. Where the chamber's profile reads
+    /// one, its gauge confirms it; else the operator types what the gauge shows.
     pub by_operator: Vec<String>,
 }
 

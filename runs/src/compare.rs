@@ -161,7 +161,8 @@ impl Judged {
             ),
             Answer::NotIndependent => "cannot tell: the runs are not independent of each other".into(),
             Answer::CannotTell => format!(
-                "cannot tell: {conditions} conditions in common, and only a shift of mu' above {:.3} would have been detected",
+                "cannot tell: {conditions} conditions in common, and only a shift of mu' above {:.3} would have been \
+                 detected",
                 self.visible_shift
             ),
         }

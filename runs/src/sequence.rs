@@ -1,5 +1,5 @@
-//! The order of a sweep: a pure state machine that eats rows and gives commands. It runs in virtual time and in
-//! wall-clock time alike, beside the loop, never in it.
+//! The order of a sweep: a pure state machine that eats rows and gives commands. It runs in virtual time and
+//! in wall-clock time alike, beside the loop, never in it.
 //!
 //! ```text
 //! Arm -> Zero -> [ Approach -> Settle -> Measure ]* -> Zero -> Done
@@ -11,11 +11,11 @@
 mod arming;
 mod at_rig;
 mod events;
+mod passing;
 
 pub use at_rig::Question;
 pub use events::{Event, MeasuredPass, Outcome};
 
-use crate::ambient::Level;
 use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
 use crate::exposure_left::Left;
 use crate::plan::{PassTimes, Point};
@@ -25,12 +25,11 @@ use at_rig::AtRig;
 use models::condition::{Ambient, Condition};
 use models::pass::Pass;
 use models::prediction::FrictionModel;
-use models::psi::PsiEq17;
 use models::quantity::PeakToPeak;
 use models::rig_file::PassNoise;
+use passing::Sums;
 use realtime::compare::{Agreement, Comparator, PassComparison};
 use realtime::cycle::{Command, Marker, Phase};
-use realtime::estimate::Moments;
 use realtime::ports::{Nanos, NoData};
 use realtime::safety::{Cause, ChannelTiming, Limits, Request};
 use realtime::turn::Row;
@@ -88,7 +87,8 @@ const APPROACH_WITHIN: Nanos = Nanos(20_000_000_000);
 pub const PAUSE_MAX_S: f64 = 600.0;
 /// A paused rig shows itself off, at rest and lifted off, no longer ago than this.
 const QUIET_WITHIN: Nanos = Nanos(2_500_000_000);
-/// A stage that stands, in m/s, and what a sensor may show with the finger lifted off, in N (as SR-43 has it).
+/// A stage that stands, in m/s, and what a sensor may show with the finger lifted off, in N (as SR-43 has
+/// it).
 const STANDS_M_S: f64 = 2e-3;
 const LIFTED_N: f64 = 0.3;
 /// A pass without contact is made again so often before the sweep gives up.
@@ -107,26 +107,14 @@ impl Approach {
     /// Where the loop and the stage are fast: a command every five milliseconds.
     const FASTEST: Approach = Approach { every: 5, gain: 25.0 };
 
-    /// For a loop and a stage of these periods. A command acts on a position that is as old as the stage's sample, the time
-    /// since the last command and a cycle: a gain well beyond one over that would swing about the goal and never arrive.
+    /// For a loop and a stage of these periods. A command acts on a position that is as old as the stage's
+    /// sample, the time since the last command and a cycle: a gain well beyond one over that would swing
+    /// about the goal and never arrive.
     fn at(cycle: Nanos, stage: &ChannelTiming) -> Self {
         let every = (5e-3 / cycle.seconds()).round().max(1.0);
         let old = (every + 1.0) * cycle.seconds() + stage.period.seconds();
         Approach { every: every as u64, gain: (0.7 / old).min(Self::FASTEST.gain) }
     }
-}
-
-/// Sums over the steady part of a pass.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    lateral: Moments,
-    normal: Moments,
-    amplitude: Moments,
-    speed: Moments,
-    position: Moments,
-    temperature: Moments,
-    lateral_sequence: Option<u32>,
-    frequency_hz: f64,
 }
 
 /// The sweep.
@@ -216,12 +204,14 @@ impl Sequence {
         Sequence { ambient, ..self }
     }
 
-    /// The same, as a session of a run that had begun `start_s` before the loop's time zero, in s: passes tell the run's time.
+    /// The same, as a session of a run that had begun `start_s` before the loop's time zero, in s: passes
+    /// tell the run's time.
     pub fn in_session(self, session: u64, start_s: f64) -> Self {
         Sequence { session: Some(session), start_s, ..self }
     }
 
-    /// The same, with certificates that are held against the amplifier's temperature at the start of each pass.
+    /// The same, with certificates that are held against the amplifier's temperature at the start of each
+    /// pass.
     pub fn watching(self, temperature_ranges: &[TemperatureRange]) -> Self {
         Sequence { temperature_ranges: temperature_ranges.to_vec(), ..self }
     }
@@ -276,7 +266,8 @@ impl Sequence {
         self.stopping = true;
     }
 
-    /// Has the sweep rest before the next pass, without drive and lifted off, or go on. A pass that slides already is made first.
+    /// Has the sweep rest before the next pass, without drive and lifted off, or go on. A pass that slides
+    /// already is made first.
     pub fn pause(&mut self, paused: bool) {
         self.paused = paused;
     }
@@ -331,7 +322,8 @@ impl Sequence {
         out.outcome = Some(outcome);
     }
 
-    /// Arming is one act: a reset once nothing stands in the way, and the proof of the second channel after it.
+    /// Arming is one act: a reset once nothing stands in the way, and the proof of the second channel after
+    /// it.
     fn arm(&mut self, row: &Row, out: &mut Reaction) {
         if self.first_steps(row, out) {
             return;
@@ -440,8 +432,8 @@ impl Sequence {
         self.approach(row, row.now, out);
     }
 
-    /// Waits until it is to go on, not armed. It goes on by arming: the second channel is proved again, and a hand at the dead-man
-    /// device must let go and grip again.
+    /// Waits until it is to go on, not armed. It goes on by arming: the second channel is proved again, and a
+    /// hand at the dead-man device must let go and grip again.
     fn rest(&mut self, row: &Row, since: Nanos, quiet: Nanos, out: &mut Reaction) {
         let loud = self.loud(row);
         let quiet = if loud.is_none() { row.now } else { quiet };
@@ -459,19 +451,12 @@ impl Sequence {
         }
     }
 
-    /// The rule that a paused rig breaks: it is not seen off, at rest and lifted off. Weights that load the finger are not lifted.
+    /// The rule that a paused rig breaks: it is not seen off, at rest and lifted off. Weights that load the
+    /// finger are not lifted.
     fn loud(&self, row: &Row) -> Option<Cause> {
-        let seen = &row.inputs.seen;
-        let (Ok(amplifier), Ok(stage)) = (&seen.amplifier, &seen.stage) else {
-            return Some(if seen.stage.is_ok() { Cause::AmplifierStale } else { Cause::StageStale });
-        };
-        let force = seen.forces.normal.as_ref().map_or(f64::INFINITY, |reading| reading.value.abs());
-        let all = [
-            (amplifier.output_on, Cause::RefusesOff),
-            (stage.velocity_m_s.abs() > STANDS_M_S, Cause::StageNotFollowing),
-            (self.load_commanded && force > LIFTED_N, Cause::LoadImplausible),
-        ];
-        all.into_iter().find(|(is, _)| *is).map(|(_, cause)| cause)
+        let normal = row.inputs.seen.forces.normal.as_ref();
+        let loaded = self.load_commanded && normal.map_or(true, |reading| reading.value.abs() > LIFTED_N);
+        awake(row).or(loaded.then_some(Cause::LoadImplausible))
     }
 
     fn approach(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
@@ -502,7 +487,8 @@ impl Sequence {
             self.stopping = true;
             return;
         }
-        // Slow down towards the goal: the stage has its own acceleration, the way here is a first-order approach.
+        // Slow down towards the goal: the stage has its own acceleration, the way here is a first-order
+        // approach.
         let fast = self.times.approach_speed_m_s;
         let velocity = (away * self.approach.gain).clamp(-fast, fast);
         let velocity = if velocity.abs() < 2e-3 { 2e-3 * away.signum() } else { velocity };
@@ -531,143 +517,16 @@ impl Sequence {
         self.check_temperature(row, out);
         self.stage = Stage::Measure { since: row.now };
     }
+}
 
-    /// Holds the amplifier's temperature against the certificates; what is new is told.
-    fn check_temperature(&mut self, row: &Row, out: &mut Reaction) {
-        let temperature_c = match &row.inputs.seen.amplifier {
-            Ok(amplifier) => amplifier.temperature_c,
-            Err(reason) => Err(*reason),
-        };
-        let flags: Vec<TemperatureFlag> =
-            self.temperature_ranges.iter().filter_map(|range| range.flag(&temperature_c)).collect();
-        let before = std::mem::take(&mut self.temperature_flags);
-        let point = self.points[self.next].number;
-        let fresh = flags.iter().filter(|flag| !before.iter().any(|b| b.certificate == flag.certificate));
-        let told = fresh.map(|flag| Event::TemperatureBeyondCertificate { point, flag: flag.clone() });
-        out.events.extend(told);
-        self.temperature_flags = flags;
-    }
-
-    /// Adds a row's fresh samples to the sums.
-    fn take(&mut self, row: &Row) {
-        let seen = &row.inputs.seen;
-        if let (true, Ok(lateral), Ok(normal)) = (row.usable, &seen.forces.lateral, &seen.forces.normal)
-            && self.sums.lateral_sequence != Some(lateral.sequence)
-        {
-            self.sums.lateral_sequence = Some(lateral.sequence);
-            self.sums.lateral.push(lateral.value);
-            self.sums.normal.push(normal.value);
-        }
-        if let Ok(amplifier) = &seen.amplifier {
-            if let Ok(amplitude) = &amplifier.amplitude {
-                self.sums.amplitude.push(amplitude.value);
-            }
-            if let Ok(temperature) = &amplifier.temperature_c {
-                self.sums.temperature.push(temperature.value);
-            }
-            self.sums.frequency_hz = amplifier.echoed_frequency_hz;
-        }
-        if let Ok(stage) = &seen.stage {
-            self.sums.speed.push(stage.velocity_m_s.abs());
-            self.sums.position.push(stage.position_m);
-        }
-    }
-
-    fn measure(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
-        if row.marker.phase == Phase::Measure {
-            self.take(row);
-            self.at_rig.during_pass();
-        }
-        if row.now.since(since) < Nanos::from_seconds(self.times.measure_s) {
-            return;
-        }
-        let point = self.points[self.next];
-        let normal = self.sums.normal.mean().unwrap_or(0.0);
-        // A pass that was never in contact says nothing about friction.
-        if normal < 0.3 * point.condition.normal_force_n {
-            self.tries += 1;
-            if self.tries >= TRIES {
-                out.commands.push(Command::Stop);
-                self.finish(out, Outcome::NoContact { point: point.number });
-                return;
-            }
-            out.events.push(Event::PassRepeated { point: point.number });
-            self.begin_next(row, out);
-            return;
-        }
-        self.tries = 0;
-        let (pass, levels) = self.pass_of(&point, since, normal, row.now);
-        let lost = levels.iter().filter_map(|level| level.planned.filter(|_| level.lost).map(|w| (level, w)));
-        out.events.extend(lost.map(|(level, wanted)| Event::LevelLost {
-            point: point.number,
-            quantity: level.quantity.clone(),
-            wanted,
-            range: level.range,
-        }));
-        let measured = MeasuredPass { levels, ..self.compare(pass, point.reference) };
-        if let Some(comparison) = &measured.comparison {
-            if let Some(mu0) = self.comparator.mu0() {
-                out.commands.push(Command::Mu0(mu0));
-            }
-            if comparison.departed && !self.departed {
-                self.departed = true;
-                let log_evidence = comparison.log_evidence;
-                out.events.push(Event::ModelDeparted { point: measured.pass.point, log_evidence });
-            }
-        }
-        out.pass = Some(measured);
-        self.next += 1;
-        self.begin_next(row, out);
-    }
-
-    fn pass_of(&self, point: &Point, since: Nanos, normal: f64, now: Nanos) -> (Pass, Vec<Level>) {
-        let sums = &self.sums;
-        let still = point.condition.amplitude == PeakToPeak::ZERO;
-        let measured = sums.amplitude.mean().unwrap_or(point.condition.amplitude.metres());
-        // What was planned of the air is not what was there.
-        let mut air = Condition {
-            ambient_pressure_pa: None,
-            temperature_c: None,
-            relative_humidity_pct: None,
-            ..point.condition
-        };
-        let levels = self.at_rig.levels(&point.condition, &mut air, now);
-        let condition = Condition {
-            amplitude: if still { PeakToPeak::ZERO } else { PeakToPeak::from_metres(measured.max(0.0)) },
-            frequency_hz: if still { point.condition.frequency_hz } else { sums.frequency_hz },
-            speed_m_s: sums.speed.mean().unwrap_or(point.condition.speed_m_s),
-            position_m: sums.position.mean().unwrap_or(point.condition.position_m),
-            normal_force_n: normal,
-            time_s: self.start_s + since.seconds(),
-            ..air.within(&self.ambient)
-        };
-        let pass = Pass {
-            normal_force_sd_n: sums.normal.sd(),
-            lateral_force_sd_n: sums.lateral.sd(),
-            samples: Some(sums.lateral.count()),
-            // The channel's, or none: two thermometers in one column would look like a change.
-            temperature_c: if self.at_rig.holds(1) { air.temperature_c } else { sums.temperature.mean() },
-            replicate: Some(u64::from(point.replicate)),
-            session: self.session,
-            ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
-        };
-        (pass, levels)
-    }
-
-    fn compare(&mut self, pass: Pass, reference: bool) -> MeasuredPass {
-        let mu0 = self.comparator.mu0().map_or(1.0, |m| m.value);
-        let condition = pass.condition(mu0).within(&self.ambient);
-        let comparison =
-            pass.friction_force_n().and_then(|f| self.comparator.pass(&*self.model, &condition, f).ok());
-        self.last_comparison = comparison.or(self.last_comparison);
-        let regime = self.model.predict(&condition).ok().map(|p| p.regime);
-        let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
-        let psi_eq17 =
-            known.map(|m| PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0);
-        let temperature_flags = self.temperature_flags.clone();
-        let levels = Vec::new();
-        MeasuredPass { pass, reference, comparison, regime, psi_eq17, temperature_flags, levels }
-    }
+/// The rule that a rig breaks which is not seen off and at rest.
+fn awake(row: &Row) -> Option<Cause> {
+    let seen = &row.inputs.seen;
+    let (Ok(amplifier), Ok(stage)) = (&seen.amplifier, &seen.stage) else {
+        return Some(if seen.stage.is_ok() { Cause::AmplifierStale } else { Cause::StageStale });
+    };
+    let moves = stage.velocity_m_s.abs() > STANDS_M_S;
+    if amplifier.output_on { Some(Cause::RefusesOff) } else { moves.then_some(Cause::StageNotFollowing) }
 }
 
 #[cfg(test)]

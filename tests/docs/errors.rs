@@ -142,6 +142,8 @@ fn given(folder: &Path, typed: &str, json: bool) -> Output {
     let mut command = muprime();
     command.args(typed.split(' ')).current_dir(folder).env("COLUMNS", "100").env("NO_COLOR", "1");
     command.env_remove("MUPRIME_RUNS").env_remove("MUPRIME_PROFILES").env_remove("MUPRIME_LOG");
+    // The page is that of any machine.
+    command.env("HOME", "/home/you").env_remove("XDG_CONFIG_HOME");
     if json {
         command.arg("--json");
     }

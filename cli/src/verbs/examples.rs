@@ -86,7 +86,7 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("schema", "muprime schema plan"),
     ("init", "muprime init setup"),
     ("show", "muprime show\nmuprime show first-sweep\nmuprime show --sample moist --out moist"),
-    ("doc profile", "muprime doc profile my-sensor.toml\nmuprime doc profile labjack-t"),
+    ("doc profile", "muprime doc profile my-sensor.toml\nmuprime doc profile labjack-t7"),
     ("man", "muprime man man1"),
     ("model point", "muprime model point --amplitude-pp-m 3e-6 --speed-m-s 0.01 --json"),
     ("model ridge", "muprime model ridge --amplitude-pp-m 2e-6 --elements 200"),

@@ -114,7 +114,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             );
         }
         say!(
-            "dead-man key: release it, then hold the space bar down to arm and to continue. Release it, or press any other key, and the drive is off"
+            "dead-man key: release it, then hold the space bar down to arm and to continue. Release it, or press any other \
+             key, and the drive is off"
         );
     }
     if job.asks_at_the_terminal() && (tui || job.setup.hand_at_key()) {

@@ -236,7 +236,8 @@ impl Cause {
                 "Look at the force sensor's link: most samples are lost. State the true rate as `rate_hz`."
             }
             Self::EmergencyStop => {
-                "Make the rig safe, release the emergency stop and start the run again; if it was not pressed, look at its wire and its input."
+                "Make the rig safe, release the emergency stop and start the run again; if it was not pressed, look at its \
+                 wire and its input."
             }
             Self::Interlock => {
                 "Close the guard and start the run again; if it was closed, look at its wire and its input."

@@ -115,7 +115,7 @@ rules! {
     "SR-21" AmplifierWatchdog [Flag] "An amplifier whose own watchdog has fired is switched off." => |c| broken(c.seen.amplifier.is_ok_and(|a| a.watchdog_tripped) && c.watch.enabled, 1.0, 0.0);
     "SR-22" DriveNoResponse [Metre] "A driven plate vibrates: at least a fifth of the commanded amplitude after ring-up." => no_response;
     "SR-23" EchoMismatch [Metre, Hertz, Flag] "The amplifier echoes the set-point that it was given, within its resolution, and shows itself on while it is driven." => echo;
-    "SR-24" RefusesOff [Flag] "An amplifier that stays on when told to be off is cut from its supply." => |c| broken(c.watch.refuses_off(c.limits, c.now), 1.0, 0.0);
+    "SR-24" RefusesOff [Flag] "An amplifier that stays on after 'off' is cut from its supply." => |c| broken(c.watch.refuses_off(c.limits, c.now), 1.0, 0.0);
     "SR-25" OverTemperature [Celsius] "Plate and amplifier stay below the temperature limit; a lost sensor counts as too hot." => temperature;
     "SR-26" StageStale [Second] "The stage's state is no older than its own periods and latency allow." => |c| state_stale(c.seen.stage.map(|s| s.taken_at), c.limits.timing.stage.age_limit(), c.now);
     "SR-27" StageFault [Flag] "A stage that reports a fault, or numbers that are none, is stopped." => |c| broken(c.seen.stage.is_ok_and(|s| s.fault || !(s.position_m.is_finite() && s.velocity_m_s.is_finite())), 1.0, 0.0);
@@ -123,16 +123,16 @@ rules! {
     "SR-31" Suspended [Second] "A cycle that begins fifty periods after the deadline that was due switches off: the rig was alone for that time." => |c| above(Some(c.seen.lateness.seconds()), SUSPENDED_CYCLES * c.limits.timing.cycle.seconds());
     "SR-29" Overrun [Count] "The loop misses fewer deadlines in a row than its limit (three by default), and of a thousand no more than another (ten by default); a skipped deadline is a missed one." => overrun;
     "SR-30" RequestRefused [Metre, MetrePerSecond, Newton, Hertz] "A request beyond any limit, or not finite, switches off." => request;
-    "SR-32" StageNotFollowing [MetrePerSecond] "The stage moves as it is told: at least a fifth of its speed after its response time, and not half as fast again." => following;
+    "SR-32" StageNotFollowing [MetrePerSecond] "The stage follows its commanded speed: at least a fifth of its speed after its response time, and not half as fast again." => following;
     "SR-33" LateralLossy [Share] "At least a quarter of the lateral samples that are due in a window come." => |c| lossy(c, c.watch.lateral.share_came);
     "SR-34" NormalLossy [Share] "At least a quarter of the normal samples that are due in a window come." => |c| lossy(c, c.watch.normal.share_came);
-    "SR-37" SupplySwitch [Second] "A second switch-off channel that is fitted reads back what it was told." => supply_switch;
+    "SR-37" SupplySwitch [Second] "A second switch-off channel that is fitted reads back its command." => supply_switch;
     "SR-38" Unguarded [Flag] "A human finger needs a second channel, an emergency stop, a dead-man device, and a watchdog at the amplifier or at the second channel; an amplifier without watchdog needs a second channel." => unguarded;
     "SR-39" ExposureDuty [Second] "With a human finger, no larger share of the last hour is vibrated than its limit." => exposure_duty;
     "SR-40" ExposureDose [SquareMetrePerSecond] "With a human finger, the squared velocity summed over the last hour stays below its limit." => exposure_dose;
     "SR-41" AmplitudeSaturated [Count] "An amplitude at the end of its range in two states in a row switches off." => |c| broken(c.watch.amplitude_saturated_in_a_row >= 2, f64::from(c.watch.amplitude_saturated_in_a_row), 2.0);
     "SR-42" AmplitudeFrozen [Count] "While the plate is driven, a measured amplitude that has noise does not repeat its raw value more often than that allows." => amplitude_frozen;
-    "SR-43" LoadImplausible [Newton] "Normal force stays near the load that the stage was told to apply, and near zero when it was told to lift off." => load_plausible;
+    "SR-43" LoadImplausible [Newton] "Normal force stays near the load that the stage is commanded to apply, and near zero when it is commanded to lift off." => load_plausible;
 }
 
 fn broken(is: bool, value: f64, bound: f64) -> Option<(f64, f64)> {

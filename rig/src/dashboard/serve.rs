@@ -43,7 +43,7 @@ pub async fn serve(listener: TcpListener, routes: Router) {
             let _ = stream.set_nodelay(true);
             let _ = rustix::net::sockopt::set_socket_send_buffer_size(&stream, HELD_BYTES);
             let _ = rustix::net::sockopt::set_tcp_user_timeout(&stream, TAKEN_WITHIN.as_millis() as u32);
-            let socket = rustix::io::dup(&stream);
+            let socket = rustix::io::fcntl_dupfd_cloexec(&stream, 0);
             let service = TowerToHyperService::new(routes);
             let connection = hyper::server::conn::http1::Builder::new()
                 .timer(TokioTimer::new())
@@ -57,7 +57,7 @@ pub async fn serve(listener: TcpListener, routes: Router) {
                 connection.as_mut().graceful_shutdown();
                 let _ = tokio::time::timeout(LAST_ANSWER_WITHIN, connection).await;
             } else if let Ok(socket) = socket {
-                // What is left of it is a live stream, which has a bound of its own: a slow browser may take longer to make room.
+                // What is left is a live stream with a bound of its own: a slow browser may take longer to make room.
                 let _ = rustix::net::sockopt::set_tcp_user_timeout(&socket, 0);
             }
         });

@@ -16,8 +16,8 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 
 /// Streams at once.
 const STREAMS: usize = 16;
-/// Lines that wait for a browser at most: passes and events of hours. A run ends soon after its last pass and waits for no viewer, so a
-/// slow browser's lines wait here.
+/// Lines that wait for a browser at most: passes and events of hours. A run ends soon after its last pass and
+/// waits for no viewer, so a slow browser's lines wait here.
 const QUEUE: usize = 4096;
 /// Lines that wait from which on states are left out.
 const WITHOUT_STATES: usize = 128;

@@ -188,7 +188,8 @@ impl Bench {
         }
     }
 
-    /// On a virtual rig a hand that is none turns the chamber's valve, and waits for the level as a person would.
+    /// On a virtual rig a hand that is none turns the chamber's valve, and waits for the level as a person
+    /// would.
     fn has_set(&mut self, question: Question, now: Nanos) -> bool {
         let (Some((at, level)), Some(world)) = (question.level, &self.world) else { return true };
         let since = *self.valve_turned.get_or_insert_with(|| {

@@ -106,7 +106,8 @@ impl Plan {
         conditions.into_iter().map(set).flat_map(visits).collect()
     }
 
-    /// Repeats, shuffles within each state of the air, interleaves references, and turns conditions into passes.
+    /// Repeats, shuffles within each state of the air, interleaves references, and turns conditions into
+    /// passes.
     fn order(&self, conditions: &[Visit<'_>], seed: u64) -> Vec<Point> {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
         let mut states: Vec<Ambient> = Vec::new();
@@ -239,7 +240,8 @@ pub(crate) fn series_place(text: &str, index: usize, name: &str) -> Option<std::
 mod tests {
     use super::*;
 
-    /// Two series that list the same pressures: each of their passes was made twice, and a pressure was visited again.
+    /// Two series that list the same pressures: each of their passes was made twice, and a pressure was
+    /// visited again.
     #[test]
     fn series_that_share_their_pressures_are_grouped_by_pressure_and_made_once() {
         let series = "[[series]]\nambient_pressure_pa = [101325, 50000]\n";

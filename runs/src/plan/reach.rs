@@ -1,4 +1,5 @@
-//! What the instruments themselves can do and see, by their profiles: a plan beyond it would trip in the middle of its sweep.
+//! What the instruments themselves can do and see, by their profiles: a plan beyond it would trip in the
+//! middle of its sweep.
 
 use super::{PassTimes, Plan};
 use crate::input::{Problems, place_of};
@@ -49,8 +50,8 @@ fn of_speed(reaches: &[Reach]) -> Option<&Reach> {
     reaches.iter().find(|reach| reach.column == "speed_m_s")
 }
 
-/// The times of a pass with a travel to its start that is no faster than the stage. A speed that the plan states was refused
-/// where it is ([`Plan::check_reach`]).
+/// The times of a pass with a travel to its start that is no faster than the stage. A speed that the plan
+/// states was refused where it is ([`Plan::check_reach`]).
 pub fn times(reaches: &[Reach], times: PassTimes) -> PassTimes {
     let most = of_speed(reaches).map_or(f64::INFINITY, |taken| taken.range[1]);
     PassTimes { approach_speed_m_s: times.approach_speed_m_s.min(most), ..times }
@@ -74,8 +75,8 @@ mod tests {
         let said = format!("{refused:?}");
         assert!(said.contains("`a` takes") && said.contains("`s` sees"), "{said}");
     }
-    /// A stage that does less than the travel's usual speed: every sweep was refused at the wire, and told as a stage that does
-    /// not follow.
+    /// A stage that does less than the travel's usual speed: every sweep was refused at the wire, and told as
+    /// a stage that does not follow.
     #[test]
     fn a_travel_is_no_faster_than_the_stage() {
         let reach = [Reach { column: "speed_m_s", range: [0.0, 0.1], by: "`s` takes".into() }];

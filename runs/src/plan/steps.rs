@@ -17,7 +17,8 @@ pub struct Step {
     /// s to wait once it is done, with the drive off: 180 for a skin that equilibrates.
     #[serde(default)]
     pub wait_s: f64,
-    /// Name, with its unit, of a number that is typed in answer, as in `skin_moisture_au`. `measure_moisture` has it of itself.
+    /// Name, with its unit, of a number that is typed in answer, as in `skin_moisture_au`, which is the
+    /// default of `measure_moisture`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub number: Option<String>,
     /// Usual value of that number: what a virtual rig answers.

@@ -1,5 +1,5 @@
-//! Whether the force sensor can see what a sweep is to show. A sweep whose whole expected change of force is a count
-//! or two, or drowns in the sensor's noise, measures the sensor: it is refused before anything moves.
+//! Whether the force sensor can see what a sweep is to show. A sweep whose whole expected change of force is
+//! a count or two, or drowns in the sensor's noise, measures the sensor: it is refused before anything moves.
 
 use super::points::series_place;
 use super::{Plan, Point, Resolution};
@@ -8,8 +8,8 @@ use models::condition::Condition;
 use models::prediction::FrictionModel;
 use models::quantity::PeakToPeak;
 
-/// Counts of the sensor that the largest expected change of a series must span. One count either way is rounding of
-/// the two readings whose difference is taken; four leave a curve of some shape.
+/// Counts of the sensor that the largest expected change of a series must span. One count either way is
+/// rounding of the two readings whose difference is taken; four leave a curve of some shape.
 pub const COUNTS_MIN: f64 = 4.0;
 
 /// What reads the lateral force, as far as it is known before the instrument is asked.
@@ -49,9 +49,10 @@ fn mn(newtons: f64) -> String {
 }
 
 impl Plan {
-    /// Refuses a series whose largest expected change of lateral force the sensor cannot see. The change is from the
-    /// reference without vibration, `(1 - mu') mu_0 F_n` (Eq. 5); of a series without vibration it is the friction
-    /// itself, `mu_0 F_n`. A condition outside the model's domain expects nothing and so refuses nothing.
+    /// Refuses a series whose largest expected change of lateral force the sensor cannot see. The change is
+    /// from the reference without vibration, `(1 - mu') mu_0 F_n` (Eq. 5); of a series without vibration it
+    /// is the friction itself, `mu_0 F_n`. A condition outside the model's domain expects nothing and so
+    /// refuses nothing.
     ///
     /// # Errors
     /// The first such series, with its best point, the sensor, both forces and what would do.
@@ -144,8 +145,8 @@ amplitude_pp_m = [0.5e-6, 3e-6]
         LateralChannel { sensor: "`s` (fx)".into(), count_n, noise_n, pass_sd_n: 0.0008 }
     }
 
-    /// The change cannot exceed mu0 Fn = 0.125 N, and at 3 um it is more than half of it: between 16 and 32 mN a
-    /// count some count must be the last that passes.
+    /// The change cannot exceed mu0 Fn = 0.125 N, and at 3 um it is more than half of it: between 16 and 32
+    /// mN a count some count must be the last that passes.
     #[test]
     fn a_count_too_coarse_for_the_sweep_is_refused_with_its_numbers() {
         assert_eq!(judge(PLAN, &channel(Some(0.0156), None)), Ok(()));
@@ -168,7 +169,8 @@ amplitude_pp_m = [0.5e-6, 3e-6]
         assert!(judge(PLAN, &rough).unwrap_err().contains("force_sd_n"));
     }
 
-    /// Full contact below w = 2 Fn/kn: the model expects no change at all there. Alone such a series shows nothing.
+    /// Full contact below w = 2 Fn/kn: the model expects no change at all there. Alone such a series shows
+    /// nothing.
     #[test]
     fn a_series_that_shows_nothing_is_refused_and_one_point_that_shows_something_is_enough() {
         let silent = PLAN.replace("[0.5e-6, 3e-6]", "[1e-8]");

@@ -24,7 +24,10 @@ pub fn describe(event: &Event) -> String {
         ),
         Event::NobodyTouches => format!("warning: {}", crate::setup::NOBODY),
         Event::NotWired { contacts } => {
-            format!("warning: not monitored, because the setup says that no device is connected: {}", contacts.join(", "))
+            format!(
+                "warning: not monitored, because the setup says that no device is connected: {}",
+                contacts.join(", ")
+            )
         }
         Event::ArmingDisturbed { cause, held_up } => {
             let what = match cause {
@@ -58,7 +61,11 @@ pub fn describe(event: &Event) -> String {
         Event::Paused { point } => format!("paused before pass {point}: drive off, lifted off, not armed"),
         Event::PauseTooLong { bound } => format!("the pause was longer than {bound:.0} s (pause_max_s): the run ends"),
         Event::PauseNotQuiet { cause } => {
-            format!("during the pause the rig was not off, at rest and lifted off ({}): the run ends\n  {}", cause.words(), cause.remedy())
+            format!(
+                "the rig was not off and at rest although it was disarmed ({}): the run ends\n  {}",
+                cause.words(),
+                cause.remedy()
+            )
         }
         Event::Resumed => "warning: resuming: the rig is armed again, then stage and plate move. Keep hands off; with a finger, \
              release the dead-man device and grip it again"

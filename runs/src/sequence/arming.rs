@@ -1,10 +1,12 @@
-//! The way to armed, as a sweep goes it: a reset once nothing stands in the way, the proof of the second channel after it.
+//! The way to armed, as a sweep goes it: a reset once nothing stands in the way, the proof of the second
+//! channel after it.
 //!
-//! A machine that is short of time disturbs this in two ways, and nothing is driven in either. A board that is not heard for
-//! its age limit is a silent emergency stop: the supply is cut, and stays cut until it is proved. Its amplifier then shows a fault for
-//! as long as its supply is open: that is no reason to wait, since the proof is what closes it. And a proof in which the loop was held
-//! up is broken off: it is made again, so often as a reset is asked for at all. Both are told. With a human finger no proof is made
-//! again: the hand at the dead-man device must let go and grip anew, and a person starts anew.
+//! A machine that is short of time disturbs this in two ways, and nothing is driven in either. A board that
+//! is not heard for its age limit is a silent emergency stop: the supply is cut, and stays cut until it is
+//! proved. Its amplifier then shows a fault for as long as its supply is open: that is no reason to wait,
+//! since the proof is what closes it. And a proof in which the loop was held up is broken off: it is made
+//! again, so often as a reset is asked for at all. Both are told. With a human finger no proof is made again:
+//! the hand at the dead-man device must let go and grip anew, and a person starts anew.
 
 use super::events::{Event, Outcome};
 use realtime::ports::Nanos;
@@ -15,7 +17,8 @@ use realtime::turn::Row;
 const ARM_WITHIN: Nanos = Nanos(10_000_000_000);
 /// Nothing may have stood in the way for this long before a reset is asked for.
 const CLEAR_FOR: Nanos = Nanos(50_000_000);
-/// A reset that found something in its way is asked for again, so often in all. Each waits until nothing stands in the way.
+/// A reset that found something in its way is asked for again, so often in all. Each waits until nothing
+/// stands in the way.
 const ASKS: u32 = 3;
 /// Time that the loop has to answer a reset.
 const ANSWER_WITHIN: Nanos = Nanos(200_000_000);
@@ -80,7 +83,8 @@ impl Arming {
         Arming { overrun, human_contact: limits.human_contact, ..self }
     }
 
-    /// The same rig, to be armed once more after a person was at it: its supply is open on purpose, which is no news.
+    /// The same rig, to be armed once more after a person was at it: its supply is open on purpose, which is
+    /// no news.
     pub(super) fn afresh(self) -> Self {
         let Arming { overrun, human_contact, .. } = self;
         Arming { overrun, human_contact, cut_told: true, ..Arming::new() }
@@ -130,8 +134,9 @@ impl Arming {
         Event::ArmingDisturbed { cause, held_up: self.held_up }
     }
 
-    /// Whether the proof is made again after a trip that broke it off: the loop itself was late, or was held up while something that
-    /// only grows old grew too old. A relay that does not do what it is told is not among these, nor anything that an instrument says.
+    /// Whether the proof is made again after a trip that broke it off: the loop itself was late, or was held
+    /// up while something that only grows old grew too old. A relay that does not do what it is told is not
+    /// among these, nor anything that an instrument says.
     fn is_made_again_after(&self, trip: &Trip) -> bool {
         let by_itself = matches!(trip.cause, Cause::Overrun | Cause::Suspended);
         let grew_old = match trip.cause {

@@ -3,12 +3,13 @@
 //! ```text
 //! before a pass whose level is not there, before the first pass and after the last:
 //!   no person:  drive off, lifted, armed ----------------------> set -> there -> next pass
-//!   a person:   Disarm -> read back off, supply open, at rest -> ask -> answer (-> timer, -> there) -> Arm -> Zero -> next pass
+//!   a person:   Disarm -> read back off, supply open, at rest -> ask -> answer (-> timer, -> there)
+//!               -> Arm -> Zero -> next pass
 //! ```
 //! Nothing vibrates and nothing moves while it waits. Answers and readings come from whoever serves the sweep
 //! ([`crate::ambient::Bench`]); this file only decides, so it runs in virtual time as in wall-clock time.
 
-use super::{Event, Outcome, QUIET_WITHIN, Reaction, Sequence, Stage, Sums};
+use super::{Event, Outcome, QUIET_WITHIN, Reaction, STANDS_M_S, Sequence, Stage, Sums, awake};
 use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, Tolerances, shown};
 use crate::plan::{Step, When};
 use models::condition::{Ambient, Condition};
@@ -23,10 +24,9 @@ use std::collections::{BTreeMap, VecDeque};
 const HOLDS_FOR: Nanos = Nanos(1_000_000_000);
 /// Time within which a disarmed rig must be read back off.
 const OFF_WITHIN: Nanos = Nanos(5_000_000_000);
-/// Time in which the finger leaves the plate, and the plate rings down: no person is asked and no zero is read before.
+/// Time in which the finger leaves the plate, and the plate rings down: no person is asked and no zero is
+/// read before.
 const LIFTED_AFTER: Nanos = Nanos(1_000_000_000);
-/// A stage slower than this stands still, m/s.
-const STILL_M_S: f64 = 1e-3;
 /// An operator who types a value beyond the tolerance is asked again so often.
 const ASKS: u32 = 5;
 /// The answer that has the step before done once more.
@@ -85,7 +85,7 @@ pub(super) struct AtRig {
     disarmed: bool,
     asked_again: u32,
     begun: bool,
-    /// When the rig was last seen off, at rest and lifted off while a person was at it.
+    /// When the rig was last seen off and at rest while a person was at it.
     quiet: Nanos,
     over: OfAir<Span>,
 }
@@ -334,9 +334,10 @@ impl Sequence {
     }
 
     pub(super) fn wait_at_rig(&mut self, row: &Row, out: &mut Reaction) {
-        // While a person is at the rig it shows itself off, at rest and lifted off, as a paused one does.
+        // While a person is at the rig it shows itself off and at rest, as a paused one does. Forces are the
+        // person's: tips are changed.
         if self.at_rig.disarmed && !matches!(self.at_rig.wait, Some(Wait::Off { .. })) {
-            let loud = self.loud(row);
+            let loud = awake(row);
             let quiet = if loud.is_none() { row.now } else { self.at_rig.quiet };
             self.at_rig.quiet = quiet;
             if let Some(cause) = loud.filter(|_| row.now.since(quiet) > QUIET_WITHIN) {
@@ -521,6 +522,6 @@ fn is_off(row: &Row) -> bool {
         Err(_) => Some(false),
     };
     let drive_off = open.unwrap_or_else(|| seen.amplifier.is_ok_and(|a| !a.output_on));
-    let at_rest = seen.stage.is_ok_and(|stage| stage.velocity_m_s.abs() < STILL_M_S);
+    let at_rest = seen.stage.is_ok_and(|stage| stage.velocity_m_s.abs() < STANDS_M_S);
     !row.armed && !row.proving && drive_off && at_rest
 }

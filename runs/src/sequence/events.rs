@@ -23,7 +23,8 @@ pub struct MeasuredPass {
     pub regime: Option<Regime>,
     /// Psi of Eq. 17 at the measured condition; `None` without vibration or without `mu_0`.
     pub psi_eq17: Option<f64>,
-    /// Certificates that do not hold at the temperature that the pass began with. Nothing was corrected for it.
+    /// Certificates that do not hold at the temperature that the pass began with. Nothing was corrected for
+    /// it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub temperature_flags: Vec<TemperatureFlag>,
     /// What was found of the air and typed at the rig, by whom and how old.
@@ -37,21 +38,25 @@ pub struct MeasuredPass {
 pub enum Event {
     /// The rig was armed.
     Armed,
-    /// It was armed without a second switch-off channel: what the amplifier refuses, nothing else switches off.
+    /// It was armed without a second switch-off channel: what the amplifier refuses, nothing else switches
+    /// off.
     NoSecondChannel,
-    /// It was armed with no watchdog at the amplifier and none at its supply: if this program dies, the output stays on.
+    /// It was armed with no watchdog at the amplifier and none at its supply: if this program dies, the
+    /// output stays on.
     NoWatchdog,
     /// It was armed with a human finger, to which this much is left.
     ExposureLeft(Left),
     /// It was armed with the numbers of a human fingertip, and the setup says that nobody touches the plate.
     NobodyTouches,
-    /// It was armed with contacts on the board that the setup declares to have no device: they are not watched.
+    /// It was armed with contacts on the board that the setup declares to have no device: they are not
+    /// watched.
     NotWired {
         /// Their names.
         contacts: Vec<String>,
     },
-    /// Before the rig was armed, with nothing driven, this rule was broken for want of time; what it left behind (a cut supply, a proof
-    /// broken off) is cleared by proving the second channel, from the beginning.
+    /// Before the rig was armed, with nothing driven, this rule was broken for want of time; what it left
+    /// behind (a cut supply, a proof broken off) is cleared by proving the second channel, from the
+    /// beginning.
     ArmingDisturbed {
         /// The rule.
         cause: Cause,
@@ -100,8 +105,8 @@ pub enum Event {
         /// Which.
         point: u32,
     },
-    /// From this pass on a certificate does not hold at the temperature that the amplifier reports, or that is not
-    /// known: every pass until it holds again carries the flag.
+    /// From this pass on a certificate does not hold at the temperature that the amplifier reports, or that
+    /// is not known: every pass until it holds again carries the flag.
     TemperatureBeyondCertificate {
         /// The first such pass.
         point: u32,
@@ -219,9 +224,11 @@ pub enum Outcome {
     },
     /// Nothing was heard of the loop.
     LoopLost,
-    /// Record, passes, catalogue, summary or report could not be written: a measurement that is not kept is not made.
+    /// Record, passes, catalogue, summary or report could not be written: a measurement that is not kept is
+    /// not made.
     RecordLost,
-    /// What the finger was exposed to could not be written in time: nothing is driven that is not counted. What was measured is kept.
+    /// What the finger was exposed to could not be written in time: nothing is driven that is not counted.
+    /// What was measured is kept.
     ExposureNotKept,
 }
 

@@ -10,8 +10,8 @@ const PLAN: &str = "name = \"p\"\nseed = 3\nreference_every = 0\n[pass]\nsettle_
     amplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\n\
     amplitude_pp_m = [2e-6, 1e-6, 2e-6, 3e-6, 1.5e-6]\n";
 
-/// Sweeps with somebody who asks for a pause in these spans of time (s); returns the passes, the events and every row with whether the
-/// sweep rested then.
+/// Sweeps with somebody who asks for a pause in these spans of time (s); returns the passes, the events and
+/// every row with whether the sweep rested then.
 fn swept(pauses: &[[f64; 2]]) -> Swept {
     let world = sim::world::WorldConfig::ideal();
     let pause = |row: &Row| pauses.iter().any(|[from, to]| (*from..*to).contains(&row.now.seconds()));
@@ -20,8 +20,8 @@ fn swept(pauses: &[[f64; 2]]) -> Swept {
 
 type Swept = (Vec<MeasuredPass>, Vec<Event>, Vec<(Row, bool)>, Outcome);
 
-/// The same on a rig of this world with a relay, a longest pause in s, somebody who asks for a pause after such rows, and an end
-/// from outside at a time in s.
+/// The same on a rig of this world with a relay, a longest pause in s, somebody who asks for a pause after
+/// such rows, and an end from outside at a time in s.
 fn swept_on(
     world: &sim::world::WorldConfig,
     pause_max_s: f64,
@@ -69,7 +69,8 @@ fn a_pause_rests_without_drive_and_lifted_off_and_loses_no_pass() {
     let (plain, _, _, outcome) = swept(&[]);
     // Each amplitude in both directions.
     assert_eq!((plain.len(), outcome), (10, Outcome::Complete));
-    // Before the first pass; in the midst of one, for longer than any time that a rule waits for; and between two.
+    // Before the first pass; in the midst of one, for longer than any time that a rule waits for; and between
+    // two.
     let (passes, events, rows, outcome) = swept(&[[0.0, 2.0], [2.65, 40.3], [41.0, 41.1]]);
     assert_eq!(outcome, Outcome::Complete, "{events:?}");
     let points = |passes: &[MeasuredPass]| passes.iter().map(|p| p.pass.point).collect::<Vec<_>>();
@@ -155,4 +156,34 @@ fn a_pause_in_which_the_rig_does_not_show_itself_off_ends_the_run() {
     let (_, events, _, outcome) = swept_on(&world, 600.0, pause, None);
     assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(Cause::RefusesOff) });
     assert_eq!(events.last(), Some(&Event::PauseNotQuiet { cause: Cause::RefusesOff }));
+}
+
+/// A person who changes a tip presses on the sensor: that ends nothing. An output that comes on meanwhile
+/// does.
+#[test]
+fn a_hand_on_the_finger_ends_no_step_and_an_output_that_comes_on_does() {
+    let (_, _, rows, _) = swept(&[[0.9, 5.0]]);
+    let mut row = rows.into_iter().rev().find(|(row, rests)| *rests && !row.armed).unwrap().0;
+    (row.tripped, row.inputs.seen.supply) = (None, Err(NoData::NotFitted));
+    row.inputs.seen.forces.normal.as_mut().unwrap().value = 2.0;
+    let setup = Setup::load("virtual-ideal").unwrap();
+    let text = format!("{PLAN}[[step]]\nwhen = \"before\"\naction = \"change_tip\"\n");
+    let plan = Plan::parse("plan.toml", &text).unwrap();
+    let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
+    let points = plan.points(1, &setup.config.limits, &resolution).unwrap();
+    let model: Arc<dyn FrictionModel> = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
+    let mut sequence =
+        Sequence::new(points, plan.file.pass, model, &setup.tip, setup.file.noise).at_rig(&plan, &setup);
+    let (mut asked, mut outcome) = (0, None);
+    for ms in 0..30_000 {
+        (row.now, row.cycle) = (row.now.plus(Nanos(1_000_000)), row.cycle + 1);
+        row.inputs.seen.amplifier.as_mut().unwrap().output_on = ms >= 20_000;
+        let reaction = sequence.on_row(&row);
+        asked += usize::from(reaction.question.is_some());
+        outcome = outcome.or(reaction.outcome.map(|outcome| (ms, outcome)));
+    }
+    assert_eq!(asked, 1);
+    let (ms, outcome) = outcome.expect("an end");
+    assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(Cause::RefusesOff) });
+    assert!((22_000..23_000).contains(&ms), "{ms} ms");
 }

@@ -71,7 +71,7 @@ fn the_second_channel_is_opened_and_closed_before_every_arming() {
     assert!(cuts(&rig) > before);
 }
 
-/// Before somebody reaches into the rig the supply opens, stays open however long that takes, and a reset proves it again.
+/// Before somebody reaches into the rig the supply opens and stays open; a reset proves it again.
 #[test]
 fn a_disarmed_rig_keeps_its_supply_open_until_the_channel_is_proved() {
     let mut rig = Relayed::new(5, None);

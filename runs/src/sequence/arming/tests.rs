@@ -1,4 +1,5 @@
-//! Arming beside stalls, in virtual time: the loop stands still, the board that it hears through stands still with it, the rig does not.
+//! Arming beside stalls, in virtual time: the loop stands still, the board that it hears through stands still
+//! with it, the rig does not.
 
 use crate::plan::{Plan, Resolution};
 use crate::sequence::{Event, Outcome, Sequence};
@@ -33,7 +34,8 @@ struct Before {
     human: bool,
 }
 
-/// A board whose link stands still with the loop: the first look after a stall shows what was there before it.
+/// A board whose link stands still with the loop: the first look after a stall shows what was there before
+/// it.
 struct Board {
     rig: SharedRig,
     pressed: Arc<AtomicBool>,
@@ -135,7 +137,8 @@ fn swept(before: Before) -> (Outcome, Vec<Event>, Vec<Row>) {
             rows.push(*row);
             events.extend(reaction.events);
         });
-    // Whatever happened, nothing was driven or moved before it was armed, and every arming came straight from a proof.
+    // Whatever happened, nothing was driven or moved before it was armed, and every arming came straight from
+    // a proof.
     for pair in rows.windows(2) {
         let [before, row] = pair else { unreachable!("two rows") };
         assert!(row.armed || (row.drive_pp_m, row.velocity_m_s, row.load_n) == (0.0, 0.0, 0.0));
@@ -152,13 +155,15 @@ fn disturbed(events: &[Event]) -> Vec<(Cause, u64)> {
     events.iter().filter_map(of).collect()
 }
 
-/// The supply was cut for a board that was not heard for 120 ms, and its amplifier showed a fault for that: for ten seconds the sweep
-/// waited for what only its own proof could clear, and told the amplifier's fault as the cause.
+/// The supply was cut for a board that was not heard for 120 ms, and its amplifier showed a fault for that:
+/// for ten seconds the sweep waited for what only its own proof could clear, and told the amplifier's fault
+/// as the cause.
 #[test]
 fn a_stall_before_arming_is_told_and_the_second_channel_proved() {
     let (outcome, events, _) = swept(Before::default());
     assert_eq!((outcome, disturbed(&events)), (Outcome::Complete, vec![]), "{events:?}");
-    // Of 120 deadlines in a thousand, more than the limit were missed: armed before they are forgotten, the rig would trip at once.
+    // Of 120 deadlines in a thousand, more than the limit were missed: armed before they are forgotten, the
+    // rig would trip at once.
     for (cycle, ms, waits) in [(3, 90, 40..80), (10, 90, 40..80), (40, 90, 40..80), (10, 120, 900..1100)] {
         let (outcome, events, rows) = swept(Before { stall: Some((cycle, ms)), ..Before::default() });
         assert_eq!(outcome, Outcome::Complete, "{events:?}");

@@ -1,0 +1,166 @@
+//! A pass while it slides: its samples are summed, and what they come to is compared with the model.
+
+use super::{Event, MeasuredPass, Outcome, Reaction, Sequence, TRIES};
+use crate::ambient::Level;
+use crate::certificates::temperature::TemperatureFlag;
+use crate::plan::Point;
+use models::condition::Condition;
+use models::pass::Pass;
+use models::psi::PsiEq17;
+use models::quantity::PeakToPeak;
+use realtime::cycle::{Command, Phase};
+use realtime::estimate::Moments;
+use realtime::ports::Nanos;
+use realtime::turn::Row;
+
+/// Sums over the steady part of a pass.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    pub(super) lateral: Moments,
+    pub(super) normal: Moments,
+    amplitude: Moments,
+    speed: Moments,
+    position: Moments,
+    temperature: Moments,
+    lateral_sequence: Option<u32>,
+    frequency_hz: f64,
+}
+
+impl Sequence {
+    /// Compares the amplifier's temperature with the certificates; what is new becomes an event.
+    pub(super) fn check_temperature(&mut self, row: &Row, out: &mut Reaction) {
+        let temperature_c = match &row.inputs.seen.amplifier {
+            Ok(amplifier) => amplifier.temperature_c,
+            Err(reason) => Err(*reason),
+        };
+        let flags: Vec<TemperatureFlag> =
+            self.temperature_ranges.iter().filter_map(|range| range.flag(&temperature_c)).collect();
+        let before = std::mem::take(&mut self.temperature_flags);
+        let point = self.points[self.next].number;
+        let fresh = flags.iter().filter(|flag| !before.iter().any(|b| b.certificate == flag.certificate));
+        let told = fresh.map(|flag| Event::TemperatureBeyondCertificate { point, flag: flag.clone() });
+        out.events.extend(told);
+        self.temperature_flags = flags;
+    }
+
+    /// Adds a row's fresh samples to the sums.
+    pub(super) fn take(&mut self, row: &Row) {
+        let seen = &row.inputs.seen;
+        if let (true, Ok(lateral), Ok(normal)) = (row.usable, &seen.forces.lateral, &seen.forces.normal)
+            && self.sums.lateral_sequence != Some(lateral.sequence)
+        {
+            self.sums.lateral_sequence = Some(lateral.sequence);
+            self.sums.lateral.push(lateral.value);
+            self.sums.normal.push(normal.value);
+        }
+        if let Ok(amplifier) = &seen.amplifier {
+            if let Ok(amplitude) = &amplifier.amplitude {
+                self.sums.amplitude.push(amplitude.value);
+            }
+            if let Ok(temperature) = &amplifier.temperature_c {
+                self.sums.temperature.push(temperature.value);
+            }
+            self.sums.frequency_hz = amplifier.echoed_frequency_hz;
+        }
+        if let Ok(stage) = &seen.stage {
+            self.sums.speed.push(stage.velocity_m_s.abs());
+            self.sums.position.push(stage.position_m);
+        }
+    }
+
+    pub(super) fn measure(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
+        if row.marker.phase == Phase::Measure {
+            self.take(row);
+            self.at_rig.during_pass();
+        }
+        if row.now.since(since) < Nanos::from_seconds(self.times.measure_s) {
+            return;
+        }
+        let point = self.points[self.next];
+        let normal = self.sums.normal.mean().unwrap_or(0.0);
+        // A pass that was never in contact says nothing about friction.
+        if normal < 0.3 * point.condition.normal_force_n {
+            self.tries += 1;
+            if self.tries >= TRIES {
+                out.commands.push(Command::Stop);
+                self.finish(out, Outcome::NoContact { point: point.number });
+                return;
+            }
+            out.events.push(Event::PassRepeated { point: point.number });
+            self.begin_next(row, out);
+            return;
+        }
+        self.tries = 0;
+        let (pass, levels) = self.pass_of(&point, since, normal, row.now);
+        let lost = levels.iter().filter_map(|level| level.planned.filter(|_| level.lost).map(|w| (level, w)));
+        out.events.extend(lost.map(|(level, wanted)| Event::LevelLost {
+            point: point.number,
+            quantity: level.quantity.clone(),
+            wanted,
+            range: level.range,
+        }));
+        let measured = MeasuredPass { levels, ..self.compare(pass, point.reference) };
+        if let Some(comparison) = &measured.comparison {
+            if let Some(mu0) = self.comparator.mu0() {
+                out.commands.push(Command::Mu0(mu0));
+            }
+            if comparison.departed && !self.departed {
+                self.departed = true;
+                let log_evidence = comparison.log_evidence;
+                out.events.push(Event::ModelDeparted { point: measured.pass.point, log_evidence });
+            }
+        }
+        out.pass = Some(measured);
+        self.next += 1;
+        self.begin_next(row, out);
+    }
+
+    fn pass_of(&self, point: &Point, since: Nanos, normal: f64, now: Nanos) -> (Pass, Vec<Level>) {
+        let sums = &self.sums;
+        let still = point.condition.amplitude == PeakToPeak::ZERO;
+        let measured = sums.amplitude.mean().unwrap_or(point.condition.amplitude.metres());
+        // What was planned of the air is not what was there.
+        let mut air = Condition {
+            ambient_pressure_pa: None,
+            temperature_c: None,
+            relative_humidity_pct: None,
+            ..point.condition
+        };
+        let levels = self.at_rig.levels(&point.condition, &mut air, now);
+        let condition = Condition {
+            amplitude: if still { PeakToPeak::ZERO } else { PeakToPeak::from_metres(measured.max(0.0)) },
+            frequency_hz: if still { point.condition.frequency_hz } else { sums.frequency_hz },
+            speed_m_s: sums.speed.mean().unwrap_or(point.condition.speed_m_s),
+            position_m: sums.position.mean().unwrap_or(point.condition.position_m),
+            normal_force_n: normal,
+            time_s: self.start_s + since.seconds(),
+            ..air.within(&self.ambient)
+        };
+        let pass = Pass {
+            normal_force_sd_n: sums.normal.sd(),
+            lateral_force_sd_n: sums.lateral.sd(),
+            samples: Some(sums.lateral.count()),
+            // The channel's, or none: two thermometers in one column would look like a change.
+            temperature_c: if self.at_rig.holds(1) { air.temperature_c } else { sums.temperature.mean() },
+            replicate: Some(u64::from(point.replicate)),
+            session: self.session,
+            ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
+        };
+        (pass, levels)
+    }
+
+    fn compare(&mut self, pass: Pass, reference: bool) -> MeasuredPass {
+        let mu0 = self.comparator.mu0().map_or(1.0, |m| m.value);
+        let condition = pass.condition(mu0).within(&self.ambient);
+        let comparison =
+            pass.friction_force_n().and_then(|f| self.comparator.pass(&*self.model, &condition, f).ok());
+        self.last_comparison = comparison.or(self.last_comparison);
+        let regime = self.model.predict(&condition).ok().map(|p| p.regime);
+        let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
+        let psi_eq17 =
+            known.map(|m| PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0);
+        let temperature_flags = self.temperature_flags.clone();
+        let levels = Vec::new();
+        MeasuredPass { pass, reference, comparison, regime, psi_eq17, temperature_flags, levels }
+    }
+}
