@@ -109,6 +109,8 @@ fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scat
         groups.entry(key).or_default().push(i);
     }
     let (mut sum, mut freedom) = (0.0, 0usize);
+    // What lasts is half the same in neighbours, and the rest of it is no repeatability.
+    let lasting = scatter.lasting(table, &problem.constants, variance);
     for rows in groups.values().filter(|r| r.len() > 1) {
         for pair in rows.windows(2) {
             let (i, j) = (pair[0], pair[1]);
@@ -123,7 +125,8 @@ fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scat
             }
             // What regulation leaves of the load's scatter is taken out along the smooth surface.
             let difference = (table.lateral[i] - scatter.level[i]) - (table.lateral[j] - scatter.level[j]);
-            sum += difference * difference / (variance[i] + variance[j]);
+            let moved = (lasting.row(i) - lasting.row(j)).norm_squared();
+            sum += difference * difference / (variance[i] + variance[j] + moved);
             freedom += 1;
         }
     }

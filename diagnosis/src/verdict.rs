@@ -2,6 +2,7 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
+use crate::describe::{Description, at_least, description};
 use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::intervals::{Estimate, curvature, estimates};
 use crate::locate::{Region, ledger, regions};
@@ -104,6 +105,10 @@ pub struct Report {
     /// How far the verdict's model had to pull the stiffnesses from their calibration; empty for `unknown`, which
     /// has no model that holds.
     pub stiffness_pulls: Vec<Pull>,
+    /// What an unknown departure looks like, best first; empty otherwise.
+    pub description: Vec<Description>,
+    /// Causes that are sure under an open verdict.
+    pub at_least: Vec<String>,
     /// Effects that the table cannot show.
     pub not_testable: Vec<NotTestable>,
     /// Under no gap: the size of each effect from which this table would have shown it, most visible first.
@@ -194,6 +199,8 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
         scatter: fitted.scatter.clone(),
         with_suspects,
         stiffness_pulls,
+        description: description(&fitted, &decision),
+        at_least: at_least(&fitted, &decision),
         not_testable: fitted
             .not_testable
             .iter()
@@ -266,10 +273,15 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
                 let leading = fitted.candidates.get(leader).map_or(f64::NEG_INFINITY, |c| c.log_evidence);
                 s.log_evidence > fitted.discrepancy.log_evidence.max(leading)
             });
-            let hint = known.map_or_else(String::new, |s| {
-                let names = s.names().join("+").replace('_', " ");
-                format!(" The nearest known effect is not in the library: {names}.")
-            });
+            let seen = description(fitted, decision);
+            let hint = match (known, seen.first()) {
+                (Some(s), _) => {
+                    let names = s.names().join("+").replace('_', " ");
+                    format!(" The nearest known effect is not in the library: {names}.")
+                }
+                (None, Some(d)) => format!(" It looks like {}.", d.text),
+                (None, None) => String::new(),
+            };
             format!(
                 "There is a gap, and no effect of the library explains most of it; {}.{hint}",
                 closed("a smooth map")
