@@ -48,6 +48,8 @@ struct Line {
     stated: Vec<(Vec<String>, f64)>,
     /// Log evidences beside no gap's.
     evidence: Vec<(String, f64)>,
+    /// Scale of the scatter, shift of runs, size and correlation of what lasts, what it cost, bare scale, structure nats, clustered p, suspects.
+    scatter: Vec<f64>,
     closure: f64,
     carrying: usize,
     closed: usize,
@@ -122,6 +124,13 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
         class: first.map(|h| h.alias_class.clone()).unwrap_or_default(),
         stated: report.hypotheses.iter().map(|h| (h.effects.clone(), h.probability)).collect(),
         evidence,
+        scatter: {
+            let s = &fitted.scatter;
+            let own =
+                [s.scale, s.run_relative_sd.unwrap_or(0.0), s.slow[0], s.slow[1], s.slow_cost, s.bare_scale];
+            let own = own.into_iter().chain([s.structure_nats, s.clustered_p, s.suspects.len() as f64]);
+            own.collect()
+        },
         closure: report.left_out.pooled_closure,
         carrying: report.left_out.carrying,
         closed: report.left_out.closed,

@@ -137,6 +137,8 @@ constants! {
     explained_sd: f64 = 3.0, "Deviations within which a cause explains a suspect pass, which then belongs.", "three standard deviations";
     slow_sizes: [f64; 8] = [0.0, 0.5, 0.8, 1.3, 2.0, 3.0, 5.0, 8.0], "Scatter that lasts from pass to pass over the independent one: values that are tried.", NUMERICAL;
     slow_correlations: [f64; 4] = [0.6, 0.8, 0.9, 0.95], "Its correlation from pass to pass: values that are tried.", NUMERICAL;
+    slow_within: f64 = 6.0, "Correlation times of it that a run must hold: what wanders for longer is a drift.", "judgement: a mean over a run then tells scatter from running in";
+    slow_long_run: usize = 48, "Passes of a run from which it may be larger than the independent scatter.", JUDGEMENT;
     slow_nats: f64 = 3.0, "Nats that scatter that lasts must gain.", JUDGEMENT;
     serial_modes: usize = 80, "Cosines of its slow part, at most a third as many as passes.", "numerical: beyond them a correlation of 0.9 is nearly independent";
 

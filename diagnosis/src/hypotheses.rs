@@ -56,7 +56,11 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
     Arc::make_mut(&mut alone.constants).slow_nats = f64::INFINITY;
     let mut independent = fit_believing(table, rig, &alone, &Belief::Judged);
     independent.problem.constants = options.constants.clone();
-    if independent.best_evidence() + k.slow_nats > lasting.best_evidence() { independent } else { lasting }
+    if independent.best_evidence() + lasting.scatter.slow_cost > lasting.best_evidence() {
+        independent
+    } else {
+        lasting
+    }
 }
 
 /// The same with a belief about which passes belong.
@@ -126,7 +130,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     let top = candidates.iter().map(|c| c.log_evidence).fold(smooth, f64::max);
     let structure =
         if none_evidence > top - k.structure_asked_nats { structure(&problem, &none) } else { None };
-    let shapes = shapes::shapes(&problem, &none, scatter.lasting_columns(&problem));
+    let shapes = shapes::shapes(&problem, &none, &scatter);
     let mut fitted = Fitted {
         shapes,
         problem,

@@ -57,6 +57,9 @@ pub struct Scatter {
     /// Size of the scatter that lasts over that of the independent one, and its own correlation.
     #[serde(skip)]
     pub slow: [f64; 2],
+    /// Nats that it had to gain.
+    #[serde(skip)]
+    pub slow_cost: f64,
     /// Probability of each pass not to belong.
     #[serde(skip)]
     pub outside: Vec<f64>,
@@ -131,7 +134,7 @@ pub fn estimate(
     let n = problem.len();
     let surfaces: Vec<Surface> =
         lengths(k, table).into_par_iter().map(|l| Surface::new(table, problem, center, l)).collect();
-    let start = State::start(table.run_count > 1);
+    let start = State::start(table.run_count > 1).within(&serial::bounds(k, table));
     let under = problem.predict(&[], center).as_slice().to_vec();
     let mut level = under.clone();
     let mut variance = stated(&level);
@@ -201,6 +204,7 @@ pub fn estimate(
         suspects: (0..n).filter(|&i| outside[i] > k.suspect_probability).map(suspect).collect(),
         together_in,
         slow: state.slow(k),
+        slow_cost: if state.slow(k)[0] > 0.0 { k.slow_nats } else { 0.0 },
         outside: outside.clone(),
         inflation: weight.iter().map(|w| 1.0 / w).collect(),
         level: seen.level,

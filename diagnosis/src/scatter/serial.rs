@@ -19,6 +19,31 @@ fn order(table: &Table) -> Vec<usize> {
     rows
 }
 
+/// Largest places on the grids of size and correlation that the runs of a table are long enough for.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Bounds {
+    /// Place on `slow_sizes`.
+    pub size: usize,
+    /// Place on `slow_correlations`.
+    pub correlation: usize,
+}
+
+/// What lasts has to pass within a run: what wanders for longer, as in running in, is a drift and no scatter. Short runs
+/// cannot tell the two apart, so there it is at most as large as the independent scatter.
+pub fn bounds(k: &Constants, table: &Table) -> Bounds {
+    let mut lengths = vec![0usize; table.run_count.max(1)];
+    table.runs.iter().for_each(|&run| lengths[run] += 1);
+    lengths.sort_unstable();
+    let length = lengths[lengths.len() / 2];
+    let passes = |rho: f64| -1.0 / rho.ln();
+    let fits = |rho: &&f64| k.slow_within * passes(**rho) <= length as f64;
+    let correlations = k.slow_correlations.iter().take_while(fits).count();
+    let largest = if length < k.slow_long_run { 1.0 } else { f64::INFINITY };
+    let sizes = k.slow_sizes.iter().take_while(|size| **size <= largest).count();
+    let size = if correlations > 0 { sizes.saturating_sub(1) } else { 0 };
+    Bounds { size, correlation: correlations.saturating_sub(1) }
+}
+
 /// Number of cosines that a table of n passes has.
 pub fn modes(k: &Constants, n: usize) -> usize {
     if n < FEWEST { 0 } else { k.serial_modes.min(n / 3) }

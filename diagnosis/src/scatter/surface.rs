@@ -22,6 +22,8 @@ pub struct State {
     slow: usize,
     lasts: usize,
     with_runs: bool,
+    /// Largest places of what lasts that the length of the runs allows.
+    most: serial::Bounds,
 }
 
 /// Sweeps over the scales.
@@ -30,12 +32,30 @@ const SWEEPS: usize = 12;
 impl State {
     /// Where the climb begins: a small departure, the stated scatter.
     pub fn start(with_runs: bool) -> Self {
-        State { even: 2, odd: 0, run: usize::from(with_runs), scale: 4, slow: 0, lasts: 1, with_runs }
+        State {
+            even: 2,
+            odd: 0,
+            run: usize::from(with_runs),
+            scale: 4,
+            slow: 0,
+            lasts: 1,
+            with_runs,
+            most: serial::Bounds::default(),
+        }
+    }
+
+    /// The same where what lasts is bounded.
+    pub fn within(self, most: &serial::Bounds) -> Self {
+        State { slow: self.slow.min(most.size), lasts: self.lasts.min(most.correlation), most: *most, ..self }
     }
 
     /// The same with scatter that lasts: from independent passes a climb does not find it.
     fn lasting(self, k: &Constants) -> Self {
-        if self.slow > 0 { self } else { State { slow: k.slow_sizes.len() / 2, even: 0, ..self } }
+        if self.slow > 0 {
+            self
+        } else {
+            State { slow: k.slow_sizes.len() / 2, even: 0, ..self }.within(&self.most)
+        }
     }
 
     /// Size of the slow scatter over that of the independent one, and its correlation from pass to pass.
@@ -68,10 +88,10 @@ impl State {
         list.extend(step(self.scale, k.scatter_scales.len()).iter().map(|&scale| State { scale, ..*self }));
         list.extend(step(self.even, k.discrepancy_even.len()).iter().map(|&even| State { even, ..*self }));
         list.extend(step(self.odd, k.discrepancy_odd.len()).iter().map(|&odd| State { odd, ..*self }));
-        list.extend(step(self.slow, k.slow_sizes.len()).iter().map(|&slow| State { slow, ..*self }));
+        list.extend(step(self.slow, self.most.size + 1).iter().map(|&slow| State { slow, ..*self }));
         if self.slow > 0 {
             list.extend(
-                step(self.lasts, k.slow_correlations.len()).iter().map(|&lasts| State { lasts, ..*self }),
+                step(self.lasts, self.most.correlation + 1).iter().map(|&lasts| State { lasts, ..*self }),
             );
         }
         if self.with_runs {

@@ -8,6 +8,7 @@ use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::gaussian::{Covariance, log_sum_exp};
 use crate::layout::NUISANCES;
+use crate::scatter::Scatter;
 use models::covariate::{Covariate, Role, TOLD};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -79,7 +80,7 @@ struct Ground {
 }
 
 /// Every kind of shape over every covariate that may have it, strongest first.
-pub fn shapes(problem: &Problem, none: &Posterior, lasting: usize) -> Vec<Shape> {
+pub fn shapes(problem: &Problem, none: &Posterior, scatter: &Scatter) -> Vec<Shape> {
     let n = problem.len();
     let rows: Vec<usize> = (0..n).step_by(n.div_ceil(MOST_PASSES).max(1)).collect();
     let part = problem.select(&rows);
@@ -87,7 +88,7 @@ pub fn shapes(problem: &Problem, none: &Posterior, lasting: usize) -> Vec<Shape>
     let jacobian = part.jacobian(&[], &none.u, &prediction);
     let nuisance = DVector::from_column_slice(&none.u[..NUISANCES]);
     let residual = DVector::from_column_slice(&part.lateral) - &prediction + &jacobian * nuisance;
-    let grounds = grounds(&part, &jacobian, &residual, lasting);
+    let grounds = grounds(&part, &jacobian, &residual, scatter.lasting_columns(problem), scatter.slow_cost);
     let mut list: Vec<Shape> =
         families(&part, &prediction).par_iter().map(|family| weighed(family, &grounds, &residual)).collect();
     list.sort_by(|a, b| b.nats.total_cmp(&a.nats));
@@ -100,7 +101,13 @@ pub fn nats(shapes: &[Shape]) -> f64 {
     log_sum_exp(&all) - (all.len().max(1) as f64).ln()
 }
 
-fn grounds(part: &Problem, jacobian: &DMatrix<f64>, residual: &DVector<f64>, lasting: usize) -> Vec<Ground> {
+fn grounds(
+    part: &Problem,
+    jacobian: &DMatrix<f64>,
+    residual: &DVector<f64>,
+    lasting: usize,
+    cost: f64,
+) -> Vec<Ground> {
     let evidence = |c: &Covariance| -0.5 * (c.quadratic(residual) + c.log_det());
     let settled = part.covariance(jacobian);
     let own = evidence(&settled);
@@ -112,7 +119,7 @@ fn grounds(part: &Problem, jacobian: &DMatrix<f64>, residual: &DVector<f64>, las
         list.extend(SCALES.iter().map(|scale| {
             let variance: Vec<f64> = part.variance.iter().map(|v| v * scale * scale).collect();
             let covariance = Covariance::new(&variance, &columns);
-            let nats = evidence(&covariance) - own + part.constants.slow_nats - (SCALES.len() as f64).ln();
+            let nats = evidence(&covariance) - own + cost - (SCALES.len() as f64).ln();
             Ground { covariance, nats }
         }));
     }
