@@ -92,10 +92,10 @@ fn what_is_wrong_with_the_scatter_is_said() {
         (0..tables).into_par_iter().filter(|&k| said(k)).count() as u64
     };
     let scale = |r: &Report| (r.scatter.scale / 1.5 - 1.0).abs() < 0.15;
-    assert!(said(Roughness::Understated, "repeatability is wrong by x1.", &scale) >= tables - tables / 4);
+    assert!(said(Roughness::Understated, "times as much as rig.toml states", &scale) >= tables - tables / 4);
     let runs = |r: &Report| r.scatter.run_relative_sd.is_some_and(|sd| (0.015..0.09).contains(&sd));
     assert_eq!(said(Roughness::Runs, "shifts from run to run", &runs), tables);
-    for words in ["is wrong by", "from run to run", "from pass to pass", "Suspect"] {
+    for words in ["times as much as", "from run to run", "from pass to pass", "Suspect"] {
         assert!(said(Roughness::Gaussian, words, &|_| true) <= 1, "{words}");
     }
 }

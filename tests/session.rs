@@ -139,7 +139,7 @@ fn bad_input_is_refused_with_its_place_and_nothing_is_touched() {
         ("[0.5e-6, 1e-6, 2e-6, 3e-6]", "[0.5e-6, 1e-3]", "outside what this rig allows"),
         ("frequency_hz = 27500", "frequency_hz = nan", "outside what this rig allows"),
         ("measure_s = 0.1", "measure_s = 10.0", "needs"),
-        ("seed = 7", "seed = -7", "invalid"),
+        ("seed = 7", "seed = -7", "0 or more"),
         ("reference_every = 4", "reference_every = 4\ndirections = [2]", "directions are 1, -1 or both"),
     ];
     for (from, to, expected) in cases {

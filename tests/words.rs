@@ -155,10 +155,10 @@ fn samples_can_be_diagnosed() {
     given(&["show", "--sample", "foreign", "--out", "theirs"]);
     let foreign = std::fs::read_to_string(folder.path().join("theirs/foreign.csv")).unwrap();
     assert!(
-        foreign.starts_with("Amplitude (um p-p);Frequency (kHz)") && foreign.lines().count() == 99,
+        foreign.starts_with("Time (s);Amplitude (um p-p);") && foreign.lines().count() == 99,
         "{foreign}"
     );
-    given(&["import", "theirs/foreign.csv", "-o", "imported"]);
+    given(&["import", "theirs/foreign.csv", "-o", "imported", "--yes"]);
     assert!(folder.path().join("imported/points.csv").exists());
 }
 

@@ -79,7 +79,7 @@ fn a_bad_force_series_is_refused_with_the_reason() {
         }
         true
     });
-    case("odd.csv", odd, "invalid float literal");
+    case("odd.csv", odd, "field 3: a number is expected");
     // The same series untouched is a certificate, so it is the damage that was refused.
     std::fs::write(at.join("good.csv"), good).unwrap();
     let said = tests::muprime()

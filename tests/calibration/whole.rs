@@ -185,9 +185,11 @@ fn a_temperature_beyond_the_certificate_flags_the_passes_and_corrects_nothing() 
                 "amplitude --table table.csv --form bent --serial A-1 --out amplitude.toml --temperature-c {low} {high}"
             ),
         );
-        // Read off at the bench: 20 deg C. The virtual amplifier reports 22.
+        // Read off at the bench: 20 deg C. The plan warms the room to 22, and the amplifier with it.
         write(at, "setup.toml", &setup("\"amplitude.toml\"", "temperature_c = 20.0\n"));
-        let run = muprime(at, &format!("run --setup setup.toml --fast --out {out} --seed 3"));
+        let warm = std::fs::read_to_string(tests::short_plan(at)).unwrap() + "temperature_c = [22.0]\n";
+        write(at, "warm.toml", &warm);
+        let run = muprime(at, &format!("run warm.toml --setup setup.toml --fast --out {out} --seed 3"));
         assert!(run.status.success(), "{}", tests::texts(&run).1);
         let journal = std::fs::read_to_string(at.join(out).join("passes.jsonl")).unwrap();
         let passes: Vec<serde_json::Value> =
@@ -201,15 +203,18 @@ fn a_temperature_beyond_the_certificate_flags_the_passes_and_corrects_nothing() 
     assert!(held.iter().all(|p| p["temperature_flags"].is_null()));
     assert!(!report.contains("does not hold"));
     let (beyond, report, same, said) = passes(10.0, 21.0, "beyond");
-    for pass in &beyond {
+    let warm = |p: &&serde_json::Value| p["pass"]["temperature_c"].as_f64().unwrap() > 21.5;
+    assert!(beyond.iter().filter(|p| !warm(p)).all(|p| p["temperature_flags"].is_null()));
+    assert!(beyond.iter().filter(warm).count() > 10);
+    for pass in beyond.iter().filter(warm) {
         let flag = &pass["temperature_flags"][0];
         assert_eq!(flag["certificate"], "amplitude certificate (amplitude.toml)", "{pass}");
         assert_eq!(flag["range_c"], serde_json::json!([10.0, 21.0]));
         assert!((flag["found_c"].as_f64().unwrap() - 22.0).abs() < 0.5, "{flag}");
     }
     let text = said.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(text.contains("holds from 10.0 to 21.0 deg C, the amplifier reports 22.0"), "{text}");
-    assert_eq!(text.matches("holds from 10.0").count(), 1, "told once, flagged on every pass: {text}");
+    assert!(text.contains("holds from 10.0 to 21.0 deg C, the amplifier reports 21.9"), "{text}");
+    assert_eq!(text.matches("holds from 10.0").count(), 1, "told once, flagged on every warm pass: {text}");
     assert!(report.contains("at which a certificate does not hold"), "the report says so");
     assert_eq!(points, same, "a flag changes no number");
 }

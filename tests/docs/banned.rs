@@ -10,7 +10,6 @@ const BANNED: &[&str] = &[
     "belongs into",
     "besides,",
     "glimpse",
-    "go on with",
     "has left the measurement",
     "held against",
     "is told",

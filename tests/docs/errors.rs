@@ -7,17 +7,44 @@ use tests::{muprime, texts};
 /// Files that the provocations name.
 const FILES: &[(&str, &str)] = &[
     ("misspelt.toml", "name = \"a\"\n[base]\namplitude = [1e-6]\n[[series]]\n"),
-    ("negative.toml", "name = \"a\"\n[[series]]\nreplicates = -1\n"),
-    ("fraction.toml", "name = \"a\"\n[[series]]\nreplicates = 1.5\n"),
+    (
+        "negative.toml",
+        "name = \"a\"\nreplicates = -1\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\nspeed_m_s = [0.02]\n",
+    ),
+    (
+        "fraction.toml",
+        "name = \"a\"\nreplicates = 1.5\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\nspeed_m_s = [0.02]\n",
+    ),
     ("unclosed.toml", "name = \"a\"\n[base\nspeed_m_s = 0.02\n"),
     ("nothing.toml", ""),
-    ("no-series.toml", "name = \"a\"\n"),
-    ("heavy.toml", "name = \"a\"\n[[series]]\nnormal_force_n = [9.0]\n"),
-    ("fast.toml", "name = \"a\"\n[[series]]\nspeed_m_s = [20]\n"),
-    ("large.toml", "name = \"a\"\n[[series]]\namplitude_pp_m = [2.0]\n"),
-    ("slow.toml", "name = \"a\"\n[[series]]\nfrequency_hz = [27.5]\n"),
-    ("words.toml", "name = \"a\"\n[[series]]\nspeed_m_s = \"fast\"\n"),
-    ("listless.toml", "name = \"a\"\n[[series]]\nspeed_m_s = 0.02\n"),
+    (
+        "no-series.toml",
+        "name = \"a\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n",
+    ),
+    (
+        "heavy.toml",
+        "name = \"a\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\nnormal_force_n = [9.0]\n",
+    ),
+    (
+        "fast.toml",
+        "name = \"a\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\nspeed_m_s = [20]\n",
+    ),
+    (
+        "large.toml",
+        "name = \"a\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\namplitude_pp_m = [2.0]\n",
+    ),
+    (
+        "slow.toml",
+        "name = \"a\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\nfrequency_hz = [27.5]\n",
+    ),
+    (
+        "words.toml",
+        "name = \"a\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\nspeed_m_s = \"fast\"\n",
+    ),
+    (
+        "listless.toml",
+        "name = \"a\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\nspeed_m_s = 0.02\n",
+    ),
     ("setup.toml", "name = \"mine\"\n[amplifier]\nprofile = \"no-such-instrument\"\n"),
     ("empty.csv", ""),
     ("words.csv", "a,b\nx,y\n"),
@@ -176,7 +203,7 @@ pub fn page() -> (String, Vec<String>) {
          ## The files\n\n",
         TYPED.len()
     );
-    for (name, text) in FILES.iter().filter(|(_, text)| text.contains('\n') && text.len() < 80) {
+    for (name, text) in FILES.iter().filter(|(_, text)| text.contains('\n') && text.len() < 240) {
         page.push_str(&format!("- `{name}`: `{}`\n", text.trim_end().replace('\n', " ⏎ ")));
     }
     page.push_str("\n## The answers\n\n| `muprime ...` | answers |\n|---|---|\n");
@@ -193,8 +220,11 @@ pub fn page() -> (String, Vec<String>) {
         let document =
             out.lines().next().and_then(|line| serde_json::from_str(line).ok()).unwrap_or_default();
         let mut told = sentences(&document);
-        if told.is_empty() {
-            told.push(err.lines().next().unwrap_or_default().to_string());
+        // What the reader of arguments says has more lines than its document.
+        if told.iter().all(|sentence| sentence.starts_with("error:")) {
+            let lines =
+                err.lines().take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"));
+            told = vec![lines.collect::<Vec<_>>().join(" ")];
         }
         let told =
             told.join(". ").replace('\n', " ").replace('|', "\\|").replace('<', "&lt;").replace("..", ".");

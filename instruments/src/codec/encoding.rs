@@ -14,7 +14,7 @@ pub fn decoded(bytes: &[u8]) -> Result<String, String> {
         let units: Vec<u16> = rest.chunks_exact(2).map(|pair| read([pair[0], pair[1]])).collect();
         String::from_utf16(&units)
             .ok()
-            .filter(|_| rest.len() % 2 == 0)
+            .filter(|_| rest.len().is_multiple_of(2))
             .ok_or("its UTF-16 is damaged".to_string())
     };
     let bytes = match bytes {

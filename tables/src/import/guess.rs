@@ -70,7 +70,7 @@ pub fn name_of(header: &str) -> String {
 
 /// Whether a text usually heads a column.
 pub fn heads(text: &str) -> bool {
-    text != "N" && meant(text, None).is_some()
+    text.trim_matches(['[', ']', '(', ')', ' ']) != "N" && meant(text, None).is_some()
 }
 
 /// Words that say how an amplitude is counted.
@@ -160,6 +160,10 @@ fn named(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(Str
         if let Some(found) = with_unit(&words[..cut].join("_"), &words[cut..].join("/")) {
             return Some(found);
         }
+    }
+    // What is in brackets and no unit of this quantity is no part of the name: `F (N)` is not `Fn`.
+    if header.split_once(['(', '[', '{']).is_some_and(|(_, rest)| !plain(rest).is_empty()) {
+        return None;
     }
     let at = find(header)?;
     // A unit that is none of this quantity says that the column is something else, or needs more than a name.

@@ -56,7 +56,7 @@ impl Source {
             rows,
         };
         Some(match above {
-            Some(above) if share(last).0 && !share(above).1 && !(named(last) && !named(above)) => {
+            Some(above) if share(last).0 && !share(above).1 && (named(above) || !named(last)) => {
                 head(above, Some(last), 2)
             }
             Some(above) if share(above).1 && named(last) && !share(last).1 => head(last, Some(above), 2),

@@ -44,7 +44,8 @@ impl Sample {
 }
 
 /// Columns of the foreign file: ours, theirs, and the factor between them.
-const FOREIGN: [(&str, &str, f64); 6] = [
+const FOREIGN: [(&str, &str, f64); 7] = [
+    ("time_s", "Time (s)", 1.0),
     ("amplitude_pp_m", "Amplitude (um p-p)", 1e6),
     ("frequency_hz", "Frequency (kHz)", 1e-3),
     ("speed_m_s", "Speed (mm/s)", 1e3),
