@@ -135,12 +135,14 @@ constants! {
     together_level: f64 = 0.01, "Family-wise level at which suspect passes lie together, which makes them a departure.", "one in a hundred";
     cause_holds_spread: f64 = 1.3, "Median residual about a leading cause, in deviations, up to which it holds and passes that stand out of it are bad.", JUDGEMENT;
     explained_sd: f64 = 3.0, "Deviations within which a cause explains a suspect pass, which then belongs.", "three standard deviations";
-    slow_sizes: [f64; 8] = [0.0, 0.5, 0.8, 1.3, 2.0, 3.0, 5.0, 8.0], "Scatter that lasts from pass to pass over the independent one: values that are tried.", NUMERICAL;
+    serial_probability: f64 = 0.7, "Probability from which scatter is taken to last from pass to pass.", JUDGEMENT;
+    serial_modes: usize = 16, "Cosines of its slow part.", "numerical: a drift over the table has less than eight turns";
+    slow_sizes: [f64; 8] = [0.0, 0.5, 0.8, 1.3, 2.0, 3.0, 5.0, 8.0], "Scatter that lasts beyond the statement, over the independent one: values that are tried.", NUMERICAL;
     slow_correlations: [f64; 4] = [0.6, 0.8, 0.9, 0.95], "Its correlation from pass to pass: values that are tried.", NUMERICAL;
     slow_within: f64 = 6.0, "Correlation times of it that a run must hold: what wanders for longer is a drift.", "judgement: a mean over a run then tells scatter from running in";
-    slow_long_run: usize = 48, "Passes of a run from which it may be larger than the independent scatter.", JUDGEMENT;
+    slow_long_run: usize = 48, "Passes of a run from which it is tried.", JUDGEMENT;
     slow_nats: f64 = 3.0, "Nats that scatter that lasts must gain.", JUDGEMENT;
-    serial_modes: usize = 80, "Cosines of its slow part, at most a third as many as passes.", "numerical: beyond them a correlation of 0.9 is nearly independent";
+    slow_modes: usize = 80, "Cosines of its slow part, at most a third as many as passes.", "numerical: beyond them a correlation of 0.9 is nearly independent";
 
     form_shares: [f64; 3] = [0.05, 0.15, 0.35], "Standard deviation of a cause's departure from its form, as a share of its net change.", "development: true causes under another formula left 13 to 49 % of their gap";
     form_weights: [f64; 3] = [0.4, 0.4, 0.2], "Prior weights of those shares.", JUDGEMENT;

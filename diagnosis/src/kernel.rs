@@ -85,9 +85,9 @@ impl Coordinates {
         SMOOTH.iter().zip(&self.sd).any(|(c, sd)| c.role == Role::Climate && *sd > 0.0)
     }
 
-    /// Covariates other than the climate that the table changes.
+    /// Settings that the table changes.
     pub fn varying(&self) -> impl Iterator<Item = usize> {
-        (0..COUNT).filter(|&k| self.sd[k] > 1e-12 && SMOOTH[k].role != Role::Climate)
+        (0..COUNT).filter(|&k| self.sd[k] > 1e-12 && SMOOTH[k].role == Role::Setting)
     }
 
     /// Standardised covariates divided by the lengths. What a condition does not say is taken as the table's mean.

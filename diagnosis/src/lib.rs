@@ -73,6 +73,7 @@ pub mod progress;
 pub mod pulls;
 pub mod reading;
 pub mod remarks;
+mod run_shifts;
 pub mod saved;
 pub mod scatter;
 pub mod shrinkage;

@@ -105,7 +105,8 @@ fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scat
     let mut groups: std::collections::BTreeMap<[Option<i64>; 6], Vec<usize>> =
         std::collections::BTreeMap::new();
     for (i, p) in table.passes.iter().enumerate() {
-        let key = covariate::SETTINGS.map(|c| Some(c.level?(c.of(p)?)));
+        let own = table.in_its_loads(p);
+        let key = covariate::SETTINGS.map(|c| Some(c.level?(c.of(&own)?)));
         groups.entry(key).or_default().push(i);
     }
     let (mut sum, mut freedom) = (0.0, 0usize);

@@ -12,6 +12,7 @@
 //! answer changes smoothly with the number of bad passes. All hypotheses share the result: none has a scatter of its own.
 
 pub(crate) mod clusters;
+mod lasting;
 mod serial;
 mod surface;
 mod suspects;
@@ -134,7 +135,7 @@ pub fn estimate(
     let n = problem.len();
     let surfaces: Vec<Surface> =
         lengths(k, table).into_par_iter().map(|l| Surface::new(table, problem, center, l)).collect();
-    let start = State::start(table.run_count > 1).within(&serial::bounds(k, table));
+    let start = State::start(table.run_count > 1).within(&lasting::bounds(k, table));
     let under = problem.predict(&[], center).as_slice().to_vec();
     let mut level = under.clone();
     let mut variance = stated(&level);
@@ -200,7 +201,11 @@ pub fn estimate(
     Scatter {
         scale: 1.0,
         run_relative_sd: (table.run_count > 1).then(|| state.run(k)),
-        serial_correlation: correlation(state.slow(k)),
+        serial_correlation: if state.slow(k)[0] > 0.0 {
+            correlation(state.slow(k))
+        } else {
+            serial::correlation(k, table, &seen.beside)
+        },
         suspects: (0..n).filter(|&i| outside[i] > k.suspect_probability).map(suspect).collect(),
         together_in,
         slow: state.slow(k),
@@ -252,7 +257,13 @@ impl Scatter {
     /// Enters a problem whose variances are those of single passes: what passes have in common leaves them and becomes columns
     /// of its own.
     pub fn enter(&self, table: &Table, problem: &mut Problem) {
-        problem.common = self.lasting(table, &problem.constants, &problem.variance);
+        let (share, common) = if self.slow[0] > 0.0 {
+            (1.0, self.lasting(table, &problem.constants, &problem.variance))
+        } else {
+            serial::columns(self.serial_correlation, table, problem, &self.inflation)
+        };
+        problem.variance.iter_mut().for_each(|v| *v *= share);
+        problem.common = common;
         if let Some(sd) = self.run_relative_sd.filter(|sd| *sd > 0.0) {
             let first = problem.common.ncols();
             let mut common = std::mem::replace(&mut problem.common, DMatrix::zeros(0, 0));
@@ -264,7 +275,7 @@ impl Scatter {
 
     /// How many of the columns that passes have in common are those of the scatter that lasts; they come first.
     pub fn lasting_columns(&self, problem: &Problem) -> usize {
-        if self.slow[0] > 0.0 { serial::modes(&problem.constants, problem.len()) } else { 0 }
+        if self.slow[0] > 0.0 { lasting::modes(&problem.constants, problem.len()) } else { 0 }
     }
 
     /// Columns of the scatter that lasts, N, beside these variances of single passes.
@@ -273,8 +284,8 @@ impl Scatter {
         if size == 0.0 {
             return DMatrix::zeros(variance.len(), 0);
         }
-        let mut columns = serial::cosines(k, table);
-        let powers = serial::powers(rho, variance.len(), columns.ncols());
+        let mut columns = lasting::cosines(k, table);
+        let powers = lasting::powers(rho, variance.len(), columns.ncols());
         for (mut column, power) in columns.column_iter_mut().zip(powers) {
             for i in 0..column.len() {
                 let own = (variance[i] / self.inflation[i]).sqrt();

@@ -53,7 +53,8 @@ pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
         .iter()
         .enumerate()
         .map(|(i, p)| {
-            let key = covariate::NEIGHBOURS.map(|c| Some(c.neighbourhood?(c.of(p)?)));
+            let own = table.in_its_loads(p);
+            let key = covariate::NEIGHBOURS.map(|c| Some(c.neighbourhood?(c.of(&own)?)));
             (key, i)
         })
         .collect();

@@ -13,6 +13,7 @@ use crate::power::{SeenFrom, seen_from};
 use crate::predict::{Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
 use crate::remarks::{WithSuspects, of_scatter, of_table, with_suspects};
+use crate::run_shifts::shifted;
 use crate::scatter::Scatter;
 use crate::shrinkage::{Gap, gap};
 use effects::imitated;
@@ -354,7 +355,9 @@ impl Diagnosis {
     pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {
         let answer = (self.decision.verdict, self.decision.leader());
         let whole = model(&self.fitted, &self.table, answer.0, answer.1, None);
-        let plain = forecast(&self.fitted, &self.rig, &whole, &conditions.passes);
+        let mut plain = forecast(&self.fitted, &self.rig, &whole, &conditions.passes);
+        let own = forecast(&self.fitted, &self.rig, &whole, &self.table.passes);
+        shifted(&self.fitted, &self.table, &own, conditions, &mut plain);
         widened(&self.fitted, &self.table, &self.rig, answer, conditions, plain)
     }
 }

@@ -7,7 +7,7 @@ use crate::fit::Problem;
 use crate::gaussian::Scaled;
 use crate::kernel::Lengths;
 use crate::layout::NUISANCES;
-use crate::scatter::serial;
+use crate::scatter::lasting;
 use nalgebra::{DMatrix, DVector};
 
 /// Places of the scales on their grids.
@@ -23,7 +23,7 @@ pub struct State {
     lasts: usize,
     with_runs: bool,
     /// Largest places of what lasts that the length of the runs allows.
-    most: serial::Bounds,
+    most: lasting::Bounds,
 }
 
 /// Sweeps over the scales.
@@ -40,12 +40,12 @@ impl State {
             slow: 0,
             lasts: 1,
             with_runs,
-            most: serial::Bounds::default(),
+            most: lasting::Bounds::default(),
         }
     }
 
     /// The same where what lasts is bounded.
-    pub fn within(self, most: &serial::Bounds) -> Self {
+    pub fn within(self, most: &lasting::Bounds) -> Self {
         State { slow: self.slow.min(most.size), lasts: self.lasts.min(most.correlation), most: *most, ..self }
     }
 
@@ -129,7 +129,7 @@ impl Surface {
             lateral: DVector::from_column_slice(&problem.lateral),
             runs: table.runs.clone(),
             run_count: if table.run_count > 1 { table.run_count } else { 0 },
-            cosines: serial::cosines(&problem.constants, table),
+            cosines: lasting::cosines(&problem.constants, table),
         }
     }
 
@@ -160,7 +160,7 @@ impl Surface {
         let parts = [(r, k.discrepancy_even[s.even]), (r, k.discrepancy_odd[s.odd]), (NUISANCES, 1.0)];
         let runs = (self.run_count, s.run(k));
         let [slow, rho] = s.slow(k);
-        let lasting = serial::powers(rho, self.linear.residual.len(), self.cosines.ncols());
+        let lasting = lasting::powers(rho, self.linear.residual.len(), self.cosines.ncols());
         parts
             .into_iter()
             .chain([runs])
