@@ -137,6 +137,12 @@ constants! {
     explained_sd: f64 = 3.0, "Deviations within which a cause explains a suspect pass, which then belongs.", "three standard deviations";
     serial_probability: f64 = 0.7, "Probability from which scatter is taken to last from pass to pass.", JUDGEMENT;
     serial_modes: usize = 16, "Cosines of its slow part.", "numerical: a drift over the table has less than eight turns";
+    slow_sizes: [f64; 8] = [0.0, 0.5, 0.8, 1.3, 2.0, 3.0, 5.0, 8.0], "Scatter that lasts beyond the statement, over the independent one: values that are tried.", NUMERICAL;
+    slow_correlations: [f64; 4] = [0.6, 0.8, 0.9, 0.95], "Its correlation from pass to pass: values that are tried.", NUMERICAL;
+    slow_within: f64 = 6.0, "Correlation times of it that a run must hold: what wanders for longer is a drift.", "judgement: a mean over a run then tells scatter from running in";
+    slow_long_run: usize = 48, "Passes of a run from which it is tried.", JUDGEMENT;
+    slow_nats: f64 = 3.0, "Nats that scatter that lasts must gain.", JUDGEMENT;
+    slow_modes: usize = 80, "Cosines of its slow part, at most a third as many as passes.", "numerical: beyond them a correlation of 0.9 is nearly independent";
 
     form_shares: [f64; 3] = [0.05, 0.15, 0.35], "Standard deviation of a cause's departure from its form, as a share of its net change.", "development: true causes under another formula left 13 to 49 % of their gap";
     form_weights: [f64; 3] = [0.4, 0.4, 0.2], "Prior weights of those shares.", JUDGEMENT;
@@ -185,6 +191,7 @@ constants! {
     half_open_survival: f64 = 0.1, "Largest share of the probability that survives where fewer than half of the regions are closed.", "contract asks for half of the regions; the value is judgement";
     few_regions: usize = 3, "Number of carrying regions below which their count says nothing.", JUDGEMENT;
 
+    temper: f64 = 2.0, "Divisor of differences of log evidence in probabilities.", "development: calibrates what is stated as 0.99";
     alias_nats: f64 = 5.0, "Nats within which the data do not tell two hypotheses apart (chi2 of 10).", CONTRACT;
     name_probability: f64 = 0.9, "Probability that a name needs.", CONTRACT;
     alone_share: [f64; 2] = [0.93, 0.993], "Share of its alias class that a name needs: one cause, two.", "development: one cause was never wrong between 0.93 and 0.98 on 190 sets; pairs were wrong by up to 4.5 nats";

@@ -188,6 +188,11 @@ impl Table {
         })
     }
 
+    /// A pass with its load in units of the table's mean load: levels of the load then do not depend on the unit of force.
+    pub(crate) fn in_its_loads(&self, pass: &Condition) -> Condition {
+        Condition { normal_force_n: pass.normal_force_n / self.design.reference_load_n, ..*pass }
+    }
+
     /// Some rows of the table, on its own scales.
     pub fn select(&self, rows: &[usize]) -> Self {
         Table {

@@ -1,7 +1,7 @@
 //! Which: from probabilities to a verdict, with what cannot be told apart said so.
 
 use crate::evidence::{Posterior, laplace};
-use crate::hypotheses::{Candidate, Fitted};
+use crate::fitted::{Candidate, Fitted};
 use crate::left_out::{Gate, Region, gate, left_out_regions};
 use effects::imitated;
 use rayon::prelude::*;
@@ -52,6 +52,7 @@ const LEAST_PROBABILITY: f64 = 1e-6;
 
 /// Decides; the leading cause gets the law that stands for it.
 pub fn decide(fitted: &mut Fitted) -> Decision {
+    fitted.weigh();
     let mut probabilities: Vec<f64> = fitted.candidates.iter().map(|c| c.probability).collect();
     let (none, mut unknown) = (fitted.none_probability, fitted.unknown_probability);
     fold_pairs(fitted, &mut probabilities);
@@ -231,7 +232,7 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
             let c = &candidates[i];
             c.effects.len() == 1 && !own.effects.contains(&c.effects[0]) && c.log_evidence > best
         }));
-        let evidence: Vec<f64> = heirs.iter().map(|&i| candidates[i].log_evidence).collect();
+        let evidence: Vec<f64> = heirs.iter().map(|&i| candidates[i].log_evidence / k.temper).collect();
         let total = crate::gaussian::log_sum_exp(&evidence);
         let weight = std::mem::take(&mut probabilities[pair]);
         for (i, e) in heirs.iter().zip(&evidence) {

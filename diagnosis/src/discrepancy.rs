@@ -15,16 +15,26 @@ use rayon::prelude::*;
 
 /// The smoothnesses that are tried: rough; as smooth as the form uncertainty of an effect, so that the open set can follow
 /// what that can; smoother yet, so that a cause that bends little is as cheap as an effect that imitates it; a spot of the
-/// plate, alike at all conditions; and two that go with temperature and humidity, where these change by themselves.
+/// plate, alike at all conditions; two that go with temperature and humidity, where these change by themselves; and each
+/// covariate alone: a law of the load is cheap there, and dear where it might bend with all others too.
 pub fn lengths(k: &Constants, table: &Table) -> Vec<Lengths> {
     let all = (0..k.discrepancy_lengths.len()).map(|i| Lengths {
         condition: k.discrepancy_lengths[i],
         time: k.discrepancy_time_lengths[i],
         position: k.discrepancy_position_lengths[i],
         climate: k.discrepancy_climate_lengths[i],
+        only: None,
     });
-    let sees = Coordinates::of(table).sees_climate();
-    all.filter(|l| sees || !l.climate.is_finite()).collect()
+    let coordinates = Coordinates::of(table);
+    let (sees, alone) = (coordinates.sees_climate(), k.discrepancy_lengths[0]);
+    let each = coordinates.varying().map(|only| Lengths {
+        condition: alone,
+        time: alone,
+        position: alone,
+        climate: f64::INFINITY,
+        only: Some(only),
+    });
+    all.filter(|l| sees || !l.climate.is_finite()).chain(each).collect()
 }
 
 /// Step of a difference in a nuisance's coordinate.

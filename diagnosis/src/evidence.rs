@@ -280,8 +280,7 @@ pub fn averaged_over_form(
 mod tests {
     use super::*;
     use crate::example::{Deviates, rig, table};
-    use crate::hypotheses::form_lengths;
-    use crate::kernel::{Coordinates, Kernel};
+    use crate::kernel::{Coordinates, Kernel, form_lengths};
     use crate::least_squares::minimise;
 
     /// Without a gap a law can gain no more than its best size does: at size zero its shapes change nothing, and a volume

@@ -4,7 +4,8 @@ use crate::constants::Constants;
 use crate::data::RigFile;
 use crate::gaussian::Covariance;
 use crate::layout::{Layout, NUISANCES};
-use effects::{Active, Baseline, Design, Law, Parameter, Place, known, library};
+pub use crate::member::Member;
+use effects::{Active, Baseline, Design, Parameter, known, library};
 use models::condition::Condition;
 use models::rig_file::CertifiedKey;
 use nalgebra::{DMatrix, DVector};
@@ -21,42 +22,6 @@ const LEAST_MU0: f64 = 0.05;
 /// Certified deviations below this share of a law's own prior are taken as this: closer to exact than any table can tell,
 /// and still a number to divide by.
 const EXACT: f64 = 1e-6;
-
-/// One member of a hypothesis: index of the effect among the known ones, and of its law.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Member {
-    /// Index among [`known`] causes, the library first.
-    pub effect: usize,
-    /// Index of the law.
-    pub law: usize,
-}
-
-impl Member {
-    /// The law.
-    pub fn form(&self) -> &'static Law {
-        &known()[self.effect].laws()[self.law]
-    }
-    /// The law's parameters, with what the loads of a table make of their priors.
-    pub fn parameters(&self, design: &Design) -> Vec<Parameter> {
-        self.form().parameters.iter().map(|p| p.at_load(design.reference_load_n)).collect()
-    }
-    /// How many there are.
-    pub fn count(&self) -> usize {
-        self.form().parameters.len()
-    }
-    /// The effect's name.
-    pub fn name(&self) -> &'static str {
-        known()[self.effect].name()
-    }
-    /// Largest share of its change by which it may depart from its form.
-    pub fn departs_by(&self) -> f64 {
-        known()[self.effect].departs_by()
-    }
-    /// Where the effect sits.
-    pub fn place(&self) -> Place {
-        known()[self.effect].place()
-    }
-}
 
 /// The data of a fit: passes, forces and their variances; a subset of a table where rows were left out.
 #[derive(Debug, Clone)]
@@ -143,6 +108,11 @@ impl Problem {
             rough: false,
             constants: constants.clone(),
         }
+    }
+
+    /// Full friction at each pass, N: the unit of the errors of docs/contract.md.
+    pub fn full_friction(&self) -> Vec<f64> {
+        self.passes.iter().map(|p| self.nominal.mu0 * p.normal_force_n).collect()
     }
 
     /// Number of passes.

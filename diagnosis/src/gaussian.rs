@@ -45,6 +45,20 @@ impl Covariance {
         direct - pa.transpose() * self.inner.solve(&pb)
     }
 
+    /// `h' C^-1 v` and `h' C^-1 h` of each column h.
+    pub fn scores(&self, columns: &DMatrix<f64>, v: &DVector<f64>) -> (Vec<f64>, Vec<f64>) {
+        let (h, z) = (self.scale(columns), v.component_mul(&self.inverse_sd));
+        let wt = self.whitened.transpose();
+        let root = |m: DMatrix<f64>| self.inner.l_dirty().solve_lower_triangular(&m).unwrap_or(m);
+        let (ph, pz) =
+            (root(&wt * &h), root(DMatrix::from_column_slice(wt.nrows(), 1, (&wt * &z).as_slice())));
+        let each = |j: usize| {
+            let (own, seen) = (h.column(j), ph.column(j));
+            (own.dot(&z) - seen.dot(&pz.column(0)), own.norm_squared() - seen.norm_squared())
+        };
+        (0..h.ncols()).map(each).unzip()
+    }
+
     /// `v' C^-1 v`.
     pub fn quadratic(&self, v: &DVector<f64>) -> f64 {
         let m = DMatrix::from_column_slice(v.len(), 1, v.as_slice());

@@ -1,5 +1,6 @@
 //! Smooth functions over the operating space: standardised covariates and a low-rank kernel on them.
 
+use crate::constants::Constants;
 use crate::data::Table;
 use models::condition::Condition;
 use models::covariate::{Role, SMOOTH};
@@ -16,17 +17,28 @@ pub struct Lengths {
     pub position: f64,
     /// Temperature and humidity.
     pub climate: f64,
+    /// The one covariate that is seen, where not all are.
+    pub only: Option<usize>,
 }
 
 impl Lengths {
-    fn of(&self, role: Role) -> f64 {
-        match role {
+    fn of(&self, covariate: usize) -> f64 {
+        if self.only.is_some_and(|only| only != covariate) {
+            return f64::INFINITY;
+        }
+        match SMOOTH[covariate].role {
             Role::Setting => self.condition,
             Role::Time => self.time,
             Role::Place => self.position,
             Role::Climate => self.climate,
         }
     }
+}
+
+/// Lengths of the form uncertainty in standard deviations of each covariate; a form does not depend on the place.
+pub fn form_lengths(k: &Constants) -> Lengths {
+    let far = f64::INFINITY;
+    Lengths { condition: k.form_length, time: k.form_length, position: far, climate: far, only: None }
 }
 
 /// Standardised covariates of passes.
@@ -73,11 +85,16 @@ impl Coordinates {
         SMOOTH.iter().zip(&self.sd).any(|(c, sd)| c.role == Role::Climate && *sd > 0.0)
     }
 
+    /// Settings that the table changes.
+    pub fn varying(&self) -> impl Iterator<Item = usize> {
+        (0..COUNT).filter(|&k| self.sd[k] > 1e-12 && SMOOTH[k].role == Role::Setting)
+    }
+
     /// Standardised covariates divided by the lengths. What a condition does not say is taken as the table's mean.
     pub fn place(&self, p: &Condition, largest_amplitude: f64, lengths: &Lengths) -> [f64; COUNT] {
         std::array::from_fn(|k| {
             let c = SMOOTH[k];
-            let length = lengths.of(c.role);
+            let length = lengths.of(k);
             match c.of(p) {
                 Some(value) if self.sd[k] > 1e-12 && length.is_finite() => {
                     // What lies far outside the design counts as its edge.

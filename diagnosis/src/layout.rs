@@ -1,7 +1,7 @@
 //! Where a hypothesis keeps what in its vector of coordinates: the baseline's parameters first, then each effect's own, the
 //! size before the shapes.
 
-use crate::fit::Member;
+use crate::member::Member;
 use std::ops::Range;
 
 /// Number of baseline parameters: logarithms of mu0, normal and lateral stiffness, the nuisances of every hypothesis.

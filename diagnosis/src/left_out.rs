@@ -3,8 +3,8 @@
 use crate::constants::Constants;
 use crate::evidence::{Posterior, net_change};
 use crate::fit::{Member, Problem};
+use crate::fitted::Fitted;
 use crate::gaussian::Covariance;
-use crate::hypotheses::Fitted;
 use crate::layout::Layout;
 use crate::least_squares::{Fit, minimise};
 use models::condition::Condition;
@@ -109,11 +109,6 @@ pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
     // A region needs a rest to be predicted from.
     list.retain(|(_, rows)| rows.len() < n);
     list
-}
-
-/// Full friction at each pass, N: the unit of the errors of docs/contract.md.
-pub fn full_friction(problem: &Problem) -> Vec<f64> {
-    problem.passes.iter().map(|p| problem.nominal.mu0 * p.normal_force_n).collect()
 }
 
 /// Measured less expected at rows that a refit to the others did not see, N; and the refit.

@@ -5,18 +5,20 @@
 //! | [`data`] | the table: passes in the order of measurement, and what its design can show |
 //! | [`noise`], [`scatter`] | the variance of each pass, from rig.toml, replicates and the table itself: suspects, shifts of runs |
 //! | [`constants`] | every tunable constant with its meaning and source |
-//! | [`fit`], [`layout`], [`least_squares`] | the regression problem of a hypothesis, its vector of parameters, its fit |
+//! | [`member`], [`fit`], [`layout`], [`least_squares`] | the regression problem of a hypothesis, its vector of parameters, its fit |
 //! | [`gaussian`], [`kernel`] | Gaussian algebra of low rank; smooth functions over the operating space |
 //! | [`evidence`] | marginal likelihood by Laplace's method, with a Gaussian-process departure from the law's form |
 //! | [`discrepancy`] | the open set: a Gaussian-process discrepancy of the baseline |
 //! | [`starts`], [`singles`], [`pairs`], [`hypotheses`] | global starts; one cause, two causes, all with their probabilities |
 //! | [`left_out`] | extrapolation to left-out regions of the operating space |
-//! | [`decision`] | the verdict rule |
+//! | [`fitted`], [`decision`] | probabilities; the verdict rule |
+//! | [`structure`] | jumps, bumps, periods and other departures that no smooth map follows |
 //! | [`intervals`], [`pulls`] | profile intervals; how far the stiffnesses went from their calibration |
 //! | [`locate`] | which part of the operating space, and of the rig, carries the gap |
 //! | [`shrinkage`], [`predict`] | how far the gap shrinks on held-out passes; the predictive distribution |
 //! | [`next`] | the experiment that would part the leading hypotheses |
 //! | [`reading`] | which reading of the paper's w the passes favour |
+//! | [`describe`] | what an unknown departure looks like; causes that are sure all the same |
 //! | [`verdict`], [`remarks`], [`saved`] | the report; remarks beside it; the corrected model for a run |
 //!
 //! docs/diagnosis/model.md states the whole model once. A small table in, a verdict out:
@@ -43,12 +45,15 @@ pub mod certificates;
 pub mod constants;
 pub mod data;
 pub mod decision;
+pub mod describe;
 pub mod discrepancy;
 pub mod document;
+mod draws;
 pub mod evidence;
 #[cfg(test)]
 mod example;
 pub mod fit;
+pub mod fitted;
 pub mod gaussian;
 pub mod hypotheses;
 pub mod intervals;
@@ -57,6 +62,7 @@ pub mod layout;
 pub mod least_squares;
 pub mod left_out;
 pub mod locate;
+pub mod member;
 pub mod next;
 pub mod noise;
 pub mod novelty;
@@ -67,12 +73,13 @@ pub mod progress;
 pub mod pulls;
 pub mod reading;
 pub mod remarks;
+mod run_shifts;
 pub mod saved;
 pub mod scatter;
 pub mod shrinkage;
 pub mod singles;
 pub mod starts;
-mod structure;
+pub mod structure;
 pub mod verdict;
 
 pub use decision::Verdict;

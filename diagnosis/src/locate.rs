@@ -5,7 +5,7 @@ mod partition;
 use crate::data::RigFile;
 use crate::evidence::Posterior;
 use crate::fit::Problem;
-use crate::hypotheses::Fitted;
+use crate::fitted::Fitted;
 use crate::predict::{Forecast, Model, forecast};
 use effects::{Place, library};
 use models::condition::Condition;
@@ -158,7 +158,7 @@ fn short(value: f64) -> String {
 /// two neighbouring ones; what comes together (time and temperature) stays together.
 fn conditions_between(passes: &[Condition], count: usize) -> Vec<Condition> {
     let mut state = 0x5DEE_CE66_D2B7_4F1D_u64;
-    let mut uniform = || (crate::shrinkage::split_mix(&mut state) >> 11) as f64 / (1u64 << 53) as f64;
+    let mut uniform = || (crate::draws::split_mix(&mut state) >> 11) as f64 / (1u64 << 53) as f64;
     let levels = |value: fn(&Condition) -> f64| {
         let mut list: Vec<f64> = passes.iter().map(value).filter(|v| *v > 0.0).collect();
         list.sort_by(f64::total_cmp);

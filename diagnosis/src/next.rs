@@ -12,7 +12,7 @@ pub mod predictive;
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict};
-use crate::hypotheses::Fitted;
+use crate::fitted::Fitted;
 use models::condition::Condition;
 use models::covariate;
 use predictive::predictives;

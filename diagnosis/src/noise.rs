@@ -105,10 +105,13 @@ fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scat
     let mut groups: std::collections::BTreeMap<[Option<i64>; 6], Vec<usize>> =
         std::collections::BTreeMap::new();
     for (i, p) in table.passes.iter().enumerate() {
-        let key = covariate::SETTINGS.map(|c| Some(c.level?(c.of(p)?)));
+        let own = table.in_its_loads(p);
+        let key = covariate::SETTINGS.map(|c| Some(c.level?(c.of(&own)?)));
         groups.entry(key).or_default().push(i);
     }
     let (mut sum, mut freedom) = (0.0, 0usize);
+    // What lasts is half the same in neighbours, and the rest of it is no repeatability.
+    let lasting = scatter.lasting(table, &problem.constants, variance);
     for rows in groups.values().filter(|r| r.len() > 1) {
         for pair in rows.windows(2) {
             let (i, j) = (pair[0], pair[1]);
@@ -123,7 +126,8 @@ fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scat
             }
             // What regulation leaves of the load's scatter is taken out along the smooth surface.
             let difference = (table.lateral[i] - scatter.level[i]) - (table.lateral[j] - scatter.level[j]);
-            sum += difference * difference / (variance[i] + variance[j]);
+            let moved = (lasting.row(i) - lasting.row(j)).norm_squared();
+            sum += difference * difference / (variance[i] + variance[j] + moved);
             freedom += 1;
         }
     }

@@ -9,7 +9,7 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::Verdict;
-use crate::hypotheses::Fitted;
+use crate::fitted::Fitted;
 use crate::predict::{Forecast, forecast, model};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};

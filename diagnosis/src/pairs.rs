@@ -2,7 +2,7 @@
 
 use crate::evidence::{Posterior, averaged_over_form, laplace, middle_form_share};
 use crate::fit::{Member, Problem};
-use crate::hypotheses::Candidate;
+use crate::fitted::Candidate;
 use crate::layout::{Layout, NUISANCES};
 use crate::least_squares::Fit;
 use crate::starts::{coarse_scan, full_scan, nuisance_starts, refine_from};

@@ -1,9 +1,8 @@
 //! What a verdict of no gap would have seen: of each effect the size from which this table would claim it.
 
 use crate::evidence::{Posterior, net_change};
-use crate::hypotheses::{Candidate, Fitted};
+use crate::fitted::{Candidate, Fitted};
 use crate::layout::Layout;
-use crate::left_out::full_friction;
 use serde::Serialize;
 
 /// The size of an effect from which a table like this would claim a gap.
@@ -29,12 +28,12 @@ const HALVINGS: usize = 24;
 /// Each single effect that was tried, most visible first.
 ///
 /// An effect of a size adds half the chi2 of its change, net of recalibration, to its log evidence; it must make up what the
-/// law is behind for its volume, and the prior, and leave no gap less than the probability at which a gap is claimed.
+/// law is behind for its volume, and the prior (tempered as all evidence is), and leave no gap less than the probability at which a gap is claimed.
 pub fn seen_from(fitted: &Fitted) -> Vec<SeenFrom> {
     let k = &fitted.problem.constants;
     let singles: Vec<&Candidate> = fitted.candidates.iter().filter(|c| c.effects.len() == 1).collect();
     let prior = (k.prior_null * singles.len() as f64 / k.prior_single).ln();
-    let asked = prior + ((1.0 - k.claim_probability) / k.claim_probability).ln();
+    let asked = k.temper * (prior + ((1.0 - k.claim_probability) / k.claim_probability).ln());
     let mut list: Vec<SeenFrom> = singles.into_iter().map(|c| one(fitted, c, asked)).collect();
     let gap = |s: &SeenFrom| s.gap_rmse.unwrap_or(f64::INFINITY);
     list.sort_by(|a, b| gap(a).total_cmp(&gap(b)).then(a.effect.cmp(b.effect)));
@@ -73,7 +72,7 @@ fn by_law(fitted: &Fitted, law: &Posterior, asked: f64) -> SeenFrom {
     });
     let rms = |size: f64| {
         let squares = change(size);
-        let over = squares.iter().zip(full_friction(problem)).map(|(c, full)| (c / full).powi(2));
+        let over = squares.iter().zip(problem.full_friction()).map(|(c, full)| (c / full).powi(2));
         (over.sum::<f64>() / problem.len() as f64).sqrt()
     };
     SeenFrom {

@@ -12,10 +12,12 @@
 //! answer changes smoothly with the number of bad passes. All hypotheses share the result: none has a scatter of its own.
 
 pub(crate) mod clusters;
+mod lasting;
 mod serial;
 mod surface;
 mod suspects;
 
+use crate::constants::Constants;
 use crate::data::Table;
 use crate::discrepancy::lengths;
 use crate::fit::Problem;
@@ -53,6 +55,12 @@ pub struct Scatter {
     pub suspects: Vec<Suspect>,
     /// Where passes that stand out lie together, which makes them a departure and no bad passes.
     pub together_in: Option<String>,
+    /// Size of the scatter that lasts over that of the independent one, and its own correlation.
+    #[serde(skip)]
+    pub slow: [f64; 2],
+    /// Nats that it had to gain.
+    #[serde(skip)]
+    pub slow_cost: f64,
     /// Probability of each pass not to belong.
     #[serde(skip)]
     pub outside: Vec<f64>,
@@ -62,6 +70,10 @@ pub struct Scatter {
     /// Friction at each pass without its scatter, N.
     #[serde(skip)]
     pub level: Vec<f64>,
+    /// The same of the baseline: what passes have in common is measured on it. On the measured level a shift of runs would
+    /// pull every fit that misses towards zero.
+    #[serde(skip)]
+    pub under: Vec<f64>,
     /// Scale of the scatter if the recalibrated baseline were all there is.
     #[serde(skip)]
     pub bare_scale: f64,
@@ -85,6 +97,8 @@ const SETTLED: f64 = 0.02;
 const HALF_NORMAL_MEDIAN: f64 = 0.6745;
 /// Deviations from which a pass that stands out of a cause is worth another fit.
 const FAR_SD: f64 = 4.5;
+/// Bounds of the baseline's level over the measured one.
+const UNDER: [f64; 2] = [0.5, 2.0];
 /// Passes' worth of weight that is worth another fit.
 const WORTH: f64 = 2.0;
 
@@ -104,6 +118,11 @@ pub enum Belief {
     },
 }
 
+/// Correlation of the scatter of neighbours: of what lasts, diluted by what does not.
+fn correlation([size, rho]: [f64; 2]) -> f64 {
+    rho * size * size / (1.0 + size * size)
+}
+
 /// Estimates the scatter of a table. `stated` gives the variances that rig.toml states at a level of friction.
 pub fn estimate(
     table: &Table,
@@ -116,8 +135,9 @@ pub fn estimate(
     let n = problem.len();
     let surfaces: Vec<Surface> =
         lengths(k, table).into_par_iter().map(|l| Surface::new(table, problem, center, l)).collect();
-    let start = State::start(table.run_count > 1);
-    let mut level = problem.predict(&[], center).as_slice().to_vec();
+    let start = State::start(table.run_count > 1).within(&lasting::bounds(k, table));
+    let under = problem.predict(&[], center).as_slice().to_vec();
+    let mut level = under.clone();
     let mut variance = stated(&level);
     let mut weight = match belief {
         Belief::AboutCause { deviations, outside } => suspects::weights(k, outside, deviations),
@@ -181,12 +201,19 @@ pub fn estimate(
     Scatter {
         scale: 1.0,
         run_relative_sd: (table.run_count > 1).then(|| state.run(k)),
-        serial_correlation: serial::correlation(k, table, &seen.beside),
+        serial_correlation: if state.slow(k)[0] > 0.0 {
+            correlation(state.slow(k))
+        } else {
+            serial::correlation(k, table, &seen.beside)
+        },
         suspects: (0..n).filter(|&i| outside[i] > k.suspect_probability).map(suspect).collect(),
         together_in,
+        slow: state.slow(k),
+        slow_cost: if state.slow(k)[0] > 0.0 { k.slow_nats } else { 0.0 },
         outside: outside.clone(),
         inflation: weight.iter().map(|w| 1.0 / w).collect(),
         level: seen.level,
+        under,
         bare_scale: bare.2,
         structure_nats: (whole - bare.0).max(0.0),
         clustered_p: clustered,
@@ -230,18 +257,42 @@ impl Scatter {
     /// Enters a problem whose variances are those of single passes: what passes have in common leaves them and becomes columns
     /// of its own.
     pub fn enter(&self, table: &Table, problem: &mut Problem) {
-        let n = problem.len();
-        let (share, mut common) = serial::columns(self.serial_correlation, table, problem, &self.inflation);
+        let (share, common) = if self.slow[0] > 0.0 {
+            (1.0, self.lasting(table, &problem.constants, &problem.variance))
+        } else {
+            serial::columns(self.serial_correlation, table, problem, &self.inflation)
+        };
         problem.variance.iter_mut().for_each(|v| *v *= share);
-        if let Some(sd) = self.run_relative_sd.filter(|sd| *sd > 0.0) {
-            let mut shifts = DMatrix::zeros(n, table.run_count);
-            for i in 0..n {
-                shifts[(i, table.runs[i])] = sd * self.level[i];
-            }
-            let first = common.ncols();
-            common = common.resize_horizontally(first + shifts.ncols(), 0.0);
-            common.columns_mut(first, shifts.ncols()).copy_from(&shifts);
-        }
         problem.common = common;
+        if let Some(sd) = self.run_relative_sd.filter(|sd| *sd > 0.0) {
+            let first = problem.common.ncols();
+            let mut common = std::mem::replace(&mut problem.common, DMatrix::zeros(0, 0));
+            common = common.resize_horizontally(first + table.run_count, 0.0);
+            (0..problem.len()).for_each(|i| common[(i, first + table.runs[i])] = sd * self.under[i]);
+            problem.common = common;
+        }
+    }
+
+    /// How many of the columns that passes have in common are those of the scatter that lasts; they come first.
+    pub fn lasting_columns(&self, problem: &Problem) -> usize {
+        if self.slow[0] > 0.0 { lasting::modes(&problem.constants, problem.len()) } else { 0 }
+    }
+
+    /// Columns of the scatter that lasts, N, beside these variances of single passes.
+    pub fn lasting(&self, table: &Table, k: &Constants, variance: &[f64]) -> DMatrix<f64> {
+        let [size, rho] = self.slow;
+        if size == 0.0 {
+            return DMatrix::zeros(variance.len(), 0);
+        }
+        let mut columns = lasting::cosines(k, table);
+        let powers = lasting::powers(rho, variance.len(), columns.ncols());
+        for (mut column, power) in columns.column_iter_mut().zip(powers) {
+            for i in 0..column.len() {
+                let own = (variance[i] / self.inflation[i]).sqrt();
+                let under = (self.under[i] / self.level[i]).abs().clamp(UNDER[0], UNDER[1]);
+                column[i] *= size * power.sqrt() * own * under;
+            }
+        }
+        columns
     }
 }

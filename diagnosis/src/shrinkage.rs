@@ -2,8 +2,8 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::Verdict;
-use crate::hypotheses::Fitted;
-use crate::left_out::full_friction;
+use crate::draws::{deviate, split_mix};
+use crate::fitted::Fitted;
 use crate::predict::{forecast, model};
 use models::covariate;
 use rayon::prelude::*;
@@ -53,7 +53,8 @@ pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
         .iter()
         .enumerate()
         .map(|(i, p)| {
-            let key = covariate::NEIGHBOURS.map(|c| Some(c.neighbourhood?(c.of(p)?)));
+            let own = table.in_its_loads(p);
+            let key = covariate::NEIGHBOURS.map(|c| Some(c.neighbourhood?(c.of(&own)?)));
             (key, i)
         })
         .collect();
@@ -78,7 +79,7 @@ pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
 pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, leader: Option<usize>) -> Gap {
     let k = &fitted.problem.constants;
     let groups = groups(table, k.folds);
-    let full = full_friction(&fitted.problem);
+    let full = fitted.problem.full_friction();
     let folds = k.folds.min(groups.iter().copied().max().unwrap_or(0) + 1).max(2);
     let per_fold: Vec<Vec<(usize, f64, [f64; 5])>> = (0..folds)
         .into_par_iter()
@@ -168,23 +169,9 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
     }
 }
 
-/// A normal deviate by the sum of twelve.
-fn deviate(state: &mut u64) -> f64 {
-    (0..12).map(|_| (split_mix(state) >> 11) as f64 / (1u64 << 53) as f64).sum::<f64>() - 6.0
-}
-
 /// Factor on the deviation of a mean over folds for the refits: folds share most of what they were fitted to, so their errors go
 /// together by about the share that is held out, and resampling the errors does not show it (Nadeau & Bengio 2003).
 fn refits(folds: usize) -> f64 {
     let k = folds as f64;
     ((1.0 / k + 1.0 / (k - 1.0)) * k).sqrt()
-}
-
-/// SplitMix64: a fixed stream, so that the same data gives the same interval.
-pub(crate) fn split_mix(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }

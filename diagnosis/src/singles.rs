@@ -3,8 +3,8 @@
 use crate::data::Table;
 use crate::evidence::{Posterior, averaged_over_form, laplace, middle_form_share};
 use crate::fit::{Member, Problem};
+use crate::fitted::Candidate;
 use crate::gaussian::log_sum_exp;
-use crate::hypotheses::{Candidate, SINGLES_END};
 use crate::least_squares::Fit;
 use crate::progress::Progress;
 use crate::starts::{REFINED_ROWS, Sought, nuisance_starts, seek};
@@ -13,6 +13,8 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+/// Share of the work after which single effects are fitted.
+pub(crate) const SINGLES_END: f64 = 0.5;
 /// Rounds of the search for a mode at the middle share of form uncertainty.
 const ROUNDS: usize = 6;
 /// The same from a place that was refined on a part of a large table.

@@ -2,6 +2,7 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
+use crate::describe::{Description, at_least, description};
 use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::intervals::{Estimate, curvature, estimates};
 use crate::locate::{Region, ledger, regions};
@@ -12,6 +13,7 @@ use crate::power::{SeenFrom, seen_from};
 use crate::predict::{Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
 use crate::remarks::{WithSuspects, of_scatter, of_table, with_suspects};
+use crate::run_shifts::shifted;
 use crate::scatter::Scatter;
 use crate::shrinkage::{Gap, gap};
 use effects::imitated;
@@ -104,6 +106,10 @@ pub struct Report {
     /// How far the verdict's model had to pull the stiffnesses from their calibration; empty for `unknown`, which
     /// has no model that holds.
     pub stiffness_pulls: Vec<Pull>,
+    /// What an unknown departure looks like, best first; empty otherwise.
+    pub description: Vec<Description>,
+    /// Causes that are sure under an open verdict.
+    pub at_least: Vec<String>,
     /// Effects that the table cannot show.
     pub not_testable: Vec<NotTestable>,
     /// Under no gap: the size of each effect from which this table would have shown it, most visible first.
@@ -194,6 +200,8 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
         scatter: fitted.scatter.clone(),
         with_suspects,
         stiffness_pulls,
+        description: description(&fitted, &decision),
+        at_least: at_least(&fitted, &decision),
         not_testable: fitted
             .not_testable
             .iter()
@@ -236,6 +244,10 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
     let leader = decision.leader().unwrap_or_default();
     let words = |candidate: usize| label(fitted, candidate).replace('_', " ");
     match decision.verdict {
+        Verdict::NoGap if decision.none < 0.5 => format!(
+            "No gap is shown: the recalibrated model may explain the table (probability {}).",
+            probability(decision.none)
+        ),
         Verdict::NoGap => "No gap: the recalibrated model explains the table.".to_string(),
         Verdict::Named => format!(
             "Most likely cause: {} (probability {}); {}.",
@@ -266,10 +278,15 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
                 let leading = fitted.candidates.get(leader).map_or(f64::NEG_INFINITY, |c| c.log_evidence);
                 s.log_evidence > fitted.discrepancy.log_evidence.max(leading)
             });
-            let hint = known.map_or_else(String::new, |s| {
-                let names = s.names().join("+").replace('_', " ");
-                format!(" The nearest known effect is not in the library: {names}.")
-            });
+            let seen = description(fitted, decision);
+            let hint = match (known, seen.first()) {
+                (Some(s), _) => {
+                    let names = s.names().join("+").replace('_', " ");
+                    format!(" The nearest known effect is not in the library: {names}.")
+                }
+                (None, Some(d)) => format!(" It looks like {}.", d.text),
+                (None, None) => String::new(),
+            };
             format!(
                 "There is a gap, and no effect of the library explains most of it; {}.{hint}",
                 closed("a smooth map")
@@ -342,7 +359,9 @@ impl Diagnosis {
     pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {
         let answer = (self.decision.verdict, self.decision.leader());
         let whole = model(&self.fitted, &self.table, answer.0, answer.1, None);
-        let plain = forecast(&self.fitted, &self.rig, &whole, &conditions.passes);
+        let mut plain = forecast(&self.fitted, &self.rig, &whole, &conditions.passes);
+        let own = forecast(&self.fitted, &self.rig, &whole, &self.table.passes);
+        shifted(&self.fitted, &self.table, &own, conditions, &mut plain);
         widened(&self.fitted, &self.table, &self.rig, answer, conditions, plain)
     }
 }

@@ -7,6 +7,7 @@
 //! | [`input`], [`files`], [`mod@print`], [`leave`] | files that people wrote, refused with their place; how files are written; how the program prints, and ends |
 //! | [`setup`], [`plan`], [`fingertip`] | rigs, plans, fingertips, all checked with the place in the file |
 //! | [`calibrate`] | certificates from data; what only instruments give comes through a bench |
+//! | [`campaign`] | one plan with several tips, conditions and days; what the paper states, answered |
 //! | [`certificates`], [`model_file`] | a setup's certificates, verified and applied once; a corrected model from its file to the loop |
 //! | [`rehearsal`] | a profile tried before any instrument is |
 //! | [`sequence`] | the order of a sweep: a pure state machine over the loop's rows |
@@ -34,6 +35,7 @@
 
 pub mod ambient;
 pub mod calibrate;
+pub mod campaign;
 pub mod catalogue;
 pub mod certificates;
 pub mod compare;

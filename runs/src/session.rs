@@ -350,6 +350,11 @@ impl Job {
         if let Some(defects) = &self.defects {
             config.defects = defects.clone();
         }
+        // The virtual finger is that of the setup's tip.
+        let tip = &self.setup.tip;
+        config.finger.mu0 = tip.mu0;
+        config.finger.normal_stiffness_n_per_m = tip.finger.normal_stiffness_n_per_m;
+        config.finger.lateral_stiffness_n_per_m = tip.finger.lateral_stiffness_n_per_m;
         // The finger is the rig's: it stays the same from run to run, and only noise and order follow the seed.
         let wrong = |e: sim::world::ConfigError| miette::miette!("the virtual rig: {e}");
         let finger = sim::world::World::new(&config, virtual_rig.finger_seed).map_err(wrong)?.true_finger();

@@ -50,6 +50,11 @@ pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
     text
 }
 
+/// Odds in words, from their logarithm to the base 10.
+pub fn odds_base10(log: f64) -> String {
+    if log > 6.0 { "odds above 1e6 to 1".into() } else { format!("odds of {:.0} to 1", 10f64.powf(log)) }
+}
+
 /// What a terminal shows.
 pub fn terminal(result: &Diagnosis) -> String {
     let r = &result.report;
@@ -67,6 +72,15 @@ pub fn terminal(result: &Diagnosis) -> String {
                 text.push_str(&format!("         {} = {value}\n", p.name));
             }
         }
+    }
+    if !r.description.is_empty() {
+        text.push_str("\nWhat the departure looks like\n");
+    }
+    for d in &r.description {
+        text.push_str(&format!("  {} ({} against no gap)\n", d.text, odds_base10(d.log10_odds_vs_no_gap)));
+    }
+    if !r.at_least.is_empty() {
+        text.push_str(&format!("\nAt least {}; the rest is open\n", r.at_least.join(", ")));
     }
     let g = &r.gap;
     let told = |rmse: Option<f64>| {

@@ -53,7 +53,7 @@ fn text_of(name: &str) -> miette::Result<String> {
     }
 }
 
-const KINDS: &str = "a profile has [profile], a setup [amplifier], a plan [base] and [[series]], a fingertip radius_m, a rig.toml [finger], a model \
+const KINDS: &str = "a profile has [profile], a setup [amplifier], a plan [base] and [[series]], a campaign [[cell]], a fingertip radius_m, a rig.toml [finger], a model \
     [baseline], defects [[defect]], a certificate content_sha256; a table ends in .csv or .parquet, a record in .mcap, a verdict, a summary and \
     an import's log in .json";
 
@@ -86,6 +86,7 @@ pub fn kind_of(name: &str) -> miette::Result<&'static str> {
     let kinds = [
         ("profile", has("profile")),
         ("setup", has("amplifier") || has("force") || has("stage")),
+        ("campaign", has("cell") || has("blocks")),
         ("plan", has("series") || has("base")),
         ("certificate", has("content_sha256") || has("covariance")),
         ("defects file", has("defect") || has("channel")),
@@ -195,6 +196,14 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
                     Err(miette::miette!(help = help.collect::<Vec<_>>().join("; "), "{why}; {closed}"))
                 }
             };
+        }
+        "campaign" => {
+            let campaign = runs::campaign::Campaign::parse(name, &text, folder)?;
+            let mut passes = 0;
+            for setup in &campaign.setups {
+                passes += preflight(setup, campaign.plan.clone(), on.model.as_ref(), None)?;
+            }
+            return Ok(Good { passes: Some(passes * campaign.file.blocks as usize), ..good });
         }
         "certificate" => runs::calibrate::check(name, &text).map(|_| ())?,
         "defects file" => {

@@ -171,7 +171,11 @@ pub struct Wanted<'a> {
 /// # Errors
 /// A file that is no Parquet table.
 pub fn parquet_as_csv(path: &Path) -> miette::Result<String> {
-    binary::parquet(path)?.csv()
+    let grid = unharmed(|| binary::parquet(path));
+    grid.unwrap_or_else(|| {
+        Err(miette::miette!(help = "export it again, or as CSV", "{}: the file is damaged", path.display()))
+    })?
+    .csv()
 }
 
 /// Cells that a source of so many bytes can hold in earnest: what says more is damaged or hostile, and is refused before
@@ -203,16 +207,36 @@ pub fn read(
 ) -> miette::Result<Grid> {
     let shown = path.display();
     // Damaged files can drive the libraries that read binary formats into a panic: that is a refusal of the file.
-    let grid = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-        read_known(path, bytes, sheet, marks, wanted)
-    }))
-    .unwrap_or_else(|_| Err(miette::miette!(help = "export it again, or as CSV", "the file is damaged")));
+    let grid = unharmed(|| read_known(path, bytes, sheet, marks, wanted))
+        .unwrap_or_else(|| Err(miette::miette!(help = "export it again, or as CSV", "the file is damaged")));
     let grid = grid.wrap_err_with(|| shown.to_string())?;
     if grid.rows.is_empty() {
         let notes = grid.notes.join("\n");
         miette::bail!("{shown}: no rows of numbers\n{notes}");
     }
     Ok(grid)
+}
+
+thread_local! {
+    /// Whether this thread reads a foreign file.
+    static READS: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
+}
+
+/// Runs a library's reader; `None` where it panics, of which nothing is printed: the refusal of the file says what is to be known.
+fn unharmed<T>(reads: impl FnOnce() -> T) -> Option<T> {
+    static QUIET: std::sync::Once = std::sync::Once::new();
+    QUIET.call_once(|| {
+        let usual = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if !READS.get() {
+                usual(panic);
+            }
+        }));
+    });
+    READS.set(true);
+    let read = std::panic::catch_unwind(std::panic::AssertUnwindSafe(reads));
+    READS.set(false);
+    read.ok()
 }
 
 fn read_known(

@@ -6,7 +6,7 @@ use runs::print::{COLUMNS, folded};
 pub const EXAMPLES: &[(&str, &str)] = &[
     (
         "run",
-        "muprime run\nmuprime run my-plan.toml --setup my-setup.toml --out runs/monday\nmuprime run --tui --operator Ada\nmuprime run --fast --seed 7 --model MODEL.toml",
+        "muprime run\nmuprime run my-plan.toml --setup my-setup.toml --out runs/monday\nmuprime run --tui --operator Ada\nmuprime run --fast --seed 7 --model MODEL.toml\nmuprime run part2-campaign --fast --out campaign",
     ),
     ("virtual-rig", "muprime virtual-rig --modbus-tcp 127.0.0.1:1502"),
     ("calibrate force", "muprime calibrate force weights.csv --operator 'A. Smith' --serial SN1"),

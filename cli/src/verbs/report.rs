@@ -1,4 +1,4 @@
-//! `muprime report RUN`.
+//! `muprime report FOLDER`: the page of a run, or of a campaign.
 
 use runs::{out, say};
 use std::path::PathBuf;
@@ -7,7 +7,7 @@ use std::process::ExitCode;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Folder of the run
+    /// Folder of the run, or of the campaign
     run: PathBuf,
     /// Where to write it [default: report.html in the run's folder]
     #[arg(long)]
@@ -20,6 +20,18 @@ pub struct Args {
 /// A folder that holds no run, or a place that cannot be written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.run, "run")?;
+    if args.run.join(runs::campaign::FILE).is_file() {
+        let (claims, made) = super::run::campaign::write(&args.run)?;
+        if json {
+            out!(
+                "{}",
+                serde_json::json!({ "report": args.run.join(super::run::campaign::PAGE), "claims": claims })
+            );
+        } else {
+            super::run::campaign::tell(&claims, made, made, &args.run);
+        }
+        return super::exit(super::DONE);
+    }
     let (html, damage) = runs::report::html_and_damage(&args.run)?;
     let out = args.out.unwrap_or_else(|| args.run.join("report.html"));
     runs::files::write_whole(&out, html)?;

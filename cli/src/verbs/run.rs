@@ -1,4 +1,6 @@
-//! `muprime run`: an automated friction sweep.
+//! `muprime run`: an automated friction sweep, or the missing ones of a campaign.
+
+pub mod campaign;
 
 use super::dashboard::Place;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -35,9 +37,9 @@ fn fitted(text: String) -> String {
 }
 
 /// Arguments.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct Args {
-    /// Plan: a file, or a bundled name (first-sweep, fig9-artificial, part2-validation, psi-reading)
+    /// Plan or campaign: a file, a bundled name ('muprime show' lists all), or the folder of a campaign
     #[arg(default_value = "first-sweep")]
     plan: String,
     /// Setup: a file, or a bundled name ('muprime show' lists all)
@@ -91,17 +93,44 @@ pub struct Args {
 ///
 /// # Errors
 /// A refusal: bad input, a busy rig, an instrument that does not answer.
-pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    let (broker, tui) = (args.publish.clone(), args.tui);
-    if tui && json {
+pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
+    if args.tui && json {
         miette::bail!(
             help = "leave out one of them",
             "--tui shows a picture, --json prints documents: not both"
         );
     }
-    let browsers =
-        args.dashboard.map(|listen| Place { listen, hosts: Vec::new(), allow_control: args.allow_control });
-    let job = job(args)?;
+    if let Some((text, folder)) = runs::campaign::text_of(&args.plan)? {
+        return campaign::run(args, &text, &folder, json);
+    }
+    let job = job(&args)?;
+    // An address that is taken is a refusal: nothing was touched yet, and nobody was told of a run.
+    job.points()?;
+    let runs = job.out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let watching = Watching::begin(&mut args, runs)?;
+    super::exit(if measure(job, &watching, json)? { super::DONE } else { super::FAILED })
+}
+
+/// Who follows a run: a terminal, a broker.
+struct Watching {
+    tui: bool,
+    broker: Option<Broker>,
+}
+
+impl Watching {
+    /// As the arguments say; a dashboard is served from here on, over a folder of runs.
+    fn begin(args: &mut Args, runs: &Path) -> miette::Result<Self> {
+        if let Some(listen) = args.dashboard.take() {
+            let place = Place { listen, hosts: Vec::new(), allow_control: args.allow_control };
+            told!("dashboard: {}", place.serve(runs.to_path_buf())?.link());
+        }
+        Ok(Watching { tui: args.tui, broker: args.publish.clone() })
+    }
+}
+
+/// Measures one run, and says so to whoever follows; whether it is complete, and was read back off.
+fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
+    let (broker, tui) = (watching.broker.clone(), watching.tui);
     if !job.fast {
         // In virtual time nothing is driven, and a slow reader gets every line.
         super::tell_beside(&job.out)?;
@@ -128,11 +157,6 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let signals = Signals::default();
     watch_signals(&signals)?;
     let planned = job.points()?.len();
-    if let Some(place) = browsers {
-        // An address that is taken is a refusal: nothing was touched yet, and nobody was told of a run.
-        let runs = job.out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        told!("dashboard: {}", place.serve(runs.to_path_buf())?.link());
-    }
     // Up before anything moves, and down before the summary is told. What is said meanwhile is held and said then.
     let watch = match tui {
         true => Some(Watch::begin(&job.out, Lead::Own(signals.clone()), job.setup.hand_at_key())?),
@@ -231,10 +255,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         told!("{}:{}: {missing}", broker.host, broker.port);
     }
     let summary = summary?;
-    super::exit(match summary.outcome {
-        Outcome::Complete if summary.off.read_back => super::DONE,
-        _ => super::FAILED,
-    })
+    Ok(summary.outcome == Outcome::Complete && summary.off.read_back)
 }
 
 /// A trip for whoever follows from afar.
@@ -245,9 +266,16 @@ fn tripped(trip: &realtime::safety::Trip) -> serde_json::Value {
     })
 }
 
-fn job(args: Args) -> miette::Result<Job> {
+fn job(args: &Args) -> miette::Result<Job> {
     let setup = Setup::load(&args.setup)?;
     let plan = Plan::load(&args.plan)?;
+    let seed = args.seed.unwrap_or(plan.file.seed);
+    let out = args.out.clone().unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
+    job_of(args, setup, plan, seed, out)
+}
+
+/// A run of this plan on this setup, with what the arguments say beside.
+fn job_of(args: &Args, setup: Setup, plan: Plan, seed: u64, out: PathBuf) -> miette::Result<Job> {
     let defects = match &args.defects {
         None => None,
         Some(path) => {
@@ -270,11 +298,10 @@ fn job(args: Args) -> miette::Result<Job> {
             runs::model_file::load_for(&setup, &path, text)?
         }
     };
-    let seed = args.seed.unwrap_or(plan.file.seed);
-    let out = args.out.unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
     if out.exists() && !out.is_dir() {
         miette::bail!(help = "give a folder, or a name that is free", "--out {} is a file", out.display());
     }
+    let args = args.clone();
     let notes =
         Notes { operator: args.operator, subject: args.subject, sample: args.sample, licence: args.licence };
     let (fast, answers) = (args.fast, args.answers);

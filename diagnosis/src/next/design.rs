@@ -111,7 +111,8 @@ mod tests {
     use crate::evidence::{Posterior, laplace};
     use crate::example::{Deviates, rig, table};
     use crate::fit::Problem;
-    use crate::hypotheses::{Fitted, Options, fit_all, form_lengths};
+    use crate::hypotheses::{Fitted, Options, fit_all};
+    use crate::kernel::form_lengths;
     use crate::next::{PASSES, grid, predictive::predictives};
     use models::condition::Condition;
 

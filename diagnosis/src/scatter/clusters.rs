@@ -5,8 +5,8 @@
 //! plate still) does not: it has a mean of its own in some cell. The strongest of all covariates is held against the same of
 //! passes that are shuffled and turned either way, so the level is that of the whole family.
 
+use crate::draws::split_mix;
 use crate::fit::Problem;
-use crate::shrinkage::split_mix;
 use models::covariate::{Role, TOLD};
 
 /// Shuffles against which a table is held; fewer for long ones.

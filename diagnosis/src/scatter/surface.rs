@@ -7,6 +7,7 @@ use crate::fit::Problem;
 use crate::gaussian::Scaled;
 use crate::kernel::Lengths;
 use crate::layout::NUISANCES;
+use crate::scatter::lasting;
 use nalgebra::{DMatrix, DVector};
 
 /// Places of the scales on their grids.
@@ -17,16 +18,49 @@ pub struct State {
     /// Stays at the first place, zero, where runs are not told apart.
     run: usize,
     scale: usize,
+    /// Size and correlation of what lasts from pass to pass.
+    slow: usize,
+    lasts: usize,
     with_runs: bool,
+    /// Largest places of what lasts that the length of the runs allows.
+    most: lasting::Bounds,
 }
 
-/// Sweeps over the four scales.
+/// Sweeps over the scales.
 const SWEEPS: usize = 12;
 
 impl State {
     /// Where the climb begins: a small departure, the stated scatter.
     pub fn start(with_runs: bool) -> Self {
-        State { even: 2, odd: 0, run: usize::from(with_runs), scale: 4, with_runs }
+        State {
+            even: 2,
+            odd: 0,
+            run: usize::from(with_runs),
+            scale: 4,
+            slow: 0,
+            lasts: 1,
+            with_runs,
+            most: lasting::Bounds::default(),
+        }
+    }
+
+    /// The same where what lasts is bounded.
+    pub fn within(self, most: &lasting::Bounds) -> Self {
+        State { slow: self.slow.min(most.size), lasts: self.lasts.min(most.correlation), most: *most, ..self }
+    }
+
+    /// The same with scatter that lasts: from independent passes a climb does not find it.
+    fn lasting(self, k: &Constants) -> Self {
+        if self.slow > 0 {
+            self
+        } else {
+            State { slow: k.slow_sizes.len() / 2, even: 0, ..self }.within(&self.most)
+        }
+    }
+
+    /// Size of the slow scatter over that of the independent one, and its correlation from pass to pass.
+    pub fn slow(&self, k: &Constants) -> [f64; 2] {
+        [k.slow_sizes[self.slow], k.slow_correlations[self.lasts]]
     }
 
     /// Relative deviation of the level from run to run.
@@ -40,7 +74,9 @@ impl State {
 
     fn log_prior(&self, k: &Constants) -> f64 {
         let (scale, run) = (self.scale(k).ln() / k.scatter_log_sd, self.run(k) / k.run_sd_prior);
-        -0.5 * (scale * scale + run * run) - if self.run > 0 { k.run_nats } else { 0.0 }
+        let costs = [(self.run, k.run_nats), (self.slow, k.slow_nats)];
+        let costs: f64 = costs.iter().map(|(at, nats)| if *at > 0 { *nats } else { 0.0 }).sum();
+        -0.5 * (scale * scale + run * run) - costs
     }
 
     /// States one step away.
@@ -52,6 +88,12 @@ impl State {
         list.extend(step(self.scale, k.scatter_scales.len()).iter().map(|&scale| State { scale, ..*self }));
         list.extend(step(self.even, k.discrepancy_even.len()).iter().map(|&even| State { even, ..*self }));
         list.extend(step(self.odd, k.discrepancy_odd.len()).iter().map(|&odd| State { odd, ..*self }));
+        list.extend(step(self.slow, self.most.size + 1).iter().map(|&slow| State { slow, ..*self }));
+        if self.slow > 0 {
+            list.extend(
+                step(self.lasts, self.most.correlation + 1).iter().map(|&lasts| State { lasts, ..*self }),
+            );
+        }
         if self.with_runs {
             list.extend(step(self.run, k.run_sds.len()).iter().map(|&run| State { run, ..*self }));
         }
@@ -65,6 +107,8 @@ pub struct Surface {
     lateral: DVector<f64>,
     runs: Vec<usize>,
     run_count: usize,
+    /// Cosines in the order of measurement.
+    cosines: DMatrix<f64>,
 }
 
 /// A table beside a surface through it.
@@ -85,15 +129,22 @@ impl Surface {
             lateral: DVector::from_column_slice(&problem.lateral),
             runs: table.runs.clone(),
             run_count: if table.run_count > 1 { table.run_count } else { 0 },
+            cosines: lasting::cosines(&problem.constants, table),
         }
     }
 
-    /// Columns (those of runs last) and residual in weighted deviations of a pass as stated, with the logarithms of those.
+    /// Columns (those of runs and of what lasts come last) and residual in weighted deviations of a pass as stated, with the logarithms of those.
     fn whitened(&self, variance: &[f64], weight: &[f64], level: &[f64]) -> Whitened {
         let n = variance.len();
         let root = DVector::from_fn(n, |i, _| (weight[i] / variance[i]).sqrt());
-        let own = self.linear.columns.ncols();
-        let mut columns = self.linear.columns.clone().resize_horizontally(own + self.run_count, 0.0);
+        let (own, slow) = (self.linear.columns.ncols(), self.cosines.ncols());
+        let mut columns = self.linear.columns.clone().resize_horizontally(own + self.run_count + slow, 0.0);
+        // What lasts is counted in deviations of a pass as stated.
+        for (mut own, cosine) in
+            columns.columns_mut(own + self.run_count, slow).column_iter_mut().zip(self.cosines.column_iter())
+        {
+            (0..n).for_each(|i| own[i] = cosine[i] * variance[i].sqrt());
+        }
         if self.run_count > 0 {
             (0..n).for_each(|i| columns[(i, own + self.runs[i])] = level[i]);
         }
@@ -108,7 +159,14 @@ impl Surface {
         let (r, scale) = (self.linear.kernel.rank(), s.scale(k));
         let parts = [(r, k.discrepancy_even[s.even]), (r, k.discrepancy_odd[s.odd]), (NUISANCES, 1.0)];
         let runs = (self.run_count, s.run(k));
-        parts.into_iter().chain([runs]).flat_map(|(count, size)| vec![size / scale; count]).collect()
+        let [slow, rho] = s.slow(k);
+        let lasting = lasting::powers(rho, self.linear.residual.len(), self.cosines.ncols());
+        parts
+            .into_iter()
+            .chain([runs])
+            .flat_map(|(count, size)| vec![size / scale; count])
+            .chain(lasting.into_iter().map(|power| slow * power.sqrt()))
+            .collect()
     }
 
     fn log_posterior(&self, k: &Constants, w: &Whitened, s: &State) -> f64 {
@@ -128,7 +186,10 @@ impl Surface {
         level: &[f64],
         start: State,
     ) -> (f64, State) {
-        self.climb(k, &self.whitened(variance, weight, level), start, |_| true)
+        let w = self.whitened(variance, weight, level);
+        let found = self.climb(k, &w, start, |_| true);
+        let other = self.climb(k, &w, found.1.lasting(k), |_| true);
+        if other.0 > found.0 { other } else { found }
     }
 
     fn climb(
@@ -170,7 +231,8 @@ impl Surface {
     ) -> (f64, State, f64) {
         let w = self.whitened(variance, weight, level);
         let start = State { even: 0, odd: 0, ..*s };
-        let (value, best) = self.climb(k, &w, start, |s| s.even == 0 && s.odd == 0);
+        let (value, best) =
+            self.climb(k, &w, start, |s| (s.even, s.odd, s.slow, s.lasts) == (0, 0, start.slow, start.lasts));
         (value, best, self.between(k, &w, best))
     }
 

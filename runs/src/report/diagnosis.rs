@@ -31,6 +31,7 @@ pub fn page(result: &Diagnosis, table: &Table, about: &[(&str, String)]) -> miet
         "<h1>Diagnosis</h1>".into(),
         head(about),
         format!("<p class=\"verdict{}\">{}</p>", if departed { " departed" } else { "" }, escape(&r.text)),
+        described(result),
         how_far(result),
         overlay.section()?,
         causes::section(result),
@@ -42,6 +43,22 @@ pub fn page(result: &Diagnosis, table: &Table, about: &[(&str, String)]) -> miet
         format!("<p class=\"note\">{} passes, SHA-256 {}</p>", r.data.points, escape(&r.data.sha256)),
     ];
     Ok(shell("Diagnosis", &body.concat()))
+}
+
+/// What an unknown departure looks like, and what is sure under an open verdict; nothing else.
+fn described(result: &Diagnosis) -> String {
+    let r = &result.report;
+    let lines = r.description.iter().map(|d| {
+        format!("{} ({} against no gap)", d.text, crate::verdict::odds_base10(d.log10_odds_vs_no_gap))
+    });
+    let sure =
+        (!r.at_least.is_empty()).then(|| format!("At least {}, beside what is open.", r.at_least.join(", ")));
+    let all: Vec<String> = lines.chain(sure).collect();
+    if all.is_empty() {
+        String::new()
+    } else {
+        format!("<h2>What the departure looks like</h2>{}", list(all, ""))
+    }
 }
 
 fn how_far(result: &Diagnosis) -> String {

@@ -1,6 +1,7 @@
 //! The figures, as SVG text: what all of them share. Each is drawn twice, wide for a page and narrow for a telephone, with its own
 //! letters in both; the page shows one of them. Series differ by mark and dash as well as by colour.
 
+pub mod campaign;
 pub mod comparison;
 pub mod run;
 pub mod verdict;

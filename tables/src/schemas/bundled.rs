@@ -27,6 +27,7 @@ pub fn all() -> Vec<Bundled> {
         list.iter().map(|(name, text)| Bundled { kind, name, text }).collect::<Vec<_>>()
     };
     let mut all = of("plan", runs::plan::BUNDLED);
+    all.extend(of("campaign", runs::campaign::BUNDLED));
     all.extend(of("setup", runs::setup::BUNDLED));
     all.extend(of("fingertip", runs::fingertip::BUNDLED));
     let text = |id| drivers::bundled::text(id).map(|text| Bundled { kind: "profile", name: id, text });

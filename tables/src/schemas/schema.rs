@@ -10,6 +10,8 @@ use serde_json::{Map, Value, json};
 pub enum Kind {
     /// A plan of passes
     Plan,
+    /// A campaign: one plan with several tips, conditions and days
+    Campaign,
     /// A rig: instruments, limits, fingertip
     Setup,
     /// A fingertip of the library
@@ -30,8 +32,9 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Kind; 9] = [
+    pub const ALL: [Kind; 10] = [
         Kind::Plan,
+        Kind::Campaign,
         Kind::Setup,
         Kind::Fingertip,
         Kind::Rig,
@@ -46,6 +49,7 @@ impl Kind {
     pub const fn name(self) -> &'static str {
         match self {
             Kind::Plan => "plan",
+            Kind::Campaign => "campaign",
             Kind::Setup => "setup",
             Kind::Fingertip => "fingertip",
             Kind::Rig => "rig",
@@ -61,6 +65,9 @@ impl Kind {
     pub const fn words(self) -> &'static str {
         match self {
             Kind::Plan => "A plan of passes (TOML), for `muprime run PLAN`.",
+            Kind::Campaign => {
+                "A campaign (TOML): one plan with several tips, conditions and days, for `muprime run CAMPAIGN`."
+            }
             Kind::Setup => {
                 "A rig (TOML), for `--setup`; the defaults and hard ranges of its limits stand in setup.md as well."
             }
@@ -83,6 +90,7 @@ impl Kind {
         let reads = || SchemaSettings::draft2020_12().into_generator();
         let schema = match self {
             Kind::Plan => reads().into_root_schema_for::<runs::plan::PlanFile>(),
+            Kind::Campaign => reads().into_root_schema_for::<runs::campaign::CampaignFile>(),
             Kind::Setup => reads().into_root_schema_for::<runs::setup::SetupFile>(),
             Kind::Fingertip => reads().into_root_schema_for::<runs::fingertip::FingertipFile>(),
             Kind::Rig => reads().into_root_schema_for::<models::rig_file::RigFile>(),

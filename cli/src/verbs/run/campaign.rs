@@ -1,0 +1,112 @@
+//! `muprime run CAMPAIGN.toml`: the sessions of a campaign that are missing, then its page.
+
+use super::{Args, Watching, job_of, measure, new_name};
+use miette::IntoDiagnostic;
+use runs::campaign::claims::Claim;
+use runs::campaign::{self, Campaign};
+use runs::catalogue::runs_folder;
+use runs::session::Job;
+use runs::{out, say};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// The page of a campaign, in its folder.
+pub const PAGE: &str = "campaign.html";
+
+/// Measures what is missing. On a virtual rig every session; on a rig with instruments one, since a person changes the tip.
+///
+/// # Errors
+/// A refusal, before anything was measured: any session that a setup cannot do among them.
+pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Result<ExitCode> {
+    if args.seed.is_some() {
+        miette::bail!(
+            help = "state `seed` in the campaign's file",
+            "--seed is that of one run; a campaign has its own"
+        );
+    }
+    let campaign = Campaign::parse(&args.plan, text, folder)?;
+    let resumed = Path::new(&args.plan).is_dir().then(|| PathBuf::from(&args.plan));
+    let out =
+        args.out.take().or(resumed).unwrap_or_else(|| runs_folder().join(new_name(&campaign.file.name)));
+    let given = args.clone();
+    let job = |session: &campaign::Session| -> miette::Result<Job> {
+        let cell = &campaign.file.cell[session.cell];
+        let setup = campaign.setups[session.cell].clone();
+        let mut job = job_of(&given, setup, campaign.plan.clone(), session.seed, out.join(&session.folder))?;
+        let words = [cell.name.as_str(), &cell.condition].join(", ");
+        job.notes.sample = job.notes.sample.or_else(|| Some(words.trim_end_matches(", ").to_string()));
+        Ok(job)
+    };
+    let all = campaign::sessions(&campaign.file);
+    // A session that cannot be done is refused before the first one is made.
+    for session in all.iter().take(campaign.file.cell.len()) {
+        job(session)?.points()?;
+    }
+    campaign.open(&out)?;
+    let watching = Watching::begin(&mut args, &out.join("sessions"))?;
+    let mut whole = true;
+    for session in &all {
+        if campaign::is_complete(&out.join(&session.folder)) {
+            continue;
+        }
+        let cell = &campaign.file.cell[session.cell];
+        let job = job(session)?;
+        let instruments = !job.fast && job.setup.file.virtual_rig.is_none();
+        if !json {
+            let condition = if cell.condition.is_empty() { "" } else { ", " };
+            say!(
+                "session {} of {}, block {}: {}{condition}{}",
+                session.number,
+                all.len(),
+                session.block,
+                cell.name,
+                cell.condition
+            );
+        }
+        whole = measure(job, &watching, json)?;
+        if !whole || instruments {
+            break;
+        }
+    }
+    let (claims, made) = write(&out)?;
+    if json {
+        out!(
+            "{}",
+            serde_json::json!({ "campaign": {
+                "folder": out, "sessions": made, "planned": all.len(), "claims": claims
+            } })
+        );
+    } else {
+        tell(&claims, made, all.len(), &out);
+    }
+    crate::verbs::exit(if whole { crate::verbs::DONE } else { crate::verbs::FAILED })
+}
+
+/// Writes the page of a campaign's folder, and its answers as JSON beside it; gives the answers and the sessions they rest on.
+///
+/// # Errors
+/// A folder that holds no campaign, or cannot be written.
+pub fn write(folder: &Path) -> miette::Result<(Vec<Claim>, usize)> {
+    let (file, made) = campaign::measured(folder)?;
+    let (html, claims) = campaign::page(&file, &made)?;
+    runs::files::write_plain(&folder.join(PAGE), html)?;
+    let answers = serde_json::to_vec_pretty(&claims).into_diagnostic()?;
+    runs::files::write_plain(&folder.join("claims.json"), answers)?;
+    Ok((claims, made.len()))
+}
+
+/// The answers for a person.
+pub fn tell(claims: &[Claim], made: usize, planned: usize, folder: &Path) {
+    say!("{made} of {planned} sessions are complete");
+    for claim in claims {
+        let change = claim.effect.map_or_else(
+            || claim.of.clone(),
+            |e| format!("{:+.3} [{:+.3}, {:+.3}], {}", e.change, e.ci95[0], e.ci95[1], claim.of),
+        );
+        say!("{}: {} ({change})", claim.statement, claim.words());
+    }
+    if made < planned {
+        say!("to make the others, repeat the command: muprime run {}", folder.display());
+    }
+    say!("page: {}", folder.join(PAGE).display());
+}

@@ -1,0 +1,94 @@
+//! What an unknown departure looks like: a jump, a bump or a period, with its place, size and odds; and which causes are sure
+//! though others act beside them, or take turns with them in the list.
+
+use crate::decision::{Decision, Verdict};
+use crate::fitted::Fitted;
+use crate::structure::shapes::{Kind, Shape};
+use serde::Serialize;
+use std::f64::consts::LN_10;
+
+/// Most structures that are described, and the least odds (base 10) against no gap of each.
+const MOST: usize = 3;
+const LEAST_ODDS: f64 = 1.0;
+
+/// One structure in a departure that no cause of the library makes.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Description {
+    /// What it is.
+    pub structure: Kind,
+    /// The covariate over which it is.
+    pub covariate: &'static str,
+    /// Place of a jump or bump, length of a period, in the covariate's unit.
+    pub at: f64,
+    /// Its 95 % interval.
+    pub at_ci95: [f64; 2],
+    /// Size in units of full friction.
+    pub size: f64,
+    /// Its 95 % interval.
+    pub size_ci95: [f64; 2],
+    /// Unit of the size.
+    pub unit: &'static str,
+    /// Odds against the best cause of the library, base 10; none where no cause could be tried.
+    pub log10_odds_vs_best_cause: Option<f64>,
+    /// Odds against no gap, base 10.
+    pub log10_odds_vs_no_gap: f64,
+    /// In words.
+    pub text: String,
+}
+
+/// A number with three significant digits.
+fn three_digits(value: f64) -> String {
+    let scale = 10f64.powi(2 - value.abs().max(1e-300).log10().floor() as i32);
+    format!("{}", (value * scale).round() / scale)
+}
+
+fn words(shape: &Shape) -> String {
+    let (factor, unit) = shape.covariate.shown;
+    let value = |v: f64| three_digits(v * factor);
+    let [low, high] = shape.at.1.map(value);
+    let (at, over) = (value(shape.at.0), shape.covariate.words);
+    let place = match shape.kind {
+        Kind::Jump => format!("a jump over {over} at {at} {unit}"),
+        Kind::Bump => format!("a bump over {over} about {at} {unit}"),
+        Kind::Period => format!("a period of {at} {unit} over {over}"),
+    };
+    let of = if shape.turns { "friction" } else { "the lateral reading, alike in both directions" };
+    format!("{place} (95 %: {low} to {high}) in {of}, {:+.3} of full friction", shape.size.0)
+}
+
+/// The structures of an unknown departure, best first; none under another verdict.
+pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
+    if decision.verdict != Verdict::Unknown {
+        return Vec::new();
+    }
+    let base10 = fitted.problem.constants.temper * LN_10;
+    let best = fitted.candidates.iter().map(|c| c.log_evidence - fitted.evidence[0]).reduce(f64::max);
+    let of = |shape: &Shape| Description {
+        structure: shape.kind,
+        covariate: shape.covariate.name,
+        at: shape.at.0,
+        at_ci95: shape.at.1,
+        size: shape.size.0,
+        size_ci95: shape.size.1,
+        unit: "mu_relative",
+        log10_odds_vs_best_cause: best.map(|best| (shape.nats - best) / base10),
+        log10_odds_vs_no_gap: shape.nats / base10,
+        text: words(shape),
+    };
+    let seen = fitted.shapes.iter().map(of);
+    seen.take_while(|d| d.log10_odds_vs_no_gap > LEAST_ODDS).take(MOST).collect()
+}
+
+/// Causes that are sure though the verdict is open: those of which the hypotheses together have the probability of a name.
+pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
+    if !matches!(decision.verdict, Verdict::Ambiguous | Verdict::Unknown) {
+        return Vec::new();
+    }
+    let of = |effect: usize| -> f64 {
+        let with = fitted.candidates.iter().zip(&decision.probabilities);
+        with.filter(|(c, _)| c.effects.contains(&effect)).map(|(_, p)| p).sum()
+    };
+    let sure = fitted.problem.constants.name_probability;
+    let library = effects::library();
+    (0..library.len()).filter(|&e| of(e) >= sure).map(|e| library[e].name().to_string()).collect()
+}

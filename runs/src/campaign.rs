@@ -1,0 +1,296 @@
+//! A campaign: the same plan with several tips and conditions, on several days, as sessions in random order.
+//!
+//! ```text
+//! campaign.toml: cells (tip, condition, setup) x blocks (days)
+//!   -> sessions: every cell once a block, in an order that the seed gives
+//!   -> FOLDER/sessions/NN-CELL: a run's folder each; those that are complete are not made again
+//!   -> claims: each of the paper's statements, answered from all sessions that are complete
+//! ```
+//! A block is a day or half of one: what drifts from day to day is then the same for all cells of it.
+
+pub mod claims;
+pub mod measured;
+mod page;
+
+use crate::fingertip::Kind;
+use crate::input::{self, Problems};
+use crate::plan::Plan;
+use crate::setup::Setup;
+use measured::Measured;
+use miette::IntoDiagnostic;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha12Rng;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+pub use page::page;
+
+/// Name and text of every bundled campaign. Add one: a file in `runs/campaigns/` and a line here.
+pub const BUNDLED: &[(&str, &str)] = &[("part2-campaign", include_str!("../campaigns/part2-campaign.toml"))];
+/// The campaign's file in its folder.
+pub const FILE: &str = "campaign.toml";
+/// What kind of tip each cell has, beside it: a folder that was copied has no setups.
+const KINDS: &str = "tips.json";
+/// Sessions that one campaign may have.
+const SESSIONS_MAX: usize = 1000;
+
+/// A campaign file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CampaignFile {
+    /// Name, for the page.
+    pub name: String,
+    /// What it is for.
+    #[serde(default)]
+    pub about: String,
+    /// The plan of every session: a bundled name, or a file beside this one.
+    pub plan: String,
+    /// Seed of the order of sessions and, with a session's number, of the order of its passes.
+    #[serde(default)]
+    pub seed: u64,
+    /// Blocks, as days: every cell is measured once in each.
+    pub blocks: u32,
+    /// Repeats of every condition in a session, in place of the plan's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub replicates: Option<u32>,
+    /// Change of relative friction up to which a factor does not matter (1).
+    #[serde(default = "margin")]
+    pub margin: f64,
+    /// What is compared: a tip in one condition.
+    pub cell: Vec<Cell>,
+}
+
+/// A tip in one condition, on the setup that it is measured with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// Name: letters, digits, `-` and `_`; part of the names of its folders.
+    pub name: String,
+    /// Setup: a bundled name, or a file beside this one.
+    pub setup: String,
+    /// Fingertip in place of the setup's: a name of the library, or a file beside the setup.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip: Option<String>,
+    /// Coulomb friction coefficient to expect, in place of the tip's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mu0: Option<f64>,
+    /// Condition of the tip, as dry or moist: for record and page.
+    #[serde(default)]
+    pub condition: String,
+}
+
+const fn margin() -> f64 {
+    0.02
+}
+
+/// A campaign that was read, with its plan and setups.
+pub struct Campaign {
+    /// The file's contents.
+    pub file: CampaignFile,
+    /// The file's text, for its folder.
+    pub text: String,
+    /// The plan of every session.
+    pub plan: Plan,
+    /// The setup of each cell.
+    pub setups: Vec<Setup>,
+}
+
+/// One session: a cell in a block.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Session {
+    /// Number in the order of measurement, from 1.
+    pub number: usize,
+    /// Block, from 1.
+    pub block: u32,
+    /// Index of the cell.
+    pub cell: usize,
+    /// Seed of its passes.
+    pub seed: u64,
+    /// Its folder in that of the campaign.
+    pub folder: PathBuf,
+}
+
+/// The text of a campaign and the folder that its paths are relative to; `None` where the name is that of a plan.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn text_of(name_or_path: &str) -> miette::Result<Option<(String, PathBuf)>> {
+    if let Some((_, text)) = BUNDLED.iter().find(|(name, _)| *name == name_or_path) {
+        return Ok(Some(((*text).to_string(), PathBuf::from("."))));
+    }
+    let path = Path::new(name_or_path);
+    let path = if path.is_dir() { path.join(FILE) } else { path.to_path_buf() };
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = input::text_of(&path)?;
+    // A file that is no TOML at all is refused as a plan, with its place.
+    let is = toml::from_str::<toml::Table>(&text)
+        .is_ok_and(|t| t.contains_key("cell") || t.contains_key("blocks"));
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    Ok(is.then(|| (text, folder.to_path_buf())))
+}
+
+impl Campaign {
+    /// Parses and checks a campaign, its plan and its setups.
+    ///
+    /// # Errors
+    /// What is wrong, with the place in the file.
+    pub fn parse(origin: &str, text: &str, folder: &Path) -> miette::Result<Self> {
+        let file: CampaignFile = input::parse_toml(origin, text)?;
+        let mut wrong = Problems::of(origin, text);
+        if file.cell.is_empty() {
+            wrong.add(&["cell"], "a campaign has at least one [[cell]]", None);
+        }
+        let sessions = file.cell.len().saturating_mul(file.blocks as usize);
+        if !(1..=SESSIONS_MAX).contains(&sessions) {
+            let problem =
+                format!("cells times blocks are {sessions} sessions; 1 to {SESSIONS_MAX} can be had");
+            wrong.add(&["blocks"], problem, None);
+        }
+        if !(file.margin.is_finite() && file.margin > 0.0 && file.margin < 1.0) {
+            let problem =
+                format!("margin = {}: above 0 and below 1, a change of relative friction", file.margin);
+            wrong.add(&["margin"], problem, None);
+        }
+        let mut names = BTreeSet::new();
+        for cell in &file.cell {
+            let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+            if cell.name.is_empty() || !cell.name.chars().all(plain) {
+                let problem = format!(
+                    "a cell's name '{}' has other characters than letters, digits, - and _",
+                    cell.name
+                );
+                wrong.add(&["cell"], problem, None);
+            }
+            if !names.insert(&cell.name) {
+                wrong.add(&["cell"], format!("two cells are named '{}'", cell.name), None);
+            }
+        }
+        wrong.end()?;
+        let plan = match crate::plan::bundled_text(&file.plan) {
+            Some(text) => Plan::parse(&file.plan, text)?,
+            None => Plan::load(&folder.join(&file.plan).display().to_string())?,
+        };
+        let replicates = file.replicates.map(|n| ("replicates", toml::Value::Integer(n.into())));
+        let plan = match replicates {
+            None => plan,
+            some => Plan::parse(&plan.origin, &edited(&plan.text, &[], some)?)?,
+        };
+        let setups = file.cell.iter().map(|cell| cell.setup(folder)).collect::<miette::Result<_>>()?;
+        Ok(Campaign { file, text: text.to_string(), plan, setups })
+    }
+
+    /// Makes the campaign's folder, or takes up that of the same campaign.
+    ///
+    /// # Errors
+    /// A folder of another campaign, or one that cannot be written.
+    pub fn open(&self, folder: &Path) -> miette::Result<()> {
+        let kept = folder.join(FILE);
+        if kept.exists() {
+            miette::ensure!(
+                input::text_of(&kept)? == self.text,
+                help = "give another --out, or the campaign as it was",
+                "{} holds another campaign than this one",
+                folder.display()
+            );
+            return Ok(());
+        }
+        crate::files::make_folder(&folder.join("sessions"))?;
+        let kinds: Vec<Kind> = self.setups.iter().map(|setup| setup.tip.kind).collect();
+        crate::files::write_plain(&folder.join(KINDS), serde_json::json!(kinds).to_string())?;
+        crate::files::write_plain(&kept, &self.text)
+    }
+}
+
+impl Cell {
+    /// Its setup, with the fingertip that the cell names.
+    fn setup(&self, folder: &Path) -> miette::Result<Setup> {
+        let (origin, text, beside) = match crate::setup::bundled_text(&self.setup) {
+            Some(text) => (self.setup.clone(), text.to_string(), folder.to_path_buf()),
+            None => {
+                let path = folder.join(&self.setup);
+                let beside = path.parent().map(Path::to_path_buf).unwrap_or_default();
+                (path.display().to_string(), input::text_of(&path)?, beside)
+            }
+        };
+        let own = [
+            self.tip.clone().map(|tip| ("tip", toml::Value::String(tip))),
+            self.mu0.map(|mu0| ("mu0", toml::Value::Float(mu0))),
+        ];
+        let text = match self.tip.is_none() && self.mu0.is_none() {
+            true => text,
+            false => edited(&text, &["finger"], own.into_iter().flatten())?,
+        };
+        Setup::parse(&origin, &text, &beside)
+    }
+}
+
+/// A TOML text with values of its own in one of its tables; a text that is none stays as it is, to be refused by its reader.
+fn edited(
+    text: &str,
+    table: &[&str],
+    values: impl IntoIterator<Item = (&'static str, toml::Value)>,
+) -> miette::Result<String> {
+    let Ok(mut document) = toml::from_str::<toml::Table>(text) else { return Ok(text.to_string()) };
+    let mut at = &mut document;
+    for name in table {
+        let inner = at.entry(*name).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+        let Some(inner) = inner.as_table_mut() else { return Ok(text.to_string()) };
+        at = inner;
+    }
+    values.into_iter().for_each(|(key, value)| drop(at.insert(key.to_string(), value)));
+    toml::to_string(&document).into_diagnostic()
+}
+
+/// All sessions of a campaign in the order of measurement: in each block every cell, in an order of its own.
+pub fn sessions(file: &CampaignFile) -> Vec<Session> {
+    let mut random = ChaCha12Rng::seed_from_u64(file.seed);
+    let mut all = Vec::new();
+    for block in 1..=file.blocks {
+        let mut cells: Vec<usize> = (0..file.cell.len()).collect();
+        cells.shuffle(&mut random);
+        for cell in cells {
+            let number = all.len() + 1;
+            let folder = Path::new("sessions").join(format!("{number:02}-{}", file.cell[cell].name));
+            // Sessions apart by far more than replicates are.
+            let seed = file.seed.wrapping_mul(1_000_003).wrapping_add(number as u64) & i64::MAX as u64;
+            all.push(Session { number, block, cell, seed, folder });
+        }
+    }
+    all
+}
+
+/// Whether the run in a folder was completed.
+pub fn is_complete(run: &Path) -> bool {
+    let summary = std::fs::read(run.join("summary.json")).ok();
+    let summary = summary.and_then(|bytes| serde_json::from_slice::<crate::session::Summary>(&bytes).ok());
+    summary.is_some_and(|summary| summary.outcome == crate::sequence::Outcome::Complete)
+}
+
+/// What was measured of a campaign: the sessions that are complete.
+///
+/// # Errors
+/// A folder without a campaign, a session whose files cannot be read.
+pub fn measured(folder: &Path) -> miette::Result<(CampaignFile, Vec<Measured>)> {
+    let path = folder.join(FILE);
+    let file: CampaignFile = input::parse_toml(&path.display().to_string(), &input::text_of(&path)?)?;
+    let kinds: Vec<Kind> = serde_json::from_str(&input::text_of(&folder.join(KINDS))?).into_diagnostic()?;
+    miette::ensure!(
+        kinds.len() == file.cell.len(),
+        "{}: {KINDS} belongs to another campaign",
+        folder.display()
+    );
+    let mut all = Vec::new();
+    for session in sessions(&file) {
+        let run = folder.join(&session.folder);
+        if is_complete(&run) {
+            let rig = input::rig_file(&run.join("rig.toml"))?;
+            let kind = kinds[session.cell];
+            all.push(Measured::new(session, kind, rig.finger, &crate::run_dir::passes_in(&run)?));
+        }
+    }
+    Ok((file, all))
+}

@@ -1,0 +1,262 @@
+//! What the paper states, each answered from a campaign.
+//!
+//! The rule is one for all: the 95 % interval of the change of mu' lies beyond the margin (it falls, it rises), within the
+//! margin (it does not matter), or across it (undecided). A statement is supported or contradicted by that, never by a
+//! difference that is merely not significant.
+
+use super::measured::{Effect, Measured, contrast, ends, mean};
+use crate::fingertip::Kind;
+use crate::report::human::number;
+use models::covariate::{self, Covariate};
+use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider, Validity};
+use models::surrogate::Surrogate;
+use serde::Serialize;
+
+/// What a statement expects of a change, or what was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Trend {
+    /// Relative friction falls by more than the margin.
+    Falls,
+    /// It rises by more than the margin.
+    Rises,
+    /// It changes by less than the margin.
+    Same,
+}
+
+/// What the campaign says of a statement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answer {
+    /// The interval lies where the statement says.
+    Supported,
+    /// It lies elsewhere.
+    Contradicted,
+    /// It lies across the margin, or nothing tells.
+    Undecided,
+}
+
+/// A statement of the paper with its answer.
+#[derive(Clone, Debug, Serialize)]
+pub struct Claim {
+    /// Short name.
+    pub name: &'static str,
+    /// The statement, in words of ours.
+    pub statement: &'static str,
+    /// Where the paper makes it.
+    pub source: &'static str,
+    /// What it expects.
+    pub expected: Trend,
+    /// The change of mu', with its interval; `None` where nothing varies what it is about.
+    pub effect: Option<Effect>,
+    /// What the change is of, in words.
+    pub of: String,
+    /// Change of mu' that does not matter.
+    pub margin: f64,
+    /// The answer.
+    pub answer: Answer,
+    /// Least change that would have been decided: the margin and half of the interval. `None` without an effect.
+    pub visible: Option<f64>,
+}
+
+/// Where an interval lies beside a margin.
+pub fn trend([low, high]: [f64; 2], margin: f64) -> Option<Trend> {
+    if high < -margin {
+        return Some(Trend::Falls);
+    }
+    if low > margin {
+        return Some(Trend::Rises);
+    }
+    (low > -margin && high < margin).then_some(Trend::Same)
+}
+
+impl Claim {
+    /// The answer in a word, and whether there is a change that the margin covers.
+    pub fn words(&self) -> String {
+        let word = match self.answer {
+            Answer::Supported => "supported",
+            Answer::Contradicted => "contradicted",
+            Answer::Undecided => "undecided",
+        };
+        let covered = |e: Effect| {
+            self.answer != Answer::Undecided && e.ci95[0] * e.ci95[1] > 0.0 && e.change.abs() < self.margin
+        };
+        let more = if self.effect.is_some_and(covered) { ", with a change within the margin" } else { "" };
+        format!("{word}{more}")
+    }
+
+    fn new(stated: &Stated, margin: f64, found: Result<(Effect, String), String>) -> Self {
+        let Stated { name, statement, source, expected } = *stated;
+        let (effect, of) = match found {
+            Ok((effect, of)) => (Some(effect), of),
+            Err(why) => (None, why),
+        };
+        let answer = match effect.and_then(|e| trend(e.ci95, margin)) {
+            None => Answer::Undecided,
+            Some(found) if found == expected => Answer::Supported,
+            Some(_) => Answer::Contradicted,
+        };
+        let visible = effect.map(|e| margin + 0.5 * (e.ci95[1] - e.ci95[0]));
+        Claim { name, statement, source, expected, effect, of, margin, answer, visible }
+    }
+}
+
+struct Stated {
+    name: &'static str,
+    statement: &'static str,
+    source: &'static str,
+    expected: Trend,
+}
+
+const RESULT: &str = "part 1, section 6 (ii)";
+const FORCE: &str = "part 1, section 6 (iv)";
+const PART2: &str = "part 1, section 1, of part 2";
+
+/// Every statement with its answer, in the order of the page.
+pub fn claims(sessions: &[Measured], margin: f64) -> Vec<Claim> {
+    let state = |name, statement, source, expected| Stated { name, statement, source, expected };
+    let within = |factor: &'static Covariate, intermittent: bool| within(sessions, factor, intermittent);
+    let ridge = Surrogate::shipped().ok();
+    let all = [
+        (
+            state("amplitude", "friction falls with amplitude", RESULT, Trend::Falls),
+            within(&covariate::AMPLITUDE, false),
+        ),
+        (
+            state("frequency", "friction falls with frequency", RESULT, Trend::Falls),
+            within(&covariate::FREQUENCY, false),
+        ),
+        (
+            state("speed", "friction rises with sliding speed", RESULT, Trend::Rises),
+            within(&covariate::SPEED, false),
+        ),
+        (
+            state("mu_0", "friction falls with the Coulomb friction coefficient", RESULT, Trend::Falls),
+            across(sessions, "mu_0", |s| s.mu0, |s| s.finger.young_modulus_pa),
+        ),
+        (
+            state(
+                "normal force",
+                "friction does not depend on the normal force once contact is intermittent",
+                FORCE,
+                Trend::Same,
+            ),
+            within(&covariate::NORMAL_FORCE, true),
+        ),
+        (
+            state("modulus", "friction does not depend on the tip's modulus", FORCE, Trend::Same),
+            across(sessions, "Young's modulus", |s| s.finger.young_modulus_pa, |s| s.mu0),
+        ),
+        (
+            state("ambient pressure", "friction does not depend on the ambient pressure", PART2, Trend::Same),
+            within(&covariate::AMBIENT_PRESSURE, false),
+        ),
+        (
+            state("spring-slider", "measurements are consistent with the spring-slider", PART2, Trend::Same),
+            beside(sessions, "the spring-slider", |s| SpringSlider::new(s.finger).ok()),
+        ),
+        (
+            state("ridge", "measurements are consistent with the finite element ridge", PART2, Trend::Same),
+            beside(sessions, "the ridge", |s| Some(ridge.clone()?.for_finger(&s.finger))),
+        ),
+        (
+            state(
+                "human and artificial",
+                "human and artificial tips follow the same law",
+                PART2,
+                Trend::Same,
+            ),
+            kinds(sessions),
+        ),
+    ];
+    all.into_iter().map(|(stated, found)| Claim::new(&stated, margin, found)).collect()
+}
+
+/// The effect of a factor that is varied within sessions.
+fn within(sessions: &[Measured], factor: &Covariate, intermittent: bool) -> Result<(Effect, String), String> {
+    let of_session = |s: &Measured| {
+        let driven: Vec<_> = s.driven.iter().filter(|d| d.intermittent || !intermittent).copied().collect();
+        contrast(factor, &driven)
+    };
+    let found: Vec<(f64, [f64; 2])> = sessions.iter().filter_map(of_session).collect();
+    if found.is_empty() {
+        return Err(format!("no complete session varies the {}", factor.words));
+    }
+    let changes: Vec<f64> = found.iter().map(|(change, _)| *change).collect();
+    let effect = Effect::mean_of(&changes, 0.0).ok_or_else(|| ONE.to_string())?;
+    let (scale, unit) = factor.shown;
+    let end = |i: usize| number(scale * mean(found.iter().map(|(_, e)| e[i])).unwrap_or(f64::NAN));
+    Ok((effect, format!("{} {} to {} {unit}", factor.words, end(0), end(1))))
+}
+
+const ONE: &str = "one session alone does not tell how sessions differ";
+
+/// The effect of what differs between sessions, over its range; what else differs is held.
+fn across(
+    sessions: &[Measured],
+    words: &str,
+    x: impl Fn(&Measured) -> Option<f64>,
+    other: impl Fn(&Measured) -> Option<f64>,
+) -> Result<(Effect, String), String> {
+    let rows: Vec<[f64; 3]> = sessions
+        .iter()
+        .filter_map(|s| Some([x(s)?.ln(), s.mean_mu()?, other(s).map_or(f64::NAN, f64::ln)]))
+        .collect();
+    let column = |i: usize| rows.iter().map(|row| row[i]).collect::<Vec<f64>>();
+    let (x, y, other) = (column(0), column(1), column(2));
+    let [low, high] = ends(&x);
+    let factor = (high - low).exp();
+    if factor.is_nan() || factor < LEAST_FACTOR {
+        return Err(format!("the sessions' {words} differs by less than a factor of {LEAST_FACTOR}"));
+    }
+    let varies = ends(&other);
+    let other = (varies[1] - varies[0] > LEAST_FACTOR.ln()).then_some(other.as_slice());
+    let effect = Effect::slope(&x, &y, other)
+        .ok_or_else(|| format!("too few sessions, or {words} changes with something else"))?;
+    Ok((effect, format!("{words} over a factor of {}", number(factor))))
+}
+
+/// Least factor by which something must differ between sessions.
+const LEAST_FACTOR: f64 = 1.2;
+
+/// How far measurements lie from a model, in the mean of a session.
+fn beside<M: FrictionModel>(
+    sessions: &[Measured],
+    words: &str,
+    model: impl Fn(&Measured) -> Option<M>,
+) -> Result<(Effect, String), String> {
+    let mut shared = 0.0f64;
+    let mut of_session = |s: &Measured| {
+        let model = model(s)?;
+        let predicted = s.driven.iter().filter_map(|d| Some((d.mu, model.predict(&d.condition).ok()?)));
+        let inside: Vec<_> = predicted.filter(|(_, p)| p.validity == Validity::Inside).collect();
+        shared = shared.max(mean(inside.iter().map(|(_, p)| p.mu_relative_sd))?);
+        (2 * inside.len() > s.driven.len()).then_some(())?;
+        mean(inside.iter().map(|(mu, p)| mu - p.mu_relative))
+    };
+    let departures: Vec<f64> = sessions.iter().filter_map(&mut of_session).collect();
+    if departures.is_empty() {
+        return Err(format!("most passes lie beyond the range of {words}"));
+    }
+    let effect = Effect::mean_of(&departures, shared).ok_or_else(|| ONE.to_string())?;
+    Ok((effect, format!("measured less predicted by {words}")))
+}
+
+/// How far human and artificial tips lie apart beside one law.
+fn kinds(sessions: &[Measured]) -> Result<(Effect, String), String> {
+    let of = |human: bool| -> Vec<f64> {
+        let own = sessions.iter().filter(|s| s.kind != Kind::Probe && (s.kind == Kind::Human) == human);
+        let departure = |s: &Measured| {
+            let law = EmpiricalPsi::paper(s.finger).ok()?;
+            mean(
+                s.driven
+                    .iter()
+                    .filter_map(|d| Some(d.mu - law.relative_friction(&d.condition).ok()?.mu_relative)),
+            )
+        };
+        own.filter_map(departure).collect()
+    };
+    let effect = Effect::between(&of(true), &of(false))
+        .ok_or_else(|| "two sessions or more of each kind of tip are needed".to_string())?;
+    Ok((effect, "human less artificial, beside Eq. 20".to_string()))
+}

@@ -1,0 +1,203 @@
+//! What a campaign's sessions measured, and effects of one factor in them.
+//!
+//! A session is the unit of evidence: passes of one session share its tip, its day and its mu_0. An effect is computed in
+//! each session by itself, as a difference between the ends of a factor's range at otherwise equal settings, and its
+//! interval is Student's over sessions.
+
+use super::Session;
+use crate::fingertip::Kind;
+use crate::sequence::MeasuredPass;
+use models::condition::Condition;
+use models::covariate::{self, Covariate};
+use models::finger::Finger;
+use models::pass::{Pass, coulomb_coefficient};
+use models::prediction::Regime;
+use models::quantity::PeakToPeak;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::collections::BTreeMap;
+
+/// Settings that a pass has; all but one are equal where an effect is looked for.
+pub const FACTORS: [&Covariate; 5] = [
+    &covariate::AMPLITUDE,
+    &covariate::FREQUENCY,
+    &covariate::SPEED,
+    &covariate::NORMAL_FORCE,
+    &covariate::AMBIENT_PRESSURE,
+];
+/// Values whose neighbours differ by less than this share are one level.
+const LEVEL: f64 = 0.08;
+
+/// A pass with vibration.
+#[derive(Clone, Copy, Debug)]
+pub struct Driven {
+    /// Its condition, with its session's `mu_0`.
+    pub condition: Condition,
+    /// Relative friction, over the session's `mu_0`.
+    pub mu: f64,
+    /// Whether the model expects intermittent contact.
+    pub intermittent: bool,
+}
+
+/// What one complete session measured.
+pub struct Measured {
+    /// The session.
+    pub session: Session,
+    /// Kind of its tip.
+    pub kind: Kind,
+    /// Its finger, as `rig.toml` has it.
+    pub finger: Finger,
+    /// Coulomb friction coefficient of its passes without vibration; `None` without any.
+    pub mu0: Option<f64>,
+    /// Its passes with vibration; none without a `mu_0`.
+    pub driven: Vec<Driven>,
+}
+
+impl Measured {
+    /// The passes of a session.
+    pub fn new(session: Session, kind: Kind, finger: Finger, passes: &[MeasuredPass]) -> Self {
+        let bare: Vec<Pass> = passes.iter().map(|p| p.pass.clone()).collect();
+        let mu0 = coulomb_coefficient(&bare).filter(|mu0| *mu0 > 0.0);
+        let driven = |p: &MeasuredPass| {
+            let (mu0, friction) = (mu0?, p.pass.friction_force_n()?);
+            (p.pass.amplitude > PeakToPeak::ZERO && p.pass.normal_force_n > 0.0).then(|| Driven {
+                condition: p.pass.condition(mu0),
+                mu: friction / (mu0 * p.pass.normal_force_n),
+                intermittent: p.regime == Some(Regime::Intermittent),
+            })
+        };
+        let driven = passes.iter().filter_map(driven).collect();
+        Measured { session, kind, finger, mu0, driven }
+    }
+
+    /// Mean relative friction of its passes with vibration.
+    pub fn mean_mu(&self) -> Option<f64> {
+        mean(self.driven.iter().map(|d| d.mu))
+    }
+}
+
+/// Mean of some values; `None` of none.
+pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (n, sum) = values.fold((0.0, 0.0), |(n, s), v| (n + 1.0, s + v));
+    (n > 0.0).then(|| sum / n)
+}
+
+/// A change of relative friction with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Effect {
+    /// Change of mu'.
+    pub change: f64,
+    /// Its 95 % interval.
+    pub ci95: [f64; 2],
+    /// Sessions that it rests on.
+    pub sessions: usize,
+}
+
+impl Effect {
+    /// A value with its standard error on so many degrees of freedom, and a standard uncertainty that all sessions share.
+    pub fn new(change: f64, error: f64, freedom: f64, shared: f64, sessions: usize) -> Option<Self> {
+        let t = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(0.975);
+        let half = (t * error).hypot(1.96 * shared);
+        Some(Effect { change, ci95: [change - half, change + half], sessions })
+    }
+
+    /// The mean of one value a session; `None` with fewer than two.
+    pub fn mean_of(values: &[f64], shared: f64) -> Option<Self> {
+        let (m, n) = (mean(values.iter().copied())?, values.len() as f64);
+        let variance = values.iter().map(|v| (v - m).powi(2)).sum::<f64>() / (n - 1.0);
+        (n > 1.0).then(|| Effect::new(m, (variance / n).sqrt(), n - 1.0, shared, values.len())).flatten()
+    }
+
+    /// Difference of the means of two groups, Welch's.
+    pub fn between(a: &[f64], b: &[f64]) -> Option<Self> {
+        let of = |v: &[f64]| {
+            let (m, n) = (mean(v.iter().copied())?, v.len() as f64);
+            (n > 1.0).then(|| (m, v.iter().map(|x| (x - m).powi(2)).sum::<f64>() / (n - 1.0) / n, n))
+        };
+        let ((ma, va, na), (mb, vb, nb)) = (of(a)?, of(b)?);
+        let freedom =
+            (va + vb).powi(2) / (va * va / (na - 1.0) + vb * vb / (nb - 1.0)).max(f64::MIN_POSITIVE);
+        Effect::new(ma - mb, (va + vb).sqrt(), freedom.clamp(1.0, 1e6), 0.0, a.len() + b.len())
+    }
+
+    /// Change over the range of `x` by a straight line through one point a session, others of its covariates held; `None`
+    /// with too few sessions, or where `x` and another change together.
+    pub fn slope(x: &[f64], y: &[f64], other: Option<&[f64]>) -> Option<Self> {
+        let one: Vec<f64> = vec![1.0; x.len()];
+        let centred = |v: &[f64]| without(v, &one);
+        let (mut x0, mut y0) = (centred(x), centred(y));
+        let before = dot(&x0, &x0);
+        if let Some(other) = other.map(centred) {
+            (x0, y0) = (without(&x0, &other), without(&y0, &other));
+        }
+        let (xx, n) = (dot(&x0, &x0), x.len());
+        let freedom = n as f64 - 2.0 - f64::from(u8::from(other.is_some()));
+        if freedom < 1.0 || xx < 0.2 * before || before <= 0.0 {
+            return None;
+        }
+        let slope = dot(&x0, &y0) / xx;
+        let left = x0.iter().zip(&y0).map(|(x, y)| (y - slope * x).powi(2)).sum::<f64>();
+        let [low, high] = ends(x);
+        let range = high - low;
+        Effect::new(slope * range, range * (left / freedom / xx).sqrt(), freedom, 0.0, n)
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// What is left of `v` beside its part along `along`.
+fn without(v: &[f64], along: &[f64]) -> Vec<f64> {
+    let share = dot(v, along) / dot(along, along).max(f64::MIN_POSITIVE);
+    v.iter().zip(along).map(|(v, a)| v - share * a).collect()
+}
+
+/// The least and the greatest.
+pub fn ends(values: &[f64]) -> [f64; 2] {
+    let start = [f64::INFINITY, f64::NEG_INFINITY];
+    values.iter().fold(start, |[l, h], v| [l.min(*v), h.max(*v)])
+}
+
+/// The levels of a factor: the least value of each.
+fn levels(factor: &Covariate, driven: &[Driven]) -> Vec<f64> {
+    let mut values: Vec<f64> = driven.iter().filter_map(|d| factor.of(&d.condition)).collect();
+    values.sort_by(f64::total_cmp);
+    let begins = |i: usize| i == 0 || values[i] > values[i - 1] * (1.0 + LEVEL);
+    (0..values.len()).filter(|i| begins(*i)).map(|i| values[i]).collect()
+}
+
+/// Passes at equal settings of all other factors, by those settings and the level of this one.
+pub fn groups(factor: &Covariate, driven: &[Driven]) -> BTreeMap<Vec<usize>, BTreeMap<usize, Vec<Driven>>> {
+    let all: Vec<Vec<f64>> = FACTORS.iter().map(|f| levels(f, driven)).collect();
+    let mut groups = BTreeMap::<Vec<usize>, BTreeMap<usize, Vec<Driven>>>::new();
+    for pass in driven {
+        let place = |i: usize| {
+            FACTORS[i].of(&pass.condition).map_or(0, |v| all[i].partition_point(|level| *level <= v))
+        };
+        let own = FACTORS.iter().position(|f| f.name == factor.name).unwrap_or(0);
+        let others = (0..FACTORS.len()).filter(|i| *i != own).map(place).collect();
+        if factor.of(&pass.condition).is_some() {
+            groups.entry(others).or_default().entry(place(own)).or_default().push(*pass);
+        }
+    }
+    groups
+}
+
+/// Change of mu' from the lowest to the highest level of a factor in a session, at equal settings of the others, and those
+/// levels; only settings over nearly the widest range count. `None` where nothing varies it.
+pub fn contrast(factor: &Covariate, driven: &[Driven]) -> Option<(f64, [f64; 2])> {
+    let of_group = |levels: &BTreeMap<usize, Vec<Driven>>| {
+        let (first, last) = (levels.first_key_value()?, levels.last_key_value()?);
+        let value = |passes: &[Driven]| mean(passes.iter().filter_map(|d| factor.of(&d.condition)));
+        let mu = |passes: &[Driven]| mean(passes.iter().map(|d| d.mu));
+        (first.0 < last.0).then_some(())?;
+        Some((mu(last.1)? - mu(first.1)?, [value(first.1)?, value(last.1)?]))
+    };
+    let all: Vec<(f64, [f64; 2])> = groups(factor, driven).values().filter_map(of_group).collect();
+    let range = |[low, high]: [f64; 2]| (high / low).ln();
+    let widest = all.iter().map(|(_, ends)| range(*ends)).reduce(f64::max)?;
+    let wide: Vec<_> = all.into_iter().filter(|(_, ends)| range(*ends) > 0.9 * widest).collect();
+    let change = mean(wide.iter().map(|(change, _)| *change))?;
+    let end = |i: usize| mean(wide.iter().map(|(_, ends)| ends[i]));
+    Some((change, [end(0)?, end(1)?]))
+}

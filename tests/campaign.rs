@@ -1,0 +1,188 @@
+//! A campaign from its file to the answers on its page.
+
+use models::prediction::SpringSlider;
+use runs::campaign::claims::{Answer, Claim, Trend, claims, trend};
+use runs::campaign::{self, Campaign};
+use runs::session::{Job, Signals};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use tests::muprime;
+
+/// The bundled campaign on a rig that is the spring-slider, with a seed and blocks of its own.
+fn ideal(seed: u64, blocks: u32) -> Campaign {
+    let text = campaign::BUNDLED[0].1;
+    let text = text
+        .replace("setup = \"virtual\"", "setup = \"virtual-ideal\"")
+        .replace("seed = 2", &format!("seed = {seed}"));
+    // One repeat a session is quick, and decides less.
+    let text = text.replace("replicates = 2 ", &format!("replicates = {} ", tests::rounds(1, 2)));
+    Campaign::parse("ideal", &text.replace("blocks = 3 ", &format!("blocks = {blocks} ")), Path::new("."))
+        .unwrap()
+}
+
+/// Its answers on a virtual rig with these defects.
+fn answers(campaign: &Campaign, defects: &str) -> Vec<Claim> {
+    let folder = tempfile::tempdir().unwrap();
+    campaign.open(folder.path()).unwrap();
+    for session in campaign::sessions(&campaign.file) {
+        let setup = campaign.setups[session.cell].clone();
+        let job = Job {
+            model: Arc::new(SpringSlider::new(setup.tip.finger).unwrap()),
+            setup,
+            plan: campaign.plan.clone(),
+            seed: session.seed,
+            model_file: None,
+            defects: Some(sim::defects::Defects::parse(defects).unwrap()),
+            out: folder.path().join(&session.folder),
+            fast: true,
+            notes: Default::default(),
+            answers: None,
+        };
+        job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
+    }
+    let (file, made) = campaign::measured(folder.path()).unwrap();
+    assert_eq!(made.len(), campaign::sessions(&file).len());
+    claims(&made, file.margin)
+}
+
+/// Every statement on three natures of the virtual rig, beside the change that the mean of all campaigns of a nature shows: an
+/// answer is wrong where the true change lies beyond the margin on another side, and it is owed where the true change is nil or
+/// twice the margin.
+#[test]
+fn answers_are_right_on_three_natures() {
+    let natures = [
+        ("as the paper says", ""),
+        (
+            "squeeze film",
+            "[[defect]]\nname = \"squeeze_film\"\nparameters = { film_area_m2 = 8e-6, half_gap_m = 2.5e-6, asperity_load_n = 1.0 }\n",
+        ),
+        ("load-dependent friction", "[[defect]]\nname = \"load_dependent_friction\"\nseed = 3\n"),
+    ];
+    let rounds = tests::rounds(1, 50);
+    let (mut wrong, mut said, mut owed, mut decided) = (0, 0, 0, 0);
+    for (nature, defects) in natures {
+        let mut found = BTreeMap::<&str, Vec<Claim>>::new();
+        for seed in 0..rounds as u64 {
+            for claim in answers(&ideal(100 + seed, 2), defects) {
+                found.entry(claim.name).or_default().push(claim);
+            }
+        }
+        println!("{nature}:");
+        for (name, all) in &found {
+            let changes: Vec<f64> = all.iter().filter_map(|c| c.effect.map(|e| e.change)).collect();
+            let truth = changes.iter().sum::<f64>() / changes.len() as f64;
+            let margin = all[0].margin;
+            let count = |answer: Answer| all.iter().filter(|c| c.answer == answer).count();
+            let is = trend([truth, truth], margin);
+            let right = if is == Some(all[0].expected) { Answer::Supported } else { Answer::Contradicted };
+            let other = if right == Answer::Supported { Answer::Contradicted } else { Answer::Supported };
+            println!(
+                "  {name:<20} true change {truth:+.3}: supported {}, contradicted {}, undecided {}",
+                count(Answer::Supported),
+                count(Answer::Contradicted),
+                count(Answer::Undecided)
+            );
+            if changes.is_empty() {
+                continue;
+            }
+            (said, wrong) = (said + all.len(), wrong + count(other));
+            if truth.abs() < 0.2 * margin || truth.abs() > 2.0 * margin {
+                (owed, decided) = (owed + all.len(), decided + all.len() - count(Answer::Undecided));
+            }
+        }
+    }
+    println!("wrong {wrong} of {said}; decided {decided} of {owed} that are owed");
+    assert!(wrong as f64 <= 0.02 * f64::from(said as u32), "{wrong} of {said}");
+    assert!(decided as f64 >= 0.8 * f64::from(owed as u32), "{decided} of {owed}");
+}
+
+/// What is complete is not made again, a copy of the folder answers the same, another campaign is refused there, and one
+/// session alone decides nothing.
+#[test]
+fn a_campaign_is_taken_up_where_it_was_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let text = campaign::BUNDLED[0]
+        .1
+        .replace("blocks = 3 ", "blocks = 1 ")
+        .replace("replicates = 2 ", "replicates = 1 ");
+    std::fs::write(at("short.toml"), &text).unwrap();
+    let run = |what: &[&str]| {
+        let out = muprime().current_dir(folder.path()).args(what).output().unwrap();
+        (out.status.code(), String::from_utf8(out.stdout).unwrap(), String::from_utf8(out.stderr).unwrap())
+    };
+    let (status, out, _) = run(&["run", "short.toml", "--fast", "--out", "made", "--json"]);
+    assert_eq!(status, Some(0));
+    let last: serde_json::Value = serde_json::from_str(out.lines().last().unwrap()).unwrap();
+    assert_eq!((&last["campaign"]["sessions"], &last["campaign"]["planned"]), (&4.into(), &4.into()));
+    let answer = |claim: &serde_json::Value| claim["answer"].as_str().unwrap().to_string();
+    assert_eq!(answer(&last["campaign"]["claims"][0]), "supported", "{last}");
+    let page = std::fs::read_to_string(at("made/campaign.html")).unwrap();
+
+    // A session that was not completed is made again, and only that one.
+    let sessions: Vec<_> =
+        std::fs::read_dir(at("made/sessions")).unwrap().map(|e| e.unwrap().path()).collect();
+    std::fs::remove_dir_all(&sessions[1]).unwrap();
+    let (status, _, told) = run(&["run", "made", "--fast"]);
+    assert_eq!(status, Some(0), "{told}");
+    assert_eq!(told.matches("session ").count(), 1, "{told}");
+    assert_eq!(
+        std::fs::read_to_string(at("made/campaign.html")).unwrap(),
+        page,
+        "the same seeds, the same page"
+    );
+
+    std::fs::rename(at("made"), at("copied")).unwrap();
+    std::fs::remove_file(at("copied/campaign.html")).unwrap();
+    assert_eq!(run(&["report", "copied"]).0, Some(0));
+    assert_eq!(std::fs::read_to_string(at("copied/campaign.html")).unwrap(), page);
+
+    std::fs::write(at("other.toml"), text.replace("seed = 2", "seed = 3")).unwrap();
+    let (status, _, told) = run(&["run", "other.toml", "--fast", "--out", "copied"]);
+    assert!(status == Some(2) && told.contains("another campaign"), "{told}");
+    let (status, _, told) = run(&["check", "other.toml"]);
+    assert!(status == Some(0) && told.contains("campaign"), "{told}");
+
+    // One session: how sessions differ is not known, so nothing is decided.
+    std::fs::write(at("one.toml"), text.split("[[cell]]").take(2).collect::<Vec<_>>().join("[[cell]]"))
+        .unwrap();
+    let (_, out, _) = run(&["run", "one.toml", "--fast", "--out", "one", "--json"]);
+    let last: serde_json::Value = serde_json::from_str(out.lines().last().unwrap()).unwrap();
+    let all = last["campaign"]["claims"].as_array().unwrap();
+    assert!(all.iter().all(|claim| answer(claim) == "undecided"), "{last}");
+}
+
+/// What a campaign cannot be is refused with its place, and nothing is made.
+#[test]
+fn a_campaign_that_cannot_be_is_refused() {
+    let text = campaign::BUNDLED[0].1;
+    let refused = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        let changed = Campaign::parse("c.toml", &text.replacen(from, to, 1), Path::new("."));
+        format!("{:?}", changed.err().unwrap_or_else(|| panic!("{to} is taken")))
+    };
+    for (from, to, says) in [
+        ("blocks = 3", "blocks = 0", "sessions"),
+        ("margin = 0.02", "margin = 5", "margin"),
+        ("\"silicone-low-friction\"", "\"silicone\"", "two cells"),
+        ("\"silicone-low-friction\"", "\"../out\"", "letters"),
+        ("tip = \"human-index-dry\"", "tip = \"nobody\"", "nobody"),
+        ("plan = \"part2-validation\"", "plan = \"none.toml\"", "none.toml"),
+        ("replicates = 2", "replicates = 0", "replicates"),
+        ("condition = \"moist\"", "conditions = \"moist\"", "conditions"),
+    ] {
+        let told = refused(from, to);
+        assert!(told.contains(says), "{to}: {told}");
+    }
+}
+
+/// The rule, at its edges.
+#[test]
+fn an_interval_across_the_margin_is_undecided() {
+    assert_eq!(trend([-0.2, -0.06], 0.05), Some(Trend::Falls));
+    assert_eq!(trend([-0.2, -0.04], 0.05), None);
+    assert_eq!(trend([-0.04, 0.04], 0.05), Some(Trend::Same));
+    assert_eq!(trend([0.06, 0.1], 0.05), Some(Trend::Rises));
+    assert_eq!(trend([f64::NAN, 0.01], 0.05), None);
+}
