@@ -46,9 +46,9 @@ fn answers(campaign: &Campaign, defects: &str) -> Vec<Claim> {
     claims(&made, file.margin)
 }
 
-/// Every statement on three natures of the virtual rig, beside the change that the mean of all campaigns of a nature shows: an
-/// answer is wrong where the true change lies beyond the margin on another side, and it is owed where the true change is nil or
-/// twice the margin.
+/// Every statement on three natures of the virtual rig, beside the change that the mean of all campaigns of a
+/// nature shows: an answer is wrong where the true change lies beyond the margin on another side, and it is
+/// owed where the true change is nil or twice the margin.
 #[test]
 fn answers_are_right_on_three_natures() {
     let natures = [
@@ -97,8 +97,8 @@ fn answers_are_right_on_three_natures() {
     assert!(decided as f64 >= 0.8 * f64::from(owed as u32), "{decided} of {owed}");
 }
 
-/// What is complete is not made again, a copy of the folder answers the same, another campaign is refused there, and one
-/// session alone decides nothing.
+/// What is complete is not made again, a copy of the folder answers the same, another campaign is refused
+/// there, and one session alone decides nothing.
 #[test]
 fn a_campaign_is_taken_up_where_it_was_left() {
     let folder = tempfile::tempdir().unwrap();

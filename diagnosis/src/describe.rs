@@ -1,5 +1,5 @@
-//! What an unknown departure looks like: a jump, a bump or a period, with its place, size and odds; and which causes are sure
-//! though others act beside them, or take turns with them in the list.
+//! What an unknown departure looks like: a jump, a bump or a period, with its place, size and odds; and which
+//! causes are sure though others act beside them, or take turns with them in the list.
 
 use crate::decision::{Decision, Verdict};
 use crate::fitted::Fitted;
@@ -79,7 +79,8 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
     seen.take_while(|d| d.log10_odds_vs_no_gap > LEAST_ODDS).take(MOST).collect()
 }
 
-/// Causes that are sure though the verdict is open: those of which the hypotheses together have the probability of a name.
+/// Causes that are sure though the verdict is open: those of which the hypotheses together have the
+/// probability of a name.
 pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
     if !matches!(decision.verdict, Verdict::Ambiguous | Verdict::Unknown) {
         return Vec::new();

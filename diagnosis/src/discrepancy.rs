@@ -1,7 +1,7 @@
 //! The open set: what any smooth departure from the baseline would look like, whatever its cause.
 //!
-//! `y = baseline + friction-like part + direction-odd part + white excess + noise`, each part Gaussian with its
-//! scale on a fixed grid, so that no scale is fitted. Its evidence is what a named effect has to beat.
+//! `y = baseline + friction-like part + direction-odd part + white excess + noise`, each part Gaussian with
+//! its scale on a fixed grid, so that no scale is fitted. Its evidence is what a named effect has to beat.
 
 use crate::constants::Constants;
 use crate::data::Table;
@@ -13,10 +13,11 @@ use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// The smoothnesses that are tried: rough; as smooth as the form uncertainty of an effect, so that the open set can follow
-/// what that can; smoother yet, so that a cause that bends little is as cheap as an effect that imitates it; a spot of the
-/// plate, alike at all conditions; two that go with temperature and humidity, where these change by themselves; and each
-/// covariate alone: a law of the load is cheap there, and dear where it might bend with all others too.
+/// The smoothnesses that are tried: rough; as smooth as the form uncertainty of an effect, so that the open
+/// set can follow what that can; smoother yet, so that a cause that bends little is as cheap as an effect
+/// that imitates it; a spot of the plate, alike at all conditions; two that go with temperature and humidity,
+/// where these change by themselves; and each covariate alone: a law of the load is cheap there, and dear
+/// where it might bend with all others too.
 pub fn lengths(k: &Constants, table: &Table) -> Vec<Lengths> {
     let all = (0..k.discrepancy_lengths.len()).map(|i| Lengths {
         condition: k.discrepancy_lengths[i],
@@ -131,8 +132,8 @@ impl Linear {
 }
 
 impl Discrepancy {
-    /// Fits the discrepancy about the baseline at `center` (nuisance coordinates): the best of some smoothnesses (of
-    /// [`lengths`], unless only a level is wanted), with the evidence of their mean.
+    /// Fits the discrepancy about the baseline at `center` (nuisance coordinates): the best of some
+    /// smoothnesses (of [`lengths`], unless only a level is wanted), with the evidence of their mean.
     pub fn fit(table: &Table, problem: &Problem, center: &[f64], lengths: &[Lengths]) -> Self {
         let all: Vec<Self> =
             lengths.par_iter().map(|l| Self::with_lengths(table, problem, center, *l)).collect();
@@ -212,8 +213,8 @@ impl Discrepancy {
         }
     }
 
-    /// Expected lateral forces at other conditions (N), the rows of the smooth part there, and the sizes on which a
-    /// departure is measured (N).
+    /// Expected lateral forces at other conditions (N), the rows of the smooth part there, and the sizes on
+    /// which a departure is measured (N).
     fn expected(&self, problem: &Problem, passes: &[Condition]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
         let parts = (self.friction, self.odd);
         let kernel = (&self.kernel, &self.lengths);
@@ -223,8 +224,8 @@ impl Discrepancy {
         (baseline - shift + &phi * &self.weights, phi, sizes)
     }
 
-    /// Predicted lateral forces at other conditions, their covariance without scatter, and the variance of the white
-    /// excess there (N, N^2, N^2).
+    /// Predicted lateral forces at other conditions, their covariance without scatter, and the variance of
+    /// the white excess there (N, N^2, N^2).
     pub fn belief(&self, problem: &Problem, passes: &[Condition]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
         let (mean, phi, sizes) = self.expected(problem, passes);
         let white = sizes.iter().map(|s| (self.white * s).powi(2)).collect();

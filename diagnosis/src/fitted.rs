@@ -81,7 +81,8 @@ pub struct Fitted {
     pub discrepancy: Discrepancy,
     /// Causes of known form that the library does not name, best first: part of the open set.
     pub unlisted: Vec<Candidate>,
-    /// The strongest structure in what the recalibrated baseline leaves; none where no gap is out of the question.
+    /// The strongest structure in what the recalibrated baseline leaves; none where no gap is out of the
+    /// question.
     pub structure: Option<Structure>,
     /// Jumps, bumps and periods beside the recalibrated baseline, strongest first.
     pub shapes: Vec<Shape>,
@@ -106,8 +107,8 @@ pub struct Fitted {
 impl Fitted {
     /// Gives every hypothesis its probability, and sorts the causes by it.
     ///
-    /// Differences of log evidence count by the part 1 / `temper`: no law, no departure from it and no scatter is exactly
-    /// that of the rig, and as often as the evidence is taken at its word it is too sure.
+    /// Differences of log evidence count by the part 1 / `temper`: no law, no departure from it and no
+    /// scatter is exactly that of the rig, and as often as the evidence is taken at its word it is too sure.
     pub fn weigh(&mut self) {
         let k = self.problem.constants.clone();
         let [none, smooth] = self.evidence;
@@ -148,8 +149,8 @@ impl Fitted {
         own.chain(self.evidence).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Variances of single passes at conditions of a problem, given the level of friction there, N^2: of runs whose shift is
-    /// not known.
+    /// Variances of single passes at conditions of a problem, given the level of friction there, N^2: of runs
+    /// whose shift is not known.
     pub fn scatter_of_a_pass(&self, at: &Problem, rig: &RigFile, center: &[f64], level: &[f64]) -> Vec<f64> {
         let run = self.scatter.run_relative_sd.unwrap_or(0.0);
         let own = variance(at, rig, center, level, self.pure.used);
@@ -161,9 +162,10 @@ impl Fitted {
 
 /// Logarithm of the share of a hypothesis' weight that speaks for a gap which the table can tell.
 ///
-/// Causes have sizes from nothing upwards. Those too small to tell fit as well as no gap does, and give a cause at most the
-/// evidence of no gap; that part of its weight says that there is nothing to be seen, and counts for no gap. Without, tables
-/// without a gap were given 0.75 to 0.93 for none where that was right in 99 of 100.
+/// Causes have sizes from nothing upwards. Those too small to tell fit as well as no gap does, and give a
+/// cause at most the evidence of no gap; that part of its weight says that there is nothing to be seen, and
+/// counts for no gap. Without, tables without a gap were given 0.75 to 0.93 for none where that was right in
+/// 99 of 100.
 fn log_shown_share(evidence: f64, none: f64) -> f64 {
     let behind = none - evidence;
     // The logarithm of one and an exponential, which must not overflow.

@@ -6,7 +6,8 @@ use models::condition::Condition;
 use models::covariate::{Role, SMOOTH};
 use nalgebra::{DMatrix, DVector};
 
-/// Which covariates a kernel sees, each kind with its length in standard deviations; an infinite one leaves it out.
+/// Which covariates a kernel sees, each kind with its length in standard deviations; an infinite one leaves
+/// it out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lengths {
     /// Settings: amplitude, frequency, speed, load, pressure.
@@ -35,7 +36,8 @@ impl Lengths {
     }
 }
 
-/// Lengths of the form uncertainty in standard deviations of each covariate; a form does not depend on the place.
+/// Lengths of the form uncertainty in standard deviations of each covariate; a form does not depend on the
+/// place.
 pub fn form_lengths(k: &Constants) -> Lengths {
     let far = f64::INFINITY;
     Lengths { condition: k.form_length, time: k.form_length, position: far, climate: far, only: None }
@@ -53,7 +55,8 @@ pub struct Coordinates {
 const EDGE_SD: f64 = 4.0;
 /// Number of covariates.
 const COUNT: usize = SMOOTH.len();
-/// Temperature or humidity of which time explains more than this share of the deviation is time by another name.
+/// Temperature or humidity of which time explains more than this share of the deviation is time by another
+/// name.
 const OF_ITS_OWN: f64 = 0.5;
 
 impl Coordinates {
@@ -90,7 +93,8 @@ impl Coordinates {
         (0..COUNT).filter(|&k| self.sd[k] > 1e-12 && SMOOTH[k].role == Role::Setting)
     }
 
-    /// Standardised covariates divided by the lengths. What a condition does not say is taken as the table's mean.
+    /// Standardised covariates divided by the lengths. What a condition does not say is taken as the table's
+    /// mean.
     pub fn place(&self, p: &Condition, largest_amplitude: f64, lengths: &Lengths) -> [f64; COUNT] {
         std::array::from_fn(|k| {
             let c = SMOOTH[k];

@@ -1,15 +1,17 @@
-//! Shifts of runs that the table has, and what lasts within them: a further pass of such a run lies where its run does, and
-//! near where its neighbours do.
+//! Shifts of runs that the table has, and what lasts within them: a further pass of such a run lies where its
+//! run does, and near where its neighbours do.
 
 use crate::data::Table;
 use crate::fitted::Fitted;
 use crate::predict::Forecast;
 use nalgebra::{DMatrix, DVector};
 
-/// Adds to forecasts in known runs how far the passes about them lie from the model, and takes that spread out of them.
+/// Adds to forecasts in known runs how far the passes about them lie from the model, and takes that spread
+/// out of them.
 ///
-/// `fitted_passes` are the forecasts of the table's own passes. Given the model's mean, what passes have in common is
-/// Gaussian with the prior that was estimated. Its slow columns are read between the passes before and after, in time.
+/// `fitted_passes` are the forecasts of the table's own passes. Given the model's mean, what passes have in
+/// common is Gaussian with the prior that was estimated. Its slow columns are read between the passes before
+/// and after, in time.
 pub fn shifted(
     fitted: &Fitted,
     table: &Table,
@@ -48,7 +50,8 @@ pub fn shifted(
     }
 }
 
-/// The passes of a run before and after a time, and how far between them it lies; `None` of a run that the table lacks.
+/// The passes of a run before and after a time, and how far between them it lies; `None` of a run that the
+/// table lacks.
 fn neighbours(table: &Table, run: usize, time_s: f64) -> Option<(usize, usize, f64)> {
     let own = || (0..table.len()).filter(|i| table.runs[*i] == run);
     let time = |i: usize| table.passes[i].time_s;

@@ -112,7 +112,8 @@ pub struct Session {
     pub folder: PathBuf,
 }
 
-/// The text of a campaign and the folder that its paths are relative to; `None` where the name is that of a plan.
+/// The text of a campaign and the folder that its paths are relative to; `None` where the name is that of a
+/// plan.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -228,7 +229,8 @@ impl Cell {
     }
 }
 
-/// A TOML text with values of its own in one of its tables; a text that is none stays as it is, to be refused by its reader.
+/// A TOML text with values of its own in one of its tables; a text that is none stays as it is, to be refused
+/// by its reader.
 fn edited(
     text: &str,
     table: &[&str],

@@ -1,9 +1,10 @@
-//! Whether values at passes cluster somewhere in the operating space: a permutation test over cells of each covariate and of
-//! each two.
+//! Whether values at passes cluster somewhere in the operating space: a permutation test over cells of each
+//! covariate and of each two.
 //!
-//! Scatter falls anywhere. A departure that no smooth surface follows (an edge, a spot, a step, the lightest load with the
-//! plate still) does not: it has a mean of its own in some cell. The strongest of all covariates is held against the same of
-//! passes that are shuffled and turned either way, so the level is that of the whole family.
+//! Scatter falls anywhere. A departure that no smooth surface follows (an edge, a spot, a step, the lightest
+//! load with the plate still) does not: it has a mean of its own in some cell. The strongest of all
+//! covariates is held against the same of passes that are shuffled and turned either way, so the level is
+//! that of the whole family.
 
 use crate::draws::split_mix;
 use crate::fit::Problem;
@@ -12,7 +13,8 @@ use models::covariate::{Role, TOLD};
 /// Shuffles against which a table is held; fewer for long ones.
 const SHUFFLES: usize = 400;
 const MOST_WORK: usize = 400_000;
-/// Levels of a covariate are parted by gaps of so many deviations; if there are more levels than these, by quantiles.
+/// Levels of a covariate are parted by gaps of so many deviations; if there are more levels than these, by
+/// quantiles.
 const GAP: f64 = 0.12;
 const MOST_LEVELS: usize = 10;
 const QUANTILES: usize = 6;
@@ -37,7 +39,8 @@ impl Cells {
         Cells { name, of, counts }
     }
 
-    /// Squared sums of values over cells, small cells counting for less: the score of a mean of its own in each cell.
+    /// Squared sums of values over cells, small cells counting for less: the score of a mean of its own in
+    /// each cell.
     fn score(&self, values: impl Iterator<Item = f64>, sums: &mut Vec<f64>) -> f64 {
         sums.clear();
         sums.resize(self.counts.len(), 0.0);
@@ -141,7 +144,8 @@ pub fn shuffled(n: usize, mut score: impl FnMut(&[usize], &[f64]) -> Vec<f64>) -
         .collect()
 }
 
-/// The largest score of each row in deviations of its test among the shuffles, and which test that is in the first row.
+/// The largest score of each row in deviations of its test among the shuffles, and which test that is in the
+/// first row.
 pub fn strongest(scores: &[Vec<f64>]) -> (Vec<f64>, usize) {
     let centre: Vec<(f64, f64)> = (0..scores[0].len())
         .map(|t| moments(&scores[1..].iter().map(|row| row[t]).collect::<Vec<_>>()))
@@ -169,7 +173,8 @@ fn scaled(values: &[f64], centre: f64) -> Option<Vec<f64>> {
     (rms > 1e-12 * centre.abs().max(1e-12)).then(|| values.iter().map(|v| (v - centre) / rms).collect())
 }
 
-/// Level of each value: parted by gaps where there are few, else by quantiles; `None` of a covariate that does not vary.
+/// Level of each value: parted by gaps where there are few, else by quantiles; `None` of a covariate that
+/// does not vary.
 fn levels(values: &[f64], least_spread: f64) -> Option<Vec<usize>> {
     let z = scaled(values, mean(values))?;
     let spread = |list: &[f64]| {

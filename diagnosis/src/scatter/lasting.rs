@@ -1,8 +1,9 @@
 //! Scatter that lasts beyond what is stated: an autoregression in the order of measurement, by its slow part.
 //!
-//! Independent passes would let it look like a drift: at a correlation of 0.7 its slow part has nearly six times the power of
-//! independent scatter. Only that part matters, so the slowest cosines have columns of their own, with the power of the
-//! autoregression, and the rest counts as independent. The work stays linear in the number of passes.
+//! Independent passes would let it look like a drift: at a correlation of 0.7 its slow part has nearly six
+//! times the power of independent scatter. Only that part matters, so the slowest cosines have columns of
+//! their own, with the power of the autoregression, and the rest counts as independent. The work stays linear
+//! in the number of passes.
 
 use crate::constants::Constants;
 use crate::data::Table;
@@ -25,8 +26,8 @@ pub struct Bounds {
     pub correlation: usize,
 }
 
-/// What lasts has to pass within a run: what wanders for longer, as in running in, is a drift and no scatter. Short runs
-/// cannot tell the two apart, so there is none.
+/// What lasts has to pass within a run: what wanders for longer, as in running in, is a drift and no scatter.
+/// Short runs cannot tell the two apart, so there is none.
 pub fn bounds(k: &Constants, table: &Table) -> Bounds {
     let mut lengths = vec![0usize; table.run_count.max(1)];
     table.runs.iter().for_each(|&run| lengths[run] += 1);
@@ -66,7 +67,8 @@ mod tests {
     use super::*;
     use crate::example::{Deviates, table};
 
-    /// The variance of the mean of all passes is that of an autoregression: `(1 + rho) / (1 - rho)` of independent ones.
+    /// The variance of the mean of all passes is that of an autoregression: `(1 + rho) / (1 - rho)` of
+    /// independent ones.
     #[test]
     fn the_columns_have_the_power_of_an_autoregression() {
         let small = table(&mut Deviates(6), 0.0);

@@ -1,9 +1,9 @@
 //! Scatter that lasts from pass to pass: its correlation, and its slow part as columns.
 //!
-//! The scatter is a first-order autoregression in the order of measurement. Independent passes would let its slow part look
-//! like a drift: at correlation 0.7 it has nearly six times the power of independent scatter. Only that part matters, so
-//! the slowest cosines have columns of their own (their power is the autoregression's), and the rest counts as
-//! independent. The work stays linear in the number of passes.
+//! The scatter is a first-order autoregression in the order of measurement. Independent passes would let its
+//! slow part look like a drift: at correlation 0.7 it has nearly six times the power of independent scatter.
+//! Only that part matters, so the slowest cosines have columns of their own (their power is the
+//! autoregression's), and the rest counts as independent. The work stays linear in the number of passes.
 
 use crate::constants::Constants;
 use crate::data::Table;
@@ -23,11 +23,12 @@ fn order(table: &Table) -> Vec<usize> {
     rows
 }
 
-/// Correlation of the scatter of neighbours, from residuals in deviations of a pass; zero unless it is probable.
+/// Correlation of the scatter of neighbours, from residuals in deviations of a pass; zero unless it is
+/// probable.
 ///
-/// Mean squared differences over one and two passes are `2 (1 - rho)` and `2 (1 - rho^2)` of the variance: their ratio less
-/// one is the correlation, whatever drifts slowly beside it. Its deviation for independent passes is the root of
-/// 2 / n. A priori the correlation is zero with probability one half.
+/// Mean squared differences over one and two passes are `2 (1 - rho)` and `2 (1 - rho^2)` of the variance:
+/// their ratio less one is the correlation, whatever drifts slowly beside it. Its deviation for independent
+/// passes is the root of 2 / n. A priori the correlation is zero with probability one half.
 pub fn correlation(k: &Constants, table: &Table, residual: &[f64]) -> f64 {
     let rows = order(table);
     let apart = |lag: usize| {
@@ -80,7 +81,8 @@ mod tests {
     use super::*;
     use crate::example::{Deviates, rig, table};
 
-    /// A slow drift is no correlation of the scatter; a correlation is found beside it; independent scatter has none.
+    /// A slow drift is no correlation of the scatter; a correlation is found beside it; independent scatter
+    /// has none.
     #[test]
     fn a_drift_is_no_correlation() {
         let k = Constants::default();
@@ -104,8 +106,8 @@ mod tests {
         assert!((found - 0.7).abs() < 0.2, "{found}");
     }
 
-    /// Independent part and columns together have the variance of a pass, and what a run of passes has in common is more than
-    /// independent scatter leaves, as an autoregression has it.
+    /// Independent part and columns together have the variance of a pass, and what a run of passes has in
+    /// common is more than independent scatter leaves, as an autoregression has it.
     #[test]
     fn the_columns_have_the_power_of_an_autoregression() {
         let small = table(&mut Deviates(6), 0.0);

@@ -133,7 +133,8 @@ impl Surface {
         }
     }
 
-    /// Columns (those of runs and of what lasts come last) and residual in weighted deviations of a pass as stated, with the logarithms of those.
+    /// Columns (those of runs and of what lasts come last) and residual in weighted deviations of a pass as
+    /// stated, with the logarithms of those.
     fn whitened(&self, variance: &[f64], weight: &[f64], level: &[f64]) -> Whitened {
         let n = variance.len();
         let root = DVector::from_fn(n, |i, _| (weight[i] / variance[i]).sqrt());
@@ -176,8 +177,8 @@ impl Surface {
         s.log_prior(k) - 0.5 * (chi2 + parts.log_det) - n * scale.ln()
     }
 
-    /// Climbs the marginal likelihood, prior included, from a state, a step of one scale at a time; its logarithm is up to what
-    /// all states share.
+    /// Climbs the marginal likelihood, prior included, from a state, a step of one scale at a time; its
+    /// logarithm is up to what all states share.
     pub fn climbed(
         &self,
         k: &Constants,
@@ -273,7 +274,8 @@ impl Surface {
             level: surface.as_slice().to_vec(),
         };
         for i in 0..n {
-            // In whitened units C = I + Phi Phi': the left-out residual is [C^-1 z]_i / [C^-1]_ii, its variance 1 / [C^-1]_ii.
+            // In whitened units C = I + Phi Phi': the left-out residual is [C^-1 z]_i / [C^-1]_ii, its
+            // variance 1 / [C^-1]_ii.
             let diagonal = (1.0 - leverage[i]).max(1e-9);
             let beside = (w.z[i] - explained[i]) / scale;
             let missed = beside / diagonal;

@@ -32,18 +32,19 @@ pub fn responsibilities(k: &Constants, left_out: &[f64]) -> Vec<f64> {
     outside
 }
 
-/// Weight that is left to each pass. What surely does not belong keeps the variance of its own residual: it must not vanish
-/// from the determinant.
+/// Weight that is left to each pass. What surely does not belong keeps the variance of its own residual: it
+/// must not vanish from the determinant.
 pub fn weights(k: &Constants, outside: &[f64], left_out: &[f64]) -> Vec<f64> {
     let own = |d: &f64| 1.0 / d.abs().max(k.outside_width).powi(2);
     outside.iter().zip(left_out).map(|(o, d)| (1.0 - o + o * own(d)).min(1.0)).collect()
 }
 
-/// Takes back passes that stand out together, which makes them a departure and no bad passes, and says where they lie; `None`
-/// where none do.
+/// Takes back passes that stand out together, which makes them a departure and no bad passes, and says where
+/// they lie; `None` where none do.
 ///
-/// Bad passes fall anywhere, and either way. `outside` is the probability of each to be one, `left_out` how far it is off. Where
-/// such passes cluster, those of the cell that does most are taken back, until the others fall anywhere.
+/// Bad passes fall anywhere, and either way. `outside` is the probability of each to be one, `left_out` how
+/// far it is off. Where such passes cluster, those of the cell that does most are taken back, until the
+/// others fall anywhere.
 pub fn take_back(problem: &Problem, space: &Space, outside: &mut [f64], left_out: &[f64]) -> Option<String> {
     let k = &problem.constants;
     let n = outside.len();

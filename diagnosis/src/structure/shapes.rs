@@ -1,8 +1,9 @@
 //! Departures of a known shape, each by its own evidence: a jump, a bump or a period over one covariate.
 //!
-//! `y = baseline + A h + scatter`, h the shape at one place, width or period, A ~ N(0, s^2) with s on a grid, the nuisances linear.
-//! The integral is exact, and the evidence of a shape is its mean over places. It acts on friction (turning with the direction)
-//! or on the sensor. Scatter that lasts can take up any of them, so each is also tried where independent scatter is all there is.
+//! `y = baseline + A h + scatter`, h the shape at one place, width or period, A ~ N(0, s^2) with s on a grid,
+//! the nuisances linear. The integral is exact, and the evidence of a shape is its mean over places. It acts
+//! on friction (turning with the direction) or on the sensor. Scatter that lasts can take up any of them, so
+//! each is also tried where independent scatter is all there is.
 
 use crate::evidence::Posterior;
 use crate::fit::Problem;
@@ -73,7 +74,8 @@ struct Family {
     unit: f64,
 }
 
-/// Scatter under which shapes are tried: its covariance, and log evidence of no gap under it beside that as settled.
+/// Scatter under which shapes are tried: its covariance, and log evidence of no gap under it beside that as
+/// settled.
 struct Ground {
     covariance: Covariance,
     nats: f64,
@@ -126,7 +128,8 @@ fn grounds(
     list
 }
 
-/// Log Bayes factor of one column, by its score b and information q, averaged over sizes; with the mean and deviation of its weight.
+/// Log Bayes factor of one column, by its score b and information q, averaged over sizes; with the mean and
+/// deviation of its weight.
 fn factor(b: f64, q: f64) -> (f64, f64, f64) {
     let each = SIZES.map(|s| {
         let grown = 1.0 + s * s * q;

@@ -1,8 +1,8 @@
 //! What the paper states, each answered from a campaign.
 //!
-//! The rule is one for all: the 95 % interval of the change of mu' lies beyond the margin (it falls, it rises), within the
-//! margin (it does not matter), or across it (undecided). A statement is supported or contradicted by that, never by a
-//! difference that is merely not significant.
+//! The rule is one for all: the 95 % interval of the change of mu' lies beyond the margin (it falls, it
+//! rises), within the margin (it does not matter), or across it (undecided). A statement is supported or
+//! contradicted by that, never by a difference that is merely not significant.
 
 use super::measured::{Effect, Measured, contrast, ends, mean};
 use crate::fingertip::Kind;
@@ -55,7 +55,8 @@ pub struct Claim {
     pub margin: f64,
     /// The answer.
     pub answer: Answer,
-    /// Least change that would have been decided: the margin and half of the interval. `None` without an effect.
+    /// Least change that would have been decided: the margin and half of the interval. `None` without an
+    /// effect.
     pub visible: Option<f64>,
 }
 

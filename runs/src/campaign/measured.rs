@@ -1,8 +1,8 @@
 //! What a campaign's sessions measured, and effects of one factor in them.
 //!
-//! A session is the unit of evidence: passes of one session share its tip, its day and its mu_0. An effect is computed in
-//! each session by itself, as a difference between the ends of a factor's range at otherwise equal settings, and its
-//! interval is Student's over sessions.
+//! A session is the unit of evidence: passes of one session share its tip, its day and its mu_0. An effect is
+//! computed in each session by itself, as a difference between the ends of a factor's range at otherwise
+//! equal settings, and its interval is Student's over sessions.
 
 use super::Session;
 use crate::fingertip::Kind;
@@ -93,7 +93,8 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// A value with its standard error on so many degrees of freedom, and a standard uncertainty that all sessions share.
+    /// A value with its standard error on so many degrees of freedom, and a standard uncertainty that all
+    /// sessions share.
     pub fn new(change: f64, error: f64, freedom: f64, shared: f64, sessions: usize) -> Option<Self> {
         let t = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(0.975);
         let half = (t * error).hypot(1.96 * shared);
@@ -119,8 +120,8 @@ impl Effect {
         Effect::new(ma - mb, (va + vb).sqrt(), freedom.clamp(1.0, 1e6), 0.0, a.len() + b.len())
     }
 
-    /// Change over the range of `x` by a straight line through one point a session, others of its covariates held; `None`
-    /// with too few sessions, or where `x` and another change together.
+    /// Change over the range of `x` by a straight line through one point a session, others of its covariates
+    /// held; `None` with too few sessions, or where `x` and another change together.
     pub fn slope(x: &[f64], y: &[f64], other: Option<&[f64]>) -> Option<Self> {
         let one: Vec<f64> = vec![1.0; x.len()];
         let centred = |v: &[f64]| without(v, &one);
@@ -183,8 +184,9 @@ pub fn groups(factor: &Covariate, driven: &[Driven]) -> BTreeMap<Vec<usize>, BTr
     groups
 }
 
-/// Change of mu' from the lowest to the highest level of a factor in a session, at equal settings of the others, and those
-/// levels; only settings over nearly the widest range count. `None` where nothing varies it.
+/// Change of mu' from the lowest to the highest level of a factor in a session, at equal settings of the
+/// others, and those levels; only settings over nearly the widest range count. `None` where nothing varies
+/// it.
 pub fn contrast(factor: &Covariate, driven: &[Driven]) -> Option<(f64, [f64; 2])> {
     let of_group = |levels: &BTreeMap<usize, Vec<Driven>>| {
         let (first, last) = (levels.first_key_value()?, levels.last_key_value()?);

@@ -138,7 +138,8 @@ fn of_cell(made: &[Measured], cell: usize) -> impl Iterator<Item = &Measured> {
     made.iter().filter(move |s| s.session.cell == cell)
 }
 
-/// Relative friction against a factor at the settings that have most levels of it; nothing where no session varies it.
+/// Relative friction against a factor at the settings that have most levels of it; nothing where no session
+/// varies it.
 fn figure(file: &CampaignFile, made: &[Measured], factor: &'static Covariate) -> miette::Result<String> {
     let all: Vec<Driven> = made.iter().flat_map(|s| s.driven.iter().copied()).collect();
     let found = groups(factor, &all);

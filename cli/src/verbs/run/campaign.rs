@@ -13,7 +13,8 @@ use std::process::ExitCode;
 /// The page of a campaign, in its folder.
 pub const PAGE: &str = "campaign.html";
 
-/// Measures what is missing. On a virtual rig every session; on a rig with instruments one, since a person changes the tip.
+/// Measures what is missing. On a virtual rig every session; on a rig with instruments one, since a person
+/// changes the tip.
 ///
 /// # Errors
 /// A refusal, before anything was measured: any session that a setup cannot do among them.
@@ -82,7 +83,8 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
     crate::verbs::exit(if whole { crate::verbs::DONE } else { crate::verbs::FAILED })
 }
 
-/// Writes the page of a campaign's folder, and its answers as JSON beside it; gives the answers and the sessions they rest on.
+/// Writes the page of a campaign's folder, and its answers as JSON beside it; gives the answers and the
+/// sessions they rest on.
 ///
 /// # Errors
 /// A folder that holds no campaign, or cannot be written.
