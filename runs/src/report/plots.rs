@@ -269,6 +269,20 @@ fn band(
     Ok(())
 }
 
+/// The axis of `mu'` over measured values: a mark is drawn where it was measured, but for a few that would flatten all others.
+pub(crate) fn mu_axis(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let [low, high] = values.fold([0.0f64, 1.1], |[low, high], v| [low.min(1.05 * v), high.max(1.05 * v)]);
+    [low.max(-0.5), high.min(2.2)]
+}
+
+/// What a caption says where a value lies beyond the ends of an axis.
+pub(crate) fn beyond(mut values: impl Iterator<Item = f64>, [low, high]: [f64; 2]) -> &'static str {
+    match values.any(|v| v < low || v > high) {
+        true => " Marks beyond the axis are drawn at its end.",
+        false => "",
+    }
+}
+
 /// A mark with its error bar, cut at the ends of the axis.
 fn measured(
     chart: &mut Chart<'_>,
@@ -322,4 +336,16 @@ pub fn mark_name(series: usize) -> &'static str {
         "hollow diamonds",
     ];
     NAMES[series.min(SERIES - 1)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mark_is_where_it_was_measured_or_the_caption_says_that_it_is_not() {
+        let said = |values: &[f64]| beyond(values.iter().copied(), mu_axis(values.iter().copied()));
+        assert_eq!(said(&[-0.1, 0.4, 1.4]), "");
+        assert!(said(&[0.4, 9.0]).contains("beyond the axis"));
+    }
 }
