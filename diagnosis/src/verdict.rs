@@ -220,9 +220,13 @@ fn label(fitted: &Fitted, candidate: usize) -> String {
     fitted.candidates[candidate].names().join("+")
 }
 
-/// A probability as it can be read: certainty is not claimed.
+/// A probability as it can be read: neither certainty nor impossibility is claimed.
 pub fn probability(p: f64) -> String {
-    if p > 0.999 { "> 0.999".into() } else { format!("{p:.3}") }
+    match p {
+        p if p > 0.999 => "> 0.999".into(),
+        p if p < 0.001 => "< 0.001".into(),
+        p => format!("{p:.3}"),
+    }
 }
 
 fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {

@@ -6,6 +6,7 @@
 
 use crate::report::RunData;
 use crate::report::human::p_value;
+use crate::report::levels;
 use models::pass::Pass;
 use models::quantity::PeakToPeak;
 use models::rig_file::PassNoise;
@@ -23,7 +24,7 @@ pub const LEVEL: f64 = 0.05;
 /// Conditions in common below which nothing is said about agreement.
 pub const ENOUGH_CONDITIONS: usize = 5;
 /// Relative distances within which two passes have the same condition: amplitude, frequency, speed, load.
-const SAME: [f64; 4] = [0.03, 0.01, 0.03, 0.10];
+const SAME: [f64; 4] = [0.03, levels::FREQUENCY, levels::SPEED, levels::FORCE];
 
 /// `mu_0` of a run with its relative standard uncertainty from the scatter of its passes without vibration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

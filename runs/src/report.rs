@@ -7,6 +7,7 @@ pub mod events;
 mod explore;
 pub mod html;
 pub mod human;
+pub(crate) mod levels;
 mod page;
 pub mod plots;
 mod traces;

@@ -138,13 +138,18 @@ pub fn terminal(result: &Diagnosis) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::plan;
+    use super::{plan, probability};
     use crate::plan::{Plan, Resolution};
     use diagnosis::next::Experiment;
     use models::condition::Condition;
     use models::quantity::{Direction, PeakToPeak};
     use realtime::ports::Nanos;
     use realtime::safety::Limits;
+
+    #[test]
+    fn neither_certainty_nor_impossibility_is_claimed() {
+        assert_eq!([0.0, 0.5, 1.0].map(probability), ["< 0.001", "0.500", "> 0.999"]);
+    }
 
     #[test]
     fn a_saved_plan_asks_for_the_designed_passes() {

@@ -41,11 +41,11 @@ pub fn page(compared: &Compared) -> miette::Result<String> {
         }
     }
     if !compared.warnings.is_empty() {
-        let _ = write!(w, "<h2>Mind</h2>{}", list(&compared.warnings, ""));
+        let _ = write!(w, "<h2>Caution</h2>{}", list(&compared.warnings, ""));
     }
     let [left, right] = result.unpaired;
     if left + right > 0 {
-        w.push_str(&note(&format!("Passes at conditions that the other run lacks: {left} of the first, {right} of the second. They take no part.")));
+        w.push_str(&note(&format!("Passes at conditions that the other run lacks: {left} of the first, {right} of the second. They are left out.")));
     }
     if conditions > 0 {
         let _ = write!(
@@ -74,13 +74,11 @@ fn about(compared: &Compared, a: &str, b: &str) -> String {
     let rows: String = names
         .into_iter()
         .map(|name| {
-            let sides = [all(first, name), all(second, name)];
-            format!(
-                "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td></tr>\n",
-                escape(name),
-                sides[0],
-                sides[1]
-            )
+            let cells = match (all(first, name), all(second, name)) {
+                (a, b) if a == b => format!("<td colspan=\"2\">{a}</td>"),
+                (a, b) => format!("<td>{a}</td><td>{b}</td>"),
+            };
+            format!("<tr><th scope=\"row\">{}</th>{cells}</tr>\n", escape(name))
         })
         .collect();
     let head =
@@ -132,7 +130,7 @@ fn pairs(result: &Comparison) -> String {
 
 fn differences(compared: &Compared) -> String {
     if compared.differences.is_empty() {
-        return "<h2>What differed</h2><p>Nothing that the records tell.</p>".into();
+        return "<h2>What differed</h2><p>Nothing that the records hold.</p>".into();
     }
     let value = |v: &Option<String>| escape(v.as_deref().unwrap_or("none"));
     let rows: String = compared

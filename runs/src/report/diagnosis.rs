@@ -8,9 +8,11 @@ mod overlay;
 
 use super::html::{bar, escape, glossary, head, list, note, shell, table};
 use super::human::number;
+use super::plots::beyond;
 use super::plots::verdict::{Seen, errors_against};
 use diagnosis::Verdict;
 use diagnosis::data::Table;
+use diagnosis::left_out::Errors;
 use diagnosis::predict::Forecast;
 use diagnosis::verdict::{Diagnosis, probability};
 use models::covariate;
@@ -124,18 +126,18 @@ fn location(result: &Diagnosis, table: &Table, errors: &[(f64, f64)]) -> String 
         .filter(|(_, p)| **p >= 0.005)
         .map(|(place, p)| format!("{place} {}", probability(*p)))
         .collect();
-    let closed: Vec<String> = r
-        .left_out
-        .regions
-        .iter()
-        .map(|(name, closed)| match closed {
-            Some(c) => format!("{name}: {:.0} % of the gap closed", 100.0 * c),
-            None => format!("{name}: no gap there, or nothing that judges"),
-        })
-        .collect();
+    // Errors with their passes: a share of the gap would be without an interval.
+    let left = |e: &Errors| {
+        let [before, after] = [e.recalibrated, e.after].map(|square| number(square.sqrt()));
+        format!("{before} by the recalibrated baseline, {after} by the model ({} passes)", e.passes)
+    };
+    let closed = result.decision.regions.iter().map(|region| match region.errors.closed() {
+        Some(_) if region.judges => format!("{}: {}", region.name, left(&region.errors)),
+        _ => format!("{}: no gap there, or nothing that judges", region.name),
+    });
     format!(
         "<h2>Where the gap lies</h2>{}{}{more}<p>In which part of the rig, by probability: {}.</p>\
-         <details><summary>The model on regions that were left out of its fit</summary>{}</details>",
+         <details><summary>Errors in regions that were left out of the fit, in standard deviations of a pass</summary>{}</details>",
         gap_map::section(table, errors),
         list(told, "No part stands out."),
         escape(&places.join(", ")),
@@ -154,11 +156,11 @@ fn uncertain(result: &Diagnosis) -> String {
             .iter()
             .map(|s| {
                 format!(
-                    "<tr><th scope=\"row\">{}</th><td class=\"n\">{} mN</td><td class=\"n\">{:+.1}</td><td class=\"n\">{:.3}</td></tr>",
+                    "<tr><th scope=\"row\">{}</th><td class=\"n\">{} mN</td><td class=\"n\">{:+.1}</td><td class=\"n\">{}</td></tr>",
                     s.point,
                     number(1e3 * s.residual_n),
                     s.deviations,
-                    s.probability
+                    probability(s.probability)
                 )
             })
             .collect();
@@ -215,7 +217,7 @@ fn residuals(result: &Diagnosis, table: &Table, forecasts: &[Forecast]) -> miett
             .collect();
         figures += &errors_against(c, limit, &points)?;
     }
-    let cut = if limit >= 40.0 { " Errors beyond 40 stand at the end of the axis." } else { "" };
+    let cut = beyond(z.iter().flat_map(|(before, after)| [*before, *after]), [-limit, limit]);
     Ok(format!(
         "<h2>Residuals</h2>{}<div class=\"panels\">{figures}</div>",
         note(&format!(

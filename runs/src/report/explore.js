@@ -65,11 +65,11 @@ function clickable(title, xTitle, yTitle, fromZero, series, file) {
 
 const SIGNS = ["\u25cf", "\u25a0", "\u25b2", "\u25c6", "\u25cb", "\u25a1", "\u25b3", "\u25c7", "\u2715"];
 function bySpeed(x, chosen) {
-  const speed = (p) => String(Number(p.u_mm_s.toPrecision(2)));
-  const speeds = [...new Set(chosen.map(speed))].sort((a, b) => a - b);
-  return SERIES.slice(0, speeds.length).map((style, i) => {
-    const of = i + 1 === SERIES.length ? speeds.slice(i) : [speeds[i]];
-    const points = chosen.filter((p) => of.includes(speed(p))).map((p) => ({ x: x(p), y: p.mu, sd: p.mu_sd, predicted: p.predicted, predicted_sd: p.predicted_sd, ...style, pass: p }));
+  const speeds = levels(chosen.map((p) => p.u_mm_s), WITHIN.speed);
+  return SERIES.slice(0, speeds.names.length).map((style, i) => {
+    const of = i + 1 === SERIES.length ? speeds.names.slice(i) : [speeds.names[i]];
+    const series = (p) => Math.min(speeds.index(p.u_mm_s), SERIES.length - 1);
+    const points = chosen.filter((p) => series(p) === i).map((p) => ({ x: x(p), y: p.mu, sd: p.mu_sd, predicted: p.predicted, predicted_sd: p.predicted_sd, ...style, pass: p }));
     return { label: `${of.join(", ")} mm/s`, sign: SIGNS[i], style, points };
   });
 }

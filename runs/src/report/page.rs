@@ -62,10 +62,9 @@ fn verdict(w: &mut String, run: &RunData) {
                     escape(&trip.to_string()),
                     escape(trip.cause.remedy())
                 ),
-                Outcome::WouldNotArm { blocking: Some(cause) } => format!(
-                    "The rig would not arm: {cause:?} stood in the way.<br>{}",
-                    escape(cause.remedy())
-                ),
+                Outcome::WouldNotArm { blocking: Some(cause) } => {
+                    format!("The rig would not arm: {}.<br>{}", escape(cause.words()), escape(cause.remedy()))
+                }
                 outcome => {
                     format!("Ended early after {made} of {planned} passes: {}.", escape(&outcome.words()))
                 }

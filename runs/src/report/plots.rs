@@ -1,5 +1,6 @@
-//! The figures, as SVG text: what all of them share. Each is drawn twice, wide for a page and narrow for a telephone, with its own
-//! letters in both; the page shows one of them. Series differ by mark and dash as well as by colour.
+//! The figures, as SVG text: what all of them share. Each is drawn twice, wide for a page and narrow for a
+//! telephone, with its own letters in both; the page shows one of them. Series differ by mark and dash as
+//! well as by colour.
 
 pub mod campaign;
 pub mod comparison;
@@ -15,7 +16,8 @@ use plotters::prelude::*;
 use plotters_backend::{BackendCoord, DrawingErrorKind};
 use std::ops::Range;
 
-/// Colours that stay apart on white, also for colour-blind readers (after Okabe and Ito, the yellow darkened).
+/// Colours that stay apart on white, also for colour-blind readers (after Okabe and Ito, the yellow
+/// darkened).
 pub const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -60,8 +62,8 @@ impl Span {
         Span::linear(low..high + 0.05 * (high - low).max(1e-300))
     }
 
-    /// Over all of these values with a margin, logarithmic where it may be and they span more than a decade: within one such an
-    /// axis has a single label.
+    /// Over all of these values with a margin, logarithmic where it may be and they span more than a decade:
+    /// within one such an axis has a single label.
     fn over(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         if logarithmic && low > 0.0 && high > 10.0 * low {
@@ -134,7 +136,8 @@ impl ValueFormatter<f64> for Axis {
 
 type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 
-/// What a figure is: its sizes, its axes with their titles, and what it shows in one sentence for who cannot see it.
+/// What a figure is: its sizes, its axes with their titles, and what it shows in one sentence for who cannot
+/// see it.
 struct Frame<'a> {
     sizes: [(u32, u32); 2],
     x: (Span, &'a str),
@@ -270,6 +273,21 @@ fn band(
     Ok(())
 }
 
+/// The axis of `mu'` over measured values: a mark is drawn where it was measured, but for a few that would
+/// flatten all others.
+pub(crate) fn mu_axis(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let [low, high] = values.fold([0.0f64, 1.1], |[low, high], v| [low.min(1.05 * v), high.max(1.05 * v)]);
+    [low.max(-0.5), high.min(2.2)]
+}
+
+/// What a caption says where a value lies beyond the ends of an axis.
+pub(crate) fn beyond(mut values: impl Iterator<Item = f64>, [low, high]: [f64; 2]) -> &'static str {
+    match values.any(|v| v < low || v > high) {
+        true => " Marks beyond the axis are drawn at its end.",
+        false => "",
+    }
+}
+
 /// A mark with its error bar, cut at the ends of the axis.
 fn measured(
     chart: &mut Chart<'_>,
@@ -299,7 +317,8 @@ pub(crate) fn filled(series: usize) -> bool {
     series < MARKS
 }
 
-/// Which mark stands for which value, for a caption: values beyond the last mark share it, and all of them are named.
+/// Which mark stands for which value, for a caption: values beyond the last mark share it, and all of them
+/// are named.
 pub(crate) fn series_key(values: &[String], unit: &str) -> String {
     let of = |series: usize| match series + 1 {
         SERIES => values[series..].join(", "),
@@ -323,4 +342,16 @@ pub fn mark_name(series: usize) -> &'static str {
         "hollow diamonds",
     ];
     NAMES[series.min(SERIES - 1)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mark_is_where_it_was_measured_or_the_caption_says_that_it_is_not() {
+        let said = |values: &[f64]| beyond(values.iter().copied(), mu_axis(values.iter().copied()));
+        assert_eq!(said(&[-0.1, 0.4, 1.4]), "");
+        assert!(said(&[0.4, 9.0]).contains("beyond the axis"));
+    }
 }

@@ -249,7 +249,7 @@ impl Outcome {
             Outcome::Stopped => "stopped on request".into(),
             Outcome::Tripped(_) => "a safety rule tripped".into(),
             Outcome::WouldNotArm { blocking: Some(cause) } => {
-                format!("the rig would not arm: {cause:?} stands in the way")
+                format!("the rig would not arm: {}", cause.words())
             }
             Outcome::WouldNotArm { blocking: None } => "the rig would not arm".into(),
             Outcome::NoContact { point } => format!("no contact at point {point}"),

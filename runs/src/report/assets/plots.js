@@ -77,6 +77,22 @@ function shape(ctx, kind, x, y, r, filled) {
   ctx.stroke();
 }
 
+// How far, as a share, measured values of one setting lie apart: the same as in the figures that need no script.
+export const WITHIN = { speed: 0.03, frequency: 0.01, force: 0.1 };
+
+// The levels in some values, each named by its mean, and the one in which a value lies: fixed digits would cut through a setting's scatter.
+export function levels(values, within) {
+  const all = [];
+  for (const value of [...values].sort((a, b) => a - b)) {
+    if (all.length && value <= (1 + within) * all.at(-1)[0]) all.at(-1).push(value);
+    else all.push([value]);
+  }
+  return {
+    names: all.map((level) => String(Number((level.reduce((sum, v) => sum + v, 0) / level.length).toPrecision(3)))),
+    index: (value) => Math.max(all.findLastIndex((level) => level[0] <= value), 0),
+  };
+}
+
 // Marks at places: `points` of { x, y, sd, predicted, predicted_sd, kind, size, hollow, colour }.
 export function marks(plot, xTitle, yTitle, yFromZero) {
   let points = [];
@@ -86,7 +102,9 @@ export function marks(plot, xTitle, yTitle, yFromZero) {
     const at = (x, y) => [u.valToPos(x, "x", true), u.valToPos(y, "y", true)];
     ctx.save();
     ctx.beginPath();
-    ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+    // With room for a whole mark at the edge.
+    const room = 14 * px;
+    ctx.rect(u.bbox.left - room, u.bbox.top - room, u.bbox.width + 2 * room, u.bbox.height + 2 * room);
     ctx.clip();
     for (const p of points) {
       if (p.predicted != null) {

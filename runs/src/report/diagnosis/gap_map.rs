@@ -64,7 +64,12 @@ fn edges(points: &Table, c: &Covariate) -> Option<Vec<f64>> {
     let mut inner: Vec<f64> = if levels.len() <= CELLS {
         levels.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect()
     } else {
-        (1..CELLS).map(|k| values[k * values.len() / CELLS]).collect()
+        // Between two levels: a bound on one would part what its setting scatters.
+        let after = |v: f64| levels.partition_point(|l| *l <= v);
+        (1..CELLS)
+            .filter_map(|k| levels.get(after(values[k * values.len() / CELLS])))
+            .map(|next| 0.5 * (values[values.partition_point(|v| v < next) - 1] + next))
+            .collect()
     };
     inner.dedup();
     Some([vec![low], inner, vec![high]].concat())

@@ -2,8 +2,8 @@
 
 use crate::report::html::note;
 use crate::report::human::number;
-use crate::report::plots::Span;
 use crate::report::plots::verdict::{Seen, overlay, parity};
+use crate::report::plots::{Span, mu_axis};
 use diagnosis::data::Table;
 use diagnosis::predict::Forecast;
 use diagnosis::verdict::Diagnosis;
@@ -106,10 +106,10 @@ impl<'a> Overlay<'a> {
             let of = |rows: &[usize]| by.of(&self.table.passes[rows[0]]).unwrap_or(0.0);
             of(a).total_cmp(&of(b))
         });
-        let top = driven.iter().map(|&i| self.table.lateral[i] / self.full(&self.table.passes[i]));
-        let top = top.fold(1.0, f64::max).min(2.0) * 1.1;
+        let all = panels.iter().flatten();
+        let axis = mu_axis(all.map(|&i| self.table.lateral[i] / self.full(&self.table.passes[i])));
         let figures: miette::Result<Vec<String>> =
-            panels.iter().map(|rows| self.panel(rows, abscissa, &others, top)).collect();
+            panels.iter().map(|rows| self.panel(rows, abscissa, &others, axis)).collect();
         let text = note(&format!(
             "{shown} of {} passes with vibration, those at the conditions that are most common. Discs with bars: measured, with the standard \
              deviation of a pass. Dashes: the recalibrated baseline. Line and band: the verdict's model with twice its standard deviation. \
@@ -124,7 +124,7 @@ impl<'a> Overlay<'a> {
         rows: &[usize],
         x: &Covariate,
         others: &[&Covariate],
-        top: f64,
+        axis: [f64; 2],
     ) -> miette::Result<String> {
         let passes = &self.table.passes;
         let shown = |i: usize| x.shown.0 * x.of(&passes[i]).unwrap_or(0.0);
@@ -162,7 +162,7 @@ impl<'a> Overlay<'a> {
             &points,
             &of(|f| f.recalibrated),
             &of(|f| f.corrected),
-            top,
+            axis,
         )
     }
 }

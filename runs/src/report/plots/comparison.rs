@@ -1,10 +1,11 @@
 //! The figures of two runs.
 
 use super::{
-    COLOURS, Frame, GREY, NARROW, SERIES, Span, WIDE, band, figure, line, mark_name, measured, series_key,
+    COLOURS, Frame, GREY, NARROW, SERIES, Span, WIDE, band, beyond, figure, line, mark_name, measured,
+    mu_axis, series_key,
 };
 use crate::compare::{Comparison, Mean, Paired};
-use crate::report::human::number;
+use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
 
 /// Both runs' `mu'` against amplitude, at the conditions that they have in common; a line joins the two of each condition.
 ///
@@ -12,9 +13,8 @@ use crate::report::human::number;
 /// Only if the drawing library fails.
 pub fn overlay(result: &Comparison) -> miette::Result<String> {
     let widest = widest(result);
-    let highest =
-        result.pairs.iter().flat_map(|p| [p.a, p.b]).map(|m| m.mu_relative + m.sd).fold(1.0, f64::max);
-    let mu = [0.0, 1.05 * highest];
+    let means = || result.pairs.iter().flat_map(|p| [p.a, p.b]);
+    let mu = mu_axis(means().flat_map(|m| [m.mu_relative - m.sd, m.mu_relative + m.sd]));
     let alt = format!(
         "Relative friction of two runs against amplitude, {} conditions in common: {} the first, {} the second.",
         result.pairs.len(),
@@ -41,28 +41,21 @@ pub fn overlay(result: &Comparison) -> miette::Result<String> {
     })?;
     Ok(format!(
         "<figure>{svg}<figcaption>{}: the first run; {}: the second, joined to the first at the same condition. Bars: one standard \
-         uncertainty from pass to pass. All speeds, frequencies and loads that both have.</figcaption></figure>",
+         uncertainty from pass to pass. All speeds, frequencies and loads that both have.{}</figcaption></figure>",
         capital(mark_name(0)),
-        mark_name(1)
+        mark_name(1),
+        beyond(means().map(|m| m.mu_relative), mu)
     ))
 }
 
-/// What conditions can differ in besides the amplitude: name, unit, value.
-type Factor = (&'static str, &'static str, fn(&Paired) -> f64);
+/// What conditions can differ in besides the amplitude: name, unit, value, and how far the values of one setting lie apart.
+type Factor = (&'static str, &'static str, fn(&Paired) -> f64, f64);
 
 const FACTORS: [Factor; 3] = [
-    ("speed", "mm/s", |p| p.speed_m_s * 1e3),
-    ("frequency", "kHz", |p| p.frequency_hz / 1e3),
-    ("normal force", "N", |p| p.normal_force_n),
+    ("speed", "mm/s", |p| p.speed_m_s * 1e3, SPEED),
+    ("frequency", "kHz", |p| p.frequency_hz / 1e3, FREQUENCY),
+    ("normal force", "N", |p| p.normal_force_n, FORCE),
 ];
-
-/// Levels of a factor, rising: values within a tenth of each other are one, named by its least.
-fn levels(pairs: &[Paired], of: fn(&Paired) -> f64) -> Vec<f64> {
-    let mut values: Vec<f64> = pairs.iter().map(of).collect();
-    values.sort_by(f64::total_cmp);
-    values.dedup_by(|next, first| *next <= 1.1 * *first);
-    values
-}
 
 /// The differences against amplitude, a mark a level of the factor that varies most, with the shift that they have in common unless they
 /// vary by more than their uncertainty.
@@ -75,12 +68,9 @@ pub fn differences(result: &Comparison) -> miette::Result<String> {
         result.pairs.iter().flat_map(|p| [p.difference - p.difference_sd, p.difference + p.difference_sd]);
     let (low, high) = ends.fold((-0.01, 0.01), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
     let [low, high] = [low - 0.05 * (high - low), high + 0.05 * (high - low)];
-    let (name, unit, of) = FACTORS
-        .into_iter()
-        .rev()
-        .max_by_key(|(.., of)| levels(&result.pairs, *of).len())
-        .unwrap_or(FACTORS[0]);
-    let levels = levels(&result.pairs, of);
+    let by = |(.., of, within): &Factor| Levels::of(result.pairs.iter().map(of), *within);
+    let factor = FACTORS.iter().rev().max_by_key(|factor| by(factor).count()).unwrap_or(&FACTORS[0]);
+    let (levels, (name, unit, of, _)) = (by(factor), factor);
     let alt = format!(
         "Difference of relative friction, second run less first, against amplitude: {} conditions, by {name}.",
         result.pairs.len()
@@ -91,7 +81,7 @@ pub fn differences(result: &Comparison) -> miette::Result<String> {
         y: (Span::linear(low..high), "difference of \u{3bc}', second less first"),
         alt: &alt,
     };
-    let level_of = |p: &Paired| levels.iter().rposition(|level| *level <= of(p)).unwrap_or(0).min(SERIES - 1);
+    let level_of = |p: &Paired| levels.index(of(p)).min(SERIES - 1);
     let along = |value: f64| vec![(0.0, value), (widest, value)];
     let shift = result.judged.filter(|judged| !judged.varies());
     let svg = figure(&frame, |chart, size| {
@@ -101,7 +91,7 @@ pub fn differences(result: &Comparison) -> miette::Result<String> {
             line(chart, along(judged.shift.clamp(low, high)), COLOURS[2], None)?;
         }
         line(chart, along(0.0), GREY, Some(4))?;
-        for series in 0..levels.len().min(SERIES) {
+        for series in 0..levels.count().min(SERIES) {
             let of_level = result.pairs.iter().filter(|p| level_of(p) == series);
             let points: Vec<(f64, f64, f64)> =
                 of_level.map(|p| (p.amplitude_pp_m * 1e6, p.difference, p.difference_sd)).collect();
@@ -113,7 +103,7 @@ pub fn differences(result: &Comparison) -> miette::Result<String> {
         Some(_) => "Line and band: the shift that all have in common, with its interval of 95 %.",
         None => "No shift is drawn: the differences vary by more than their uncertainty.",
     };
-    let key = series_key(&levels.iter().map(|level| number(*level)).collect::<Vec<_>>(), unit);
+    let key = series_key(&levels.names(), unit);
     Ok(format!(
         "<figure>{svg}<figcaption>By {name}. {}, each condition with one standard uncertainty, the references' included. {common} \
          Dashed: no difference.</figcaption></figure>",

@@ -1,11 +1,13 @@
 //! The figures of a run.
 
 use super::{
-    COLOURS, Frame, GREY, NARROW, Span, WIDE, band, figure, line, mark, measured, series_key, wrong,
+    COLOURS, Frame, GREY, NARROW, Span, WIDE, band, beyond, figure, line, mark, measured, mu_axis,
+    series_key, wrong,
 };
 use crate::report::RunData;
 use crate::report::html::escape;
 use crate::report::human::number;
+use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
 use crate::sequence::MeasuredPass;
 use models::condition::Condition;
 use models::prediction::{FrictionModel, SpringSlider};
@@ -15,9 +17,6 @@ use models::reading::Reading;
 use plotters::prelude::*;
 use realtime::pacing::LoopReport;
 
-/// Where the axis of `mu'` ends.
-const MU: [f64; 2] = [0.0, 1.15];
-
 /// A measured `mu'` of a pass with vibration: amplitude in um, value, sd.
 fn value(p: &MeasuredPass) -> Option<(f64, f64, f64)> {
     let c = p.comparison?;
@@ -25,42 +24,38 @@ fn value(p: &MeasuredPass) -> Option<(f64, f64, f64)> {
     Some((p.pass.amplitude.micrometres(), c.mu_relative?, c.mu_relative_sd?))
 }
 
-/// A number with so many significant digits.
-fn round(v: f64, digits: i32) -> String {
-    let scale = 10f64.powi(digits - 1 - v.abs().max(1e-12).log10().floor() as i32);
-    format!("{}", (v * scale).round() / scale)
-}
-
-/// Nominal conditions, rounded so that passes of one setting fall together.
-fn setting(p: &MeasuredPass) -> (String, String, String) {
-    (round(p.pass.speed_m_s * 1e3, 2), round(p.pass.frequency_hz / 1e3, 3), round(p.pass.normal_force_n, 1))
-}
-
-/// The most common frequency and load: the base condition of the figure by speed.
-fn base(passes: &[MeasuredPass]) -> Option<(String, String)> {
-    let mut counts = std::collections::BTreeMap::<(String, String), usize>::new();
-    for p in passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO) {
-        let (_, f, n) = setting(p);
-        *counts.entry((f, n)).or_default() += 1;
+/// The passes with vibration at the most common frequency and load: the base of the figure by speed.
+fn at_base(passes: &[MeasuredPass]) -> Vec<&MeasuredPass> {
+    let driven: Vec<&MeasuredPass> = passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO).collect();
+    let frequencies = Levels::of(driven.iter().map(|p| p.pass.frequency_hz), FREQUENCY);
+    let loads = Levels::of(driven.iter().map(|p| p.pass.normal_force_n), FORCE);
+    let mut settings = std::collections::BTreeMap::<(usize, usize), Vec<&MeasuredPass>>::new();
+    for p in driven {
+        let setting = (frequencies.index(p.pass.frequency_hz), loads.index(p.pass.normal_force_n));
+        settings.entry(setting).or_default().push(p);
     }
-    counts.into_iter().max_by_key(|(_, n)| *n).map(|(key, _)| key)
+    settings.into_values().max_by_key(Vec::len).unwrap_or_default()
 }
 
-/// Relative friction against amplitude: a mark a speed, the spring-slider as a line with its band, and what was predicted for each
-/// pass (by a corrected model too) as a short stroke.
+fn mean(passes: &[&MeasuredPass], of: fn(&MeasuredPass) -> f64) -> f64 {
+    passes.iter().map(|p| of(p)).sum::<f64>() / passes.len() as f64
+}
+
+/// Relative friction against amplitude: a mark a speed, the spring-slider as a line with its band, and what
+/// was predicted for each pass (by a corrected model too) as a short stroke.
 ///
 /// # Errors
 /// Only if the drawing library fails.
 pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
-    let Some((f, n)) = base(&run.passes) else { return Ok("<p>No pass with vibration.</p>".into()) };
-    let at_base = |p: &&MeasuredPass| {
-        let (_, pf, pn) = setting(p);
-        p.pass.amplitude > PeakToPeak::ZERO && pf == f && pn == n
-    };
-    let chosen: Vec<&MeasuredPass> = run.passes.iter().filter(at_base).collect();
-    let mut speeds: Vec<String> = chosen.iter().map(|p| setting(p).0).collect();
-    speeds.sort_by(|a, b| a.parse::<f64>().unwrap_or(0.0).total_cmp(&b.parse().unwrap_or(0.0)));
-    speeds.dedup();
+    let chosen = at_base(&run.passes);
+    if chosen.is_empty() {
+        return Ok("<p>No pass with vibration.</p>".into());
+    }
+    let f = number(mean(&chosen, |p| p.pass.frequency_hz / 1e3));
+    let speed = |p: &MeasuredPass| p.pass.speed_m_s * 1e3;
+    let speeds = Levels::of(chosen.iter().map(|p| speed(p)), SPEED);
+    let marks = || chosen.iter().filter_map(|p| value(p));
+    let axis = mu_axis(marks().flat_map(|(_, mu, sd)| [mu - sd, mu + sd]));
     let widest = chosen.iter().map(|p| p.pass.amplitude.micrometres()).fold(1.0, f64::max) * 1.05;
     let model = SpringSlider::new(run.finger).map_err(wrong)?;
     let mu0 =
@@ -68,18 +63,19 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     let alt = format!(
         "Relative friction against amplitude at {f} kHz: {} passes at {} speeds, measured and predicted.",
         chosen.len(),
-        speeds.len()
+        speeds.count()
     );
     let frame = Frame {
         sizes: [WIDE, NARROW],
         x: (Span::linear(0.0..widest), "amplitude w, um peak to peak"),
-        y: (Span::linear(MU[0]..MU[1]), "relative friction \u{3bc}'"),
+        y: (Span::linear(axis[0]..axis[1]), "relative friction \u{3bc}'"),
         alt: &alt,
     };
     let svg = figure(&frame, |chart, size| {
-        for (i, speed) in speeds.iter().enumerate() {
+        for i in 0..speeds.count() {
             let colour = COLOURS[i % COLOURS.len()];
-            let of_speed: Vec<&&MeasuredPass> = chosen.iter().filter(|p| setting(p).0 == *speed).collect();
+            let of_speed: Vec<&&MeasuredPass> =
+                chosen.iter().filter(|p| speeds.index(speed(p)) == i).collect();
             if let (Some(mu0), Some(first)) = (mu0, of_speed.first()) {
                 let at = |w: f64| {
                     let amplitude = PeakToPeak::from_metres(w * 1e-6);
@@ -89,14 +85,14 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
                 let curve: Vec<(f64, f64, f64)> =
                     grid.filter_map(|w| at(w).map(|p| (w, p.mu_relative, p.mu_relative_sd))).collect();
                 let edge = |k: f64| -> Vec<(f64, f64)> {
-                    curve.iter().map(|(w, m, s)| (*w, (m + k * s).clamp(MU[0], MU[1]))).collect()
+                    curve.iter().map(|(w, m, s)| (*w, (m + k * s).clamp(axis[0], axis[1]))).collect()
                 };
                 band(chart, &edge(-2.0), &edge(2.0), colour)?;
                 line(chart, edge(0.0), colour, (i > 0).then_some(3 * i as i32))?;
             }
             // Asked of the model of the run itself, at the conditions that were measured.
             let strokes = of_speed.iter().filter_map(|p| {
-                let (w, predicted) = (value(p)?.0, p.comparison?.predicted.clamp(MU[0], MU[1]));
+                let (w, predicted) = (value(p)?.0, p.comparison?.predicted.clamp(axis[0], axis[1]));
                 let half = 0.012 * widest;
                 Some(PathElement::new(
                     vec![(w - half, predicted), (w + half, predicted)],
@@ -105,21 +101,20 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
             });
             chart.draw_series(strokes).map_err(wrong)?;
             let points: Vec<_> = of_speed.iter().filter_map(|p| value(p)).collect();
-            measured(chart, i, size, colour, &points, MU)?;
+            measured(chart, i, size, colour, &points, axis)?;
         }
         Ok(())
     })?;
-    // Loads fall together by one digit, which is no word on what the load was.
-    let load_n = chosen.iter().map(|p| p.pass.normal_force_n).sum::<f64>() / chosen.len() as f64;
-    let load = round(load_n, 2);
+    let load = number(mean(&chosen, |p| p.pass.normal_force_n));
     let driven = run.passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO).count();
     let elsewhere = match driven - chosen.len() {
         0 => String::new(),
         n => format!(" {n} passes at other frequencies or loads are in the table, not in this figure."),
     };
     Ok(format!(
-        "<figure>{svg}<figcaption>at {f} kHz and {load} N. {}. Short strokes: what was predicted for each pass.{elsewhere}</figcaption></figure>",
-        escape(&series_key(&speeds, "mm/s"))
+        "<figure>{svg}<figcaption>at {f} kHz and {load} N. {}. Short strokes: what was predicted for each pass.{}{elsewhere}</figcaption></figure>",
+        escape(&series_key(&speeds.names(), "mm/s")),
+        beyond(marks().map(|m| m.1), axis)
     ))
 }
 
@@ -135,6 +130,7 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
     }
     let lowest = points.iter().map(|p| p.0).fold(0.1, f64::min) * 0.8;
     let highest = points.iter().map(|p| p.0).fold(10.0, f64::max) * 1.2;
+    let axis = mu_axis(points.iter().flat_map(|(_, mu, sd)| [mu - sd, mu + sd]));
     let alt = format!(
         "Relative friction against Psi from {lowest:.2} to {highest:.1}: {} passes and the curves of Eq. 20 under both readings of w.",
         points.len()
@@ -142,7 +138,7 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
     let frame = Frame {
         sizes: [WIDE, NARROW],
         x: (Span::logarithmic(lowest..highest), "\u{3a8} of Eq. 17"),
-        y: (Span::linear(MU[0]..MU[1]), "relative friction \u{3bc}'"),
+        y: (Span::linear(axis[0]..axis[1]), "relative friction \u{3bc}'"),
         alt: &alt,
     };
     let svg = figure(&frame, |chart, size| {
@@ -155,9 +151,13 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
             band(chart, &law(star + sd), &law(star - sd), GREY)?;
             line(chart, law(star), GREY, None)?;
         }
-        measured(chart, 0, size, COLOURS[0], &points, MU)
+        measured(chart, 0, size, COLOURS[0], &points, axis)
     })?;
-    Ok(format!("<figure>{svg}</figure>"))
+    Ok(format!(
+        "<figure>{svg}<figcaption>All {} passes with vibration and a &Psi;.{}</figcaption></figure>",
+        points.len(),
+        beyond(points.iter().map(|p| p.1), axis)
+    ))
 }
 
 /// How far each pass lies from what was expected after those before it, in the order of measurement.
@@ -199,7 +199,7 @@ pub fn residuals(run: &RunData) -> miette::Result<String> {
         chart.draw_series(marks).map_err(wrong)?;
         Ok(())
     })?;
-    let cut = if worst > most { " Those beyond the axis stand at its end." } else { "" };
+    let cut = beyond(points.iter().map(|p| p.1), [-most, most]);
     Ok(format!(
         "<figure>{svg}<figcaption>Hollow squares: references without vibration.{cut}</figcaption></figure>"
     ))

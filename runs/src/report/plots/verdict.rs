@@ -1,6 +1,6 @@
 //! The figures of a verdict.
 
-use super::{COLOURS, Frame, GREY, NARROW, PANEL, Span, band, figure, line, mark, wrong};
+use super::{COLOURS, Frame, GREY, NARROW, PANEL, Span, band, beyond, figure, line, mark, mu_axis, wrong};
 use models::covariate::{Covariate, Scale};
 use plotters::prelude::*;
 
@@ -31,7 +31,7 @@ pub fn overlay(
     points: &[Seen],
     baseline: &Curve,
     corrected: &Curve,
-    top: f64,
+    axis: [f64; 2],
 ) -> miette::Result<String> {
     let alt = format!(
         "{title}: {} measured passes, the recalibrated baseline and the verdict's model.",
@@ -40,17 +40,16 @@ pub fn overlay(
     let frame = Frame {
         sizes: [PANEL, NARROW],
         x: (span, x_name),
-        y: (Span::linear(0.0..top), "relative friction \u{3bc}'"),
+        y: (Span::linear(axis[0]..axis[1]), "relative friction \u{3bc}'"),
         alt: &alt,
     };
+    let cut = |v: f64| v.clamp(axis[0], axis[1]);
     let svg = figure(&frame, |chart, size| {
-        let edge = |k: f64| -> Vec<(f64, f64)> {
-            corrected.iter().map(|(x, m, s)| (*x, (m + k * s).clamp(0.0, top))).collect()
-        };
+        let edge =
+            |k: f64| -> Vec<(f64, f64)> { corrected.iter().map(|(x, m, s)| (*x, cut(m + k * s))).collect() };
         band(chart, &edge(-2.0), &edge(2.0), COLOURS[0])?;
-        line(chart, baseline.iter().map(|(x, m, _)| (*x, m.clamp(0.0, top))).collect(), COLOURS[1], Some(6))?;
+        line(chart, baseline.iter().map(|(x, m, _)| (*x, cut(*m))).collect(), COLOURS[1], Some(6))?;
         line(chart, edge(0.0), COLOURS[0], None)?;
-        let cut = |v: f64| v.clamp(0.0, top);
         let bars = points.iter().map(|p| {
             let ends = [(p.x, cut(p.before - p.after)), (p.x, cut(p.before + p.after))];
             PathElement::new(ends.to_vec(), BLACK.stroke_width(1))
@@ -61,7 +60,8 @@ pub fn overlay(
             .map_err(wrong)?;
         rings(chart, points.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.before))), size)
     })?;
-    Ok(format!("<figure>{svg}<figcaption>{}</figcaption></figure>", crate::report::html::escape(title)))
+    let cut = beyond(points.iter().map(|p| p.before), axis);
+    Ok(format!("<figure>{svg}<figcaption>{}.{cut}</figcaption></figure>", crate::report::html::escape(title)))
 }
 
 /// Rings around suspects.
@@ -79,8 +79,8 @@ fn rings(
 /// # Errors
 /// Only if the drawing library fails.
 pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
-    let top = points.iter().flat_map(|(m, a, b, _)| [*m, *a, *b]).fold(1.0, f64::max).min(3.0) * 1.05;
-    let bottom = points.iter().flat_map(|(m, a, b, _)| [*m, *a, *b]).fold(0.0, f64::min).max(-1.0) * 1.05;
+    let all = || points.iter().flat_map(|(m, a, b, _)| [*m, *a, *b]);
+    let [bottom, top] = mu_axis(all());
     let panels = [("recalibrated baseline", 0), ("verdict's model", 1)].map(|(name, which)| {
         let alt =
             format!("Measured relative friction of {} passes against that of the {name}.", points.len());
@@ -103,7 +103,8 @@ pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
         Ok(format!("<figure>{svg}</figure>"))
     });
     let panels: miette::Result<Vec<String>> = panels.into_iter().collect();
-    Ok(format!("<div class=\"panels\">{}</div>", panels?.concat()))
+    let cut = beyond(all(), [bottom, top]);
+    Ok(format!("<div class=\"panels\">{}</div>{}", panels?.concat(), crate::report::html::note(cut)))
 }
 
 /// Errors of passes in standard deviations against one covariate: hollow before a cause was added, filled after.

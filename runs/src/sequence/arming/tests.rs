@@ -199,6 +199,8 @@ fn a_proof_that_a_stall_broke_off_is_made_again_and_told() {
 fn a_stop_that_was_pressed_before_arming_is_not_cleared_by_the_sweep() {
     let (outcome, events, rows) = swept(Before { pressed: [10, 300], ..Before::default() });
     assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(Cause::EmergencyStop) }, "{events:?}");
+    // A person reads what stopped it, no name of the code.
+    assert_eq!(outcome.words(), format!("the rig would not arm: {}", Cause::EmergencyStop.words()));
     assert!(rows.iter().skip(10).all(|row| row.supply_cut && !row.proving));
     // In the midst of a proof too, whatever the machine does.
     let (outcome, ..) = swept(Before { pressed: [54, 300], proofs: Some((1, 9)), ..Before::default() });
