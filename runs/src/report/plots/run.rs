@@ -11,7 +11,6 @@ use models::condition::Condition;
 use models::prediction::{FrictionModel, SpringSlider};
 use models::psi::{self, PsiEq17};
 use models::quantity::PeakToPeak;
-use models::reading::Reading;
 use plotters::prelude::*;
 use realtime::pacing::LoopReport;
 
@@ -123,7 +122,7 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     ))
 }
 
-/// Relative friction against Psi (Eq. 17) with Eq. 20 and its stated uncertainty.
+/// Relative friction against Psi (Eq. 17) with Eq. 20 and the run's Psi*.
 ///
 /// # Errors
 /// Only if the drawing library fails.
@@ -136,7 +135,7 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
     let lowest = points.iter().map(|p| p.0).fold(0.1, f64::min) * 0.8;
     let highest = points.iter().map(|p| p.0).fold(10.0, f64::max) * 1.2;
     let alt = format!(
-        "Relative friction against Psi from {lowest:.2} to {highest:.1}: {} passes and the curves of Eq. 20 under both readings of w.",
+        "Relative friction against Psi from {lowest:.2} to {highest:.1}: {} passes and the curve of Eq. 20 with the run's Psi*.",
         points.len()
     );
     let frame = Frame {
@@ -150,10 +149,9 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
         let law = |star: f64| -> Vec<(f64, f64)> {
             grid().map(|p| (p, psi::relative_friction(PsiEq17(p), star))).collect()
         };
-        for reading in Reading::ALL {
-            let (star, sd) = reading.psi_star();
-            band(chart, &law(star + sd), &law(star - sd), GREY)?;
-            line(chart, law(star), GREY, None)?;
+        if let Some(found) = run.psi_star() {
+            band(chart, &law(found.high), &law(found.low), GREY)?;
+            line(chart, law(found.psi_star), GREY, None)?;
         }
         measured(chart, 0, size, COLOURS[0], &points, MU)
     })?;
