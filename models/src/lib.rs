@@ -11,7 +11,8 @@
 //! | [`spring_slider`] | Eqs. 6-15 and section 5.3 |
 //! | [`psi`] | Eqs. 16-20 |
 //! | [`psi_fit`] | its constant Psi* fitted, with an interval |
-//! | [`psi_star`], [`reading_evidence`] | Psi* of a rig's own passes, with an interval; which reading of the paper's w it supports |
+//! | [`psi_star`] | Psi* of a rig's own passes, with an interval |
+//! | [`reading_evidence`] | which reading of the paper's w they support |
 //! | [`ridge`] | the finite element model of section 3 |
 //! | [`surrogate`], [`inverse`] | a table of the ridge that is quick to read; the amplitude for a wanted friction |
 //! | [`prediction`] | what every friction law answers |

@@ -1,15 +1,18 @@
 //! `Psi*` of a rig's own passes, with an interval that holds how far its conditions differ.
 //!
-//! Eq. 20 is an approximation of a rig: each condition gives a `Psi*` of its own by hand, `-Psi / ln(1 - mu')`. The `Psi*` of a rig is
-//! the centre of what many such conditions give, and those of a run are a sample of them:
+//! Eq. 20 is an approximation of a rig: each condition gives a `Psi*` of its own by hand, `-Psi / ln(1 -
+//! mu')`. The `Psi*` of a rig is the centre of what many such conditions give, and those of a run are a
+//! sample of them:
 //!
-//! 1. The repeats of a condition are averaged, since they share its misfit. `mu_0` is that of the passes without vibration.
-//! 2. `Psi*` is fitted to the forces of the conditions by weighted least squares. A condition weighs by its noise and by the law's error,
-//!    0.055 rms in units of `4 mu' (1 - mu')`, which is never fitted. The pull of a condition changes its sign at its own value
-//!    by hand, so the fit lies within the range of those values.
-//! 3. The variance between conditions is that of their pulls (a sandwich, with the leverage of each and Student's quantile for
-//!    so many); fewer than four have the law's error at least. The uncertainties that all conditions share, of `mu_0` and of the gains,
-//!    are added.
+//! 1. The repeats of a condition are averaged, since they share its misfit. `mu_0` is that of the passes
+//!    without vibration.
+//! 2. `Psi*` is fitted to the forces of the conditions by weighted least squares. A condition weighs by its
+//!    noise and by the law's error, 0.055 rms in units of `4 mu' (1 - mu')`, which is never fitted. The pull
+//!    of a condition changes its sign at its own value by hand, so the fit lies within the range of those
+//!    values.
+//! 3. The variance between conditions is that of their pulls (a sandwich, with the leverage of each and
+//!    Student's quantile for so many); fewer than four have the law's error at least. The uncertainties that
+//!    all conditions share, of `mu_0` and of the gains, are added.
 
 mod conditions;
 
@@ -22,15 +25,18 @@ use conditions::{Mean, by_condition, single_passes};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// `Psi` of the true stroke at which passes are asked: about one, where the readings differ most. A condition at an end has half its weight.
+/// `Psi` of the true stroke at which passes are asked: about one, where the readings differ most. A condition
+/// at an end has half its weight.
 pub const PSI_RANGE: [f64; 2] = [0.4, 4.0];
-/// Factor about each end over which the weight goes from all to nothing: a `mu_0` with noise then moves no condition in or out at once.
+/// Factor about each end over which the weight goes from all to nothing: a `mu_0` with noise then moves no
+/// condition in or out at once.
 pub const PSI_EDGE: f64 = 1.25;
 /// Ends of the search for `Psi*`.
 const SEARCH: [f64; 2] = [0.03, 90.0];
 /// The law's error, rms, in units of 4 mu' (1 - mu').
 const LAW_SD: f64 = 0.055;
-/// Standard deviations at which a condition begins to weigh less: neither a bad pass nor the law's worst condition may decide.
+/// Standard deviations at which a condition begins to weigh less: neither a bad pass nor the law's worst
+/// condition may decide.
 const ROBUST: f64 = 1.5;
 /// Half a width of 95 % in standard deviations.
 const Z95: f64 = 1.959_963_985;
@@ -53,7 +59,8 @@ impl fmt::Display for PsiStar {
         let PsiStar { psi_star, low, high, conditions } = self;
         write!(
             f,
-            "Psi* = {psi_star:.2} (95 %: {low:.2} to {high:.2}) for the peak-to-peak amplitude, from {conditions} conditions"
+            "Psi* = {psi_star:.2} (95 %: {low:.2} to {high:.2}) for the peak-to-peak amplitude, \
+             from {conditions} conditions"
         )
     }
 }
@@ -108,7 +115,8 @@ struct Means {
     noise: PassNoise,
 }
 
-/// What certificates of amplitude and speed leave open of Psi, a relative standard uncertainty that all passes share.
+/// What certificates of amplitude and speed leave open of Psi, a relative standard uncertainty that all
+/// passes share.
 pub fn scale_sd(rig: &RigFile) -> f64 {
     let gain = |key| rig.calibration.sd(key).unwrap_or(0.0);
     gain(CertifiedKey::AmplitudeGain).hypot(gain(CertifiedKey::SpeedGain))
@@ -120,12 +128,13 @@ pub fn of_run<'a>(passes: impl IntoIterator<Item = &'a Pass>, rig: &RigFile) -> 
     of_passes(passes, rig.finger.poisson_ratio, rig.noise, scale_sd(rig)).map(PsiStar::from)
 }
 
-/// `Psi*` of passes, in any order: each one's measured condition (whose `mu0` is ignored) and mean friction force in N, positive along
-/// the sliding direction. `scale_sd` is the relative standard uncertainty of Psi that all passes share, of the gains of
-/// amplitude and speed.
+/// `Psi*` of passes, in any order: each one's measured condition (whose `mu0` is ignored) and mean friction
+/// force in N, positive along the sliding direction. `scale_sd` is the relative standard uncertainty of Psi
+/// that all passes share, of the gains of amplitude and speed.
 ///
-/// Left out are passes that the law says nothing of (no load, no speed, no finite force) and those whose Psi is far from one
-/// ([`PSI_RANGE`]). `None` without a pass of each kind, or where friction under vibration is nowhere between none and that without.
+/// Left out are passes that the law says nothing of (no load, no speed, no finite force) and those whose Psi
+/// is far from one ([`PSI_RANGE`]). `None` without a pass of each kind, or where friction under vibration is
+/// nowhere between none and that without.
 pub fn of_passes(
     passes: impl IntoIterator<Item = (Condition, f64)>,
     poisson_ratio: f64,
@@ -178,7 +187,8 @@ impl Means {
         (passes, passes_low, passes_high): (u32, f64, Option<f64>),
     ) -> Option<Fit> {
         let ln_star = self.centre(mu0)?;
-        // The slopes of the score in its unknowns, by differences: with what the conditions are off by, which a linear law has not.
+        // The slopes of the score in its unknowns, by differences: with what the conditions are off by, which
+        // a linear law has not.
         let step = 1e-4;
         let slope = |f: &dyn Fn(f64) -> f64| (f(step) - f(-step)) / (2.0 * step);
         let in_star = slope(&|h| self.score(ln_star + h, mu0));
@@ -197,9 +207,11 @@ impl Means {
             seen += (u.pull / in_star).powi(2) / (1.0 - share);
             sums = [sums[0] + share * share, sums[1] + lever, sums[2] + lever * lever];
         }
-        // Satterthwaite's number for `seen` where a share is what the inverse of a variance makes it: n - 1 for equal ones.
+        // Satterthwaite's number for `seen` where a share is what the inverse of a variance makes it: n - 1
+        // for equal ones.
         let free = 1.0 / (sums[0] + sums[1] * sums[1] - sums[2]);
-        // Three conditions show too little of their scatter (Student's quantile is 4.3): then it is the law's known error at least.
+        // Three conditions show too little of their scatter (Student's quantile is 4.3): then it is the law's
+        // known error at least.
         let (between, quantile) = if free > 2.5 {
             (seen, student(free))
         } else {
@@ -221,7 +233,8 @@ impl Means {
         (half.is_finite() && fit.noise_variance.is_finite()).then_some(fit)
     }
 
-    /// `ln Psi*` where the score is nothing. Below what every condition gives by hand the score is negative, above it positive.
+    /// `ln Psi*` where the score is nothing. Below what every condition gives by hand the score is negative,
+    /// above it positive.
     fn centre(&self, mu0: f64) -> Option<f64> {
         let [mut low, mut high] = SEARCH.map(f64::ln);
         if !(self.score(low, mu0) < 0.0 && self.score(high, mu0) > 0.0) {

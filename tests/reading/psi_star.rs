@@ -1,9 +1,11 @@
-//! Psi* of a sweep: how often its interval holds the truth, over the virtual rig's natures and all bundled plans.
+//! Psi* of a sweep: how often its interval holds the truth, over the virtual rig's natures and all bundled
+//! plans.
 //!
-//! A plan's conditions are a sample of those between them: a condition between two of the plan's has the geometric mean of each
-//! setting, with a random weight. A sweep draws as many conditions as the plan has, with its repeats and references, and the noise that the
-//! setup states. The truth is the Psi* that the same estimator gives on very many such conditions without noise. Where Eq. 20
-//! itself is the rig's law, the truth is the law's own number.
+//! A plan's conditions are a sample of those between them: a condition between two of the plan's has the
+//! geometric mean of each setting, with a random weight. A sweep draws as many conditions as the plan has,
+//! with its repeats and references, and the noise that the setup states. The truth is the Psi* that the same
+//! estimator gives on very many such conditions without noise. Where Eq. 20 itself is the rig's law, the
+//! truth is the law's own number.
 
 use models::condition::Condition;
 use models::psi::{PsiEq17, relative_friction};
@@ -166,7 +168,8 @@ fn fitted(passes: &Passes, setup: &Setup) -> Option<Fit> {
     of_passes(passes.iter().copied(), setup.tip.finger.poisson_ratio, setup.file.noise, 0.0)
 }
 
-/// `-Psi / ln(1 - mu')` of each condition's mean by hand, from the least to the greatest; infinite where friction is whole.
+/// `-Psi / ln(1 - mu')` of each condition's mean by hand, from the least to the greatest; infinite where
+/// friction is whole.
 fn by_hand(passes: &Passes, poisson_ratio: f64) -> [f64; 2] {
     let mu = |wanted: &[(Condition, f64)], power: i32| {
         let top: f64 = wanted.iter().map(|(c, f)| f * c.normal_force_n.powi(power)).sum();
@@ -279,7 +282,8 @@ fn the_laws_own_number_is_found_where_it_is_the_law() {
     }
 }
 
-/// What a run says, on the rig itself in virtual time: every plan on the rig with a hidden effect and the one without.
+/// What a run says, on the rig itself in virtual time: every plan on the rig with a hidden effect and the one
+/// without.
 #[test]
 fn a_run_states_psi_star_within_what_its_conditions_give_by_hand() {
     let plans = rounds(&PLANS[2..], &PLANS[..]);
@@ -297,7 +301,8 @@ fn a_run_states_psi_star_within_what_its_conditions_give_by_hand() {
         let fit = fitted(&own, &setup).unwrap();
         println!("{name}: {fit:?}, by hand {:?}", by_hand(&own, setup.tip.finger.poisson_ratio));
         within_its_conditions(&name, &own, &fit, &setup);
-        // Conditions that differ by tens of per cent leave their centre open by more than the noise of hundreds of passes.
+        // Conditions that differ by tens of per cent leave their centre open by more than the noise of
+        // hundreds of passes.
         assert!(fit.high / fit.low > 1.04, "{name}: {fit:?}");
     }
 }

@@ -6,8 +6,8 @@ use crate::psi::PsiEq17;
 use crate::quantity::PeakToPeak;
 use std::collections::BTreeMap;
 
-/// Amplitude, frequency, speed, load and pressure within these factors are one setting: repeats scatter by less, and steps of a plan are
-/// larger.
+/// Amplitude, frequency, speed, load and pressure within these factors are one setting: repeats scatter by
+/// less, and steps of a plan are larger.
 const SAME_SETTING: [f64; 5] = [1.05, 1.05, 1.05, 1.2, 1.05];
 /// The mean of passes under one condition.
 pub(super) struct Mean {
@@ -65,7 +65,8 @@ fn levels(values: &[f64], same: f64) -> Vec<u32> {
     of
 }
 
-/// How many passes are asked, and between which `Psi*` nine of ten lie, each by itself; no friction below that without vibration: infinite.
+/// How many passes are asked, and between which `Psi*` nine of ten lie, each by itself; no friction below
+/// that without vibration: infinite.
 pub(super) fn single_passes<'a>(
     passes: impl Iterator<Item = &'a (Condition, f64)>,
     mu0: f64,
