@@ -231,7 +231,12 @@ fn run_diagnose_check_and_point_tell_it() {
     assert!(remarks.iter().any(|r| r.as_str().unwrap().starts_with("Eq. 20 of the paper")), "{remarks:?}");
     // It is a question about the paper: a run does not answer it.
     let page = std::fs::read_to_string(format!("{out}/report.html")).unwrap();
-    assert!(!format!("{run:?}{page}").contains("favour"), "{run:?}");
+    for word in ["favour", "readings of", "sine's amplitude"] {
+        assert!(!format!("{run:?}{page}").contains(word), "{word}: {run:?}");
+    }
+    let stated = &run.last().unwrap()["summary"]["psi_star"];
+    let stated = ["low", "psi_star", "high"].map(|key| stated[key].as_f64().unwrap());
+    assert!(stated.is_sorted() && page.contains("for the peak-to-peak amplitude"), "{stated:?}");
 
     let point = &told(&["model", "point", "--model", "psi"]).1[0];
     let number = |value: &serde_json::Value, key: &str| value[key].as_f64().unwrap();

@@ -7,7 +7,7 @@ use crate::Verdict;
 use crate::data::{RigFile, Table};
 use crate::scatter::Scatter;
 use models::reading_evidence::{self, Decision, ReadingFinding};
-use models::rig_file::{CertifiedKey, PassNoise};
+use models::rig_file::PassNoise;
 
 /// The finding of a table: suspects left out, with the scatter that the table has and what certificates leave open of amplitude and
 /// speed. `None` without a pass with and one without vibration.
@@ -19,8 +19,7 @@ pub fn of_table(table: &Table, rig: &RigFile, scatter: &Scatter) -> Option<Readi
     let suspect = |row: usize| scatter.suspects.iter().any(|s| s.row == row);
     let passes = table.passes.iter().zip(&table.lateral).enumerate().filter(|(row, _)| !suspect(*row));
     let passes = passes.map(|(_, (c, lateral))| (*c, c.direction.sign() * lateral));
-    let gain = |key| rig.calibration.sd(key).unwrap_or(0.0);
-    let scale_sd = gain(CertifiedKey::AmplitudeGain).hypot(gain(CertifiedKey::SpeedGain));
+    let scale_sd = models::psi_star::scale_sd(rig);
     reading_evidence::of_passes(passes, rig.finger.poisson_ratio, noise, scale_sd)
 }
 

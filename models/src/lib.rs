@@ -11,6 +11,8 @@
 //! | [`spring_slider`] | Eqs. 6-15 and section 5.3 |
 //! | [`psi`] | Eqs. 16-20 |
 //! | [`psi_fit`] | its constant Psi* fitted, with an interval |
+//! | [`psi_star`] | Psi* of a rig's own passes, with an interval |
+//! | [`reading_evidence`] | which reading of the paper's w they support |
 //! | [`ridge`] | the finite element model of section 3 |
 //! | [`surrogate`], [`inverse`] | a table of the ridge that is quick to read; the amplitude for a wanted friction |
 //! | [`prediction`] | what every friction law answers |
@@ -42,6 +44,7 @@ pub mod pass;
 pub mod prediction;
 pub mod psi;
 pub mod psi_fit;
+pub mod psi_star;
 pub mod quantity;
 pub mod reading;
 pub mod reading_evidence;

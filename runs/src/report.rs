@@ -46,6 +46,13 @@ pub struct RunData {
     pub damage: Vec<String>,
 }
 
+impl RunData {
+    /// `Psi*` of the passes, as the summary has it.
+    pub fn psi_star(&self) -> Option<models::psi_star::PsiStar> {
+        self.summary.as_ref()?.psi_star
+    }
+}
+
 /// Reads a run's folder.
 ///
 /// # Errors

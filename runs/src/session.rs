@@ -19,6 +19,7 @@ use crate::setup::{Guards, Setup};
 use crate::supervisor::OffReport;
 use calibration::certificate::sha256_hex;
 use models::prediction::FrictionModel;
+use models::psi_star::PsiStar;
 use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
@@ -122,6 +123,9 @@ pub struct Summary {
     /// What the comparison of all passes says.
     #[serde(default = "nothing_said")]
     pub agreement: Agreement,
+    /// `Psi*` of Eq. 20 for the peak-to-peak amplitude; none where the passes give none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub psi_star: Option<PsiStar>,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
     /// When the machine kept ordinary threads from running; `None` in virtual time.

@@ -390,6 +390,9 @@ fn tell(summary: &Summary, json: bool) {
         told!("to resume, repeat the command with --out {}", summary.folder.display());
     }
     told!("{}", summary.agreement);
+    if let Some(psi_star) = summary.psi_star {
+        told!("{psi_star}");
+    }
     if summary.model_departed {
         told!("next: muprime diagnose {}", summary.folder.display());
     }

@@ -30,8 +30,8 @@ pub(super) fn page(run: &RunData, traces: &[Trace]) -> miette::Result<String> {
         ),
         plots::run::mu_against_psi(run)?,
         note(
-            "&Psi; = U / (w f &mu;<sub>0</sub> (1+&nu;)), Eq. 17. Lines and bands: Eq. 20 with the paper's &Psi;* = 2.38 &plusmn; 0.21, \
-             below where its w is the whole stroke, above where it is the sine's amplitude (1.19 of the stroke)."
+            "&Psi; = U / (w f &mu;<sub>0</sub> (1+&nu;)), Eq. 17, with w peak-to-peak. Line and band: Eq. 20 with this run's &Psi;* and its \
+             interval of 95 %, which holds how far the conditions differ."
         ),
         plots::run::residuals(run)?,
         note(
@@ -83,8 +83,10 @@ fn verdict(w: &mut String, run: &RunData) {
         let last = run.passes.iter().rev().find_map(|p| p.comparison.as_ref());
         escape(&format!("Finding: {}.", realtime::compare::Agreement::of(last, complete)))
     };
+    let psi_star =
+        run.psi_star().map_or_else(String::new, |found| format!("<br>{}.", escape(&found.to_string())));
     let class = if departed { "verdict departed" } else { "verdict" };
-    let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}</p>");
+    let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}{psi_star}</p>");
     if !run.damage.is_empty() {
         let items: String = run.damage.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
         let _ = writeln!(

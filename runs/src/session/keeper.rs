@@ -207,6 +207,9 @@ impl Keeper {
     ) -> Summary {
         let (loop_report, stalls, held) =
             machine.map_or((None, None, None), |(report, stalls, held)| (Some(report), Some(stalls), held));
+        // As far as they can be read: what cannot is said below.
+        let passes = crate::run_dir::passes_in(self.dir.path()).unwrap_or_default();
+        let rig = crate::input::rig_file(&self.dir.path().join("rig.toml")).ok();
         let mut summary = Summary {
             requirement: outcome.cause().and_then(Cause::requirement).map(String::from),
             remedy: outcome.cause().map(|cause| cause.remedy().to_string()),
@@ -224,8 +227,8 @@ impl Keeper {
             off,
             notes: self.dir.notes().clone(),
             protocol: self.protocol.clone(),
-            // As far as it can be read: a table that cannot is said below.
-            levels: crate::run_dir::passes_in(self.dir.path()).map_or_else(|_| Vec::new(), |p| levels_of(&p)),
+            levels: levels_of(&passes),
+            psi_star: rig.and_then(|rig| models::psi_star::of_run(passes.iter().map(|p| &p.pass), &rig)),
             finished_before: false,
             guards: self.guards.clone(),
         };

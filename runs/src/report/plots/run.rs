@@ -13,7 +13,6 @@ use models::condition::Condition;
 use models::prediction::{FrictionModel, SpringSlider};
 use models::psi::{self, PsiEq17};
 use models::quantity::PeakToPeak;
-use models::reading::Reading;
 use plotters::prelude::*;
 use realtime::pacing::LoopReport;
 
@@ -118,7 +117,7 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     ))
 }
 
-/// Relative friction against Psi (Eq. 17) with Eq. 20 and its stated uncertainty.
+/// Relative friction against Psi (Eq. 17) with Eq. 20 and the run's Psi*.
 ///
 /// # Errors
 /// Only if the drawing library fails.
@@ -132,7 +131,7 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
     let highest = points.iter().map(|p| p.0).fold(10.0, f64::max) * 1.2;
     let axis = mu_axis(points.iter().flat_map(|(_, mu, sd)| [mu - sd, mu + sd]));
     let alt = format!(
-        "Relative friction against Psi from {lowest:.2} to {highest:.1}: {} passes and the curves of Eq. 20 under both readings of w.",
+        "Relative friction against Psi from {lowest:.2} to {highest:.1}: {} passes and the curve of Eq. 20 with the run's Psi*.",
         points.len()
     );
     let frame = Frame {
@@ -146,10 +145,9 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
         let law = |star: f64| -> Vec<(f64, f64)> {
             grid().map(|p| (p, psi::relative_friction(PsiEq17(p), star))).collect()
         };
-        for reading in Reading::ALL {
-            let (star, sd) = reading.psi_star();
-            band(chart, &law(star + sd), &law(star - sd), GREY)?;
-            line(chart, law(star), GREY, None)?;
+        if let Some(found) = run.psi_star() {
+            band(chart, &law(found.high), &law(found.low), GREY)?;
+            line(chart, law(found.psi_star), GREY, None)?;
         }
         measured(chart, 0, size, COLOURS[0], &points, axis)
     })?;
