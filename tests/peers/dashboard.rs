@@ -143,9 +143,17 @@ impl Paced {
     }
 }
 
+/// The default plan, with a base speed that scatters about a bound of two digits.
 fn finished(out: &Path) {
+    let bundled = std::fs::read_to_string(file("runs/plans/first-sweep.toml")).unwrap();
+    let plan = out.with_extension("toml");
+    std::fs::create_dir_all(out.parent().unwrap()).unwrap();
+    std::fs::write(&plan, bundled.replace("speed_m_s = 0.02\n", "speed_m_s = 0.0125\n")).unwrap();
     let mut run = muprime();
-    run.args(["run", "--fast", "--seed", "3", "--operator", OPERATOR, "--sample", SAMPLE, "--out"]).arg(out);
+    run.arg("run")
+        .arg(&plan)
+        .args(["--fast", "--seed", "3", "--operator", OPERATOR, "--sample", SAMPLE, "--out"])
+        .arg(out);
     let made = run.output().unwrap();
     assert!(made.status.code().is_some_and(|code| code < 2), "{}", texts(&made).1);
 }

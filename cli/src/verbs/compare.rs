@@ -1,8 +1,8 @@
 //! `muprime compare RUN_A RUN_B`: two runs side by side.
 
 use runs::compare::Compared;
-use runs::out;
 use runs::print::folded;
+use runs::{out, say};
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -34,6 +34,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let compared = Compared::of([&args.run_a, &args.run_b])?;
     if let Some(page) = &args.report {
         runs::files::write_whole(page, runs::report::comparison::page(&compared)?)?;
+        say!("report: {} (the dashboard compares two runs by itself)", page.display());
     }
     if json {
         out!("{}", serde_json::json!(compared));
@@ -78,10 +79,10 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     for p in worst.iter().take(TOLD) {
         let _ = writeln!(
             w,
-            "  {:6.3} um {:6.2} kHz {:6.1} mm/s {:.2} N  {:.3} {:.3}  {:+.3} ({:+.1})",
+            "  {:6.3} um {:6.2} kHz {:+6.1} mm/s {:.2} N  {:.3} {:.3}  {:+.3} ({:+.1})",
             p.amplitude_pp_m * 1e6,
             p.frequency_hz / 1e3,
-            p.speed_m_s * 1e3,
+            p.speed_m_s * f64::from(p.direction) * 1e3,
             p.normal_force_n,
             p.a.mu_relative,
             p.b.mu_relative,

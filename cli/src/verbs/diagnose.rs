@@ -131,7 +131,12 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         };
         let page = runs::report::diagnosis::page(&result, &table, &about)?;
         write_text(out, &page)?;
-        keep_in_run(&args.data, out, &page);
+        say!("report: {}", out.display());
+        // The run that this is the table of.
+        let run = table_path.parent().filter(|run| run.join("passes.jsonl").exists());
+        if let Some(run) = run {
+            keep_in_run(run, out, &page);
+        }
     }
     if json {
         out!("{}", document(&result, &rig, &damage).into_diagnostic()?);
@@ -142,14 +147,14 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A run's page that was written elsewhere, once more in the run's folder, where the dashboard lists it. A folder that takes no file, or a
-/// table without a run, keeps nothing.
+/// A run's page that was written elsewhere, once more in the run's folder: the dashboard lists the pages there and no others.
 fn keep_in_run(run: &Path, page: &Path, text: &str) {
     let inside = || Some(page.canonicalize().ok()?.parent()? == run.canonicalize().ok()?);
-    if run.is_dir() && inside() == Some(false) {
+    if inside() == Some(false) {
         let copy = run.join("diagnosis.html");
-        if let Err(why) = write_text(&copy, text) {
-            say!("the dashboard will not list this page: {why}");
+        match write_text(&copy, text) {
+            Ok(()) => say!("the dashboard lists its copy: {}", copy.display()),
+            Err(why) => say!("the dashboard will not list this page: {why}"),
         }
     }
 }

@@ -34,7 +34,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         return super::exit(super::DONE);
     }
     for r in runs {
-        let outcome = if r.outcome.is_empty() { "no ending" } else { &r.outcome };
+        let outcome = if r.outcome.is_empty() { "no ending".into() } else { r.outcome.replace('_', " ") };
         let departed = if r.departed { "  disagrees" } else { "" };
         out!("{:40} {:>5}/{:<5} {outcome:12} {}{departed}", r.folder, r.passes, r.planned, r.setup);
     }

@@ -4,7 +4,6 @@ use crate::live::{State, View};
 use realtime::cycle::Phase;
 use runs::print::clean;
 use runs::report::human::number;
-use runs::sequence::MeasuredPass;
 
 /// States of the last second.
 const SECOND: usize = 10;
@@ -54,15 +53,15 @@ pub fn phase(phase: Phase) -> &'static str {
 pub fn of_state(view: &View) -> Vec<(&'static str, String)> {
     // What the last cycle showed is no state of a rig that nobody leads any more.
     if view.ended.is_some() {
-        return vec![("rig", "none: the run is over".into()), ("last pass", last_pass(view))];
+        return [vec![("rig", "none: the run is over".into())], last_pass(view)].concat();
     }
     let Some(s) = view.states.back() else {
-        return vec![("rig", "none: no cycle was told".into()), ("last pass", last_pass(view))];
+        return [vec![("rig", "none: no cycle was told".into())], last_pass(view)].concat();
     };
     // A running mu' is there while a pass slides only.
     let slides = matches!(s.phase, Phase::Settle | Phase::Measure);
     let sliding = |text: String| if text == "none" && !slides { "none: nothing slides".into() } else { text };
-    vec![
+    let now = vec![
         ("lateral force", signed(s.lateral_force_n, 4, " N (sensor frame)")),
         ("normal force", signed(s.normal_force_n, 4, " N (compression +)")),
         ("mu' measured", sliding(band(s.mu_relative, s.mu_relative_sd))),
@@ -72,8 +71,8 @@ pub fn of_state(view: &View) -> Vec<(&'static str, String)> {
         ("frequency", value(s.frequency_hz, 1e-3, 3, " kHz")),
         ("output", output(s)),
         ("lateness", lateness(view)),
-        ("last pass", last_pass(view)),
-    ]
+    ];
+    [now, last_pass(view)].concat()
 }
 
 fn residual(s: &State) -> String {
@@ -99,18 +98,15 @@ fn lateness(view: &View) -> String {
     format!("{} ms, worst of 1 s", number(worst * 1e3))
 }
 
-fn last_pass(view: &View) -> String {
-    view.passes.last().map_or_else(|| "none".into(), of_pass)
-}
-
-fn of_pass(pass: &MeasuredPass) -> String {
+/// A pass's surprise is after the passes before it: no residual of its own `mu'`.
+fn last_pass(view: &View) -> Vec<(&'static str, String)> {
+    let Some(pass) = view.passes.last() else { return vec![("last pass", "none".into())] };
     let c = pass.comparison;
-    format!(
-        "{}: mu' {}, {}",
-        pass.pass.point,
-        value(c.and_then(|c| c.mu_relative), 1.0, 3, ""),
-        signed(c.map(|c| c.z), 1, " sd")
-    )
+    let mu = value(c.and_then(|c| c.mu_relative), 1.0, 3, "");
+    vec![
+        ("last pass", format!("{}: mu' {mu}", pass.pass.point)),
+        ("its surprise", signed(c.map(|c| c.z), 1, " sd")),
+    ]
 }
 
 /// Text from a file or an instrument, on one line and without control characters.

@@ -12,6 +12,7 @@ use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use realtime::safety::Cause;
 use runs::report::events::describe;
+use runs::sequence::Outcome;
 
 /// Columns and rows from which on the whole page is shown.
 const WHOLE: [u16; 2] = [80, 24];
@@ -155,8 +156,13 @@ fn state(page: &Page<'_>) -> (String, Style) {
             (None, Some(error)) => plain(error),
             (None, None) => "nothing is known of its end".into(),
         };
-        let complete = ended.outcome == Some(runs::sequence::Outcome::Complete);
-        return (format!("ENDED: {how}"), if complete { look.strong(Color::Green) } else { look.alarm() });
+        let style = match ended.outcome {
+            Some(Outcome::Complete) => look.strong(Color::Green),
+            // It was asked for.
+            Some(Outcome::Stopped) => look.heading(),
+            _ => look.alarm(),
+        };
+        return (format!("ENDED: {how}"), style);
     }
     if let Some(trip) = view.trip {
         if trip.cause == Cause::Stopped {
@@ -295,8 +301,8 @@ fn help(page: &Page<'_>) -> Vec<String> {
     [
         "s, Ctrl-C: stop, safe state at once  p: pause before the next pass  r: resume",
         leave,
-        "lateral force is signed in the sensor's frame, normal force + in compression",
-        "mu' = mu/mu_0; residual: measured - predicted, z in sd; w is peak-to-peak",
+        "lateral force: in the sensor's frame; normal: + in compression; mu' = mu/mu_0",
+        "residual: measured - predicted, z in sd; surprise: after the passes before it",
     ]
     .map(String::from)
     .to_vec()

@@ -67,8 +67,11 @@ fn a_row_of_a_report_does_not_contradict_itself() {
     }
     assert!(compared > 80, "{compared}");
     // Every speed of the plan has a mark of its own, in a figure that does not show all passes.
-    for speed in ["discs: 5 mm/s", "squares: 10 mm/s", "diamonds: 80 mm/s", "not in this figure"] {
-        assert!(html.contains(speed), "{speed}");
+    // Every pass at the base load is in it, whatever the load's last digits: the others are 12 at other loads and 6 at another frequency.
+    for said in
+        ["discs: 5 mm/s", "squares: 10 mm/s", "diamonds: 80 mm/s", " 18 passes at other frequencies or loads"]
+    {
+        assert!(html.contains(said), "{said}");
     }
 }
 
@@ -141,6 +144,8 @@ fn a_comparison_leads_with_what_decides_it() {
         assert!(second.contains(&format!("{end:+.3}")), "{end}: {second}");
     }
     assert!(html.contains("class=\"verdict departed\"") && html.contains("No shift is drawn"));
+    // What both have is written once.
+    assert_eq!(html.matches("<td colspan=\"2\">artificial-silicone</td>").count(), 1);
     let said = compared(&b, &c);
     let html = page(out.clone());
     assert!(said.contains("mu' shifts by") && html.contains("class=\"verdict\""), "{said}");
@@ -158,9 +163,16 @@ fn a_verdict_claims_no_certainty() {
     let said = done(&diagnosed).replace("\n    ", " ");
     let headline = said.lines().next().unwrap();
     assert!(headline.contains("% (95 %: ") && !said.contains("1.00)") && !said.contains("1.000"), "{said}");
-    let html = page(elsewhere);
+    let html = page(elsewhere.clone());
     assert!(html.contains("% (95 %: ") && !html.contains("no pass inside"));
-    assert_eq!(html, page(run_folder.join("diagnosis.html")));
+    // Regions that were left out: no share without its interval.
+    assert!(html.contains("by the recalibrated baseline, ") && !html.contains("of the gap closed"));
+    let copy = run_folder.join("diagnosis.html");
+    let told = texts(&diagnosed).1;
+    for place in [&elsewhere, &copy] {
+        assert!(told.contains(&format!(": {}", place.display())), "{told}");
+    }
+    assert_eq!(html, page(copy));
 }
 
 /// What no rig can be is refused with the unit that was meant, and a law without an uncertainty prints none.

@@ -113,7 +113,8 @@ impl Drive {
                     waits_for.or(self.seen().tripped.map(|trip| trip.cause)).unwrap_or(Cause::SupplySwitch);
                 miette::bail!(
                     help = cause.remedy(),
-                    "the rig does not arm within {ARM_WITHIN_S} s: {cause:?}"
+                    "the rig does not arm within {ARM_WITHIN_S} s: {}",
+                    cause.words()
                 );
             }
             self.rig.send(Command::Set(Request::default(), Marker::default()));
@@ -140,7 +141,7 @@ impl Drive {
         let seen = self.seen();
         let why = seen.tripped.map(|trip| trip.cause).or(seen.row.and_then(|row| row.waits_for));
         Err(match why {
-            Some(cause) => format!("the rig has tripped ({cause:?})"),
+            Some(cause) => format!("the rig has tripped ({})", cause.words()),
             None => format!("{:.3} um are not reached in {REACH_WITHIN_S} s", amplitude.micrometres()),
         })
     }

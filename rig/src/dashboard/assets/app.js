@@ -1,4 +1,4 @@
-import { figure, marks, SERIES, traces } from "/plots.js";
+import { figure, levels, marks, SERIES, traces, WITHIN } from "/plots.js";
 
 // The token comes with the address's fragment, which is never sent, and stays with this tab.
 const given = new URLSearchParams(location.hash.slice(1)).get("token");
@@ -65,7 +65,7 @@ async function catalogue() {
     box.checked = chosen.has(run.folder);
     const pages = run.pages.map((page) => el("a", { href: `#/page/${part(run.folder)}/${part(page)}` }, page));
     const began = new Date(run.started_unix_s * 1000).toISOString().slice(0, 16).replace("T", " ");
-    const outcome = run.live ? "goes on" : run.outcome || "no ending";
+    const outcome = run.live ? "goes on" : run.outcome.replaceAll("_", " ") || "no ending";
     return el("tr", {},
       el("td", {}, box),
       el("td", {}, el("a", { href: `#/run/${part(run.folder)}` }, run.folder)),
@@ -138,16 +138,13 @@ class Picture {
   }
 }
 
-function levels(passes, { of, level }) {
-  return new Set(passes.map((p) => level(of(p)))).size;
-}
-
-// What a plan varies besides the amplitude; `level` puts passes of one setting together.
+// What a plan varies besides the amplitude; `count` says at how many settings.
+const regulated = (within) => (values) => levels(values, within).names.length;
 const FACTORS = [
-  { name: "frequency, kHz", of: (p) => p.pass.frequency_hz / 1e3, level: (v) => v.toPrecision(3) },
-  { name: "speed, mm/s", of: (p) => p.pass.speed_m_s * 1e3, level: (v) => v.toPrecision(2) },
-  { name: "normal force, N", of: (p) => p.pass.normal_force_n, level: (v) => v.toPrecision(1) },
-  { name: "position, mm", of: (p) => p.pass.position_m * 1e3, level: (v) => Math.round(v / 10) },
+  { name: "frequency, kHz", of: (p) => p.pass.frequency_hz / 1e3, count: regulated(WITHIN.frequency) },
+  { name: "speed, mm/s", of: (p) => p.pass.speed_m_s * 1e3, count: regulated(WITHIN.speed) },
+  { name: "normal force, N", of: (p) => p.pass.normal_force_n, count: regulated(WITHIN.force) },
+  { name: "position, mm", of: (p) => p.pass.position_m * 1e3, count: (values) => new Set(values.map((v) => Math.round(v / 10))).size },
 ];
 
 function runPage(name, control) {
@@ -180,11 +177,12 @@ function runPage(name, control) {
   }
   const plots = el("div", { class: "plots" });
   const events = el("ol", { class: "events", tabindex: "0", "aria-label": "Events" });
+  const passes = el("h2", {}, "Passes");
   const rows = el("tbody");
   const head = (text) => el("th", { scope: "col", class: "n" }, text);
   const table = el("div", { class: "scroll passes", tabindex: "0", role: "region", "aria-label": "Passes" }, el("table", {},
     el("thead", {}, el("tr", {}, ...["point", "w, um", "f, kHz", "U, mm/s", "load, N", "\u03bc'", "predicted", "difference", "surprise, sd"].map(head))), rows));
-  main.replaceChildren(title, about, keys, said, trip, now, plots, el("h2", {}, "Events"), events, el("h2", {}, "Passes"), table);
+  main.replaceChildren(title, about, keys, said, trip, now, plots, el("h2", {}, "Events"), events, passes, el("p", { class: "note" }, "Difference: measured less predicted \u03bc'. Surprise: the force against what the model lets expect after the passes before, which have corrected its stiffnesses and \u03bc\u2080. The two can differ in sign."), table);
 
   const figures = {
     forces: figure(plots, "Forces"), mu: figure(plots, "Relative friction now"), w: figure(plots, "Relative friction against amplitude"),
@@ -232,27 +230,29 @@ function runPage(name, control) {
 
   function drawPasses() {
     const compared = picture.passes.filter((p) => p.comparison && p.comparison.mu_relative != null && p.pass.amplitude > 0);
-    const speedOf = (p) => (p.pass.speed_m_s * 1e3).toPrecision(2);
-    const speeds = [...new Set(compared.map(speedOf))].sort((a, b) => a - b);
+    const speed = (p) => p.pass.speed_m_s * 1e3;
+    const speeds = levels(compared.map(speed), WITHIN.speed);
     // Speeds beyond the last mark share it, and the key says so: no mark stands for a speed that is not its own.
-    const series = (speed) => SERIES[Math.min(speeds.indexOf(speed), SERIES.length - 1)];
-    const place = (x) => (p) => ({ x: x(p), y: p.comparison.mu_relative, sd: p.comparison.mu_relative_sd, predicted: p.comparison.predicted, predicted_sd: p.comparison.predicted_sd, ...series(speedOf(p)) });
-    const key = SERIES.map((one) => [one.name, speeds.filter((speed) => series(speed) === one).map(Number)])
-      .filter(([, of]) => of.length).map(([mark, of]) => `${mark}: ${of.join(", ")} mm/s`).join("; ");
-    const tail = "Strokes: predicted, with twice its standard uncertainty.";
+    const mark = (index) => SERIES[Math.min(index, SERIES.length - 1)];
+    const place = (x) => (p) => ({ x: x(p), y: p.comparison.mu_relative, sd: p.comparison.mu_relative_sd, predicted: p.comparison.predicted, predicted_sd: p.comparison.predicted_sd, ...mark(speeds.index(speed(p))) });
+    const key = SERIES.map((one) => [one.name, speeds.names.filter((_, i) => mark(i) === one)])
+      .filter(([, of]) => of.length).map(([name, of]) => `${name}: ${of.join(", ")} mm/s`).join("; ");
+    const tail = "All frequencies and loads. Strokes: predicted, with twice its standard uncertainty.";
     charts.w.set(compared.map(place((p) => p.pass.amplitude * 1e6)));
     figures.w.say(compared.length ? `${compared.length} passes; ${key}. ${tail}` : "No pass with vibration yet.");
     const known = compared.filter((p) => p.psi_eq17 != null);
     charts.psi.set(known.map(place((p) => p.psi_eq17)));
     figures.psi.say(known.length ? `${known.length} passes; ${key}. ${tail}` : "No pass with a \u03a8 yet: it needs vibration and a friction without it.");
     const judged = compared.filter((p) => Number.isFinite(p.comparison.z));
-    const factor = FACTORS.reduce((best, one) => (levels(judged, one) > levels(judged, best) ? one : best), FACTORS[0]);
+    const count = (factor) => factor.count(judged.map(factor.of));
+    const factor = FACTORS.reduce((best, one) => (count(one) > count(best) ? one : best), FACTORS[0]);
     charts.map.set(judged.map((p) => {
       const z = p.comparison.z;
       return { x: p.pass.amplitude * 1e6, y: factor.of(p), kind: 0, size: 2 + 2.2 * Math.min(Math.abs(z), 5), hollow: z < 0, faint: true, colour: z < 0 ? "--b" : "--a" };
     }), factor.name);
     const worst = judged.reduce((w, p) => (w && Math.abs(w.comparison.z) >= Math.abs(p.comparison.z) ? w : p), null);
-    figures.map.say(worst ? `Filled: more friction than the model and the passes before let expect; hollow: less; the larger, the more standard deviations. Largest: ${signed(worst.comparison.z, 1)} at point ${worst.pass.point}.` : "No pass was judged yet.");
+    figures.map.say(worst ? `Filled: more friction than the model and the passes before let expect; hollow: less; the larger, the more standard deviations (all alike from 5 on). Largest: ${signed(worst.comparison.z, 1)} at point ${worst.pass.point}.` : "No pass was judged yet.");
+    passes.textContent = picture.passes.length > 200 ? `The last 200 of ${picture.passes.length} passes` : "Passes";
     rows.replaceChildren(...picture.passes.slice(-200).reverse().map((p) => {
       const c = p.comparison;
       return el("tr", {}, ...[String(p.pass.point), fixed(p.pass.amplitude * 1e6, 3), fixed(p.pass.frequency_hz / 1e3, 2), signed(p.pass.speed_m_s * (p.pass.direction ?? 1) * 1e3, 1), fixed(p.pass.normal_force_n, 3), fixed(c?.mu_relative, 3), fixed(c?.predicted, 3), signed(c?.mu_relative == null ? null : c.mu_relative - c.predicted, 3), signed(c?.z, 1)].map((text) => el("td", { class: "n" }, text)));
@@ -271,8 +271,8 @@ function runPage(name, control) {
     const last = picture.states.at(-1);
     const ended = picture.ended;
     state.textContent = ended ? (ended.outcome?.outcome ?? "failed").replaceAll("_", " ") : picture.trip ? "tripped" : picture.paused ? "paused" : last?.armed ? "armed" : last ? "not armed" : "waiting";
-    stop.disabled = Boolean(ended);
-    pause.disabled = Boolean(ended) || Boolean(run?.fast);
+    stop.hidden = pause.hidden = Boolean(ended);
+    pause.disabled = Boolean(run?.fast);
     pause.textContent = picture.paused ? "Go on" : "Pause";
     const lines = [picture.trip?.words, ended?.error, ended && !picture.trip && ended.outcome?.outcome !== "stopped" ? ended.remedy : null, ended?.off ?? picture.off, ended?.agreement].filter(Boolean);
     const key = lines.join("\n");
