@@ -97,6 +97,6 @@ mod tests {
 
     #[test]
     fn a_level_holds_what_is_near_its_least() {
-        assert_eq!(levels(&[2.0, 1.0, 1.05, 1.2, 0.0, 2.1, 0.0], 1.1), [4, 2, 2, 3, 1, 4, 1]);
+        assert_eq!(levels(&[2.0, 1.0, 1.05, 1.2, 0.0, 2.1, 0.0], 1.1), [3, 1, 1, 2, 0, 3, 0]);
     }
 }
