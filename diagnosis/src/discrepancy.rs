@@ -213,6 +213,11 @@ impl Discrepancy {
         }
     }
 
+    /// Where it has the nuisances, in their prior deviations.
+    pub fn nuisances(&self) -> &[f64] {
+        &self.weights.as_slice()[2 * self.kernel.rank()..]
+    }
+
     /// Expected lateral forces at other conditions (N), the rows of the smooth part there, and the sizes on
     /// which a departure is measured (N).
     fn expected(&self, problem: &Problem, passes: &[Condition]) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {

@@ -6,6 +6,7 @@ use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::gaussian::log_sum_exp;
 use crate::kernel::{Coordinates, Kernel};
+use crate::layout::NUISANCES;
 use crate::noise::{PureError, variance};
 use crate::scatter::Scatter;
 use crate::structure::Structure;
@@ -115,24 +116,30 @@ impl Fitted {
         let count = self.tried.max(1) as f64;
         let pair_count = (count * (count - 1.0) / 2.0).max(1.0);
         let beside = |evidence: f64| (evidence - none) / k.temper;
+        // What the calibration says of stiffnesses and mu_0 is a prior, and a prior is not tempered: a baseline
+        // that needs a stiffness far from its certificate pays for that in full.
+        let pull = |nuisances: &[f64]| 0.5 * nuisances.iter().map(|u| u * u).sum::<f64>();
+        let own = pull(&self.none.u[..NUISANCES]);
+        let spared = |nuisances: &[f64]| (1.0 - 1.0 / k.temper) * (own - pull(nuisances));
+        let weight = |c: &Candidate| beside(c.log_evidence) + spared(&c.best.u[..NUISANCES]);
+        let smooth = beside(smooth) + spared(self.discrepancy.nuisances());
         // A structure's nats are those of a p-value, which no law enters.
         let rough = self.structure.as_ref().map_or(f64::NEG_INFINITY, Structure::nats);
         let share = k.structure_share;
         let sudden = shapes::nats(&self.shapes) / k.temper;
-        let parts = [(beside(smooth), 1.0 - share), (rough, 0.5 * share), (sudden, 0.5 * share)];
+        let parts = [(smooth, 1.0 - share), (rough, 0.5 * share), (sudden, 0.5 * share)];
         let open = log_sum_exp(&parts.map(|(nats, share)| nats + share.ln()));
         let prior_of = |c: &Candidate| {
             if c.effects.len() == 1 { k.prior_single / count } else { k.prior_pair / pair_count }
         };
-        let mut all: Vec<f64> =
-            self.candidates.iter().map(|c| beside(c.log_evidence) + prior_of(c).ln()).collect();
+        let mut all: Vec<f64> = self.candidates.iter().map(|c| weight(c) + prior_of(c).ln()).collect();
         let (no_gap, unknown) = (k.prior_null.ln(), open + k.prior_open.ln());
         all.extend([no_gap, unknown]);
         let total = log_sum_exp(&all);
         // The rest of each hypothesis' weight is no gap's: see `log_shown_share`.
         let mut rest = 1.0;
         for (c, v) in self.candidates.iter_mut().zip(&all) {
-            c.log_probability = v - total + log_shown_share(beside(c.log_evidence), 0.0);
+            c.log_probability = v - total + log_shown_share(weight(c), 0.0);
             c.probability = c.log_probability.exp();
             rest -= c.probability;
         }

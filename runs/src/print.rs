@@ -174,6 +174,11 @@ fn put(output: usize, piece: Piece, first: bool) {
 /// # Errors
 /// The system gives no thread.
 pub fn beside() -> io::Result<()> {
+    // A second run of this process goes on with the threads of the first.
+    let had = outlets().is_some();
+    if had {
+        return Ok(());
+    }
     outlets().get_or_insert_default();
     for (output, name) in [(OUT, "standard output"), (ERR, "standard error")] {
         let thread = std::thread::Builder::new().name(name.into()).spawn(move || write_on(output));

@@ -106,6 +106,9 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
     let job = job(&args)?;
     // An address that is taken is a refusal: nothing was touched yet, and nobody was told of a run.
     job.points()?;
+    if !job.fast {
+        super::tell_beside(&job.out)?;
+    }
     let runs = job.out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let watching = Watching::begin(&mut args, runs)?;
     super::exit(if measure(job, &watching, json)? { super::DONE } else { super::FAILED })
