@@ -116,8 +116,8 @@ impl Fitted {
         let count = self.tried.max(1) as f64;
         let pair_count = (count * (count - 1.0) / 2.0).max(1.0);
         let beside = |evidence: f64| (evidence - none) / k.temper;
-        // What the calibration says of stiffnesses and mu_0 is a prior, and a prior is not tempered: a baseline
-        // that needs a stiffness far from its certificate pays for that in full.
+        // What the calibration says of the nuisances is a prior, and a prior is not tempered: a baseline that
+        // needs a stiffness far from its certificate pays for that in full.
         let pull = |nuisances: &[f64]| 0.5 * nuisances.iter().map(|u| u * u).sum::<f64>();
         let own = pull(&self.none.u[..NUISANCES]);
         let spared = |nuisances: &[f64]| (1.0 - 1.0 / k.temper) * (own - pull(nuisances));
