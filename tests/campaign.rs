@@ -84,7 +84,7 @@ fn answers_are_right_on_three_natures() {
                 count(Answer::Contradicted),
                 count(Answer::Undecided)
             );
-            // Known without any campaign: the ratchet's dependences, and whether there is air under the finger.
+            // Known without any campaign: the ratchet's dependences, and whether a film of air is there.
             let known = match *name {
                 "amplitude" | "frequency" | "speed" | "mu_0" => Some(Answer::Supported),
                 "ambient pressure" if nature == "squeeze film" => Some(Answer::Contradicted),
