@@ -133,6 +133,8 @@ fn a_campaign_is_taken_up_where_it_was_left() {
     let sessions: Vec<_> =
         std::fs::read_dir(at("made/sessions")).unwrap().map(|e| e.unwrap().path()).collect();
     std::fs::remove_dir_all(&sessions[1]).unwrap();
+    let (_, _, told) = run(&["report", "made"]);
+    assert!(told.contains("3 of 4 sessions") && told.contains("repeat the command"), "{told}");
     let (status, _, told) = run(&["run", "made", "--fast"]);
     assert_eq!(status, Some(0), "{told}");
     assert_eq!(told.matches("session ").count(), 1, "{told}");

@@ -21,14 +21,14 @@ pub struct Args {
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.run, "run")?;
     if args.run.join(runs::campaign::FILE).is_file() {
-        let (claims, made) = super::run::campaign::write(&args.run)?;
+        let (claims, made, planned) = super::run::campaign::write(&args.run)?;
         if json {
             out!(
                 "{}",
                 serde_json::json!({ "report": args.run.join(super::run::campaign::PAGE), "claims": claims })
             );
         } else {
-            super::run::campaign::tell(&claims, made, made, &args.run);
+            super::run::campaign::tell(&claims, made, planned, &args.run);
         }
         return super::exit(super::DONE);
     }

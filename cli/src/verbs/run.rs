@@ -104,7 +104,7 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
         return campaign::run(args, &text, &folder, json);
     }
     let job = job(&args)?;
-    // An address that is taken is a refusal: nothing was touched yet, and nobody was told of a run.
+    // An address that is taken is a refusal: nothing was touched yet.
     job.points()?;
     if !job.fast {
         super::tell_beside(&job.out)?;

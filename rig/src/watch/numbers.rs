@@ -56,7 +56,7 @@ pub fn of_state(view: &View) -> Vec<(&'static str, String)> {
         return [vec![("rig", "none: the run is over".into())], last_pass(view)].concat();
     }
     let Some(s) = view.states.back() else {
-        return [vec![("rig", "none: no cycle was told".into())], last_pass(view)].concat();
+        return [vec![("rig", "none: no cycle was received".into())], last_pass(view)].concat();
     };
     // A running mu' is there while a pass slides only.
     let slides = matches!(s.phase, Phase::Settle | Phase::Measure);

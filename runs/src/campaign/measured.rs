@@ -6,6 +6,7 @@
 
 use super::Session;
 use crate::fingertip::Kind;
+use crate::report::levels::Levels;
 use crate::sequence::MeasuredPass;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
@@ -24,8 +25,8 @@ pub const FACTORS: [&Covariate; 5] = [
     &covariate::NORMAL_FORCE,
     &covariate::AMBIENT_PRESSURE,
 ];
-/// Values whose neighbours differ by less than this share are one level.
-const LEVEL: f64 = 0.08;
+/// Values within this share of the least of a level belong to it.
+const LEVEL: f64 = 0.1;
 
 /// A pass with vibration.
 #[derive(Clone, Copy, Debug)]
@@ -159,22 +160,13 @@ pub fn ends(values: &[f64]) -> [f64; 2] {
     values.iter().fold(start, |[l, h], v| [l.min(*v), h.max(*v)])
 }
 
-/// The levels of a factor: the least value of each.
-fn levels(factor: &Covariate, driven: &[Driven]) -> Vec<f64> {
-    let mut values: Vec<f64> = driven.iter().filter_map(|d| factor.of(&d.condition)).collect();
-    values.sort_by(f64::total_cmp);
-    let begins = |i: usize| i == 0 || values[i] > values[i - 1] * (1.0 + LEVEL);
-    (0..values.len()).filter(|i| begins(*i)).map(|i| values[i]).collect()
-}
-
 /// Passes at equal settings of all other factors, by those settings and the level of this one.
 pub fn groups(factor: &Covariate, driven: &[Driven]) -> BTreeMap<Vec<usize>, BTreeMap<usize, Vec<Driven>>> {
-    let all: Vec<Vec<f64>> = FACTORS.iter().map(|f| levels(f, driven)).collect();
+    let levels = |f: &&Covariate| Levels::of(driven.iter().filter_map(|d| f.of(&d.condition)), LEVEL);
+    let all: Vec<Levels> = FACTORS.iter().map(levels).collect();
     let mut groups = BTreeMap::<Vec<usize>, BTreeMap<usize, Vec<Driven>>>::new();
     for pass in driven {
-        let place = |i: usize| {
-            FACTORS[i].of(&pass.condition).map_or(0, |v| all[i].partition_point(|level| *level <= v))
-        };
+        let place = |i: usize| FACTORS[i].of(&pass.condition).map_or(0, |v| all[i].index(v));
         let own = FACTORS.iter().position(|f| f.name == factor.name).unwrap_or(0);
         let others = (0..FACTORS.len()).filter(|i| *i != own).map(place).collect();
         if factor.of(&pass.condition).is_some() {

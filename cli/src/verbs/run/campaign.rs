@@ -69,7 +69,7 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
             break;
         }
     }
-    let (claims, made) = write(&out)?;
+    let (claims, made, _) = write(&out)?;
     if json {
         out!(
             "{}",
@@ -83,18 +83,18 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
     crate::verbs::exit(if whole { crate::verbs::DONE } else { crate::verbs::FAILED })
 }
 
-/// Writes the page of a campaign's folder, and its answers as JSON beside it; gives the answers and the
-/// sessions they rest on.
+/// Writes the page of a campaign's folder, and its answers as JSON beside it; gives the answers, the
+/// sessions that they rest on, and how many are planned.
 ///
 /// # Errors
 /// A folder that holds no campaign, or cannot be written.
-pub fn write(folder: &Path) -> miette::Result<(Vec<Claim>, usize)> {
+pub fn write(folder: &Path) -> miette::Result<(Vec<Claim>, usize, usize)> {
     let (file, made) = campaign::measured(folder)?;
     let (html, claims) = campaign::page(&file, &made)?;
     runs::files::write_plain(&folder.join(PAGE), html)?;
     let answers = serde_json::to_vec_pretty(&claims).into_diagnostic()?;
     runs::files::write_plain(&folder.join("claims.json"), answers)?;
-    Ok((claims, made.len()))
+    Ok((claims, made.len(), campaign::sessions(&file).len()))
 }
 
 /// The answers for a person.
