@@ -1,5 +1,6 @@
-//! Listeners that take nothing: a terminal that stands still, a pipe that is full or closed, viewers that are slow or deaf, a broker
-//! that is dead. A sweep is kept whole, is read back off and ends all the same; and what a person must know goes every way.
+//! Listeners that take nothing: a terminal that stands still, a pipe that is full or closed, viewers that are
+//! slow or deaf, a broker that is silent, and a disk that is slow. A sweep is kept whole, is read back off
+//! and ends all the same; and what a person must know goes every way.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -8,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tests::served::{self, AmplifierWatch, ServedRig};
-use tests::{muprime, unhurried};
+use tests::{muprime, rounds, unhurried};
 use wall::{cut_by_a_stall, unless_the_machine_stalls, wait_until};
 
 /// No sweep here takes a tenth of it: one that still runs then waits for somebody.
@@ -64,15 +65,30 @@ fn closed_pipe() -> Stdio {
 
 /// A sweep on the virtual rig, in wall-clock time.
 fn sweep(folder: &Path, out: &Path, more: &[&str]) -> Command {
-    std::fs::write(folder.join("plan.toml"), PLAN).unwrap();
     let mut command = muprime();
+    arguments(&mut command, folder, out, more);
+    command
+}
+
+/// The same on a disk that takes 50 ms to confirm that bytes are safe: `strace` delays the two calls, and
+/// stops no thread that makes neither.
+fn sweep_on_a_slow_disk(folder: &Path, out: &Path, more: &[&str]) -> Command {
+    let mut command = Command::new("strace");
+    command.args(["-f", "--seccomp-bpf", "-qq", "-o"]).arg(out.with_extension("strace"));
+    command.args(["-e", "trace=fsync,fdatasync", "-e", "inject=fsync,fdatasync:delay_enter=50000"]);
+    command.arg(muprime().get_program());
+    arguments(&mut command, folder, out, more);
+    command
+}
+
+fn arguments(command: &mut Command, folder: &Path, out: &Path, more: &[&str]) {
+    std::fs::write(folder.join("plan.toml"), PLAN).unwrap();
     command.args(more).arg("run").arg(folder.join("plan.toml"));
     command
         .args(["--setup", &unhurried("virtual-ideal", folder), "--out"])
         .arg(out)
         .env("MUPRIME_RUNS", folder);
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    command
 }
 
 /// Waits for the end of a program, which waits for nobody.
@@ -105,12 +121,16 @@ fn is_whole(out: &Path, what: &str) {
 }
 
 /// One sweep with listeners of a kind, which `begin` starts; tried again where a stall of the machine cut it.
-fn keeps_all(what: &str, begin: impl Fn(&Path, &Path) -> (Child, Box<dyn std::any::Any>)) {
+/// How long it took.
+fn keeps_all(what: &str, begin: impl Fn(&Path, &Path) -> (Child, Box<dyn std::any::Any>)) -> Duration {
     let folder = tempfile::tempdir().unwrap();
+    let took = std::cell::Cell::new(Duration::ZERO);
     unless_the_machine_stalls(|n| {
         let out = folder.path().join(format!("run-{n}"));
+        let began = Instant::now();
         let (mut child, listeners) = begin(folder.path(), &out);
         let status = ended(&mut child, what);
+        took.set(began.elapsed());
         drop(listeners);
         if status == Some(1) && cut_by_a_stall(&out).is_some() {
             return Some(out);
@@ -119,13 +139,117 @@ fn keeps_all(what: &str, begin: impl Fn(&Path, &Path) -> (Child, Box<dyn std::an
         is_whole(&out, what);
         None
     });
+    took.get()
 }
 
+/// Who listens to a run, or keeps it, and takes nothing or little.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Listener {
+    StoppedTerminal,
+    FullPipe,
+    ClosedPipe,
+    SlowViewer,
+    DeafViewer,
+    SilentBroker,
+    SlowDisk,
+}
+
+impl Listener {
+    const ALL: [Listener; 7] = [
+        Listener::StoppedTerminal,
+        Listener::FullPipe,
+        Listener::ClosedPipe,
+        Listener::SlowViewer,
+        Listener::DeafViewer,
+        Listener::SilentBroker,
+        Listener::SlowDisk,
+    ];
+
+    /// The stream that it is the other end of, with what holds that end open; `None` for one that is no
+    /// stream.
+    fn stream(self) -> Option<(Stdio, Box<dyn std::any::Any>)> {
+        match self {
+            Listener::StoppedTerminal => {
+                let (near, far) = terminal(true);
+                Some((far.try_clone().unwrap().into(), Box::new((near, far))))
+            }
+            Listener::FullPipe => {
+                let (reader, writer) = full_pipe();
+                Some((writer.into(), Box::new(reader)))
+            }
+            Listener::ClosedPipe => Some((closed_pipe(), Box::new(()))),
+            _ => None,
+        }
+    }
+}
+
+/// A sweep with two listeners: streams are its standard error, and as documents its standard output.
+fn with_both(pair: [Listener; 2], folder: &Path, out: &Path) -> (Child, Box<dyn std::any::Any>) {
+    let folder = folder.canonicalize().unwrap();
+    let out = folder.join(out.file_name().unwrap());
+    let mut held: Vec<Box<dyn std::any::Any>> = Vec::new();
+    let (mut more, mut streams) = (vec!["--json".to_string()], Vec::new());
+    for listener in pair {
+        streams.extend(listener.stream());
+        match listener {
+            Listener::SlowViewer => held.push(Box::new(viewer(out.clone(), 60))),
+            Listener::DeafViewer => held.push(Box::new(viewer(out.clone(), 0))),
+            Listener::SilentBroker if more.len() == 1 => {
+                let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+                let broker = format!("mqtt://{}/x", silent.local_addr().unwrap());
+                more.extend(["--publish".to_string(), broker]);
+                held.push(Box::new(silent));
+            }
+            _ => {}
+        }
+    }
+    // `--json` belongs before the verb, what is published after it.
+    let (before, after) = more.split_at(1);
+    let before: Vec<&str> = before.iter().map(String::as_str).collect();
+    let make = if pair.contains(&Listener::SlowDisk) { sweep_on_a_slow_disk } else { sweep };
+    let mut command = make(&folder, &out, &before);
+    command.args(after);
+    let mut streams = streams.into_iter();
+    if let Some((stream, end)) = streams.next() {
+        command.stderr(stream);
+        held.push(end);
+    }
+    if let Some((stream, end)) = streams.next() {
+        command.stdout(stream);
+        held.push(end);
+    }
+    (command.spawn().unwrap(), Box::new(held))
+}
+
+/// Each listener beside each, and beside another of its own kind: every pass made is kept, the rig is read
+/// back off, and the sweep ends as one without listeners does. By default each listener in two pairs.
 #[test]
-fn a_terminal_or_a_pipe_that_takes_nothing_holds_up_nothing() {
+fn each_listener_beside_each_holds_up_nothing() {
+    wall::in_wall_clock_time(|| {
+        let all = Listener::ALL;
+        let each: Vec<_> =
+            (0..all.len()).flat_map(|i| (i..all.len()).map(move |j| [all[i], all[j]])).collect();
+        let few = (0..all.len()).map(|i| [all[i], all[(i + 3) % all.len()]]).collect();
+        let pairs = rounds(few, each);
+        let mut slowest = Duration::ZERO;
+        for &pair in &pairs {
+            let what = format!("{pair:?}");
+            let took = keeps_all(&what, |folder, out| with_both(pair, folder, out));
+            println!("{what}: ended after {:.1} s", took.as_secs_f64());
+            slowest = slowest.max(took);
+        }
+        println!(
+            "{} pairs, passes made = passes kept, off read back in all; slowest {slowest:.1?}",
+            pairs.len()
+        );
+    });
+}
+
+/// A terminal that nobody reads, and the picture on one that is stopped.
+#[test]
+fn a_terminal_that_takes_nothing_holds_up_nothing() {
     wall::in_wall_clock_time(|| {
         for (what, stopped, more) in [
-            ("a stopped terminal", true, None),
             ("a terminal that is not read", false, None),
             ("a stopped terminal under a picture", true, Some("--tui")),
         ] {
@@ -136,23 +260,6 @@ fn a_terminal_or_a_pipe_that_takes_nothing_holds_up_nothing() {
                 (child, Box::new((near, far)))
             });
         }
-        for (what, json) in [("a full pipe", false), ("a full pipe of documents", true)] {
-            keeps_all(what, |folder, out| {
-                let (reader, writer) = full_pipe();
-                let more: &[&str] = if json { &["--json"] } else { &[] };
-                let mut command = sweep(folder, out, more);
-                if json {
-                    command.stdout(writer)
-                } else {
-                    command.stderr(writer)
-                };
-                (command.spawn().unwrap(), Box::new(reader))
-            });
-        }
-        keeps_all("closed pipes", |folder, out| {
-            let mut command = sweep(folder, out, &["--json"]);
-            (command.stdout(closed_pipe()).stderr(closed_pipe()).spawn().unwrap(), Box::new(()))
-        });
     });
 }
 
@@ -202,25 +309,8 @@ fn viewer(out: PathBuf, bytes: usize) -> std::thread::JoinHandle<()> {
     })
 }
 
-#[test]
-fn slow_and_deaf_viewers_and_dead_brokers_hold_up_nothing() {
-    wall::in_wall_clock_time(|| {
-        keeps_all("a slow and a deaf viewer", |folder, out| {
-            let folder = folder.canonicalize().unwrap();
-            let out = folder.join(out.file_name().unwrap());
-            let child = sweep(&folder, &out, &[]).spawn().unwrap();
-            (child, Box::new([viewer(out.clone(), 60), viewer(out, 0)]))
-        });
-        keeps_all("a silent broker", |folder, out| {
-            let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-            let broker = format!("mqtt://{}/x", silent.local_addr().unwrap());
-            (sweep(folder, out, &[]).args(["--publish", &broker]).spawn().unwrap(), Box::new(silent))
-        });
-    });
-}
-
-/// An amplifier that stays on: said on standard error, as a document, and to whoever watches, before the end of the run is, while a terminal
-/// that takes nothing hears of it too.
+/// An amplifier that stays on: said on standard error, as a document, and to whoever watches, before the end
+/// of the run is, while a terminal that takes nothing hears of it too.
 #[test]
 fn a_drive_that_is_not_read_back_off_is_said_first_and_every_way() {
     wall::in_wall_clock_time(|| {
