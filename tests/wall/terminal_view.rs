@@ -361,3 +361,68 @@ fn the_page_of_the_docs_is_that_of_a_run() {
     let top = 14;
     assert_eq!(kept[..top], page[..top], "MUPRIME_UPDATE=1 makes it anew");
 }
+
+/// A plan whose moisture a person measures and whose pressure a person sets, on a rig in another process: the operator reads each
+/// request on the terminal and types the answer. A word that is no number and a pressure outside the tolerance are asked for again;
+/// the table holds what was typed.
+#[test]
+fn the_operator_types_what_the_run_needs() {
+    unless_the_machine_stalls(|_| {
+        let folder = tempfile::tempdir().unwrap();
+        let rig = ServedRig::start(5, None);
+        let (plan, file) = files(folder.path(), &rig);
+        let text = timed_plan("air", 0, &[2e-6, 1e-6], [0.1, 0.2]);
+        let more = "ambient_pressure_pa = [101325, 50000]\n[[step]]\nwhen = \"before\"\naction = \"measure_moisture\"\n";
+        std::fs::write(&plan, format!("{text}{more}")).unwrap();
+        let by_hand = "[ambient]\nby_operator = [\"ambient_pressure_pa\"]\n";
+        std::fs::write(&file, format!("{}{by_hand}", setup("served", rig.address))).unwrap();
+        let out = folder.path().join("run");
+        let tmux = Tmux::start(
+            folder.path(),
+            "operator",
+            (160, 50),
+            &[],
+            &["run", &plan, "--setup", &file, "--operator", "Ada", "--out", out.to_str().unwrap()],
+        );
+        let turns: [(&str, usize, &str); 5] = [
+            ("moisture of the skin", 1, "wet"),
+            ("moisture of the skin", 2, "31"),
+            ("set pressure 101", 1, "101200"),
+            ("set pressure 50", 1, "70000"),
+            ("set pressure 50", 2, "50300"),
+        ];
+        for (request, times, answer) in turns {
+            let began = Instant::now();
+            let requested = |screen: &str| {
+                let lines = screen.lines().filter(|l| l.contains("AT THE RIG") && l.contains(request));
+                lines.count() >= times
+            };
+            loop {
+                let screen = tmux.screen();
+                if requested(&screen) {
+                    break;
+                }
+                if screen.contains("STATUS") && cut_by_a_stall(&out).is_some() {
+                    return Some(out);
+                }
+                assert!(began.elapsed().as_secs() < 60, "'{request}' is not on the screen:\n{screen}");
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            tmux.keys(answer);
+            tmux.keys("Enter");
+        }
+        let Some(_) = tmux.shows(&["STATUS"]) else { unreachable!() };
+        if cut_by_a_stall(&out).is_some() {
+            return Some(out);
+        }
+        tmux.given_back(0);
+        let passes = models::pass::read_passes(&std::fs::read(out.join("points.csv")).unwrap()[..]).unwrap();
+        let mut found: Vec<f64> = passes.iter().map(|p| p.ambient_pressure_pa.unwrap()).collect();
+        found.dedup();
+        found.sort_by(f64::total_cmp);
+        assert_eq!(found, [50_300.0, 101_200.0]);
+        let lines = std::fs::read_to_string(out.join("passes.jsonl")).unwrap();
+        assert!(lines.contains("\"operator\"") && lines.contains("31"), "{lines}");
+        None
+    });
+}
