@@ -97,8 +97,8 @@ fn check(points: &[AmplitudePoint], what: &'static str, needed: usize) -> Result
     Ok(())
 }
 
-/// Scatter of amplitudes up to a factor: proportional to them (speckle, drive) above a floor of a fifth of the
-/// largest (noise of the vibrometer).
+/// Scatter of amplitudes up to a factor: proportional to them (speckle, drive) above a floor of a fifth of
+/// the largest (noise of the vibrometer).
 fn relative_scatter(points: &[AmplitudePoint]) -> Vec<f64> {
     let largest = points.iter().fold(0f64, |m, p| m.max(p.amplitude_pp_m));
     points.iter().map(|p| p.amplitude_pp_m.hypot(0.2 * largest)).collect()

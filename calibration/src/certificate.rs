@@ -72,8 +72,8 @@ impl Parameter {
         Parameter { ci95, ..self }
     }
 
-    /// The same with value and interval kept within what the quantity can be, `least` or more. The part that is cut
-    /// off holds no possible value, so the interval covers the truth as often as before; its lower end at `least` says
+    /// The same with value and interval limited to the quantity's possible values, `least` or more. The part
+    /// that is cut off holds no possible value, so the coverage stays the same; a lower end at `least` means
     /// that the data give an upper bound only. The value is then the likelihood's maximum within the range.
     pub fn at_least(self, least: f64) -> Self {
         let ci95 = self.ci95.map(|end| end.max(least));

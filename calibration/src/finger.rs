@@ -234,7 +234,7 @@ enum Ends {
     Free,
     /// The quantity cannot be less.
     AtLeast(f64),
-    /// A profile of the likelihood told them.
+    /// Both limits come from a profile of the likelihood.
     Both([f64; 2]),
 }
 
@@ -246,8 +246,8 @@ struct ModulusFit {
 }
 
 impl ModulusFit {
-    /// Elastic skin where that will do, as the paper has it; otherwise the skin with all three free. Penalty and
-    /// time are parameters only where both ends of their interval were found.
+    /// Elastic skin where that will do, as the paper has it; otherwise the skin with all three free. Penalty
+    /// and time are parameters only where both ends of their interval were found.
     fn of(elastic: &Identified, skin: Option<&IdentifiedSkin>) -> ModulusFit {
         let (value, ci95) = match skin {
             Some(skin) if !skin.elastic_will_do() => (skin.young_modulus_pa.best, skin.young_modulus_pa.ci95),

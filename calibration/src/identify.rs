@@ -1,5 +1,5 @@
-//! Inverse analysis of section 3.3, by Eq. 2: here the stratum corneum's modulus, taken as elastic as the paper
-//! does in the end; in [`skin`] modulus, penalty and retardation time together.
+//! Inverse analysis of section 3.3, by Eq. 2: here the stratum corneum's modulus, taken as elastic as the
+//! paper does in the end; in [`skin`] modulus, penalty and retardation time together.
 //!
 //! The objective is not smooth (contact is lost, periods double), so it is scanned on a fine grid over the
 //! whole range, which is a multi-start of its own, and only then refined in the best valleys. The uncertainty

@@ -60,7 +60,7 @@ pub enum FitError {
         parameters: usize,
     },
     /// Columns of the design depend on each other.
-    #[error("parameter {parameter} (counted from 0) cannot be told from the ones before it on this data")]
+    #[error("parameter {parameter} (counted from 0) cannot be separated from those before it")]
     Singular {
         /// The first column that depends on those before it.
         parameter: usize,

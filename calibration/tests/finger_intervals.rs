@@ -1,5 +1,5 @@
-//! The intervals of the finger's certificate stay within what a stiffness, a loss, a modulus or a time can be, and
-//! still hold the truth as often as they say.
+//! The intervals of the finger's certificate stay within what a stiffness, a loss, a modulus or a time can
+//! be, and still hold the truth as often as they say.
 
 use muprime_calibration::certificate::{Certificate, Instrument, Occasion, Parameter, RawData, Refusal};
 use muprime_calibration::finger::FingerFit;
@@ -60,8 +60,8 @@ fn a_stiffness_and_a_loss_near_zero_have_intervals_that_begin_there() {
     let mut covered = [0u64; 2];
     for trial in 0..TRIALS {
         let mut draw = ChaCha12Rng::seed_from_u64(trial);
-        // No loss at all; the noise is 40 % of the smallest force: the symmetric interval of the loss is half below zero.
-        // A measurement that is refused covers nothing.
+        // No loss at all; the noise is 40 % of the smallest force: the symmetric interval of the loss is half
+        // below zero. A measurement that is refused covers nothing.
         let Some(fit) = measured(stiffness, 0.0, 0.4 * stiffness * 1e-8, &mut draw) else {
             refused += 1;
             continue;

@@ -64,8 +64,8 @@ impl InDoubt {
     }
 }
 
-/// The certificates that rig.toml names and that a remarkable pull puts in doubt. They are not blamed: the finger's own
-/// calibration may be the wrong one.
+/// The certificates that rig.toml names and that a remarkable pull puts in doubt. They are not blamed: the
+/// finger's own calibration may be the wrong one.
 pub fn in_doubt(rig: &RigFile, pulls: &[Pull]) -> Vec<InDoubt> {
     let mut doubts = Vec::new();
     for pull in pulls.iter().filter(|p| p.remarkable()) {

@@ -112,7 +112,7 @@ constants! {
     prior_pair: f64 = 0.07, "Prior probability of two causes, shared evenly by their pairs.", JUDGEMENT;
     prior_open: f64 = 0.07, "Prior probability of the open set.", JUDGEMENT;
     structure_share: f64 = 0.5, "Share of the open set's weight for departures that are sudden, periodic or local.", JUDGEMENT;
-    structure_asked_nats: f64 = 10.0, "Nats behind the best hypothesis up to which no gap is asked for its structure.", NUMERICAL;
+    structure_asked_nats: f64 = 10.0, "Nats behind the best hypothesis up to which the structure of no gap is searched.", NUMERICAL;
     unlisted_share: f64 = 0.1, "Share of the open set's weight for causes of known form that the library does not name.", JUDGEMENT;
     lapse_probability: f64 = 0.02, "Probability that a certificate no longer holds when a table is taken.", "judgement: one certificate in fifty is outdated by a knock or a change";
     mu0_log_sd: [f64; 2] = [0.3, 0.8], "Prior deviation of ln mu0, with passes at w = 0 and without.", "judgement: wide against the 1 % to which such passes give mu0";
@@ -205,7 +205,7 @@ constants! {
     pair_complete_nats: f64 = 20.0, "and raises the log evidence by these nats.", JUDGEMENT;
     pair_departure: f64 = 0.3, "Root mean square share of the gap up to which what a member of a pair leaves alone, with a smooth departure from its form, makes the pair untold from it, where the pair's own forms depart too.", "development: forms of one cause that pairs were named for left up to 0.29 of the gap, true pairs from 0.31 on";
     pair_own_form: f64 = 0.1, "The same where the pair's own forms do not depart.", "development: forms of one cause left nothing";
-    pair_own_form_nats: f64 = 60.0, "Evidence for a pair over a member alone from which the second cause is told all the same, where the pair's own forms do not depart.", "development: pairs named for another form of one cause had 43 and 58 nats";
+    pair_own_form_nats: f64 = 60.0, "Evidence for a pair over a member alone from which the second cause is named all the same, where the pair's own forms do not depart.", "development: pairs named for another form of one cause had 43 and 58 nats";
     pair_pull_chi2: f64 = 50.0, "Or: chi2 by which it frees the nuisances.", "development: true single causes pull them by up to 30, a gain that hides in a stiffness by hundreds";
 
     }
@@ -213,7 +213,7 @@ constants! {
     folds: usize = 5, "Parts that are held out in turn.", "Hastie, Tibshirani & Friedman 2009, sec. 7.10: five or ten";
     resamples: usize = 400, "Resamples of the bootstrap.", "numerical: Efron & Tibshirani 1993";
     gapless_sd: f64 = 2.0, "Deviations of the mean square's scatter within which held-out passes show no gap to shrink.", "two standard deviations";
-    misstated: f64 = 1.25, "Factor from which a statement of repeatability is said to be wrong.", JUDGEMENT;
+    misstated: f64 = 1.25, "Factor from which a statement of repeatability is reported as wrong.", JUDGEMENT;
     stands_out_sd: f64 = 2.0, "Deviations of a pass by which the gap at a condition must stand out.", "two standard deviations";
     least_contraction: f64 = 0.05, "Least contraction of the prior variance before a pull of a stiffness is stated.", JUDGEMENT;
 

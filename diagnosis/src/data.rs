@@ -80,8 +80,8 @@ pub struct Table {
     pub lateral: Vec<f64>,
     /// Run of each pass, numbered in the order of appearance.
     pub runs: Vec<usize>,
-    /// Number of runs that the table tells apart; of conditions to predict, the number of runs of the table that was diagnosed:
-    /// runs from this number on are new.
+    /// Number of runs that the table tells apart; of conditions to predict, the number of runs of the table
+    /// that was diagnosed: runs from this number on are new.
     pub run_count: usize,
     /// Reference scales.
     pub design: Design,
@@ -93,22 +93,22 @@ impl Table {
     /// # Errors
     /// Fewer than 12 passes, values that no pass can have, points or readings that stand twice.
     pub fn measured(passes: &[Pass]) -> Result<Self, DataError> {
-        let kept: Vec<&Pass> = passes.iter().filter(|p| p.lateral_force_n.is_some()).collect();
-        if kept.len() < 12 {
-            return Err(DataError::TooFew(kept.len()));
+        let measured: Vec<&Pass> = passes.iter().filter(|p| p.lateral_force_n.is_some()).collect();
+        if measured.len() < 12 {
+            return Err(DataError::TooFew(measured.len()));
         }
-        if let Some([first, second]) = read_twice(&kept) {
+        if let Some([first, second]) = read_twice(&measured) {
             return Err(DataError::DoubleReading(first, second));
         }
-        let table = Self::build(kept, None)?;
+        let table = Self::build(measured, None)?;
         if table.is_unsigned() {
             return Err(DataError::Unsigned);
         }
         Ok(table)
     }
 
-    /// Whether lateral forces are magnitudes: of one sign in both directions, and as large in one as in the other. An offset that
-    /// hides the turn of friction makes the two differ by far.
+    /// Whether lateral forces are magnitudes: of one sign in both directions, and as large in one as in the
+    /// other. An offset that hides the turn of friction makes the two differ by far.
     fn is_unsigned(&self) -> bool {
         let of = |forward: bool| -> Vec<f64> {
             let rows = self.passes.iter().zip(&self.lateral);
@@ -288,8 +288,8 @@ pub struct Origin {
     design: Design,
 }
 
-/// Passes in each direction from which signs are judged, the share of one sign, and the ratio of mean forces within which
-/// both directions are as large.
+/// Passes in each direction from which signs are judged, the share of one sign, and the ratio of mean forces
+/// within which both directions are as large.
 const FEWEST_OF_A_DIRECTION: usize = 4;
 const ONE_SIGN: f64 = 0.95;
 const AS_LARGE: f64 = 1.4;
@@ -304,7 +304,7 @@ const LARGEST_RATIO: f64 = 100.0;
 pub fn check(p: &Pass) -> Result<(), DataError> {
     let refuse = |column, value, needed| Err(DataError::BadValue { point: p.point, column, value, needed });
     let condition = p.condition(1.0);
-    for c in covariate::TOLD {
+    for c in covariate::COVARIATES {
         let Some(value) = c.of(&condition) else { continue };
         if c.scale == Scale::Log && value.is_nan() | (value <= 0.0) {
             return refuse(c.name, value, "a finite number above zero");

@@ -1,4 +1,4 @@
-//! Which: from probabilities to a verdict, with what cannot be told apart said so.
+//! Which: from probabilities to a verdict, with the causes that the data cannot separate.
 
 use crate::evidence::{Posterior, laplace};
 use crate::fitted::{Candidate, Fitted};
@@ -14,7 +14,7 @@ pub enum Verdict {
     NoGap,
     /// One effect, or one pair, causes most of the gap.
     Named,
-    /// The leading hypotheses cannot be told apart on this table.
+    /// The table cannot separate the leading hypotheses.
     Ambiguous,
     /// No effect of the library causes most of the gap.
     Unknown,
@@ -81,7 +81,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     let mut class = alias_class(fitted, leader);
     let departed = departed_singles(fitted, leader);
     let alone = k.alone_share[usize::from(candidates[leader].effects.len() > 1)];
-    // Priors alone make no name: a rival whose forces are the same must be told apart by the data.
+    // Priors alone make no name: a rival whose forces are the same must differ in the data.
     let distinct = imitated(&candidates[leader].names()).is_none()
         && class[1..].iter().all(|&i| !same_said(fitted, leader, i))
         && departed.is_empty();
@@ -99,9 +99,9 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     Decision { verdict, none, unknown, probabilities, class, gate: judged, regions }
 }
 
-/// The leader on the left-out regions. Of its laws that the evidence does not tell apart the one that predicts best what it has not
-/// seen stands for the cause: which of them is a tenth of a nat ahead is no ground to doubt the cause.
-/// Where no gap is claimed there is nothing to choose for.
+/// The leader on the left-out regions. Of its laws that the evidence does not tell apart the one that
+/// predicts best what it has not seen stands for the cause: which of them is a tenth of a nat ahead is no
+/// ground to doubt the cause. Where no gap is claimed there is nothing to choose for.
 fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Gate) {
     let k = fitted.problem.constants.clone();
     let own = &fitted.candidates[leader];
@@ -139,10 +139,10 @@ fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
     class
 }
 
-/// The members of a leading pair that alone might be it, with a form of their own: a smooth departure from the library's, as large as
-/// forms are known to depart, leaves next to nothing of the gap. That is enough where the pair's own forms depart too; where
-/// they do not, the evidence for the second cause must be small besides. A second cause is then not told from
-/// another form of the first.
+/// Members of a leading pair that may be the only cause, with a form of their own. A smooth departure from
+/// the library's form, as large as known forms depart, then leaves next to nothing of the gap. That is enough
+/// if the pair's own forms depart too. If they do not, the evidence for the second cause must be small as
+/// well: such a second cause cannot be separated from another form of the first.
 fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
     let candidates = &fitted.candidates;
     let (k, own) = (&*fitted.problem.constants, &candidates[leader]);
@@ -193,8 +193,8 @@ fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
     b.u.len() <= a.u.len() && apart < fitted.problem.constants.same_forces_chi2
 }
 
-/// A pair that says little more than one of its members alone is that single with a form of its own: its weight goes
-/// to such members, and to singles that do better than they, in proportion to their evidence.
+/// A pair that says little more than one of its members alone is that single with a form of its own: its
+/// weight goes to such members, and to singles that do better than they, in proportion to their evidence.
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     let problem = &fitted.problem;
     let k = &problem.constants;

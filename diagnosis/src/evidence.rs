@@ -236,8 +236,8 @@ fn equations(
     (hessian, gradient)
 }
 
-/// Largest share by which a hypothesis may depart from its form. Of two causes the stricter one sets it: else a companion
-/// that does nothing frees the other.
+/// Largest share by which a hypothesis may depart from its form. Of two causes the stricter one sets it: else
+/// a companion that does nothing frees the other.
 fn largest_share(members: &[Member]) -> f64 {
     members.iter().map(Member::departs_by).fold(f64::INFINITY, f64::min)
 }
@@ -283,8 +283,8 @@ mod tests {
     use crate::kernel::{Coordinates, Kernel, form_lengths};
     use crate::least_squares::minimise;
 
-    /// Without a gap a law can gain no more than its best size does: at size zero its shapes change nothing, and a volume
-    /// that nothing limits must not count for it.
+    /// Without a gap a law can gain no more than its best size does: at size zero its shapes change nothing,
+    /// and a volume that nothing limits must not count for it.
     #[test]
     fn a_law_without_effect_gains_nothing() {
         let table = table(&mut Deviates(11), 0.0);

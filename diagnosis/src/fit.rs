@@ -19,8 +19,8 @@ const FARTHEST_NUISANCE: f64 = 40.0;
 const HALF_LN_2PI: f64 = 0.918_938_533_204_672_8;
 /// Least guess of mu0 where no pass has the plate still.
 const LEAST_MU0: f64 = 0.05;
-/// Certified deviations below this share of a law's own prior are taken as this: closer to exact than any table can tell,
-/// and still a number to divide by.
+/// Certified deviations below this share of a law's own prior are taken as this: closer to exact than any
+/// table can tell, and still a number to divide by.
 const EXACT: f64 = 1e-6;
 
 /// The data of a fit: passes, forces and their variances; a subset of a table where rows were left out.
@@ -32,8 +32,8 @@ pub struct Problem {
     pub lateral: Vec<f64>,
     /// Variances of the lateral forces, N^2: of what each pass has by itself.
     pub variance: Vec<f64>,
-    /// Scatter that passes have in common, N: independent standard deviates times these columns (shifts of runs, slow parts of
-    /// a serial correlation). No columns where passes scatter independently.
+    /// Scatter that passes have in common, N: independent standard deviates times these columns (shifts of
+    /// runs, slow parts of a serial correlation). No columns where passes scatter independently.
     pub common: DMatrix<f64>,
     /// Scales of the table.
     pub design: Design,
@@ -49,9 +49,9 @@ pub struct Problem {
     pub constants: Arc<Constants>,
 }
 
-/// Instrument errors that no table of passes tells from another baseline, with the logarithmic change of the baseline's
-/// parameters that each is. What a certificate leaves open of them is part of the recalibration; without a certificate the
-/// instrument is taken at its word, and a pull of the stiffnesses is the only sign.
+/// Instrument errors that no table of passes tells from another baseline, with the logarithmic change of the
+/// baseline's parameters that each is. What a certificate leaves open of them is part of the recalibration;
+/// without a certificate the instrument is taken at its word, and a pull of the stiffnesses is the only sign.
 fn gains_within_the_baseline() -> impl Iterator<Item = (CertifiedKey, [f64; NUISANCES])> {
     library()
         .iter()

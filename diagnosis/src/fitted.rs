@@ -70,7 +70,7 @@ impl Candidate {
 pub struct Fitted {
     /// The problem with its settled variances.
     pub problem: Problem,
-    /// What the replicates said.
+    /// What the replicates show.
     pub pure: PureError,
     /// What the table says about its own scatter.
     pub scatter: Scatter,

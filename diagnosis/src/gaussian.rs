@@ -71,8 +71,8 @@ impl Covariance {
         self.inner.solve(&(self.whitened.transpose() * r))
     }
 
-    /// Variance of the smooth part at a row of `Phi`, given the data. The row may be shorter than the table's: what it leaves
-    /// out (shifts of runs) is not there.
+    /// Variance of the smooth part at a row of `Phi`, given the data. The row may be shorter than the
+    /// table's: what it leaves out (shifts of runs) is not there.
     pub fn posterior_variance(&self, row: &DVector<f64>) -> f64 {
         let row = row.clone().resize_vertically(self.whitened.ncols(), 0.0);
         row.dot(&self.inner.solve(&row))
@@ -93,8 +93,8 @@ impl Covariance {
     }
 }
 
-/// A covariance `I + Phi S S Phi'` of whitened data for scales `S` of the columns, from products that stay the same for all
-/// scales.
+/// A covariance `I + Phi S S Phi'` of whitened data for scales `S` of the columns, from products that stay
+/// the same for all scales.
 pub struct Scaled {
     factor: Cholesky<f64, Dyn>,
     active: Vec<usize>,
@@ -133,8 +133,8 @@ impl Scaled {
         all
     }
 
-    /// Share of each row's variance that the other rows and columns explain, of whitened columns `phi`: the diagonal of
-    /// `Phi S (I + S Phi' Phi S)^-1 S Phi'`.
+    /// Share of each row's variance that the other rows and columns explain, of whitened columns `phi`: the
+    /// diagonal of `Phi S (I + S Phi' Phi S)^-1 S Phi'`.
     pub fn leverage(&self, phi: &DMatrix<f64>) -> Vec<f64> {
         let mut rows = phi.select_columns(self.active.iter());
         for (mut column, &j) in rows.column_iter_mut().zip(&self.active) {

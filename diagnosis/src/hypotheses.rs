@@ -30,7 +30,7 @@ pub struct Options {
     pub pairs: bool,
     /// Effects that are left out of the library (for leave-one-effect-out tests).
     pub without: Vec<String>,
-    /// Who is told how far it is.
+    /// Receives the progress of the diagnosis.
     pub progress: Progress,
 }
 
@@ -181,8 +181,8 @@ fn certified(effect: &dyn Effect, rig: &RigFile) -> Option<String> {
     ))
 }
 
-/// The members of the best pairs once more, each from where the pair has it: a single cause that was sought in vain must not
-/// lose to a pair of which the second member does nothing.
+/// The members of the best pairs once more, each from where the pair has it: a single cause that was sought
+/// in vain must not lose to a pair of which the second member does nothing.
 fn sought_again(problem: &Problem, singles: &mut [Candidate], pairs: &[Candidate], search: &Search<'_>) {
     let mut ahead: Vec<&Candidate> =
         pairs.iter().filter(|p| p.log_evidence > singles[0].log_evidence).collect();

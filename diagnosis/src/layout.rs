@@ -1,5 +1,5 @@
-//! Where a hypothesis keeps what in its vector of coordinates: the baseline's parameters first, then each effect's own, the
-//! size before the shapes.
+//! Where a hypothesis keeps what in its vector of coordinates: the baseline's parameters first, then each
+//! effect's own, the size before the shapes.
 
 use crate::member::Member;
 use std::ops::Range;

@@ -82,8 +82,8 @@ pub fn minimise(
     Fit { u, prediction: m, cost }
 }
 
-/// Carries a Jacobian along with a step by the least change that agrees with it (Broyden 1965): a computed one costs a prediction a
-/// coordinate.
+/// Carries a Jacobian along with a step by the least change that agrees with it (Broyden 1965): a computed
+/// one costs a prediction a coordinate.
 pub fn carry(jacobian: &mut DMatrix<f64>, from: &[f64], to: &[f64], change: &DVector<f64>) {
     let step = DVector::from_iterator(from.len(), to.iter().zip(from).map(|(t, f)| t - f));
     let square = step.norm_squared();

@@ -124,9 +124,9 @@ fn left_out(rest: &Problem, out: &Problem, members: &[Member], start: &[f64]) ->
 
 /// Covariance of a region's passes: scatter, and what the rest leaves open of the baseline.
 ///
-/// Stiffnesses that the rest does not tell carry baseline and hypothesis off together where they begin to matter; that
-/// says nothing of the cause. What the rest leaves open of the hypothesis is not granted: unlisted that a free shape
-/// imitates would close by it.
+/// Stiffnesses that the rest does not tell carry baseline and hypothesis off together where they begin to
+/// matter; that says nothing of the cause. What the rest leaves open of the hypothesis is not granted:
+/// unlisted that a free shape imitates would close by it.
 fn metric(rest: &Problem, out: &Problem, baseline: &Fit) -> Covariance {
     let whitened = |p: &Problem| {
         let mut m = p.jacobian(&[], &baseline.u, &p.predict(&[], &baseline.u));
@@ -135,9 +135,9 @@ fn metric(rest: &Problem, out: &Problem, baseline: &Fit) -> Covariance {
         }
         m
     };
-    let (seen, asked) = (whitened(rest), whitened(out));
+    let (seen, left) = (whitened(rest), whitened(out));
     let precision = seen.transpose() * &seen + DMatrix::from_diagonal(&rest.prior_precision(&[]).into());
-    let root = precision.cholesky().and_then(|c| c.l().solve_lower_triangular(&asked.transpose()));
+    let root = precision.cholesky().and_then(|c| c.l().solve_lower_triangular(&left.transpose()));
     let mut open = root.map_or_else(|| DMatrix::zeros(out.len(), 0), |r| r.transpose());
     for (i, v) in out.variance.iter().enumerate() {
         open.row_mut(i).scale_mut(v.sqrt());
@@ -145,8 +145,8 @@ fn metric(rest: &Problem, out: &Problem, baseline: &Fit) -> Covariance {
     out.covariance(&open)
 }
 
-/// Whether the rest of a table has one level of a covariate that has more in the whole, and what the cause changes there is
-/// but another baseline: a law cannot be learnt from one level.
+/// Whether the rest of a table has one level of a covariate that has more in the whole, and what the cause
+/// changes there is but another baseline: a law cannot be learnt from one level.
 fn tells_nothing(problem: &Problem, rest: &Problem, best: &Posterior) -> bool {
     let levels: [fn(&Condition) -> f64; 4] =
         [|p| p.amplitude.metres(), |p| p.speed_m_s, |p| p.normal_force_n, |p| p.frequency_hz];
@@ -173,8 +173,8 @@ fn without(problem: &Problem, rows: &[usize]) -> Vec<usize> {
 /// Rounds of a refit without a region.
 const ROUNDS: usize = 6;
 
-/// Squared changes by each of two effects beside the other, in deviations of a pass; of a single effect nothing: what it
-/// does is the gap.
+/// Squared changes by each of two effects beside the other, in deviations of a pass; of a single effect
+/// nothing: what it does is the gap.
 fn own_changes(problem: &Problem, best: &Posterior) -> Vec<Vec<f64>> {
     if best.members.len() < 2 {
         return Vec::new();
@@ -234,8 +234,8 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// Share of a candidate's probability that survives: one half where it closes just so much as a mimic may, and
-    /// ever less below that. `share` is the form uncertainty that it needed.
+    /// Share of a candidate's probability that survives: one half where it closes just so much as a mimic
+    /// may, and ever less below that. `share` is the form uncertainty that it needed.
     pub fn survival(&self, k: &Constants, effects: usize, share: f64) -> f64 {
         let rank = k.form_shares.iter().filter(|s| **s < share * (1.0 - 1e-9)).count();
         let closures = if effects > 1 { k.closure_pair } else { k.closure_single };
@@ -248,8 +248,8 @@ impl Gate {
 
 /// Judges the regions: those count whose gap stands above the floor's own scatter.
 ///
-/// What is left is granted its sampling error, the root of twice the number of passes in units of the floor: a
-/// small gap cannot be shown to stay open by noise alone.
+/// What is left is granted its sampling error, the root of twice the number of passes in units of the floor:
+/// a small gap cannot be shown to stay open by noise alone.
 pub fn gate(k: &Constants, regions: &[Region]) -> Gate {
     let share = |gap: f64, left: f64| (gap > 0.0).then(|| 1.0 - (left.max(0.0) / gap).sqrt());
     let (mut gap, mut left, mut passes) = (0.0, 0.0, 0.0);
@@ -282,8 +282,8 @@ mod tests {
     use super::*;
     use crate::example::{Deviates, rig, table};
 
-    /// One vibrating pass, predicted from passes with the plate still, which tell nothing of the stiffnesses: a miss
-    /// along them counts in deviations of scatter and of the stiffnesses' prior together.
+    /// One vibrating pass, predicted from passes with the plate still, which tell nothing of the stiffnesses:
+    /// a miss along them counts in deviations of scatter and of the stiffnesses' prior together.
     #[test]
     fn a_miss_that_the_rest_leaves_open_counts_for_little() {
         let table = table(&mut Deviates(3), 0.0);
@@ -298,11 +298,11 @@ mod tests {
         let (rest, out) = (problem.select(&still), problem.select(&[telling]));
         let fit = minimise(&rest, &[], &[0.0; 3], &rest.variance, 6);
         let slope = |p: &Problem| p.jacobian(&[], &fit.u, &p.predict(&[], &fit.u));
-        let (seen, asked) = (slope(&rest), slope(&out));
+        let (seen, left) = (slope(&rest), slope(&out));
         // Plate still: friction is mu0 times load, whatever the stiffnesses.
         assert!(seen.column(1).amax() < 1e-9 && seen.column(2).amax() < 1e-9);
         let mu0: f64 = (0..rest.len()).map(|i| seen[(i, 0)].powi(2) / rest.variance[i]).sum();
-        let open = (asked[(0, 1)].powi(2) + asked[(0, 2)].powi(2) + asked[(0, 0)].powi(2) / (1.0 + mu0))
+        let open = (left[(0, 1)].powi(2) + left[(0, 2)].powi(2) + left[(0, 0)].powi(2) / (1.0 + mu0))
             / out.variance[0];
         assert!(open > 0.5, "{open}");
         let miss = DVector::from_element(1, 2.5 * out.variance[0].sqrt());

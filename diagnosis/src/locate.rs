@@ -45,22 +45,22 @@ pub fn ledger(fitted: &Fitted, probabilities: &[f64], unknown: f64) -> BTreeMap<
     map
 }
 
-/// Conditions at which the verdict's model is asked for its gap.
-const ASKED: usize = 10_000;
+/// Conditions at which the verdict's model predicts its gap.
+const PREDICTED: usize = 10_000;
 /// Expected number of passes that stand out from which there is a region.
 const LEAST_PASSES: f64 = 3.0;
 
 /// Boxes that together hold the conditions at which the verdict's model says that the gap stands out of the noise.
 ///
-/// The model is asked between the passes of the table too, in all combinations of its covariates: a box fitted to the
-/// passes alone would end where the next pass happens to be. A condition counts by its probability of standing out. The
-/// space is cut into parts, each time where that probability differs most; those parts are named that together have
-/// the largest expected F1.
+/// The model also predicts between the passes of the table, in all combinations of its covariates: a box
+/// fitted to the passes alone would end where the next pass happens to be. A condition counts by its
+/// probability of standing out. The space is cut into parts, each time where that probability differs most.
+/// The named parts are those that together have the largest expected F1.
 pub fn regions(fitted: &Fitted, rig: &RigFile, model: &(Model, Problem, Posterior)) -> Vec<Region> {
     let problem = &fitted.problem;
     let n = problem.len();
     let mut places = problem.passes.clone();
-    places.extend(conditions_between(&problem.passes, ASKED));
+    places.extend(conditions_between(&problem.passes, PREDICTED));
     let forecasts = forecast(fitted, rig, model, &places);
     let chance: Vec<f64> = forecasts.iter().map(|f| stands_out(f, problem.constants.stands_out_sd)).collect();
     if chance[..n].iter().sum::<f64>() < LEAST_PASSES {
@@ -112,7 +112,7 @@ fn region(
     let mut named = BTreeMap::new();
     let mut words = Vec::new();
     for (k, b) in bounds {
-        let covariate = covariate::TOLD[*k];
+        let covariate = covariate::COVARIATES[*k];
         // An open side ends where the table does.
         let (low, high) = passes
             .iter()
@@ -139,7 +139,7 @@ fn region(
         None => format!(
             "nothing was measured at {place}; only the verdict's model puts {percent:.0} % of its gap there"
         ),
-        // The test's distribution is not known so far out: smaller ones are not told apart.
+        // The test's distribution is not known so far out: no smaller value is printed.
         Some(p) if p < 1e-6 => format!("{percent:.0} % of the gap: {place} (p < 1e-6)"),
         Some(p) if p < 0.01 => format!("{percent:.0} % of the gap: {place} (p = {p:.1e})"),
         Some(p) => format!("{percent:.0} % of the gap: {place} (p = {p:.2})"),
@@ -154,8 +154,8 @@ fn short(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
-/// Conditions of the same design: what can be set is drawn independently, from the table's levels or from between
-/// two neighbouring ones; what comes together (time and temperature) stays together.
+/// Conditions of the same design: what can be set is drawn independently, from the table's levels or from
+/// between two neighbouring ones; what comes together (time and temperature) stays together.
 fn conditions_between(passes: &[Condition], count: usize) -> Vec<Condition> {
     let mut state = 0x5DEE_CE66_D2B7_4F1D_u64;
     let mut uniform = || (crate::draws::split_mix(&mut state) >> 11) as f64 / (1u64 << 53) as f64;
@@ -202,7 +202,7 @@ mod tests {
     fn a_share_of_the_gap_is_one_of_passes() {
         let passes =
             [1e-6, 4e-6].map(|w| Condition { amplitude: PeakToPeak::from_metres(w), ..Condition::paper() });
-        let amplitude = covariate::TOLD.iter().position(|c| c.name == "amplitude_pp_m").unwrap();
+        let amplitude = covariate::COVARIATES.iter().position(|c| c.name == "amplitude_pp_m").unwrap();
         let bounds = BTreeMap::from([(amplitude, [2e-6, 3e-6])]);
         let empty = region(&bounds, &passes, 0.08, None).text;
         assert_eq!(

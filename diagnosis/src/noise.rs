@@ -99,8 +99,8 @@ pub fn variance(problem: &Problem, rig: &RigFile, center: &[f64], level: &[f64],
         .collect()
 }
 
-/// Repeats of one condition, compared among themselves after a common drift in time is taken out; and, where they leave it
-/// open, the scatter about the baseline if that is all there is.
+/// Repeats of one condition, compared among themselves after a common drift in time is taken out; and, where
+/// they leave it open, the scatter about the baseline if that is all there is.
 fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scatter) -> PureError {
     let mut groups: std::collections::BTreeMap<[Option<i64>; 6], Vec<usize>> =
         std::collections::BTreeMap::new();
@@ -144,9 +144,9 @@ fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scat
     }
 }
 
-/// How far a scatter about the recalibrated baseline is scatter, and no structure that no surface follows: less where a
-/// surface does better, where it clusters, where replicates, which see no structure, scatter less, and where it speaks too
-/// softly against the statement.
+/// How far a scatter about the recalibrated baseline is scatter, and no structure that no surface follows:
+/// less where a surface does better, where it clusters, where replicates, which see no structure, scatter
+/// less, and where it speaks too softly against the statement.
 fn believed(k: &Constants, scatter: &Scatter, sum: f64, freedom: usize) -> f64 {
     let square = scatter.bare_scale.powi(2);
     let ratio = sum / (freedom as f64 * square).max(f64::MIN_POSITIVE);
@@ -156,8 +156,8 @@ fn believed(k: &Constants, scatter: &Scatter, sum: f64, freedom: usize) -> f64 {
         0.0
     };
     let clustered = scatter.clustered_p.powi(2) / (scatter.clustered_p.powi(2) + k.clustered_p.powi(2));
-    // A weak cause that recalibration half takes up looks like a little more scatter: the statement stands until the table
-    // speaks against it.
+    // A weak cause that recalibration half takes up looks like a little more scatter: the statement stands
+    // until the table speaks against it.
     let against = 0.5 * scatter.level.len() as f64 * (square - 1.0 - square.max(1e-6).ln());
     let speaks = 1.0 / (1.0 + (k.statement_nats - against).exp());
     speaks * clustered / (1.0 + (scatter.structure_nats + pure - k.structure_nats).exp())

@@ -103,11 +103,11 @@ fn misses(
     (verdict, leader): (Verdict, Option<usize>),
     out: &[usize],
 ) -> Option<Misses> {
-    let kept: Vec<usize> = (0..table.len()).filter(|i| out.binary_search(i).is_err()).collect();
-    if kept.len() < LEAST[0] || out.len() < LEAST[1] {
+    let rest: Vec<usize> = (0..table.len()).filter(|i| out.binary_search(i).is_err()).collect();
+    if rest.len() < LEAST[0] || out.len() < LEAST[1] {
         return None;
     }
-    let fit = model(fitted, table, verdict, leader, Some(&kept));
+    let fit = model(fitted, table, verdict, leader, Some(&rest));
     let passes: Vec<_> = out.iter().map(|&i| table.passes[i]).collect();
     let forecasts = forecast(fitted, rig, &fit, &passes);
     let held = |unit: &dyn Fn(&Forecast) -> f64| {

@@ -53,8 +53,8 @@ fn effects_of(members: &[Member]) -> Vec<usize> {
     effects
 }
 
-/// Whether two hypotheses change the forces alike: by name, or by the angle between their changes in deviations of a
-/// pass.
+/// Whether two hypotheses change the forces alike: by name, or by the angle between their changes in
+/// deviations of a pass.
 fn one_change(problem: &Problem, a: &Posterior, b: &Posterior) -> bool {
     if one_cause(a.members[0].name(), b.members[0].name()) {
         return true;
@@ -65,8 +65,8 @@ fn one_change(problem: &Problem, a: &Posterior, b: &Posterior) -> bool {
     product(a, b) > problem.constants.one_change_cosine * (product(a, a) * product(b, b)).sqrt().max(1e-300)
 }
 
-/// The best pairs once more, in every law of both members: which law a cause follows, and where, shows in its pair and
-/// not alone, and a pair in a local minimum loses to the open set.
+/// The best pairs once more, in every law of both members: which law a cause follows, and where, shows in its
+/// pair and not alone, and a pair in a local minimum loses to the open set.
 fn with_every_law(
     problem: &Problem,
     mut pairs: Vec<Pair>,
@@ -190,8 +190,8 @@ fn coarse_starts(problem: &Problem, singles: &[Candidate], loose: &[f64]) -> Vec
             let seed = &seeds[*s].best;
             let members = vec![seed.members[0], e.members[0]];
             let alone = &e.u[NUISANCES..];
-            // A cause that acts as a gain of the stiffness, the amplitude or the speed hides in the stiffnesses that the
-            // single drove to imitate it.
+            // A cause that acts as a gain of the stiffness, the amplitude or the speed hides in the
+            // stiffnesses that the single drove to imitate it.
             nuisance_starts(&seed.u, k.driven_sd)
                 .iter()
                 .filter_map(|fixed| coarse_scan(problem, &members, fixed, loose, alone))

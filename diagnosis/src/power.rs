@@ -33,22 +33,22 @@ pub fn seen_from(fitted: &Fitted) -> Vec<SeenFrom> {
     let k = &fitted.problem.constants;
     let singles: Vec<&Candidate> = fitted.candidates.iter().filter(|c| c.effects.len() == 1).collect();
     let prior = (k.prior_null * singles.len() as f64 / k.prior_single).ln();
-    let asked = k.temper * (prior + ((1.0 - k.claim_probability) / k.claim_probability).ln());
-    let mut list: Vec<SeenFrom> = singles.into_iter().map(|c| one(fitted, c, asked)).collect();
+    let threshold = k.temper * (prior + ((1.0 - k.claim_probability) / k.claim_probability).ln());
+    let mut list: Vec<SeenFrom> = singles.into_iter().map(|c| one(fitted, c, threshold)).collect();
     let gap = |s: &SeenFrom| s.gap_rmse.unwrap_or(f64::INFINITY);
     list.sort_by(|a, b| gap(a).total_cmp(&gap(b)).then(a.effect.cmp(b.effect)));
     list
 }
 
 /// By the law that fits best, else by the first that shows: the shapes of a law that fits nothing may be such that it does nothing.
-fn one(fitted: &Fitted, candidate: &Candidate, asked: f64) -> SeenFrom {
+fn one(fitted: &Fitted, candidate: &Candidate, threshold: f64) -> SeenFrom {
     let behind = (fitted.none.log_evidence - candidate.log_evidence).max(0.0);
-    let own = by_law(fitted, &candidate.best, asked + behind);
-    let mut others = candidate.laws.iter().map(|(_, law)| by_law(fitted, law, asked + behind));
+    let own = by_law(fitted, &candidate.best, threshold + behind);
+    let mut others = candidate.laws.iter().map(|(_, law)| by_law(fitted, law, threshold + behind));
     if own.size.is_some() { own } else { others.find(|s| s.size.is_some()).unwrap_or(own) }
 }
 
-fn by_law(fitted: &Fitted, law: &Posterior, asked: f64) -> SeenFrom {
+fn by_law(fitted: &Fitted, law: &Posterior, threshold: f64) -> SeenFrom {
     let problem = &fitted.problem;
     let (member, place) = (law.members[0], Layout::of(&law.members).size(0));
     let parameter = member.parameters(&problem.design)[0];
@@ -57,7 +57,7 @@ fn by_law(fitted: &Fitted, law: &Posterior, asked: f64) -> SeenFrom {
         u[place] = size;
         net_change(problem, &u, &problem.predict(&law.members, &u))
     };
-    let seen = |size: f64| 0.5 * problem.chi2(&change(size)) > asked;
+    let seen = |size: f64| 0.5 * problem.chi2(&change(size)) > threshold;
     let (mut low, mut high) = (0.0, parameter.coordinate_bounds().1);
     let found = seen(high).then(|| {
         for _ in 0..HALVINGS {
@@ -111,12 +111,11 @@ mod tests {
     use crate::layout::Layout;
     use crate::verdict::diagnose;
 
-    /// A gap of 0.4 of what is stated is rarely claimed, one of twice as much mostly: what noise adds to the evidence, and what a gap
-    /// adds to the estimate of the noise,
-    /// is of the order of the limit itself.
+    /// A gap of 0.4 of what is stated is rarely claimed, one of twice as much mostly: what noise adds to the
+    /// evidence, and what a gap adds to the estimate of the noise, is of the order of the limit itself.
     #[test]
     fn a_gap_shows_from_the_size_that_is_stated() {
-        let asked = ["load_dependent_friction", "lateral_offset_drift", "rate_dependent_friction"];
+        let effects = ["load_dependent_friction", "lateral_offset_drift", "rate_dependent_friction"];
         let (mut small, mut large, mut tables) = (0, 0, 0);
         let options = Options { pairs: false, ..Options::default() };
         let claims =
@@ -125,7 +124,7 @@ mod tests {
             let own = table(&mut Deviates(seed), 0.0);
             let result = diagnose(&own, &rig(), &options, String::new());
             assert_eq!(result.report.verdict, Verdict::NoGap, "{}", result.report.text);
-            for seen in result.report.seen_from.iter().filter(|s| asked.contains(&s.effect)) {
+            for seen in result.report.seen_from.iter().filter(|s| effects.contains(&s.effect)) {
                 let size = seen.size.expect("a size that shows");
                 let candidate = result.fitted.candidates.iter().find(|c| c.names() == [seen.effect]);
                 let (problem, best) = (&result.fitted.problem, &candidate.expect("a single effect").best);

@@ -1,4 +1,4 @@
-//! How far a diagnosis is, told to whoever waits for it.
+//! Progress of a diagnosis.
 
 use std::fmt;
 use std::sync::Arc;
@@ -10,12 +10,12 @@ pub struct Stage {
     pub doing: &'static str,
     /// Share of the work that is done, 0 to 1; a second look at the table begins anew.
     pub share: f64,
-    /// Effects that lead so far with their log evidence over no gap in nats, best first: before pairs, left-out regions and the open set
-    /// are judged, so no verdict. Empty until there are some.
+    /// Effects that lead so far with their log evidence over no gap in nats, best first: before pairs,
+    /// left-out regions and the open set are judged, so no verdict. Empty until there are some.
     pub leading: Vec<(Vec<&'static str>, f64)>,
 }
 
-/// Who is told; nobody by default.
+/// The receiver of the stages; none by default.
 #[derive(Clone, Default)]
 pub struct Progress(Option<Arc<dyn Fn(Stage) + Send + Sync>>);
 
@@ -26,9 +26,9 @@ impl fmt::Debug for Progress {
 }
 
 impl Progress {
-    /// Tells that one, from whichever thread.
-    pub fn to(told: impl Fn(Stage) + Send + Sync + 'static) -> Self {
-        Progress(Some(Arc::new(told)))
+    /// Calls `receiver` at each stage, from any thread.
+    pub fn to(receiver: impl Fn(Stage) + Send + Sync + 'static) -> Self {
+        Progress(Some(Arc::new(receiver)))
     }
 
     /// A stage is reached.
@@ -43,8 +43,8 @@ impl Progress {
         share: f64,
         leading: impl FnOnce() -> Vec<(Vec<&'static str>, f64)>,
     ) {
-        if let Some(told) = &self.0 {
-            told(Stage { doing, share, leading: leading() });
+        if let Some(receiver) = &self.0 {
+            receiver(Stage { doing, share, leading: leading() });
         }
     }
 }
@@ -57,21 +57,21 @@ mod tests {
     use std::sync::Mutex;
 
     #[test]
-    fn stages_are_told_and_change_nothing() {
+    fn stages_are_reported_and_change_nothing() {
         let table = table(&mut Deviates(5), 0.8);
-        let told = Arc::new(Mutex::new(Vec::new()));
-        let kept = Arc::clone(&told);
+        let stages = Arc::new(Mutex::new(Vec::new()));
+        let sink = Arc::clone(&stages);
         let quiet = Options { pairs: false, ..Options::default() };
-        let progress = Progress::to(move |stage| kept.lock().unwrap().push(stage));
+        let progress = Progress::to(move |stage| sink.lock().unwrap().push(stage));
         let options = Options { progress, ..quiet.clone() };
         let alone = crate::verdict::diagnose(&table, &rig(), &quiet, String::new());
         let watched = crate::verdict::diagnose(&table, &rig(), &options, String::new());
-        let said = |d: &crate::verdict::Diagnosis| -> Vec<(Vec<String>, u64)> {
+        let outcome = |d: &crate::verdict::Diagnosis| -> Vec<(Vec<String>, u64)> {
             d.report.hypotheses.iter().map(|h| (h.effects.clone(), h.probability.to_bits())).collect()
         };
-        assert_eq!(said(&alone), said(&watched));
-        let told = told.lock().unwrap();
-        assert!(told.len() > 20 && told.iter().all(|s| (0.0..=1.0).contains(&s.share)), "{told:?}");
-        assert!(told.iter().any(|s| s.leading.len() > 3), "{told:?}");
+        assert_eq!(outcome(&alone), outcome(&watched));
+        let stages = stages.lock().unwrap();
+        assert!(stages.len() > 20 && stages.iter().all(|s| (0.0..=1.0).contains(&s.share)), "{stages:?}");
+        assert!(stages.iter().any(|s| s.leading.len() > 3), "{stages:?}");
     }
 }

@@ -2,9 +2,9 @@
 //!
 //! Only the groups `Fn / (k_n w)` and `k_l U / (pi f mu0 k_n w)` enter the baseline (Eqs. 6-15). So an amplitude whose
 //! scale is wrong by a factor is, pass for pass, a normal stiffness wrong by that factor: the stiffness takes it up, no
-//! gap is left, and no table of passes can say which of the two it was. What can be said is that the stiffness had to go
-//! where its own calibration does not want it. The pull says how far: the shift in units of the deviation that such a
-//! shift has when prior and table agree (prior variance less posterior variance).
+//! gap is left, and no table of passes can say which of the two it was. The table only shows that the
+//! stiffness had to move away from its own calibration. The pull says how far: the shift in units of the
+//! deviation that such a shift has when prior and table agree (prior variance less posterior variance).
 
 use crate::evidence::Posterior;
 use crate::fit::{Member, Problem};
@@ -79,8 +79,8 @@ fn imitators(parameter: usize) -> Vec<&'static str> {
     names
 }
 
-/// Pulls of both stiffnesses in a model. Where `model` explains the table by an error of a stiffness, that error is what
-/// was pulled: how far is then asked of the recalibrated baseline, `none`, and the fitted value is the model's whole one.
+/// Pulls of both stiffnesses in a model. Where `model` explains the table by an error of a stiffness, that
+/// error is what was pulled: the recalibrated baseline, `none`, then shows how far; the value is the model's.
 pub fn pulls(problem: &Problem, none: &Posterior, model: &Posterior) -> Vec<Pull> {
     let named = model.members.iter().any(errs_in_the_finger);
     let judged = if named { none } else { model };

@@ -1,7 +1,7 @@
 //! What a table says of `Psi*` and of the two readings of the paper's `w`: [`models::reading_evidence`] on the passes as measured.
 //!
-//! It stands beside the verdict and is no part of it: the baseline is the spring-slider, whatever the empirical law's scale is. A cause
-//! that the verdict names moves `Psi*` too, so what is told then is told of the passes as they are.
+//! The verdict does not use it: the baseline is the spring-slider, whatever the scale of the empirical law. A
+//! cause that the verdict names moves `Psi*` too, so this finding holds for the passes as measured.
 
 use crate::Verdict;
 use crate::data::{RigFile, Table};
@@ -9,8 +9,8 @@ use crate::scatter::Scatter;
 use models::reading_evidence::{self, Decision, ReadingFinding};
 use models::rig_file::PassNoise;
 
-/// The finding of a table: suspects left out, with the scatter that the table has and what certificates leave open of amplitude and
-/// speed. `None` without a pass with and one without vibration.
+/// The finding of a table: suspects left out, with the scatter that the table has and what certificates leave
+/// open of amplitude and speed. `None` without a pass with and one without vibration.
 pub fn of_table(table: &Table, rig: &RigFile, scatter: &Scatter) -> Option<ReadingFinding> {
     let noise = PassNoise {
         pass_relative_sd: rig.noise.pass_relative_sd * scatter.scale,

@@ -10,8 +10,8 @@ use models::covariate::{AMPLITUDE, Role, SMOOTH};
 use models::quantity::PeakToPeak;
 use serde::Serialize;
 
-/// Suspect passes that are told in words, the farthest first.
-const TOLD: usize = 8;
+/// Most suspect passes that the text lists, the farthest first.
+const LISTED: usize = 8;
 
 /// The verdict on a table whose suspect passes count as any other.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
@@ -55,7 +55,7 @@ pub fn with_suspects(
 /// Relative departure of the scatter from the statement below which the statement was used.
 const AS_STATED: f64 = 0.01;
 
-/// Family-wise p-value from which structure is told.
+/// Family-wise p-value below which the text reports structure.
 const STRUCTURED: f64 = 0.01;
 
 /// What a table lacks.
@@ -82,8 +82,8 @@ pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<Stri
         };
         remarks.push(format!("No repeats close in time: {stands}"));
     }
-    let told = fitted.structure.as_ref().filter(|s| s.p < STRUCTURED && decision.verdict != Verdict::Named);
-    remarks.extend(told.map(|s| {
+    let found = fitted.structure.as_ref().filter(|s| s.p < STRUCTURED && decision.verdict != Verdict::Named);
+    remarks.extend(found.map(|s| {
         format!(
             "The residuals of the recalibrated baseline are not scatter: {} is conspicuous (p = {:.1e} over everything \
              searched).",
@@ -108,8 +108,8 @@ const PARTED: f64 = 0.8;
 
 /// Settings that the leading cause needs and that have two levels: that it acts shows, its law does not.
 fn two_levels(fitted: &Fitted, table: &Table, decision: &Decision) -> Option<String> {
-    let asked = matches!(decision.verdict, Verdict::Named | Verdict::Ambiguous);
-    let leader = &fitted.candidates[decision.leader().filter(|_| asked)?];
+    let led = matches!(decision.verdict, Verdict::Named | Verdict::Ambiguous);
+    let leader = &fitted.candidates[decision.leader().filter(|_| led)?];
     let needs = leader.effects.iter().flat_map(|e| known()[*e].needs());
     let largest = table.design.largest_amplitude_m;
     let mut words: Vec<&str> = needs
@@ -127,7 +127,7 @@ fn two_levels(fitted: &Fitted, table: &Table, decision: &Decision) -> Option<Str
     words.dedup();
     (!words.is_empty()).then(|| {
         format!(
-            "Two levels only of {}: that the leading cause acts can be told from them, by which law it cannot. Add a third level.",
+            "Two levels only of {}: they show that the leading cause acts, but not by which law. Add a third level.",
             words.join(" and ")
         )
     })
@@ -143,9 +143,9 @@ fn together(table: &Table) -> Vec<String> {
         .iter()
         .filter(|c| c.role != Role::Climate)
         .filter_map(|c| {
-            let told: Option<Vec<f64>> =
+            let values: Option<Vec<f64>> =
                 table.passes.iter().map(|p| c.of(p).map(|v| c.scaled(v, largest))).collect();
-            let mut values = told?;
+            let mut values = values?;
             let n = values.len() as f64;
             let mean = values.iter().sum::<f64>() / n;
             values.iter_mut().for_each(|v| *v -= mean);
@@ -154,19 +154,19 @@ fn together(table: &Table) -> Vec<String> {
             (norm > c.least_spread.max(1e-9) * n.sqrt()).then_some((c.words, values))
         })
         .collect();
-    let mut said = Vec::new();
+    let mut remarks = Vec::new();
     for (k, (a, x)) in axes.iter().enumerate() {
         for (b, y) in &axes[k + 1..] {
             let r: f64 = x.iter().zip(y).map(|(p, q)| p * q).sum();
             if r.abs() > TOGETHER {
-                said.push(format!(
+                remarks.push(format!(
                     "{a} and {b} change together (correlation {r:.2}): this table cannot tell what one does from what the other \
                      does. Vary one while the other stays."
                 ));
             }
         }
     }
-    said
+    remarks
 }
 
 /// What a table's scatter says.
@@ -212,12 +212,12 @@ pub fn of_scatter(fitted: &Fitted, decision: &Decision, with_suspects: Option<&W
 fn suspects(scatter: &Scatter, effects: &[String], verdict: Verdict, other: &WithSuspects) -> String {
     let mut list: Vec<_> = scatter.suspects.iter().collect();
     list.sort_by(|a, b| b.deviations.abs().total_cmp(&a.deviations.abs()));
-    let told: Vec<String> = list
+    let points: Vec<String> = list
         .iter()
-        .take(TOLD)
+        .take(LISTED)
         .map(|s| format!("{} (off by {:+.3} N, {:+.1} sd)", s.point, s.residual_n, s.deviations))
         .collect();
-    let more = match list.len().saturating_sub(TOLD) {
+    let more = match list.len().saturating_sub(LISTED) {
         0 => String::new(),
         n => format!(" and {n} more"),
     };
@@ -228,7 +228,7 @@ fn suspects(scatter: &Scatter, effects: &[String], verdict: Verdict, other: &Wit
     };
     format!(
         "Suspect passes, which count for little: points {}{more}. {with}. Look them up in the record.",
-        told.join(", ")
+        points.join(", ")
     )
 }
 
@@ -250,18 +250,18 @@ mod tests {
     use crate::example::{Deviates, rig, table};
     use crate::verdict::diagnose;
 
-    /// Load that rises with time is said; a table in random order has nothing to say of the kind.
+    /// A load that rises with time is reported; a table in random order has no such pair.
     #[test]
-    fn covariates_that_change_together_are_said() {
+    fn covariates_that_change_together_are_reported() {
         let mut table = table(&mut Deviates(5), 0.0);
         assert!(together(&table).is_empty(), "{:?}", together(&table));
         table.passes.iter_mut().for_each(|p| p.normal_force_n = 0.15 * (1.0 + p.time_s / 60.0));
-        let said = together(&table);
-        assert!(said.len() == 1 && said[0].contains("time") && said[0].contains("force"), "{said:?}");
+        let list = together(&table);
+        assert!(list.len() == 1 && list[0].contains("time") && list[0].contains("force"), "{list:?}");
     }
 
-    /// Two speeds are enough to name friction that depends on speed: without one of them the rest tells nothing, so that region
-    /// does not judge, and that is said.
+    /// Two speeds are enough to name friction that depends on speed: without one of them the rest tells
+    /// nothing, so that region does not judge, and the text reports it.
     #[test]
     fn a_law_of_two_levels_is_not_judged_without_one_of_them() {
         let mut table = table(&mut Deviates(8), 0.0);

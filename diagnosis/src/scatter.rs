@@ -1,8 +1,8 @@
-//! The scatter of real passes: how wrong the stated repeatability is, what shifts between runs, what lasts from pass to
-//! pass, and which passes do not belong.
+//! The scatter of real passes: how wrong the stated repeatability is, what shifts between runs, what lasts
+//! from pass to pass, and which passes do not belong.
 //!
-//! A statement of repeatability is a prior, not a truth. A flexible surface, the open set's, stands for whatever friction may
-//! do over the operating space; what single passes leave beside it is scatter:
+//! A statement of repeatability is a prior, not a truth. A flexible surface, the open set's, stands for
+//! whatever friction may do over the operating space; what single passes leave beside it is scatter:
 //!
 //! `y = surface + level * shift[run] + e`, `shift ~ N(0, run_sd^2)`,
 //! `e ~ (1 - share) N(0, scale^2 v) + share Cauchy(0, 5 scale sqrt(v))`, correlated from pass to pass.
@@ -70,8 +70,8 @@ pub struct Scatter {
     /// Friction at each pass without its scatter, N.
     #[serde(skip)]
     pub level: Vec<f64>,
-    /// The same of the baseline: what passes have in common is measured on it. On the measured level a shift of runs would
-    /// pull every fit that misses towards zero.
+    /// The same of the baseline: what passes have in common is measured on it. On the measured level a shift
+    /// of runs would pull every fit that misses towards zero.
     #[serde(skip)]
     pub under: Vec<f64>,
     /// Scale of the scatter if the recalibrated baseline were all there is.
@@ -85,10 +85,10 @@ pub struct Scatter {
     pub clustered_p: f64,
 }
 
-/// Rounds in which scales and responsibilities take turns; in those listed every smoothness is asked: the first says little
-/// while bad passes still speak.
+/// Rounds in which scales and responsibilities take turns. Every smoothness is tried in those listed: the
+/// first round shows little while bad passes still count.
 const ROUNDS: usize = 8;
-const ALL_ASKED: [usize; 2] = [0, 3];
+const ALL_SMOOTHNESSES: [usize; 2] = [0, 3];
 /// Rounds in which weights are those of Student's t, before there is a scale to go by.
 const HEAVY: usize = 2;
 /// Change of a weight below which the rounds end.
@@ -145,7 +145,7 @@ pub fn estimate(
     };
     let (mut best, mut state) = (0, start);
     for round in 0..ROUNDS {
-        if ALL_ASKED.contains(&round) {
+        if ALL_SMOOTHNESSES.contains(&round) {
             let fits: Vec<(f64, State)> =
                 surfaces.par_iter().map(|s| s.climbed(k, &variance, &weight, &level, state)).collect();
             best = (0..fits.len()).fold(0, |b, i| if fits[i].0 > fits[b].0 { i } else { b });
@@ -164,7 +164,7 @@ pub fn estimate(
         let moved = next.iter().zip(&weight).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         (weight, level) = (next, seen.level);
         variance = stated(&level);
-        if round > ALL_ASKED[1] && moved < SETTLED {
+        if round > ALL_SMOOTHNESSES[1] && moved < SETTLED {
             break;
         }
     }
@@ -249,13 +249,13 @@ impl Scatter {
             (0..n).any(|i| called(&outside[i]) && !called(&self.outside[i]) && deviations[i].abs() > FAR_SD);
         // Passes' worth of weight that belongs after all.
         let weight = suspects::weights(k, &outside, &deviations);
-        let kept: f64 =
+        let regained: f64 =
             (0..n).filter(|&i| !called(&outside[i])).map(|i| weight[i] - 1.0 / self.inflation[i]).sum();
-        (found || kept > WORTH).then_some(Belief::AboutCause { deviations, outside })
+        (found || regained > WORTH).then_some(Belief::AboutCause { deviations, outside })
     }
 
-    /// Enters a problem whose variances are those of single passes: what passes have in common leaves them and becomes columns
-    /// of its own.
+    /// Enters a problem whose variances are those of single passes: what passes have in common leaves them
+    /// and becomes columns of its own.
     pub fn enter(&self, table: &Table, problem: &mut Problem) {
         let (share, common) = if self.slow[0] > 0.0 {
             (1.0, self.lasting(table, &problem.constants, &problem.variance))

@@ -84,12 +84,12 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
     let per_fold: Vec<Vec<(usize, f64, [f64; 5])>> = (0..folds)
         .into_par_iter()
         .map(|fold| {
-            let (out, kept): (Vec<usize>, Vec<usize>) =
+            let (out, rest): (Vec<usize>, Vec<usize>) =
                 (0..table.len()).partition(|&i| groups[i] % folds == fold);
-            if out.is_empty() || kept.len() < LEAST_KEPT {
+            if out.is_empty() || rest.len() < LEAST_KEPT {
                 return Vec::new();
             }
-            let fit = model(fitted, table, verdict, leader, Some(&kept));
+            let fit = model(fitted, table, verdict, leader, Some(&rest));
             let passes: Vec<_> = out.iter().map(|&i| table.passes[i]).collect();
             forecast(fitted, rig, &fit, &passes)
                 .iter()

@@ -30,7 +30,7 @@ pub(crate) struct Search<'a> {
     pub nuisances: &'a [f64],
     pub loose: &'a [f64],
     pub basis: &'a DMatrix<f64>,
-    /// Who is told of each law.
+    /// Receives the progress of the search.
     pub progress: &'a Progress,
 }
 
@@ -66,8 +66,8 @@ pub(crate) fn unlisted(problem: &Problem, table: &Table, search: &Search<'_>) ->
 
 /// Effects whose certificate no longer holds: freed in the problem, and with the evidence of their own prior.
 ///
-/// What a certificate says holds unless the table speaks against it by more than such an accident is rare: then the
-/// effect has its own prior again, here and in all that follows.
+/// What a certificate says holds unless the table speaks against it by more than such an accident is rare:
+/// then the effect has its own prior again, here and in all that follows.
 pub(crate) fn lapsed(
     problem: &mut Problem,
     table: &Table,
@@ -96,12 +96,12 @@ pub(crate) fn lapsed(
 
 /// Every law alone: its log evidence over the shares of form uncertainty, and its best solution.
 fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<Option<(f64, Posterior)>> {
-    // Middle share first, for every law; the other shares where they could matter. Laws cost from one millisecond to two
-    // hundred: each is a task of its own.
+    // Middle share first, for every law; the other shares where they could matter. Laws cost from one
+    // millisecond to two hundred: each is a task of its own.
     let k = &*problem.constants;
     let done = AtomicUsize::new(0);
-    // Causes that no library names are sought after the others, and count for what is left.
-    let told = |of: f64| {
+    // The search for unlisted causes runs last; they count for the rest.
+    let report = |of: f64| {
         let n = done.fetch_add(1, Ordering::Relaxed) + 1;
         search.progress.at("single effects", of * n as f64 / (2 * members.len()).max(1) as f64);
     };
@@ -111,7 +111,7 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
         .map(|member| {
             let fixed = nuisance_starts(search.nuisances, k.driven_sd);
             let sought = fixed.iter().map(|fixed| seek(problem, *member, fixed, search.loose)).collect();
-            told(SINGLES_END);
+            report(SINGLES_END);
             sought
         })
         .collect();
@@ -131,7 +131,7 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
             };
             let mut fits: Vec<Fit> = sought.into_iter().flat_map(finish).collect();
             fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-            told(SINGLES_END);
+            report(SINGLES_END);
             fits
         })
         .collect();

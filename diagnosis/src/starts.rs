@@ -13,13 +13,13 @@ const SCAN_ROWS: usize = 128;
 const PAIR_SCAN_ROWS: usize = 64;
 /// The same where a wavelength is sought: what a stroke shows of a short wave needs many places.
 const WAVE_SCAN_ROWS: usize = 512;
-/// Rows on which a start is refined: a place from these lies within a few deviations of the whole table's, and the search
-/// under form uncertainty goes on from there.
+/// Rows on which a start is refined: a place from these lies within a few deviations of the whole table's,
+/// and the search under form uncertainty goes on from there.
 pub(crate) const REFINED_ROWS: usize = 1024;
 /// Starts that are fitted on the scan's rows, and those of them refined on all.
 const STARTS: (usize, usize) = (4, 2);
-/// Rounds of a local fit on the scan's rows before the starts are compared, and after, and on all rows: the search under
-/// form uncertainty goes on from there.
+/// Rounds of a local fit on the scan's rows before the starts are compared, and after, and on all rows: the
+/// search under form uncertainty goes on from there.
 const ROUNDS: (usize, usize, usize) = (4, 8, 4);
 
 /// Factor on the best cost and offset beyond which a start is given up, after the first rounds and after the next.
@@ -179,8 +179,8 @@ pub fn refine_from(problem: &Problem, members: &[Member], start: Vec<f64>, varia
     finished(problem, members, variance, &rows, fits, 1).into_iter().next()
 }
 
-/// At most so many rows, one from each of as many even blocks, at a place in it that steps by the golden section: a table
-/// whose conditions come round every so many passes is not met at one condition only.
+/// At most so many rows, one from each of as many even blocks, at a place in it that steps by the golden
+/// section: a table whose conditions come round every so many passes is not met at one condition only.
 fn rows(n: usize, limit: usize) -> Vec<usize> {
     if n <= limit {
         return (0..n).collect();
@@ -315,20 +315,20 @@ fn refined(problem: &Problem, members: &[Member], variance: &[f64], fits: &[Fit]
     fits.iter().map(on).collect()
 }
 
-/// Leaves one of those that have come to the same place, the best.
+/// Leaves one fit, the best, of those that converged to the same place.
 fn distinct(fits: &mut Vec<Fit>) {
-    let mut kept: Vec<Fit> = Vec::with_capacity(fits.len());
+    let mut unique: Vec<Fit> = Vec::with_capacity(fits.len());
     for fit in fits.drain(..) {
         let same = |k: &Fit| k.u.iter().zip(&fit.u).all(|(a, b)| (a - b).abs() < SAME_PLACE);
-        if !kept.iter().any(same) {
-            kept.push(fit);
+        if !unique.iter().any(same) {
+            unique.push(fit);
         }
     }
-    *fits = kept;
+    *fits = unique;
 }
 
-/// Variances with a floor of `share` of a residual gap: starts are sought on what the gap looks like at large,
-/// not on its last per cent.
+/// Variances with a floor of `share` of a residual gap: starts are sought on what the gap looks like at
+/// large, not on its last per cent.
 pub fn tempered(problem: &Problem, gap: &DVector<f64>, share: f64) -> Vec<f64> {
     problem.variance.iter().zip(gap.iter()).map(|(v, g)| v + (share * g).powi(2)).collect()
 }
@@ -338,8 +338,8 @@ pub fn nuisances_of(fit: &Fit) -> Vec<f64> {
     fit.u[..NUISANCES].to_vec()
 }
 
-/// Where nuisances start: where they are, and at their calibration if they have been driven far from it to imitate a
-/// cause, from where no local fit comes back.
+/// Where nuisances start: where they are, and at their calibration if they have been driven far from it to
+/// imitate a cause, from where no local fit comes back.
 pub fn nuisance_starts(u: &[f64], driven_sd: f64) -> Vec<Vec<f64>> {
     let mut list = vec![u.to_vec()];
     if u[..NUISANCES].iter().any(|x| x.abs() > driven_sd) {

@@ -1,5 +1,5 @@
-//! Whether what the recalibrated baseline leaves is scatter: runs, steps, spots and periods along the order of measurement and along
-//! each covariate, held against shuffled passes.
+//! Whether what the recalibrated baseline leaves is scatter: runs, steps, spots and periods along the order
+//! of measurement and along each covariate, held against shuffled passes.
 //!
 //! Smooth departures and the library's causes have their own evidence. What is sudden, periodic or local has none there: a window that
 //! slides over the passes in the order of each covariate finds steps and spots (a scan statistic), a periodogram over time and place
@@ -11,7 +11,7 @@ pub mod shapes;
 use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::scatter::clusters::{moments, shuffled, strongest};
-use models::covariate::{Role, TOLD};
+use models::covariate::{COVARIATES, Role};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{E, PI};
 
@@ -37,8 +37,8 @@ pub struct Structure {
 }
 
 impl Structure {
-    /// Nats for a departure of that kind against scatter, at most: the largest Bayes factor that a p-value allows (Sellke, Bayarri and
-    /// Berger 2001).
+    /// Nats for a departure of that kind against scatter, at most: the largest Bayes factor that a p-value
+    /// allows (Sellke, Bayarri and Berger 2001).
     pub fn nats(&self) -> f64 {
         if self.p < 1.0 / E { -(-E * self.p * self.p.ln()).ln() } else { 0.0 }
     }
@@ -101,9 +101,9 @@ fn strongest_period(values: impl Iterator<Item = f64> + Clone, places: &[f64]) -
 fn looks(problem: &Problem) -> Vec<Look> {
     let n = problem.len();
     let mut list = Vec::new();
-    for c in TOLD {
-        let told: Option<Vec<f64>> = problem.passes.iter().map(|p| c.of(p)).collect();
-        let Some(values) = told else { continue };
+    for c in COVARIATES {
+        let values: Option<Vec<f64>> = problem.passes.iter().map(|p| c.of(p)).collect();
+        let Some(values) = values else { continue };
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
         let (first, last) = (values[order[0]], values[order[n - 1]]);

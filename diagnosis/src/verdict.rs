@@ -96,15 +96,15 @@ pub struct Report {
     pub gap: Gap,
     /// The leader on left-out regions.
     pub left_out: LeftOut,
-    /// What the replicates said about the stated repeatability.
+    /// What the replicates show about the stated repeatability.
     pub pure_error: PureError,
     /// What the table says about its own scatter: shifts of runs, suspect passes.
     pub scatter: Scatter,
     /// The verdict if suspect passes counted as any other; none where no pass is suspect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub with_suspects: Option<WithSuspects>,
-    /// How far the verdict's model had to pull the stiffnesses from their calibration; empty for `unknown`, which
-    /// has no model that holds.
+    /// How far the verdict's model had to pull the stiffnesses from their calibration; empty for `unknown`,
+    /// which has no model that holds.
     pub stiffness_pulls: Vec<Pull>,
     /// What an unknown departure looks like, best first; empty otherwise.
     pub description: Vec<Description>,
@@ -158,8 +158,8 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
             regions(&fitted, rig, &model(&fitted, table, decision.verdict, leader, None))
         },
     };
-    let asked = best.filter(|_| decision.verdict != Verdict::NoGap);
-    let parameters = asked.map(|best| estimates(&fitted.problem, best, &fitted.basis));
+    let leading = best.filter(|_| decision.verdict != Verdict::NoGap);
+    let parameters = leading.map(|best| estimates(&fitted.problem, best, &fitted.basis));
     let hypotheses = hypotheses(&fitted, &decision, parameters.as_ref());
     options.progress.at("the next experiment", 0.92);
     let next_experiment = experiments(&fitted, table, rig, &decision);
@@ -351,15 +351,15 @@ fn hypotheses(
 }
 
 impl Diagnosis {
-    /// What the verdict's model says of conditions that lie within the table: a curve for a figure. Unlike [`Self::predict`] it does not ask
-    /// in which run they are.
+    /// What the verdict's model says of conditions that lie within the table: a curve for a figure. Unlike
+    /// [`Self::predict`] it does not ask in which run they are.
     pub fn curve(&self, passes: &[Condition]) -> Vec<Forecast> {
         let whole = model(&self.fitted, &self.table, self.decision.verdict, self.decision.leader(), None);
         forecast(&self.fitted, &self.rig, &whole, passes)
     }
 
-    /// Predicts conditions with the verdict's model; those in runs that the table does not have, or after its end, with the
-    /// deviations that such passes of the table needed.
+    /// Predicts conditions with the verdict's model; those in runs that the table does not have, or after its
+    /// end, with the deviations that such passes of the table needed.
     pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {
         let answer = (self.decision.verdict, self.decision.leader());
         let whole = model(&self.fitted, &self.table, answer.0, answer.1, None);

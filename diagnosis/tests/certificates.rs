@@ -60,8 +60,8 @@ fn a_calibrated_zero_and_a_speed_bound_what_they_certify() {
     }
 }
 
-/// A normal force read by a factor g is a normal stiffness wrong by g and a mu0 wrong by 1/g, exactly: what the dead
-/// weight left open of g is what recalibration may move beside the finger's own uncertainty.
+/// A normal force read by a factor g is a normal stiffness wrong by g and a mu0 wrong by 1/g, exactly: what
+/// the dead weight left open of g is what recalibration may move beside the finger's own uncertainty.
 #[test]
 fn a_certified_gain_of_either_axis_is_part_of_the_recalibration() {
     assert_eq!(problem("").prior_sd[1..], [0.05, 0.05]);

@@ -13,8 +13,8 @@ use std::f64::consts::PI;
 const RIG: &str = "[finger]\nnormal_stiffness_n_per_m = 3.9e6\nlateral_stiffness_n_per_m = 1.5e6\n\
                    stiffness_relative_sd = 0.05\n[noise]\npass_relative_sd = 0.01\nforce_sd_n = 0.0005\n";
 
-/// Passes in a room whose temperature goes up and down (or drifts with time), under friction that depends on it in a way
-/// that no effect has: highest in the middle of the range.
+/// Passes in a room whose temperature goes up and down (or drifts with time), under friction that depends on
+/// it in a way that no effect has: highest in the middle of the range.
 fn passes(temperature: fn(f64, f64) -> f64) -> Vec<Pass> {
     let mut state = 11u64;
     let mut uniform = || {

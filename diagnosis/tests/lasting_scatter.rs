@@ -1,5 +1,5 @@
-//! Friction series cut into passes: noise that lasts is no gap, a law of the load between runs is one, and structures are
-//! described as what they are.
+//! Friction series cut into passes: noise that lasts is no gap, a law of the load between runs is one, and
+//! structures are described as what they are.
 use models::pass::read_passes;
 use models::rig_file::RigFile;
 use muprime_diagnosis::data::Table;
@@ -8,8 +8,8 @@ use muprime_diagnosis::hypotheses::Options;
 use muprime_diagnosis::verdict::{Report, diagnose};
 use std::f64::consts::TAU;
 
-/// What a series is made of: noise that lasts some ten passes, independent noise, and friction over speed (mm/s), load (N) and
-/// time (s).
+/// What a series is made of: noise that lasts some ten passes, independent noise, and friction over speed
+/// (mm/s), load (N) and time (s).
 struct Series {
     lasting: f64,
     independent: f64,
@@ -27,8 +27,8 @@ fn normal(state: &mut u64) -> f64 {
     (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
-/// Four runs at two loads, each with four speeds in rising order, a pass every ten seconds; the repeatability is stated from
-/// neighbouring passes, as an import does where nobody says better.
+/// Four runs at two loads, each with four speeds in rising order, a pass every ten seconds; the repeatability
+/// is stated from neighbouring passes, as an import does where nobody says better.
 fn report(series: &Series, seed: u64) -> Report {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut csv =
@@ -81,8 +81,8 @@ fn noise_that_lasts_is_no_gap() {
     }
 }
 
-/// A factor that is constant within a run is no shift of runs where replicate runs agree far better: friction that falls with the
-/// load is a gap, and the class of the causes that two loads do not part holds it.
+/// A factor that is constant within a run is no shift of runs where replicate runs agree far better: friction
+/// that falls with the load is a gap, and the class of the causes that two loads do not part holds it.
 #[test]
 fn a_law_of_the_load_between_runs_is_a_gap() {
     let friction = |_: f64, load: f64, _: f64| 0.17 * (load / 5.0).powf(-0.2);

@@ -1,9 +1,9 @@
 //! The element kernel on one core: beside its twin in C, in turn, and beside the bound of its own instructions.
 //!
-//! `cargo bench -p muprime-models --bench ridge_kernel`: about 1500 elements, contact included, CPU seconds of the thread;
-//! wants `cc` for the twin and `objdump` for the bound. `-- lanes`: eight cases side by side in the lanes of a vector against one
-//! case along its rows, at 200, 400 and 800 elements, and single precision, all in the twin. A ratio within a turn is what says
-//! something: the machine may be shared.
+//! `cargo bench -p muprime-models --bench ridge_kernel`: about 1500 elements, contact included, CPU seconds
+//! of the thread; wants `cc` for the twin and `objdump` for the bound. `-- lanes`: eight cases side by side
+//! in the lanes of a vector against one case along its rows, at 200, 400 and 800 elements, and single
+//! precision, all in the twin. A ratio within a turn is what says something: the machine may be shared.
 #![allow(clippy::disallowed_methods, reason = "it measures time and reads its arguments")]
 
 #[path = "peers/mix.rs"]
@@ -41,7 +41,7 @@ fn main() {
     }
     let mut viscous = Ridge::new(Strain::Objective, true, 1500);
     let rate = spread((0..TURNS).map(|_| viscous.updates() / viscous.turn() / 1e6));
-    println!("objective with viscous arms: {}", told(rate));
+    println!("objective with viscous arms: {}", rate_text(rate));
 }
 
 struct Ridge {
@@ -109,7 +109,7 @@ impl Ridge {
     }
 }
 
-fn told(s: Spread) -> String {
+fn rate_text(s: Spread) -> String {
     format!("{:.0} million updates/s ({:.0} to {:.0})", s.median, s.least, s.most)
 }
 
@@ -127,8 +127,8 @@ fn in_turn(instructions: Instructions, name: &str, strain: Strain) {
     let ratio = spread(turns.iter().map(|t| t[1] / t[0]));
     println!(
         "{name}, {strain:?}: kernel {}, twin in C {}, kernel over twin {:.2} ({:.2} to {:.2}) in {TURNS} turns",
-        told(spread(turns.iter().map(|t| updates / t[0] / 1e6))),
-        told(spread(turns.iter().map(|t| updates / t[1] / 1e6))),
+        rate_text(spread(turns.iter().map(|t| updates / t[0] / 1e6))),
+        rate_text(spread(turns.iter().map(|t| updates / t[1] / 1e6))),
         ratio.median,
         ratio.least,
         ratio.most
@@ -185,7 +185,7 @@ fn lanes() {
         println!(
             "{} elements, objective: twin along rows {}, kernel over it {:.2}",
             ridge.mesh.elements(),
-            told(spread(turns.iter().map(|t| updates / t.1 / 1e6))),
+            rate_text(spread(turns.iter().map(|t| updates / t.1 / 1e6))),
             spread(turns.iter().map(|t| t.1 / t.0)).median
         );
         for (k, (name, _)) in variants.iter().enumerate() {

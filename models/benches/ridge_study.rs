@@ -13,12 +13,12 @@ use muprime_models::ridge::{RidgeCase, RidgeRun, RunSettings, run};
 use std::collections::BTreeSet;
 use turns::{spread, timed};
 
-fn asked(word: &str) -> bool {
+fn has_argument(word: &str) -> bool {
     std::env::args().any(|a| a == word)
 }
 
 fn main() {
-    let one_in = if asked("all") { 1 } else { 16 };
+    let one_in = if has_argument("all") { 1 } else { 16 };
     let new = RunSettings { energy: false, ..RunSettings::default() };
     let old = RunSettings { one_step: true, added_mass: 0.0, ..new };
     let share = std::env::args().find_map(|a| a.strip_prefix("mass=").map(|v| v.parse().expect("a number")));
@@ -53,7 +53,7 @@ fn beside(one_in: usize, like: &str, old: &RunSettings, new: &RunSettings) {
     for (name, case) in &cases {
         let mut results = Vec::new();
         for (k, mut settings) in [*old, *new].into_iter().enumerate() {
-            if let (Some((first, _)), true) = (results.first(), asked("half")) {
+            if let (Some((first, _)), true) = (results.first(), has_argument("half")) {
                 let first: &RidgeRun = first;
                 settings = RunSettings { step_s: Some(0.5 * first.step_s), ..*old };
             }

@@ -3,8 +3,8 @@
 use crate::quantity::{Direction, PeakToPeak};
 use serde::{Deserialize, Serialize};
 
-/// The conditions of one pass: what a prediction needs to know besides the fingertip. Each is a covariate of the table
-/// in [`crate::covariate`]; what was not measured is `None`.
+/// The conditions of one pass: what a prediction needs to know besides the fingertip. Each is a covariate of
+/// the table in [`crate::covariate`]; what was not measured is `None`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
     /// Peak-to-peak vibration amplitude `w`.
@@ -17,7 +17,7 @@ pub struct Condition {
     pub direction: Direction,
     /// Normal force `F_n` in N, positive in compression.
     pub normal_force_n: f64,
-    /// Coulomb friction coefficient without vibration, `mu_0`, as it is known where the condition is asked about.
+    /// Coulomb friction coefficient without vibration, `mu_0`, as far as it is known at the condition.
     pub mu0: f64,
     /// Mean position along the stroke in m.
     pub position_m: f64,
@@ -80,7 +80,7 @@ impl Condition {
         }
     }
 
-    /// Time since the first pass of the run in s; since the start of the table where runs are not told apart.
+    /// Time since the first pass of the run in s; since the start of a table without runs.
     pub fn time_in_run_s(&self) -> f64 {
         self.run_time_s.unwrap_or(self.time_s)
     }

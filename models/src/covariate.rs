@@ -280,8 +280,8 @@ pub static SMOOTH: [&Covariate; 9] = [
     &RELATIVE_HUMIDITY,
 ];
 
-/// All of them in the order in which people are told of them.
-pub static TOLD: [&Covariate; 10] = [
+/// All covariates in the order of presentation.
+pub static COVARIATES: [&Covariate; 10] = [
     &AMPLITUDE,
     &SPEED,
     &NORMAL_FORCE,
@@ -298,7 +298,7 @@ pub static TOLD: [&Covariate; 10] = [
 pub static SETTINGS: [&Covariate; 6] =
     [&AMPLITUDE, &FREQUENCY, &SPEED, &DIRECTION, &NORMAL_FORCE, &AMBIENT_PRESSURE];
 
-/// Settings by which neighbouring passes are told, the first one first.
+/// Settings that identify neighbouring passes, the first one first.
 pub static NEIGHBOURS: [&Covariate; 5] = [&AMPLITUDE, &SPEED, &FREQUENCY, &NORMAL_FORCE, &AMBIENT_PRESSURE];
 
 /// What a plan can set: everything but time and the day's climate.
@@ -309,7 +309,7 @@ pub fn planned() -> impl Iterator<Item = &'static Covariate> {
 
 /// The covariate of that name.
 pub fn by_name(name: &str) -> Option<&'static Covariate> {
-    TOLD.into_iter().find(|c| c.name == name)
+    COVARIATES.into_iter().find(|c| c.name == name)
 }
 
 #[cfg(test)]
@@ -319,22 +319,22 @@ mod tests {
     #[test]
     fn every_covariate_is_in_every_list_that_it_belongs_to() {
         for c in REQUIRED.into_iter().chain(OPTIONAL) {
-            assert!(by_name(c.name).is_some_and(|same| std::ptr::eq(same, c)), "{} in TOLD", c.name);
+            assert!(by_name(c.name).is_some_and(|same| std::ptr::eq(same, c)), "{} in COVARIATES", c.name);
             let listed = |list: &[&Covariate]| list.iter().any(|other| std::ptr::eq(*other, c));
             assert_eq!(listed(&SMOOTH), c.name != "direction", "{} in SMOOTH", c.name);
             assert_eq!(listed(&SETTINGS), c.level.is_some(), "{} in SETTINGS", c.name);
             assert_eq!(listed(&NEIGHBOURS), c.neighbourhood.is_some(), "{} in NEIGHBOURS", c.name);
         }
-        assert_eq!(TOLD.len(), REQUIRED.len() + OPTIONAL.len());
+        assert_eq!(COVARIATES.len(), REQUIRED.len() + OPTIONAL.len());
     }
 
     #[test]
     fn what_is_put_in_is_read_back_and_nothing_else_changes() {
-        for (k, c) in TOLD.into_iter().enumerate() {
+        for (k, c) in COVARIATES.into_iter().enumerate() {
             let mut at = Condition::paper();
             c.put(&mut at, -1.0);
             assert_eq!(c.of(&at), Some(-1.0), "{}", c.name);
-            for (j, other) in TOLD.into_iter().enumerate() {
+            for (j, other) in COVARIATES.into_iter().enumerate() {
                 let same = other.of(&at) == other.of(&Condition::paper());
                 assert!(j == k || same, "{} changes {}", c.name, other.name);
             }
@@ -343,7 +343,7 @@ mod tests {
 
     #[test]
     fn the_papers_point_is_within_every_range_and_absurd_ones_are_not() {
-        for c in TOLD {
+        for c in COVARIATES {
             assert!(c.of(&Condition::paper()).is_none_or(|v| c.admits(v)), "{}", c.name);
             for absurd in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e19] {
                 assert!(!c.admits(absurd), "{} = {absurd}", c.name);

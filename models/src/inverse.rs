@@ -1,8 +1,8 @@
 //! The law turned round: the amplitude for a wanted friction, for open-loop control (the paper's last words).
 //!
-//! Drive power grows with w^2 (section 5.2, after its reference 31), so the least amplitude that reaches the target is
-//! the cheapest. Friction need not fall evenly with the amplitude (regimes, doubled periods): the first crossing
-//! is sought on a grid and then closed by bisection.
+//! Drive power grows with w^2 (section 5.2, after its reference 31), so the least amplitude that reaches the
+//! target is the cheapest. Friction need not fall evenly with the amplitude (regimes, doubled periods): the
+//! first crossing is sought on a grid and then closed by bisection.
 
 use crate::condition::{Condition, OutOfDomain};
 use crate::prediction::{FrictionModel, Prediction, Validity};

@@ -44,7 +44,7 @@ pub struct Prediction {
     pub validity: Validity,
 }
 
-/// Relative friction alone, without the contact's regime: what a law is asked for on whole columns.
+/// Relative friction alone, without the contact's regime: the result of a law for whole columns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelativeFriction {
     /// `mu'`, as [`Prediction::mu_relative`].
@@ -78,8 +78,8 @@ pub trait FrictionModel: Send + Sync {
         })
     }
 
-    /// Relative standard deviations of the two parameters that a calibration leaves uncertain (normal and lateral
-    /// stiffness, or what takes their place). Zero: the law has none.
+    /// Relative standard deviations of the two parameters that a calibration leaves uncertain (normal and
+    /// lateral stiffness, or what takes their place). Zero: the law has none.
     fn parameter_relative_sd(&self) -> [f64; 2] {
         [0.0; 2]
     }
@@ -162,8 +162,8 @@ pub struct EmpiricalPsi {
 }
 
 impl EmpiricalPsi {
-    /// Eq. 20 with `Psi* = 2.38 +- 0.21` for a `w` of which the paper does not say surely what it is: each reading as likely
-    /// as the other.
+    /// Eq. 20 with `Psi* = 2.38 +- 0.21` for a `w` of which the paper does not say surely what it is: each
+    /// reading as likely as the other.
     ///
     /// # Errors
     /// A finger outside the domain of the model, by name.

@@ -46,8 +46,8 @@ pub fn sensitivity_to_psi_star(psi: PsiEq17, psi_star: f64) -> f64 {
     if ratio.is_finite() { -ratio / psi_star * (-ratio).exp() } else { 0.0 }
 }
 
-/// Root-mean-square distance of the exponential from the massless spring-slider over `w/h` 4 to 60 and
-/// Psi 0.1 to 2 pi. The collapse onto one curve is itself approximate; `tests/paper.rs` recomputes this number.
+/// Root-mean-square distance of the exponential from the massless spring-slider over `w/h` 4 to 60 and Psi
+/// 0.1 to 2 pi. The collapse onto one curve is itself approximate; `tests/paper.rs` recomputes this number.
 pub const COLLAPSE_RMSE: f64 = 0.11;
 
 /// Whether Fig. 12's data cover a condition: 0.3 to 5 um (modulus and force series above 1 um only),

@@ -25,8 +25,8 @@ use conditions::{Mean, by_condition, single_passes};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// `Psi` of the true stroke at which passes are asked: about one, where the readings differ most. A condition
-/// at an end has half its weight.
+/// `Psi` of the true stroke at which passes count: about one, where the readings differ most. A condition at
+/// an end has half its weight. at an end has half its weight.
 pub const PSI_RANGE: [f64; 2] = [0.4, 4.0];
 /// Factor about each end over which the weight goes from all to nothing: a `mu_0` with noise then moves no
 /// condition in or out at once.
@@ -265,19 +265,19 @@ impl Means {
         let (slope, variance) = (full * ratio * (-ratio).exp(), noise + (LAW_SD * law_n).powi(2));
         let off = (mean.force_n - full * law) / variance.sqrt();
         let near = 1.0 + (off / ROBUST).powi(2);
-        let asked = asked(psi.0);
+        let weight_by_psi = psi_weight(psi.0);
         Under {
             slope,
             law_n,
             noise,
-            pull: asked * slope * off / (near * variance).sqrt(),
-            weight: asked * near.powf(-1.5) / variance,
+            pull: weight_by_psi * slope * off / (near * variance).sqrt(),
+            weight: weight_by_psi * near.powf(-1.5) / variance,
         }
     }
 }
 
 /// The weight of a condition by its Psi: one within [`PSI_RANGE`], nothing far outside, smooth between.
-fn asked(psi: f64) -> f64 {
+fn psi_weight(psi: f64) -> f64 {
     let edge = |beyond: f64| {
         let t = (0.5 + beyond.ln() / (2.0 * PSI_EDGE.ln())).clamp(0.0, 1.0);
         t * t * (3.0 - 2.0 * t)

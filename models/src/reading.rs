@@ -32,8 +32,8 @@ impl Reading {
         }
     }
 
-    /// The paper's `Psi*` (-) for a `Psi` of the true stroke, and its standard uncertainty. `Psi` is inverse in `w`, so
-    /// the stroke's `Psi` is the paper's divided by [`Reading::strokes`].
+    /// The paper's `Psi*` (-) for a `Psi` of the true stroke, and its standard uncertainty. `Psi` is inverse
+    /// in `w`, so the stroke's `Psi` is the paper's divided by [`Reading::strokes`].
     pub const fn psi_star(self) -> (f64, f64) {
         (PSI_STAR / self.strokes(), PSI_STAR_UNCERTAINTY / self.strokes())
     }

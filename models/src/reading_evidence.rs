@@ -13,9 +13,9 @@ use std::fmt;
 
 /// `Psi*` that 'neither reading' holds for possible, evenly in its logarithm.
 pub const PSI_STAR_RANGE: [f64; 2] = [0.3, 9.0];
-/// Nats from which a reading is said to be favoured: odds of 20 to 1.
+/// Nats from which a reading is favoured: odds of 20 to 1.
 pub const DECIDED_NATS: f64 = 2.995_732_273_553_991;
-/// Standard deviation of `ln Psi*` up to which the two readings, a factor of 2 apart, are told from what lies between them.
+/// Standard deviation of `ln Psi*` up to which the two readings, a factor of 2 apart, are distinct.
 const RESOLVED_SD: f64 = 0.25;
 
 /// What the passes say of the readings.
@@ -37,7 +37,7 @@ pub enum Decision {
 /// The weights of the readings after some passes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ReadingFinding {
-    /// What may be said.
+    /// The conclusion.
     pub decision: Decision,
     /// Natural logarithm of the evidence for peak-to-peak over that for the sine's amplitude: negative favours the latter.
     pub nats: f64,
@@ -123,7 +123,7 @@ pub fn of_passes(
     })
 }
 
-/// What is said of the readings where `ln Psi*` is known within a variance; the two logarithms of odds.
+/// The conclusion on the readings where `ln Psi*` is known within a variance, and the two logarithms of odds.
 fn decide(ln_star: f64, variance: f64) -> (Decision, f64, f64) {
     let normal = |away: f64, variance: f64| {
         -0.5 * (away * away / variance + variance.ln() + std::f64::consts::TAU.ln())

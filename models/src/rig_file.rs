@@ -190,8 +190,8 @@ impl Calibration {
         }
     }
 
-    /// The certificate behind a key for people, as in 'force certificate (cell-7.toml)'. A quantity that no kind of
-    /// certificate covers has rig.toml's own word.
+    /// The certificate behind a key for people, as in 'force certificate (cell-7.toml)'. A quantity that no
+    /// kind of certificate covers has rig.toml's own word.
     pub fn certificate_of(&self, key: CertifiedKey) -> String {
         let Some(kind) = key.kind() else { return format!("{} that rig.toml states", key.name()) };
         match self.certificates.get(&kind) {
@@ -378,8 +378,8 @@ mod tests {
             "[calibration]\nnormal_gain = 0.1\n",
             "[calibration.certificates]\nspeed = \"s.toml\"\n",
         ] {
-            let said = refusal(&format!("{TEXT}\n{wrong}"));
-            assert!(said.contains("unknown"), "{wrong}: {said}");
+            let message = refusal(&format!("{TEXT}\n{wrong}"));
+            assert!(message.contains("unknown"), "{wrong}: {message}");
         }
         assert!(refusal(&TEXT.replace("force_sd_n", "force_sd")).contains("unknown field `force_sd`"));
     }
@@ -405,13 +405,13 @@ mod tests {
             ("[noise]", "poisson_ratio = 0.6\n[noise]", "[finger] poisson_ratio = 0.6"),
         ] {
             assert!(TEXT.contains(from), "{from}");
-            let said = refusal(&TEXT.replacen(from, to, 1));
-            assert!(said.contains(place) && said.contains("is needed"), "{to}: {said}");
+            let message = refusal(&TEXT.replacen(from, to, 1));
+            assert!(message.contains(place) && message.contains("is needed"), "{to}: {message}");
         }
         for key in CertifiedKey::ALL {
             for value in ["nan", "-0.01", "1e3"] {
-                let said = refusal(&format!("{TEXT}[calibration]\n{} = {value}\n", key.name()));
-                assert!(said.contains(&format!("[calibration] {}", key.name())), "{said}");
+                let message = refusal(&format!("{TEXT}[calibration]\n{} = {value}\n", key.name()));
+                assert!(message.contains(&format!("[calibration] {}", key.name())), "{message}");
             }
         }
         let silent = TEXT.replace("= 0.015", "= 0.0").replace("= 0.0008", "= 0.0");

@@ -53,9 +53,9 @@ pub fn bracketed(mut f: impl FnMut(f64) -> f64, lo: f64, hi: f64) -> f64 {
     0.5 * (a + b)
 }
 
-/// The root of `f` in `[lo, hi]`, where `f(lo)` and `f(hi)` differ in sign, by Newton's method kept within the
+/// The root of `f` in `[lo, hi]`, where `f(lo)` and `f(hi)` differ in sign, by Newton's method within the
 /// bracket; `f` gives value and derivative, `start` is where it begins. Where a step leaves the bracket or
-/// hardly shrinks, the bracket is halved instead. A handful of evaluations where [`bracketed`] takes dozens.
+/// hardly shrinks, the bracket is halved. A handful of evaluations where [`bracketed`] takes dozens.
 ///
 /// The end of smaller absolute value is returned if the signs do not differ (a root on the boundary).
 pub fn newton(mut f: impl FnMut(f64) -> (f64, f64), lo: f64, hi: f64, start: f64) -> f64 {

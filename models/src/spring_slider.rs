@@ -1,9 +1,9 @@
 //! The massless spring-Coulomb slider of section 4 (Eqs. 6-15) with section 5.3's finite lateral recovery.
 //!
 //! Over one period the plate's phase is `phi = 2 pi f t`, zero where the plate presses most. The reaction
-//! force, in units of `k_n a` (`a = w/2`, [`PeakToPeak::sine_amplitude_m`]), is
-//! `g(phi) = cos(phi) + s` where that is positive and zero elsewhere (Eq. 14). The offset `s` follows from the
-//! force balance of Eq. 15 by root finding, never from a table.
+//! force, in units of `k_n a` (`a = w/2`, [`PeakToPeak::sine_amplitude_m`]), is `g(phi) = cos(phi) + s` where
+//! that is positive and zero elsewhere (Eq. 14). The offset `s` follows from the force balance of Eq. 15 by
+//! root finding, never from a table.
 //!
 //! The lateral stretch, in units of `mu_0 k_n a / k_l`, grows at `kappa = k_l U / (2 pi f mu_0 k_n a)` while the
 //! slider sticks, and slips where it would exceed `g` (Eqs. 9-13). While it lies above `g` or contact is lost it
@@ -220,8 +220,8 @@ pub(crate) fn solve_checked(c: &Condition, finger: &Finger) -> Cycle {
 }
 
 impl Cycle {
-    /// Standard deviation of `mu'` from independent relative standard deviations `sd` of both stiffnesses: half
-    /// the spread at one standard deviation either way, exact to second order.
+    /// Standard deviation of `mu'` from independent relative standard deviations `sd` of both stiffnesses:
+    /// half the spread at one standard deviation either way, exact to second order.
     pub fn mu_relative_sd(&self, sd: f64) -> f64 {
         if sd == 0.0 || !self.groups.compression_ratio.is_finite() {
             return 0.0;

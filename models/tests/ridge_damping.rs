@@ -99,8 +99,8 @@ fn a_damped_ridge_runs_and_nonsense_is_refused() {
     }
 }
 
-/// One lightly damped case ends in two states: contact kept, where it comes from rest, and lost for most of the time, where it comes down from twice
-/// the amplitude. With the default damping both starts end alike.
+/// One lightly damped case ends in two states: unbroken contact, where it comes from rest, and lost for most
+/// of the time, where it comes down from twice the amplitude. With the default damping both starts end alike.
 #[test]
 fn a_lightly_damped_case_has_two_states() {
     let base = RidgeCase { elements: 200, ..RidgeCase::paper() }.with_amplitude_pp_m(1e-6);
@@ -115,8 +115,8 @@ fn a_lightly_damped_case_has_two_states() {
             (found.mu_relative, found.contact_fraction)
         })
     };
-    let [kept, lost] = both(&RidgeCase { mass_damping_per_s: 6e3, ..base });
-    assert!(kept.0 > 0.95 && kept.1 > 0.999 && lost.0 < 0.3 && lost.1 < 0.5, "{kept:?} {lost:?}");
+    let [closed, lost] = both(&RidgeCase { mass_damping_per_s: 6e3, ..base });
+    assert!(closed.0 > 0.95 && closed.1 > 0.999 && lost.0 < 0.3 && lost.1 < 0.5, "{closed:?} {lost:?}");
     let [rest, above] = both(&base);
     assert!((rest.0 - above.0).abs() < 0.01, "{rest:?} {above:?}");
     let wild = RunSettings { overshoot: 0.5, ..RunSettings::default() };

@@ -22,7 +22,7 @@ fn mu(case: &RidgeCase, settings: &RunSettings) -> (f64, usize, f64) {
 }
 
 /// Three levels of one case, printed.
-fn told(case: &RidgeCase, levels: [f64; 3]) -> [f64; 3] {
+fn printed(case: &RidgeCase, levels: [f64; 3]) -> [f64; 3] {
     let (mpa, um) = (case.young_modulus_pa / 1e6, case.amplitude.micrometres());
     println!("{mpa:.0} MPa, {um:.1} um: mu' {:.5} {:.5} {:.5}", levels[0], levels[1], levels[2]);
     levels
@@ -42,9 +42,9 @@ struct Order {
 /// From levels whose sizes have the ratio `ratio`.
 fn order(levels: &[[f64; 3]], ratio: f64) -> Order {
     let pooled = |without: Option<usize>| {
-        let kept: Vec<_> = levels.iter().enumerate().filter(|(i, _)| Some(*i) != without).collect();
+        let rest: Vec<_> = levels.iter().enumerate().filter(|(i, _)| Some(*i) != without).collect();
         let rms = |k: usize| {
-            (kept.iter().map(|(_, l)| (l[k] - l[k + 1]).powi(2)).sum::<f64>() / kept.len() as f64).sqrt()
+            (rest.iter().map(|(_, l)| (l[k] - l[k + 1]).powi(2)).sum::<f64>() / rest.len() as f64).sqrt()
         };
         (rms(0), rms(1))
     };
@@ -69,7 +69,7 @@ fn order_with_the_mesh() {
                 .map(|elements| mu(&RidgeCase { elements, ..*case }, &RunSettings::default()));
             // Of the element's size, which goes with the root of their number.
             ratio = (runs[2].1 as f64 / runs[0].1 as f64).powf(0.25);
-            told(case, runs.map(|run| run.0))
+            printed(case, runs.map(|run| run.0))
         })
         .collect();
     let found = order(&levels, ratio);
@@ -93,7 +93,7 @@ fn order_with_the_step() {
             let plain = RunSettings { one_step: true, added_mass: 0.0, ..RunSettings::default() };
             let (own, _, step) = mu(&case, &plain);
             let with = |part: f64| mu(&case, &RunSettings { step_s: Some(part * step), ..plain }).0;
-            told(&case, [own, with(0.5), with(0.25)])
+            printed(&case, [own, with(0.5), with(0.25)])
         })
         .collect();
     let found = order(&levels, 2.0);

@@ -57,8 +57,8 @@ fn half_plane(nx: usize, ny: usize, size: f64, first: f64, material: Material) -
     .expect("a mesh")
 }
 
-/// Flamant: a narrow contact on a half plane yields along the surface as it does across it. Twice the width, and both compliances
-/// fall by 2 (1 - nu^2) ln 2 / (pi E) (Johnson 1985, 2.3, and 2.8 for a rigid punch).
+/// Flamant: a narrow contact on a half plane yields along the surface as it does across it. Twice the width,
+/// and both compliances fall by 2 (1 - nu^2) ln 2 / (pi E) (Johnson 1985, 2.3, and 2.8 for a rigid punch).
 #[test]
 fn narrow_contacts_follow_flamant_both_ways() {
     for nu in [0.2, 0.33, 0.45] {
@@ -138,8 +138,8 @@ fn ratio_of_the_papers_ridge() {
     assert!((coarse / fine - 1.0).abs() < 0.05 && fine < 0.9 * ridge);
 }
 
-/// The ratio decides the law: the massless slider with the ridge's own static springs has the ridge's Psi*, with and without a layer along the plate
-/// that halves the ratio.
+/// The ratio decides the law: the massless slider with the ridge's own static springs has the ridge's Psi*,
+/// with and without a layer along the plate that halves the ratio.
 #[test]
 fn static_springs_give_the_ridges_law() {
     let base = RidgeCase { elements: 200, ..RidgeCase::paper() };

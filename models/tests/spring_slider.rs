@@ -1,5 +1,5 @@
-//! The slider's quick roots against plain bisection and its uncertainty against separate solutions, over the whole
-//! range of conditions: the same within 1e-10.
+//! The slider's quick roots against plain bisection and its uncertainty against separate solutions, over the
+//! whole range of conditions: the same within 1e-10.
 
 use muprime_models::condition::Condition;
 use muprime_models::finger::Finger;

@@ -88,7 +88,7 @@ pub enum Refusal {
 }
 
 impl Certificate {
-    /// Everything that can be said of a certificate without knowing where it will be used:
+    /// Every check of a certificate that needs no knowledge of where it will be used:
     /// untouched, with dates, parameters and a covariance that can be.
     ///
     /// # Errors

@@ -109,7 +109,7 @@ pub fn friction(points: &[FrictionPoint]) -> Result<FrictionFit, FingerError> {
                 base + inner.max(1e-9).ln()
             };
             let [low, high] = span(times);
-            // The time constant may lie anywhere in the record: several starts, the best is kept.
+            // The time constant may lie anywhere in the record: the best of several starts counts.
             [0.1, 0.3, 0.7]
                 .iter()
                 .filter_map(|x| {

@@ -1,9 +1,9 @@
-//! Both stiffnesses of the spring-slider from passes with and without vibration, and above all their ratio `k_l / k_n`, which decides
-//! the law of friction (Eq. 16).
+//! Both stiffnesses of the spring-slider from passes with and without vibration, and above all their ratio
+//! `k_l / k_n`, which decides the law of friction (Eq. 16).
 //!
-//! Least squares on the forces in `ln k_n`, `ln (k_l / k_n)` and `ln mu_0` with no prior: each pass weighs by what the rig repeats to. The
-//! interval of the ratio is its profile, `k_n` and `mu_0` searched anew at each value. Where the passes scatter more than stated, the
-//! interval is as much wider.
+//! Least squares on the forces in `ln k_n`, `ln (k_l / k_n)` and `ln mu_0` with no prior: each pass weighs by
+//! what the rig repeats to. The interval of the ratio is its profile, `k_n` and `mu_0` searched anew at each
+//! value. Where the passes scatter more than stated, the interval is as much wider.
 
 use super::FingerError;
 use models::condition::Condition;
@@ -202,8 +202,8 @@ fn search(rows: &[Row], start: Found, free: [bool; 3]) -> Found {
     here
 }
 
-/// Where the profile along an axis passes what is allowed, towards `end` (`outwards` is 1 for the upper one, -1 for the lower); and
-/// whether it does. A best value beyond the range has no end there.
+/// Where the profile along an axis passes what is allowed, towards `end` (`outwards` is 1 for the upper one,
+/// -1 for the lower); and whether it does. A best value beyond the range has no end there.
 fn profile_end(rows: &[Row], best: Found, axis: usize, end: f64, outwards: f64, allowed: f64) -> (f64, bool) {
     if (end - best.at[axis]) * outwards <= 0.0 {
         return (best.at[axis], false);

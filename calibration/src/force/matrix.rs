@@ -1,8 +1,8 @@
 //! The calibration matrix from a dead-weight series.
 //!
 //! Loads are known and counts scatter, so counts are regressed on loads and the matrix is inverted for use:
-//! `counts_i = o_i + sum_j (g_ij F_j + q_ij F_j^2) + d_i (t - t0) + h_ij b s_j + temperature`. Both channels share
-//! the design; the scatter of their residuals may be correlated (Zellner 1962: with one design for all
+//! `counts_i = o_i + sum_j (g_ij F_j + q_ij F_j^2) + d_i (t - t0) + h_ij b s_j + temperature`. Both channels
+//! share the design; the scatter of their residuals may be correlated (Zellner 1962: with one design for all
 //! channels ordinary least squares loses nothing). Errors that all loads share (gravity, masses, the
 //! direction of the pull) cannot show in the residuals: they are added as type B.
 

@@ -125,7 +125,7 @@ impl Spectrum {
     }
 }
 
-/// One line of the discrete Fourier transform at `cycles` per sample (Goertzel's recurrence, kept stable by
+/// One line of the discrete Fourier transform at `cycles` per sample (Goertzel's recurrence, stabilised by
 /// rotating rather than by the second-order form).
 fn line(samples: &[f64], cycles: f64) -> (f64, f64) {
     let (sin, cos) = (2.0 * PI * cycles).sin_cos();

@@ -43,7 +43,7 @@ pub struct LoadReading {
     pub branch: Option<Branch>,
     /// Temperature in degrees Celsius.
     pub temperature_c: Option<f64>,
-    /// Whether the instrument said that it was at the end of its range.
+    /// Whether the instrument reported the end of its range.
     pub saturated: bool,
 }
 

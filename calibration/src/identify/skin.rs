@@ -2,7 +2,7 @@
 //!
 //! The misfit is not smooth and has valleys along which two quantities trade places, so it is scanned whole,
 //! refined from the best valleys by a compass search that also steps along diagonals, and profiled: for each
-//! value of one quantity the other two are searched anew. What the phases cannot tell is said in words, from
+//! value of one quantity the other two are searched again. A remark reports what the phases cannot show, from
 //! the open ends of the profiles and from how the quantities move together within the likelihood.
 
 use super::{CHI2_95, IdentifyError, Search, apart, check, row_sds};
@@ -39,17 +39,17 @@ pub struct IdentifiedSkin {
     pub chi2_elastic: f64,
     /// Eq. 2 at the best skin, degrees squared.
     pub objective_deg2: f64,
-    /// How modulus and penalty, modulus and time, penalty and time move together within the likelihood, -1 to 1
-    /// (in their logarithms; the time as [`retardation_place`]).
+    /// How modulus and penalty, modulus and time, penalty and time move together within the likelihood, -1 to
+    /// 1 (in their logarithms; the time as [`retardation_place`]).
     pub correlation: [f64; 3],
     /// What the data cannot tell, in words.
     pub cannot_tell: Vec<String>,
 }
 
 impl IdentifiedSkin {
-    /// Whether elastic skin with the default penalty fits as well: freeing both gains no more than chance does
-    /// once in a thousand. (Once in twenty would be too often: the mesh's error is not random.) The paper then
-    /// takes the elastic case (section 3.3).
+    /// Whether elastic skin with the default penalty fits as well: freeing both gains no more than chance
+    /// does once in a thousand. (Once in twenty would be too often: the mesh's error is not random.) The
+    /// paper then takes the elastic case (section 3.3).
     pub fn elastic_will_do(&self) -> bool {
         self.chi2_elastic - self.chi2 < CHI2_999_TWO
     }
@@ -65,7 +65,7 @@ const STARTS: [usize; 2] = [8, 3];
 const LEAST_STEP: f64 = 2e-4;
 /// Fewest rows for three quantities.
 const FEWEST: usize = 6;
-/// Two quantities that move together more than this cannot be told apart.
+/// Two quantities that move together more than this cannot be separated.
 const TOGETHER: f64 = 0.7;
 
 /// Place of a skin: modulus, penalty, time, each 0 to 1 over the range searched.
@@ -357,8 +357,8 @@ mod tests {
         SkinGrid::free((5e6, 100e6), 5)
     }
 
-    /// A phase curve whose onset moves with modulus and contact and whose plateau moves with the time; its foot
-    /// has a corner.
+    /// A phase curve whose onset moves with modulus and contact and whose plateau moves with the time; its
+    /// foot has a corner.
     fn toy(skin: &Skin, w: PeakToPeak) -> f64 {
         let series = skin.young_modulus_pa * skin.penalty_ratio / (skin.penalty_ratio + 0.3);
         let omega_tau = 2.0 * std::f64::consts::PI * 27_500.0 * skin.retardation_time_s;

@@ -49,7 +49,7 @@ pub enum DrawError {
     /// The correlation matrix is not positive definite.
     #[error("the correlation matrix of the inputs is not positive definite")]
     Correlation,
-    /// Too few draws for the interval that is asked for (Supplement 1, 7.2 advises 10^4 / (1 - p)).
+    /// Too few draws for the requested interval (Supplement 1, 7.2 advises 10^4 / (1 - p)).
     #[error("{0} draws are too few: take at least 10000")]
     TooFew(usize),
 }

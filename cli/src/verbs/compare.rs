@@ -7,9 +7,9 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Conditions that are told, those furthest apart first.
-const TOLD: usize = 5;
-/// Longest value that is told of a difference, in characters.
+/// Most conditions in the table, those furthest apart first.
+const PRINTED: usize = 5;
+/// Longest value in the table of differences, in characters.
 const SHOWN: usize = 24;
 
 /// Arguments.
@@ -76,7 +76,7 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
         w.push_str("largest differences (w peak-to-peak; second minus first, in standard deviations):\n");
         w.push_str("     w, um  f, kHz  U, mm/s  F, N  first second difference (sd)\n");
     }
-    for p in worst.iter().take(TOLD) {
+    for p in worst.iter().take(PRINTED) {
         let _ = writeln!(
             w,
             "  {:6.3} um {:6.2} kHz {:+6.1} mm/s {:.2} N  {:.3} {:.3}  {:+.3} ({:+.1})",

@@ -19,8 +19,8 @@ use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 use tables::passes::parse_passes;
 
-/// Parts of the operating space that are told in words, the largest first.
-const TOLD: usize = 6;
+/// Parts of the operating space that are printed, the largest first.
+const PRINTED: usize = 6;
 
 /// Say where simulation and reality part on a table of passes, which effect causes it, and how far it shrinks.
 #[derive(Debug, ClapArgs)]
@@ -53,7 +53,7 @@ pub struct Args {
     pub without: Vec<String>,
 }
 
-/// Reads, diagnoses, writes what was asked for.
+/// Reads, diagnoses, writes the requested files.
 ///
 /// # Errors
 /// Files that cannot be read or written, tables and rigs that are refused; nothing is written then.
@@ -159,10 +159,10 @@ fn keep_in_run(run: &Path, page: &Path, text: &str) {
     }
 }
 
-/// A bar that follows a diagnosis; on Ctrl-C the effects that lead so far are told.
+/// A bar that follows a diagnosis; Ctrl-C prints the effects that lead so far.
 fn follow(bar: &ProgressBar, json: bool) -> miette::Result<Progress> {
     let reached: Arc<Mutex<Option<Stage>>> = Arc::default();
-    let kept = Arc::clone(&reached);
+    let latest = Arc::clone(&reached);
     studies::progress::on_interrupt(bar, move |_| {
         let stage = reached.lock().unwrap_or_else(PoisonError::into_inner).clone();
         tell_partial(stage.as_ref(), json);
@@ -172,7 +172,7 @@ fn follow(bar: &ProgressBar, json: bool) -> miette::Result<Progress> {
         // A second look at the table begins anew: the bar stays where it was.
         bar.set_position(bar.position().max((1e3 * stage.share) as u64));
         bar.set_message(stage.doing);
-        let mut reached = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut reached = latest.lock().unwrap_or_else(PoisonError::into_inner);
         let leading = reached.take().map(|before| before.leading).filter(|_| stage.leading.is_empty());
         *reached = Some(Stage { leading: leading.unwrap_or(stage.leading), ..stage });
     }))
@@ -199,7 +199,7 @@ fn tell_partial(stage: Option<&Stage>, json: bool) {
     if leading.is_empty() {
         out!("  no effect was fitted yet");
     }
-    for (effects, nats) in leading.iter().take(TOLD) {
+    for (effects, nats) in leading.iter().take(PRINTED) {
         out!("  {:+9.1} nats over no gap  {}", nats, effects.join(" + "));
     }
 }

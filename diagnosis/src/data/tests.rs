@@ -19,8 +19,8 @@ fn still(count: usize, force: impl Fn(usize, f64, f64) -> f64) -> Vec<Pass> {
     read_passes(csv.as_bytes()).expect("a table")
 }
 
-/// Magnitudes in both directions are refused, with what is needed; signed forces are not, nor those with an offset that
-/// hides the turn of friction.
+/// Magnitudes in both directions are refused, with what is needed; signed forces are not, nor those with an
+/// offset that hides the turn of friction.
 #[test]
 fn forces_without_a_sign_are_refused() {
     let unsigned = Table::measured(&still(16, |_, _, load| 0.5 * load));

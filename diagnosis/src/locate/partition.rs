@@ -12,7 +12,7 @@ const LEVELS: usize = 24;
 /// Least gain of a cut in the sum of squares.
 const LEAST_GAIN: f64 = 0.5;
 
-/// A covariate, the values at which it may be cut, and for each place asked how many of them it lies above.
+/// A covariate, the values at which it may be cut, and for each place how many of them it lies above.
 pub(super) struct Cut {
     covariate: usize,
     pub at: Vec<f64>,
@@ -29,9 +29,9 @@ fn spread(values: &[f64]) -> f64 {
 pub(super) fn cuts(places: &[Condition]) -> Vec<Cut> {
     let one = |covariate: usize| {
         let values: Vec<f64> =
-            places.iter().map(|p| covariate::TOLD[covariate].of(p)).collect::<Option<_>>()?;
-        if covariate::TOLD[covariate].role == Role::Climate
-            && spread(&values) < covariate::TOLD[covariate].least_spread
+            places.iter().map(|p| covariate::COVARIATES[covariate].of(p)).collect::<Option<_>>()?;
+        if covariate::COVARIATES[covariate].role == Role::Climate
+            && spread(&values) < covariate::COVARIATES[covariate].least_spread
         {
             return None;
         }
@@ -50,7 +50,7 @@ pub(super) fn cuts(places: &[Condition]) -> Vec<Cut> {
         let above = values.iter().map(|v| at.partition_point(|a| a < v) as u8).collect();
         (!at.is_empty()).then_some(Cut { covariate, at, above })
     };
-    (0..covariate::TOLD.len()).filter_map(one).collect()
+    (0..covariate::COVARIATES.len()).filter_map(one).collect()
 }
 
 /// A part of the operating space.

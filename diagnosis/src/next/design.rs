@@ -1,10 +1,10 @@
 //! Which conditions: greedily those after which the hypotheses are least confused.
 //!
-//! Two hypotheses of probabilities p and q are confused by at most `sqrt(p q) exp(-B)`, B the Bhattacharyya distance of
-//! what they expect of all chosen passes together. For Gaussians of like covariance B is an eighth of the sum of both
-//! Kullback-Leibler divergences, and those add up from pass to pass, each given the passes before it. The design
-//! minimises the sum over all pairs: a pair that is parted stops drawing passes, a condition that a hypothesis has
-//! learnt stops telling.
+//! Two hypotheses of probabilities p and q are confused by at most `sqrt(p q) exp(-B)`, B the Bhattacharyya
+//! distance of what they expect of all chosen passes together. For Gaussians of like covariance B is an
+//! eighth of the sum of both Kullback-Leibler divergences, and those add up from pass to pass, each given the
+//! passes before it. The design minimises the sum over all pairs: a pair that is parted stops drawing passes,
+//! a condition that a hypothesis has learnt stops telling.
 
 use super::predictive::Predictive;
 use nalgebra::{DMatrix, DVector};

@@ -122,8 +122,8 @@ fn thinned(list: &[Condition]) -> Vec<Condition> {
     rows.into_iter().map(|i| list[i]).collect()
 }
 
-/// A pass some way into a further run. Where the runs of a table follow each other in time the run comes last, else
-/// each run counts its own time.
+/// A pass some way into a further run. Where the runs of a table follow each other in time the run comes
+/// last, else each run counts its own time.
 fn further(table: &Table) -> Condition {
     let passes = &table.passes;
     let last = *passes.last().expect("a table has passes");

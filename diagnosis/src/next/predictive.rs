@@ -1,8 +1,8 @@
 //! What a hypothesis expects at conditions that were not measured, and how surely, correlated between conditions.
 //!
-//! A cause is uncertain in its parameters and in its smooth departure from form; the open set in its two smooth parts;
-//! all in the baseline. A second pass at a condition therefore tells less than the first: what the first left open is
-//! noise, while the hypothesis' own doubt about that condition is gone.
+//! A cause is uncertain in its parameters and in its smooth departure from form; the open set in its two
+//! smooth parts; all in the baseline. A second pass at a condition therefore tells less than the first: what
+//! the first left open is noise, while the hypothesis' own doubt about that condition is gone.
 
 use crate::data::RigFile;
 use crate::decision::Decision;
@@ -100,7 +100,7 @@ fn expected(
     let there = problem.jacobian(&e.members, &e.u, &e.prediction);
     let d = e.u.len();
     let r = if e.departure.is_empty() { 0 } else { basis.ncols() };
-    let (mut seen, mut asked) = (there.insert_columns(d, r, 0.0), here.insert_columns(d, r, 0.0));
+    let (mut seen, mut planned) = (there.insert_columns(d, r, 0.0), here.insert_columns(d, r, 0.0));
     let mut mean = plain.clone();
     if r > 0 {
         let (_, _, shift) = recalibration(problem, &e.u, &e.prediction);
@@ -109,7 +109,7 @@ fn expected(
         mean += change.component_mul(&(basis * &e.departure)) * e.share;
         for k in 0..r {
             seen.set_column(d + k, &(fitted.basis.column(k).component_mul(&e.change) * e.share));
-            asked.set_column(d + k, &(basis.column(k).component_mul(&change) * e.share));
+            planned.set_column(d + k, &(basis.column(k).component_mul(&change) * e.share));
         }
     }
     let mut precision = problem.covariance(&DMatrix::zeros(problem.len(), 0)).inner(&seen, &seen);
@@ -123,7 +123,7 @@ fn expected(
     let factor = precision.cholesky().expect("a prior makes the precision positive definite");
     let root = factor
         .l()
-        .solve_lower_triangular(&asked.transpose())
+        .solve_lower_triangular(&planned.transpose())
         .expect("a Cholesky factor has no zero on its diagonal");
     (mean, root.transpose() * root)
 }

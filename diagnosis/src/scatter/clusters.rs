@@ -8,7 +8,7 @@
 
 use crate::draws::split_mix;
 use crate::fit::Problem;
-use models::covariate::{Role, TOLD};
+use models::covariate::{COVARIATES, Role};
 
 /// Shuffles against which a table is held; fewer for long ones.
 const SHUFFLES: usize = 400;
@@ -70,10 +70,10 @@ impl Space {
         let largest = problem.design.largest_amplitude_m;
         let mut single: Vec<Cells> = Vec::new();
         let mut fine: Vec<Cells> = Vec::new();
-        for c in TOLD {
-            let told: Option<Vec<f64>> =
+        for c in COVARIATES {
+            let values: Option<Vec<f64>> =
                 problem.passes.iter().map(|q| c.of(q).map(|v| c.scaled(v, largest))).collect();
-            let Some(values) = told else { continue };
+            let Some(values) = values else { continue };
             let Some(cells) = levels(&values, c.least_spread) else { continue };
             single.push(Cells::new(c.words.to_string(), cells));
             if matches!(c.role, Role::Time | Role::Place) && values.len() >= FINE * FEWEST {

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 /// Values of the correlation that are tried beside none.
 const VALUES: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
-/// Fewest differences from which a correlation is asked.
+/// Fewest differences for a search for correlation.
 const FEWEST: usize = 24;
 
 /// Rows in the order of measurement, run by run.

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct State {
     even: usize,
     odd: usize,
-    /// Stays at the first place, zero, where runs are not told apart.
+    /// Stays at the first place, zero, where the table does not separate runs.
     run: usize,
     scale: usize,
     /// Size and correlation of what lasts from pass to pass.

@@ -71,7 +71,7 @@ pub fn take_back(problem: &Problem, space: &Space, outside: &mut [f64], left_out
     (!places.is_empty()).then(|| places.join("; "))
 }
 
-/// Fewest passes that can be said to lie together.
+/// Fewest passes that form a cluster.
 const FEWEST: usize = 3;
 /// Cells that are taken back at most.
 const MOST_TAKEN: usize = 12;

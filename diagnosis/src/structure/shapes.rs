@@ -10,7 +10,7 @@ use crate::fit::Problem;
 use crate::gaussian::{Covariance, log_sum_exp};
 use crate::layout::NUISANCES;
 use crate::scatter::Scatter;
-use models::covariate::{Covariate, Role, TOLD};
+use models::covariate::{COVARIATES, Covariate, Role};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -195,7 +195,7 @@ fn families(part: &Problem, prediction: &DVector<f64>) -> Vec<Family> {
         signals.push((false, vec![mean; full.len()], rms(&|i| mean / full[i])));
     }
     let mut list = Vec::new();
-    for covariate in TOLD {
+    for covariate in COVARIATES {
         let values: Option<Vec<f64>> = part.passes.iter().map(|p| covariate.of(p)).collect();
         let Some(values) = values else { continue };
         for (kind, shapes) in over(part, covariate, &values) {

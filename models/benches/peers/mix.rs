@@ -62,9 +62,9 @@ impl Core {
         }
     }
 
-    /// Ice Lake and later Xeons with two AVX-512 multipliers: ports 0 and 5 do all arithmetic of 512 bits, ports 0 and 1 that of
-    /// 256 (logic also on 5); two loads of either, two stores of 256 bits or one of 512; five instructions. (Intel, Optimization
-    /// reference manual, 248966; division from uops.info.)
+    /// Ice Lake and later Xeons with two AVX-512 multipliers: ports 0 and 5 do all arithmetic of 512 bits,
+    /// ports 0 and 1 that of 256 (logic also on 5); two loads of either, two stores of 256 bits or one of
+    /// 512; five instructions. (Intel, Optimization reference manual, 248966; division from uops.info.)
     pub fn xeon(avx512: bool) -> Core {
         Core {
             name: "Xeon (Ice Lake)",
@@ -106,8 +106,8 @@ pub struct Loops {
     pub nodes: Mix,
 }
 
-/// Finds them in this program, for vectors of 512 or 256 bits; none without objdump, or where the compiler laid them out so that
-/// they are not known again.
+/// Finds them in this program, for vectors of 512 or 256 bits; none without objdump, or where the compiler
+/// laid them out so that they are not known again.
 pub fn loops(avx512: bool) -> Option<Loops> {
     let program = std::env::current_exe().ok()?;
     let out = Command::new("objdump").args(["-d", "--no-show-raw-insn"]).arg(program).output().ok()?;

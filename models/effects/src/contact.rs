@@ -96,8 +96,8 @@ pub enum Attraction {
         /// Normal force at which half of it is there, N.
         scale: f64,
     },
-    /// `2 Fc + 2 sqrt(Fc (F + Fc))`: what the contact of Johnson, Kendall and Roberts adds to the load, by its
-    /// pull-off force.
+    /// `2 Fc + 2 sqrt(Fc (F + Fc))`: what the contact of Johnson, Kendall and Roberts adds to the load, by
+    /// its pull-off force.
     Jkr {
         /// Pull-off force, N.
         pull_off: f64,

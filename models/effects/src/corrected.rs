@@ -254,8 +254,8 @@ impl FrictionModel for Corrected {
         self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
     }
 
-    /// The lateral force is what the sensor will read along the motion, so an effect of an instrument is in it;
-    /// the relative friction is that force over `mu_0 F_n` with the loop's own `mu_0`.
+    /// The lateral force is what the sensor will read along the motion, so an effect of an instrument is in
+    /// it; the relative friction is that force over `mu_0 F_n` with the loop's own `mu_0`.
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
         condition.check()?;
         // The finger of today may rub more or less than that of the diagnosis: the loop's mu_0 counts.

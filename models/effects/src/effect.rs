@@ -68,8 +68,8 @@ pub struct Parameter {
     pub lower: f64,
     /// Largest value that the fit may take.
     pub upper: f64,
-    /// Whether it only bends the law about its middle, where the coordinate is zero: a search begins there, and the local fit
-    /// finds it.
+    /// Whether it only bends the law about its middle, where the coordinate is zero: a search begins there,
+    /// and the local fit finds it.
     pub bends: bool,
 }
 
@@ -168,8 +168,8 @@ impl Parameter {
     }
 }
 
-/// How a law acts as a change of the baseline, exactly and on every pass: by e-folds of mu0, normal and lateral
-/// stiffness for one e-fold of the law's size.
+/// How a law acts as a change of the baseline, exactly and on every pass: by e-folds of mu0, normal and
+/// lateral stiffness for one e-fold of the law's size.
 pub type Rescaling = [f64; 3];
 
 /// A check that sees a law's size without going through friction.
@@ -325,9 +325,9 @@ pub trait Effect: Sync {
     fn source(&self) -> &'static str;
     /// Its functional forms.
     fn laws(&self) -> &'static [Law];
-    /// Largest share of its change by which it may depart smoothly from its form. A linear map of the readings has no
-    /// shape of its own: what needs more is something else (a vibration in the plane of the plate looks like a cross-talk
-    /// that is off by a third).
+    /// Largest share of its change by which it may depart smoothly from its form. A linear map of the
+    /// readings has no shape of its own: what needs more is something else (a vibration in the plane of the
+    /// plate looks like a cross-talk that is off by a third).
     fn departs_by(&self) -> f64 {
         1.0
     }

@@ -30,7 +30,7 @@
 //! };
 //! let pass = Condition::paper();
 //! let effect = by_name("amplitude_miscalibration").ok_or("no effect of that name")?;
-//! // The plate moves by half of what was asked: friction falls less.
+//! // The plate moves by half of the set amplitude: friction falls less.
 //! let half = [Active { effect, law: 0, theta: &[0.5_f64.ln()] }];
 //! let expected = lateral_force(&baseline, &[], &pass, &design);
 //! assert!(lateral_force(&baseline, &half, &pass, &design) > expected);

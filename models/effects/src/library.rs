@@ -1,8 +1,8 @@
 //! The candidate causes, one file each.
 //!
-//! A file holds everything that is known of its cause: laws, priors and sources, what a table must hold to show it,
-//! which certificate bounds it, what does the same, and which check sees it without going through friction. Nothing
-//! of that stands anywhere else. To add a cause: its file, and its line in the list below.
+//! A file holds everything that is known of its cause: laws, priors and sources, what a table must hold to
+//! show it, which certificate bounds it, what does the same, and which check sees it without going through
+//! friction. Nothing of that stands anywhere else. To add a cause: its file, and its line in the list below.
 
 use crate::effect::{Effect, Law};
 
@@ -26,8 +26,8 @@ macro_rules! causes {
 }
 
 causes! {
-    // In the order in which a signal passes them: instruments that falsify the condition, plate, finger, contact,
-    // instruments that read the force.
+    // In the order in which a signal passes them: instruments that falsify the condition, plate, finger,
+    // contact, instruments that read the force.
     library {
         normal_offset::NormalOffset
         normal_gain::NormalGain
@@ -95,8 +95,8 @@ pub fn imitated(names: &[&str]) -> Option<&'static dyn Effect> {
     known().iter().find(by).copied()
 }
 
-/// Every two laws that do the same for the same size, by index of effect and law: those that act as one change of the
-/// baseline, and those that say so of each other.
+/// Every two laws that do the same for the same size, by index of effect and law: those that act as one
+/// change of the baseline, and those that say so of each other.
 pub fn twins() -> Vec<[(usize, usize); 2]> {
     let laws: Vec<(usize, usize, &Law)> = (library().iter().enumerate())
         .flat_map(|(e, effect)| effect.laws().iter().enumerate().map(move |(l, law)| (e, l, law)))

@@ -16,8 +16,8 @@ pub struct Active<'a> {
     pub theta: &'a [f64],
 }
 
-/// Signed mean lateral force that the sensor reads, N. Effects act in the library's order; allocates nothing. The
-/// friction coefficient is the baseline's, not the condition's.
+/// Signed mean lateral force that the sensor reads, N. Effects act in the library's order; allocates nothing.
+/// The friction coefficient is the baseline's, not the condition's.
 pub fn lateral_force(baseline: &Baseline, effects: &[Active<'_>], pass: &Condition, design: &Design) -> f64 {
     read(baseline.contact(pass, design), effects, pass, design)
 }

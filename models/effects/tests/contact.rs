@@ -115,8 +115,8 @@ fn inertia_table_errs_as_stated() {
     }
 }
 
-/// In a contact that never ends the equations are linear: the force swings by the modulus of the dynamic stiffness,
-/// and the slider is the massless one of that swing. Skin of one part in sixty gives way a little.
+/// In a contact that never ends the equations are linear: the force swings by the modulus of the dynamic
+/// stiffness, and the slider is the massless one of that swing. Skin of one part in sixty gives way a little.
 #[test]
 fn an_unbroken_contact_with_mass_is_linear() {
     for (ratio, damping) in [(0.3, 0.2), (0.6, 0.5), (0.9, 1.0)] {
@@ -134,7 +134,7 @@ fn an_unbroken_contact_with_mass_is_linear() {
     }
 }
 
-/// The sweep, asked for what the closed form knows, gives the closed form.
+/// The sweep gives the closed form where that one exists.
 #[test]
 fn sweep_agrees_with_the_closed_form() {
     let (mut worst, mut coarsest) = (0.0f64, 0.0f64);

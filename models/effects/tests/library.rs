@@ -143,8 +143,8 @@ fn heating_is_imitated_by_rate_and_load_together() {
     assert!(muprime_effects::imitated(&pair[..1]).is_none());
 }
 
-/// What a check measures is of the unit of the law's size: its deviation is a part of the size's prior, neither more than
-/// half of it nor next to nothing.
+/// What a check measures is of the unit of the law's size: its deviation is a part of the size's prior,
+/// neither more than half of it nor next to nothing.
 #[test]
 fn checks_measure_in_the_unit_of_the_size() {
     let mut checked = 0;

@@ -56,8 +56,8 @@ const NUMBERS: [(&str, [f64; 2], &str); 4] = [
     ("phase_shift_deg", [-3600.0, 3600.0], "an angle in degrees, at most ten turns"),
 ];
 
-/// Whether a table may do without the column: one without the place has it nowhere, and a plate that stands still has no
-/// frequency.
+/// Whether a table may do without the column: one without the place has it nowhere, and a plate that stands
+/// still has no frequency.
 fn may_lack(c: &Covariate) -> bool {
     c.name == covariate::POSITION.name || c.name == covariate::FREQUENCY.name
 }
@@ -128,8 +128,8 @@ impl Row<'_> {
         self.parsed(text, c.name, |v| c.admits(v) && unit(v), c.needed)
     }
 
-    /// Whether a table can go without this value here. The condition holds the row's amplitude already, which stands
-    /// before the frequency among the covariates.
+    /// Whether a table can go without this value here. The condition holds the row's amplitude already, which
+    /// stands before the frequency among the covariates.
     fn may_be_empty(&self, c: &'static Covariate, condition: &Condition) -> Result<(), TableError> {
         let nowhere = c.name == covariate::POSITION.name && self.columns.place(c.name).is_none();
         let still = c.name == covariate::FREQUENCY.name && condition.amplitude == PeakToPeak::ZERO;
@@ -217,8 +217,8 @@ pub fn read_passes(from: impl Read) -> Result<Vec<Pass>, TableError> {
     Ok(filled.collect())
 }
 
-/// Writes a point table with every column of docs/contract.md; missing values are empty cells. Numbers have as many
-/// digits as it takes to read them back unchanged.
+/// Writes a point table with every column of docs/contract.md; missing values are empty cells. Numbers have
+/// as many digits as it takes to read them back unchanged.
 ///
 /// # Errors
 /// Whatever the writer says.

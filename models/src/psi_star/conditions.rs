@@ -65,8 +65,8 @@ fn levels(values: &[f64], same: f64) -> Vec<u32> {
     of
 }
 
-/// How many passes are asked, and between which `Psi*` nine of ten lie, each by itself; no friction below
-/// that without vibration: infinite.
+/// The number of passes needed, and the interval that holds nine of ten `Psi*`, each by itself. Infinite if
+/// there is no friction below that without vibration.
 pub(super) fn single_passes<'a>(
     passes: impl Iterator<Item = &'a (Condition, f64)>,
     mu0: f64,

@@ -198,7 +198,7 @@ impl Body {
                 shape.iter_mut().zip(of).for_each(|(field, value)| field.push(value));
                 // sum over corners of b_i b_i, b the gradient of the shape functions.
                 let gradients = (dx13 * dx13 + dy13 * dy13 + dx24 * dx24 + dy24 * dy24) / (2.0 * area * area);
-                // Over 16: the force is kept as a quarter, its share at a corner, of a rate that is four times too large.
+                // Over 16: the stored force is a quarter, a corner's share, of a rate four times too large.
                 hourglass_stiffness.push(
                     HOURGLASS_COEFFICIENT / 16.0
                         * (material.lambda_pa() + 2.0 * material.shear_modulus_pa())
@@ -270,8 +270,8 @@ impl Body {
         self.count_energy = on;
     }
 
-    /// Chooses the instructions of the kernel, for comparisons; what this machine lacks gives the widest it has
-    /// (ask [`Instructions::here`] first).
+    /// Chooses the instructions of the kernel, for comparisons; what this machine lacks gives the widest it
+    /// has (ask [`Instructions::here`] first).
     pub fn use_instructions(&mut self, instructions: Instructions) {
         self.instructions = instructions;
     }

@@ -150,8 +150,8 @@ impl RidgeCase {
         })
     }
 
-    /// The plate that the case's ridge meets. A node far from the tip, which stands for more than four spacings of it, has no
-    /// stiffer spring than four.
+    /// The plate that the case's ridge meets. A node far from the tip, which stands for more than four
+    /// spacings of it, has no stiffer spring than four.
     ///
     /// # Errors
     /// What [`Plate`] refuses.

@@ -1,8 +1,8 @@
 //! The rigid plate: penalty contact with Coulomb friction on the surface row.
 //!
-//! Where the surface is below the plate, a spring of the node pushes it back; along the plate a second
-//! spring of the same stiffness, or a softer one, stretches with the sliding until Coulomb's limit. Out of contact the
-//! stretch is forgotten at once. The springs are free of inertia.
+//! Where the surface is below the plate, a spring of the node pushes it back; along the plate a second spring
+//! of the same stiffness, or a softer one, stretches with the sliding until Coulomb's limit. Out of contact
+//! the stretch is forgotten at once. The springs are free of inertia.
 
 use super::RidgeError;
 use super::kernel::Surface;

@@ -1,4 +1,4 @@
-//! What is kept of a vibration cycle, and the judgement whether the cycles have become steady.
+//! The summary of a vibration cycle, and the judgement whether the cycles have become steady.
 
 use serde::Serialize;
 

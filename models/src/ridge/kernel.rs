@@ -9,7 +9,7 @@
 //! - corners 1 and 3 (2 and 4) take opposite stress forces, so two force vectors serve four corners.
 //!
 //! Positions are those of the half step, where the velocities are, so that the strain of a rigid rotation
-//! is exactly zero. Stress is kept as mean, half difference and shear: a rotation by the spin leaves the
+//! is exactly zero. Stress is stored as mean, half difference and shear: a rotation by the spin leaves the
 //! first alone and turns the other two by twice the angle.
 //!
 //! No colouring and no scatter: forces on the nodes of row j are complete once the element rows j-1 and j
@@ -69,8 +69,8 @@ pub struct Surface<'a> {
     pub dt: f64,
 }
 
-/// Runs `count` steps of `body`; `contact` is called in each with the surface (through a pointer, so that the kernel is compiled once
-/// and not for each contact).
+/// Runs `count` steps of `body`; `contact` is called in each with the surface (through a pointer, so that the
+/// kernel is compiled once and not for each contact).
 pub(super) fn run(
     body: &mut Body,
     features: Features,

@@ -26,8 +26,8 @@ pub(super) struct Layer {
 }
 
 impl Body {
-    /// Lets layers move in longer steps: `(first row of elements, steps of the surface in one of theirs)`, from the surface
-    /// inwards. Each number of steps must be a multiple of the one before it.
+    /// Lets layers move in longer steps: `(first row of elements, steps of the surface in one of theirs)`,
+    /// from the surface inwards. Each number of steps must be a multiple of the one before it.
     ///
     /// # Panics
     /// If they are not in order or not multiples.
@@ -60,8 +60,8 @@ impl Body {
         }
     }
 
-    /// Puts the node row in front of the layer where it was in the mean, and lays aside what it is owed, so that the element row
-    /// behind it gives its own forces alone.
+    /// Puts the node row in front of the layer where it was in the mean, and lays aside what it is owed, so
+    /// that the element row behind it gives its own forces alone.
     #[inline(never)]
     pub(super) fn enter_layer(&mut self, level: usize) {
         self.note_interface(level);

@@ -35,8 +35,8 @@ pub struct RunSettings {
     pub step_s: Option<f64>,
     /// Whether to count work and energy.
     pub energy: bool,
-    /// Amplitude from which the run comes, over the case's: 1 grows to it from rest, with contact kept as long as can be; more
-    /// comes down to it, from contact that is lost or doubled. From 1 to 10.
+    /// Amplitude from which the run comes, over the case's: 1 grows to it from rest, in contact for as long
+    /// as possible; more comes down to it, from contact that is lost or doubled. From 1 to 10.
     pub overshoot: f64,
     /// Whether all layers move in the surface's step; otherwise the soft ones in longer ones (`stability::longer_steps`).
     pub one_step: bool,
@@ -116,7 +116,7 @@ pub struct RidgeRun {
     pub step_s: f64,
     /// Memory of the body in bytes.
     pub memory_bytes: usize,
-    /// Work and energy over the averaged cycles, if asked for.
+    /// Work and energy over the averaged cycles, if requested.
     pub energy: Option<EnergyBalance>,
     /// The mean cycle, forces per metre of depth of the ridge.
     #[serde(skip)]
@@ -278,7 +278,7 @@ pub fn run(case: &RidgeCase, settings: &RunSettings) -> Result<RidgeRun, RidgeEr
     run_watched(case, settings, &mut |_| {})
 }
 
-/// The same; `each` is told the relative friction of each cycle with the whole amplitude.
+/// The same; `each` receives the relative friction of each cycle with the whole amplitude.
 ///
 /// # Errors
 /// As [`run`].

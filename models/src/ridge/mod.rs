@@ -64,10 +64,10 @@ pub enum RidgeError {
         /// What is allowed.
         range: String,
     },
-    /// A time step above the stable one was asked for.
+    /// The requested time step is above the stable one.
     #[error("a time step of {asked_s:e} s is unstable here: at most {stable_s:e} s (or leave it out)")]
     UnstableStep {
-        /// What was asked for, s.
+        /// The requested step, s.
         asked_s: f64,
         /// The largest stable step, s.
         stable_s: f64,

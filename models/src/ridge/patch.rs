@@ -6,8 +6,8 @@
 //! field: waves from ridge to ridge are left out.
 //!
 //! **Finite length** ([`plane_stress`]). A ridge as long as it is wide lies between plane strain and plane stress. In the plane both
-//! are one problem with other constants, `nu' = nu / (1 + nu)` and `E' = E (1 + 2 nu) / (1 + nu)^2` (Timoshenko and Goodier), so the same
-//! run gives the other end.
+//! are one problem with other constants, `nu' = nu / (1 + nu)` and `E' = E (1 + 2 nu) / (1 + nu)^2`
+//! (Timoshenko and Goodier), so the same run gives the other end.
 
 use super::{RidgeCase, RidgeError, RunSettings, run};
 

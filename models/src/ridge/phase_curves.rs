@@ -46,9 +46,9 @@ impl SkinGrid {
         }
     }
 
-    /// All three free. The penalty goes from where it makes the contact much softer than the skin to Table 2's
-    /// for moist skin, above which it makes no difference; the time from none to where one cycle sees nothing
-    /// of the relaxation (`docs/ridge.md`).
+    /// All three free. The penalty goes from where it makes the contact much softer than the skin to Table
+    /// 2's for moist skin, above which it makes no difference; the time from none to where one cycle sees
+    /// nothing of the relaxation (`docs/ridge.md`).
     pub fn free((low_pa, high_pa): (f64, f64), count: usize) -> Self {
         SkinGrid {
             moduli_pa: ratios(low_pa, high_pa, count),
@@ -162,8 +162,8 @@ impl PhaseCurves {
         &self.grid
     }
 
-    /// Phase in degrees for a skin at one of the amplitudes; not a number at any other amplitude. Beyond an end
-    /// of the grid it is that at the end.
+    /// Phase in degrees for a skin at one of the amplitudes; not a number at any other amplitude. Beyond an
+    /// end of the grid it is that at the end.
     pub fn at(&self, skin: &Skin, amplitude: PeakToPeak) -> f64 {
         let Some(row) = self.amplitudes.iter().position(|w| *w == amplitude) else {
             return f64::NAN;

@@ -72,8 +72,8 @@ pub fn psi_star(base: RidgeCase, reading: Reading) -> Result<Option<PsiFit>, Rid
 /// Load over the mean one at which [`springs`] are taken: what the contact carries while it lasts, about.
 pub const SPRING_LOADS: f64 = 3.0;
 
-/// The finger of the massless spring-slider whose springs are the ridge's own: `k_l` and the secant `k_n` of a static solve with the
-/// base of the stratum corneum held, under [`SPRING_LOADS`] mean loads.
+/// The finger of the massless spring-slider whose springs are the ridge's own: `k_l` and the secant `k_n` of
+/// a static solve with the base of the stratum corneum held, under [`SPRING_LOADS`] mean loads.
 ///
 /// # Errors
 /// A case that makes no sense.

@@ -118,8 +118,8 @@ pub fn contact_step_s(body: &Body, penalty: &[f64]) -> f64 {
     step * (1.0 - 0.5 * stiffer)
 }
 
-/// Adds mass to the nodes whose elements and contact springs alone hold the step down, `share` of the first layer's mass in all,
-/// and returns what was added in kg per metre of depth.
+/// Adds mass to the nodes whose elements and contact springs alone hold the step down, `share` of the first
+/// layer's mass in all, and returns what was added in kg per metre of depth.
 ///
 /// A node's mass suffices for a step dt where it is at least dt^2/4 (sum of omega_e^2 m_e + k), omega_e = 2 c / l the highest
 /// frequency of each element beside it, m_e its share of the element's mass and k its contact spring. The step is raised until

@@ -183,8 +183,8 @@ fn press(
         let approach = (load + shape.iter().sum::<f64>()) / unit.iter().sum::<f64>();
         let force: Vec<f64> = unit.iter().zip(&shape).map(|(u, s)| approach * u - s).collect();
         if force.iter().any(|f| *f < 0.0) {
-            let kept = touching.iter().zip(&force).filter(|(_, f)| **f >= 0.0).map(|(i, _)| *i);
-            touching = kept.collect();
+            let pressed = touching.iter().zip(&force).filter(|(_, f)| **f >= 0.0).map(|(i, _)| *i);
+            touching = pressed.collect();
             continue;
         }
         let lift = |i: usize| -> f64 {

@@ -1,8 +1,8 @@
-//! Parametric studies: the cases of Fig. 9, and the content key under which a result is kept.
+//! Parametric studies: the cases of Fig. 9, and the content key under which a result is stored.
 
 use super::{RidgeCase, RunSettings};
 
-/// Changes whenever the model itself changes its results, so that kept results are not mistaken for new ones.
+/// Changes whenever the model itself changes its results, so that old results are not mistaken for new ones.
 pub const MODEL_VERSION: u32 = 2;
 
 /// The key of a case's result: a hash of the model's version and of everything that defines the run.

@@ -1,7 +1,7 @@
 //! The lateral stretch over one turn of the plate, piece by piece.
 //!
-//! Everything is in units of `k_n a` (forces) and radians (time). On each piece the stretch is a straight line
-//! or follows the reaction force, so pieces end at roots that are bracketed by known extrema, and their
+//! Everything is in units of `k_n a` (forces) and radians (time). On each piece the stretch is a straight
+//! line or follows the reaction force, so pieces end at roots that are bracketed by known extrema, and their
 //! integrals are closed forms.
 
 use crate::root;
@@ -127,8 +127,8 @@ impl Stretch {
             }
             let gap = self.g(phi) - x;
             let tolerance = 1e-13 * (1.0 + self.offset.abs());
-            // The slope just ahead: a slip ends where slope and rate are equal, and rounding must not decide there
-            // whether what follows is another slip, to the end of the contact.
+            // The slope just ahead: a slip ends where slope and rate are equal, and rounding must not decide
+            // there whether what follows is another slip, to the end of the contact.
             let slope = -(phi + AHEAD_RAD).sin();
             let piece = if gap < -tolerance {
                 Piece::Recover

@@ -89,7 +89,7 @@ fn monotone_cubic(line: &[f64], cell: usize, t: f64) -> f64 {
             return rise(0);
         }
         if k == 0 || k == n - 1 {
-            // One-sided and of second order, kept from turning the sign or overshooting.
+            // One-sided and of second order, limited so that it neither changes sign nor overshoots.
             let (near, far) = if k == 0 { (rise(0), rise(1)) } else { (rise(n - 2), rise(n - 3)) };
             let s = 1.5 * near - 0.5 * far;
             return if s * near <= 0.0 {

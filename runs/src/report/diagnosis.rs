@@ -17,8 +17,8 @@ use diagnosis::predict::Forecast;
 use diagnosis::verdict::{Diagnosis, probability};
 use models::covariate;
 
-/// Parts of the operating space that are told in words, the largest first.
-const TOLD: usize = 3;
+/// Parts of the operating space that the page lists, the largest first.
+const LISTED_REGIONS: usize = 3;
 
 /// The page; `about` is what is known of the table's run, and stands first.
 ///
@@ -105,15 +105,15 @@ fn how_far(result: &Diagnosis) -> String {
 
 fn location(result: &Diagnosis, table: &Table, errors: &[(f64, f64)]) -> String {
     let r = &result.report;
-    let told: Vec<&str> = r
+    let listed: Vec<&str> = r
         .location
         .regions
         .iter()
         .filter(|g| g.share_of_gap >= 0.01)
-        .take(TOLD)
+        .take(LISTED_REGIONS)
         .map(|g| g.text.as_str())
         .collect();
-    let rest = r.location.regions.len() - told.len();
+    let rest = r.location.regions.len() - listed.len();
     let more = if rest > 0 {
         note(&format!("And {rest} smaller parts, in the JSON document."))
     } else {
@@ -139,7 +139,7 @@ fn location(result: &Diagnosis, table: &Table, errors: &[(f64, f64)]) -> String 
         "<h2>Where the gap lies</h2>{}{}{more}<p>In which part of the rig, by probability: {}.</p>\
          <details><summary>Errors in regions that were left out of the fit, in standard deviations of a pass</summary>{}</details>",
         gap_map::section(table, errors),
-        list(told, "No part stands out."),
+        list(listed, "No part stands out."),
         escape(&places.join(", ")),
         list(closed, "No region was left out.")
     )
@@ -201,7 +201,7 @@ fn residuals(result: &Diagnosis, table: &Table, forecasts: &[Forecast]) -> miett
         .collect();
     let limit = z.iter().fold(4.0f64, |a, (b, _)| a.max(b.abs())).min(40.0);
     let mut figures = String::new();
-    for c in covariate::TOLD {
+    for c in covariate::COVARIATES {
         let all: Option<Vec<f64>> = table.passes.iter().map(|p| c.of(p).map(|v| c.shown.0 * v)).collect();
         let Some(x) = all else { continue };
         let (low, high) =

@@ -34,7 +34,7 @@ pub(super) fn refuse_unfit(readings: &[LoadReading], options: &Options) -> Resul
 }
 
 /// A converter that stands still while the load still grows, or that repeats its extreme value to the last
-/// digit where every other mean has a fraction, is saturated even if nobody said so.
+/// digit where every other mean has a fraction, is saturated even without the instrument's flag.
 fn plateau(readings: &[LoadReading]) -> Result<(), ForceError> {
     for axis in AXES {
         let a = axis as usize;

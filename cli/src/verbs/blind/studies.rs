@@ -16,11 +16,11 @@ use studies::validation::blind::same_form::{self, Covered};
 use studies::validation::blind::{sensitivity, share};
 
 /// One JSON document; one that Ctrl-C has cut says so.
-fn document(mut said: Value, partial: bool) {
+fn document(mut report: Value, partial: bool) {
     if partial {
-        said["partial"] = true.into();
+        report["partial"] = true.into();
     }
-    out!("{said}");
+    out!("{report}");
 }
 
 /// What stands above a table that Ctrl-C has cut.
@@ -69,10 +69,10 @@ pub fn rough(args: &Args, kind: &str, options: &Options, json: bool) -> miette::
 
 fn tell_rough(rows: &[Answers], seed: u64, sets: usize, partial: bool, json: bool) {
     if json {
-        let said = serde_json::json!({
+        let report = serde_json::json!({
             "schema": "muprime.blind.noise/1", "seed": seed, "sets": sets, "rows": rows,
         });
-        return document(said, partial);
+        return document(report, partial);
     }
     out!(
         "| scatter | truth | sets | right | wrong | ambiguous | unknown | missed | bad passes found | others suspect |"
@@ -97,19 +97,19 @@ fn tell_rough(rows: &[Answers], seed: u64, sets: usize, partial: bool, json: boo
 /// Verdicts with each constant halved and doubled.
 pub fn sensitivity(
     args: &Args,
-    asked: &str,
+    choice: &str,
     stratum: Option<Stratum>,
     options: &Options,
     json: bool,
 ) -> miette::Result<ExitCode> {
-    let picked = |row: &Row| match asked {
+    let picked = |row: &Row| match choice {
         "all" => true,
         "fit" => row.stage == Stage::Fit,
         "decision" => row.stage == Stage::Decision,
         name => row.name == name,
     };
     if !options.constants.rows().iter().any(picked) {
-        miette::bail!("--sensitivity {asked}: fit, decision, the name of a constant, or nothing is needed");
+        miette::bail!("--sensitivity {choice}: fit, decision, the name of a constant, or nothing is needed");
     }
     let tried = Arc::new(sensitivity::Study::new(options, &picked)?);
     let (seed, sets, so_far) = (args.seed, args.sets, Arc::clone(&tried));
@@ -125,10 +125,10 @@ pub fn sensitivity(
 
 fn tell_sensitivity(rows: &[sensitivity::Row], seed: u64, sets: usize, partial: bool, json: bool) {
     if json {
-        let said = serde_json::json!({
+        let report = serde_json::json!({
             "schema": "muprime.blind.sensitivity/1", "seed": seed, "sets": sets, "rows": rows,
         });
-        return document(said, partial);
+        return document(report, partial);
     }
     out!("| constant | factor | right | misnamed | changed | probability on the truth | n |");
     out!("|---|---|---|---|---|---|---|");
@@ -164,9 +164,9 @@ fn tell_same_form(sets: &[Covered], partial: bool, json: bool) {
     let covered = stated.iter().map(|(t, ci)| ci[0] <= *t && *t <= ci[1]).collect();
     let figure = share("size inside its 95 % interval, same form", "0.92 to 0.98", covered);
     if json {
-        let said =
+        let report =
             serde_json::json!({ "schema": "muprime.blind.same_form/1", "figure": figure, "sets": sets });
-        return document(said, partial);
+        return document(report, partial);
     }
     let ci = figure.ci95.unwrap_or([f64::NAN; 2]);
     out!(
@@ -193,10 +193,10 @@ pub fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
             let (designed, random) = (passes(r.designed), passes(r.random));
             study.bar.suspend(|| {
                 say!(
-                    "{} {:26} kept {} before {:.3} designed {designed} random {random}",
+                    "{} {:26} from {} before {:.3} designed {designed} random {random}",
                     r.seed,
                     r.truth,
-                    r.kept,
+                    r.passes,
                     r.before
                 );
             });
@@ -212,10 +212,10 @@ pub fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
 fn tell_further(races: &[Race], partial: bool, json: bool) {
     let figures = further::figures(races);
     if json {
-        let said = serde_json::json!({
+        let report = serde_json::json!({
             "schema": "muprime.blind.further/2", "limit": LIMIT, "figures": figures, "races": races,
         });
-        return document(said, partial);
+        return document(report, partial);
     }
     out!(
         "further passes to a probability of 0.9 on the truth, {} sets whose cause is open at first:",

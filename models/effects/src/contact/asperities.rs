@@ -24,8 +24,8 @@ const SHARES: usize = 9;
 impl Heights {
     /// Medians of equal shares of the distribution, in units of its scale, about a mean of zero.
     ///
-    /// Equal shares rather than quadrature nodes: as the plate takes leave of one asperity after another, a node of
-    /// half the weight would leave at once.
+    /// Equal shares rather than quadrature nodes: as the plate takes leave of one asperity after another, a
+    /// node of half the weight would leave at once.
     fn nodes(self) -> &'static [f64; SHARES] {
         match self {
             Heights::Gaussian => &[

@@ -1,10 +1,10 @@
-//! Ridges with mass: a table of the steady friction of a bouncing oscillator, each node made when first asked for.
+//! Ridges with mass: a table of the steady friction of a bouncing oscillator; nodes come on first use.
 //!
-//! In units of `k_n w/2` and radians: `r^2 x'' + 2 zeta r x' + s (x + depth) = force`, the plate at `sin(theta)`,
-//! `r = 2 pi f sqrt(m/k_n)`. The skin's surface is a spring of [`SURFACE`] times `k_n` with a dashpot, so that a landing
-//! takes time and gives back what the dashpot leaves; `s` is such that both springs in series are `k_n`. The table
-//! holds the ratio to a massless slider, so that it is exactly one where there is no mass. Its interpolation error is
-//! [`STATED_ERROR`].
+//! In units of `k_n w/2` and radians: `r^2 x'' + 2 zeta r x' + s (x + depth) = force`, the plate at
+//! `sin(theta)`, `r = 2 pi f sqrt(m/k_n)`. The skin's surface is a spring of [`SURFACE`] times `k_n` with a
+//! dashpot, so that a landing takes time and gives back what the dashpot leaves; `s` is such that both
+//! springs in series are `k_n`. The table holds the ratio to a massless slider, so that it is exactly one
+//! where there is no mass. Its interpolation error is [`STATED_ERROR`].
 
 use crate::contact::{Contact, arc_load, half_contact_angle, lost_to_stick};
 use std::f64::consts::PI;
@@ -14,11 +14,11 @@ use std::sync::OnceLock;
 pub const SURFACE: f64 = 60.0;
 /// Stiffness of the ridge, so that both in series are the normal stiffness.
 const SPRING: f64 = SURFACE / (SURFACE - 1.0);
-/// Damping ratios of the surface under the ridge's mass for which tables are kept: a landing without rebound and one
+/// Damping ratios of the surface under the ridge's mass that have tables: a landing without rebound and one
 /// that gives back about half of the speed.
 pub const LANDINGS: [f64; 2] = [1.0, 0.2];
-/// Error of mu' by interpolation, root mean square, measured between the nodes by the tests; half of all places lie within
-/// a thirtieth of it. The rest is where a bounce takes two cycles, or wanders.
+/// Error of mu' by interpolation, root mean square, measured between the nodes by the tests; half of all
+/// places lie within a thirtieth of it. The rest is where a bounce takes two cycles, or wanders.
 pub const STATED_ERROR: f64 = 0.007;
 
 /// One axis of the table: nodes spaced evenly between two coordinates.
@@ -85,8 +85,8 @@ fn massless(load: f64, drag: f64) -> f64 {
     carried - lost_to_stick(phi, drag) / (2.0 * PI)
 }
 
-/// Amplitude of the force in a contact that never ends, over that of the massless slider: the dynamic stiffnesses of
-/// ridge and surface in series.
+/// Amplitude of the force in a contact that never ends, over that of the massless slider: the dynamic
+/// stiffnesses of ridge and surface in series.
 fn swing(ratio: f64, damping: f64, landing: f64) -> f64 {
     let ridge = (SPRING - ratio * ratio, 2.0 * damping * ratio);
     let surface = (SURFACE, 2.0 * landing * SURFACE.sqrt() * ratio);
@@ -95,8 +95,8 @@ fn swing(ratio: f64, damping: f64, landing: f64) -> f64 {
 
 /// Ratio of the mean friction with mass to that without.
 ///
-/// A contact that never ends is a massless slider whose force swings by another amount: what the table holds is the
-/// ratio to that one, so it need not follow where contact begins to be lost.
+/// A contact that never ends is a massless slider whose force swings by another amount: what the table holds
+/// is the ratio to that one, so it need not follow where contact begins to be lost.
 pub fn friction_ratio(c: &Contact) -> f64 {
     let r = 2.0 * PI * c.frequency * (c.mass / c.normal_stiffness).sqrt();
     if r < 1e-6 {
@@ -238,8 +238,8 @@ fn oscillators(ratio: f64, damping: f64, landing: f64, h: f64) -> [Oscillator; 2
 impl Bouncing {
     /// Mean friction (units of `mu0 k_n w/2`) at several drags.
     ///
-    /// The finger's depth is steered by its mean force until the load is carried and the motion repeats; what does
-    /// not repeat (a bounce may take two cycles, or wander) is averaged over many cycles.
+    /// The finger's depth is steered by its mean force until the load is carried and the motion repeats; what
+    /// does not repeat (a bounce may take two cycles, or wander) is averaged over many cycles.
     pub fn friction<const N: usize>(&self, drags: &[f64; N]) -> [f64; N] {
         let h = 2.0 * PI / STEPS as f64;
         let dashpot = 2.0 * self.landing * SURFACE.sqrt() * self.ratio;

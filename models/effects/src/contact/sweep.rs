@@ -209,8 +209,8 @@ impl Lateral {
 /// Share of a stretch that is little to lose in one step.
 const LITTLE: f64 = 0.02;
 
-/// What is left of a stretch `x` that recovers at a speed `v x/(x + knee)` for a time in which it would have lost
-/// `rate` at the full speed: the root of `y + knee ln y = x + knee ln x - rate`.
+/// What is left of a stretch `x` that recovers at a speed `v x/(x + knee)` for a time in which it would have
+/// lost `rate` at the full speed: the root of `y + knee ln y = x + knee ln x - rate`.
 fn softened(x: f64, rate: f64, knee: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;

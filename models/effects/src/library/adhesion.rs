@@ -27,7 +27,7 @@ impl Effect for Adhesion {
         Place::Contact
     }
     fn summary(&self) -> &'static str {
-        "The friction limit is mu0 (F + Fa), and contact is kept until the spring pulls with Fa."
+        "The friction limit is mu0 (F + Fa), and contact lasts until the spring pulls with Fa."
     }
     fn source(&self) -> &'static str {
         "Derjaguin, Muller, Toporov 1975; Johnson, Kendall, Roberts 1971; capillary and van der Waals pull of tens of mN on a finger"

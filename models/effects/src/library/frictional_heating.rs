@@ -1,5 +1,5 @@
-//! Rubbing warms the contact and softens what is sheared: friction falls with load times speed. A cause that the library
-//! does not name.
+//! Rubbing warms the contact and softens what is sheared: friction falls with load times speed. A cause that
+//! the library does not name.
 
 use super::prelude::*;
 use crate::contact::sweep::root;

@@ -21,7 +21,7 @@ impl Effect for LateralGain {
         "Lateral force read by a constant factor: an exact alias of mu0 and lateral stiffness together."
     }
     fn source(&self) -> &'static str {
-        "calibration drift of force cells; told apart only by a dead weight on the lateral axis"
+        "calibration drift of force cells; separable only with a dead weight on the lateral axis"
     }
     fn laws(&self) -> &'static [Law] {
         &LAWS

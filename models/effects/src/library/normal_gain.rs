@@ -21,7 +21,7 @@ impl Effect for NormalGain {
         "Normal force read by a constant factor: an exact alias of mu0 and normal stiffness together."
     }
     fn source(&self) -> &'static str {
-        "calibration drift of force cells; told apart only by a dead weight on the normal axis"
+        "calibration drift of force cells; separable only with a dead weight on the normal axis"
     }
     fn laws(&self) -> &'static [Law] {
         &LAWS

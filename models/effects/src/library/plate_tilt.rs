@@ -5,8 +5,8 @@ use super::prelude::*;
 /// See the module.
 pub struct PlateTilt;
 
-// A plate that turns shows in both axes. A lateral cell that is askew by itself reads a share of the normal force: that is a
-// cross-talk by its definition.
+// A plate that turns shows in both axes. A lateral cell that is askew by itself reads a share of the normal
+// force: that is a cross-talk by its definition.
 static LAWS: [Law; 1] = [Law::new("rotation", &[Parameter::signed("angle", "rad", 0.03, -0.3, 0.3)])
     .certified_by(CertifiedKey::Tilt)
     .seen_by("Put a spirit level (or the sensor, unloaded and turned by 180 degrees) on the plate.", 0.002)];

@@ -1,6 +1,6 @@
 //! The drive is off the plate's resonance: by warming up, with time, or at one of the frequencies.
 //!
-//! A resonance that falls with the amplitude alone is not told from saturation, and belongs there.
+//! A resonance that falls with the amplitude alone is indistinguishable from saturation and belongs there.
 
 use super::prelude::*;
 

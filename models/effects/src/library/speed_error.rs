@@ -36,7 +36,7 @@ impl Effect for SpeedError {
         "True speed is a factor (or a constant) away from the commanded one; the factor may change with speed."
     }
     fn source(&self) -> &'static str {
-        "wrong lead or step count; told apart from a stiffness only by an encoder"
+        "wrong lead or step count; separable from a stiffness only with an encoder"
     }
     fn laws(&self) -> &'static [Law] {
         &LAWS

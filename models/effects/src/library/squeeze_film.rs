@@ -21,8 +21,8 @@ const STEEPEST: f64 = 1e-6;
 /// What sees it without friction.
 const CHECK: &str = "Repeat the largest amplitudes at 0.2 atm.";
 
-/// Shapes of a film whose lift goes with powers of amplitude, frequency and load, and which ends between a slow fade
-/// (`1/(1 + lift)`, and slower) and a steep one (`exp(-lift)`).
+/// Shapes of a film whose lift goes with powers of amplitude, frequency and load, and which ends between a
+/// slow fade (`1/(1 + lift)`, and slower) and a steep one (`exp(-lift)`).
 const POWERS: [Parameter; 5] = [
     Parameter::positive("lift_at_largest_amplitude", "1", 3.0, 200.0),
     Parameter::shape("amplitude_exponent", "1", 2.0, 0.3).bending(),
@@ -96,8 +96,8 @@ fn share_by_powers(theta: &[f64], pass: &Condition, design: &Design, c: &Contact
 }
 
 /// The same where the film is that of a strongly squeezed isothermal gas at any excursion `e = a/u`:
-/// `Fn = solid exp(-u) + film (sqrt((1 + 3/2 e^2) / (1 - e^2)) - 1)` (Langlois 1962, Salbu 1964), whose first term is
-/// 5/4 e^2.
+/// `Fn = solid exp(-u) + film (sqrt((1 + 3/2 e^2) / (1 - e^2)) - 1)` (Langlois 1962, Salbu 1964), whose first
+/// term is 5/4 e^2.
 fn finite_film_share(a: f64, film: f64, solid: f64, load: f64) -> f64 {
     if a <= 0.0 {
         return 1.0;

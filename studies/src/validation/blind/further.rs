@@ -17,11 +17,11 @@ use serde::Serialize;
 use sim::noise::Noise;
 use sim::sealed::{Ask, Stratum, generate_with_rig};
 
-/// Passes that a thinned set keeps: the most of these at which its cause is open. A sixth with the plate still. Most causes
-/// that the whole set tells are plain from two dozen passes.
-const KEPT: [usize; 5] = [48, 36, 24, 16, 12];
-/// Passes of a batch, and batches. Causes are often found within six passes: larger batches would not show who was
-/// sooner.
+/// Passes that a thinned set keeps: the most of these at which its cause is open. A sixth with the plate
+/// still. Most causes that the whole set identifies are plain from two dozen passes.
+const SIZES: [usize; 5] = [48, 36, 24, 16, 12];
+/// Passes of a batch, and batches. Causes are often found within six passes: larger batches would not show
+/// who was sooner.
 const BATCH: usize = 2;
 const BATCHES: usize = 32;
 /// Passes at which a race is broken off: who has not arrived counts with so many.
@@ -30,10 +30,10 @@ pub const LIMIT: usize = BATCH * BATCHES;
 const FOUND: f64 = 0.9;
 /// Probability below which a cause is open. Where it is likelier than not at the start, any further pass may end the race.
 const OPEN: f64 = 0.5;
-/// chi2 by which the whole set tells its cause from the recalibrated baseline: 100 and more enters.
-const TOLD: f64 = 100.0;
+/// chi2 by which the whole set separates its cause from the recalibrated baseline: a set enters from 100 on.
+const SEPARATED: f64 = 100.0;
 
-/// What the diagnosis said after a batch.
+/// The diagnosis after a batch.
 #[derive(Debug, Clone, Serialize)]
 pub struct Step {
     /// Further passes so far.
@@ -55,8 +55,9 @@ pub struct Race {
     pub seed: u64,
     /// The cause.
     pub truth: String,
-    /// Passes that were kept.
-    pub kept: usize,
+    /// Number of passes in the thinned set.
+    #[serde(rename = "kept")]
+    pub passes: usize,
     /// Probability of the truth before any further pass.
     pub before: f64,
     /// Further passes as designed; none where they did not suffice.
@@ -69,7 +70,7 @@ pub struct Race {
     pub random_steps: Vec<Step>,
 }
 
-/// Races over `count` sets, each told to `each` as it ends; those whose cause leads from the start are left out.
+/// Races over `count` sets, each passed to `each` as it ends; sets whose cause leads at first are left out.
 ///
 /// # Errors
 /// A set that the diagnosis refuses.
@@ -87,22 +88,22 @@ pub fn run(seed: u64, count: usize, each: &(dyn Fn(Option<&Race>) + Sync)) -> mi
 
 fn one(seed: u64) -> miette::Result<Option<Race>> {
     let set = generate_with_rig(seed, Stratum::Single, Ask::Imitators).0;
-    if set.label.chi2_gain < TOLD || !set.label.decidable() {
+    if set.label.chi2_gain < SEPARATED || !set.label.decidable() {
         return Ok(None);
     }
     let truth = set.label.causes[0].name.clone();
     let rig: RigFile = RigFile::parse(&set.rig_toml).map_err(|e| miette::miette!("rig.toml: {e}"))?;
-    let Some((kept, start, first)) = thin(&set.passes, &rig, &truth)? else { return Ok(None) };
+    let Some((size, start, first)) = thin(&set.passes, &rig, &truth)? else { return Ok(None) };
     let grid = grid(&start)?;
     let race = |designed: bool| -> miette::Result<Vec<Step>> {
         // Each side has the rig to itself: the same finger, the same stream of further noise.
         let mut sealed = generate_with_rig(seed, Stratum::Single, Ask::Gain).1;
         let mut chance = Noise::new(seed, "random experiments");
-        let (mut passes, mut asked) = (start.clone(), first.asked.clone());
+        let (mut passes, mut next) = (start.clone(), first.next.clone());
         let mut steps = Vec::new();
         for batch in 1..=BATCHES {
-            let wanted = if designed && !asked.is_empty() {
-                std::mem::take(&mut asked)
+            let wanted = if designed && !next.is_empty() {
+                std::mem::take(&mut next)
             } else {
                 (0..BATCH).map(|_| grid[chance.below(grid.len())]).collect()
             };
@@ -111,10 +112,10 @@ fn one(seed: u64) -> miette::Result<Option<Race>> {
                 pass.run = Some(format!("further {batch}"));
             }
             passes.extend(further);
-            let said = says(&passes, &rig, &truth)?;
-            asked = said.asked;
-            steps.push(Step { passes: batch * BATCH, ..said.step });
-            if said.found >= FOUND {
+            let answer = says(&passes, &rig, &truth)?;
+            next = answer.next;
+            steps.push(Step { passes: batch * BATCH, ..answer.step });
+            if answer.found >= FOUND {
                 break;
             }
         }
@@ -125,7 +126,7 @@ fn one(seed: u64) -> miette::Result<Option<Race>> {
     Ok(Some(Race {
         seed,
         truth,
-        kept,
+        passes: size,
         before: first.found,
         designed: arrived(&designed_steps),
         random: arrived(&random_steps),
@@ -161,13 +162,13 @@ pub fn figures(races: &[Race]) -> Vec<Figure> {
     ]
 }
 
-/// The largest thinned set that does not tell its cause, with what the diagnosis says of it.
-fn thin(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Option<(usize, Vec<Pass>, Said)>> {
-    for kept in KEPT {
-        let start = thinned(passes, kept);
-        let said = says(&start, rig, truth)?;
-        if said.found < OPEN {
-            return Ok(Some((kept, start, said)));
+/// The largest thinned set that does not identify its cause, with its diagnosis.
+fn thin(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Option<(usize, Vec<Pass>, Answer)>> {
+    for size in SIZES {
+        let start = thinned(passes, size);
+        let answer = says(&start, rig, truth)?;
+        if answer.found < OPEN {
+            return Ok(Some((size, start, answer)));
         }
     }
     Ok(None)
@@ -180,31 +181,31 @@ fn thinned(passes: &[Pass], keep: usize) -> Vec<Pass> {
         let step = list.len().div_ceil(count.max(1)).max(1);
         list.iter().step_by(step).map(|p| (*p).clone()).collect()
     };
-    let mut kept = some(&still, keep / 6);
-    kept.extend(some(&moving, keep - keep / 6));
-    for pass in &mut kept {
+    let mut thinned = some(&still, keep / 6);
+    thinned.extend(some(&moving, keep - keep / 6));
+    for pass in &mut thinned {
         pass.run = Some(pass.run.take().unwrap_or_else(|| "first".to_string()));
     }
-    kept
+    thinned
 }
 
-/// What the diagnosis says of some passes.
-struct Said {
+/// The diagnosis of some passes.
+struct Answer {
     /// Probability of the truth.
     found: f64,
     step: Step,
-    /// The conditions asked for next, a batch of them.
-    asked: Vec<Condition>,
+    /// The batch of conditions to measure next.
+    next: Vec<Condition>,
 }
 
-fn says(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Said> {
+fn says(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Answer> {
     let options = Options { pairs: false, ..Options::default() };
     let report = diagnose(&table(passes)?, rig, &options, String::new()).report;
     let of = |name: &str| -> f64 {
         report.hypotheses.iter().filter(|h| h.effects == [name]).map(|h| h.probability).sum()
     };
-    let asked = report.next_experiment.iter().find(|e| !e.conditions.is_empty());
-    let asked = asked.map_or_else(Vec::new, |e| e.conditions.iter().take(BATCH).map(settings).collect());
+    let next = report.next_experiment.iter().find(|e| !e.conditions.is_empty());
+    let next = next.map_or_else(Vec::new, |e| e.conditions.iter().take(BATCH).map(settings).collect());
     let found = of(truth);
     let step = Step {
         passes: 0,
@@ -213,7 +214,7 @@ fn says(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Said> {
         leader: report.hypotheses[0].effects.join("+"),
         closure: report.left_out.pooled_closure,
     };
-    Ok(Said { found, step, asked })
+    Ok(Answer { found, step, next })
 }
 
 fn table(passes: &[Pass]) -> miette::Result<Table> {
