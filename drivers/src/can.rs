@@ -1,8 +1,8 @@
 //! The conversation in CAN messages, over the kernel's bus or a serial adapter.
 //!
-//! Several messages may make up one sample. They are tied together by the request that asked for
-//! them: a new request throws away what an earlier one left, and after a time without an answer the
-//! bus is listened to in silence before the next, so that a late half is never joined to a new one.
+//! Several messages may make up one sample. Their common request ties them together: a new request drops what
+//! an earlier one left. After a time without an answer the driver only listens before the next request, so
+//! that a late half is never joined to a new one.
 
 use super::off::Closed;
 use super::session::{Ended, LONGEST_SLEEP, Periodic, Session};
@@ -19,8 +19,8 @@ use std::convert::Infallible;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// What is said of a controller whose error counters are at 96, and at 128: then nobody hears of a broken frame any more, and
-/// the link ends.
+/// The message for a controller whose error counters are at 96, or at 128: then no node hears of a broken
+/// frame any more, and the link ends.
 pub(super) const WARNS: &str =
     "the CAN controller warns: its error counters are high; look at cable and termination";
 pub(super) const PASSIVE: &str =
@@ -124,7 +124,7 @@ fn converse(
                 }
                 periodic.advance(now);
             }
-            if group.asked_at.is_some_and(|asked| asked.elapsed() > limit) {
+            if group.asked_at.is_some_and(|since| since.elapsed() > limit) {
                 return Err(Ended::Timeout(limit_ms));
             }
         }
@@ -166,7 +166,7 @@ fn converse(
 impl Group {
     /// Takes a frame if it is the next of the sample; says whether the sample is whole.
     fn take(&mut self, frame: &CanFrame) -> bool {
-        // An answer that nobody asked for, or asked for too long ago, is not taken.
+        // An answer without a request, or to one too long ago, is dropped.
         if self.request.is_some() && self.asked_at.is_none() {
             return false;
         }
@@ -218,7 +218,7 @@ mod tests {
     struct Bus {
         /// The sensor answers.
         answers: Arc<AtomicBool>,
-        /// Told once, before any frame.
+        /// Reported once, before any frame.
         event: Arc<Mutex<Option<CanEvent>>>,
         waiting: VecDeque<CanFrame>,
         read: u32,
@@ -239,8 +239,8 @@ mod tests {
             Ok(true)
         }
 
-        /// A bus that is full: something is there at every look. Of nine frames one is the sensor's; the others are unknown, of
-        /// the sensor's identifiers with a wrong length, or no frame at all.
+        /// A bus that is full: something is there at every look. Of nine frames one is the sensor's; the
+        /// others are unknown, of the sensor's identifiers with a wrong length, or no frame at all.
         fn receive(&mut self, _: Instant) -> std::io::Result<Option<CanEvent>> {
             if let Some(event) = self.event.lock().unwrap().take() {
                 return Ok(Some(event));
@@ -304,10 +304,10 @@ mod tests {
                 sample: 0,
             };
             let ended = Arc::new(Mutex::new(Vec::new()));
-            let (mut shared, told) = (bus.clone(), Arc::clone(&ended));
+            let (mut shared, ends) = (bus.clone(), Arc::clone(&ended));
             let thread = session.spawn(move |session| {
                 let over = converse(session, &mut shared, 432, None);
-                told.lock().unwrap().extend(over.as_ref().err().map(ToString::to_string));
+                ends.lock().unwrap().extend(over.as_ref().err().map(ToString::to_string));
                 over
             });
             opened.recv().unwrap().unwrap();
@@ -346,12 +346,12 @@ mod tests {
         link.until("samples", |link| link.health.report().samples > 100);
         assert!((link.normal().unwrap() - 0.299).abs() < 1e-9, "{:?}", link.normal());
         assert!(link.ended.lock().unwrap().is_empty());
-        // Silent in the midst of the others' frames: told as silent, not waited for.
+        // Silent in the midst of the others' frames: reported as silent, without a wait.
         link.bus.answers.store(false, Ordering::Relaxed);
         let silent_from = Instant::now();
         link.until("its end", |link| link.ended.lock().unwrap().iter().any(|why| why.contains("no answer")));
         assert!(silent_from.elapsed() < Duration::from_secs(120), "{:?}", silent_from.elapsed());
-        link.until("told", |link| link.normal() == Err(NoData::Disconnected));
+        link.until("its report", |link| link.normal() == Err(NoData::Disconnected));
     }
 
     #[test]

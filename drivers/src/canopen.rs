@@ -136,8 +136,8 @@ impl Master {
     fn set_up(&mut self, session: &mut Session) -> Result<(), Ended> {
         let kind = self.read(0x1000, 0)?;
         if kind & 0xFFFF != PROFILE_402 {
-            let said = format!("node {} is no drive of CiA 402 (device type {kind:#010x})", self.node);
-            return Err(Ended::Frame(BadFrame::WrongInstrument(said)));
+            let problem = format!("node {} is no drive of CiA 402 (device type {kind:#010x})", self.node);
+            return Err(Ended::Frame(BadFrame::WrongInstrument(problem)));
         }
         let status = self.read(0x6041, 0)?;
         let faulted = u16::try_from(status & 0xFFFF).ok().and_then(DriveState::of) == Some(DriveState::Fault);
@@ -237,8 +237,8 @@ impl OffWay for Master {
         let safe = session.endpoint.hand_out_off(session.now());
         let sent = self.process_data(session, NOT_ENABLED, &safe);
         self.tries += 1;
-        // A drive that is not operational takes no process data, but service data: the second way, where the first has
-        // not shown itself or where nobody knows the drive's state.
+        // A drive that is not operational takes no process data, but service data: the second way, where the
+        // first has not shown itself or where nobody knows the drive's state.
         let served = if self.tries > 1 || sent.is_err() {
             self.write(0x6040, 0, 2, i64::from(NOT_ENABLED))
         } else {

@@ -1,8 +1,8 @@
 //! A chamber around the rig, or a gauge that only reads: the air's pressure, temperature and humidity.
 //!
 //! It takes no part in the loop: air changes within seconds or minutes, and nothing that it shows switches
-//! anything off. A thread reads it a few times a second over Modbus TCP, passes set-points on, and connects again
-//! after an outage.
+//! anything off. A thread reads it a few times a second over Modbus TCP, passes set-points on, and connects
+//! again after an outage.
 
 use super::InstrumentSetup;
 use super::modbus::{Blocks, Trouble};
@@ -177,7 +177,7 @@ impl Talk {
                 let described = &self.profile.description.set[id.0];
                 let first = usize::from(described.register);
                 let count = described.number.map_or(1, |number| number.bytes().div_ceil(2));
-                // Its own registers alone: a block holds set-points that nobody has asked for.
+                // Only its own registers: the block also holds set-points that nobody requested.
                 let (own, at) = match registers.get(first..first + count) {
                     Some(own) => (own, block.address + described.register),
                     None => (&registers[..], block.address),

@@ -115,11 +115,11 @@ impl ContactsLink {
 
     /// Takes what a frame says of them. `None` where it says nothing; else whether the loop's ring was full.
     fn take(&mut self, view: &View<'_>) -> Option<bool> {
-        let kept = [&mut self.last.emergency_stop, &mut self.last.interlock, &mut self.last.dead_man];
+        let contact = [&mut self.last.emergency_stop, &mut self.last.interlock, &mut self.last.dead_man];
         let mut touched = false;
-        for (signal, kept) in self.signals.iter().zip(kept) {
+        for (signal, contact) in self.signals.iter().zip(contact) {
             if let Some(signal) = signal.filter(|signal| view.profile.frame_of(*signal) == view.frame) {
-                *kept = view.channel(signal).map(|reading| Contact {
+                *contact = view.channel(signal).map(|reading| Contact {
                     closed: reading.value != 0.0,
                     taken_at: reading.taken_at,
                     sequence: reading.sequence,
@@ -131,9 +131,9 @@ impl ContactsLink {
     }
 
     fn lost(&mut self, reason: NoData) {
-        let kept = [&mut self.last.emergency_stop, &mut self.last.interlock, &mut self.last.dead_man];
-        for (signal, kept) in self.signals.iter().zip(kept) {
-            *kept = Err(if signal.is_some() { reason } else { NoData::NotFitted });
+        let contact = [&mut self.last.emergency_stop, &mut self.last.interlock, &mut self.last.dead_man];
+        for (signal, contact) in self.signals.iter().zip(contact) {
+            *contact = Err(if signal.is_some() { reason } else { NoData::NotFitted });
         }
         let _ = self.ring.try_push(self.last);
     }
@@ -332,8 +332,8 @@ impl Endpoint {
         self.values.get(signal)
     }
 
-    /// Whether what a sensor shows is kept from the loop, since it is not set up yet: another range or filter may still hold, and
-    /// a number of it is none.
+    /// Holds back what a sensor shows from the loop until it is set up: another range or filter may still be
+    /// active, and its numbers do not count.
     pub fn hold(&mut self, held: bool) {
         self.held = held;
     }
@@ -412,11 +412,11 @@ impl Endpoint {
             Part::Force { .. } if self.held => return,
             Part::Force { lateral, normal, last, ring } => {
                 let mut touched = false;
-                for (axis, kept) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
+                for (axis, force) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
                     if let Some(axis) =
                         axis.as_ref().filter(|axis| view.profile.frame_of(axis.signal) == frame)
                     {
-                        *kept = view.channel(axis.signal).map(|reading| Reading {
+                        *force = view.channel(axis.signal).map(|reading| Reading {
                             value: axis.gain * reading.value - axis.offset_n,
                             ..reading
                         });

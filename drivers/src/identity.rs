@@ -7,9 +7,9 @@ use instruments::schema::LinkKind;
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 
-/// The identities of all instruments of a setup that exist outside this process: each by its place and, where the setup names it, by
-/// its serial number. What drives or moves is claimed with all that answers at its socket: many devices do not look at the unit
-/// of a request, and would be driven twice under two units.
+/// The identities of all instruments of a setup that exist outside this process: each by its place and, where
+/// the setup names it, by its serial number. What drives or moves is claimed with all that answers at its
+/// socket: many devices do not look at the unit of a request, and would be driven twice under two units.
 ///
 /// # Errors
 /// A profile that does not exist, or an address that stands for nothing.
@@ -25,8 +25,8 @@ pub fn identities(setup: &InstrumentsSetup) -> Result<BTreeSet<String>, OpenErro
     Ok(all)
 }
 
-/// Every identity of one instrument that drives or moves: its place, the socket that it answers at, and its serial number where the
-/// setup names it. None where it exists within this process only.
+/// Every identity of one instrument that drives or moves: its place, the socket that it answers at, and its
+/// serial number where the setup names it. None where it exists within this process only.
 ///
 /// # Errors
 /// A profile that does not exist, or an address that stands for nothing.

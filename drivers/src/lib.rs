@@ -50,7 +50,7 @@
 //! | [`modbus`] | the conversation with registers, over [`modbus_tcp`] or [`modbus_rtu`] |
 //! | [`can`] | the conversation in CAN messages, over [`slcan`] or [`socketcan`] |
 //! | [`text`] | the conversation in lines |
-//! | [`way`] | what carries lines and streams: a serial line, TCP, datagrams |
+//! | [`transport`] | what carries lines and streams: a serial line, TCP, datagrams |
 //! | [`trace`] | every byte on its way, for whoever looks for a fault |
 //! | [`chamber`] | the air around the rig, set and read beside the loop |
 //! | [`canopen`] | the conversation with a CANopen drive of CiA 402 |
@@ -90,8 +90,8 @@ pub mod stream;
 pub mod text;
 pub mod timebase;
 pub mod trace;
+pub mod transport;
 pub mod vibrometer;
-pub mod way;
 
 pub use health::{Health, HealthReport};
 pub use off::Closed;

@@ -1,7 +1,7 @@
 //! Profiles that do not come with the program: files beside a setup, and folders of a laboratory's own.
 //!
-//! A profile is read once, with the files that it names (DBC, EDS), when its setup is read. Driver, emulator, check and
-//! record then work with that one text.
+//! A profile is read once, with the files that it names (DBC, EDS), when its setup is read. Driver, emulator,
+//! check and record then work with that one text.
 
 use super::{OpenError, bundled};
 use instruments::Profile;
@@ -36,7 +36,7 @@ impl Source {
         let named = |error| OpenError::Profile { id: origin.display().to_string(), error };
         let files = Profile::names_files(&text).map_err(named)?;
         let folder = origin.parent().unwrap_or(Path::new("."));
-        let mut kept = Vec::new();
+        let mut read = Vec::new();
         for name in files {
             let path = folder.join(&name);
             let found = match bundled::file(&name) {
@@ -45,9 +45,9 @@ impl Source {
                     foreign_text_of(&path).map_err(|problem| OpenError::Unreadable { file: path, problem })?
                 }
             };
-            kept.push((name, found));
+            read.push((name, found));
         }
-        let mut source = Self { id: String::new(), origin: origin.into(), text, files: kept };
+        let mut source = Self { id: String::new(), origin: origin.into(), text, files: read };
         source.id = source.profile()?.id().to_string();
         let bundled = bundled::text(&source.id);
         if bundled.is_some_and(|bundled| bundled != source.text) {
@@ -218,24 +218,24 @@ mod tests {
     fn what_means_nothing_or_two_things_is_refused_with_the_remedy() {
         let (a, b) = (Folder::new("a"), Folder::new("b"));
         let library = Library::of(vec![a.0.clone(), b.0.clone()]);
-        let said = |name: &str| library.find(name, &a.0).unwrap_err().to_string();
-        let unknown = said("no-such-thing");
+        let refusal = |name: &str| library.find(name, &a.0).unwrap_err().to_string();
+        let unknown = refusal("no-such-thing");
         assert!(
             unknown.contains("muprime-force2") && unknown.contains(&b.0.display().to_string()),
             "{unknown}"
         );
-        assert!(said("not-there.toml").contains("not-there.toml"));
+        assert!(refusal("not-there.toml").contains("not-there.toml"));
         a.put("cell.toml", &force("cell"));
         b.put("cell.toml", &force("cell"));
         assert!(library.find("cell", &a.0).is_ok(), "twice the same is one");
         b.put("cell.toml", &force("cell").replacen("maker = \"", "maker = \"not ", 1));
-        assert!(said("cell").contains("by its path"), "{}", said("cell"));
+        assert!(refusal("cell").contains("by its path"), "{}", refusal("cell"));
         a.put("wrong-name.toml", &force("cell"));
-        assert!(said("wrong-name").contains("one name"));
+        assert!(refusal("wrong-name").contains("one name"));
         a.put("shadow.toml", &force("muprime-stage"));
-        assert!(said("shadow.toml").contains("of its own"), "an id that is taken");
+        assert!(refusal("shadow.toml").contains("of its own"), "an id that is taken");
         a.put("bad.toml", &force("bad").replacen("schema = 1", "schema = 9", 1));
-        assert!(said("bad.toml").contains("line "), "{}", said("bad.toml"));
+        assert!(refusal("bad.toml").contains("line "), "{}", refusal("bad.toml"));
     }
 
     #[test]

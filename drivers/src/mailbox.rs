@@ -1,8 +1,8 @@
 //! One place for the newest command, from the loop to a link.
 //!
-//! Commands are absolute, so only the newest counts: it takes the place of one that the link has not taken yet. One thing
-//! must not be overtaken by a newer command: an 'off'. So it is also noted beside the place, and stays noted until the link
-//! has seen it. Nothing here blocks, locks or allocates after it was made.
+//! Commands are absolute, so only the newest counts: it takes the place of one that the link has not taken
+//! yet. One thing must not be overtaken by a newer command: an 'off'. So it is also noted beside the place,
+//! and stays noted until the link has seen it. Nothing here blocks, locks or allocates after it was made.
 
 use crossbeam_queue::ArrayQueue;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ impl<T> Mailbox<T> {
         self.0.newest.pop()
     }
 
-    /// Whether an 'off' came since the last time that [`Mailbox::take_off`] was asked.
+    /// Whether an 'off' came since the last call of [`Mailbox::take_off`].
     #[must_use]
     pub fn off_waits(&self) -> bool {
         self.0.off.load(Ordering::Acquire)

@@ -189,21 +189,21 @@ impl Conversation {
         Ok(())
     }
 
-    /// Every block that holds one of the set-points, whatever becomes of the one before; the first trouble is told.
+    /// Every block that holds one of the set-points, even after a failure; returns the first trouble.
     fn write(
         &mut self,
         session: &Session,
         wire: &mut dyn Registers,
         set_points: &[(SetId, f64)],
     ) -> Result<(), Trouble> {
-        let mut told = Ok(());
+        let mut outcome = Ok(());
         for (block, registers) in self.blocks.put(session.endpoint.profile(), set_points) {
             match wire.write(session, block.table, block.address, &registers) {
                 Err(Trouble::Ended(ended)) => return Err(Trouble::Ended(ended)),
-                written => told = told.and(written),
+                written => outcome = outcome.and(written),
             }
         }
-        told
+        outcome
     }
 
     /// One set-point by itself, in its own registers.
@@ -231,13 +231,13 @@ impl Conversation {
                 return Ok(Some(value));
             }
             Err(Trouble::Ended(ended)) => return Err(ended),
-            Err(Trouble::Refused(said)) => {
+            Err(Trouble::Refused(problem)) => {
                 health.count(&health.exceptions);
-                Ended::Refused(said)
+                Ended::Refused(problem)
             }
-            Err(Trouble::Corrupt(said)) => {
+            Err(Trouble::Corrupt(problem)) => {
                 health.count(&health.corrupt_frames);
-                Ended::Corrupt(said)
+                Ended::Corrupt(problem)
             }
         };
         health.problem(ended.to_string());
@@ -262,8 +262,8 @@ fn initialise(session: &Session, wire: &mut dyn Registers) -> Result<(), Ended> 
         match done {
             Ok(()) => {}
             Err(Trouble::Ended(ended)) => return Err(ended),
-            Err(Trouble::Refused(said) | Trouble::Corrupt(said)) => {
-                return Err(Ended::Refused(format!("{}: {said}", init.text)));
+            Err(Trouble::Refused(problem) | Trouble::Corrupt(problem)) => {
+                return Err(Ended::Refused(format!("{}: {problem}", init.text)));
             }
         }
     }
@@ -286,9 +286,9 @@ impl OffWay for Way<'_> {
         let health = session.endpoint.health();
         let mut not_taken = |trouble: Trouble| match trouble {
             Trouble::Ended(ended) => Err(ended),
-            Trouble::Refused(said) | Trouble::Corrupt(said) => {
+            Trouble::Refused(problem) | Trouble::Corrupt(problem) => {
                 health.count(&health.exceptions);
-                health.problem(format!("'off' was not taken: {said}"));
+                health.problem(format!("'off' was not taken: {problem}"));
                 Ok(false)
             }
         };

@@ -1,10 +1,10 @@
 //! Registers over Modbus RTU, and the streams that sensors leave it for.
 //!
-//! RTU has no transaction number: a late answer of the right length looks like the answer to the
-//! next request. So after a timeout the line is drained until it has been silent for longer than
-//! the instrument's longest answer takes, and only then is the next request made.
-//! Sensors may share a line, each with a thread of its own: an exchange has the line to itself. What takes set-points has a
-//! line of its own, so that nothing holds up an 'off'.
+//! RTU has no transaction number: a late answer of the right length looks like the answer to the next
+//! request. So after a timeout the line is drained until it has been silent for longer than the instrument's
+//! longest answer takes, and only then is the next request made. Sensors may share a line, each with a thread
+//! of its own: an exchange has the line to itself. What takes set-points has a line of its own, so that
+//! nothing holds up an 'off'.
 
 use super::modbus::{Blocks, Conversation, Registers, Trouble};
 use super::off::Closed;
@@ -188,7 +188,7 @@ impl Rtu {
             match started {
                 Ok(()) => return Ok(()),
                 Err(Trouble::Ended(ended)) => return Err(ended),
-                Err(Trouble::Refused(said) | Trouble::Corrupt(said)) => last = Ended::Refused(said),
+                Err(Trouble::Refused(why) | Trouble::Corrupt(why)) => last = Ended::Refused(why),
             }
         }
         Err(last)
@@ -240,7 +240,7 @@ mod tests {
     use std::io::Read;
     use std::sync::Arc;
 
-    /// An amplifier whose enable is in a block of its own: a line that answers nothing is told all of 'off' all the same.
+    /// An amplifier with its enable in a block of its own: 'off' goes into every block without an answer.
     #[test]
     fn an_unanswered_off_is_in_every_block() {
         let text = crate::bundled::text("muprime-amplifier").unwrap();

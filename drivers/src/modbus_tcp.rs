@@ -158,15 +158,15 @@ fn mismatch(error: &tokio_modbus::Error) -> String {
                 let rest = half.split_once(&format!("{name}: "))?.1;
                 rest.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
             };
-            let (asked, came) = message.split_once("actual").unwrap_or((message, ""));
-            let both = |name: &str| Some((number(asked, name)?, number(came, name)?));
+            let (expected, came) = message.split_once("actual").unwrap_or((message, ""));
+            let both = |name: &str| Some((number(expected, name)?, number(came, name)?));
             match (both("unit_id"), both("transaction_id")) {
-                (Some((asked, came)), _) if asked != came => format!(
-                    "another unit answers, {came} in place of {asked}: set `unit` to the one that is meant (255 or 0 for a device \
+                (Some((expected, came)), _) if expected != came => format!(
+                    "another unit answers, {came} in place of {expected}: set `unit` to the one that is meant (255 or 0 for a device \
                      without a gateway)"
                 ),
-                (_, Some((asked, came))) if asked != came => format!(
-                    "an answer carries transaction {came} in place of {asked}: a gateway that does not number as Modbus TCP does is reached \
+                (_, Some((expected, came))) if expected != came => format!(
+                    "an answer carries transaction {came} in place of {expected}: a gateway that does not number as Modbus TCP does is reached \
                      as RTU over TCP (address tcp:HOST:PORT with a profile of kind modbus_rtu)"
                 ),
                 _ => "an answer carries another head than its question".into(),

@@ -1,16 +1,16 @@
 //! How an instrument is switched off, whatever the wire: send, read back, again, until it shows 'off' or the time is over.
 //!
-//! An end of the program, a trip that ends a sweep, a signal and a panic all come here, since each of them drops
-//! [`crate::Links`]. A link that is down at that moment is made anew for the purpose. What cannot be read back is not said to
-//! be off.
+//! An end of the program, a trip that ends a sweep, a signal and a panic all come here, since each of them
+//! drops [`crate::Links`]. A link that is down at that moment is reopened for the purpose. The driver does
+//! not report 'off' without reading it back.
 
 use super::session::{Ended, Session};
 use realtime::ports::Nanos;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// A link tries this long to switch off and to read it back, lost connections made anew included; then it is given up, and
-/// [`Closed::NotReadBack`] says so.
+/// A link tries this long to switch off and to read it back, lost connections made anew included; then it is
+/// given up, and [`Closed::NotReadBack`] says so.
 pub const OFF_WITHIN: Duration = Duration::from_secs(2);
 /// An answer on the way to 'off' may take this long, in ms, where the profile allows less: a slow answer is still one.
 pub const OFF_ANSWER_MS: u32 = 600;
@@ -77,7 +77,7 @@ pub fn at_the_end(session: &mut Session, way: &mut dyn OffWay) -> Ended {
     }
 }
 
-/// The beginning of a conversation that follows a lost one: 'off' leaves before anything is asked, where it is owed.
+/// The start of a conversation after a lost one: an owed 'off' leaves before any request.
 ///
 /// # Errors
 /// The connection carries nothing more.

@@ -1,5 +1,5 @@
-//! The loop's side of the drivers: port objects over single-producer, single-consumer rings of samples and a mailbox of
-//! commands.
+//! The loop's side of the drivers: port objects over single-producer, single-consumer rings of samples and a
+//! mailbox of commands.
 //!
 //! Nothing here blocks, locks or allocates after it was made.
 
@@ -74,10 +74,10 @@ impl From<StageCommand> for StageSetPoint {
     }
 }
 
-/// Takes everything that waits and keeps the last.
-fn latest<T>(ring: &mut HeapCons<T>, kept: &mut T) {
+/// Takes all waiting items; the newest stays in `newest`.
+fn latest<T>(ring: &mut HeapCons<T>, newest: &mut T) {
     while let Some(newer) = ring.try_pop() {
-        *kept = newer;
+        *newest = newer;
     }
 }
 
@@ -212,10 +212,10 @@ impl Stage for StagePort {
     }
 }
 
-/// The supply opens where the loop has said nothing for so long: a loop that is dead closes no supply.
+/// The supply opens when the loop has been silent for this time: a dead loop closes no supply.
 const SUPPLY_EXPIRES: Nanos = Nanos(250_000_000);
 
-/// What the loop wants of the supply, as the link's thread takes it.
+/// The loop's set-point of the supply, as the link's thread takes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SupplySetPoint {
     /// Closed; else open.

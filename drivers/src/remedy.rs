@@ -26,7 +26,7 @@ pub fn shown(bytes: &[u8]) -> String {
 #[must_use]
 pub fn unended(came: &[u8], end: &[u8], question: &str) -> String {
     let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02X}")).collect::<Vec<_>>().join(" ");
-    let said =
+    let found =
         format!("{} bytes came and no line end ({}) among them: {}", came.len(), hex(end), shown(came));
     let text = came.iter().filter(|b| matches!(b, 0x20..=0x7e | b'\r' | b'\n' | b'\t' | 0 | 2 | 3)).count();
     let other =
@@ -40,7 +40,7 @@ pub fn unended(came: &[u8], end: &[u8], question: &str) -> String {
         Some(other) => format!("is rx_terminator right? This ends with {}: rx_terminator = {other:?}", hex(other.as_bytes())),
         None => "is rx_terminator right? It may also be a prompt, or an answer that response_timeout_ms cuts".into(),
     };
-    format!("{said}: {cause}")
+    format!("{found}: {cause}")
 }
 
 /// What a Modbus exception says, and what to do.
@@ -82,17 +82,17 @@ mod tests {
 
     #[test]
     fn each_cause_has_a_remedy_of_its_own() {
-        let said = |came: &[u8]| unended(came, b"\r\n", "READ?");
-        let line_end = said(b"+1.25E-01,-2.5E-03\r");
+        let remark = |came: &[u8]| unended(came, b"\r\n", "READ?");
+        let line_end = remark(b"+1.25E-01,-2.5E-03\r");
         assert!(
             line_end
                 .starts_with("19 bytes came and no line end (0D 0A) among them: \"+1.25E-01,-2.5E-03\\r\"")
         );
         assert!(line_end.contains("is rx_terminator right? This ends with 0D"), "{line_end}");
-        assert!(said(b"\xfe\x80\x06\xf8").contains("baud, parity"));
-        assert!(said(b"READ?\r1.5").contains("echo"));
-        assert!(said(b"1.5 N>").contains("prompt"));
-        assert!(said(b"1.5\x03").contains("ends with 03"));
+        assert!(remark(b"\xfe\x80\x06\xf8").contains("baud, parity"));
+        assert!(remark(b"READ?\r1.5").contains("echo"));
+        assert!(remark(b"1.5 N>").contains("prompt"));
+        assert!(remark(b"1.5\x03").contains("ends with 03"));
         let all: std::collections::BTreeSet<String> = [1, 2, 3, 4, 6, 10, 11].map(exception).into();
         assert_eq!(all.len(), 7);
         assert_ne!(advice(&exception(2)), advice("no answer within 100 ms"));

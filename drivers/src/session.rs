@@ -37,7 +37,7 @@ pub enum Ended {
     /// The line itself failed.
     #[error("{0}")]
     Io(String),
-    /// The instrument refuses what it is asked.
+    /// The instrument refuses a request.
     #[error("the instrument refused: {0}")]
     Refused(String),
     /// Answers do not pass their checks.
@@ -47,7 +47,7 @@ pub enum Ended {
     #[error(transparent)]
     Frame(#[from] BadFrame),
     /// 'Off' was sent again and again, and the instrument still shows 'on', or shows nothing.
-    #[error("told to switch off for {} s, the instrument did not show it", OFF_WITHIN.as_secs())]
+    #[error("the instrument did not show 'off' within {} s of the command", OFF_WITHIN.as_secs())]
     StillOn,
     /// The driver panicked: a fault of this program.
     #[error("the driver panicked: {0}")]
@@ -120,7 +120,7 @@ impl Session {
         self.ready.is_some()
     }
 
-    /// Whether the time for switching off is over. It runs from the first time that this is asked.
+    /// Whether the time for switching off is over. It runs from the first call.
     pub fn off_time_over(&mut self) -> bool {
         let now = self.now();
         now >= *self.off_by.get_or_insert(now.plus(Nanos(OFF_WITHIN.as_nanos() as u64)))
@@ -152,7 +152,7 @@ impl Session {
         self.clock.sleep_until(due.map_or(latest, |due| due.min(latest)));
     }
 
-    /// Starts the thread, which converses again and again until it is told to stop and the instrument is off.
+    /// Starts the thread, which repeats the conversation until it is stopped and the instrument is off.
     ///
     /// # Errors
     /// Where no thread can be had.
@@ -222,14 +222,14 @@ impl Session {
             Ok(Ok(never)) => match never {},
             Ok(Err(ended)) => ended,
             Err(cause) => {
-                let said = cause.downcast_ref::<&str>().map(ToString::to_string);
-                let said = said.or_else(|| cause.downcast_ref::<String>().cloned());
-                Ended::Panicked(said.unwrap_or_else(|| "no words".into()))
+                let message = cause.downcast_ref::<&str>().map(ToString::to_string);
+                let message = message.or_else(|| cause.downcast_ref::<String>().cloned());
+                Ended::Panicked(message.unwrap_or_else(|| "no words".into()))
             }
         }
     }
 
-    /// Sleeps, but not through a stop; commands that come meanwhile are dropped, not kept.
+    /// Sleeps, but not through a stop; commands that come meanwhile are dropped.
     fn back_off(&mut self, pause: Duration) {
         let until = self.now().plus(Nanos(u64::try_from(pause.as_nanos()).unwrap_or(u64::MAX)));
         let stopping = self.stopping();

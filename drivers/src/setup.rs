@@ -65,8 +65,8 @@ pub struct InstrumentSetup {
     /// The profile as it was read, where it does not come with the program. Whoever reads a setup puts it here.
     #[serde(skip)]
     pub source: Option<Arc<Source>>,
-    /// Where it is: `host` or `host:port` for TCP and UDP, a path for a serial line
-    /// (`rtu:PATH` for a Modbus TCP profile that is reached so), an interface (`can0`) or `slcan:PATH` for CAN.
+    /// Where it is: `host` or `host:port` for TCP and UDP, a path for a serial line (`rtu:PATH` for a Modbus
+    /// TCP profile that is reached so), an interface (`can0`) or `slcan:PATH` for CAN.
     pub address: String,
     /// Serial number: certificates must name it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -90,8 +90,8 @@ pub struct InstrumentSetup {
     /// The same for what they measure.
     #[serde(default)]
     pub measured_m_per_unit: Option<f64>,
-    /// Safety inputs that are wired, by their signals: `emergency_stop`, `interlock`, `dead_man`. Left out: all that the profile
-    /// has.
+    /// Safety inputs that are wired, by their signals: `emergency_stop`, `interlock`, `dead_man`. Left out:
+    /// all that the profile has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wired: Option<Vec<String>>,
     /// Stages that load nothing: the weight that does, in N.

@@ -50,8 +50,8 @@ impl CanPort for Slcan {
                 return Ok(None);
             }
             let waiting = &mut self.waiting;
-            self.reader.push(&buffer[..count], |said| {
-                if let SlcanSaid::Frame(frame) = said {
+            self.reader.push(&buffer[..count], |message| {
+                if let SlcanSaid::Frame(frame) = message {
                     waiting.push_back(frame);
                 }
             });

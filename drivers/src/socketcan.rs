@@ -1,8 +1,8 @@
 //! CAN through the kernel (SocketCAN).
 //!
 //! Frames that wait when the bus goes off would leave when it comes back (yarp-devices issue 246). So
-//! bus-off ends the connection, nothing restarts by itself, and a queue without room is told to the
-//! caller, who sends the newest command instead of queueing more.
+//! bus-off ends the connection, nothing restarts by itself, and the caller learns of a queue without room and
+//! sends the newest command instead of queueing more.
 
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;
@@ -113,9 +113,9 @@ mod tests {
 
     /// What the kernel tells of its controller, as `linux/can/error.h` has it.
     #[test]
-    fn error_frames_are_told_apart() {
+    fn error_frames_are_classified() {
         use socketcan::CanErrorFrame;
-        let said = |class: u32, controller: u8| {
+        let event_of = |class: u32, controller: u8| {
             let frame = CanErrorFrame::new_error(class, &[0, controller, 0, 0, 0, 0, 0, 0]).unwrap();
             judge(&CanError::from(frame))
         };
@@ -128,11 +128,11 @@ mod tests {
             (0x28, CanEvent::Passive),
             (0x40, CanEvent::Other),
         ] {
-            assert_eq!(said(CONTROLLER, bits), event, "{bits:#04x}");
+            assert_eq!(event_of(CONTROLLER, bits), event, "{bits:#04x}");
         }
-        assert_eq!(said(0x040, 0), CanEvent::BusOff);
-        assert_eq!(said(0x040 | CONTROLLER, 0x30), CanEvent::BusOff);
-        assert_eq!(said(0x080, 0), CanEvent::Other);
+        assert_eq!(event_of(0x040, 0), CanEvent::BusOff);
+        assert_eq!(event_of(0x040 | CONTROLLER, 0x30), CanEvent::BusOff);
+        assert_eq!(event_of(0x080, 0), CanEvent::Other);
     }
 
     #[test]

@@ -37,8 +37,8 @@ impl Framing {
     }
 }
 
-/// Hands over frames until the thread is to end. `read` gives what comes until its deadline; `parted` says that each read is a
-/// datagram.
+/// Hands over frames until the thread is to end. `read` gives what comes until its deadline; `parted` says
+/// that each read is a datagram.
 ///
 /// # Errors
 /// Silence for longer than an answer may take, and whatever `read` says.

@@ -1,17 +1,16 @@
-//! The conversation in lines of text and blocks of bytes, whatever carries it: a serial line, a device server in front of one
-//! (`tcp:HOST:PORT`), or TCP; and streams, also in datagrams.
+//! The conversation in lines of text and blocks of bytes, whatever carries it: a serial line, a device server
+//! in front of one (`tcp:HOST:PORT`), or TCP; and streams, also in datagrams.
 //!
-//! Every set-point is absolute and is sent when it changes, and again each second. Lines that an
-//! instrument sends without being asked are taken out before an answer is looked for: they must
-//! never be taken for one. A binary answer is framed by its length, since its bytes may look like
-//! the end of a line.
+//! Every set-point is absolute and is sent when it changes, and again each second. Lines that an instrument
+//! sends without a request are removed before the driver looks for an answer: they must never be taken for
+//! one. A binary answer is framed by its length, since its bytes may look like the end of a line.
 
 use super::endpoint::Due;
 use super::off::{self, Closed, OFF_ANSWER_MS, OffWay};
 use super::remedy;
 use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
 use super::setup::InstrumentSetup;
-use super::way::{Place, Way};
+use super::transport::{Address, Transport};
 use instruments::codec::pattern::Pattern;
 use instruments::codec::text::number;
 use instruments::profile::FrameKind;
@@ -38,13 +37,13 @@ const COMMAND_RATE_HZ: f64 = 500.0;
 /// Where the address makes no sense or no thread can be had.
 pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
     let link = session.endpoint.profile().description.link.clone();
-    let place = Place::of(&instrument.address, &link, instrument.baud)?;
+    let at = Address::of(&instrument.address, &link, instrument.baud)?;
     let rate_hz = instrument.rate_hz;
     session.spawn(move |session| {
-        let way = place.open(Duration::from_millis(u64::from(link.connect_timeout_ms)))?;
+        let transport = at.open(Duration::from_millis(u64::from(link.connect_timeout_ms)))?;
         let health = session.endpoint.health();
         health.count(&health.connections);
-        let mut talk = Talk::new(way, link.clone());
+        let mut talk = Talk::new(transport, link.clone());
         if !session.is_first() && session.endpoint.owes_off() {
             // Sent before anything is listened to: nobody knows how long the line will carry.
             talk.send_unanswered_off(session)?;
@@ -59,7 +58,7 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
     })
 }
 
-/// A line that comes without being asked for.
+/// A line that the instrument sends without a request.
 struct Alarm(Pattern);
 
 impl Alarm {
@@ -77,12 +76,12 @@ impl Alarm {
 }
 
 struct Talk {
-    way: Way,
+    transport: Transport,
     link: Link,
     came: Vec<u8>,
     asked_at: Instant,
     /// The line that was sent last.
-    asked: String,
+    request: String,
     sent: HashMap<SetId, (String, Instant)>,
     newest: HashMap<SetId, f64>,
     alarms: Vec<Alarm>,
@@ -91,17 +90,17 @@ struct Talk {
 }
 
 impl Talk {
-    fn new(way: Way, link: Link) -> Self {
+    fn new(transport: Transport, link: Link) -> Self {
         let patience_ms = link.response_timeout_ms;
         // The profile was read: every alarm is a pattern.
         let alarms =
             link.unsolicited.iter().filter_map(|alarm| Pattern::parse(alarm).ok()).map(Alarm).collect();
         Self {
-            way,
+            transport,
             link,
             came: Vec::new(),
             asked_at: Instant::now(),
-            asked: String::new(),
+            request: String::new(),
             sent: HashMap::new(),
             newest: HashMap::new(),
             alarms,
@@ -117,7 +116,7 @@ impl Talk {
     /// Takes in what comes; `false` where nothing did until the deadline.
     fn take(&mut self, deadline: Instant) -> Result<bool, Ended> {
         let mut buffer = [0; 1024];
-        let count = self.way.read(&mut buffer, deadline)?;
+        let count = self.transport.read(&mut buffer, deadline)?;
         self.came.extend_from_slice(&buffer[..count]);
         Ok(count > 0)
     }
@@ -126,9 +125,9 @@ impl Talk {
         let gap = Duration::from_secs_f64(self.link.min_gap_ms.max(0.0) * 1e-3);
         std::thread::sleep(gap.saturating_sub(self.asked_at.elapsed()));
         let end = self.link.tx_terminator.clone().unwrap_or_else(|| "\n".into());
-        self.way.write(format!("{line}{end}").as_bytes())?;
+        self.transport.write(format!("{line}{end}").as_bytes())?;
         self.asked_at = Instant::now();
-        line.clone_into(&mut self.asked);
+        line.clone_into(&mut self.request);
         Ok(())
     }
 
@@ -150,14 +149,14 @@ impl Talk {
         self.newest.get(&set).copied().or(first).unwrap_or(0.0)
     }
 
-    /// A stream that runs by itself: what starts it is said, then nothing more.
+    /// A stream that runs by itself: only its start is sent.
     fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
         if !session.endpoint.profile().description.init.is_empty() {
             self.initialise(session)?;
         }
-        let parted = self.way.is_parted();
+        let parted = self.transport.is_parted();
         super::stream::listen(session, stream, parted, &mut |buffer, deadline| {
-            self.way.read(buffer, deadline)
+            self.transport.read(buffer, deadline)
         })?;
         Err(Ended::Stopped)
     }
@@ -186,7 +185,7 @@ impl Talk {
             if !self.take(deadline)? && Instant::now() >= deadline {
                 return Err(match self.came.is_empty() {
                     true => Ended::Timeout(self.patience_ms),
-                    false => Ended::Cut(remedy::unended(&self.came, &end, &self.asked)),
+                    false => Ended::Cut(remedy::unended(&self.came, &end, &self.request)),
                 });
             }
         }
@@ -215,7 +214,7 @@ impl Talk {
         }
     }
 
-    /// Ends whatever an earlier connection left half said, and lets the answers to it pass.
+    /// Ends a line that an earlier connection left incomplete, and drops the answers to it.
     fn settle(&mut self) -> Result<(), Ended> {
         let quiet = Instant::now() + self.limit();
         self.send("")?;
@@ -245,7 +244,7 @@ impl Talk {
     }
 
     fn initialise(&mut self, session: &mut Session) -> Result<(), Ended> {
-        // A socket is new with every connection: nothing is left half said there.
+        // A socket is new with every connection: no line is incomplete there.
         if matches!(self.link.kind, LinkKind::Serial | LinkKind::Scpi) {
             self.settle()?;
         }
@@ -254,7 +253,7 @@ impl Talk {
                 Init { send: Some(send), .. } => send,
                 Init { hex: Some(hex), .. } => {
                     // The profile was read: they are bytes.
-                    self.way.write(&from_hex(hex).unwrap_or_default())?;
+                    self.transport.write(&from_hex(hex).unwrap_or_default())?;
                     continue;
                 }
                 _ => continue,
@@ -331,16 +330,16 @@ impl Talk {
         Ok(())
     }
 
-    /// Bears a few bad answers.
-    fn bear(&mut self, session: &Session, said: String) -> Result<(), Ended> {
-        self.note(session, said.clone());
-        if self.bad >= BAD_IN_A_ROW { Err(Ended::Corrupt(said)) } else { Ok(()) }
+    /// Tolerates a few bad answers.
+    fn bear(&mut self, session: &Session, problem: String) -> Result<(), Ended> {
+        self.note(session, problem.clone());
+        if self.bad >= BAD_IN_A_ROW { Err(Ended::Corrupt(problem)) } else { Ok(()) }
     }
 
-    fn note(&mut self, session: &Session, said: String) {
+    fn note(&mut self, session: &Session, problem: String) {
         let health = session.endpoint.health();
         health.count(&health.corrupt_frames);
-        health.problem(said);
+        health.problem(problem);
         self.bad += 1;
     }
 
@@ -383,17 +382,17 @@ impl Talk {
         self.clear(session)?;
         self.send(&line)?;
         if let Some(start) = answer {
-            let said = self.line(session)?;
-            if !said.starts_with(&start) || (start.is_empty() && number(&said).is_none()) {
-                self.note(session, format!("`{line}` was answered by `{said}`"));
+            let answered = self.line(session)?;
+            if !answered.starts_with(&start) || (start.is_empty() && number(&answered).is_none()) {
+                self.note(session, format!("`{line}` was answered by `{answered}`"));
                 return Ok(false);
             }
         }
         if let Some(query) = self.link.error_query.clone() {
             self.send(&query.send)?;
-            let said = self.line(session)?;
-            if !query.ok.iter().any(|ok| said.starts_with(ok.as_str())) {
-                self.note(session, format!("`{line}` gave the error `{said}`"));
+            let answered = self.line(session)?;
+            if !query.ok.iter().any(|ok| answered.starts_with(ok.as_str())) {
+                self.note(session, format!("`{line}` gave the error `{answered}`"));
                 return Ok(false);
             }
         }

@@ -1,8 +1,8 @@
 //! Every byte that goes over a wire, in both directions: `MUPRIME_LOG=warn,wire`.
 //!
-//! A line a write or read, under the target `wire`: the port, `->` for what is sent and `<-` for what comes, the bytes in
-//! hexadecimal, and as text. Where nobody asks for the target one flag is looked at and nothing is formatted; the threads of the
-//! links write it, the loop has none of it.
+//! A line a write or read, under the target `wire`: the port, `->` for what is sent and `<-` for what comes,
+//! the bytes in hexadecimal, and as text. Where nobody asks for the target one flag is looked at and nothing
+//! is formatted; the threads of the links write it, the loop has none of it.
 
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;

@@ -1,8 +1,8 @@
 //! A vibrometer's settings, read back from its controller for a calibration.
 //!
-//! The velocity itself is a voltage that something else reads; what turns it into metres is set at the controller: the
-//! decoder's range and delay. They are asked for once, before a calibration, and nothing is ever set. Decoders have other
-//! numbers in other instruments, and a wrong one gives a plausible wrong amplitude: so each is asked for its name first.
+//! The velocity itself is a voltage that something else reads; the decoder's range and delay turn it into
+//! metres. They are queried once, before a calibration, and never changed. Each instrument numbers its
+//! decoders differently, and a wrong one gives a plausible wrong amplitude, so their names are queried first.
 
 use super::OpenError;
 use super::library::Source;
@@ -106,34 +106,34 @@ impl std::fmt::Display for Settings {
 /// Asks a controller for the settings of the decoder that the setup names.
 ///
 /// # Errors
-/// A profile that is no vibrometer's, a line that cannot be opened, a decoder that is not there, answers that make no
-/// sense, settings that changed while they were read; in words.
+/// A profile that is no vibrometer's, a line that cannot be opened, a decoder that is not there, answers that
+/// make no sense, settings that changed while they were read; in words.
 pub fn settings(setup: &VibrometerSetup) -> Result<Settings, String> {
     let profile = setup.description().map_err(|error| error.to_string())?;
     let link = profile.description.link.clone();
     let (LinkKind::Serial, Some(choice)) = (link.kind, link.choice.clone()) else {
         return Err(format!("profile `{}` is not that of a vibrometer's controller", setup.profile));
     };
-    let told = |error: Ended| format!("`{}` at {}: {error}", setup.profile, setup.address);
+    let failed = |error: Ended| format!("`{}` at {}: {error}", setup.profile, setup.address);
     let format = link.format.clone().unwrap_or_else(|| "8N1".into());
     let line =
-        Line::open(&setup.address, setup.baud.or(link.baud).unwrap_or(115_200), &format).map_err(told)?;
+        Line::open(&setup.address, setup.baud.or(link.baud).unwrap_or(115_200), &format).map_err(failed)?;
     let mut talk = Talk { line, link, came: Vec::new() };
-    // Ends whatever an earlier program left half said.
-    talk.line.write(talk.end(true).as_bytes()).map_err(told)?;
-    talk.line.drain(Duration::from_millis(100), Duration::from_secs(1)).map_err(told)?;
+    // Ends a line that an earlier program left incomplete.
+    talk.line.write(talk.end(true).as_bytes()).map_err(failed)?;
+    talk.line.drain(Duration::from_millis(100), Duration::from_secs(1)).map_err(failed)?;
     let mut decoders = Vec::new();
     for number in 0..choice.most {
         match talk.ask(&choice.ask.replace("{which}", &number.to_string())) {
             Ok(name) if is_name(&name) => decoders.push(name),
             // The end of the list: silence, or words that are no name.
             Ok(_) | Err(Ended::Timeout(_) | Ended::Cut(_)) => break,
-            Err(error) => return Err(told(error)),
+            Err(error) => return Err(failed(error)),
         }
     }
     let number = choose(&decoders, setup.decoder.as_deref())
         .map_err(|problem| format!("`{}` at {}: {problem}", setup.profile, setup.address))?;
-    let mut read = || talk.settings(&profile, number, &decoders).map_err(told);
+    let mut read = || talk.settings(&profile, number, &decoders).map_err(failed);
     let (first, second) = (read()?, read()?);
     if first != second {
         return Err(format!(

@@ -54,9 +54,9 @@ fn table(page: &mut String, heads: &str, rows: impl Iterator<Item = Vec<String>>
 
 /// What is fixed of the link.
 fn link(link: &Link) -> String {
-    let mut said = vec![format!("{:?}", link.kind)];
+    let mut parts = vec![format!("{:?}", link.kind)];
     let mut add =
-        |name: &str, value: Option<String>| said.extend(value.map(|value| format!("{name} {value}")));
+        |name: &str, value: Option<String>| parts.extend(value.map(|value| format!("{name} {value}")));
     add("port", link.port.map(|port| port.to_string()));
     add("to this machine's port", link.local_port.map(|port| port.to_string()));
     add("unit", link.unit.map(|unit| unit.to_string()));
@@ -73,7 +73,7 @@ fn link(link: &Link) -> String {
         (!link.unsolicited.is_empty()).then(|| link.unsolicited.iter().map(|a| code(a)).collect::<Vec<_>>());
     add("alarms", alarms.map(|alarms| alarms.join(" ")));
     add("an answer must be complete within", Some(format!("{} ms", link.response_timeout_ms)));
-    said.join("; ")
+    parts.join("; ")
 }
 
 fn frame_row(d: &Description, frame: &Frame) -> Vec<String> {
@@ -98,7 +98,7 @@ fn frame_row(d: &Description, frame: &Frame) -> Vec<String> {
             let message = &d.message[*index];
             let ids: Vec<String> = parts.iter().map(|part| format!("{:#x}", part.id)).collect();
             let only = message.multiplex.map_or(String::new(), |value| format!(", multiplexor {value}"));
-            let how = if message.request.is_some() { "asked for" } else { "by themselves" };
+            let how = if message.request.is_some() { "on request" } else { "by themselves" };
             let names = message.replies.join(", ");
             (format!("{names} (base + {}), {how}{only}", ids.join(", ")), Some(message.rate_hz))
         }
@@ -127,7 +127,7 @@ fn init_row(init: &Init) -> Vec<String> {
     let registers = |(first, values): &(u16, Vec<u16>)| {
         format!("{} registers from {first}: {values:?}", table_name(init.table))
     };
-    let said = None
+    let action = None
         .or_else(|| init.send.as_deref().map(code))
         .or_else(|| init.hex.as_ref().map(|hex| format!("bytes {hex}")))
         .or_else(|| init.registers.as_ref().map(registers))
@@ -140,7 +140,7 @@ fn init_row(init: &Init) -> Vec<String> {
     let expect = init.expect.as_ref().map_or(String::new(), |all| {
         format!(", answered by {}", all.iter().map(|start| code(start)).collect::<Vec<_>>().join(" or "))
     });
-    vec![format!("{}{expect}", said.unwrap_or_default()), escaped(&init.text)]
+    vec![format!("{}{expect}", action.unwrap_or_default()), escaped(&init.text)]
 }
 
 fn signal_row(profile: &Profile, id: SignalId) -> Vec<String> {

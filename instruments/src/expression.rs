@@ -261,9 +261,9 @@ mod tests {
     }
 
     #[test]
-    fn faults_in_an_expression_are_told() {
+    fn faults_in_an_expression_are_reported() {
         let none = |_: &str| None;
-        for (text, said) in [
+        for (text, problem) in [
             ("1 +", "expected at character 4"),
             ("speed > 1", "no signal is called `speed`"),
             ("(1", "`)` expected"),
@@ -272,7 +272,7 @@ mod tests {
             ("", "expected at character 1"),
         ] {
             let error = Expression::compile(text, &none).unwrap_err();
-            assert!(error.contains(said), "{text}: {error}");
+            assert!(error.contains(problem), "{text}: {error}");
         }
         assert!(Expression::compile(&"(".repeat(10_000), &none).is_err());
     }

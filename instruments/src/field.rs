@@ -24,7 +24,7 @@ pub enum NumberType {
     I32,
     /// IEEE 754 single.
     F32,
-    /// IEEE 754 double; numbers that came as text are kept so.
+    /// IEEE 754 double; numbers in text are stored so.
     F64,
 }
 
@@ -122,10 +122,9 @@ impl Field {
         }
     }
 
-    /// Stores `value`, rounded to the nearest and held to the type's limits, as an instrument's
-    /// converter does. Other bits of the same word are kept. A value that is no number is stored
-    /// as one only in floating point; integers take zero.
-    /// Returns `false` where the frame is too short.
+    /// Stores `value`, rounded to the nearest and limited to the type's range, as an instrument's converter
+    /// does. Other bits of the same word stay unchanged. A value that is no number is stored as one only in
+    /// floating point; integers take zero. Returns `false` where the frame is too short.
     pub fn write(&self, frame: &mut [u8], value: f64) -> bool {
         let Some(old) = self.word(frame) else { return false };
         let word = if let Some((first, width)) = self.bits {

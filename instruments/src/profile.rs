@@ -333,8 +333,8 @@ impl Profile {
         values.get(signal) * self.signals[signal.0].si_factor
     }
 
-    /// The smallest change that a signal shows, in SI units, at the scale that holds now: what the profile states, else one
-    /// count. NaN where neither is known, as with floats.
+    /// The smallest change that a signal shows, in SI units, at the scale that holds now: what the profile
+    /// states, else one count. NaN where neither is known, as with floats.
     #[must_use]
     pub fn lsb_si(&self, signal: SignalId, values: &Values) -> f64 {
         if let Some(stated) = self.signals[signal.0].resolution_si {
@@ -359,8 +359,8 @@ impl Profile {
         if signal.valid_when.as_ref().is_some_and(|valid| !valid.holds(values.as_slice())) {
             return Some(Refusal::MarkedInvalid);
         }
-        // A value on the end of the range is a rail: what lies beyond it cannot be seen. What is worked out from a
-        // signal at its rail is worth no more.
+        // A value on the end of the range is a rail: what lies beyond it cannot be seen. What is worked out
+        // from a signal at its rail is worth no more.
         let railed = |signal: &CompiledSignal, value: f64| {
             signal.range.is_some_and(|(low, high)| value <= low || value >= high)
         };

@@ -33,13 +33,13 @@ pub struct Description {
     /// Reads of registers; each yields ONE sample with one time.
     #[serde(default)]
     pub poll: Vec<Poll>,
-    /// Frames that come without being asked for, after the stream was started.
+    /// Frames that the instrument sends without a request, after the stream was started.
     #[serde(default)]
     pub stream: Option<Stream>,
     /// CAN messages that together make one sample.
     #[serde(default)]
     pub message: Vec<Message>,
-    /// Lines of text or blocks of bytes that are asked for.
+    /// Lines of text or blocks of bytes that are requested.
     #[serde(default)]
     pub query: Vec<Query>,
     /// What is sent once, at connection, before anything else.

@@ -1,7 +1,7 @@
 //! How much of a line's capacity an instrument's samples take.
 //!
-//! Only what the line itself needs is counted: bits, and the pauses that the protocol demands. What an instrument takes to
-//! answer comes on top, and so do set-points; what does not fit so cannot work at all.
+//! Only what the line itself needs is counted: bits, and the pauses that the protocol demands. What an
+//! instrument takes to answer comes on top, and so do set-points; what does not fit so cannot work at all.
 
 use crate::Profile;
 use crate::codec::modbus_rtu::silence_s;
@@ -22,8 +22,8 @@ pub struct LineSetup {
     pub rate_hz: Option<f64>,
 }
 
-/// Bits of a classic CAN frame besides its data: start, identifier, control, CRC, acknowledgement, end and pause, without
-/// the stuffing, which adds up to a fifth.
+/// Bits of a classic CAN frame besides its data: start, identifier, control, CRC, acknowledgement, end and
+/// pause, without the stuffing, which adds up to a fifth.
 const fn can_overhead(extended: bool) -> f64 {
     if extended { 67.0 } else { 47.0 }
 }
@@ -36,8 +36,8 @@ fn bits_a_byte(format: &str) -> f64 {
 }
 
 impl Profile {
-    /// The share of its line that an instrument's samples take: above 1 they do not fit. `None` for a line whose capacity
-    /// nobody states, such as TCP.
+    /// The share of its line that an instrument's samples take: above 1 they do not fit. `None` for a line
+    /// whose capacity nobody states, such as TCP.
     #[must_use]
     pub fn line_share(&self, setup: LineSetup) -> Option<f64> {
         let d = &self.description;
@@ -81,13 +81,13 @@ impl Profile {
                 let groups = self.frames().iter().filter_map(|frame| {
                     let FrameKind::Messages(index, parts) = &frame.kind else { return None };
                     let message = &d.message[*index];
-                    let asked = message
+                    let request = message
                         .request
                         .as_ref()
                         .map_or(0.0, |data| can_overhead(false) + 8.0 * data.len() as f64);
-                    let answered: f64 =
+                    let answer: f64 =
                         parts.iter().map(|part| can_overhead(part.extended) + 8.0 * part.length as f64).sum();
-                    Some(setup.rate_hz.unwrap_or(message.rate_hz) * (asked + answered))
+                    Some(setup.rate_hz.unwrap_or(message.rate_hz) * (request + answer))
                 });
                 groups.sum::<f64>() / bitrate
             }

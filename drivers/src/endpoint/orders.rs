@@ -1,8 +1,8 @@
 //! What is to be sent to an instrument, and whether it was read back off.
 //!
-//! Two rules stand here for every transport. A command that drives or moves leaves only before its expiry and never after a
-//! newer 'off'. An 'off' is owed until the instrument itself has shown it: it is handed out again wherever it was refused,
-//! or a state that came after it still says 'on'.
+//! Two rules stand here for every transport. A command that drives or moves leaves only before its expiry and
+//! never after a newer 'off'. An 'off' is owed until the instrument itself has shown it: it is handed out
+//! again wherever it was refused, or a state that came after it still says 'on'.
 
 use super::{ALARM_HOLDS, Endpoint, Part};
 use crate::Role;
@@ -76,8 +76,8 @@ impl Endpoint {
         self.discard_commands();
         let _ = match &mut self.part {
             Part::Force { lateral, normal, last, ring } => {
-                for (axis, kept) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
-                    *kept = Err(if axis.is_some() { reason } else { NoData::NotFitted });
+                for (axis, force) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
+                    *force = Err(if axis.is_some() { reason } else { NoData::NotFitted });
                 }
                 ring.try_push(*last).is_ok()
             }
@@ -102,8 +102,8 @@ impl Endpoint {
         self.orders.wanted = None;
     }
 
-    /// What is due to be sent at `now`: the newest command, if its time has not passed; else the safe set-points, where
-    /// the instrument has been on and has not shown since that it is off.
+    /// What is due to be sent at `now`: the newest command, if its time has not passed; else the safe
+    /// set-points, where the instrument has been on and has not shown since that it is off.
     pub fn due(&mut self, now: Nanos) -> Due {
         let newest = self.newest_command();
         let off_came = self.take_off();
@@ -154,9 +154,9 @@ impl Endpoint {
         }
     }
 
-    /// Whether a command that drives or moves, of which a part has left, may go on leaving. Asked before each set-point that
-    /// leaves by itself: the one before may have taken its time, and an 'off' may have come meanwhile. A newer command that
-    /// drives or moves as well keeps it alive, and is handed out next.
+    /// Whether a command that drives or moves, of which a part has left, may continue. Checked before each
+    /// set-point that leaves by itself: the one before may have taken its time, and an 'off' may have come
+    /// meanwhile. A newer command that drives or moves as well keeps it alive, and is handed out next.
     #[must_use]
     pub fn still_wanted(&mut self, now: Nanos) -> bool {
         if let Some(mut newest) = self.newest_command() {

@@ -13,9 +13,9 @@ use std::time::Instant;
 /// Whatever hangs fails instead.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// What the instrument is asked: on which connection, and what.
+/// A request frame to the instrument: on which connection, and what.
 #[derive(Debug, Clone, PartialEq)]
-enum Asked {
+enum Frame {
     State(usize),
     Write(usize, u16, Vec<u16>),
 }
@@ -32,7 +32,7 @@ struct Ways {
 }
 
 /// One connection: requests are answered until either side ends it.
-fn serve(mut stream: TcpStream, number: usize, ways: &Ways, asked: &Sender<Asked>) -> std::io::Result<()> {
+fn serve(mut stream: TcpStream, number: usize, ways: &Ways, frames: &Sender<Frame>) -> std::io::Result<()> {
     loop {
         let mut head = [0; 8];
         stream.read_exact(&mut head)?;
@@ -43,7 +43,7 @@ fn serve(mut stream: TcpStream, number: usize, ways: &Ways, asked: &Sender<Asked
         }
         let mut answer = vec![head[7]];
         if head[7] == 3 {
-            let _ = asked.send(Asked::State(number));
+            let _ = frames.send(Frame::State(number));
             let mut output = ways.output.lock().unwrap();
             output.1 += 1;
             let registers = state(output.1, output.0);
@@ -54,7 +54,7 @@ fn serve(mut stream: TcpStream, number: usize, ways: &Ways, asked: &Sender<Asked
             let registers: Vec<u16> =
                 body[5..].chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
             let enable = registers.get(usize::from(103_u16.wrapping_sub(address))).copied();
-            let _ = asked.send(Asked::Write(number, address, registers));
+            let _ = frames.send(Frame::Write(number, address, registers));
             if enable == Some(0) && ways.refuses_output.load(Ordering::SeqCst) {
                 answer = vec![head[7] | 0x80, 3];
             } else {
@@ -70,26 +70,26 @@ fn serve(mut stream: TcpStream, number: usize, ways: &Ways, asked: &Sender<Asked
     }
 }
 
-/// An instrument on a port of this machine, and what it is asked.
-fn instrument() -> (String, Arc<Ways>, Receiver<Asked>) {
+/// An instrument on a port of this machine, and the requests that it gets.
+fn instrument() -> (String, Arc<Ways>, Receiver<Frame>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
-    let (asked, told) = channel();
+    let (sender, requests) = channel();
     let ways = Arc::<Ways>::default();
     let shared = Arc::clone(&ways);
     std::thread::spawn(move || {
         for (number, stream) in listener.incoming().enumerate() {
             // The client ends a connection by dropping it.
-            let _ = serve(stream.unwrap(), number + 1, &shared, &asked);
+            let _ = serve(stream.unwrap(), number + 1, &shared, &sender);
         }
     });
-    (address, ways, told)
+    (address, ways, requests)
 }
 
-/// The driver of that instrument, driving. What it is asked from the first 'on' on is left in `told`.
+/// The driver of that instrument, driving. Requests from the first 'on' on stay in `requests`.
 fn driving(
     address: &str,
-    told: &Receiver<Asked>,
+    requests: &Receiver<Frame>,
 ) -> (JoinHandle<Closed>, Arc<AtomicBool>, impl Sized + use<>) {
     let (endpoint, mut port): (Endpoint, _) = amplifier();
     let (ready, opened) = sync_channel(1);
@@ -98,19 +98,19 @@ fn driving(
     let thread = spawn(&InstrumentSetup::new("muprime-amplifier", address), session).unwrap();
     assert_eq!(opened.recv_timeout(PATIENCE), Ok(Ok(())));
     port.push(on(1, u64::MAX));
-    let on = |asked: &Asked| matches!(asked, Asked::Write(_, 100, registers) if registers[3] == 1);
-    while !on(&told.recv_timeout(PATIENCE).unwrap()) {}
+    let on = |one: &Frame| matches!(one, Frame::Write(_, 100, registers) if registers[3] == 1);
+    while !on(&requests.recv_timeout(PATIENCE).unwrap()) {}
     (thread, stop, port)
 }
 
-/// The writes among what is asked, up to the one that is looked for.
-fn writes_until(told: &Receiver<Asked>, is: impl Fn(&Asked) -> bool) -> Vec<Asked> {
+/// The writes among the requests, up to the one that is looked for.
+fn writes_until(requests: &Receiver<Frame>, is: impl Fn(&Frame) -> bool) -> Vec<Frame> {
     let mut writes = Vec::new();
     loop {
-        let asked = told.recv_timeout(PATIENCE).expect("it was never asked");
-        let found = is(&asked);
-        if matches!(asked, Asked::Write(..)) {
-            writes.push(asked);
+        let request = requests.recv_timeout(PATIENCE).expect("no request came");
+        let found = is(&request);
+        if matches!(request, Frame::Write(..)) {
+            writes.push(request);
         }
         if found {
             return writes;
@@ -120,32 +120,32 @@ fn writes_until(told: &Receiver<Asked>, is: impl Fn(&Asked) -> bool) -> Vec<Aske
 
 #[test]
 fn a_set_point_that_is_refused_keeps_no_other_from_being_sent() {
-    let (address, ways, told) = instrument();
-    let (thread, stop, _port) = driving(&address, &told);
+    let (address, ways, requests) = instrument();
+    let (thread, stop, _port) = driving(&address, &requests);
     ways.refuses_output.store(true, Ordering::SeqCst);
     stop.store(true, Ordering::Release);
-    let amplitude = |asked: &Asked| matches!(asked, Asked::Write(_, 100, registers) if *registers == [0]);
-    let writes = writes_until(&told, amplitude);
+    let amplitude = |one: &Frame| matches!(one, Frame::Write(_, 100, registers) if *registers == [0]);
+    let writes = writes_until(&requests, amplitude);
     let [block, output, amplitude] = &writes[..] else { panic!("{writes:?}") };
-    assert!(matches!(block, Asked::Write(1, 100, registers) if registers.len() == 5 && registers[3] == 0));
-    assert_eq!((output, amplitude), (&Asked::Write(1, 103, vec![0]), &Asked::Write(1, 100, vec![0])));
+    assert!(matches!(block, Frame::Write(1, 100, registers) if registers.len() == 5 && registers[3] == 0));
+    assert_eq!((output, amplitude), (&Frame::Write(1, 103, vec![0]), &Frame::Write(1, 100, vec![0])));
     assert_eq!(thread.join().unwrap(), Closed::ReadBackOff, "what it shows counts");
 }
 
 #[test]
 fn a_new_connection_begins_with_off() {
-    let (address, ways, told) = instrument();
-    let (thread, stop, port) = driving(&address, &told);
+    let (address, ways, requests) = instrument();
+    let (thread, stop, port) = driving(&address, &requests);
     ways.cuts.store(true, Ordering::SeqCst);
-    // Neither state nor signature is asked for before.
+    // Neither state nor signature is read before.
     let first = loop {
-        match told.recv_timeout(PATIENCE).unwrap() {
-            Asked::State(1) | Asked::Write(1, ..) => {}
+        match requests.recv_timeout(PATIENCE).unwrap() {
+            Frame::State(1) | Frame::Write(1, ..) => {}
             first => break first,
         }
     };
     assert!(
-        matches!(&first, Asked::Write(2, 100, registers) if registers[3] == 0 && registers[0] == 0),
+        matches!(&first, Frame::Write(2, 100, registers) if registers[3] == 0 && registers[0] == 0),
         "{first:?}"
     );
     stop.store(true, Ordering::Release);

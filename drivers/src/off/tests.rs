@@ -136,7 +136,7 @@ fn a_new_connection_begins_with_the_off_that_is_owed() {
     at_the_beginning(&mut session, &mut instrument).unwrap();
     assert_eq!(instrument.did, [Did::Patient, Did::Off, Did::Read, Did::Off, Did::Read]);
     assert!(session.endpoint.reads_off());
-    // A wire that breaks is told.
+    // A broken wire is reported.
     let mut instrument = Instrument { breaks_at: 1, ..Instrument::new(1) };
     assert!(at_the_beginning(&mut driven(), &mut instrument).is_err());
 }

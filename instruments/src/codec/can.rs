@@ -85,17 +85,17 @@ pub struct SlcanReader {
 const LONGEST_LINE: usize = 30;
 
 impl SlcanReader {
-    /// Takes bytes as they come and gives each thing said to `said`.
-    pub fn push(&mut self, bytes: &[u8], mut said: impl FnMut(SlcanSaid)) {
+    /// Takes bytes as they come and gives each message to `sink`.
+    pub fn push(&mut self, bytes: &[u8], mut sink: impl FnMut(SlcanSaid)) {
         for &byte in bytes {
             match byte {
                 b'\r' => {
-                    said(if self.overlong { SlcanSaid::Other } else { understand(&self.line) });
+                    sink(if self.overlong { SlcanSaid::Other } else { understand(&self.line) });
                     self.line.clear();
                     self.overlong = false;
                 }
                 0x07 => {
-                    said(SlcanSaid::Refused);
+                    sink(SlcanSaid::Refused);
                     self.line.clear();
                     self.overlong = false;
                 }
@@ -137,7 +137,7 @@ fn frame(line: &[u8], digits: usize, extended: bool) -> Option<CanFrame> {
 mod tests {
     use super::*;
 
-    fn said(bytes: &[u8]) -> Vec<SlcanSaid> {
+    fn decoded(bytes: &[u8]) -> Vec<SlcanSaid> {
         let (mut reader, mut all) = (SlcanReader::default(), Vec::new());
         reader.push(bytes, |one| all.push(one));
         all
@@ -147,22 +147,22 @@ mod tests {
     fn lines_both_ways() {
         let frame = CanFrame::new(0x1B4, &[0x02]).unwrap();
         assert_eq!(slcan_line(&frame), b"t1B4102\r");
-        assert_eq!(said(b"t1B4102\r"), [SlcanSaid::Frame(frame)]);
-        assert_eq!(said(b"t1b410200FF\r"), [SlcanSaid::Frame(frame)], "with a time stamp");
+        assert_eq!(decoded(b"t1B4102\r"), [SlcanSaid::Frame(frame)]);
+        assert_eq!(decoded(b"t1b410200FF\r"), [SlcanSaid::Frame(frame)], "with a time stamp");
         let long = CanFrame::build(0x0123_4567, true, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
         assert_eq!(slcan_line(&long), b"T0123456780102030405060708\r");
-        assert_eq!(said(&slcan_line(&long)), [SlcanSaid::Frame(long)]);
+        assert_eq!(decoded(&slcan_line(&long)), [SlcanSaid::Frame(long)]);
     }
 
     #[test]
     fn what_is_no_frame_is_none() {
-        assert_eq!(said(b"z\r\r\x07"), [SlcanSaid::Done, SlcanSaid::Done, SlcanSaid::Refused]);
+        assert_eq!(decoded(b"z\r\r\x07"), [SlcanSaid::Done, SlcanSaid::Done, SlcanSaid::Refused]);
         for line in ["t1B49\r", "t1B41\r", "tXYZ0\r", "t1B4102000\r", "V1013\r", "T1B4102\r", "t8001FF\r"] {
-            assert_eq!(said(line.as_bytes()), [SlcanSaid::Other], "{line}");
+            assert_eq!(decoded(line.as_bytes()), [SlcanSaid::Other], "{line}");
         }
         let mut noise = vec![b'0'; 100_000];
         noise.extend(b"\rt1B4102\r");
-        assert_eq!(said(&noise).len(), 2, "an endless line is one thing said");
+        assert_eq!(decoded(&noise).len(), 2, "an endless line is one message");
     }
 
     #[test]

@@ -136,7 +136,7 @@ impl TryFrom<String> for Check {
                     ALIASES.iter().find(|(alias, _)| *alias == other).map_or(other, |(_, meant)| meant);
                 let found = CATALOGUE.iter().find(|(known, _)| *known == meant);
                 let unknown = || {
-                    // As wide as the one that is asked for: the usual remedy is a look at what there is.
+                    // The ones of the same width: the usual remedy is to choose one of them.
                     let width = spelt.split('_').find(|part| part.chars().all(|c| c.is_ascii_digit()));
                     let wide = width.map(|width| format!("CRC_{width}_"));
                     let alike = CATALOGUE
@@ -189,8 +189,8 @@ impl Check {
         }
     }
 
-    /// The check of `body`, as it stands in the frame. `high_first`: its high byte comes first; left out, so it is with
-    /// checks that are not reflected, as is usual.
+    /// The check of `body`, as it stands in the frame. `high_first`: its high byte comes first; left out, so
+    /// it is with checks that are not reflected, as is usual.
     #[must_use]
     pub fn of(self, body: &[u8], high_first: Option<bool>) -> Vec<u8> {
         match self {

@@ -112,8 +112,8 @@ impl Beginning {
 
 /// The refusal of a file that is no DBC file, with the place where reading stopped.
 fn no_dbc(text: &str, error: &can_dbc::DbcError) -> String {
-    let said = error.to_string();
-    let place = said.split_once("--> ").and_then(|(_, rest)| {
+    let message = error.to_string();
+    let place = message.split_once("--> ").and_then(|(_, rest)| {
         let (line, rest) = rest.split_once(':')?;
         let column = rest.split_whitespace().next()?;
         Some((line.trim().parse::<usize>().ok()?, column.parse::<usize>().ok()?))
@@ -123,12 +123,12 @@ fn no_dbc(text: &str, error: &can_dbc::DbcError) -> String {
             let shown = text.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();
             format!("no DBC file: line {line} cannot be read from column {column} on: `{shown}`")
         }
-        None => format!("no DBC file: {said}"),
+        None => format!("no DBC file: {message}"),
     }
 }
 
-/// All messages of a file, by name, and by their long name where the file has one. What is wrong with a message is its
-/// `fault`: a file serves for its other messages.
+/// All messages of a file, by name, and by their long name where the file has one. What is wrong with a
+/// message is its `fault`: a file serves for its other messages.
 ///
 /// # Errors
 /// Where the file is no DBC file.
@@ -293,8 +293,8 @@ impl DbcSignal {
         Some(if self.signed { ((word << unused) as i64) >> unused } else { word as i64 })
     }
 
-    /// Stores `value`, rounded and held to what the bits can say. Other bits are kept.
-    /// Returns `false` where the frame is too short.
+    /// Stores `value`, rounded and limited to what the bits can hold. Other bits stay unchanged. Returns
+    /// `false` where the frame is too short.
     pub fn write(&self, frame: &mut [u8], value: f64) -> bool {
         let number = (value - self.offset) / self.factor;
         let raw = number.round();
@@ -402,8 +402,8 @@ mod tests {
             assert_eq!(messages["Short"].extended, raw != "2047", "{raw}");
         }
         for raw in ["536871000", "3221225472", "4294967295"] {
-            let said = fault(&TEXT.replace("437", raw), "Short");
-            assert!(said.contains("line 10") && said.contains(raw) && said.contains("29 bits"), "{said}");
+            let why = fault(&TEXT.replace("437", raw), "Short");
+            assert!(why.contains("line 10") && why.contains(raw) && why.contains("29 bits"), "{why}");
         }
         let twice = TEXT.replace(" SG_ Odd", " SG_ Fx : 32|16@1- (1,0) [0|0] \"\" RIG\n SG_ Odd");
         assert!(

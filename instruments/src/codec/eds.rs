@@ -27,8 +27,8 @@ pub struct Object {
     pub data_type: u16,
     /// `ro`, `wo`, `rw`, `rwr`, `rww` or `const`.
     pub access: String,
-    /// Value after power-on, where the data sheet states a whole number: that of the device as it is configured
-    /// (`ParameterValue`), else its maker's (`DefaultValue`).
+    /// Value after power-on, where the data sheet states a whole number: that of the device as it is
+    /// configured (`ParameterValue`), else its maker's (`DefaultValue`).
     pub default: Option<DefaultValue>,
 }
 
@@ -102,11 +102,11 @@ fn close(
     let Some((key, entries)) = section else { return Ok(()) };
     let (index, sub) = key;
     let entry = |name: &str| entries.get(name).map(|(value, _)| value.as_str()).filter(|v| !v.is_empty());
-    let wrong = |name: &str, said: &str| {
+    let wrong = |name: &str, text: &str| {
         let line = entries.get(name).map_or(0, |(_, line)| *line);
-        format!("line {line}: {name} of object {index:04X}sub{sub}: `{said}` is no number")
+        format!("line {line}: {name} of object {index:04X}sub{sub}: `{text}` is not a number")
     };
-    let whole = |name: &str| entry(name).map(|said| self::number(said).ok_or(wrong(name, said))).transpose();
+    let whole = |name: &str| entry(name).map(|text| self::number(text).ok_or(wrong(name, text))).transpose();
     let compact = whole("compactsubobj")?.filter(|count| *count > 0);
     if compact.is_none() && matches!(whole("objecttype")?, Some(8 | 9)) {
         return Ok(());
@@ -122,8 +122,8 @@ fn close(
         None => Ok(()),
     };
     let Some(count) = compact else { return put(sub, object) };
-    // An array in one section (CiA 306, 4.6.3.3): how many there are, then that many of one kind. Values of single ones are
-    // elsewhere, so none is known here.
+    // An array in one section (CiA 306, 4.6.3.3): how many there are, then that many of one kind. Values of
+    // single ones are elsewhere, so none is known here.
     let count = u8::try_from(count).ok().filter(|count| *count < 255);
     let count = count.ok_or_else(|| wrong("CompactSubObj", entry("compactsubobj").unwrap_or_default()))?;
     let number = DefaultValue { value: count.into(), plus_node: false };
@@ -152,8 +152,8 @@ fn default_of(text: &str) -> Option<DefaultValue> {
     }
 }
 
-/// What a process data frame holds: each object with its first byte. `first` is 0x1800 for what the node sends and
-/// 0x1400 for what it takes; `cob` is the frame's identifier less the node's number.
+/// What a process data frame holds: each object with its first byte. `first` is 0x1800 for what the node
+/// sends and 0x1400 for what it takes; `cob` is the frame's identifier less the node's number.
 ///
 /// # Errors
 /// Where the data sheet has no such frame that is switched on, or one that is not made of whole bytes.
@@ -163,8 +163,8 @@ pub fn mapping(objects: &Objects, first: u16, cob: u32) -> Result<(Vec<(Key, usi
         object.default.filter(|_| within).map(|identifier| (index, identifier))
     };
     let frames: Vec<(u16, DefaultValue)> = objects.iter().filter_map(frame).collect();
-    // A sheet that was configured for one node may state its identifier as a whole; only what the base of a frame leaves can be
-    // a node's number.
+    // A sheet that was configured for one node may state its identifier as a whole; only what the base of a
+    // frame leaves can be a node's number.
     let of_node = |d: &DefaultValue| {
         let id = d.value & 0x7FF;
         id == i64::from(cob)

@@ -1,5 +1,5 @@
-//! Texts of other programs: UTF-8 and UTF-16 by their mark, UTF-8 where it is that, else Windows-1252, which editors of
-//! DBC files and data sheets write.
+//! Texts of other programs: UTF-8 and UTF-16 by their mark, UTF-8 where it is that, else Windows-1252, which
+//! editors of DBC files and data sheets write.
 
 /// What Windows-1252 has between 0x80 and 0x9F; the rest of it is Latin-1.
 const WINDOWS: &str = "\u{20ac}\u{81}\u{201a}\u{192}\u{201e}\u{2026}\u{2020}\u{2021}\u{2c6}\u{2030}\u{160}\u{2039}\u{152}\u{8d}\u{17d}\u{8f}\

@@ -19,17 +19,17 @@ pub enum RtuError {
     /// Another unit answered.
     #[error("unit {found} answered instead of unit {expected}")]
     Unit {
-        /// Asked.
+        /// Expected.
         expected: u8,
-        /// Answered.
+        /// Found.
         found: u8,
     },
     /// The answer is one to another request.
     #[error("the answer is to function {found}, not {expected}")]
     Function {
-        /// Asked.
+        /// Expected.
         expected: u8,
-        /// Answered.
+        /// Found.
         found: u8,
     },
     /// The answer speaks of another length or another register.
@@ -178,7 +178,7 @@ pub fn written(request: &Request, answer: &[u8]) -> Result<(), RtuError> {
 
 /// A request, as the instrument's side sees it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Asked {
+pub enum Operation {
     /// Function 3 or 4.
     Read {
         /// The function.
@@ -214,7 +214,7 @@ pub enum Heard {
     /// No request begins here: drop a byte and look again.
     Noise,
     /// A request for `unit`, and how many bytes it took.
-    Request(u8, Asked, usize),
+    Request(u8, Operation, usize),
 }
 
 /// Looks for a request at the start of `bytes`; `own` are the functions of the maker's own, whose
@@ -237,15 +237,15 @@ pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
         return Heard::Noise;
     }
     let word = |at: usize| u16::from_be_bytes([body[at], body[at + 1]]);
-    let asked = match function {
-        1..=4 => Asked::Read { function, address: word(2), count: word(4) },
-        6 => Asked::Write { function, address: word(2), registers: vec![word(4)] },
+    let operation = match function {
+        1..=4 => Operation::Read { function, address: word(2), count: word(4) },
+        6 => Operation::Write { function, address: word(2), registers: vec![word(4)] },
         15 => {
             let count = usize::from(word(4));
             if body[7..].len() != count.div_ceil(8) {
                 return Heard::Noise;
             }
-            Asked::Write { function, address: word(2), registers: from_bits(&body[7..], count) }
+            Operation::Write { function, address: word(2), registers: from_bits(&body[7..], count) }
         }
         16 => {
             let data = &body[7..];
@@ -253,11 +253,11 @@ pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
                 return Heard::Noise;
             }
             let registers = data.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
-            Asked::Write { function, address: word(2), registers }
+            Operation::Write { function, address: word(2), registers }
         }
-        _ => Asked::Custom { function, data: body[2] },
+        _ => Operation::Custom { function, data: body[2] },
     };
-    Heard::Request(body[0], asked, length)
+    Heard::Request(body[0], operation, length)
 }
 
 /// The answer that gives registers, as bits where the function is one of bits.
@@ -318,8 +318,8 @@ mod tests {
         let write = write_coils(1, 19, &coils);
         assert_eq!(&write.bytes[..9], &[1, 15, 0, 19, 0, 10, 2, 0xCD, 0x01]);
         let heard = hear(&write.bytes, &[]);
-        let asked = Asked::Write { function: 15, address: 19, registers: coils.clone() };
-        assert_eq!(heard, Heard::Request(1, asked, write.bytes.len()));
+        let operation = Operation::Write { function: 15, address: 19, registers: coils.clone() };
+        assert_eq!(heard, Heard::Request(1, operation, write.bytes.len()));
         assert!(written(&write, &confirm(1, 15, 19, 10)).is_ok());
         assert_eq!(give(1, 1, &coils)[2..5], [2, 0xCD, 0x01]);
     }
@@ -334,12 +334,12 @@ mod tests {
     #[test]
     fn both_sides_agree() {
         let request = read(9, 3, 180, 2);
-        let heard = Heard::Request(9, Asked::Read { function: 3, address: 180, count: 2 }, 8);
+        let heard = Heard::Request(9, Operation::Read { function: 3, address: 180, count: 2 }, 8);
         assert_eq!(hear(&request.bytes, &[]), heard);
         assert_eq!(registers(&request, &give(9, 3, &[1, 0xFFFE])).unwrap(), [0, 1, 0xFF, 0xFE]);
         let request = write(9, 410, &[0x0200, 7]);
-        let asked = Asked::Write { function: 16, address: 410, registers: vec![0x0200, 7] };
-        assert_eq!(hear(&request.bytes, &[]), Heard::Request(9, asked, 13));
+        let operation = Operation::Write { function: 16, address: 410, registers: vec![0x0200, 7] };
+        assert_eq!(hear(&request.bytes, &[]), Heard::Request(9, operation, 13));
         assert_eq!(written(&request, &confirm(9, 16, 410, 2)), Ok(()));
         assert_eq!(written(&request, &confirm(9, 16, 411, 2)), Err(RtuError::Mismatch));
     }

@@ -85,8 +85,8 @@ impl Form {
     }
 }
 
-/// The decimal number at the head of `text`, and what follows. Only digits, a sign, a point and an exponent: Rust would read
-/// `inf` as well.
+/// The decimal number at the head of `text`, and what follows. Only digits, a sign, a point and an exponent:
+/// Rust would read `inf` as well.
 fn decimal(text: &str) -> Option<(f64, &str)> {
     let bytes = text.as_bytes();
     let digits =
@@ -149,7 +149,7 @@ impl Pattern {
                 continue;
             }
             let (name, form) = match inside.split_once(':') {
-                Some((name, form)) => (name, Form::parse(form).map_err(|said| format!("`{text}`: {said}"))?),
+                Some((name, form)) => (name, Form::parse(form).map_err(|why| format!("`{text}`: {why}"))?),
                 None => (inside, Form::Decimal(None)),
             };
             if open {
@@ -222,8 +222,8 @@ impl Pattern {
         rest.is_empty().then_some(values)
     }
 
-    /// The line that has these numbers; those whose form states no decimals have `decimals` of them. A number that is missing
-    /// is zero.
+    /// The line that has these numbers; those whose form states no decimals have `decimals` of them. A number
+    /// that is missing is zero.
     #[must_use]
     pub fn write(&self, values: &[f64], decimals: u8) -> String {
         let mut values = values.iter().copied();
@@ -257,7 +257,7 @@ mod tests {
     use super::*;
 
     fn read(pattern: &str, line: &str) -> Option<Vec<f64>> {
-        Pattern::parse(pattern).unwrap_or_else(|said| panic!("{said}")).read(line)
+        Pattern::parse(pattern).unwrap_or_else(|why| panic!("{why}")).read(line)
     }
 
     #[test]

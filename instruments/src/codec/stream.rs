@@ -1,4 +1,4 @@
-//! Sensor streams: frames that come without being asked for.
+//! Sensor streams: frames that the instrument sends without a request.
 //!
 //! A stream has no silence to find its frames by. Sync bytes also occur in data, and some streams
 //! have none, so alignment stands on the check alone, and it is believed only after several frames

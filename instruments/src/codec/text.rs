@@ -71,8 +71,8 @@ const PREFIXES: [(&str, f64); 8] = [
     ("G", 1e9),
 ];
 
-/// The value in `unit` that a line such as `5mm/s/V` (0.005 m/s/V) or `8.16 us` stands for: a number, perhaps a space, an
-/// SI prefix or none, the unit. `None` for anything else, and for numbers that are not finite.
+/// The value in `unit` that a line such as `5mm/s/V` (0.005 m/s/V) or `8.16 us` stands for: a number, perhaps
+/// a space, an SI prefix or none, the unit. `None` for anything else, and for numbers that are not finite.
 #[must_use]
 pub fn quantity(line: &str, unit: &str) -> Option<f64> {
     let rest = line.trim().strip_suffix(unit)?;

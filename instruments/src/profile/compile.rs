@@ -50,7 +50,7 @@ impl Compiler<'_> {
         let signals = d.signal.iter().map(signal).collect::<Result<Vec<_>, _>>()?;
         let sets = d.set.iter().map(|s| self.set(s, &sheet)).collect::<Result<_, _>>()?;
         let condition = |when: &toml::Spanned<String>| {
-            Expression::compile(when.as_ref(), &index).map_err(|said| self.at(when.span(), said))
+            Expression::compile(when.as_ref(), &index).map_err(|why| self.at(when.span(), why))
         };
         let signatures = d.signature.iter().map(|s| condition(&s.when)).collect::<Result<_, _>>()?;
         let faults = d.fault.iter().map(|f| condition(&f.when)).collect::<Result<_, _>>()?;
@@ -76,7 +76,7 @@ impl Compiler<'_> {
         let place = self.text.find(name.as_str()).map(|at| at..at + name.len());
         let error = |message: String| ProfileError::at(self.text, place.clone(), message);
         let text = (self.file)(name).ok_or_else(|| error(format!("the file `{name}` is not there")))?;
-        dbc::parse(&text).map_err(|said| error(format!("{name}: {said}")))
+        dbc::parse(&text).map_err(|why| error(format!("{name}: {why}")))
     }
 
     /// The objects of the profile's data sheet, if it names one, and what the profile writes to them at connection.
@@ -85,7 +85,7 @@ impl Compiler<'_> {
         let place = self.text.find(name.as_str()).map(|at| at..at + name.len());
         let error = |message: String| ProfileError::at(self.text, place.clone(), message);
         let text = (self.file)(name).ok_or_else(|| error(format!("the file `{name}` is not there")))?;
-        let sheet = eds::parse(&text).map_err(|said| error(format!("{name}: {said}")))?;
+        let sheet = eds::parse(&text).map_err(|why| error(format!("{name}: {why}")))?;
         for (index, sub, bytes, _) in self.description.init.iter().filter_map(|init| init.sdo) {
             let wrong = match sheet.get(&(index, sub)) {
                 None => "is not in the data sheet",
@@ -107,11 +107,10 @@ impl Compiler<'_> {
             )
         {
             let (_, mapped) =
-                eds::mapping(&sheet, first, cob).map_err(|said| error(format!("{name}: {said}")))?;
+                eds::mapping(&sheet, first, cob).map_err(|why| error(format!("{name}: {why}")))?;
             if mapped != length {
-                let said =
-                    format!("{name}: the frame {cob:#x} has {mapped} bytes, the profile says {length}");
-                return Err(error(said));
+                let why = format!("{name}: the frame {cob:#x} has {mapped} bytes, the profile says {length}");
+                return Err(error(why));
             }
         }
         Ok(sheet)
@@ -126,7 +125,7 @@ impl Compiler<'_> {
         sheet: &Objects,
         name: &toml::Spanned<String>,
     ) -> Result<Field, ProfileError> {
-        let error = |said: String| self.at(name.span(), format!("`{}`: {said}", name.as_ref()));
+        let error = |why: String| self.at(name.span(), format!("`{}`: {why}", name.as_ref()));
         let (object, cob) =
             object.zip(cob).ok_or_else(|| error("`object` needs a frame with `cob`".into()))?;
         let (placed, _) = eds::mapping(sheet, first, cob).map_err(error)?;
@@ -246,20 +245,20 @@ impl Compiler<'_> {
                 self.at(group.name.span(), format!("the identifier of `{reply}` is below `dbc_base`"))
             })?;
             if message.length > 8 {
-                let said = format!("`{reply}` has {} bytes: CAN FD is not spoken", message.length);
-                return Err(self.at(group.name.span(), said));
+                let why = format!("`{reply}` has {} bytes: CAN FD is not supported", message.length);
+                return Err(self.at(group.name.span(), why));
             }
             let selector = group.multiplex.zip(message.selector()).map(|(value, signal)| (signal, value));
             if let Some((signal, value)) = selector.filter(|(signal, value)| *value > signal.mask()) {
-                let said = format!("`multiplex` of `{name}`: {value} does not fit the {} bits", signal.size);
-                return Err(self.at(group.name.span(), said));
+                let why = format!("`multiplex` of `{name}`: {value} does not fit the {} bits", signal.size);
+                return Err(self.at(group.name.span(), why));
             }
             Ok(Part { id, extended: message.extended, length: message.length, selector })
         };
         let parts: Vec<Part> = group.replies.iter().map(part).collect::<Result<_, _>>()?;
         if group.multiplex.is_some() && parts.iter().all(|part| part.selector.is_none()) {
-            let said = format!("`multiplex` of `{name}`: none of its messages has a multiplexor");
-            return Err(self.at(group.name.span(), said));
+            let why = format!("`multiplex` of `{name}`: none of its messages has a multiplexor");
+            return Err(self.at(group.name.span(), why));
         }
         Ok(parts)
     }
@@ -277,16 +276,16 @@ impl Compiler<'_> {
             // A number has at most 8 bytes.
             let count = signal.number.map_or(1, |number| number.bytes().div_ceil(2)) as u16;
             if u32::from(address) + u32::from(count) > 65536 {
-                let said = format!("signal `{}` runs past register 65535", signal.name.as_ref());
-                return Err(self.at(signal.name.span(), said));
+                let why = format!("signal `{}` runs past register 65535", signal.name.as_ref());
+                return Err(self.at(signal.name.span(), why));
             }
             wanted.push(Span { address, count });
         }
         if wanted.is_empty() {
-            let said = format!(
+            let why = format!(
                 "poll `{name}` needs `address` and `count`, or signals with an `address` of their own"
             );
-            return Err(self.at(poll.name.span(), said));
+            return Err(self.at(poll.name.span(), why));
         }
         Ok(Span::cover(wanted, poll.gap))
     }
@@ -351,8 +350,8 @@ impl Compiler<'_> {
                     let message = format!("signal `{name}` is worked out: it stands nowhere and has no type");
                     return Err(self.at(s.name.span(), message));
                 }
-                let said = |said| self.at(s.name.span(), format!("signal `{name}`: {said}"));
-                Place::Computed(Expression::compile(value, index).map_err(said)?)
+                let why = |why| self.at(s.name.span(), format!("signal `{name}`: {why}"));
+                Place::Computed(Expression::compile(value, index).map_err(why)?)
             }
         };
         if let Place::Bytes(field) = &place {
@@ -365,8 +364,8 @@ impl Compiler<'_> {
             return Err(self.at(s.name.span(), format!("the range of signal `{name}` is empty")));
         }
         let compile = |text: &Option<String>| {
-            let said = |said| self.at(s.name.span(), format!("signal `{name}`: {said}"));
-            text.as_ref().map(|text| Expression::compile(text, index).map_err(said)).transpose()
+            let why = |why| self.at(s.name.span(), format!("signal `{name}`: {why}"));
+            text.as_ref().map(|text| Expression::compile(text, index).map_err(why)).transpose()
         };
         if s.resolution_si.is_some_and(|step| !(step.is_finite() && step > 0.0)) {
             return Err(
@@ -412,7 +411,7 @@ impl Compiler<'_> {
             let FrameKind::Messages(group, _) = frame.kind else { return Err(unknown()) };
             let replies = &self.description.message[group].replies;
             let of_group = self.description.message[group].multiplex;
-            let (said, help) = match signal.multiplex {
+            let (why, help) = match signal.multiplex {
                 Multiplex::Where(value) if of_group != Some(value) => (
                     format!(
                         "`{path}` of signal `{name}` is multiplexed: it is there only where the multiplexor is {value}"
@@ -421,14 +420,14 @@ impl Compiler<'_> {
                 ),
                 Multiplex::Nested => (
                     format!(
-                        "`{path}` of signal `{name}` is multiplexed by ranges or in two steps (SG_MUL_VAL_), which is not spoken"
+                        "`{path}` of signal `{name}` is multiplexed by ranges or in two steps (SG_MUL_VAL_), which is not supported"
                     ),
                     "choose a message that always has it".to_string(),
                 ),
                 _ => (String::new(), String::new()),
             };
-            if !said.is_empty() {
-                return Err(self.at(s.name.span(), said).with_help(&help));
+            if !why.is_empty() {
+                return Err(self.at(s.name.span(), why).with_help(&help));
             }
             let which = replies.iter().position(|reply| reply == message).ok_or_else(unknown)?;
             let before =
@@ -443,9 +442,9 @@ impl Compiler<'_> {
                 || s.number.is_some()
                 || s.bits.is_some())
         {
-            let said =
+            let why =
                 format!("signal `{name}` stands in a line of text: it has no register, byte, type or bits");
-            return Err(self.at(s.name.span(), said));
+            return Err(self.at(s.name.span(), why));
         }
         if let Some(Form::Pattern(pattern)) = &frame.text {
             let at = pattern.fields().position(|(field, _)| field == name).ok_or_else(|| {
@@ -468,8 +467,8 @@ impl Compiler<'_> {
             let stands =
                 Self::within(&frame.spans, wanted).filter(|_| s.register.is_none() && s.byte.is_none());
             let at = stands.ok_or_else(|| {
-                let said = format!("`address` {address} of signal `{name}` is not read by `{}`", frame.name);
-                self.at(s.name.span(), said).with_help(
+                let why = format!("`address` {address} of signal `{name}` is not read by `{}`", frame.name);
+                self.at(s.name.span(), why).with_help(
                     "`address` is a register of a [[poll]], and takes the place of `register` and `byte`",
                 )
             })?;
@@ -481,11 +480,11 @@ impl Compiler<'_> {
             .iter()
             .any(|poll| *poll.name.as_ref() == frame.name && poll.address.is_none())
         {
-            let said = format!(
+            let why = format!(
                 "signal `{name}` needs `address`: poll `{}` names no registers of its own",
                 frame.name
             );
-            return Err(self.at(s.name.span(), said));
+            return Err(self.at(s.name.span(), why));
         }
         let at = match (s.register, s.byte) {
             (None, None) if text_answer => 0,
@@ -550,7 +549,7 @@ impl Compiler<'_> {
     /// A pattern of the file, its place the text itself.
     pub(super) fn pattern(&self, text: &str) -> Result<Pattern, ProfileError> {
         let place = self.text.find(text).map(|at| at..at + text.len());
-        Pattern::parse(text).map_err(|said| ProfileError::at(self.text, place, said))
+        Pattern::parse(text).map_err(|why| ProfileError::at(self.text, place, why))
     }
 
     /// The line that carries a set-point, and whose values stand in it.
@@ -568,17 +567,17 @@ impl Compiler<'_> {
             let sets = &self.description.set;
             let other = sets.iter().position(|set| set.name.as_ref() == field && set.send.is_some());
             other.map(|other| Some(SetId(other))).ok_or_else(|| {
-                let said = format!(
+                let why = format!(
                     "`{{{field}}}` in the line of set-point `{}` is no set-point of text",
                     s.name.as_ref()
                 );
-                self.at(s.name.span(), said)
+                self.at(s.name.span(), why)
             })
         };
         let owners = pattern.fields().map(owner).collect::<Result<Vec<_>, _>>()?;
         if !owners.is_empty() && !owners.contains(&None) {
-            let said = format!("the line of set-point `{}` has no `{{}}` for its own value", s.name.as_ref());
-            return Err(self.at(s.name.span(), said));
+            let why = format!("the line of set-point `{}` has no `{{}}` for its own value", s.name.as_ref());
+            return Err(self.at(s.name.span(), why));
         }
         Ok((pattern, owners))
     }

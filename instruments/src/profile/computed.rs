@@ -1,5 +1,5 @@
-//! Signals that are worked out from others: forces from strain gages by the matrix that the instrument was calibrated
-//! with, as instruments leave it to the host.
+//! Signals that are worked out from others: forces from strain gages by the matrix that the instrument was
+//! calibrated with, as instruments leave it to the host.
 
 use super::{FrameId, Place, Profile, SignalId, Values};
 use crate::expression::Expression;
@@ -66,9 +66,9 @@ impl Profile {
         signals.filter(|(_, s)| reads(s)).map(|(i, _)| i).collect()
     }
 
-    /// The inputs of a frame for which its computed signals take the values in `unit_value`, as an emulator needs
-    /// them. `known` are the values of other frames. `None` where the frame computes nothing, or not as many signals
-    /// as it has inputs, or they do not depend on each other one to one.
+    /// The inputs of a frame for which its computed signals take the values in `unit_value`, as an emulator
+    /// needs them. `known` are the values of other frames. `None` where the frame computes nothing, or not as
+    /// many signals as it has inputs, or they do not depend on each other one to one.
     #[must_use]
     pub fn inputs_for(
         &self,

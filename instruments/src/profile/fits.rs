@@ -1,5 +1,5 @@
-//! What the types of a profile cannot say: what its kind of link can carry, and what a role needs. Whatever would be ignored
-//! is refused.
+//! What the types of a profile cannot say: what its kind of link can carry, and what a role needs. Whatever
+//! would be ignored is refused.
 
 mod frames;
 
@@ -67,10 +67,10 @@ impl Compiler<'_> {
             matches!(data, b'7' | b'8') && matches!(parity, b'N' | b'E' | b'O') && matches!(stop, b'1' | b'2')
         };
         if let Some(format) = link.format.as_ref().filter(|format| !formed(format)) {
-            let said = format!(
+            let problem = format!(
                 "`format`: `{format}` is none; data bits 7 or 8, parity N, E or O, stop bits 1 or 2, as 8N1"
             );
-            return Err(ProfileError::at(self.text, link_place, said));
+            return Err(ProfileError::at(self.text, link_place, problem));
         }
         if link.baud == Some(0) || link.bitrate == Some(0) {
             return Err(ProfileError::at(
@@ -155,8 +155,8 @@ impl Compiler<'_> {
         self.check_stream()?;
         for alarm in &d.link.unsolicited {
             if self.pattern(alarm)?.head().is_empty() {
-                let said = format!("the alarm `{alarm}` must begin with text of its own");
-                return Err(self.at_section("[link]", said));
+                let problem = format!("the alarm `{alarm}` must begin with text of its own");
+                return Err(self.at_section("[link]", problem));
             }
         }
         let rates = d
@@ -166,16 +166,16 @@ impl Compiler<'_> {
             .chain(d.query.iter().map(|q| (&q.name, q.rate_hz)));
         for (name, rate) in rates {
             if !(rate > 0.0 && rate <= FASTEST_HZ) {
-                let said = format!("`{}`: a `rate_hz` is above 0 and at most {FASTEST_HZ}", name.as_ref());
-                return Err(self.at(name.span(), said));
+                let problem = format!("`{}`: a `rate_hz` is above 0 and at most {FASTEST_HZ}", name.as_ref());
+                return Err(self.at(name.span(), problem));
             }
         }
         for query in &d.query {
             let name = &query.send;
             if d.link.kind == Sysfs && (name.is_empty() || name.starts_with('.') || name.contains(['/', ' ']))
             {
-                let said = format!("query `{}`: `{name}` is no name of an attribute", query.name.as_ref());
-                return Err(self.at(query.name.span(), said));
+                let problem = format!("query `{}`: `{name}` is no name of an attribute", query.name.as_ref());
+                return Err(self.at(query.name.span(), problem));
             }
             if [query.length.is_some(), query.unit.is_some(), query.answer.is_some()]
                 .iter()
@@ -183,18 +183,18 @@ impl Compiler<'_> {
                 .count()
                 > 1
             {
-                let said =
+                let problem =
                     format!("query `{}` takes one of `length`, `unit` and `answer`", query.name.as_ref());
-                return Err(self.at(query.name.span(), said));
+                return Err(self.at(query.name.span(), problem));
             }
         }
         if let Some(set) = d.set.iter().find(|set| text != set.send.is_some()) {
-            let said = if text {
+            let problem = if text {
                 "needs `send`: its link speaks in lines"
             } else {
                 "has `send`, and no lines to send"
             };
-            return Err(self.at(set.name.span(), format!("set-point `{}` {said}", set.name.as_ref())));
+            return Err(self.at(set.name.span(), format!("set-point `{}` {problem}", set.name.as_ref())));
         }
         self.check_roles()
     }
@@ -208,14 +208,14 @@ impl Compiler<'_> {
                 None => Ok(()),
             };
         }
-        let said = if d.stream.is_none() {
+        let problem = if d.stream.is_none() {
             "a link of kind Udp needs a [stream]"
         } else if d.link.local_port.is_none() && d.init.is_empty() {
             "a link of kind Udp needs `local_port`, or an [[init]] that tells the instrument where to send"
         } else {
             return Ok(());
         };
-        Err(self.at_section("[link]", said.into()))
+        Err(self.at_section("[link]", problem.into()))
     }
 
     /// Modbus RTU has no transaction number: an answer that comes late to one of two requests that
@@ -230,9 +230,9 @@ impl Compiler<'_> {
             let poll = &self.description.poll[index];
             for span in &frame.spans {
                 if seen.contains(&(poll.table, span.count)) {
-                    let said =
+                    let problem =
                         format!("poll `{}` reads the same number of registers as a read before", frame.name);
-                    return Err(self.at(poll.name.span(), said).with_help(
+                    return Err(self.at(poll.name.span(), problem).with_help(
                         "over RTU a late answer to one would be taken for the other's; read one register more, or raise `gap`",
                     ));
                 }
@@ -256,7 +256,7 @@ impl Compiler<'_> {
         ];
         let used: Vec<&(&str, bool, &[LinkKind])> = acts.iter().filter(|(_, used, _)| *used).collect();
         let kind = self.description.link.kind;
-        let said = match used.as_slice() {
+        let problem = match used.as_slice() {
             [(_, _, kinds)] if kinds.contains(&kind) => match &init.registers {
                 Some((_, values)) if values.is_empty() || values.len() > 123 => {
                     "one write takes 1 to 123 registers".into()
@@ -279,7 +279,7 @@ impl Compiler<'_> {
             [(act, ..)] => format!("a link of kind {kind:?} has no `{act}`"),
             _ => "does one thing: send, hex, can, function, copy, registers or sdo".to_string(),
         };
-        Err(self.at_section("[[init]]", format!("an [[init]]: {said}")))
+        Err(self.at_section("[[init]]", format!("an [[init]]: {problem}")))
     }
 
     fn check_roles(&self) -> Result<(), ProfileError> {
@@ -292,27 +292,27 @@ impl Compiler<'_> {
             );
         }
         for role in &d.profile.roles {
-            let said = |what: String| {
+            let problem = |what: String| {
                 Err(self.at_section("[profile]", format!("an instrument of role {role:?} needs {what}")))
             };
             let row = NEEDS.iter().find(|(named, ..)| named == role);
             let (signals, sets) = row.map_or((&[][..], &[][..]), |(_, signals, sets)| (*signals, *sets));
             if let Some(missing) = signals.iter().find(|name| !signal(name)) {
-                return said(format!("a signal `{missing}`"));
+                return problem(format!("a signal `{missing}`"));
             }
             if let Some(missing) = sets.iter().find(|name| set(name).is_none()) {
-                return said(format!("a set-point `{missing}`"));
+                return problem(format!("a set-point `{missing}`"));
             }
             let unsafe_one = SAFE
                 .iter()
                 .find(|(named, name)| named == role && set(name).is_some_and(|s| s.safe.is_none()));
             if let Some((_, name)) = unsafe_one {
-                return said(format!(
+                return problem(format!(
                     "a `safe` value of its set-point `{name}`: without it there is no 'off'"
                 ));
             }
             if matches!(role, Role::ForceLateral | Role::ForceNormal) && d.signal.is_empty() {
-                return said("a signal".into());
+                return problem("a signal".into());
             }
         }
         self.check_heartbeat()?;
@@ -344,11 +344,11 @@ impl Compiler<'_> {
             None => Ok(()),
             Some(set) => {
                 let names = known.join(", ");
-                let said = format!(
+                let problem = format!(
                     "nobody would send the set-point `{}`; its roles have: {names}",
                     set.name.as_ref()
                 );
-                Err(self.at(set.name.span(), said).with_help("what is done once goes into an [[init]]"))
+                Err(self.at(set.name.span(), problem).with_help("what is done once goes into an [[init]]"))
             }
         }
     }

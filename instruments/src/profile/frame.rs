@@ -56,8 +56,8 @@ impl Span {
         self.address as u32 + self.count as u32
     }
 
-    /// The fewest reads that bring all of `wanted` (first register and count of each), where so many registers between
-    /// two of them may be read in vain. Each of them lies within one read.
+    /// The fewest reads that bring all of `wanted` (first register and count of each), where so many
+    /// registers between two of them may be read in vain. Each of them lies within one read.
     #[must_use]
     pub fn cover(mut wanted: Vec<Span>, gap: u16) -> Vec<Span> {
         wanted.sort_by_key(|span| (span.address, span.count));

@@ -77,8 +77,8 @@ impl Profile {
         Some((pattern.write(&values, decimals), answer))
     }
 
-    /// The set-point that a line of text carries, as an emulator hears it: its own value, and those of others that stand in
-    /// the line. A line without a number is 1.
+    /// The set-point that a line of text carries, as an emulator hears it: its own value, and those of others
+    /// that stand in the line. A line without a number is 1.
     #[must_use]
     pub fn heard(&self, set: SetId, line: &str) -> Option<Vec<(SetId, f64)>> {
         let (pattern, owners) = self.sets[set.0].line.as_ref()?;

@@ -30,8 +30,8 @@ impl Table {
     }
 }
 
-/// `[[poll]]`: registers that are read together, and yield one sample: `count` of them from `address` on, or those that its
-/// signals name by their own `address`, in as few reads as `gap` permits.
+/// `[[poll]]`: registers that are read together, and yield one sample: `count` of them from `address` on, or
+/// those that its signals name by their own `address`, in as few reads as `gap` permits.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Poll {
@@ -47,8 +47,8 @@ pub struct Poll {
     /// How many registers: 1 to 125; left out where the signals name theirs.
     #[serde(default)]
     pub count: Option<u16>,
-    /// Where the signals name theirs: so many registers between two of them may be read although nobody wants them, to save
-    /// a read.
+    /// Where the signals name theirs: so many registers between two of them may be read although nobody wants
+    /// them, to save a read.
     #[serde(default)]
     pub gap: u16,
     /// Reads per second; left out for one that is read once, at connection.
@@ -65,7 +65,7 @@ pub struct Poll {
     pub device_time: Option<String>,
 }
 
-/// `[stream]`: frames that come without being asked for. Its frame is called `stream`.
+/// `[stream]`: frames that the instrument sends without a request. Its frame is called `stream`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stream {
@@ -86,8 +86,8 @@ pub struct Stream {
     /// `high_first` or `low_first`: the order of the check's bytes. Left out: low first where the check is reflected, as is usual.
     #[serde(default)]
     pub check_order: Option<CheckOrder>,
-    /// In place of length and check: the instrument sends lines of text like this one, `{lateral},{normal}`, each number by
-    /// its signal's name. See [`crate::codec::pattern`].
+    /// In place of length and check: the instrument sends lines of text like this one, `{lateral},{normal}`,
+    /// each number by its signal's name. See [`crate::codec::pattern`].
     #[serde(default)]
     pub line: Option<String>,
     /// Frames in a row that make an alignment believed.
@@ -151,8 +151,8 @@ pub struct Message {
     /// The identifier that the DBC file's identifiers were written for; they move with `link.base`.
     #[serde(default)]
     pub dbc_base: Option<u32>,
-    /// Only messages whose multiplexor, by the DBC file, has this value: the signals that are there only then stand in this
-    /// group.
+    /// Only messages whose multiplexor, by the DBC file, has this value: the signals that are there only then
+    /// stand in this group.
     #[serde(default)]
     pub multiplex: Option<u64>,
     /// CANopen: identifier less the node number.
@@ -186,8 +186,8 @@ pub struct Query {
     /// The answer is a number, an SI prefix or none, and this unit, as `5mm/s/V`; left out for a bare number or a truth.
     #[serde(default)]
     pub unit: Option<String>,
-    /// The answer is a line like this one, `AMP={amplitude}%,F={frequency}`: each number by its signal's name. See
-    /// [`crate::codec::pattern`].
+    /// The answer is a line like this one, `AMP={amplitude}%,F={frequency}`: each number by its signal's
+    /// name. See [`crate::codec::pattern`].
     #[serde(default)]
     pub answer: Option<String>,
     /// Questions per second.

@@ -23,8 +23,8 @@ pub enum LinkKind {
     Udp,
     /// SCPI over TCP.
     Scpi,
-    /// Attributes of a device that the kernel drives, such as an IIO converter's in sysfs: a question is the name of one, its
-    /// content the answer.
+    /// Attributes of a device that the kernel drives, such as an IIO converter's in sysfs: a question is the
+    /// name of one, its content the answer.
     Sysfs,
 }
 
@@ -76,7 +76,7 @@ pub struct Link {
     /// Pause between two requests, in ms.
     #[serde(default)]
     pub min_gap_ms: f64,
-    /// Alarms: lines that come without being asked for, such as `ALARM {code}`. See [`crate::codec::pattern`].
+    /// Alarms: lines sent without a request, such as `ALARM {code}`. See [`crate::codec::pattern`].
     #[serde(default)]
     pub unsolicited: Vec<String>,
     /// A query that is put after every set-point, and what its answer must begin with.
@@ -99,13 +99,13 @@ pub struct Link {
     pub backoff_longest_ms: u32,
 }
 
-/// How the name of each of several units is asked for.
+/// The query for the name of each of several units.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Choice {
     /// The question for a name; `{which}` is the number of the unit, from 0.
     pub ask: String,
-    /// So many numbers are asked for at most.
+    /// Most numbers that are queried.
     pub most: u8,
 }
 

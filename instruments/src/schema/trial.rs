@@ -19,8 +19,8 @@ pub struct Emulator {
     /// Signals that keep one raw value.
     #[serde(default)]
     pub constant: BTreeMap<String, f64>,
-    /// Names of the units of `link.choice`, by number. The first has the values above; a unit's range is ten times that
-    /// of the unit before: a wrong one answers plausibly.
+    /// Names of the units of `link.choice`, by number. The first has the values above; a unit's range is ten
+    /// times that of the unit before: a wrong one answers plausibly.
     #[serde(default)]
     pub names: Vec<String>,
 }

@@ -64,8 +64,8 @@ pub struct Signal {
     /// Smallest and largest value that the instrument can measure, in `unit`s.
     #[serde(default)]
     pub range: Option<(f64, f64)>,
-    /// The smallest change that the instrument shows, in SI units. Left out: one count, where counts are whole numbers; unknown
-    /// for floats, whose type says nothing of it.
+    /// The smallest change that the instrument shows, in SI units. Left out: one count, where counts are
+    /// whole numbers; unknown for floats, whose type says nothing of it.
     #[serde(default)]
     pub resolution_si: Option<f64>,
     /// Standard deviation of the noise, in `unit`s.
@@ -115,8 +115,8 @@ pub struct Set {
     /// Type; left out for lines of text.
     #[serde(rename = "type", default)]
     pub number: Option<NumberType>,
-    /// The line of text that carries it; `{}` is the value, `{name}` the newest one of another set-point. Forms such as `{:.1}`
-    /// and `{:04X}`: see [`crate::codec::pattern`].
+    /// The line of text that carries it; `{}` is the value, `{name}` the newest one of another set-point.
+    /// Forms such as `{:.1}` and `{:04X}`: see [`crate::codec::pattern`].
     #[serde(default)]
     pub send: Option<String>,
     /// The line of text where the value is zero.

@@ -2,7 +2,7 @@
 
 use super::SharedPlant;
 use super::device::{Device, Refused};
-use instruments::codec::modbus_rtu::{self as rtu, Asked, Heard};
+use instruments::codec::modbus_rtu::{self as rtu, Heard, Operation};
 use instruments::schema::{Stream, Table};
 use realtime::ports::Nanos;
 use std::collections::{BTreeMap, BTreeSet};
@@ -145,22 +145,22 @@ impl RtuLine {
                 Heard::Noise => {
                     self.heard.remove(0);
                 }
-                Heard::Request(unit, asked, length) => {
+                Heard::Request(unit, operation, length) => {
                     self.heard.drain(..length);
-                    return self.answer(unit, asked);
+                    return self.answer(unit, operation);
                 }
             }
         }
     }
 
-    fn answer(&mut self, unit: u8, asked: Asked) -> Vec<u8> {
+    fn answer(&mut self, unit: u8, operation: Operation) -> Vec<u8> {
         let Some(device) = self.devices.get_mut(&unit) else { return Vec::new() };
         let (mut plant, now) = self.plant.now();
         let stream = device.profile().description.stream.clone();
         // An instrument with functions of its own around its configuration is locked until the first of them.
         let key = device.profile().description.init.iter().find_map(|init| init.function);
-        match asked {
-            Asked::Read { function, address, count } => {
+        match operation {
+            Operation::Read { function, address, count } => {
                 let table = match function {
                     1 => Table::Coil,
                     2 => Table::Discrete,
@@ -172,7 +172,7 @@ impl RtuLine {
                     Err(refused) => rtu::refuse(unit, function, code(refused)),
                 }
             }
-            Asked::Write { function, address, registers } => {
+            Operation::Write { function, address, registers } => {
                 let second =
                     if function == 6 { registers[0] } else { u16::try_from(registers.len()).unwrap_or(0) };
                 let starts = stream
@@ -191,7 +191,7 @@ impl RtuLine {
                     Err(refused) => rtu::refuse(unit, function, code(refused)),
                 }
             }
-            Asked::Custom { function, data } => {
+            Operation::Custom { function, data } => {
                 if stream.and_then(|s| s.start_function) == Some((function, data)) {
                     self.streaming = Some((unit, now));
                 } else if key == Some((function, data)) {

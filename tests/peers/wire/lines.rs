@@ -158,7 +158,7 @@ const WRONG: u16 = 12_345;
 
 /// An FT 300 with a prank from the tenth request on.
 fn rtu_prankster(prank: Prank) -> (String, Arc<AtomicUsize>, Arc<AtomicBool>) {
-    use instruments::codec::modbus_rtu::{Asked, Heard, give, hear};
+    use instruments::codec::modbus_rtu::{Heard, Operation, give, hear};
     let (mut port, path) = pty();
     let (count, stop) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicBool::new(false)));
     let (counted, stopped) = (Arc::clone(&count), Arc::clone(&stop));
@@ -177,7 +177,7 @@ fn rtu_prankster(prank: Prank) -> (String, Arc<AtomicUsize>, Arc<AtomicBool>) {
                     heard.remove(0);
                     continue;
                 }
-                Heard::Request(_, Asked::Read { address, .. }, length) => (address, length),
+                Heard::Request(_, Operation::Read { address, .. }, length) => (address, length),
                 Heard::Request(_, _, length) => (0, length),
             };
             heard.drain(..length);

@@ -56,7 +56,7 @@ fn a_state_alone_reads_no_off_back() {
     assert!(!endpoint.reads_off() && !endpoint.owes_off(), "no 'off' was sent, and none is owed");
     show(&mut endpoint, 2, true, 20);
     assert!(endpoint.owes_off(), "on, whoever switched it on");
-    assert!(matches!(endpoint.due(Nanos(21)), Due::Safe(_)), "nobody asked for that");
+    assert!(matches!(endpoint.due(Nanos(21)), Due::Safe(_)), "no command");
     // 'Off' was sent, it was driven again, and shows 'off' still: that is from before.
     show(&mut endpoint, 3, false, 30);
     assert!(endpoint.reads_off());
@@ -188,9 +188,9 @@ fn only_what_takes_safe_set_points_is_switched_off() {
     let inputs = InstrumentSetup::new("muprime-relay", "");
     let (contacts, _) = Endpoint::contacts(profile("muprime-relay").unwrap(), &inputs).unwrap();
     let (amplifier, stage, supply) = (amplifier().0, stage(None).0, supply().0);
-    let told = [&force, &amplifier, &stage, &supply, &contacts].map(|one| (one.role(), one.is_actuator()));
+    let roles = [&force, &amplifier, &stage, &supply, &contacts].map(|one| (one.role(), one.is_actuator()));
     assert_eq!(
-        told,
+        roles,
         [
             (Role::Force, false),
             (Role::Amplifier, true),
@@ -237,15 +237,15 @@ fn a_stage_that_was_moved_or_loaded_is_owed_a_stop() {
 }
 
 #[test]
-fn a_load_that_no_weight_gives_is_refused_and_told() {
-    for (asked, given) in
+fn a_load_that_no_weight_gives_is_refused_and_reported() {
+    for (requested, given) in
         [(0.25, true), (0.25 + 5e-7, true), (0.0, true), (0.3, false), (0.2, false), (-0.25, false)]
     {
         let (mut endpoint, _port) = stage(Some(0.25));
-        ask(&endpoint, 0.01, asked);
+        ask(&endpoint, 0.01, requested);
         let due = endpoint.due(Nanos(10));
-        assert_eq!(matches!(due, Due::SetPoints(_)), given, "{asked} N: {due:?}");
-        assert_eq!(endpoint.health().report().commands_refused, u64::from(!given), "{asked} N");
+        assert_eq!(matches!(due, Due::SetPoints(_)), given, "{requested} N: {due:?}");
+        assert_eq!(endpoint.health().report().commands_refused, u64::from(!given), "{requested} N");
     }
 }
 
@@ -258,7 +258,7 @@ fn a_supply_that_was_closed_is_owed_an_opening() {
     assert!(endpoint.owes_off());
     port.command(SupplyCommand::Cut, Nanos(20));
     port.command(SupplyCommand::Restore, Nanos(21));
-    assert!(!endpoint.still_wanted(Nanos(22)), "it was told to cut");
+    assert!(!endpoint.still_wanted(Nanos(22)), "a cut was commanded");
     let due = endpoint.due(Nanos(22));
     assert_eq!(sent(&endpoint, &due, "closed"), Some(0.0), "the cut leaves first");
     show_closed(&mut endpoint, false, 30);
@@ -267,7 +267,7 @@ fn a_supply_that_was_closed_is_owed_an_opening() {
     assert!(endpoint.owes_off(), "closed by itself");
 }
 
-/// Whatever waits when a link goes down is dropped, and the loop is told why nothing comes.
+/// A link that goes down drops whatever waits, and gives the loop the reason.
 #[test]
 fn a_link_that_goes_down_tells_the_loop_and_forgets_what_was_wanted() {
     let why = NoData::Corrupt;
@@ -337,8 +337,8 @@ fn a_stage_is_enabled_while_it_is_to_move_or_to_load() {
     assert!(endpoint.safe_set_points().contains(&(enable, 0.0)));
 }
 
-/// A coil that has two values changes with every command that leaves, however the loop's commands and the link's turns fall; what the
-/// loop does not ask for, and a safe set-point, feed nothing.
+/// A coil that has two values changes with every command that leaves, however the loop's commands and the
+/// link's turns fall; what the loop does not ask for, and a safe set-point, feed nothing.
 #[test]
 fn a_supplys_heartbeat_changes_with_every_command_and_with_nothing_else() {
     let relay = crate::bundled::text("muprime-relay").unwrap();

@@ -1,6 +1,6 @@
 //! The life of a link whose conversations a test leads: threads and pauses are real, the wire is not needed.
 //!
-//! Pauses are held from below; from above only where a pause of seconds is told from none.
+//! Pauses are checked from below; from above only to separate a pause of seconds from none.
 
 use super::super::*;
 use super::PATIENCE;
@@ -232,7 +232,7 @@ fn pauses_double_up_to_the_longest_and_begin_anew_after_a_good_link() {
     assert!((30..1000).contains(&pause.as_millis()), "{pause:?}");
 }
 
-/// Where 'off' is owed a good link that was lost is made anew at once; one that cannot be had is not asked for without a pause.
+/// Where 'off' is owed, a good link that was lost is reopened at once; vain attempts pause.
 #[test]
 fn an_owed_off_is_tried_at_once_and_then_with_pauses() {
     let at_once = || {
@@ -257,7 +257,7 @@ fn an_owed_off_is_tried_at_once_and_then_with_pauses() {
     assert!((0..5).any(|_| at_once() < Duration::from_millis(1000)));
 }
 
-/// A pause of an hour does not hold up the end, and what the loop wants meanwhile is not kept for later.
+/// A pause of an hour does not hold up the end, and the loop's commands during it are not stored.
 #[test]
 fn a_pause_ends_with_the_program_and_keeps_no_command() {
     let link = Link::start(
@@ -273,7 +273,7 @@ fn a_pause_ends_with_the_program_and_keeps_no_command() {
     link.stop.store(true, Ordering::Release);
     assert_eq!((link.closed(), link.conversations()), (Closed::NotReadBack("cut".into()), 1));
 
-    let (said, due) = sync_channel(1);
+    let (sender, due) = sync_channel(1);
     let link = Link::start(
         300,
         300,
@@ -282,7 +282,7 @@ fn a_pause_ends_with_the_program_and_keeps_no_command() {
                 works(number, session, false);
                 return io("cut");
             }
-            let _ = said.send(session.endpoint.due(session.now()));
+            let _ = sender.send(session.endpoint.due(session.now()));
             switches_off(number, session)
         }),
     );

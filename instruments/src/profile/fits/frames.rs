@@ -11,20 +11,20 @@ impl Compiler<'_> {
         let name = poll.name.as_ref();
         match (poll.address, poll.count) {
             (Some(_), Some(count)) if !(1..=MOST_REGISTERS).contains(&count) => {
-                let said =
+                let why =
                     format!("poll `{name}` has {count} registers; one read takes 1 to {MOST_REGISTERS}");
-                return Err(self.at(poll.name.span(), said));
+                return Err(self.at(poll.name.span(), why));
             }
             (Some(address), Some(count)) if u32::from(address) + u32::from(count) > 65536 => {
                 return Err(self.at(poll.name.span(), format!("poll `{name}` runs past register 65535")));
             }
             (Some(_), Some(_)) if poll.gap != 0 => {
-                let said = format!("poll `{name}`: `gap` is for signals with an `address` of their own");
-                return Err(self.at(poll.name.span(), said));
+                let why = format!("poll `{name}`: `gap` is for signals with an `address` of their own");
+                return Err(self.at(poll.name.span(), why));
             }
             (Some(_), None) | (None, Some(_)) => {
-                let said = format!("poll `{name}` needs both `address` and `count`, or neither");
-                return Err(self.at(poll.name.span(), said));
+                let why = format!("poll `{name}` needs both `address` and `count`, or neither");
+                return Err(self.at(poll.name.span(), why));
             }
             _ => {}
         }
@@ -58,7 +58,7 @@ impl Compiler<'_> {
     pub(super) fn check_blocks(&self) -> Result<(), ProfileError> {
         for block in &self.description.write {
             let name = block.name.as_ref();
-            let said = if !(1..=123).contains(&block.count) {
+            let why = if !(1..=123).contains(&block.count) {
                 format!("block `{name}` has {} registers; one write takes 1 to 123", block.count)
             } else if !matches!(block.table, Table::Holding | Table::Coil) {
                 format!("block `{name}`: only holding registers and coils can be written")
@@ -67,7 +67,7 @@ impl Compiler<'_> {
             } else {
                 continue;
             };
-            return Err(self.at(block.name.span(), said));
+            return Err(self.at(block.name.span(), why));
         }
         Ok(())
     }
@@ -75,7 +75,7 @@ impl Compiler<'_> {
     pub(super) fn check_stream(&self) -> Result<(), ProfileError> {
         let d = self.description;
         let Some(stream) = &d.stream else { return Ok(()) };
-        let wrong = |said: &str| Err(self.at_section("[stream]", format!("[stream]: {said}")));
+        let wrong = |why: &str| Err(self.at_section("[stream]", format!("[stream]: {why}")));
         let free = matches!(d.link.kind, LinkKind::Serial | LinkKind::Tcp | LinkKind::Udp);
         let datagrams = d.link.kind == LinkKind::Udp;
         let starts = stream.start_register.is_some() || stream.start_function.is_some();
@@ -159,15 +159,15 @@ impl Compiler<'_> {
             };
             if let Some(name) = named.filter(|name| !stands(name)) {
                 let place = self.text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
-                let said = format!("`sequence` of `{}`: `{name}` is no signal in it", frame.name);
-                return Err(ProfileError::at(self.text, place, said));
+                let why = format!("`sequence` of `{}`: `{name}` is no signal in it", frame.name);
+                return Err(ProfileError::at(self.text, place, why));
             }
             if let Some(crate::codec::text::Form::Pattern(pattern)) = &frame.text
                 && let Some((name, _)) = pattern.fields().find(|(name, _)| !stands(name))
             {
                 let place = self.text.find(&format!("{{{name}")).map(|at| at..at + name.len() + 1);
-                let said = format!("`{{{name}}}` in the line of `{}` is no signal of that frame", frame.name);
-                return Err(ProfileError::at(self.text, place, said)
+                let why = format!("`{{{name}}}` in the line of `{}` is no signal of that frame", frame.name);
+                return Err(ProfileError::at(self.text, place, why)
                     .with_help("`{*}` stands for what does not matter"));
             }
         }

@@ -1,5 +1,5 @@
-//! What carries lines of text, blocks of bytes and streams: a serial line, TCP, datagrams, or the attributes of a device that the
-//! kernel drives.
+//! What carries lines of text, blocks of bytes and streams: a serial line, TCP, datagrams, or the attributes
+//! of a device that the kernel drives.
 
 use super::modbus_tcp::resolve;
 use super::serial::Line;
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 /// Where an instrument of lines or streams is, before it is connected.
 #[derive(Debug, Clone)]
-pub enum Place {
+pub enum Address {
     /// A serial line: path, symbols per second, format.
     Serial(String, u32, String),
     /// A socket, a device server's in front of a serial line included.
@@ -24,8 +24,8 @@ pub enum Place {
     Folder(PathBuf),
 }
 
-impl Place {
-    /// The place that an address means by an instrument's link.
+impl Address {
+    /// The address of an instrument by its link.
     ///
     /// # Errors
     /// Where it makes no sense.
@@ -47,15 +47,15 @@ impl Place {
     ///
     /// # Errors
     /// Where nobody is there, or the port cannot be had.
-    pub fn open(&self, limit: Duration) -> Result<Way, Ended> {
+    pub fn open(&self, limit: Duration) -> Result<Transport, Ended> {
         match self {
-            Self::Folder(path) if path.is_dir() => Ok(Way::Folder(path.clone(), Vec::new())),
+            Self::Folder(path) if path.is_dir() => Ok(Transport::Folder(path.clone(), Vec::new())),
             Self::Folder(path) => Err(Ended::Io(format!("{} is no folder", path.display()))),
-            Self::Serial(path, baud, format) => Ok(Way::Serial(Line::open(path, *baud, format)?)),
+            Self::Serial(path, baud, format) => Ok(Transport::Serial(Line::open(path, *baud, format)?)),
             Self::Tcp(address) => {
                 let stream = TcpStream::connect_timeout(address, limit)?;
                 stream.set_nodelay(true)?;
-                Ok(Way::Tcp(stream, address.to_string()))
+                Ok(Transport::Tcp(stream, address.to_string()))
             }
             Self::Udp(address, local_port) => {
                 let unspecified: IpAddr =
@@ -67,14 +67,14 @@ impl Place {
                     // What others send is then not even seen.
                     socket.connect(address)?;
                 }
-                Ok(Way::Udp(socket, *address, address.to_string()))
+                Ok(Transport::Udp(socket, *address, address.to_string()))
             }
         }
     }
 }
 
 /// A connection, with its name in the trace.
-pub enum Way {
+pub enum Transport {
     /// A serial line.
     Serial(Line),
     /// A socket.
@@ -85,7 +85,7 @@ pub enum Way {
     Folder(PathBuf, Vec<u8>),
 }
 
-impl Way {
+impl Transport {
     /// Whether what comes is parted already, each part whole.
     #[must_use]
     pub fn is_parted(&self) -> bool {
@@ -99,8 +99,8 @@ impl Way {
     pub fn read(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, Ended> {
         let left = deadline.saturating_duration_since(Instant::now());
         match self {
-            Way::Serial(line) => line.read(buffer, deadline),
-            Way::Folder(_, came) => {
+            Transport::Serial(line) => line.read(buffer, deadline),
+            Transport::Folder(_, came) => {
                 if came.is_empty() {
                     std::thread::sleep(left);
                 }
@@ -109,9 +109,8 @@ impl Way {
                 came.drain(..count);
                 Ok(count)
             }
-            Way::Tcp(stream, port) => {
-                // The kernel rounds a timeout up to its tick of some milliseconds: what is only asked whether it is
-                // there is asked without waiting.
+            Transport::Tcp(stream, port) => {
+                // The kernel rounds a timeout up to its tick of some milliseconds, so a check does not wait.
                 let came = if left.is_zero() {
                     stream.set_nonblocking(true)?;
                     let came = stream.read(buffer);
@@ -131,7 +130,7 @@ impl Way {
                     Err(error) => Err(error.into()),
                 }
             }
-            Way::Udp(socket, instrument, port) => {
+            Transport::Udp(socket, instrument, port) => {
                 socket.set_read_timeout(Some(left.max(Duration::from_micros(100))))?;
                 match socket.recv_from(buffer) {
                     Ok((count, from)) if from.ip() == instrument.ip() => {
@@ -156,13 +155,13 @@ impl Way {
     /// Where the connection does not take them.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), Ended> {
         match self {
-            Way::Serial(line) => line.write(bytes),
-            Way::Folder(path, came) => attribute(path, &String::from_utf8_lossy(bytes), came),
-            Way::Tcp(stream, port) => {
+            Transport::Serial(line) => line.write(bytes),
+            Transport::Folder(path, came) => attribute(path, &String::from_utf8_lossy(bytes), came),
+            Transport::Tcp(stream, port) => {
                 trace::sent(port, bytes);
                 stream.write_all(bytes).map_err(Ended::from)
             }
-            Way::Udp(socket, instrument, port) => {
+            Transport::Udp(socket, instrument, port) => {
                 trace::sent(port, bytes);
                 let sent = if socket.peer_addr().is_ok() {
                     socket.send(bytes)
