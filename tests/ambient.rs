@@ -1,5 +1,5 @@
-//! The air of a plan, from the list in the plan to the row of the table: set, waited for, found, or refused. Steps of a person
-//! at the rig: disarmed, answered, recorded.
+//! The air of a plan, from the list in the plan to the row of the table: set, waited for, found, or refused.
+//! Steps of a person at the rig: disarmed, answered, recorded.
 
 use models::prediction::SpringSlider;
 use realtime::cycle::Phase;
@@ -9,7 +9,7 @@ use runs::plan::{Plan, Resolution};
 use runs::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use runs::session::{Job, Signals, Update};
 use runs::setup::Setup;
-use runs::supervisor::{self, Asked, VirtualLoop};
+use runs::supervisor::{self, Requests, VirtualLoop};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tests::muprime;
@@ -82,8 +82,8 @@ fn mu(passes: &[MeasuredPass], pa: f64) -> f64 {
     all.iter().sum::<f64>() / all.len() as f64
 }
 
-/// The finding: the pressure was written into the table, and nothing set it. The bundled rig has a squeeze film, which half the air
-/// carries half as well: its friction must rise, and that of the ideal rig must not.
+/// The finding: the pressure was written into the table, and nothing set it. The bundled rig has a squeeze
+/// film, which half the air carries half as well: its friction must rise, and that of the ideal rig must not.
 #[test]
 fn a_pressure_of_the_plan_is_felt_and_the_table_holds_what_was_found() {
     let film = run("virtual", "", PLAN, None, None);
@@ -214,7 +214,7 @@ fn the_operator_is_asked_and_what_he_types_is_what_the_table_holds() {
     let last = pressure(ran.passes.last().unwrap());
     assert!(last.age_s > 2.0, "it grows old: {last:?}");
     let count = |which: fn(&Event) -> bool| ran.events.iter().filter(|e| which(e)).count();
-    assert_eq!(count(|e| matches!(e, Event::Asked { .. })), 4, "{:?}", ran.events);
+    assert_eq!(count(|e| matches!(e, Event::OperatorStep { .. })), 4, "{:?}", ran.events);
     assert_eq!(count(|e| matches!(e, Event::Answered { .. })), 4);
     assert_eq!((count(|e| matches!(e, Event::Disarmed { .. })), count(|e| *e == Event::Armed)), (2, 3));
     // Nobody to answer any more: the run stops, and says so.
@@ -222,8 +222,8 @@ fn the_operator_is_asked_and_what_he_types_is_what_the_table_holds() {
     assert_eq!(short.outcome, Outcome::Stopped);
 }
 
-/// While somebody is at the rig: output off and supply open by their readbacks, not armed, nothing moves; afterwards the channel is
-/// proved again.
+/// While somebody is at the rig: output off and supply open by their readbacks, not armed, nothing moves;
+/// afterwards the channel is proved again.
 #[test]
 fn every_step_of_a_person_finds_the_rig_disarmed() {
     let steps = "[[step]]\nwhen = \"before\"\naction = \"clean\"\n[[step]]\nwhen = \"before\"\naction = \"measure_moisture\"\n\
@@ -248,8 +248,8 @@ fn every_step_of_a_person_finds_the_rig_disarmed() {
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let (mut asked, mut open_rows, mut events, mut passes) = (false, 0, Vec::new(), Vec::new());
     let outcome =
-        supervisor::sweep(&mut rig, &mut sequence, &mut Asked::default, &mut |row, sequence, reaction| {
-            let begins = reaction.events.iter().any(|e| matches!(e, Event::Asked { .. }));
+        supervisor::sweep(&mut rig, &mut sequence, &mut Requests::default, &mut |row, sequence, reaction| {
+            let begins = reaction.events.iter().any(|e| matches!(e, Event::OperatorStep { .. }));
             let ends = reaction.events.iter().any(|e| matches!(e, Event::Answered { .. }));
             if asked || begins {
                 open_rows += 1;
@@ -265,7 +265,7 @@ fn every_step_of_a_person_finds_the_rig_disarmed() {
     let steps: Vec<&str> = events
         .iter()
         .filter_map(|e| match e {
-            Event::Asked { step, .. } => Some(step.as_str()),
+            Event::OperatorStep { step, .. } => Some(step.as_str()),
             _ => None,
         })
         .collect();
@@ -296,7 +296,7 @@ fn a_step_can_be_repeated() {
         .events
         .iter()
         .filter_map(|e| match e {
-            Event::Asked { step, .. } => step.split(' ').next(),
+            Event::OperatorStep { step, .. } => step.split(' ').next(),
             _ => None,
         })
         .collect();
@@ -332,8 +332,8 @@ fn a_chamber_behind_modbus_is_set_and_read() {
     assert!(stderr.contains("pressure 50 kPa reached"), "{stderr}");
 }
 
-/// Who ran it, on what and after which preparation goes wherever the numbers go, and a session that says nothing of it keeps what
-/// the first one said.
+/// Who ran it, on what and after which preparation goes wherever the numbers go, and a session that says
+/// nothing of it keeps what the first one said.
 #[test]
 fn operator_sample_and_protocol_survive_a_resume_and_go_into_every_form() {
     let folder = tempfile::tempdir().unwrap();
@@ -382,8 +382,8 @@ fn operator_sample_and_protocol_survive_a_resume_and_go_into_every_form() {
     assert!(holds("Ada") && holds("commercial soap") && holds("silicone tip 3"), "HDF5");
 }
 
-/// The plan of the book's page, on the bundled rigs: the hidden squeeze film is named, with a region that the pressure bounds first; the
-/// ideal rig has no gap.
+/// The plan of the book's page, on the bundled rigs: the hidden squeeze film is named, with a region that the
+/// pressure bounds first; the ideal rig has no gap.
 #[test]
 fn the_pressure_steps_name_the_squeeze_film_and_leave_the_ideal_rig_alone() {
     let page = std::fs::read_to_string(tests::file("docs/how-to/part-2.md")).unwrap();

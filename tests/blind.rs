@@ -27,8 +27,8 @@ fn sets_without_a_cause_name_nothing() {
     }
 }
 
-/// A sealed set for each cause that tables show. Its chi2 is above 100 and its gap above the floor, but for gains of
-/// speed, amplitude and stiffness: the stiffnesses' own scatter takes those up.
+/// A sealed set for each cause that tables show. Its chi2 is above 100 and its gap above the floor, but for
+/// gains of speed, amplitude and stiffness: the stiffnesses' own scatter takes those up.
 const ONE_OF_EACH: [(&str, u64); 23] = [
     ("adhesion", 1_610_004_830_056),
     ("amplitude_droop", 1_610_004_830_003),
@@ -107,8 +107,8 @@ fn no_sealed_form_is_the_librarys_own() {
     assert!(near.is_empty(), "nearer than {LEAST_DISTANCE} to the library's own law: {near:?}");
 }
 
-/// Priors alone make no name: a stage that slides at another speed than it says is, pass for pass, a softer or harder
-/// ridge (the group `k_l U / (pi f mu0 k_n w)` of Eqs. 6-15).
+/// Priors alone make no name: a stage that slides at another speed than it says is, pass for pass, a softer
+/// or harder ridge (the group `k_l U / (pi f mu0 k_n w)` of Eqs. 6-15).
 #[test]
 fn an_exact_alias_is_never_named_for_being_less_of_a_surprise() {
     for seed in [1_680_005_040_007, 1_680_005_040_015, 1_680_005_040_023] {
@@ -120,9 +120,9 @@ fn an_exact_alias_is_never_named_for_being_less_of_a_surprise() {
     }
 }
 
-/// A gain that hides in a stiffness, beside another cause: the amplitude is half of what was asked, and the plate is
-/// tilted. The tilt alone explains every pass, with a stiffness twenty deviations from its calibration. The answer is two
-/// causes, with the aliases of both in the class.
+/// A gain that hides in a stiffness, beside another cause: the amplitude is half of what was asked, and the
+/// plate is tilted. The tilt alone explains every pass, with a stiffness twenty deviations from its
+/// calibration. The answer is two causes, with the aliases of both in the class.
 #[test]
 fn a_cause_does_not_hide_in_a_certified_stiffness() {
     let set = generate(1_710_005_130_388, Stratum::Pair, Ask::Gain);
@@ -134,8 +134,8 @@ fn a_cause_does_not_hide_in_a_certified_stiffness() {
     assert!(scored.class.iter().any(|name| stated(&name)), "{:?}", scored.class);
 }
 
-/// Friction that heats up goes with load times speed: two effects of the library together nearly do. The open set has that
-/// form, under which one cause does what they need two for.
+/// Friction that heats up goes with load times speed: two effects of the library together nearly do. The open
+/// set has that form, under which one cause does what they need two for.
 #[test]
 fn friction_that_heats_up_is_not_named_as_rate_and_load() {
     for seed in [1_710_005_130_201, 1_710_005_130_512, 1_710_005_130_543] {
@@ -146,8 +146,8 @@ fn friction_that_heats_up_is_not_named_as_rate_and_load() {
     }
 }
 
-/// A stage that slips by more the faster it slides, beside a saturation: with one gain for all speeds the pair left more than
-/// its forms could be uncertain by, and was lost.
+/// A stage that slips by more the faster it slides, beside a saturation: with one gain for all speeds the
+/// pair left more than its forms could be uncertain by, and was lost.
 #[test]
 fn a_speed_that_is_wrong_by_half_is_found_beside_another_cause() {
     let set = generate(1_910_005_730_508, Stratum::Pair, Ask::Gain);
@@ -156,8 +156,8 @@ fn a_speed_that_is_wrong_by_half_is_found_beside_another_cause() {
     assert!(scored.top_right, "{:?}", scored.named);
 }
 
-/// A vibration in the plane of the plate adds a force that goes with the load, more or less: a cross-talk, were it not off
-/// by a third. A linear map of the readings has no such freedom.
+/// A vibration in the plane of the plate adds a force that goes with the load, more or less: a cross-talk,
+/// were it not off by a third. A linear map of the readings has no such freedom.
 #[test]
 fn a_vibration_in_the_plane_of_the_plate_is_no_cross_talk() {
     for &seed in &[1_810_005_430_157, 2_110_006_330_095][..tests::rounds(1, 2)] {
@@ -265,8 +265,8 @@ fn a_saved_model_comes_back() {
     }
 }
 
-/// A zero that sinks, attraction that grows with the speed: one cause each, whose form departs
-/// from the library's so that a second cause mends it. Whether it is one is not told; the cause stands in the class.
+/// A zero that sinks, attraction that grows with the speed: one cause each, whose form departs from the
+/// library's so that a second cause mends it. Whether it is one is not told; the cause stands in the class.
 #[test]
 fn a_companion_that_may_be_a_form_of_its_own_is_not_named() {
     for (seed, cause) in [(7_700_023_100_086, "normal_offset"), (7_701_023_103_049, "adhesion")] {

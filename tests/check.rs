@@ -460,8 +460,8 @@ fn what_an_instrument_cannot_do_is_refused_beforehand() {
     }
 }
 
-/// Every number of a plan and of a setup, at values that people write by mistake and at good ones: nothing that `check` approves is
-/// refused by `run`.
+/// Every number of a plan and of a setup, at values that people write by mistake and at good ones: nothing
+/// that `check` approves is refused by `run`.
 #[test]
 fn nothing_that_check_approves_is_refused_by_run() {
     let made = Made::new();

@@ -19,7 +19,7 @@ fn where_even_the_summary_cannot_be_written_the_run_has_failed_and_was_not_refus
     assert_eq!(output.status.code(), Some(1), "{stdout}{stderr}");
     let said = documents(&output);
     assert_eq!(said.last().unwrap()["summary"]["outcome"], "record_lost", "{stdout}");
-    assert!(stderr.contains("could not be kept"), "{stderr}");
+    assert!(stderr.contains("could not be saved"), "{stderr}");
     // With the place free again the same command ends as it should.
     std::fs::remove_dir_all(out.join("summary.json")).unwrap();
     let again = sweep.output().unwrap();

@@ -63,8 +63,8 @@ fn random_pairs_of_faults() {
     assert_clean(&tally);
 }
 
-/// Pairs that hide each other: a rogue master that sets half the amplitude, with a readback of twice of it, or garbage, or a link
-/// that is cut while its heartbeat goes on. The slower of the two bounds counts.
+/// Pairs that hide each other: a rogue master that sets half the amplitude, with a readback of twice of it,
+/// or garbage, or a link that is cut while its heartbeat goes on. The slower of the two bounds counts.
 #[test]
 fn faults_that_hide_each_other_are_off_within_the_slower_bound() {
     let row = |name: &str| ROWS.iter().position(|r| r.name == name).unwrap();
@@ -94,8 +94,8 @@ fn seeds_run_twice_give_equal_hashes_and_replay_to_equal_decisions() {
     ));
 }
 
-/// Negative controls: a core that sleeps, that is deaf, or that trips for a wrong cause, and the bench says so for every fault
-/// that must switch off.
+/// Negative controls: a core that sleeps, that is deaf, or that trips for a wrong cause, and the bench says
+/// so for every fault that must switch off.
 #[test]
 fn a_core_that_sleeps_is_deaf_or_mistaken_is_found_out_by_every_fault() {
     for core in [Core::Sleeps, Core::Deaf, Core::Mistaken] {

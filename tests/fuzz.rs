@@ -1,11 +1,11 @@
 //! Damaged input for everything that reads: decoders of every bus, configuration, tables, records.
 //!
-//! Each target takes a committed corpus (`tests/fuzz/*.hex`, and the project's own configuration
-//! files) and mutates it from a fixed seed. It holds more than 'no panic': each states what must be
-//! true of whatever comes out. `MUPRIME_FUZZ_CASES` sets the cases a target, `MUPRIME_FUZZ_SEED` the
-//! seed; an input that fails is printed in hexadecimal, to be added to the corpus. The mutations
-//! know nothing of coverage: this finds shallow defects quickly and deep ones slowly. The same targets, guided by coverage,
-//! are in `fuzz/` (see its README); `MUPRIME_FUZZ_SEEDS=FOLDER` writes the corpus as they want it.
+//! Each target takes a committed corpus (`tests/fuzz/*.hex`, and the project's own configuration files) and
+//! mutates it from a fixed seed. It holds more than 'no panic': each states what must be true of whatever
+//! comes out. `MUPRIME_FUZZ_CASES` sets the cases a target, `MUPRIME_FUZZ_SEED` the seed; an input that fails
+//! is printed in hexadecimal, to be added to the corpus. The mutations know nothing of coverage: this finds
+//! shallow defects quickly and deep ones slowly. The same targets, guided by coverage, are in `fuzz/` (see
+//! its README); `MUPRIME_FUZZ_SEEDS=FOLDER` writes the corpus as they want it.
 
 #[path = "fuzz/chance.rs"]
 mod chance;

@@ -1,5 +1,5 @@
-//! What a verdict must not depend on: the unit of force, where a run was split, a table handed over twice; and what two levels of a
-//! factor can say.
+//! What a verdict must not depend on: the unit of force, where a run was split, a table handed over twice;
+//! and what two levels of a factor can say.
 use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;

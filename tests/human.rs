@@ -1,5 +1,5 @@
-//! A human finger, from the setup to the end of a sweep: refused with what is missing, armed by a hand, ended by its exposure.
-//! The finger is the virtual rig's, in virtual time: nobody is vibrated.
+//! A human finger, from the setup to the end of a sweep: refused with what is missing, armed by a hand, ended
+//! by its exposure. The finger is the virtual rig's, in virtual time: nobody is vibrated.
 
 use models::prediction::SpringSlider;
 use realtime::safety::Cause;

@@ -1,5 +1,5 @@
-//! Foreign tables: ten sources of one and the same passes, each imported and compared with the truth to the last digit, and sources that are
-//! refused or remarked on.
+//! Foreign tables: ten sources of one and the same passes, each imported and compared with the truth to the
+//! last digit, and sources that are refused or remarked on.
 
 #[path = "import/truth.rs"]
 mod source;
@@ -269,8 +269,8 @@ fn slipped_units_and_lost_signs_are_remarked_on() {
     assert!(turned.contains("friction pushes along the sliding in 24 of 24 passes"), "{turned}");
 }
 
-/// A record of strokes to and fro, each with a step of velocity within: a pass a stretch, in every one the speed and the friction that
-/// went in.
+/// A record of strokes to and fro, each with a step of velocity within: a pass a stretch, in every one the
+/// speed and the friction that went in.
 #[test]
 fn a_series_is_cut_at_reversals_and_steps() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! The null case: where the virtual rig keeps every assumption of the model, the comparison must say so, no more and
-//! no less; and how soon it notices one defect. The world shares no friction law with the model.
+//! The null case: where the virtual rig keeps every assumption of the model, the comparison must say so, no
+//! more and no less; and how soon it notices one defect. The world shares no friction law with the model.
 
 use models::prediction::{FrictionModel, SpringSlider};
 use rayon::prelude::*;

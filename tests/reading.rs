@@ -1,7 +1,7 @@
 //! Which reading of the paper's w holds: the bundled plan 'psi-reading' on rigs whose Psi* is known, decided again and again for each.
 //!
-//! Two natures: the paper's finite element ridge, by its table, at a multiple of the stroke, on the virtual rig in virtual time and at once with
-//! many mu_0; and Eq. 20 itself.
+//! Two natures: the paper's finite element ridge, by its table, at a multiple of the stroke, on the virtual
+//! rig in virtual time and at once with many mu_0; and Eq. 20 itself.
 
 use models::condition::Condition;
 use models::finger::Finger;
@@ -39,8 +39,8 @@ const NATURES: [(f64, Decision); 3] =
 
 /// Psi* of the finite element ridge at the amplitudes of Fig. 12's caption (docs/ridge.md).
 const RIDGES_PSI_STAR: f64 = 1.36;
-/// Multiples of the stroke by which the ridge's plate moves, and what should be said: twice is the first reading, once the second; the third lies
-/// equally far from both.
+/// Multiples of the stroke by which the ridge's plate moves, and what should be said: twice is the first
+/// reading, once the second; the third lies equally far from both.
 const RIDGES: [(f64, Decision); 3] = [
     (2.0, Decision::PeakToPeak),
     (1.0, Decision::SineAmplitude),
@@ -99,8 +99,8 @@ fn the_plan_decides_on_a_virtual_rig_built_under_either_reading() {
     }
 }
 
-/// The virtual rig's own finger, a slider on springs, is no rig of either reading: at the plan's conditions its best exponential lies between, nearer
-/// to the second, with stiffnesses that scatter by 5 %.
+/// The virtual rig's own finger, a slider on springs, is no rig of either reading: at the plan's conditions
+/// its best exponential lies between, nearer to the second, with stiffnesses that scatter by 5 %.
 #[test]
 fn the_spring_slider_lies_between() {
     let told = tally(Decision::Between, &on_the_virtual_rig(0.0));

@@ -1,5 +1,5 @@
-//! Measured tables of plain tribometers that others published, with what is known of them by other means. Their sources and licences
-//! stand beside them in `tests/recordings`.
+//! Measured tables of plain tribometers that others published, with what is known of them by other means.
+//! Their sources and licences stand beside them in `tests/recordings`.
 
 use diagnosis::data::{RigFile, Table};
 use diagnosis::decision::Verdict;
@@ -27,8 +27,8 @@ fn verdict_of(table: &str) -> Report {
     report
 }
 
-/// Soft silicone on a hard plate: a fit outside this project gives the coefficient an exponent of -0.34 in the load over this
-/// range, a soft sphere has -1/3 (mu ~ F^-1/3, contact area by Hertz).
+/// Soft silicone on a hard plate: a fit outside this project gives the coefficient an exponent of -0.34 in
+/// the load over this range, a soft sphere has -1/3 (mu ~ F^-1/3, contact area by Hertz).
 #[test]
 fn silicone_on_a_plate_is_named_by_its_load() {
     let report = verdict_of("silicone-load/points.csv");
@@ -67,8 +67,8 @@ fn steady_slope(table: &str) -> (f64, f64) {
     (slope, y)
 }
 
-/// Sepiolite from 0.2 to 2 um/s: a - b is +0.020 on a coefficient of 0.478. Time and speed go together in a record with one step; what
-/// speaks for speed is that the change is sudden, and the diagnosis remarks on it.
+/// Sepiolite from 0.2 to 2 um/s: a - b is +0.020 on a coefficient of 0.478. Time and speed go together in a
+/// record with one step; what speaks for speed is that the change is sudden, and the diagnosis remarks on it.
 #[test]
 fn a_rock_that_strengthens_with_speed_is_named_with_its_slope() {
     let table = "rock-velocity-steps/sepiolite.csv";
@@ -91,8 +91,8 @@ fn a_rock_that_strengthens_with_speed_is_named_with_its_slope() {
     );
 }
 
-/// Basalt from 3 to 10 um/s: a - b is +0.0005, 0.1 % over the step, and friction creeps by as much on either side of it. That is
-/// below the repeatability that is stated: no gap.
+/// Basalt from 3 to 10 um/s: a - b is +0.0005, 0.1 % over the step, and friction creeps by as much on either
+/// side of it. That is below the repeatability that is stated: no gap.
 #[test]
 fn a_rock_that_does_not_care_for_speed_has_no_gap() {
     let table = "rock-velocity-steps/basalt.csv";

@@ -1,5 +1,5 @@
-//! The promises that do not depend on the machine: the loop does not allocate, whatever the cycle does; the record's writer
-//! holds no more memory after hours than after seconds.
+//! The promises that do not depend on the machine: the loop does not allocate, whatever the cycle does; the
+//! record's writer holds no more memory after hours than after seconds.
 
 use models::prediction::SpringSlider;
 use realtime::cycle::{Command, CycleState};

@@ -183,8 +183,8 @@ impl Places {
     }
 }
 
-/// What a damaged record must still be: damage is said, nothing is invented, and what is known to be missing is as much as was
-/// lost.
+/// What a damaged record must still be: damage is said, nothing is invented, and what is known to be missing
+/// is as much as was lost.
 fn judged(damaged: &[u8], whole: &Contents, what: &dyn Fn() -> String) -> Contents {
     let read = recorder::read(damaged);
     assert!(

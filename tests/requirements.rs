@@ -1,5 +1,5 @@
-//! Pages that must say what the program does: `docs/safety.md`, the table from requirement to test, generated; and
-//! `docs/contract.md`, whose commands and flags must be the program's.
+//! Pages that must say what the program does: `docs/safety.md`, the table from requirement to test,
+//! generated; and `docs/contract.md`, whose commands and flags must be the program's.
 //!
 //! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements` writes it anew.
 

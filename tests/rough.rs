@@ -38,8 +38,8 @@ fn scatter_hides_no_cause() {
     }
 }
 
-/// One bad pass leaves the verdict as it was, and is named with how far it is off and what the verdict is with it: in two tables
-/// of three, for one within the form uncertainty of a large cause does not stand out.
+/// One bad pass leaves the verdict as it was, and is named with how far it is off and what the verdict is
+/// with it: in two tables of three, for one within the form uncertainty of a large cause does not stand out.
 #[test]
 fn one_bad_pass_is_named_and_leaves_the_verdict_as_it_was() {
     let film = Kind::named("squeeze_film");

@@ -1,5 +1,5 @@
-//! A rig in a process of its own: `muprime virtual-rig` behind Modbus TCP, the setup that reaches it, small plans, and a
-//! Modbus master of nothing but bytes that watches the amplifier by the amplifier's own clock.
+//! A rig in a process of its own: `muprime virtual-rig` behind Modbus TCP, the setup that reaches it, small
+//! plans, and a Modbus master of nothing but bytes that watches the amplifier by the amplifier's own clock.
 
 use crate::muprime;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -22,8 +22,8 @@ pub fn timed_plan(name: &str, reference_every: u32, amplitudes_pp_m: &[f64], tim
     )
 }
 
-/// A setup whose three instruments are served at an address, at 250 Hz. Nothing real is driven: rate and limits allow for a machine that
-/// takes a CPU away for tens of ms at a time.
+/// A setup whose three instruments are served at an address, at 250 Hz. Nothing real is driven: rate and
+/// limits allow for a machine that takes a CPU away for tens of ms at a time.
 pub fn setup(name: &str, address: SocketAddr) -> String {
     let instrument = |head: &str, id: &str| format!("{head}\nprofile = \"{id}\"\naddress = \"{address}\"\n");
     format!(

@@ -21,8 +21,8 @@ fn in_virtual_time_equal_seeds_give_equal_bytes() {
     assert!(first.1 != other.1, "another seed gives another run");
 }
 
-/// The README's story in virtual time: the model leaves the measurement, the diagnosis says why, and the corrected model agrees with
-/// sweeps of other seeds than it was made from.
+/// The README's story in virtual time: the model leaves the measurement, the diagnosis says why, and the
+/// corrected model agrees with sweeps of other seeds than it was made from.
 #[test]
 fn the_story_of_the_readme_ends_with_a_model_that_agrees() {
     let folder = tempfile::tempdir().unwrap();

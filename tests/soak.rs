@@ -27,8 +27,8 @@ fn seconds(name: &str, short: u64) -> u64 {
     std::env::var(name).map_or(short, |s| s.parse().unwrap_or_else(|_| panic!("{name} is whole seconds")))
 }
 
-/// A law that is asked anew only where what it depends on has changed by a twentieth: the loop predicts in every cycle, and 86
-/// million predictions would take most of the day's time.
+/// A law that is asked anew only where what it depends on has changed by a twentieth: the loop predicts in
+/// every cycle, and 86 million predictions would take most of the day's time.
 struct Held(EmpiricalPsi, Mutex<Option<(Condition, Prediction)>>);
 
 impl FrictionModel for Held {

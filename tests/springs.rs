@@ -78,8 +78,8 @@ fn the_interval_of_the_ratio_holds_the_truth() {
     }
 }
 
-/// Where the finger is the finite element ridge, the slider is not the law: the springs that fit it best have a ratio a fifth above that of the ridge's
-/// static solve, 0.53 (docs/ridge.md), and the misfit tells.
+/// Where the finger is the finite element ridge, the slider is not the law: the springs that fit it best have
+/// a ratio a fifth above that of the ridge's static solve, 0.53 (docs/ridge.md), and the misfit tells.
 #[test]
 fn the_ridges_ratio_comes_out_of_its_own_passes() {
     let mut world = WorldConfig::ideal();

@@ -9,8 +9,8 @@ use sim::sealed::rough::{Roughness, rough};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// A table without a cause in the order of measurement, to which so many deviations of a pass are added where a shape says so, against
-/// the motion.
+/// A table without a cause in the order of measurement, to which so many deviations of a pass are added where
+/// a shape says so, against the motion.
 fn with(
     seed: u64,
     roughness: Roughness,
@@ -52,8 +52,8 @@ fn unknown(
         .count()
 }
 
-/// A spell of an eighth of the run, a period of a dozen passes, jumps to and fro, a spot of the plate: each a gap of about one deviation
-/// of a pass.
+/// A spell of an eighth of the run, a period of a dozen passes, jumps to and fro, a spot of the plate: each a
+/// gap of about one deviation of a pass.
 #[test]
 fn what_is_sudden_periodic_or_local_is_a_gap() {
     let spell = |t: f64, _: &Pass| f64::from(u8::from((0.55..0.675).contains(&t)));

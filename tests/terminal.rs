@@ -66,8 +66,8 @@ fn errors_are_documents_for_scripts() {
     }
 }
 
-/// What people read fits into 80 columns: findings, verdicts, what `check` says. The lines of a run fit at a terminal only: in a log they
-/// are searched.
+/// What people read fits into 80 columns: findings, verdicts, what `check` says. The lines of a run fit at a
+/// terminal only: in a log they are searched.
 #[test]
 fn answers_fit_80_columns() {
     let folder = tempfile::tempdir().unwrap();

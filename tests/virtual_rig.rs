@@ -9,8 +9,8 @@ use sim::world::{World, WorldConfig};
 
 const MS: u64 = 1_000_000;
 
-/// A stroke with vibration: every delivered force sample's bytes, and the mean lateral and normal force over the
-/// steady part.
+/// A stroke with vibration: every delivered force sample's bytes, and the mean lateral and normal force over
+/// the steady part.
 fn stroke(config: &WorldConfig, seed: u64, pp_m: f64, speed: f64, load: f64) -> (Vec<u8>, f64, f64) {
     let mut world = World::new(config, seed).unwrap();
     let (mut bytes, mut sums, mut last) = (Vec::new(), [0.0, 0.0, 0.0], 0);

@@ -1,5 +1,5 @@
-//! The only waits of the deterministic tests: for an event that comes on any machine, however slow, with a bound that only a program that
-//! hangs can reach. Nothing here says how long anything took.
+//! The only waits of the deterministic tests: for an event that comes on any machine, however slow, with a
+//! bound that only a program that hangs can reach. Nothing here says how long anything took.
 #![allow(clippy::disallowed_methods, reason = "waits for processes, with a bound that only a hang can reach")]
 
 use std::process::{Child, ExitStatus};

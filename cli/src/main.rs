@@ -123,10 +123,10 @@ fn features() -> Vec<&'static str> {
 
 /// `-V` is a line, `--version` says which build and which models, with `--json` as a document.
 fn say_version() -> ExitCode {
-    let asked = |flag: &str| std::env::args().any(|a| a == flag);
-    if asked("--json") {
+    let has = |flag: &str| std::env::args().any(|a| a == flag);
+    if has("--json") {
         out!("{}", serde_json::json!(version::of_this_program(features())));
-    } else if asked("--version") {
+    } else if has("--version") {
         out!("{}", version::of_this_program(features()).words());
     } else {
         out!("muprime {}", env!("CARGO_PKG_VERSION"));
@@ -149,15 +149,15 @@ fn main() -> ExitCode {
                 return say_version();
             }
             if error.use_stderr() && std::env::args().any(|a| a == "--json") {
-                let said = cli::plain(&error.to_string());
+                let message = cli::plain(&error.to_string());
                 out!(
                     "{}",
-                    serde_json::json!({ "error": said.lines().next().unwrap_or_default(), "status": cli::REFUSED })
+                    serde_json::json!({ "error": message.lines().next().unwrap_or_default(), "status": cli::REFUSED })
                 );
             }
-            let said = error.render().to_string();
-            match cli::plain(&said) {
-                better if better != said => say!("{}", better.trim_end()),
+            let message = error.render().to_string();
+            match cli::plain(&message) {
+                better if better != message => say!("{}", better.trim_end()),
                 _ => drop(error.print()),
             }
             return ExitCode::from(if error.use_stderr() { cli::REFUSED } else { cli::DONE });

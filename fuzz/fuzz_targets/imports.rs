@@ -1,5 +1,5 @@
-//! Coverage-guided: the functions of `tests/fuzz/imports.rs`. The first byte says which, the next eight are the seed of its
-//! choices, the rest is its input.
+//! Coverage-guided: the functions of `tests/fuzz/imports.rs`. The first byte says which, the next eight are
+//! the seed of its choices, the rest is its input.
 #![no_main]
 
 #[path = "../../tests/fuzz/chance.rs"]

@@ -40,7 +40,7 @@ pub fn fit_finger(
         modulus_range_pa,
         elements,
         modulus_only,
-        told: false,
+        shown: false,
     };
     let (elastic, skin) = py.detach(|| inverse::analyse(&options, &points)).map_err(refused)?;
     Ok(serde_json::json!({ "elastic": elastic, "all_free": skin }).to_string())

@@ -90,7 +90,7 @@ pub fn evaluate(
     };
     let law = law(name, finger, reading).map_err(MuprimeError::new_err)?;
     let rows = inside.item_count();
-    let told = columns.iter().map(|given| Column::of(py, given, rows)).collect::<PyResult<Vec<_>>>()?;
+    let given = columns.iter().map(|given| Column::of(py, given, rows)).collect::<PyResult<Vec<_>>>()?;
     let [mut mu, mut sd] = [(); 2].map(|()| vec![0.0; rows]);
     let mut within = vec![0_u8; rows];
     let answered = py.detach(|| {
@@ -98,11 +98,11 @@ pub fn evaluate(
             let mut condition = Condition::paper();
             for (k, ((mu, sd), within)) in mu.iter_mut().zip(sd).zip(within).enumerate() {
                 let row = nth * SHARE + k;
-                condition.amplitude = PeakToPeak::from_metres(told[0].at(row));
-                condition.frequency_hz = told[1].at(row);
-                condition.speed_m_s = told[2].at(row);
-                condition.normal_force_n = told[3].at(row);
-                condition.mu0 = told[4].at(row);
+                condition.amplitude = PeakToPeak::from_metres(given[0].at(row));
+                condition.frequency_hz = given[1].at(row);
+                condition.speed_m_s = given[2].at(row);
+                condition.normal_force_n = given[3].at(row);
+                condition.mu0 = given[4].at(row);
                 let answer = law.relative_friction(&condition).map_err(|why| format!("row {row}: {why}"))?;
                 (*mu, *sd) = (answer.mu_relative, answer.sd);
                 *within = u8::from(answer.validity == Validity::Inside);
@@ -110,7 +110,7 @@ pub fn evaluate(
             Ok::<(), String>(())
         };
         let columns = mu.par_chunks_mut(SHARE).zip(sd.par_chunks_mut(SHARE));
-        // Of several rows that are refused, the first share's is told, whatever the number of threads.
+        // Of several rows that are refused, the first share's is reported, whatever the number of threads.
         let all: Vec<_> = columns.zip(within.par_chunks_mut(SHARE)).enumerate().map(share).collect();
         all.into_iter().find(Result::is_err).unwrap_or(Ok(()))
     });
@@ -138,11 +138,11 @@ fn groups(columns: &[Vec<f64>], poisson_ratio: f64) -> Result<Vec<PsiEq17>, Stri
 }
 
 fn columns_of(py: Python<'_>, columns: &[PyBuffer<f64>; 5]) -> PyResult<Vec<Vec<f64>>> {
-    let told = columns.iter().map(|column| column.to_vec(py)).collect::<PyResult<Vec<_>>>()?;
-    if told.iter().any(|column| column.len() != told[0].len()) {
+    let values = columns.iter().map(|column| column.to_vec(py)).collect::<PyResult<Vec<_>>>()?;
+    if values.iter().any(|column| column.len() != values[0].len()) {
         return Err(MuprimeError::new_err("columns of one length are needed"));
     }
-    Ok(told)
+    Ok(values)
 }
 
 /// Eq. 20 with a Psi* of one's own on columns (as of [`evaluate`]): mu'.
@@ -161,8 +161,8 @@ pub fn psi_curve(
     out.copy_from_slice(py, &mu)
 }
 
-/// Least-squares Psi* of columns and their mu': its value, its standard uncertainty by leaving out one curve (`curves` numbers them) at a time,
-/// and the root mean square residual.
+/// Least-squares Psi* of columns and their mu': its value, its standard uncertainty by leaving out one curve
+/// (`curves` numbers them) at a time, and the root mean square residual.
 #[pyfunction]
 #[pyo3(signature = (columns, mu_relative, curves, poisson_ratio))]
 pub fn fit_psi(
@@ -172,13 +172,13 @@ pub fn fit_psi(
     curves: Vec<usize>,
     poisson_ratio: f64,
 ) -> PyResult<(f64, f64, f64)> {
-    let told = columns_of(py, &columns)?;
+    let values = columns_of(py, &columns)?;
     let mu = mu_relative.to_vec(py)?;
-    if mu.len() != told[0].len() || curves.len() != mu.len() {
+    if mu.len() != values[0].len() || curves.len() != mu.len() {
         return Err(MuprimeError::new_err("columns of one length are needed"));
     }
     let found = py.detach(|| {
-        let groups = groups(&told, poisson_ratio)?;
+        let groups = groups(&values, poisson_ratio)?;
         let points: Vec<(usize, f64, f64)> = curves
             .iter()
             .zip(groups.iter().zip(&mu))

@@ -1,5 +1,5 @@
-//! muprime in Python. What people call is `muprime/__init__.py`; here stands what it calls, one file a subject, each a thin door to
-//! the crates that the binary is made of. Long work lets the interpreter go on.
+//! muprime in Python. What people call is `muprime/__init__.py`; here stands what it calls, one file a
+//! subject, each a thin door to the crates that the binary is made of. Long work lets the interpreter go on.
 //!
 //! | file | door to |
 //! |---|---|

@@ -13,13 +13,13 @@ use std::sync::Arc;
 /// Name (as messages say it), text and document (JSON) of a plan: a bundled one, or a file.
 #[pyfunction]
 pub fn plan_load(name: &str) -> PyResult<(String, String, String)> {
-    Plan::load(name).and_then(told).map_err(refused)
+    Plan::load(name).and_then(parts).map_err(refused)
 }
 
 /// The same of a plan's text.
 #[pyfunction]
 pub fn plan_parse(name: &str, text: &str) -> PyResult<(String, String, String)> {
-    Plan::parse(name, text).and_then(told).map_err(refused)
+    Plan::parse(name, text).and_then(parts).map_err(refused)
 }
 
 /// The same of a plan's document (JSON): it is written as text first, so that what is refused has its place there.
@@ -28,16 +28,16 @@ pub fn plan_made(document: &str) -> PyResult<(String, String, String)> {
     let file: PlanFile =
         serde_json::from_str(document).map_err(|why| MuprimeError::new_err(format!("the plan: {why}")))?;
     let text = toml::to_string(&file).map_err(|why| MuprimeError::new_err(format!("the plan: {why}")))?;
-    Plan::parse(&file.name, &text).and_then(told).map_err(refused)
+    Plan::parse(&file.name, &text).and_then(parts).map_err(refused)
 }
 
-fn told(plan: Plan) -> miette::Result<(String, String, String)> {
+fn parts(plan: Plan) -> miette::Result<(String, String, String)> {
     let document = serde_json::to_string(&plan.file).into_diagnostic()?;
     Ok((plan.origin, plan.text, document))
 }
 
-/// The passes of a plan on a setup, in the order of measurement, as JSON: everything that a run looks at before it touches the rig. Nothing
-/// is opened.
+/// The passes of a plan on a setup, in the order of measurement, as JSON: everything that a run looks at
+/// before it touches the rig. Nothing is opened.
 #[pyfunction]
 #[pyo3(signature = (name, text, setup, seed))]
 pub fn plan_passes(name: &str, text: &str, setup: &str, seed: Option<u64>) -> PyResult<String> {

@@ -12,12 +12,12 @@ use rayon::prelude::*;
 #[pyfunction]
 #[pyo3(signature = (columns, elements))]
 pub fn ridge(py: Python<'_>, columns: [PyBuffer<f64>; 7], elements: usize) -> PyResult<String> {
-    let told = columns.iter().map(|column| column.to_vec(py)).collect::<PyResult<Vec<_>>>()?;
-    if told.iter().any(|column| column.len() != told[0].len()) {
+    let values = columns.iter().map(|column| column.to_vec(py)).collect::<PyResult<Vec<_>>>()?;
+    if values.iter().any(|column| column.len() != values[0].len()) {
         return Err(MuprimeError::new_err("columns of one length are needed"));
     }
     let one = |row: usize| {
-        let at = |column: usize| told[column][row];
+        let at = |column: usize| values[column][row];
         let case = RidgeCase {
             amplitude: PeakToPeak::from_metres(at(0)),
             frequency_hz: at(1),
@@ -32,7 +32,7 @@ pub fn ridge(py: Python<'_>, columns: [PyBuffer<f64>; 7], elements: usize) -> Py
         };
         solve(&case, &RunSettings::default()).map_err(|why| format!("row {row}: {why}"))
     };
-    let runs = py.detach(|| (0..told[0].len()).into_par_iter().map(one).collect::<Result<Vec<_>, _>>());
+    let runs = py.detach(|| (0..values[0].len()).into_par_iter().map(one).collect::<Result<Vec<_>, _>>());
     let runs = runs.map_err(MuprimeError::new_err)?;
     serde_json::to_string(&runs).map_err(|why| MuprimeError::new_err(why.to_string()))
 }

@@ -15,12 +15,12 @@ use std::sync::atomic::Ordering;
 /// The run of a folder: its passes as an Arrow IPC file, then as JSON the facts of its record, its summary, its damage.
 #[pyfunction]
 pub fn load(py: Python<'_>, folder: PathBuf) -> PyResult<(Py<PyBytes>, String)> {
-    let told = py.detach(|| -> miette::Result<_> {
+    let loaded = py.detach(|| -> miette::Result<_> {
         let run = runs::report::read(&folder)?;
         let about = serde_json::json!({ "facts": run.facts, "summary": run.summary, "damage": run.damage });
         Ok((tables::export::arrow_bytes(&run)?, about.to_string()))
     });
-    let (bytes, about) = told.map_err(refused)?;
+    let (bytes, about) = loaded.map_err(refused)?;
     Ok((PyBytes::new(py, &bytes).unbind(), about))
 }
 
@@ -46,7 +46,7 @@ pub fn run(
     let job = job(plan, setup, out, seed, defects.as_deref(), model.as_deref(), notes).map_err(refused)?;
     let signals = Signals::default();
     let stops = Arc::clone(&signals.stops);
-    // A key that interrupts the interpreter ends the sweep as a stop does: asked for at every pass.
+    // A key that interrupts the interpreter ends the sweep as a stop does: checked at every pass.
     let mut interrupted = None;
     let summary = py.detach(|| {
         job.run_in_virtual_time(&signals, &mut |_| {

@@ -12,8 +12,8 @@ use runs::verdict::words;
 use std::path::Path;
 use tables::passes::parse_passes;
 
-/// What a diagnosis comes to: the JSON document of `muprime diagnose --json`, its words, its page, and predictions as CSV where asked.
-type Told = (String, String, String, Option<String>);
+/// A diagnosis: the document of `muprime diagnose --json`, text, page, and requested predictions as CSV.
+type Texts = (String, String, String, Option<String>);
 
 /// Diagnoses a point table in memory (`name` is how messages call it) under a rig.toml in memory.
 #[pyfunction]
@@ -29,15 +29,15 @@ pub fn diagnose(
     without: Vec<String>,
     predict: Option<Vec<u8>>,
     damage: Vec<String>,
-) -> PyResult<Told> {
+) -> PyResult<Texts> {
     if let Some(unknown) = without.iter().find(|name| effects::by_name(name).is_none()) {
         return Err(MuprimeError::new_err(format!("without {unknown:?}: no such effect")));
     }
-    py.detach(|| told(name, &table, rig_name, rig, pairs, without, predict, &damage)).map_err(refused)
+    py.detach(|| texts(name, &table, rig_name, rig, pairs, without, predict, &damage)).map_err(refused)
 }
 
 #[allow(clippy::too_many_arguments)]
-fn told(
+fn texts(
     name: &str,
     bytes: &[u8],
     rig_name: &str,
@@ -46,7 +46,7 @@ fn told(
     without: Vec<String>,
     predict: Option<Vec<u8>>,
     damage: &[String],
-) -> miette::Result<Told> {
+) -> miette::Result<Texts> {
     let rig = runs::input::rig_text(rig_name, rig)?;
     let passes = parse_passes(Path::new(name), bytes)?;
     let table = Table::measured(&passes).into_diagnostic().wrap_err_with(|| name.to_string())?;

@@ -1,15 +1,15 @@
 //! Time as the drivers, the loop and a virtual world read it.
 //!
 //! [`Clock`] runs with the machine. That of a virtual rig whose every instrument this process serves itself
-//! may be *held*: it stands still while a thread of the run is kept from running, so that a pause of the
-//! computer ages no sample and delays no cycle.
+//! may be *held*: it stands still while a thread of the run cannot run, so that a pause of the computer ages
+//! no sample and delays no cycle.
 //!
 //! Each thread of the run is a [`Participant`]. Before it waits it promises when it looks at the clock again;
-//! the clock passes no promise by more than the participant's slack. Whoever is kept from running (the loop,
-//! a driver, an emulator that owes a driver its answer) so finds the time that it waited for, at most its
-//! slack later, whatever the machine did meanwhile. A thread that idles beside them could not tell: the one
-//! that is starved need not be the one that watches. A participant that is silent for [`PATIENCE`] while
-//! others run is waited for no longer: a fault of the program still ages samples, and trips.
+//! the clock passes no promise by more than the participant's slack. A thread that could not run (the loop, a
+//! driver, an emulator that owes a driver its answer) so finds the time that it waited for, at most its slack
+//! later, whatever the machine did meanwhile. A thread that idles beside them could not tell: the one that is
+//! starved need not be the one that watches. A participant that is silent for [`PATIENCE`] while others run
+//! is waited for no longer: a fault of the program still ages samples, and trips.
 //!
 //! What may be held is proved, not stated: [`Clock::serves`] takes the listening socket itself, and
 //! [`Clock::hold_for`] compares addresses with the proofs. An address where another process listens, on this

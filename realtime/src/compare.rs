@@ -1,10 +1,10 @@
 //! Measurement against prediction, pass by pass, and the test that says when the model has left.
 //!
 //! What a pass tells is a force, so forces are compared, never ratios of noisy numbers. `mu_0` and the two
-//! stiffnesses are known only within their calibration; every pass of a run shares their error. Left alone that
-//! would make residuals agree with each other and look like a departure. So a small Kalman filter carries those three
-//! numbers under their priors: its innovations are independent and of unit variance as long as model, calibration
-//! and noise are what they claim to be, and only then.
+//! stiffnesses are known only within their calibration; every pass of a run shares their error. Left alone
+//! that would make residuals agree with each other and look like a departure. So a small Kalman filter
+//! carries those three numbers under their priors: its innovations are independent and of unit variance as
+//! long as model, calibration and noise are what they claim to be, and only then.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 mod agreement;
@@ -83,7 +83,7 @@ impl Comparator {
         }
     }
 
-    /// `mu_0` as known now; `None` until a pass has told of it.
+    /// `mu_0` as known now; `None` until a pass has measured it.
     pub fn mu0(&self) -> Option<Mu0> {
         let sd = self.covariance[0][0].sqrt();
         (sd < 0.2 * self.estimate[0]).then_some(Mu0 { value: self.estimate[0], sd })
@@ -101,8 +101,8 @@ impl Comparator {
         Ok(mu * c.mu0 * c.normal_force_n)
     }
 
-    /// Takes a pass: its measured condition (whose `mu0` is ignored) and mean friction force in N, positive along
-    /// the sliding direction.
+    /// Takes a pass: its measured condition (whose `mu0` is ignored) and mean friction force in N, positive
+    /// along the sliding direction.
     ///
     /// # Errors
     /// A condition outside the model's domain, by name; the comparator is unchanged then.
@@ -149,8 +149,8 @@ impl Comparator {
         let vibrating = c.amplitude.metres() > 0.0;
         let unit = if vibrating { coulomb } else { 0.0 };
         self.power.push(unit, &slope, &gain, variance, (known.is_some() && vibrating).then_some(z));
-        // What lies beyond the cap is no news of the shared parameters: a filter that followed it would take up in one
-        // pass what it is there to judge. The first word on mu_0 is taken whole.
+        // What lies beyond the cap is no news of the shared parameters: a filter that followed it would take
+        // up in one pass what it is there to judge. The first word on mu_0 is taken whole.
         let taken = if known.is_some() { z.clamp(-CAP, CAP) * variance.sqrt() } else { innovation };
         for (estimate, gain) in self.estimate.iter_mut().zip(&gain) {
             *estimate += gain / variance * taken;

@@ -1,9 +1,8 @@
 //! One cycle of the loop: a pure function of configuration, state, inputs and the time passed in.
 //!
-//! Order: commands and safety ([`decide`]), then estimate and comparison ([`judge`]): what is decided can leave before a model
-//! is asked. Everything that a cycle can reach is `Copy` (checked below), so it
-//! holds no lock, no heap and no handle; the model is reached through `&`, and models hold plain tables.
-#![deny(clippy::disallowed_types, clippy::disallowed_methods)]
+//! Order: commands and safety ([`decide`]), then estimate and comparison ([`judge`]), so that a decision can
+//! leave before a model runs. Everything that a cycle can reach is `Copy` (checked below), so it holds no
+//! lock, no heap and no handle. The model is reached through `&`, and models hold plain tables.
 
 use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
 use crate::ports::{Nanos, SupplyCommand};
@@ -20,7 +19,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
-    /// Nothing is asked for.
+    /// Nothing is requested.
     #[default]
     Idle,
     /// Going to the start of a pass.
@@ -55,7 +54,7 @@ pub enum Command {
     /// Stop, latch, and open the second switch-off channel until it is proved again:
     /// before a person reaches into the rig.
     Disarm,
-    /// The dead-man key of a trial: held, to be said again before [`KEY_AGE`] is over, or released.
+    /// The dead-man key of a trial: held, to be repeated before [`KEY_AGE`] is over, or released.
     DeadMan(bool),
     /// `mu_0` as known now.
     Mu0(Mu0),
@@ -63,7 +62,7 @@ pub enum Command {
     Ambient(Ambient),
 }
 
-/// Time after which a dead-man key that was not said to be held again counts as released: a terminal repeats a held key after
+/// Time after which a dead-man key without a repeat counts as released. A terminal repeats a held key after
 /// half a second at the latest.
 pub const KEY_AGE: Nanos = Nanos(700_000_000);
 
@@ -101,8 +100,8 @@ impl CycleState {
         self.safety.state()
     }
 
-    /// Before the first cycle: what earlier runs did is carried over. A key that was not heard yet may be held all the same: it
-    /// is released when it has not been heard for its age.
+    /// Before the first cycle: what earlier runs did is carried over. A key that was not heard yet may be
+    /// held all the same: it is released when it has not been heard for its age.
     fn begin(&mut self, config: &Config, now: Nanos) {
         self.begun = true;
         self.key_held_at = Some(now);

@@ -12,7 +12,7 @@
 //! | [`clock`] | time of drivers, loop and virtual world; a virtual rig's can be held |
 //! | [`queue`] | commands to the loop; a stop waits behind nothing |
 //! | [`wrap`] | ports around ports: faults |
-//! | [`witness`] | notes when the machine kept ordinary threads from running |
+//! | [`stall_monitor`] | records when ordinary threads of the machine could not run |
 //! | [`replay`] | recorded cycles through the same code again |
 //! | [`recorder`] | rows, passes and events as MCAP; tolerant reading and recovery |
 //!
@@ -41,6 +41,6 @@ pub mod queue;
 pub mod recorder;
 pub mod replay;
 pub mod safety;
+pub mod stall_monitor;
 pub mod turn;
-pub mod witness;
 pub mod wrap;

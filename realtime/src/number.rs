@@ -1,5 +1,5 @@
-//! Numbers in a record that need not be finite: JSON has no word for them, and a record that writes `null` cannot be read
-//! again. `NaN` and the infinities are written as text.
+//! Numbers in a record that need not be finite: JSON has no word for them, and a record that writes `null`
+//! cannot be read again. `NaN` and the infinities are written as text.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serializer};

@@ -1,9 +1,9 @@
 //! The thread of the loop: absolute deadlines, priority, locked memory, lateness histogram.
 //!
-//! Overrun policy: a cycle that ends past the next deadline skips the deadlines it has missed, so the loop never runs two
-//! cycles back to back to catch up. Skipped deadlines are counted, and the lateness of the next cycle is that against the
-//! first deadline that was due: safety sees it, and the histogram holds every deadline, run or skipped. Whatever ends the
-//! loop, 'off' is the last that the ports are told.
+//! Overrun policy: a cycle that ends past the next deadline skips the deadlines it has missed, so the loop
+//! never runs two cycles back to back to catch up. Skipped deadlines are counted, and the lateness of the
+//! next cycle is that against the first deadline that was due: safety sees it, and the histogram holds every
+//! deadline, run or skipped. Whatever ends the loop, the last command to the ports is 'off'.
 
 mod machine;
 
@@ -47,7 +47,7 @@ pub struct LoopReport {
     pub major_faults: i64,
     /// Lateness quantiles in ns over all deadlines, skipped ones included: 0.5, 0.9, 0.99, 0.999, maximum.
     pub lateness_ns: [u64; 5],
-    /// What a port said when it panicked, which ended the loop with the drive off; `None` otherwise.
+    /// Message of a port's panic, which ended the loop with the drive off; `None` otherwise.
     #[serde(default)]
     pub panicked: Option<String>,
     /// Lateness counts: upper bound of a bucket in ns, deadlines in it.
@@ -214,7 +214,7 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
     }
 }
 
-/// Longest lateness that is told from longer ones, in ns.
+/// Longest resolved lateness, in ns.
 const LONGEST_NS: u64 = 10_000_000_000;
 
 /// 1 us to 10 s at two digits: some 40 kB, allocated once.
@@ -222,8 +222,8 @@ fn lateness_histogram() -> Histogram<u64> {
     Histogram::new_with_bounds(1_000, LONGEST_NS, 2).expect("the bounds are constants")
 }
 
-/// Counts the lateness of a cycle and of the deadlines that were missed before it. Those were late as well, each by one period
-/// less: without them a stall would count once.
+/// Counts the lateness of a cycle and of the deadlines that were missed before it. Those were late as well,
+/// each by one period less: without them a stall would count once.
 fn count_deadlines(histogram: &mut Histogram<u64>, late: u64, missed: u64, period: u64) {
     for k in 0..=missed.min(LONGEST_NS / period) {
         histogram.saturating_record(late - k * period);
@@ -235,21 +235,21 @@ const fn faults_between(before: (i64, i64), now: (i64, i64)) -> (i64, i64) {
     (now.0 - before.0, now.1 - before.1)
 }
 
-/// Tells every port that can still be told: off, at rest. A port that panics keeps no other from being told; then the
-/// instrument's own watchdog is left, and the second channel.
+/// Commands every port: off, at rest. A port that panics does not stop the others; its instrument then has
+/// its own watchdog and the second channel.
 fn switch_off(ports: &mut Ports, now: Nanos) {
     let expires_at = now.plus(Nanos(1_000_000_000));
     let off = DriveCommand::off(u32::MAX, expires_at);
-    let told = std::panic::catch_unwind(AssertUnwindSafe(|| ports.amplifier.command(off, now))).is_ok();
+    let commanded = std::panic::catch_unwind(AssertUnwindSafe(|| ports.amplifier.command(off, now))).is_ok();
     let stop = StageCommand::stop(u32::MAX, expires_at);
     let _ = std::panic::catch_unwind(AssertUnwindSafe(|| ports.stage.command(stop, now)));
-    if !told {
+    if !commanded {
         let cut = AssertUnwindSafe(|| ports.supply.command(SupplyCommand::Cut, now));
         let _ = std::panic::catch_unwind(cut);
     }
 }
 
-/// What a panic said.
+/// The message of a panic.
 fn words_of(cause: &(dyn std::any::Any + Send)) -> String {
     let text = cause.downcast_ref::<&str>().map(ToString::to_string);
     text.or_else(|| cause.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no words".into())

@@ -183,7 +183,7 @@ pub trait Stage: Send {
     fn state(&mut self, now: Nanos) -> Result<StageState, NoData>;
 }
 
-/// What the second switch-off channel is told.
+/// The command to the second switch-off channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SupplyCommand {
@@ -207,8 +207,8 @@ pub struct SupplyState {
 
 /// The second, independent way to switch off: a relay in the amplifier's supply, or an enable line of its own.
 ///
-/// The loop hands over the absolute command every cycle; a port sends it when it is new, and again from time to time.
-/// A switch that loses its own supply or its link must fall open by itself where its hardware can.
+/// The loop hands over the absolute command every cycle; a port sends it when it is new, and again from time
+/// to time. A switch that loses its own supply or its link must fall open by itself where its hardware can.
 pub trait SupplySwitch: Send {
     /// Hands over what the switch is to do.
     fn command(&mut self, command: SupplyCommand, now: Nanos);

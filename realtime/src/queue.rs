@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Commands to the loop, from any thread. The loop's end neither blocks nor allocates.
 ///
-/// A [`Command::Stop`] goes past the ring: the loop sees it first in its next cycle, and what was queued before it is
-/// dropped, a reset included.
+/// A [`Command::Stop`] goes past the ring: the loop sees it first in its next cycle, and what was queued
+/// before it is dropped, a reset included.
 #[derive(Debug)]
 pub struct CommandQueue {
     ring: ArrayQueue<Command>,
@@ -54,7 +54,7 @@ impl CommandQueue {
     /// The next command: a stop before any other.
     pub fn pop(&self) -> Option<Command> {
         if self.stop.swap(false, Ordering::AcqRel) {
-            // What was asked before the stop is not asked after it. Bounded: a writer may go on writing meanwhile.
+            // A stop drops the requests before it. Bounded: a writer may write meanwhile.
             for _ in 0..self.ring.capacity() {
                 if self.ring.pop().is_none() {
                     break;
@@ -87,7 +87,7 @@ mod tests {
         assert_eq!(queue.push(Command::Stop), Ok(()));
         assert_eq!((queue.pop(), queue.pop()), (Some(Command::Stop), None));
         queue.push(Command::Reset).unwrap();
-        assert_eq!((queue.pop(), queue.pop()), (Some(Command::Reset), None), "one stop is told once");
+        assert_eq!((queue.pop(), queue.pop()), (Some(Command::Reset), None), "one stop is delivered once");
     }
 
     #[test]

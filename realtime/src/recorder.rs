@@ -1,15 +1,15 @@
 //! The record of a run: MCAP with JSON messages, which Foxglove, PlotJuggler and the `mcap` tools open.
 //!
-//! What a reader must know comes first (metadata and attachments), so that a file cut at any byte still tells what it
-//! is. Chunks are closed at every [`Recorder::flush`]; a kill loses at most what came after the last one.
-//! Time stamps are the wall clock at the start plus loop time, which is monotonic.
+//! What a reader must know comes first (metadata and attachments), so that a file cut at any byte still tells
+//! what it is. Chunks are closed at every [`Recorder::flush`]; a kill loses at most what came after the last
+//! one. Time stamps are the wall clock at the start plus loop time, which is monotonic.
 //!
 //! Every byte is under a checksum: a chunk's messages under the chunk's, an attachment under its own, a metadata record under
 //! one that stands among its facts ([`CHECKSUM`]), and all of the data and all of the index under those that the format puts at
 //! the end. Messages are numbered, and the last words say how many there were: so a reader knows what is missing.
 //!
-//! Memory stays the same however long a run lasts. Every chunk is made by a writer of its own and tells its own channels;
-//! what a reader needs to find its way is put together when the file ends, from the file.
+//! Memory stays the same however long a run lasts. Every chunk is made by a writer of its own and tells its
+//! own channels; what a reader needs to find its way is put together when the file ends, from the file.
 
 mod integrity;
 mod read;
@@ -127,8 +127,8 @@ impl<W: Write> Recorder<W> {
 }
 
 impl<W: Read + Write + Seek> Recorder<W> {
-    /// Repeats the preamble's facts with `last` words and the counts of messages, and ends the file so that any reader opens
-    /// it.
+    /// Repeats the preamble's facts with `last` words and the counts of messages, and ends the file so that
+    /// any reader opens it.
     ///
     /// # Errors
     /// Whatever the file says.

@@ -1,9 +1,9 @@
 //! Safety: limits, the state machine, and the only constructors of commands that move or drive anything.
 //!
-//! Duties: decide each cycle, before anything else, whether the rig may drive and move; latch what went wrong with
-//! its cause, value, bound and cycle; hand out commands that the limits allow.
-//! Owners: `limits.rs` the numbers, `watch.rs` and `exposure.rs` what must be remembered, `rules.rs` the rules with their
-//! requirement identifiers, `cause.rs` how a trip is told, `arming.rs` the way to armed. This file: states, requests, and commands.
+//! Duties: decide each cycle, before anything else, whether the rig may drive and move; latch what went wrong
+//! with its cause, value, bound and cycle; hand out commands that the limits allow. Owners: `limits.rs` the
+//! numbers, `watch.rs` and `exposure.rs` the memory, `rules.rs` the rules with their requirement identifiers,
+//! `cause.rs` the texts of a trip, `arming.rs` the way to armed; here states, requests and commands.
 //!
 //! ```text
 //!                 reset edge, causes clear             second channel opened and
@@ -12,8 +12,8 @@
 //!      |   +------- any rule broken, a stop, or a proof that failed --------------------+
 //!      +-- start-up                (without a second channel: straight to Armed)
 //! ```
-//! Faulted and Proving command output off, stage at rest, finger lifted. Armed passes on requests that came since it was
-//! armed, clamped to nothing: a request beyond a limit is a trip, not a smaller request.
+//! Faulted and Proving command output off, stage at rest, finger lifted. Armed passes on requests that came
+//! since it was armed, clamped to nothing: a request beyond a limit is a trip, not a smaller request.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 mod arming;
@@ -75,8 +75,8 @@ impl DriveCommand {
     #[must_use]
     pub fn on_scale(self, set_point: impl FnOnce(PeakToPeak) -> Option<PeakToPeak>) -> Self {
         let allowed = |w: &PeakToPeak| (0.0..=HARD.amplitude_max.metres()).contains(&w.metres());
-        let asked = Some(self.amplitude).filter(|w| self.enable && *w > PeakToPeak::ZERO);
-        let amplitude = asked.and_then(set_point).filter(allowed).unwrap_or(PeakToPeak::ZERO);
+        let requested = Some(self.amplitude).filter(|w| self.enable && *w > PeakToPeak::ZERO);
+        let amplitude = requested.and_then(set_point).filter(allowed).unwrap_or(PeakToPeak::ZERO);
         DriveCommand { amplitude, ..self }
     }
 
@@ -247,7 +247,7 @@ pub struct Decision {
     pub remark: Option<Remark>,
 }
 
-/// What is not as it should be while the rig may still run: the data are kept, and flagged.
+/// What is not as it should be while the rig may still run: the data are stored, and flagged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Remark {
@@ -255,7 +255,7 @@ pub enum Remark {
     LateralLossy,
     /// More than 15 % of the normal samples that were due did not come.
     NormalLossy,
-    /// The plate moves less than 0.7 of what it is told: resonance drifted, or a load damps it.
+    /// The plate moves less than 0.7 of the commanded amplitude: resonance drifted, or a load damps it.
     AmplitudeSags,
 }
 
@@ -268,7 +268,7 @@ pub struct Safety {
     sequence: u32,
     reset_before: bool,
     /// A request came since the rig was armed.
-    asked: bool,
+    requested: bool,
     /// What the second channel was cut for, where it has not been proved since.
     supply_cut: Option<arming::CutFor>,
 }
@@ -290,7 +290,7 @@ impl Safety {
             cycle: 0,
             sequence: 0,
             reset_before: false,
-            asked: false,
+            requested: false,
             supply_cut: None,
         }
     }
@@ -339,9 +339,9 @@ impl Safety {
             State::Armed { since } => Some(since),
             State::Faulted(_) | State::Proving { .. } => None,
         };
-        // A request counts from the cycle after arming on: what was asked for before a reset is not asked for after it.
-        self.asked = armed_since.is_some() && (self.asked || controls.new_request);
-        let request = if self.asked { *request } else { Request::default() };
+        // A request counts from the cycle after arming on: a reset drops earlier requests.
+        self.requested = armed_since.is_some() && (self.requested || controls.new_request);
+        let request = if self.requested { *request } else { Request::default() };
         let context = rules::Context {
             limits,
             seen,
@@ -352,7 +352,7 @@ impl Safety {
             now,
         };
         let broken = rules::first_broken(&context);
-        let mut said = Decision {
+        let mut decision = Decision {
             drive: DriveCommand::off(self.sequence, now),
             stage: StageCommand::stop(self.sequence, now),
             supply: SupplyCommand::Cut,
@@ -374,11 +374,11 @@ impl Safety {
             cycle: self.cycle,
             now,
         };
-        said.waits_for = self.waits_for(&step);
-        self.advance(&step, &mut said);
+        decision.waits_for = self.waits_for(&step);
+        self.advance(&step, &mut decision);
 
         let expires_at = now.plus(limits.timing.command_expiry);
-        (said.drive, said.stage) = match self.state {
+        (decision.drive, decision.stage) = match self.state {
             State::Armed { .. } => (
                 DriveCommand::within(limits, &request, self.sequence, expires_at),
                 StageCommand {
@@ -392,9 +392,9 @@ impl Safety {
                 (DriveCommand::off(self.sequence, expires_at), StageCommand::stop(self.sequence, expires_at))
             }
         };
-        said.supply = self.supply();
-        self.watch.commanded(&said, now);
-        said
+        decision.supply = self.supply();
+        self.watch.commanded(&decision, now);
+        decision
     }
 }
 

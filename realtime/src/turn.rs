@@ -65,7 +65,7 @@ pub struct Row {
     /// Whether the second switch-off channel was being proved.
     #[serde(default)]
     pub proving: bool,
-    /// Whether the supply was told to be cut.
+    /// Whether the supply was commanded to be cut.
     #[serde(default)]
     pub supply_cut: bool,
     /// A trip latched in this cycle.

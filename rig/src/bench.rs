@@ -8,7 +8,7 @@ use drivers::vibrometer::Settings;
 use runs::calibrate::{Bench, LiveTable, SeriesOptions};
 use runs::setup::Setup;
 
-/// The bench of this machine: instruments are opened, the operator is asked at the terminal.
+/// The bench of this machine: instruments are opened, the operator answers at the terminal.
 pub struct AtTheBench;
 
 impl Bench for AtTheBench {

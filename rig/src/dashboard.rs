@@ -12,8 +12,8 @@
 //! | stop a run | the same |
 //! | pause, go on | the same, and a server that was started with `--allow-control` |
 //!
-//! The token is new at every start, is told in the address's fragment (which no browser sends), and is compared in constant time.
-//! Nothing that is asked for can arm a rig, begin a run or change a limit.
+//! The token is new at every start, is part of the address's fragment (which no browser sends), and is
+//! compared in constant time. No request can arm a rig, begin a run or change a limit.
 
 #[cfg(feature = "dashboard")]
 mod api;
@@ -38,7 +38,7 @@ pub use without::Dashboard;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-/// Where a dashboard listens where nothing else is said.
+/// The default address of a dashboard.
 pub const LISTEN: &str = "127.0.0.1:8417";
 
 /// What a dashboard is to serve.
@@ -50,6 +50,6 @@ pub struct Options {
     pub listen: SocketAddr,
     /// Further names by which browsers may ask for it, as `rig-1.lab:8417`.
     pub hosts: Vec<String>,
-    /// Whether runs may be paused and told to go on. A stop may always be asked for.
+    /// Whether runs may be paused and resumed. A stop is always allowed.
     pub control: bool,
 }

@@ -8,14 +8,14 @@ mod judge;
 mod ports;
 
 pub use follow::{ChannelReport, Follow, Seen};
-pub use judge::{Asked, Finding, judge};
+pub use judge::{Finding, Target, judge};
 
 use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, OpenError};
 use ports::Opened;
 use realtime::cycle::{COMMANDS_PER_CYCLE, Config, CycleState, Inputs, decide};
 use realtime::ports::{AmplifierState, Channel, Contacts, Nanos, NoData, StageState, SupplyState};
 use realtime::safety::{Cause, ChannelTiming, Observation, Timing};
-use realtime::witness::{StallReport, Witnesses};
+use realtime::stall_monitor::{StallMonitor, StallReport};
 use runs::setup::Setup;
 use serde::Serialize;
 use std::time::{Duration, Instant};
@@ -35,8 +35,7 @@ pub struct Answers {
     pub samples_per_s: f64,
     /// Share of the answers that were none: corrupt, refused, or too late.
     pub bad_share: f64,
-    /// Of an instrument that sends by itself: share of its samples that never came. An instrument that is asked takes more samples
-    /// than are wanted of it, and loses none.
+    /// Of an instrument that sends by itself: share of its samples that never came. A polled one has none.
     pub lost_share: f64,
     /// Times that the link was made anew.
     pub reconnected: u64,
@@ -70,9 +69,9 @@ pub struct Look {
     pub supply: Option<Result<SupplyState, NoData>>,
     /// The last readings of the safety contacts.
     pub contacts: Option<Contacts>,
-    /// The rule that kept the loop from being armed most often, with the share of cycles in which any did; only where everything could be opened.
+    /// The rule that most often prevented arming, with the share of cycles in which any did; if all opened.
     pub blocking: Option<(Cause, f64)>,
-    /// When this computer kept threads from running while it looked: what the links lost in that time is not theirs.
+    /// Stalls of this computer during the look: what the links lost then is not their fault.
     pub stalls: StallReport,
 }
 
@@ -123,7 +122,7 @@ impl Followed {
         self.contacts.look(fitted.map(|c| of_state(f64::from(c.closed), c.taken_at, c.sequence)), now);
     }
 
-    /// The channels of one instrument; each is told once.
+    /// The channels of one instrument; each is reported once.
     fn reports(
         &mut self,
         of: &Opened<'_>,
@@ -215,7 +214,7 @@ impl Rules {
         }
     }
 
-    /// The rule that kept the loop from being armed most often, with the share of cycles in which any did.
+    /// The rule that most often prevented arming, with the share of cycles in which any did.
     fn worst(&self) -> Option<(Cause, f64)> {
         let all: u32 = self.blocked.iter().map(|(_, n)| n).sum();
         let (cause, _) = self.blocked.iter().max_by_key(|(_, n)| *n)?;
@@ -227,7 +226,7 @@ impl Rules {
 pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
     let epoch = Instant::now();
     let (all, mut bench) = ports::open(setup, instruments, epoch);
-    let witnesses = Witnesses::start(realtime::pacing::monotonic_ns());
+    let monitor = StallMonitor::start(realtime::pacing::monotonic_ns());
     let mut rules = Rules::of(setup, bench.supply.is_some());
     let mut followed = Followed::default();
     let counted = || -> Vec<HealthReport> { all.iter().map(Opened::health).collect() };
@@ -245,8 +244,8 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
             last = Some(seen);
         }
     }
-    // Without threads for witnesses nothing is known of stalls, and none is claimed.
-    let stalls = witnesses.map(Witnesses::finish).unwrap_or_default();
+    // Without threads for the monitor nothing is known of stalls, and none is claimed.
+    let stalls = monitor.map(StallMonitor::finish).unwrap_or_default();
     let after = counted();
     let (before, began) = before.unwrap_or_else(|| (after.clone(), opened));
     let seconds = began.elapsed().as_secs_f64();

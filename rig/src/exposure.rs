@@ -1,11 +1,12 @@
 //! The ledger of a human finger's exposure: what was vibrated in earlier runs counts in the next one.
 //!
-//! It is kept where a machine keeps files over a restart (`/var/tmp`), for each identity of the amplifier ([`drivers::identity::every`])
-//! and for the person, where one is named; the worst of them holds. Each user has a file of each, which no other user can write: what
-//! several users drove is added up. It is written while the run goes, once a second. What stands in it is always ahead of the truth:
-//! each entry holds [`AHEAD`] of driving at the setup's strongest as if it had happened, and the entry of an orderly end takes
-//! that back. So a program that is killed loses nothing; it is charged too much, by [`AHEAD`] at most. A file has two places
-//! that are written in turn, each with its check sum: what is torn by a power cut leaves the other.
+//! It is stored where files survive a restart (`/var/tmp`), for each identity of the amplifier
+//! ([`drivers::identity::every`]) and for the person, where one is named; the worst of them holds. Each user
+//! has a file of each, which no other user can write: what several users drove is added up. It is written
+//! while the run goes, once a second. It is always ahead of the truth: each entry includes [`AHEAD`] of
+//! driving at the setup's strongest, and the entry of an orderly end takes that back. So a killed program
+//! loses nothing; it is charged too much, by [`AHEAD`] at most. A file has two places that are written in
+//! turn, each with its check sum: a power cut can tear only one.
 //!
 //! Time is that of the machine since it was started, in its sleep as well: no wall clock that somebody sets makes an hour short.
 //! After a restart of the machine only the time since then is known to be over, and only that counts as rest.
@@ -29,7 +30,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Where ledgers are kept.
+/// The folder of the ledgers.
 const FOLDER: &str = "/var/tmp";
 /// How far an entry is ahead of what was driven: what a program that is killed is charged too much.
 pub const AHEAD: Duration = Duration::from_secs(4);
@@ -78,7 +79,7 @@ impl Entry {
         self.minutes.retain(|number, _| *number > oldest);
     }
 
-    /// The same, told in the times of this start of the machine. All that was before another start was before this one.
+    /// The same, in the times of this start of the machine. All earlier starts were before it.
     fn moved_to(mut self, boot: &str) -> Self {
         if self.boot != boot {
             let end = self.until_ns.div_ceil(MINUTE_NS) as i64;
@@ -236,7 +237,7 @@ impl Ledger {
                 match written {
                     Ok(now_ns) => shown.written(now_ns),
                     Err(why) => {
-                        tracing::error!(%why, "the exposure of the finger cannot be kept: the rig is stopped");
+                        tracing::error!(%why, "the exposure of the finger cannot be saved: the rig is stopped");
                         shown.failed.store(true, Ordering::Relaxed);
                         stop();
                     }
@@ -390,7 +391,7 @@ impl State {
     }
 }
 
-/// A ledger that is being kept.
+/// A ledger in use.
 pub struct Keeping {
     state: Arc<State>,
     end: Sender<bool>,

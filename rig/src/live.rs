@@ -15,7 +15,7 @@ mod view;
 mod viewer;
 
 pub use feed::Feed;
-pub use message::{Ended, Message, Progress, Run, State, Told};
+pub use message::{Ended, Message, Progress, Run, State, TimedEvent};
 pub use stop::stop;
 pub use view::View;
 pub use viewer::{Heard, Viewer};

@@ -1,7 +1,7 @@
 //! What happens at a rig, published to the laboratory, read only: nothing that a broker says is listened to.
 //!
-//! Off unless asked for, and never in the loop: the thread that tells the news puts messages into a bounded queue and waits for nothing.
-//! Where the queue is full, because a broker is slow or gone, messages are dropped and counted; the run does not notice.
+//! Off by default, and never in the loop: messages go into a bounded queue that nothing waits for. If it is
+//! full, because a broker is slow or gone, messages are dropped and counted; the run continues.
 
 #[cfg(feature = "mqtt")]
 mod mqtt;

@@ -45,7 +45,7 @@ pub(crate) fn is_shared(path: &Path) -> bool {
     path.symlink_metadata().is_ok_and(|m| m.is_dir() && m.permissions().mode() & 0o7777 == SHARED)
 }
 
-/// Where locks are kept on this machine.
+/// The folder of the locks on this machine.
 fn folder() -> miette::Result<PathBuf> {
     let mut folders = FOLDERS.iter().map(PathBuf::from);
     folders.find(|path| is_shared(path)).ok_or_else(|| {
@@ -98,7 +98,7 @@ pub(crate) fn open_shared(path: &Path) -> io::Result<File> {
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
             match open_plain(path, options(true).create_new(true)) {
                 Ok(file) => {
-                    // Whatever the mask of this user: the next one must be told who holds it.
+                    // Whatever the mask of this user: the next one must see who holds it.
                     file.set_permissions(Permissions::from_mode(0o666))?;
                     Ok(file)
                 }

@@ -14,14 +14,14 @@ use miette::{IntoDiagnostic, WrapErr};
 use realtime::clock::Clock;
 use realtime::pacing;
 use realtime::ports::Nanos;
+use realtime::stall_monitor::StallMonitor;
 use realtime::turn::Ports;
-use realtime::witness::Witnesses;
 use runs::ambient::{Bench, World};
 use runs::exposure_left::Left;
 use runs::sequence::{Event, MeasuredPass, Outcome};
 use runs::session::keeper::{self, Keeper};
 use runs::session::{Begun, Job, Signals, Snapshot, Snapshots, Summary, Unfinished, Update, words};
-use runs::supervisor::{self, Asked, End};
+use runs::supervisor::{self, End, Requests};
 use std::collections::BTreeMap;
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
@@ -36,7 +36,7 @@ struct Note {
     pass: Option<MeasuredPass>,
     /// Passes made, planned, s to go.
     progress: (usize, usize, f64),
-    /// The cycle, where it is to be told.
+    /// The cycle, if it is to be shown.
     state: Option<Snapshot>,
 }
 
@@ -84,13 +84,13 @@ fn over_instruments(
     let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
         miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
     })?;
-    let mut kept = Keeper::begin(&job, dir, planned, start_unix_ns)?;
-    let file = kept.new_record()?;
+    let mut keeper = Keeper::begin(&job, dir, planned, start_unix_ns)?;
+    let file = keeper.new_record()?;
     let preamble = keeper::preamble(&job, start_unix_ns)?;
 
     let lost = Arc::new(AtomicBool::new(false));
-    let witnesses = Witnesses::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
-    let (rig, mut reins, row_out) = WallLoop::start(Parts {
+    let monitor = StallMonitor::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
+    let (rig, mut handle, row_out) = WallLoop::start(Parts {
         config: job.setup.config,
         model: Arc::clone(&job.model),
         ports: Ports::new(
@@ -107,9 +107,9 @@ fn over_instruments(
     .wrap_err(Unfinished::Internal)?;
     let keeping = match ledger {
         None => None,
-        Some(ledger) => Some(ledger.keep(rig.life(), reins.stopper()).into_diagnostic()?),
+        Some(ledger) => Some(ledger.keep(rig.life(), handle.stopper()).into_diagnostic()?),
     };
-    let held = key.map(|key| key.hold(reins.sender())).transpose().into_diagnostic()?;
+    let held = key.map(|key| key.hold(handle.sender())).transpose().into_diagnostic()?;
     let (to_writer, notes) = channel();
     let (last_in, last_out) = channel();
     let writing = {
@@ -122,15 +122,15 @@ fn over_instruments(
     let (note_in, note_out) = channel::<Note>();
     let mut unkept = None;
     let (outcome, panicked) = std::thread::scope(|scope| {
-        let (following_sequence, lost, stop) = (&mut sequence, &*lost, reins.stopper());
+        let (following_sequence, lost, stop) = (&mut sequence, &*lost, handle.stopper());
         let keeping = keeping.as_ref();
         let following = scope.spawn(move || {
             let (mut stops, mut knows) = (0, false);
             let mut ends = || {
-                let asked = signals.stops.load(Ordering::Relaxed);
-                if asked > stops {
-                    stops = asked;
-                    return Some(End::Asked);
+                let requested = signals.stops.load(Ordering::Relaxed);
+                if requested > stops {
+                    stops = requested;
+                    return Some(End::Requested);
                 }
                 let unkept = keeping.is_some_and(|keeping| !keeping.holds());
                 let end = match lost.load(Ordering::Relaxed) {
@@ -141,9 +141,9 @@ fn over_instruments(
                 knows |= end.is_some();
                 end
             };
-            let mut ask = || Asked { end: ends(), pause: signals.paused.load(Ordering::Relaxed) };
+            let mut ask = || Requests { end: ends(), pause: signals.paused.load(Ordering::Relaxed) };
             let mut snapshots = Snapshots::default();
-            supervisor::sweep(&mut reins, following_sequence, &mut ask, &mut |row, sequence, reaction| {
+            supervisor::sweep(&mut handle, following_sequence, &mut ask, &mut |row, sequence, reaction| {
                 bench.serve(row.now, sequence, &reaction);
                 let state = snapshots.take(row);
                 if state.is_some() || !reaction.events.is_empty() || reaction.pass.is_some() {
@@ -157,8 +157,8 @@ fn over_instruments(
         });
         let mut keep = |notes: &Receiver<Note>, news: &mut dyn FnMut(Update<'_>)| {
             for note in notes {
-                // Passes that come until the sweep has stopped are kept where they can be.
-                if let Err(why) = kept.keep(&note.events, note.pass.as_ref(), news) {
+                // Passes that come until the sweep has stopped are stored if possible.
+                if let Err(why) = keeper.keep(&note.events, note.pass.as_ref(), news) {
                     lost.store(true, Ordering::Relaxed);
                     unkept.get_or_insert(why);
                 }
@@ -174,15 +174,16 @@ fn over_instruments(
                 }
             }
         };
-        // Whoever is told the news is foreign code, and may panic where its terminal is gone: then the rig is stopped before
-        // anything else, what was measured is kept, and the panic goes on when the rig is off.
-        let told = std::panic::catch_unwind(AssertUnwindSafe(|| keep(&note_out, news)));
-        if told.is_err() {
+        // The receiver of the updates is foreign code, and may panic where its terminal is gone. Then the rig
+        // is stopped before anything else, the measurements are stored, and the panic continues with the rig
+        // off.
+        let finished = std::panic::catch_unwind(AssertUnwindSafe(|| keep(&note_out, news)));
+        if finished.is_err() {
             stop();
             lost.store(true, Ordering::Relaxed);
             keep(&note_out, &mut |_| {});
         }
-        (following.join(), told.err())
+        (following.join(), finished.err())
     });
     // Whatever ended it: off first.
     let Ended { report, links, off } = rig.end();
@@ -192,7 +193,7 @@ fn over_instruments(
     if let Some(keeping) = keeping {
         keeping.end(off.read_back);
     }
-    let stalls = witnesses.finish();
+    let stalls = monitor.finish();
     let held = clock.held_back();
     drop(to_writer);
     let outcome = outcome.map_err(|_| fault("the sweep's thread panicked"));
@@ -224,14 +225,14 @@ fn over_instruments(
         tracing::error!(what, "a port panicked in the loop: the rig was stopped");
     }
     for why in written.problem.iter().cloned().chain(unkept.map(|e| format!("{e:#}"))) {
-        tracing::error!(why, "the record could not be kept: the sweep was stopped");
+        tracing::error!(why, "the record could not be saved: the sweep was stopped");
     }
     // A file that failed only while the last rows went into it: the sweep was over, but it is not recorded.
     let unrecorded = written.problem.is_some() && outcome == Outcome::Complete;
     let outcome = if unrecorded { Outcome::RecordLost } else { outcome };
     let record_lost = written.lost_rows + report.ring_drops;
     let agreement = sequence.agreement(outcome == Outcome::Complete);
-    Ok(kept.end(outcome, agreement, Some((report, stalls, held)), record_lost, links, off))
+    Ok(keeper.end(outcome, agreement, Some((report, stalls, held)), record_lost, links, off))
 }
 
 /// Raises a flag where the thread that holds it panics.

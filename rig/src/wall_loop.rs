@@ -71,7 +71,7 @@ pub struct Ended {
 }
 
 impl WallLoop {
-    /// Starts the loop. The reins go to whoever leads it; the rows for a record come out of the ring.
+    /// Starts the loop. The handle goes to whoever leads it; the rows for a record come out of the ring.
     ///
     /// # Errors
     /// No thread can be had; the links are closed then.
@@ -79,14 +79,14 @@ impl WallLoop {
         let (rows, record) = HeapRb::<Row>::new(RING).split();
         let (watch, watched) = HeapRb::<Row>::new(RING).split();
         let rig = Self::start_into(parts, rows, watch)?;
-        let reins = LoopHandle {
+        let handle = LoopHandle {
             commands: Arc::clone(&rig.commands),
             life: Arc::clone(&rig.life),
             watch: watched,
             heard: rig.clock.now(),
             clock: rig.clock.join(SWEEP_SLACK),
         };
-        Ok((rig, reins, record))
+        Ok((rig, handle, record))
     }
 
     fn start_into(parts: Parts, rows: HeapProd<Row>, watch: HeapProd<Row>) -> miette::Result<Self> {

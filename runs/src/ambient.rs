@@ -159,7 +159,7 @@ impl Tolerances {
 pub struct Level {
     /// Column of the point table, or the name of what was typed.
     pub quantity: String,
-    /// What the plan asked for; none where it left the quantity as it is.
+    /// The plan's value; none if the plan leaves the quantity as it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub planned: Option<f64>,
     /// What was found, on average over the pass.
@@ -180,7 +180,7 @@ pub struct Level {
 pub struct LevelsFound {
     /// Column of the point table, or the name of what was typed.
     pub quantity: String,
-    /// What the plan asked for.
+    /// The plan's value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub planned: Option<f64>,
     /// Passes.
@@ -235,9 +235,9 @@ impl SetupFile {
             let profile = self.chamber.as_ref().and_then(|chamber| chamber.description().ok());
             let set = profile.as_ref().is_some_and(|p| p.set(name).is_some());
             let read = profile.as_ref().is_some_and(|p| p.signal(name).is_some());
-            let asked = self.ambient.by_operator.iter().any(|one| one == covariate.name);
+            let by_operator = self.ambient.by_operator.iter().any(|one| one == covariate.name);
             let reads = |other: By| if read { By::Chamber } else { other };
-            match (set, asked, self.virtual_rig.is_some()) {
+            match (set, by_operator, self.virtual_rig.is_some()) {
                 (true, ..) => Some(Means { sets: By::Chamber, reads: reads(By::Operator) }),
                 (_, true, _) => Some(Means { sets: By::Operator, reads: reads(By::Operator) }),
                 (.., true) => Some(Means { sets: By::World, reads: reads(By::World) }),

@@ -70,7 +70,7 @@ impl Bench for FilesAlone {
     }
 }
 
-/// How a dead-weight series is taken and where it is kept.
+/// How a dead-weight series is taken and where it is stored.
 pub struct SeriesOptions<'a> {
     /// Setup whose force instruments are read; without one the operator types the counts.
     pub setup: Option<&'a str>,
@@ -78,7 +78,7 @@ pub struct SeriesOptions<'a> {
     pub average_s: f64,
     /// How long a link that went down is waited for, in s.
     pub reconnect_s: f64,
-    /// Where the series will be kept; until it is whole, each reading stands in the `.part` file beside.
+    /// Where the series will be stored; until it is whole, each reading stands in the `.part` file beside.
     pub keep: &'a Path,
 }
 
@@ -181,8 +181,8 @@ pub fn from_files(words: &[String]) -> miette::Result<Issued> {
         what: What,
     }
     let line = <Line as clap::Parser>::try_parse_from(words).map_err(|e| {
-        let said = e.to_string();
-        let first = said.lines().take_while(|l| !l.is_empty() && !l.starts_with("Usage")).collect::<Vec<_>>();
+        let text = e.to_string();
+        let first = text.lines().take_while(|l| !l.is_empty() && !l.starts_with("Usage")).collect::<Vec<_>>();
         miette::miette!("{}", first.join(" ").trim_start_matches("error: "))
     })?;
     certified(&line.what, &FilesAlone)

@@ -189,10 +189,10 @@ impl Campaign {
     /// # Errors
     /// A folder of another campaign, or one that cannot be written.
     pub fn open(&self, folder: &Path) -> miette::Result<()> {
-        let kept = folder.join(FILE);
-        if kept.exists() {
+        let stored = folder.join(FILE);
+        if stored.exists() {
             miette::ensure!(
-                input::text_of(&kept)? == self.text,
+                input::text_of(&stored)? == self.text,
                 help = "give another --out, or the campaign as it was",
                 "{} holds another campaign than this one",
                 folder.display()
@@ -202,7 +202,7 @@ impl Campaign {
         crate::files::make_folder(&folder.join("sessions"))?;
         let kinds: Vec<Kind> = self.setups.iter().map(|setup| setup.tip.kind).collect();
         crate::files::write_plain(&folder.join(KINDS), serde_json::json!(kinds).to_string())?;
-        crate::files::write_plain(&kept, &self.text)
+        crate::files::write_plain(&stored, &self.text)
     }
 }
 

@@ -1,10 +1,10 @@
 //! Certificates of a setup: verified when the setup is read, applied once in the loop.
 //!
 //! A force certificate takes the counts of the force instruments and gives newtons with cross-talk taken off;
-//! the profile's own scale and the setup's `gain` and `offset_n` then play no part. An amplitude certificate turns
-//! the amplitude that is asked for into the amplifier's set-point, and what the amplifier reads back into the plate's
-//! true amplitude: every amplitude in the loop, its limits and its record is then the plate's. What certificates
-//! leave open goes into rig.toml as `[calibration]`.
+//! the profile's own scale and the setup's `gain` and `offset_n` then play no part. An amplitude certificate
+//! turns the requested amplitude into the amplifier's set-point, and what the amplifier reads back into the
+//! plate's true amplitude: every amplitude in the loop, its limits and its record is then the plate's. What
+//! certificates leave open goes into rig.toml as `[calibration]`.
 
 pub mod temperature;
 
@@ -91,14 +91,14 @@ impl Certificates {
             if kind == Kind::Amplitude {
                 all.take_amplitude(file, verified).map_err(&fail)?;
             }
-            let kept = path.file_name().map_or(name.clone(), |n| n.to_string_lossy().into_owned());
+            let file_name = path.file_name().map_or(name.clone(), |n| n.to_string_lossy().into_owned());
             // No instrument of force reports a temperature to the loop; the amplifier does.
             if let (Kind::Amplitude, Some(range_c)) = (kind, certificate.validity.temperature_c) {
-                let certificate = format!("{kind} certificate ({kept})");
+                let certificate = format!("{kind} certificate ({file_name})");
                 all.temperature_ranges.push(TemperatureRange { certificate, range_c });
             }
-            all.calibration.certificates.insert(kind, kept.clone());
-            all.files.push((format!("certificates/{kept}"), text));
+            all.calibration.certificates.insert(kind, file_name.clone());
+            all.files.push((format!("certificates/{file_name}"), text));
         }
         Ok(all)
     }

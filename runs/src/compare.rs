@@ -21,7 +21,7 @@ pub use folders::Compared;
 
 /// Level of the whole answer: shift and scatter are each tested at half of it.
 pub const LEVEL: f64 = 0.05;
-/// Conditions in common below which nothing is said about agreement.
+/// Least number of common conditions for a conclusion on agreement.
 pub const ENOUGH_CONDITIONS: usize = 5;
 /// Relative distances within which two passes have the same condition: amplitude, frequency, speed, load.
 const SAME: [f64; 4] = [0.03, levels::FREQUENCY, levels::SPEED, levels::FORCE];

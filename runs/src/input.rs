@@ -45,7 +45,7 @@ pub struct Several {
     all: Vec<BadInput>,
 }
 
-/// Problems of one file as they are found: all are told at once.
+/// Problems of one file as they are found: all are reported at once.
 pub struct Problems<'a> {
     name: &'a str,
     text: &'a str,
@@ -239,7 +239,7 @@ pub fn rig_text(name: &str, text: &str) -> miette::Result<RigFile> {
     let mut wrong = Problems::of(name, text);
     let mut rest: toml::Table = parse_toml(name, text)?;
     let mut judged = file.check();
-    // What was told of is taken for a good value, and the rest is looked at again.
+    // A reported value is taken for a good one, and the rest is checked again.
     while let Err(error) = judged {
         let RigFileError::Value { section, key, value, .. } = &error else {
             wrong.add(&[], error.to_string(), None);

@@ -4,8 +4,8 @@
 //! queues: whoever keeps a pass or switches a drive off never waits for a terminal, a pipe or a pager.
 //!
 //! A reader may go away at any time (`muprime ... | head -1`), and a run must not end with it: what cannot be written is
-//! dropped. Text may hold what an instrument or a file said: control characters, which could rewrite what a person sees on a
-//! terminal, are shown as `\u001b` and the like; colours and line ends stay.
+//! dropped. Text may come from an instrument or a file: control characters, which could rewrite what a person
+//! sees on a terminal, are shown as `\u001b` and the like; colours and line ends stay.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -42,7 +42,7 @@ pub fn remark(text: &str) {
     question(&format!("{text}\n"));
 }
 
-/// Writes to standard error without a line end: the form behind [`ask!`]. What is said while it is held is kept.
+/// Writes to standard error without a line end: the form behind [`ask!`]. While that is held, the text waits.
 pub fn question(text: &str) {
     if let Some(held) = &mut *HELD.lock().unwrap_or_else(PoisonError::into_inner) {
         return held.keep(text);
@@ -129,7 +129,7 @@ impl Outlet {
         if first { self.waiting.push_front(piece) } else { self.waiting.push_back(piece) }
     }
 
-    /// The next piece; what was left out is said where it would have stood.
+    /// The next piece; a note takes the place of what was left out.
     fn next(&mut self, output: usize) -> Option<Piece> {
         let piece = match self.waiting.pop_front() {
             Some(piece) => {
@@ -169,7 +169,7 @@ fn put(output: usize, piece: Piece, first: bool) {
     piece.write(output);
 }
 
-/// From now on nobody waits for a reader of what is said; a panic's words go the same way.
+/// From now on nobody waits for a reader of the output; a panic's message goes the same way.
 ///
 /// # Errors
 /// The system gives no thread.
@@ -242,7 +242,7 @@ pub fn end() -> String {
 const FIRST: usize = 100;
 const LAST: usize = 900;
 
-/// What is said on standard error while a picture has the terminal.
+/// Output to standard error while a picture has the terminal.
 static HELD: Mutex<Option<Held>> = Mutex::new(None);
 
 /// Remarks that wait.
@@ -271,7 +271,7 @@ impl Held {
     }
 }
 
-/// Holds what is said on standard error from now on: a picture has the terminal.
+/// Holds the output to standard error from now on: a picture has the terminal.
 pub fn hold() {
     HELD.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_default();
 }

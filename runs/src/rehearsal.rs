@@ -127,23 +127,23 @@ mod tests {
         let mut profile = drivers::profile("muprime-force2").unwrap();
         profile.description.emulator.measure.remove("fault");
         profile.description.emulator.constant.insert("fault".into(), 1.0);
-        let said = second(profile).unwrap_err();
-        assert!(said.contains("`fault == 1`") && said.contains("[emulator.constant]"), "{said}");
+        let message = second(profile).unwrap_err();
+        assert!(message.contains("`fault == 1`") && message.contains("[emulator.constant]"), "{message}");
     }
 
     #[test]
     fn an_open_signature_says_what_to_write() {
         let mut profile = drivers::profile("muprime-force2").unwrap();
         profile.description.emulator.constant.remove("magic");
-        let said = second(profile).unwrap_err();
-        assert!(said.contains("`magic = ...`"), "{said}");
+        let message = second(profile).unwrap_err();
+        assert!(message.contains("`magic = ...`"), "{message}");
     }
 
     #[test]
-    fn a_quantity_that_the_world_does_not_have_is_told() {
+    fn a_quantity_that_the_world_does_not_have_is_reported() {
         let mut profile = drivers::profile("muprime-force2").unwrap();
         profile.description.emulator.measure.insert("normal".into(), "force.normal_kg".into());
-        let said = second(profile).unwrap_err();
-        assert!(said.contains("force.normal_kg") && said.contains("force.normal_n"), "{said}");
+        let message = second(profile).unwrap_err();
+        assert!(message.contains("force.normal_kg") && message.contains("force.normal_n"), "{message}");
     }
 }

@@ -70,7 +70,7 @@ pub struct RunDir {
     sessions: Vec<Session>,
     planned: Option<Session>,
     identity: Identity,
-    /// A pass could not be kept: half a line may stand at the end, and nothing may follow it.
+    /// A pass could not be stored: half a line may stand at the end, and nothing may follow it.
     failed: bool,
     new: New,
 }
@@ -186,8 +186,8 @@ impl RunDir {
         self.new.begun = true;
     }
 
-    /// Plans the session that comes now. In wall-clock time the run's time has gone on since its first session began; in virtual
-    /// time (`fast`) it goes on where the last pass that was kept had ended, `pass_s` after its `time_s`.
+    /// Plans the session that comes now. In wall-clock time the run's time continues from the start of its
+    /// first session. In virtual time (`fast`) it continues `pass_s` after the last pass's `time_s`.
     pub fn plan_session(&mut self, now_unix_ns: u64, pass_s: f64, fast: bool) -> Session {
         let session = 1 + self.sessions.iter().map(|s| s.session).max().unwrap_or(0);
         // A clock that was set back meanwhile does not put a pass before one that was made.
@@ -257,11 +257,11 @@ impl RunDir {
     /// Whatever the file system says, or a file that was removed meanwhile; the sweep must stop then.
     pub fn keep(&mut self, measured: &MeasuredPass) -> miette::Result<()> {
         if self.failed {
-            miette::bail!("point {} is not kept: an earlier pass could not be", measured.pass.point);
+            miette::bail!("point {} is not stored: an earlier pass could not be", measured.pass.point);
         }
-        let kept = self.append(measured);
-        self.failed = kept.is_err();
-        kept
+        let appended = self.append(measured);
+        self.failed = appended.is_err();
+        appended
     }
 
     fn append(&mut self, measured: &MeasuredPass) -> miette::Result<()> {
@@ -338,14 +338,14 @@ pub fn passes_in(path: &Path) -> miette::Result<Vec<MeasuredPass>> {
         let file = path.join(name);
         fs::read(&file).into_diagnostic().wrap_err_with(|| file.display().to_string())
     };
-    let (kept, _) = whole_table(&read(POINTS)?).wrap_err_with(|| path.join(POINTS).display().to_string())?;
+    let (table, _) = whole_table(&read(POINTS)?).wrap_err_with(|| path.join(POINTS).display().to_string())?;
     let (journal, _) =
         whole_passes(&read(JOURNAL)?).wrap_err_with(|| path.join(JOURNAL).display().to_string())?;
-    let in_table: BTreeSet<u64> = kept.iter().map(|k| k.point).collect();
+    let in_table: BTreeSet<u64> = table.iter().map(|k| k.point).collect();
     let last: BTreeMap<u64, usize> = journal.iter().enumerate().map(|(i, p)| (p.pass.point, i)).collect();
     let counts = |i: usize, p: &MeasuredPass| in_table.contains(&p.pass.point) && last[&p.pass.point] == i;
     let passes = journal.into_iter().enumerate().filter(|(i, p)| counts(*i, p)).map(|(_, p)| p).collect();
-    match kept.iter().find(|k| !last.contains_key(&k.point)) {
+    match table.iter().find(|k| !last.contains_key(&k.point)) {
         None => Ok(passes),
         Some(k) => miette::bail!(
             "{}: point {} is in {POINTS} and not in {JOURNAL}: one of them is damaged",

@@ -48,7 +48,7 @@ pub struct Reaction {
     pub outcome: Option<Outcome>,
     /// A quantity of the air (its place in [`crate::ambient::AIR`]) that is to be set, and the level.
     pub set_level: Option<(usize, f64)>,
-    /// Something is asked of whoever stands at the rig; the words are among the events.
+    /// A question to whoever stands at the rig; its text is among the events.
     pub question: Option<Question>,
 }
 
@@ -138,7 +138,7 @@ pub struct Sequence {
     poisson_ratio: f64,
     temperature_ranges: Vec<TemperatureRange>,
     temperature_flags: Vec<TemperatureFlag>,
-    /// What the setup states of the air, and what the loop was last told of it.
+    /// What the setup states of the air, and what the loop last received of it.
     ambient: Ambient,
     ambient_sent: Ambient,
     at_rig: AtRig,
@@ -216,7 +216,7 @@ impl Sequence {
         Sequence { temperature_ranges: temperature_ranges.to_vec(), ..self }
     }
 
-    /// The same, with the limits of the rig that is armed: what guards are missing is told then.
+    /// The same, with the limits of the rig that is armed: missing guards are reported then.
     pub fn guarded_by(self, limits: &Limits) -> Self {
         Sequence {
             has_watchdog: limits.amplifier_watchdog || limits.supply_watchdog,
@@ -228,12 +228,12 @@ impl Sequence {
         }
     }
 
-    /// The same, with what is told of its guards at each arming, and the longest pause in s.
+    /// The same, with the guards that are reported at each arming, and the longest pause in s.
     pub fn on_rig(self, guards: Guards, pause_max_s: f64) -> Self {
         Sequence { guards, pause_max: Nanos::from_seconds(pause_max_s), ..self }
     }
 
-    /// What is left to a human finger of the hour is told at the first arming.
+    /// The first arming reports what is left to a human finger of the hour.
     pub fn exposure_left(&mut self, left: Left) {
         self.exposure_left = Some(left);
     }
@@ -478,7 +478,7 @@ impl Sequence {
             return;
         }
         if row.now.since(since) > APPROACH_WITHIN {
-            // The stop that follows is an orderly one; why it comes is said here.
+            // The stop that follows is an orderly one; its reason is logged here.
             tracing::warn!(
                 "point {}: the stage did not come to its start position within {} s: the sweep stops",
                 point.number,

@@ -23,7 +23,7 @@ use models::psi_star::PsiStar;
 use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
-use realtime::witness::StallReport;
+use realtime::stall_monitor::StallReport;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -88,7 +88,7 @@ impl Notes {
 
 /// What happened, for whoever watches.
 pub enum Update<'a> {
-    /// A pass was kept: it is safe on the disk.
+    /// A pass was saved: it is safe on the disk.
     Pass(&'a MeasuredPass),
     /// Something worth a line.
     Event(&'a Event),
@@ -106,7 +106,7 @@ pub struct Summary {
     /// How it ended.
     #[serde(flatten)]
     pub outcome: Outcome,
-    /// Requirement (`SR-..`) whose rule ended it or kept it from being armed.
+    /// Requirement (`SR-..`) whose rule ended the run or prevented its arming.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub requirement: Option<String>,
     /// What to do about that.
@@ -128,11 +128,11 @@ pub struct Summary {
     pub psi_star: Option<PsiStar>,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
-    /// When the machine kept ordinary threads from running; `None` in virtual time.
+    /// When the machine did not run ordinary threads; `None` in virtual time.
     #[serde(default)]
     pub stalls: Option<StallReport>,
-    /// Time that the clock of a virtual rig was held back while the computer kept threads of the run from
-    /// running; `None` where the clock cannot be held.
+    /// Time that the clock of a virtual rig was held back while the computer did not run its threads; `None`
+    /// where the clock cannot be held.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held: Option<HeldBack>,
     /// Rows that the record lost.
@@ -168,11 +168,11 @@ fn nothing_said() -> Agreement {
 /// the rig or the folder of the run is touched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error, miette::Diagnostic)]
 pub enum Unfinished {
-    /// The sweep ran, and its record could not be kept.
-    #[error("the sweep had begun, and what came of it could not be kept")]
+    /// The sweep ran, and its record could not be saved.
+    #[error("the sweep had begun, and its results could not be saved")]
     NotKept,
     /// A thread hangs or has panicked: a fault of this program.
-    #[error("the sweep had begun; the instruments' own watchdogs switch off; what was measured is kept")]
+    #[error("the sweep had begun; the instruments' own watchdogs switch off; what was measured is saved")]
     Internal,
     /// A signal ended it.
     #[error("stopped by a signal")]
@@ -182,10 +182,10 @@ pub enum Unfinished {
     NotOff,
 }
 
-/// What a run looks at while it goes on: what was asked of it from outside.
+/// The requests to a run from outside.
 #[derive(Clone, Debug, Default)]
 pub struct Signals {
-    /// How often a stop was asked for: SIGINT, SIGTERM, SIGHUP, or somebody who watches.
+    /// Number of stop requests: SIGINT, SIGTERM, SIGHUP, or somebody who watches.
     pub stops: Arc<AtomicUsize>,
     /// Whether the sweep is to rest before its next pass. In virtual time nothing waits.
     pub paused: Arc<AtomicBool>,

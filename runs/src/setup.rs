@@ -114,7 +114,7 @@ pub struct Pace {
     pub rate_hz: f64,
     /// SCHED_FIFO priority to ask for, 1 to 98; 0 asks for none.
     pub priority: i32,
-    /// CPU to run on and no other: for one that is kept free of other work.
+    /// CPU to run on and no other: for one that is free of other work.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cpu: Option<usize>,
     /// Keeps CPUs out of deep sleep while the loop runs, for some watts. Left out: with real instruments, and not on a virtual rig.
@@ -201,7 +201,7 @@ impl Guards {
     }
 }
 
-/// What is said where a person's fingertip is named and nobody is there.
+/// The warning if a person's fingertip is named and nobody is there.
 pub const NOBODY: &str = "nobody touches the plate (stated in the setup): the guards for a finger are off";
 
 const fn default_estimate() -> EstimateConfig {

@@ -1,8 +1,8 @@
-//! The one supervisor of the loop: whoever drives a rig, in wall-clock or in virtual time, drives it from here.
+//! The only supervisor of the loop: rigs in wall-clock and in virtual time are driven from here.
 //!
-//! A supervisor owns ports, queue, lifeline, rings and links. Whatever ends it (an orderly end, an error, a panic, a signal)
-//! the stop goes to the loop first, then the links switch off and read back. 'The drive is off' is said only of what was read
-//! back off.
+//! A supervisor owns ports, queue, lifeline, rings and links. Whatever ends it (an orderly end, an error, a
+//! panic, a signal), the stop goes to the loop first, then the links switch off and read back. Only a drive
+//! that was read back off is reported as off.
 
 mod virtual_time;
 
@@ -14,7 +14,7 @@ use realtime::cycle::Command;
 use realtime::turn::Row;
 use serde::{Deserialize, Serialize};
 
-/// What is said where the drive was not read back off.
+/// The warning if the drive was not read back off.
 pub const MAY_BE_ON: &str = "the output may still be on: switch the supply off";
 
 /// A loop at work, in whichever time it runs.
@@ -35,9 +35,9 @@ pub trait Loop {
 /// Why a sweep is to end before its plan does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// Somebody asked for it.
-    Asked,
-    /// What comes of it cannot be kept.
+    /// On request.
+    Requested,
+    /// The results cannot be saved.
     NotKept,
     /// What the finger is exposed to cannot be written.
     ExposureNotKept,
@@ -45,36 +45,36 @@ pub enum End {
 
 /// What whoever leads a sweep asks of it now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Asked {
+pub struct Requests {
     /// It is to end before its plan does.
     pub end: Option<End>,
     /// It is to rest before the next pass.
     pub pause: bool,
 }
 
-/// Feeds a sequence with the loop's rows and sends its commands, until it ends. `ask` says what is asked of the sweep; `each` takes
-/// every row with what it led to, after the commands have left.
+/// Feeds a sequence with the loop's rows and sends its commands, until it ends. `ask` returns the requests to
+/// the sweep; `each` takes every row with what it led to, after the commands have left.
 pub fn sweep(
     rig: &mut impl Loop,
     sequence: &mut Sequence,
-    ask: &mut dyn FnMut() -> Asked,
+    ask: &mut dyn FnMut() -> Requests,
     each: &mut dyn FnMut(&Row, &mut Sequence, Reaction),
 ) -> Outcome {
     let mut instead = None;
     loop {
-        let asked = ask();
-        if let Some(end) = asked.end {
+        let requests = ask();
+        if let Some(end) = requests.end {
             // Safe state first: the command goes out before anything else is looked at.
             rig.stop();
             sequence.stop();
             let why = match end {
-                End::Asked => None,
+                End::Requested => None,
                 End::NotKept => Some(Outcome::RecordLost),
                 End::ExposureNotKept => Some(Outcome::ExposureNotKept),
             };
             instead = instead.or(why);
         }
-        sequence.pause(asked.pause);
+        sequence.pause(requests.pause);
         let Some(row) = rig.next_row() else {
             if rig.is_lost() {
                 return Outcome::LoopLost;
@@ -145,7 +145,7 @@ impl OffReport {
         OffReport { read_back: not_read_back.is_empty(), not_read_back }
     }
 
-    /// What is to be said to whoever stands at the rig.
+    /// The message to whoever stands at the rig.
     #[must_use]
     pub fn words(&self) -> String {
         if self.read_back {

@@ -83,12 +83,12 @@ pub fn terminal(result: &Diagnosis) -> String {
         text.push_str(&format!("\nAt least {}; the rest is open\n", r.at_least.join(", ")));
     }
     let g = &r.gap;
-    let told = |rmse: Option<f64>| {
+    let share = |rmse: Option<f64>| {
         rmse.map_or_else(|| "- (the table is too short)".to_string(), |v| format!("{v:.4}"))
     };
     text.push_str(&format!(
         "\nGap on passes that were not fitted, as a share of full friction\n  nominal baseline      {}\n  recalibrated baseline {}\n  verdict's model       {}\n  repeatability         {}\n",
-        told(g.before_rmse), told(g.recalibrated_rmse), told(g.after_rmse), told(g.noise_floor_rmse)
+        share(g.before_rmse), share(g.recalibrated_rmse), share(g.after_rmse), share(g.noise_floor_rmse)
     ));
     if let (Some(s), Some([low, high])) = (g.shrinkage, g.shrinkage_ci95) {
         text.push_str(&format!(
@@ -101,11 +101,11 @@ pub fn terminal(result: &Diagnosis) -> String {
     }
     if !r.location.regions.is_empty() {
         text.push_str("\nWhere\n");
-        let told = r.location.regions.iter().filter(|g| g.share_of_gap >= 0.01).count().min(PARTS);
-        for region in r.location.regions.iter().take(told) {
+        let shown = r.location.regions.iter().filter(|g| g.share_of_gap >= 0.01).count().min(PARTS);
+        for region in r.location.regions.iter().take(shown) {
             text.push_str(&format!("  {}\n", region.text));
         }
-        let rest = r.location.regions.len() - told;
+        let rest = r.location.regions.len() - shown;
         if rest > 0 {
             text.push_str(&format!("  and {rest} more in the JSON document (--json)\n"));
         }
@@ -173,7 +173,7 @@ mod tests {
         let resolution = Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
         let points =
             plan.points(1, &Limits::paper(Nanos(1_000_000)), &resolution).expect("a plan within limits");
-        let mut asked: Vec<[f64; 4]> = points
+        let mut planned: Vec<[f64; 4]> = points
             .iter()
             .filter(|p| !p.reference)
             .map(|p| {
@@ -186,9 +186,9 @@ mod tests {
             .map(|c| [c.speed_m_s, c.direction.sign(), c.position_m, c.ambient_pressure_pa.unwrap_or(0.0)])
             .collect();
         let order = |a: &[f64; 4], b: &[f64; 4]| a.partial_cmp(b).expect("finite settings");
-        asked.sort_by(order);
+        planned.sort_by(order);
         wanted.sort_by(order);
-        assert_eq!(asked, wanted);
+        assert_eq!(planned, wanted);
         // Each pressure is set once.
         let mut pressures: Vec<_> = points.iter().map(|p| p.condition.ambient_pressure_pa).collect();
         pressures.dedup();

@@ -1,12 +1,12 @@
-//! What this program is: its version, the very build, and the models that it holds, so that two results can be said to come from the same.
+//! This program's version, its exact build, and the models that it holds, to trace results.
 
 use calibration::certificate::sha256_hex;
 use models::ridge::study::MODEL_VERSION;
 use models::surrogate::DEFAULT_TABLE;
 use serde::Serialize;
 
-/// The commit of a build that was told (`MUPRIME_COMMIT` when it was compiled, as `packaging/build` has it). A program that asked git itself would
-/// have to be compiled anew at every commit, or tell an old one.
+/// The commit of a build (`MUPRIME_COMMIT` when it was compiled, as `packaging/build` has it). A program that
+/// reads git itself would have to be compiled again at every commit, or show an old one.
 const COMMIT: Option<&str> = option_env!("MUPRIME_COMMIT");
 
 /// Version, build and models.
@@ -25,7 +25,7 @@ pub struct Version {
 pub struct Build {
     /// SHA-256 of the program's own file; `None` where it cannot be read.
     pub program_sha256: Option<String>,
-    /// The commit that it was told when it was compiled; `None` where it was told none.
+    /// The commit, given at compilation; `None` if none was given.
     pub commit: Option<&'static str>,
     /// Architecture, system and C library.
     pub target: String,
@@ -73,7 +73,7 @@ pub fn of_this_program(features: Vec<&'static str>) -> Version {
         version: env!("CARGO_PKG_VERSION"),
         build: Build {
             program_sha256: own.ok().map(|bytes| sha256_hex(&bytes)),
-            commit: COMMIT.filter(|told| !told.is_empty()),
+            commit: COMMIT.filter(|commit| !commit.is_empty()),
             target: format!("{}-{}{libc}", std::env::consts::ARCH, std::env::consts::OS),
             profile: if cfg!(debug_assertions) { "debug" } else { "release" },
             features,
@@ -91,7 +91,7 @@ impl Version {
             "muprime {}\nbuild    {}\n  commit   {}\n  target   {}, {}\n  features {features}\nmodels\n  ridge    version {}\n  surrogate {}\n  effects  {} of them, {}",
             self.version,
             build.program_sha256.as_deref().unwrap_or("the program's file cannot be read"),
-            build.commit.unwrap_or("not told (MUPRIME_COMMIT, when it was compiled)"),
+            build.commit.unwrap_or("unknown (set MUPRIME_COMMIT when compiling)"),
             build.target,
             build.profile,
             models.ridge_version,
@@ -108,13 +108,13 @@ mod tests {
 
     #[test]
     fn the_hashes_are_of_what_they_say() {
-        let told = of_this_program(Vec::new());
+        let program = of_this_program(Vec::new());
         let own = std::fs::read(std::env::current_exe().unwrap()).unwrap();
-        assert_eq!(told.build.program_sha256.as_deref(), Some(sha256_hex(&own).as_str()));
-        assert!(told.words().starts_with(concat!("muprime ", env!("CARGO_PKG_VERSION"), "\n")));
+        assert_eq!(program.build.program_sha256.as_deref(), Some(sha256_hex(&own).as_str()));
+        assert!(program.words().starts_with(concat!("muprime ", env!("CARGO_PKG_VERSION"), "\n")));
         // The surrogate is read from the very text that is hashed.
         let read = models::surrogate::Surrogate::from_text(DEFAULT_TABLE).unwrap();
         assert_eq!(read.inputs_hash, models::surrogate::Surrogate::shipped().unwrap().inputs_hash);
-        assert_eq!(told.models.effects, effects::library().len());
+        assert_eq!(program.models.effects, effects::library().len());
     }
 }

@@ -1,7 +1,7 @@
 //! How much faster than real time the virtual rig runs on one core, loop included, and what its parts cost.
 //!
-//! `cargo bench -p muprime-sim`: each item is a simulated second (or a cycle's solution); a second of the world in 1 ms is a
-//! factor of a thousand.
+//! `cargo bench -p muprime-sim`: each item is a simulated second (or a cycle's solution); a second of the
+//! world in 1 ms is a factor of a thousand.
 
 use divan::{Bencher, black_box};
 use models::quantity::PeakToPeak;

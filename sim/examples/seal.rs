@@ -1,7 +1,7 @@
 //! Writes sealed data sets: `cargo run --release -p muprime-sim --example seal -- FOLDER COUNT FIRST_SEED [STRATUM]`.
 //!
-//! `FOLDER/open/SEED/` holds what a diagnoser may read, `FOLDER/sealed/SEED/` what only the scorer may. The stratum is
-//! drawn from the seed unless one is named: none, single, pair, alias, outside.
+//! `FOLDER/open/SEED/` holds what a diagnoser may read, `FOLDER/sealed/SEED/` what only the scorer may. The
+//! stratum is drawn from the seed unless one is named: none, single, pair, alias, outside.
 #![allow(clippy::disallowed_methods, reason = "it says how long it took")]
 
 use std::path::Path;

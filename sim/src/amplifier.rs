@@ -1,8 +1,8 @@
 //! The ultrasonic amplifier: quantised set-points, an enable, a heartbeat watchdog of its own, a supply relay.
 //!
-//! The watchdog is the amplifier's: when no command with a new heartbeat has come for its timeout it switches the
-//! output off by itself and stays off until it is told off and on again. The supply relay is a second, independent
-//! way to switch off: it works even where the amplifier refuses its enable.
+//! The watchdog is the amplifier's: when no command with a new heartbeat has come for its timeout it switches
+//! the output off by itself and stays off until commanded off and on again. The supply relay is a second,
+//! independent way to switch off: it works even where the amplifier refuses its enable.
 
 use models::quantity::PeakToPeak;
 use realtime::ports::Nanos;
@@ -152,7 +152,7 @@ impl Amplifier {
         let frequency = if usable { input.frequency_hz } else { self.frequency_hz };
         (self.amplitude, self.frequency_hz) = Self::quantise(&self.config, wanted, frequency);
         if !input.enable {
-            // Told off: this is also what re-arms a tripped watchdog.
+            // 'Off': this also re-arms a tripped watchdog.
             self.watchdog_tripped = false;
             if !self.config.refuses_off {
                 self.output_on = false;

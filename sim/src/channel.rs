@@ -1,7 +1,7 @@
 //! The way from an instrument to its reader: latency, and what can be wrong with it.
 //!
-//! The vocabulary of faults is that of the wrappers around the loop's ports, which is PX4's: ok, off, stuck, garbage, wrong,
-//! slow, delayed, intermittent.
+//! The vocabulary of faults is that of the wrappers around the loop's ports, which is PX4's: ok, off, stuck,
+//! garbage, wrong, slow, delayed, intermittent.
 
 use std::collections::VecDeque;
 

@@ -7,8 +7,8 @@
 //!   the cycle's contact phase on a fine grid until it repeats.
 //! * [`resolved`]: a ridge with mass and damping, which flies, lands and sticks; marched through many cycles.
 //!
-//! [`Contact::steady`] picks the cheapest one that holds everything asked for. [`averaged`] keeps the resolved one
-//! affordable in a control loop.
+//! [`Contact::steady`] picks the cheapest one that holds everything requested. [`averaged`] keeps the
+//! resolved one affordable in a control loop.
 //!
 //! Sources: the paper's section 4 (a Coulombic slider on two springs), section 5.3 (finite lateral recovery).
 
@@ -138,8 +138,8 @@ pub struct Steady {
 
 /// Points over a slow modulation's period.
 const MODULATION_POINTS: usize = 6;
-/// Mid-points of seven equal shares of a mirrored gamma distribution of shape 2, mean 0 and deviation 1: heights of a worn bed of
-/// ridges.
+/// Mid-points of seven equal shares of a mirrored gamma distribution of shape 2, mean 0 and deviation 1:
+/// heights of a worn bed of ridges.
 const HEIGHTS: [f64; 7] = [-1.92261, -0.777237, -0.197039, 0.219217, 0.564011, 0.882609, 1.23105];
 
 impl Contact {

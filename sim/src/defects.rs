@@ -1,9 +1,9 @@
 //! What can be wrong with this world.
 //!
-//! A defect is a [`Kind`]: a name, a place, its parameters, and what it does at up to four points: to the world's
-//! set-up, to the plate's amplitude under the finger, to the contact, to the forces on their way to the sensor.
-//! Its formulae are this world's own. Where a library effect bears the same name, the cause is the same and the
-//! formula another.
+//! A defect is a [`Kind`]: a name, a place, its parameters, and what it does at up to four points: to the
+//! world's set-up, to the plate's amplitude under the finger, to the contact, to the forces on their way to
+//! the sensor. Its formulae are this world's own. Where a library effect bears the same name, the cause is
+//! the same and the formula another.
 //!
 //! To add one: a file in this folder with a `KIND`, and its line in the list below.
 
@@ -111,8 +111,8 @@ pub struct Kind {
     pub in_library: bool,
     /// Whether a table of steady passes can show it.
     pub in_tables: bool,
-    /// Whether another cause of the library does the same by construction (gains of stiffness, speed, amplitude; tilt
-    /// and cross-talk).
+    /// Whether another cause of the library does the same by construction (gains of stiffness, speed,
+    /// amplitude; tilt and cross-talk).
     pub imitated: bool,
     /// What it is, and its source.
     pub summary: &'static str,
@@ -137,7 +137,7 @@ impl Kind {
         values
     }
 
-    /// Sets its size to a share of its range: 0 the smallest, 1 the largest; a sign or a factor's side is kept.
+    /// Sets its size to a share of its range: 0 the smallest, 1 the largest; a sign or a factor's side stays.
     pub fn resize(&self, values: &mut Values, share: f64) {
         if let Some(size) = self.parameters.first() {
             values[0] = size.at(share, values[0]);

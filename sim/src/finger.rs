@@ -1,7 +1,7 @@
 //! The artificial fingertip: ridges on a soft pad.
 //!
-//! At ultrasonic frequencies the ridges stand on an immobile backing: normal and lateral springs, perhaps with
-//! mass and damping. At the stage's pace the pad is a soft lateral spring: a reversal first unwinds it.
+//! At ultrasonic frequencies the ridges stand on an immobile backing: normal and lateral springs, perhaps
+//! with mass and damping. At the stage's pace the pad is a soft lateral spring: a reversal first unwinds it.
 
 use serde::{Deserialize, Serialize};
 

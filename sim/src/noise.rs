@@ -1,5 +1,5 @@
-//! Randomness of the world: every body draws from a stream of its own, named, so that a change in one body leaves
-//! the others' draws where they were.
+//! Randomness of the world: every body draws from a stream of its own, named, so that a change in one body
+//! leaves the others' draws where they were.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,5 +1,5 @@
-//! The air around the rig and the chamber that changes it: a first-order lag towards a set-point, and a leak to the
-//! room outside.
+//! The air around the rig and the chamber that changes it: a first-order lag towards a set-point, and a leak
+//! to the room outside.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,9 +1,9 @@
 //! Sealed data sets: point tables whose cause is known to their label alone.
 //!
 //! [`generate`] makes one set from a seed and a [`Stratum`]: a design, a fingertip, perhaps a cause of a size drawn
-//! evenly in its logarithm through the limit of detection, forces from this world's own contact, and noise of its
-//! own. The set holds what a diagnoser may see (table, rig.toml, hidden conditions) apart from what only a scorer may
-//! (label and noise-free truth); [`Set::write`] puts them in two folders.
+//! evenly in its logarithm through the limit of detection, forces from this world's own contact, and noise of
+//! its own. The set holds what a diagnoser may see (table, rig.toml, hidden conditions) apart from what only
+//! a scorer may (label and noise-free truth); [`Set::write`] puts them in two folders.
 //!
 //! | room | purpose |
 //! |---|---|
@@ -115,8 +115,8 @@ pub struct Label {
     /// chi2 by which the truth is better than the recalibrated baseline, from noise-free forces. 30 and more:
     /// detectable.
     pub chi2_gain: f64,
-    /// Share of the recalibrated gap that the best single cause of the library leaves, its size, its shapes and the
-    /// stiffnesses sought for it alone; none but for detectable pairs of which it was asked.
+    /// Share of the recalibrated gap that the best single cause of the library leaves, its size, its shapes
+    /// and the stiffnesses sought for it alone; none but for detectable pairs for which it was computed.
     pub best_single_leaves: Option<f64>,
     /// Rms over the hidden passes of the nominal baseline's error over mu0 F.
     pub hidden_before_rmse: f64,
@@ -136,14 +136,14 @@ pub struct Label {
     pub design: Design,
     /// The causes, strongest first; none for `none`.
     pub causes: Vec<Cause>,
-    /// Best imitations by library causes, best first: of each cause while the others act beside it; for pairs of which
-    /// the best single leaves less than [`PAIR_LEAVES`], of both together. Empty where they were not asked for, and
-    /// where the gain is under [`DETECTABLE`].
+    /// Best imitations by library causes, best first: of each cause while the others act beside it; for pairs
+    /// of which the best single leaves less than [`PAIR_LEAVES`], of both together. Empty if they were not
+    /// requested, or if the gain is under [`DETECTABLE`].
     pub imitators: Vec<Imitator>,
 }
 
 impl Label {
-    /// Whether no other cause asked for imitates the truth, form uncertainty included.
+    /// Whether no other requested cause imitates the truth, form uncertainty included.
     pub fn decidable(&self) -> bool {
         !self.imitators.iter().any(|i| i.is_near())
     }
@@ -170,7 +170,7 @@ pub struct Set {
     pub label: Label,
 }
 
-/// How much the oracle is asked.
+/// What the oracle computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Ask {
     /// The gain of the truth over the recalibrated baseline.
@@ -184,7 +184,7 @@ pub enum Ask {
 
 /// chi2 by which the truth must beat the recalibrated baseline for a set to show its cause at all.
 pub const DETECTABLE: f64 = 30.0;
-/// Share of the gap that the best single cause must leave for both causes to be asked for.
+/// Share of the gap that the best single cause must leave for both causes to be requested.
 pub const PAIR_LEAVES: f64 = 0.25;
 /// Passes hidden for scoring.
 const HIDDEN: usize = 100;
@@ -200,8 +200,8 @@ pub struct SealedRig {
 }
 
 impl SealedRig {
-    /// Measures further passes in a new run, in the order given. Of a condition, `time_s` and `mu0` are not used: passes
-    /// follow each other at the set's pace.
+    /// Measures further passes in a new run, in the order given. Of a condition, `time_s` and `mu0` are not
+    /// used: passes follow each other at the set's pace.
     pub fn measure(&mut self, conditions: &[Condition]) -> Vec<Pass> {
         let planned: Vec<Planned> = conditions
             .iter()
@@ -247,7 +247,7 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
     let (best_single_leaves, imitators) = match ask {
         Ask::Gain => (None, Vec::new()),
         _ if gain < DETECTABLE || kinds.is_empty() => (None, Vec::new()),
-        _ => asked(&case, &defects.defects, &base, truth.chi2, ask == Ask::AllImitators),
+        _ => imitations(&case, &defects.defects, &base, truth.chi2, ask == Ask::AllImitators),
     };
 
     let seen_hidden = bench.circumstances(&hidden, false, &mut noise);
@@ -295,7 +295,7 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
 }
 
 /// What the best single cause leaves of a pair's gap, and every cause's imitators.
-fn asked(
+fn imitations(
     case: &Case<'_>,
     causes: &[Defect],
     base: &Fit,
@@ -306,7 +306,7 @@ fn asked(
     if causes.len() > 1 {
         let singles = case.imitators(causes, base, truth_chi2, whole);
         leaves = singles.first().map(|best| best.share_left.max(0.0));
-        // One cause all but explains the data: there is no pair to be told.
+        // One cause all but explains the data: there is no pair to find.
         if leaves.is_some_and(|share| share < PAIR_LEAVES) {
             return (leaves, singles);
         }

@@ -1,5 +1,5 @@
-//! The two-axis force sensor: cross-talk, bandwidth, noise, wander, gain, quantisation, latency, saturation, a
-//! sample counter and a clock of its own.
+//! The two-axis force sensor: cross-talk, bandwidth, noise, wander, gain, quantisation, latency, saturation,
+//! a sample counter and a clock of its own.
 
 use realtime::ports::Nanos;
 use serde::{Deserialize, Serialize};
@@ -41,8 +41,8 @@ impl Default for SensorConfig {
             latency_s: 5e-4,
             bandwidth_hz: 200.0,
             white_sd_n: [2e-3, 2e-3],
-            // Shorter than the time between passes: what rig.toml states of a pass's mean is independent from pass
-            // to pass. A zero that wanders over many passes is a defect, `lateral_offset_drift`.
+            // Shorter than the time between passes: what rig.toml states of a pass's mean is independent from
+            // pass to pass. A zero that wanders over many passes is a defect, `lateral_offset_drift`.
             wander_sd_n: [1.05e-3, 1.05e-3],
             wander_time_s: 0.1,
             gain: [1.0, 1.0],

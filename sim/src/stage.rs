@@ -1,5 +1,5 @@
-//! The stage: slides the plate under the finger with limited acceleration and travel, and presses the finger on
-//! with a force controller of its own.
+//! The stage: slides the plate under the finger with limited acceleration and travel, and presses the finger
+//! on with a force controller of its own.
 
 use realtime::ports::Nanos;
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
 //! The three ports of the loop on a world in this process, in virtual time.
 //!
-//! [`VirtualRig`] is all three ports on one world: nothing is shared, nothing locked. Where three separate ports are
-//! wanted, [`VirtualRig::split`] shares the world between them behind a mutex: for threads beside the loop, not
-//! for its real-time path. Each call first moves the world to the time it is given.
+//! [`VirtualRig`] is all three ports on one world: nothing is shared, nothing locked. Where three separate
+//! ports are wanted, [`VirtualRig::split`] shares the world between them behind a mutex: for threads beside
+//! the loop, not for its real-time path. Each call first moves the world to the time it is given.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

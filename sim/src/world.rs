@@ -1,11 +1,11 @@
 //! The world: fingertip, plate, amplifier, sensor and stage, stepped together in its own time.
 //!
-//! Time is a number handed in: [`World::advance_to`] steps to it in ticks. The same world runs in virtual time (the
-//! in-process ports of `virtual_rig`) and in wall-clock time (behind the protocols of `wire`). Same
+//! Time is a number handed in: [`World::advance_to`] steps to it in ticks. The same world runs in virtual
+//! time (the in-process ports of `virtual_rig`) and in wall-clock time (behind the protocols of `wire`). Same
 //! configuration, same seed, same inputs at the same times: same bytes.
 //!
-//! A tick, in order: the amplifier gives its drive, the plate follows, the stage slides and presses, the contact
-//! yields its friction, the pad passes it on, the sensor feels and samples, the channels deliver.
+//! A tick, in order: the amplifier gives its drive, the plate follows, the stage slides and presses, the
+//! contact yields its friction, the pad passes it on, the sensor feels and samples, the channels deliver.
 
 mod config;
 mod ridge_table;

@@ -3,8 +3,8 @@
 use muprime_sim::contact::resolved::March;
 use muprime_sim::contact::{Contact, Recovery};
 
-/// w/h, then mu' at Psi (Eq. 17) = 0.1, 0.25, 0.5, 1, 2, 3, 4.5, 2 pi: a massless time-domain computation that
-/// shares no code with this one.
+/// w/h, then mu' at Psi (Eq. 17) = 0.1, 0.25, 0.5, 1, 2, 3, 4.5, 2 pi: a massless time-domain computation
+/// that shares no code with this one.
 const TABLE: [(f64, [f64; 8]); 3] = [
     (4.0, [0.036, 0.088, 0.170, 0.317, 0.555, 0.735, 0.914, 1.000]),
     (8.0, [0.041, 0.099, 0.191, 0.354, 0.612, 0.793, 0.951, 1.000]),
@@ -61,9 +61,9 @@ fn without_vibration_friction_is_coulombs() {
 
 #[test]
 fn figure_13_and_14_recovery() {
-    // k_n 3.9, k_l 1.5 MN/m, U 20 mm/s, F_n 0.5 N, mu0 0.5. First with w = 5 um peak-to-peak, then with Eq. 14 read
-    // literally (5 um the sine's amplitude). The reference was marched with a coarse step: it is 2.6 % off its own
-    // limit where the curve is steepest (5 mm/s).
+    // k_n 3.9, k_l 1.5 MN/m, U 20 mm/s, F_n 0.5 N, mu0 0.5. First with w = 5 um peak-to-peak, then with Eq.
+    // 14 read literally (5 um the sine's amplitude). The reference was marched with a coarse step: it is 2.6
+    // % off its own limit where the curve is steepest (5 mm/s).
     for (amplitude, rows) in [
         (2.5e-6, [(1.5e-3, 0.979), (3e-3, 0.858), (5e-3, 0.494), (8e-3, 0.138), (f64::INFINITY, 0.136)]),
         (5e-6, [(1.5e-3, 0.957), (3e-3, 0.721), (5e-3, 0.086), (8e-3, 0.086), (f64::INFINITY, 0.086)]),
@@ -127,8 +127,8 @@ fn figure_13_friction_first_drops_and_then_climbs() {
 
 #[test]
 fn the_contact_period_doubles_at_large_amplitude() {
-    // The paper (section 5.1) and Dai et al. saw the contact period double at 2.5 um peak-to-peak; here a ridge of 4 mg on a
-    // springy skin does, and does not at 0.8 um.
+    // The paper (section 5.1) and Dai et al. saw the contact period double at 2.5 um peak-to-peak; here a
+    // ridge of 4 mg on a springy skin does, and does not at 0.8 um.
     let normal = |w: f64| {
         let mut contact = Contact::ideal(2e6, 0.75e6, 0.5, 0.25, 0.5 * w, 27_500.0, 0.02);
         contact.ridge.mass_kg = 4e-6;

@@ -59,7 +59,7 @@ impl Study {
     ///
     /// # Errors
     /// A study that is not whole.
-    pub fn whole(&self, out: &Path) -> miette::Result<Vec<(StudyPoint, store::Kept)>> {
+    pub fn whole(&self, out: &Path) -> miette::Result<Vec<(StudyPoint, store::StoredRun)>> {
         let (results, failed) = self.results(out)?;
         let points = self.points();
         let found: Vec<_> = points
@@ -120,12 +120,12 @@ pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Res
     let cases = moduli().flat_map(|e| FIG_4_AMPLITUDES_M.map(|w| at(e, w)));
     let (results, failed) = store::complete(&out.join("ridge.jsonl"), cases, &settings())?;
     let curve = |e: f64| -> Vec<(f64, f64)> {
-        let kept = FIG_4_AMPLITUDES_M.iter().filter_map(|w| {
+        let points = FIG_4_AMPLITUDES_M.iter().filter_map(|w| {
             let phase = results.get(&content_key(&at(e, *w), &settings()))?.phase_shift_deg?;
             // A lead of some degrees in full contact is drawn as such.
             Some((w * 1e6, if phase > 270.0 { phase - 360.0 } else { phase }))
         });
-        kept.collect()
+        points.collect()
     };
     // Where the curve passes levels of the way from contact to its plateau near 90.
     let crossing = |e: f64, level: f64| passing(&curve(e), level);

@@ -25,8 +25,8 @@ pub fn bar(length: u64, what: &str) -> ProgressBar {
     bar
 }
 
-/// On Ctrl-C the bar goes, `partial` says what there is so far (it gets the bar's position), and the program ends with [`INTERRUPTED`]. A second Ctrl-C waits for
-/// nothing.
+/// On Ctrl-C the bar goes, `partial` says what there is so far (it gets the bar's position), and the program
+/// ends with [`INTERRUPTED`]. A second Ctrl-C waits for nothing.
 ///
 /// # Errors
 /// The system gives no thread or no signals.
@@ -45,12 +45,12 @@ pub fn on_interrupt(bar: &ProgressBar, partial: impl FnOnce(u64) + Send + 'stati
                 let position = bar.position();
                 bar.finish_and_clear();
                 say!("stopped by Ctrl-C: what follows is partial");
-                // Saying it may take long, or fail: the next Ctrl-C does not wait for it.
-                let said = std::thread::Builder::new().name("partial".into()).spawn(move || {
+                // Printing it may take long, or fail: the next Ctrl-C does not wait for it.
+                let thread = std::thread::Builder::new().name("partial".into()).spawn(move || {
                     partial(position);
                     leave_now(INTERRUPTED);
                 });
-                if said.is_err() {
+                if thread.is_err() {
                     leave_now(INTERRUPTED);
                 }
             }
@@ -77,9 +77,9 @@ impl<T: Clone + Send + 'static> Study<T> {
         partial: impl FnOnce(Vec<T>, u64) + Send + 'static,
     ) -> miette::Result<Self> {
         let (bar, found) = (bar(parts, what), Arc::<Mutex<Vec<T>>>::default());
-        let kept = Arc::clone(&found);
+        let results = Arc::clone(&found);
         on_interrupt(&bar, move |done| {
-            let so_far = kept.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let so_far = results.lock().unwrap_or_else(PoisonError::into_inner).clone();
             partial(so_far, done);
         })?;
         Ok(Study { bar, found })

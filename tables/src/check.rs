@@ -159,20 +159,20 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
         _ => {}
     }
     let text = instead.map_or_else(|| text_of(name), Ok)?;
-    let mut said = Vec::new();
+    let mut remarks = Vec::new();
     match kind {
         "profile" => {
-            let told = |problem: String| miette::miette!("{problem}");
+            let refused = |problem: String| miette::miette!("{problem}");
             if path.exists() {
-                runs::rehearsal::of(path).map_err(told)?;
+                runs::rehearsal::of(path).map_err(refused)?;
             } else {
-                drivers::profile(name).map_err(|e| told(e.to_string()))?;
+                drivers::profile(name).map_err(|e| refused(e.to_string()))?;
             }
         }
         "setup" => {
             let setup = Setup::parse(name, &text, folder)?;
             complete(&setup)?;
-            said = finger_remarks(&[
+            remarks = finger_remarks(&[
                 ("normal_stiffness_n_per_m", setup.tip.finger.normal_stiffness_n_per_m),
                 ("lateral_stiffness_n_per_m", setup.tip.finger.lateral_stiffness_n_per_m),
                 ("force_sd_n", setup.file.noise.force_sd_n),
@@ -228,7 +228,7 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
                 wrong.add(&place, problem, meant);
             }
             wrong.end()?;
-            said = finger_remarks(&[
+            remarks = finger_remarks(&[
                 ("normal_stiffness_n_per_m", tip.finger.normal_stiffness_n_per_m),
                 ("lateral_stiffness_n_per_m", tip.finger.lateral_stiffness_n_per_m),
                 ("young_modulus_pa", tip.finger.young_modulus_pa.unwrap_or(1e6)),
@@ -240,7 +240,7 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
         }
         _ => {
             let rig = runs::input::rig_text(name, &text)?;
-            said = finger_remarks(&[
+            remarks = finger_remarks(&[
                 ("normal_stiffness_n_per_m", rig.finger.normal_stiffness_n_per_m),
                 ("lateral_stiffness_n_per_m", rig.finger.lateral_stiffness_n_per_m),
                 ("young_modulus_pa", rig.finger.young_modulus_pa.unwrap_or(1e6)),
@@ -248,7 +248,7 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
             ]);
         }
     }
-    Ok(Good { remarks: said, ..good })
+    Ok(Good { remarks, ..good })
 }
 
 fn finger_remarks(values: &[(&str, f64)]) -> Vec<String> {
@@ -282,8 +282,8 @@ fn complete(setup: &Setup) -> miette::Result<()> {
     wrong.end()
 }
 
-/// Everything that a run looks at in a plan before it touches rig or folder; the lateral channel's noise in N, where it was found.
-/// Returns the number of passes.
+/// Everything that a run looks at in a plan before it touches rig or folder; the lateral channel's noise in
+/// N, where it was found. Returns the number of passes.
 ///
 /// # Errors
 /// What the run would refuse.

@@ -1,7 +1,7 @@
 //! Conversions of a run for other programs. Each is made beside its goal, synced and moved there: never half a file.
 //!
-//! All but CSV carry what the numbers are: the unit and the meaning of every column or topic, and the facts of the run
-//! ([`facts`]): operator, sample, instruments, certificates, versions, seed, licence.
+//! All but CSV carry what the numbers are: the unit and the meaning of every column or topic, and the facts
+//! of the run ([`facts`]): operator, sample, instruments, certificates, versions, seed, licence.
 
 #[cfg(feature = "arrow")]
 mod arrow;
@@ -62,7 +62,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Name of the file, unless another is asked for.
+    /// Default name of the file.
     pub const fn file(self) -> &'static str {
         match self {
             Format::Csv => "passes.csv",
@@ -91,12 +91,12 @@ pub fn arrow_bytes(run: &RunData) -> miette::Result<Vec<u8>> {
     arrow::bytes(&columns::of(&run.passes), &facts::of(run, &facts::Stated::default()))
 }
 
-/// Exports the run in `folder` and returns where it stands: `to`, or the format's own name in the folder. A licence
-/// that is stated now stands in place of the one that the run was made with.
+/// Exports the run in `folder` and returns where it stands: `to`, or the format's own name in the folder. A
+/// licence that is stated now stands in place of the one that the run was made with.
 ///
 /// # Errors
-/// Whatever the file system or the format's library says; a crate of a run without a licence, or at another place than the
-/// run's folder.
+/// Whatever the file system or the format's library says; a crate of a run without a licence, or at another
+/// place than the run's folder.
 pub fn export(
     folder: &Path,
     run: &RunData,

@@ -1,5 +1,5 @@
-//! Foreign tables made into point tables: what is in them is found out or stated, every number is brought to SI once, and
-//! nothing is repaired, dropped or assumed without being told.
+//! Foreign tables made into point tables. Their contents are detected or stated, every number is converted to
+//! SI once, and every repair, omission and assumption is reported.
 
 #[cfg(feature = "matlab")]
 mod arrays;
@@ -34,7 +34,7 @@ use values::{Dropped, Values};
 
 pub use grid::Grid;
 pub use remarks::Range;
-pub use series::{Cut, Told};
+pub use series::{Counts, Cut};
 pub use text::Marks;
 
 /// Refuses: built without MAT and HDF5.
@@ -129,11 +129,11 @@ pub struct Log {
 /// How a series was cut, and what became of its samples.
 #[derive(Clone, Debug, Serialize)]
 pub struct SeriesLog {
-    /// As it was asked for.
+    /// The requested cut.
     pub cut: Cut,
-    /// What became of it.
+    /// The counts of its samples.
     #[serde(flatten)]
-    pub told: Told,
+    pub counts: Counts,
 }
 
 /// What an import makes.
@@ -178,8 +178,8 @@ pub fn parquet_as_csv(path: &Path) -> miette::Result<String> {
     .csv()
 }
 
-/// Cells that a source of so many bytes can hold in earnest: what says more is damaged or hostile, and is refused before
-/// memory is taken for it.
+/// Cells that a source of so many bytes can hold in earnest: what says more is damaged or hostile, and is
+/// refused before memory is taken for it.
 #[cfg(any(feature = "arrow", feature = "excel", feature = "matlab", feature = "parquet"))]
 pub(crate) const fn most_cells(bytes: usize) -> usize {
     4 * bytes + 1_000_000
@@ -271,8 +271,8 @@ fn read_known(
 /// Makes a point table of a source.
 ///
 /// # Errors
-/// Columns that are missing or given twice, all at once; fewer than half of the rows that can be taken; a series without steady
-/// stretches. Nothing is written.
+/// Columns that are missing or given twice, all at once; fewer than half of the rows that can be taken; a
+/// series without steady stretches. Nothing is written.
 pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> miette::Result<Imported> {
     let map = &wanted.map;
     let lacks = map.lacks(wanted.series.is_some());
@@ -302,9 +302,9 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
     }
     let clocks = match map.columns.iter().find(|c| c.target == Id::Time as usize) {
         Some(column) => {
-            let (times, said) = clock::times(grid, column.index, &column.unit_text)
+            let (times, remarks) = clock::times(grid, column.index, &column.unit_text)
                 .map_err(|e| miette::miette!("{source}: {e}"))?;
-            notes.extend(said);
+            notes.extend(remarks);
             times
         }
         None => Vec::new(),
@@ -339,10 +339,10 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
     if let Some(cut) = wanted.series {
         let twice = series::last_twice(&mut values);
         dropped.extend(twice);
-        let (passes, of_each, told) =
+        let (passes, of_each, counts) =
             series::cut(&values, &cut).map_err(|e| miette::miette!("{source}: {e}"))?;
         (values, spreads) = (passes, of_each);
-        series = Some(SeriesLog { cut, told });
+        series = Some(SeriesLog { cut, counts });
     }
     let states_frequency = map.has(Id::Frequency);
     if !states_frequency && values.iter().any(|v| v.amplitude().is_some_and(|a| a > 0.0)) {
@@ -467,7 +467,7 @@ fn mostly_dropped(
         }
     }
     reasons.sort_by_key(|(_, n, _)| std::cmp::Reverse(*n));
-    let told: Vec<String> = reasons
+    let list: Vec<String> = reasons
         .iter()
         .take(4)
         .map(|(what, n, first)| format!("{n} rows: {what} (first in row {}: '{}')", first.row, first.text))
@@ -483,7 +483,7 @@ fn mostly_dropped(
     } else {
         "look at the map and its units".to_string()
     };
-    miette::miette!(help = help, "{source}: {passes} passes of {rows} rows can be taken\n{}", told.join("\n"))
+    miette::miette!(help = help, "{source}: {passes} passes of {rows} rows can be taken\n{}", list.join("\n"))
 }
 
 /// The map that the headers suggest, as text for people and whether anything was assumed.

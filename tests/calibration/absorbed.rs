@@ -1,6 +1,6 @@
-//! An amplitude certificate that is wrong by a factor: what the verdict says of it, by the size of the factor. Only the
-//! group `k_n w` enters the model, so a normal stiffness of that factor imitates it exactly; what is told is told
-//! because the finger's own calibration (5 %) does not let the stiffness go so far.
+//! An amplitude certificate that is wrong by a factor: what the verdict says of it, by the size of the
+//! factor. Only the group `k_n w` enters the model, so a normal stiffness of that factor imitates it exactly;
+//! what is told is told because the finger's own calibration (5 %) does not let the stiffness go so far.
 
 use crate::closing::muprime;
 use sim::noise::Noise;

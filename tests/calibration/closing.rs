@@ -172,8 +172,8 @@ fn guided_at_the_terminal_a_series_gives_a_certificate() {
     child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
     let guided = child.wait_with_output().unwrap();
     assert!(guided.status.success(), "{}", tests::texts(&guided).1);
-    let kept = std::fs::read_to_string(folder.path().join("guided.csv")).unwrap();
-    assert_eq!(kept.lines().count(), text.lines().count(), "the series is kept beside the certificate");
+    let saved = std::fs::read_to_string(folder.path().join("guided.csv")).unwrap();
+    assert_eq!(saved.lines().count(), text.lines().count(), "the series is beside the certificate");
     let document = &tests::documents(&guided)[0];
     assert_eq!(document["serial"], "S");
     for channel in ["lateral", "normal"] {
@@ -209,13 +209,13 @@ fn a_series_in_two_sessions_is_one_series() {
         let done = guided.wait_with_output().unwrap();
         assert_eq!(done.status.success(), last, "{}", tests::texts(&done).1);
     }
-    let kept = std::fs::read_to_string(folder.path().join("weighed.csv")).unwrap();
+    let saved = std::fs::read_to_string(folder.path().join("weighed.csv")).unwrap();
     let counts = |line: &str| line.split(',').skip(1).take(4).map(String::from).collect::<Vec<_>>();
-    let kept: Vec<Vec<String>> = kept.lines().skip(1).map(counts).collect();
-    assert_eq!(kept.len(), rows.len());
-    for (kept, typed) in kept.iter().zip(&rows) {
-        assert_eq!(kept[0], typed[1]);
-        assert_eq!(kept[2].parse::<f64>().unwrap(), typed[3].parse::<f64>().unwrap());
+    let saved: Vec<Vec<String>> = saved.lines().skip(1).map(counts).collect();
+    assert_eq!(saved.len(), rows.len());
+    for (saved, typed) in saved.iter().zip(&rows) {
+        assert_eq!(saved[0], typed[1]);
+        assert_eq!(saved[2].parse::<f64>().unwrap(), typed[3].parse::<f64>().unwrap());
     }
     assert!(!folder.path().join("weighed.csv.part").exists() && folder.path().join("weighed.toml").exists());
 }

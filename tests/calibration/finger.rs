@@ -1,5 +1,5 @@
-//! Finger: friction without vibration of the virtual fingertip, its coefficient withheld; and the command of the
-//! inverse analysis on a file of phases made by another mesh and step.
+//! Finger: friction without vibration of the virtual fingertip, its coefficient withheld; and the command of
+//! the inverse analysis on a file of phases made by another mesh and step.
 
 use crate::bench::{Coverage, seed, trials};
 use crate::bound::{independent, jacobian};
@@ -91,8 +91,8 @@ fn a_contact_that_is_not_coulombic_is_seen() {
     assert!(exponent + 3.0 * u < 0.0 && exponent > -0.34, "{exponent} +- {u}");
 }
 
-/// Phases of elastic skin of 28.3 MPa on 800 elements with a step of its own, a deterministic scatter of about a
-/// degree and a half on each mean, as PHASES.csv has them.
+/// Phases of elastic skin of 28.3 MPa on 800 elements with a step of its own, a deterministic scatter of
+/// about a degree and a half on each mean, as PHASES.csv has them.
 fn phases_csv(conditions: [&str; 2]) -> String {
     let mut text = String::from("amplitude_pp_m,phase_shift_deg,phase_shift_sd_deg,repeats,condition\n");
     for (n, um) in [1.1, 1.3, 1.5, 1.8, 2.2, 2.6].into_iter().enumerate() {

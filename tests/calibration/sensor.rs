@@ -1,5 +1,5 @@
-//! The verbs for what a sensor is besides its matrix, on the example files of the documentation: what their first lines
-//! say they were made of must come back within four standard uncertainties.
+//! The verbs for what a sensor is besides its matrix, on the example files of the documentation: what their
+//! first lines say they were made of must come back within four standard uncertainties.
 
 fn certificate(verb: &str, more: &[&str]) -> serde_json::Value {
     let folder = tempfile::tempdir().unwrap();

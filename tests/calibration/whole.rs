@@ -171,8 +171,8 @@ fn a_certificate_holds_within_its_temperatures_only() {
     assert!(!at.join("c").exists(), "nothing was touched");
 }
 
-/// A certificate that holds at the bench's temperature but not at the amplifier's during the run: every pass says so, the
-/// report too, and the numbers are the same as without.
+/// A certificate that holds at the bench's temperature but not at the amplifier's during the run: every pass
+/// says so, the report too, and the numbers are the same as without.
 #[test]
 fn a_temperature_beyond_the_certificate_flags_the_passes_and_corrects_nothing() {
     let folder = tempfile::tempdir().unwrap();

@@ -76,8 +76,8 @@ pub fn calls(text: &str) -> Vec<(usize, String)> {
     found
 }
 
-/// Whether a command takes a flag that its help does not show. Beside a flag that there is not, the program refuses and does nothing; it says which
-/// of the two it does not know.
+/// Whether a command takes a flag that its help does not show. Beside a flag that there is not, the program
+/// refuses and does nothing; it says which of the two it does not know.
 fn hidden(name: &str, flag: &str) -> bool {
     let output = muprime().args(name.split(' ')).args([flag, "--no-such-flag"]).output().unwrap();
     let said = texts(&output).1;

@@ -1,5 +1,5 @@
-//! Decoders of every bus, and the descriptions that they are built from. What stands here is held of any input, by the
-//! mutations of `tests/fuzz.rs` and by the coverage-guided targets in `fuzz/`.
+//! Decoders of every bus, and the descriptions that they are built from. What stands here is held of any
+//! input, by the mutations of `tests/fuzz.rs` and by the coverage-guided targets in `fuzz/`.
 
 use super::Chance;
 use instruments::Profile;

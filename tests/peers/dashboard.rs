@@ -1,8 +1,8 @@
 //! The dashboard, with the real program, a real Chromium, and an attacker.
 //!
-//! Where only what is shown matters, the run is one in virtual time whose news are held back to the pace of a clock: no busy machine trips it.
-//! `MUPRIME_PAGES=FOLDER` keeps the pictures there; `MUPRIME_DASHBOARD_SOAK_S=449` makes the soak
-//! as long as that; the run takes some eight minutes.
+//! Where only what is shown matters, the run is one in virtual time whose news are held back to the pace of a
+//! clock: no busy machine trips it. `MUPRIME_PAGES=FOLDER` keeps the pictures there;
+//! `MUPRIME_DASHBOARD_SOAK_S=449` makes the soak as long as that; the run takes some eight minutes.
 
 use rig::live::{Ended, Feed, Run};
 use runs::plan::Plan;

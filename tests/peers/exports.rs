@@ -52,8 +52,8 @@ fn the_record_describes_itself() {
     assert_eq!(found["messages"]["/pass"], 22);
 }
 
-/// The flat topics hold what the record holds, with a unit each; the layouts show topics that there are; ten lines of Python draw
-/// every one.
+/// The flat topics hold what the record holds, with a unit each; the layouts show topics that there are; ten
+/// lines of Python draw every one.
 #[test]
 fn viewers_plot_a_run_at_once() {
     let folder = tempfile::tempdir().unwrap();

@@ -18,8 +18,8 @@ fn look(at: &std::path::Path) -> Value {
     serde_json::from_slice(&seen.stdout).unwrap()
 }
 
-/// One page of one or two columns' width; every word of the SVG is text in the PDF; axis titles with units; the parametric study's five
-/// panels stand in one figure, and what the paper states is marked.
+/// One page of one or two columns' width; every word of the SVG is text in the PDF; axis titles with units;
+/// the parametric study's five panels stand in one figure, and what the paper states is marked.
 #[test]
 fn figures_are_as_a_journal_prints_them() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Files as other people's programs write them: the small cases of `tests/foreign/`, each with its right value or refusal, and one truth in
-//! many dialects. A wrong value is never right; a refusal may be.
+//! Files as other people's programs write them: the small cases of `tests/foreign/`, each with its right
+//! value or refusal, and one truth in many dialects. A wrong value is never right; a refusal may be.
 
 #[path = "foreign/bus.rs"]
 mod bus;

@@ -41,8 +41,8 @@ fn until(what: &str, mut done: impl FnMut() -> bool) {
     }
 }
 
-/// Somebody has taken the place where the run tells, says nothing and does nothing. A stop is then sent to the process that leads the run,
-/// and is answered when that shows it.
+/// Somebody has taken the place where the run tells, says nothing and does nothing. A stop is then sent to
+/// the process that leads the run, and is answered when that shows it.
 #[test]
 fn a_stop_that_nobody_heard_goes_to_the_process() {
     let folder = tempfile::tempdir().unwrap();
@@ -68,8 +68,8 @@ fn a_stop_by_the_feed_is_answered_when_the_run_shows_it() {
     assert!(summary.contains("\"stopped\"") || summary.contains("\"tripped\""), "{summary}");
 }
 
-/// Another user's process in the place of the run: not believed, whatever it tells. Only root can play another user; anybody else shows here
-/// that a process of their own is believed.
+/// Another user's process in the place of the run: not believed, whatever it tells. Only root can play
+/// another user; anybody else shows here that a process of their own is believed.
 #[test]
 fn another_users_process_is_no_run() {
     let folder = tempfile::tempdir().unwrap();

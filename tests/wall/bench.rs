@@ -101,8 +101,8 @@ fn serve_at(host: &str, bench: &Bench, units: &[(u8, &str)], epoch: Instant) -> 
     ModbusTcpServer::start(format!("{host}:0").parse().unwrap(), devices, plant).unwrap()
 }
 
-/// The whole virtual bench on a loopback address of its own. A link whose server has ended goes on looking for it, and sends
-/// 'off' first: on a shared address the port may be this server's by then.
+/// The whole virtual bench on a loopback address of its own. A link whose server has ended goes on looking
+/// for it, and sends 'off' first: on a shared address the port may be this server's by then.
 pub fn serve_apart(bench: &Bench, epoch: Instant) -> ModbusTcpServer {
     static COUNT: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
     let n = COUNT.fetch_add(1, std::sync::atomic::Ordering::Relaxed);

@@ -99,8 +99,8 @@ fn forces_over_socketcan() {
 fn can_utils_hear_and_are_heard() {
     let candump =
         Command::new("candump").args(["-L", "-n", "2", "vcan1"]).stdout(Stdio::piped()).spawn().unwrap();
-    // Not a pause, nor a wait that sleeps: a guest whose clock counts instructions leaps over it, while candump is
-    // still being read from the disk.
+    // Not a pause, nor a wait that sleeps: a guest whose clock counts instructions leaps over it, while
+    // candump is still being read from the disk.
     let began = Instant::now();
     let listens = |all: String| all.lines().any(|line| line.trim_start().starts_with("vcan1"));
     while !listens(std::fs::read_to_string("/proc/net/can/rcvlist_all").unwrap()) {
@@ -238,8 +238,8 @@ fn a_bus_full_of_others_frames_holds_nothing_up() {
     assert!(sent > 200, "{sent}");
 }
 
-/// A drive was enabled when its bus went off, by a command that is still valid: after the bus is back not one frame
-/// of set-points may leave until the loop gives a new command.
+/// A drive was enabled when its bus went off, by a command that is still valid: after the bus is back not one
+/// frame of set-points may leave until the loop gives a new command.
 #[test]
 #[ignore = "needs the guest kernel"]
 fn no_command_from_before_a_bus_off_leaves_after_it() {

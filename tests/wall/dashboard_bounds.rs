@@ -1,4 +1,4 @@
-//! Clients that hold a dashboard's places without taking what they asked for, or without ending what they say, are let go.
+//! Clients that hold a dashboard's places without reading answers or ending requests are disconnected.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;

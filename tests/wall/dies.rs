@@ -148,8 +148,8 @@ impl Drop for Sweep {
     }
 }
 
-/// For how long the output was on after a strike, by the emulator's clock in s; none where it stayed on for a second
-/// and more. With the events of the record.
+/// For how long the output was on after a strike, by the emulator's clock in s; none where it stayed on for a
+/// second and more. With the events of the record.
 type Struck = (Option<f64>, Vec<String>);
 
 /// One strike. A sweep that trips before it, on a machine that others use, is no strike.

@@ -1,5 +1,5 @@
-//! The disk fails: a file size limit in the middle of a sweep stops it in order, the loop never notices, and what was
-//! acknowledged is kept.
+//! The disk fails: a file size limit in the middle of a sweep stops it in order, the loop never notices, and
+//! what was acknowledged is kept.
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! The end of a run, with the real program as one process and its rig as another: an amplifier that refuses 'off', a second signal
-//! while 'off' is still owed, a standard error that nobody reads any more.
+//! The end of a run, with the real program as one process and its rig as another: an amplifier that refuses
+//! 'off', a second signal while 'off' is still owed, a standard error that nobody reads any more.
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -154,8 +154,8 @@ fn two_interrupts_at_once_switch_off() {
     });
 }
 
-/// `muprime run ... 2>&1 | head -1`: nobody reads what is said any more. The sweep is led and recorded as before; an interrupt then
-/// ends it as it does any other.
+/// `muprime run ... 2>&1 | head -1`: nobody reads what is said any more. The sweep is led and recorded as
+/// before; an interrupt then ends it as it does any other.
 #[test]
 fn a_sweep_whose_standard_error_is_gone_is_stopped_and_kept_whole() {
     wall::outcome_alone(|| {

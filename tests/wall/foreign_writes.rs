@@ -1,6 +1,6 @@
-//! Somebody else writes to an instrument: its set-point is another than the one that was commanded. On every bundled profile that
-//! takes set-points, for each of them: the rig trips within the stated time, or it is said here, and in docs/devices.md, that nothing
-//! shows it.
+//! Somebody else writes to an instrument: its set-point is another than the one that was commanded. On every
+//! bundled profile that takes set-points, for each of them: the rig trips within the stated time, or it is
+//! said here, and in docs/devices.md, that nothing shows it.
 
 use models::quantity::PeakToPeak;
 use realtime::cycle::{Command, Marker};

@@ -40,8 +40,8 @@ struct Struck {
 /// Sweeps in wall-clock time that are tried on a machine that others use too.
 const ATTEMPTS: u32 = 8;
 
-/// Whether a sweep was refused or cut short as a busy machine does it: an instrument of this very process answered too late, or
-/// the loop ran too late. What is judged here is what is kept, not the loop.
+/// Whether a sweep was refused or cut short as a busy machine does it: an instrument of this very process
+/// answered too late, or the loop ran too late. What is judged here is what is kept, not the loop.
 fn too_busy(status: Option<i32>, outcome: &serde_json::Value, stderr: &str) -> bool {
     outcome == "tripped"
         || outcome == "would_not_arm"

@@ -1,5 +1,5 @@
-//! Real `kill -9`s of a real `muprime run` over Modbus TCP, at random instants: no acknowledged pass is lost, every file
-//! reads, and the amplifier's own watchdog drops the drive in time by the amplifier's own clock.
+//! Real `kill -9`s of a real `muprime run` over Modbus TCP, at random instants: no acknowledged pass is lost,
+//! every file reads, and the amplifier's own watchdog drops the drive in time by the amplifier's own clock.
 //!
 //! Thirty kills by default; `MUPRIME_KILLS=1000 cargo test --release -p muprime-tests-wall --test kills -- --nocapture` makes a thousand.
 
@@ -17,8 +17,8 @@ use std::time::{Duration, Instant};
 use tests::muprime;
 use tests::served::{self, AmplifierWatch};
 
-/// Watches the amplifier after the controller's death; the longest time, by its clock, that it was seen on after the last
-/// new heartbeat, in us. `None`: it was off already.
+/// Watches the amplifier after the controller's death; the longest time, by its clock, that it was seen on
+/// after the last new heartbeat, in us. `None`: it was off already.
 fn alone(amplifier: &mut AmplifierWatch) -> Option<u32> {
     let began = Instant::now();
     let mut last = amplifier.read();

@@ -1,8 +1,8 @@
 //! 'Off' always leaves: the plate is driven, or the stage slides, behind a real link; the link is struck; the run ends. The
 //! instrument, in a process of its own, must be off within the stated time, and what is said of it must be true.
 //!
-//! `MUPRIME_OFF_SEEDS` faults are drawn for each rig (7 when it is not set: one of each kind). `MUPRIME_OFF_CASE` names one rig. No
-//! instrument here has a watchdog that would help.
+//! `MUPRIME_OFF_SEEDS` faults are drawn for each rig (7 when it is not set: one of each kind).
+//! `MUPRIME_OFF_CASE` names one rig. No instrument here has a watchdog that would help.
 
 #[path = "off_leaves/line.rs"]
 mod line;
@@ -29,8 +29,8 @@ use wall::Stopwatch;
 /// One at a time: two loops would take each other's processors.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// Beside the profile's own time limit: an answer that is waited for ([`drivers::off::OFF_ANSWER_MS`]), a new connection, and a
-/// busy machine.
+/// Beside the profile's own time limit: an answer that is waited for ([`drivers::off::OFF_ANSWER_MS`]), a new
+/// connection, and a busy machine.
 const BESIDE: Duration = Duration::from_millis(drivers::off::OFF_ANSWER_MS as u64 + 600);
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -143,9 +143,9 @@ fn thirty_passes(own: &[&'static str]) {
     }
     // What the machine holds up looks poor, and is: only beside a recorded stall is it looked at again.
     let doctor = || {
-        let witnesses = realtime::witness::Witnesses::start(realtime::pacing::monotonic_ns()).unwrap();
+        let monitor = realtime::stall_monitor::StallMonitor::start(realtime::pacing::monotonic_ns()).unwrap();
         let seen = muprime().args(["doctor", "--instruments-only", "--setup"]).arg(&setup).output().unwrap();
-        (seen, witnesses.finish().count)
+        (seen, monitor.finish().count)
     };
     let excused = |(seen, stalls): &(Output, _)| seen.status.code() != Some(0) && *stalls > 0;
     let looks = std::iter::repeat_with(doctor).take(4).find(|look| !excused(look));

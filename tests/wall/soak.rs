@@ -24,8 +24,8 @@ struct SessionSeen {
     summary: Summary,
 }
 
-/// Wall-clock time, real Modbus TCP, two processes. A trip needs a stall of the machine that a witness recorded; the sweep is
-/// then taken up again, as its user would.
+/// Wall-clock time, real Modbus TCP, two processes. A trip needs a stall of the machine that the monitor
+/// recorded; the sweep is then taken up again, as its user would.
 #[test]
 fn half_an_hour_over_the_wire_without_a_trip_that_the_machine_did_not_cause() {
     wall::in_wall_clock_time(|| {

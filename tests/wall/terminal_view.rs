@@ -240,8 +240,8 @@ fn one_key_stops_and_signals_give_the_terminal_back() {
     }
 }
 
-/// A terminal that nobody reads holds up its picture, and nothing else: every pass is made and the rig is off, while the program's last
-/// words wait.
+/// A terminal that nobody reads holds up its picture, and nothing else: every pass is made and the rig is
+/// off, while the program's last words wait.
 #[test]
 fn a_terminal_that_nobody_reads_holds_nothing_up() {
     unless_the_machine_stalls(|attempt| {

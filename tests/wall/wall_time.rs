@@ -1,14 +1,14 @@
 //! Judgements in wall-clock time on a machine that others use too.
 //!
 //! A shared machine takes a CPU away for many milliseconds, and the safety core then trips, as it must. Four rules keep that
-//! apart from a fault of the program. A trip is forgiven only beside a stall that a witness recorded, and the sweep is tried
+//! apart from a fault of the program. A trip is forgiven only beside a stall that the monitor recorded, and the sweep is tried
 //! again. A test that fails all the same beside a stall has shown nothing: it is run again in the guest kernel, whose clock
 //! counts instructions, so that nothing that the machine does is seen there, and that run decides. What cannot be decided
 //! beside a stall is counted in `target/tests-undecided.txt`: `tests/run` prints the count, and more than two fail. A failure
 //! without a recorded stall stands, and so does a wrong outcome of the safety tests: a drive that is on, a pass that is lost.
 
 use ::tests::{file, texts};
-use realtime::witness::Witnesses;
+use realtime::stall_monitor::StallMonitor;
 use std::any::Any;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -63,14 +63,14 @@ pub fn outcome_alone(test: impl FnOnce()) {
 /// A time that is judged by a bound, and what the machine did meanwhile.
 pub struct Stopwatch {
     began: Instant,
-    witnesses: Witnesses,
+    monitor: StallMonitor,
 }
 
 impl Stopwatch {
     /// Starts now.
     pub fn start() -> Self {
-        let witnesses = Witnesses::start(realtime::pacing::monotonic_ns()).expect("threads");
-        Stopwatch { began: Instant::now(), witnesses }
+        let monitor = StallMonitor::start(realtime::pacing::monotonic_ns()).expect("threads");
+        Stopwatch { began: Instant::now(), monitor }
     }
 
     /// The time since its start.
@@ -80,7 +80,7 @@ impl Stopwatch {
 
     /// Whether the machine stalled since its start.
     pub fn saw_a_stall(self) -> bool {
-        self.witnesses.finish().count > 0
+        self.monitor.finish().count > 0
     }
 
     /// Judges a bound. Missed beside a recorded stall it is counted as undecided.
@@ -88,7 +88,7 @@ impl Stopwatch {
     /// # Panics
     /// Where the bound was missed though the machine did not stall.
     pub fn judge(self, in_time: bool, what: &str) {
-        let stalls = self.witnesses.finish();
+        let stalls = self.monitor.finish();
         if in_time {
             return;
         }
@@ -107,9 +107,9 @@ impl Stopwatch {
 /// Where it fails without a recorded stall.
 pub fn again_beside_a_stall(test: impl Fn()) {
     for attempt in 1..=3 {
-        let witnesses = Witnesses::start(realtime::pacing::monotonic_ns()).expect("threads");
+        let monitor = StallMonitor::start(realtime::pacing::monotonic_ns()).expect("threads");
         let ended = failure_of(&test);
-        let seen = witnesses.finish();
+        let seen = monitor.finish();
         match ended {
             Ok(()) => return,
             Err(failed) if seen.count == 0 => resume_unwind(failed),
@@ -119,8 +119,8 @@ pub fn again_beside_a_stall(test: impl Fn()) {
     count_undecided("failed three times beside stalls of the machine");
 }
 
-/// Runs a test in wall-clock time: the body of a `#[test]`. Where it fails beside a stall of the machine it is run again in the
-/// guest kernel, and passes or fails there.
+/// Runs a test in wall-clock time: the body of a `#[test]`. Where it fails beside a stall of the machine it
+/// is run again in the guest kernel, and passes or fails there.
 ///
 /// # Panics
 /// Where the test fails without a recorded stall, or in the guest.
@@ -129,9 +129,9 @@ pub fn in_wall_clock_time<T: FnOnce()>(test: T) {
         return test();
     }
     let outside = GUEST.read().unwrap_or_else(PoisonError::into_inner);
-    let witnesses = Witnesses::start(realtime::pacing::monotonic_ns()).expect("threads");
+    let monitor = StallMonitor::start(realtime::pacing::monotonic_ns()).expect("threads");
     let ended = failure_of(test);
-    let seen = witnesses.finish();
+    let seen = monitor.finish();
     drop(outside);
     let Err(failed) = ended else { return };
     if seen.count == 0 {
@@ -170,9 +170,9 @@ pub fn in_wall_clock_time<T: FnOnce()>(test: T) {
 
 /// Runs a sweep in wall-clock time to its end, in a fresh folder for every attempt.
 ///
-/// A trip is accepted only if a witness recorded a stall of the machine in the 300 ms before it, and at most four times; any
-/// other trip fails. What ends otherwise is the caller's to judge. `sweep` makes the command for a folder. Returns the
-/// folder and output of the attempt that went through.
+/// A trip is accepted only if the monitor recorded a stall of the machine in the 300 ms before it, and at most
+/// four times; any other trip fails. What ends otherwise is the caller's to judge. `sweep` makes the command
+/// for a folder. Returns the folder and output of the attempt that went through.
 pub fn sweep_unless_the_machine_stalls(folder: &Path, sweep: impl Fn(&Path) -> Command) -> (PathBuf, Output) {
     for attempt in 1..=5 {
         let out = folder.join(format!("attempt-{attempt}"));
@@ -207,8 +207,8 @@ pub fn sweep_taken_up_again(out: &Path, sweep: impl Fn() -> Command) -> Output {
     undecided("sixteen times in a row a sweep was cut by stalls of the machine")
 }
 
-/// What cut a run that has ended: a trip with a recorded stall of the machine before it, or a rig that would not arm beside one, in words;
-/// `None` if neither did.
+/// What cut a run that has ended: a trip with a recorded stall of the machine before it, or a rig that would
+/// not arm beside one, in words; `None` if neither did.
 ///
 /// # Panics
 /// A trip without a stall, and a run without a summary.
@@ -216,7 +216,7 @@ pub fn cut_by_a_stall(out: &Path) -> Option<String> {
     let said = std::fs::read_to_string(out.join("summary.json"));
     let said = said.unwrap_or_else(|e| panic!("no summary in {}: {e}", out.display()));
     let summary: runs::session::Summary = serde_json::from_str(&said).unwrap();
-    let stalls = summary.stalls.expect("a run in wall-clock time has witnesses");
+    let stalls = summary.stalls.expect("a run in wall-clock time has a monitor");
     let trip = match summary.outcome {
         runs::sequence::Outcome::Tripped(trip) => trip,
         // The proof of the second channel has its own bounds in time, and ten seconds to go through.
@@ -239,8 +239,8 @@ pub fn cut_by_a_stall(out: &Path) -> Option<String> {
     Some(format!("{:?}, the machine stalled for {} ms", trip.cause, stall.lasted.0 / 1_000_000))
 }
 
-/// Tries again, eight times at most, where the machine stalled and the safety core tripped for it: the attempt then gives the
-/// folder of the run that was cut.
+/// Tries again, eight times at most, where the machine stalled and the safety core tripped for it: the
+/// attempt then gives the folder of the run that was cut.
 ///
 /// # Panics
 /// Where something else than a stall cut it.
@@ -248,7 +248,7 @@ pub fn unless_the_machine_stalls(mut attempt: impl FnMut(u32) -> Option<PathBuf>
     for n in 1..=8 {
         let watch = Stopwatch::start();
         let Some(out) = attempt(n) else { return };
-        let seen = watch.witnesses.finish();
+        let seen = watch.monitor.finish();
         // Before there is a loop there is no summary: an answer stayed away while the rig was opened.
         let refused = || format!("refused beside {} stalls", seen.count);
         let why = if out.join("summary.json").exists() {

@@ -1,7 +1,7 @@
 //! Faults in wall-clock time: the rig in one process, its controller in another, Modbus TCP between them.
 //!
-//! Each trip must match what was injected, or a stall of the machine that a witness recorded (then the case is run again,
-//! seven times at most); reactions are judged on the virtual amplifier's own clock.
+//! Each trip must match what was injected, or a stall of the machine that the monitor recorded (then the case
+//! is run again, seven times at most); reactions are judged on the virtual amplifier's own clock.
 
 use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip};
@@ -19,8 +19,8 @@ use tests::{file, muprime, texts};
 const STRIKES_S: f64 = 3.0;
 /// How long it lasts: the amplifier can be asked again after it.
 const LASTS_S: f64 = 1.0;
-/// Of the loop: at 1 kHz a machine that takes a CPU away for some milliseconds at a time cuts one run after another. How soon each rule
-/// trips at 1 kHz is measured in virtual time (`tests/faults.rs`).
+/// Of the loop: at 1 kHz a machine that takes a CPU away for some milliseconds at a time cuts one run after
+/// another. How soon each rule trips at 1 kHz is measured in virtual time (`tests/faults.rs`).
 const CYCLE_MS: f64 = 4.0;
 /// Of a rule that counts cycles: the setup lets a tenth of them be missed without a trip.
 const CYCLES_MADE_UP: f64 = 1.1;
@@ -28,7 +28,7 @@ const CYCLES_MADE_UP: f64 = 1.1;
 const SILENT_MS: f64 = 45.0 + 3.0 * CYCLE_MS;
 /// Beside a rule's own time: two polls and a write (1 to 2 ms each), the state's period, the world's step, and the cycle that sees it.
 const ON_THE_WAY_MS: f64 = 10.0 + CYCLE_MS;
-/// What the machine may add unseen: six threads stand between a fault and the lamp, and a witness notes delays of 3 ms and
+/// What the machine may add unseen: six threads stand between a fault and the lamp, and the monitor notes delays of 3 ms and
 /// more. A case that is late by less is run again; one whose bound is wrong is late each time.
 const UNSEEN_MS: f64 = 6.0 * 3.0;
 /// The amplifier's own heartbeat timeout, the age of a state and the world's step.
@@ -197,7 +197,7 @@ impl Running {
     }
 }
 
-/// The longest stall that a witness recorded in the 300 ms before a time, in ms.
+/// The longest stall that the monitor recorded in the 300 ms before a time, in ms.
 fn stall_before(summary: &Summary, at: Nanos) -> Option<f64> {
     let before = Nanos(at.0.saturating_sub(300_000_000));
     summary.stalls.as_ref().unwrap().within(before, at).map(|s| s.lasted.seconds() * 1e3)
@@ -316,8 +316,8 @@ fn each_fault_of_a_channel_trips_with_its_cause_and_the_amplifier_is_off_in_time
     });
 }
 
-/// The controller stands still for half a second: the amplifier's own watchdog drops the output, and the controller's first
-/// cycle afterwards trips.
+/// The controller stands still for half a second: the amplifier's own watchdog drops the output, and the
+/// controller's first cycle afterwards trips.
 #[test]
 fn a_stopped_controller_is_outlived_by_the_amplifiers_watchdog_and_trips_when_it_goes_on() {
     wall::in_wall_clock_time(|| {

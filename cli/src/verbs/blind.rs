@@ -4,7 +4,7 @@ mod studies;
 
 use ::studies::progress::Study;
 use ::studies::validation::blind::distance::by_cause;
-use ::studies::validation::blind::reliability::{diagram, told};
+use ::studies::validation::blind::reliability::{diagram, identifiable};
 use ::studies::validation::blind::{Scored, confusion, figures, run as score_all};
 use diagnosis::constants::Constants;
 use diagnosis::hypotheses::Options;
@@ -117,8 +117,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(kind) = args.noise.as_deref() {
         return studies::rough(&args, kind, &options, json);
     }
-    if let Some(asked) = args.sensitivity.as_deref() {
-        return studies::sensitivity(&args, asked, stratum, &options, json);
+    if let Some(picked) = args.sensitivity.as_deref() {
+        return studies::sensitivity(&args, picked, stratum, &options, json);
     }
     let (seed, sets) = (args.seed, args.sets);
     let study = Study::begin(sets as u64, "sets", move |scored: Vec<Scored>, done| {
@@ -148,7 +148,7 @@ fn tell(scored: &[Scored], seed: u64, sets: usize, partial: bool, json: bool) ->
         let mut document = serde_json::json!({
             "schema": "muprime.blind/1", "seed": seed, "sets": sets,
             "figures": figures, "reliability": diagram(scored.iter()),
-            "reliability_of_what_can_be_told": diagram(scored.iter().filter(|s| told(s))),
+            "reliability_of_what_can_be_told": diagram(scored.iter().filter(|s| identifiable(s))),
             "distances": by_cause(scored), "confusion": confusion, "scored": scored,
         });
         if partial {
@@ -172,8 +172,8 @@ fn tell(scored: &[Scored], seed: u64, sets: usize, partial: bool, json: bool) ->
     for (cause, (distance, sets)) in by_cause(scored) {
         out!("  {cause:28} {distance:.3} ({sets})");
     }
-    let told_only = diagram(scored.iter().filter(|s| told(s)));
-    for (title, bins) in [("all sets", diagram(scored.iter())), ("what can be told", told_only)] {
+    let identifiable_only = diagram(scored.iter().filter(|s| identifiable(s)));
+    for (title, bins) in [("all sets", diagram(scored.iter())), ("identifiable sets", identifiable_only)] {
         out!("\nentries of the lists, {title}: stated probability, share that is right");
         for b in bins {
             let ([from, to], [low, high]) = (b.from_to, b.ci95);

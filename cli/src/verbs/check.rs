@@ -37,7 +37,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let among = args.files.iter().filter(|f| kind_of(f).is_ok_and(|k| k == "setup"));
     let setup = match (named, among.collect::<Vec<_>>().as_slice()) {
         (Some(setup), _) => Some(setup),
-        // One that is wrong is told of by itself.
+        // A wrong one is reported by itself.
         (None, [one]) => Setup::load(one).ok(),
         (None, _) => None,
     };
@@ -54,7 +54,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     for file in &args.files {
         let verdict = tables::check::file(file, &on);
         if json {
-            let said = match &verdict {
+            let document = match &verdict {
                 Ok(good) => serde_json::json!({
                     "file": file, "ok": true, "kind": good.kind, "passes": good.passes, "remarks": good.remarks,
                 }),
@@ -63,7 +63,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                     "help": e.help().map(|h| h.to_string()), "problems": problems_of(e),
                 }),
             };
-            out!("{said}");
+            out!("{document}");
         } else {
             match &verdict {
                 Ok(good) => {

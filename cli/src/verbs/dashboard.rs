@@ -26,7 +26,7 @@ pub struct Place {
     /// A further name that browsers ask for it by, with its port, as rig-1.lab:8417 (may be repeated)
     #[arg(long = "host", value_name = "NAME:PORT")]
     pub hosts: Vec<String>,
-    /// Runs may be paused and told to go on from a browser; a stop may always be asked for
+    /// Runs may be paused and resumed from a browser; a stop is always allowed
     #[arg(long)]
     pub allow_control: bool,
 }

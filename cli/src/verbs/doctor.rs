@@ -1,7 +1,7 @@
 //! `muprime doctor`: judges this machine truthfully, and talks to the instruments of a setup.
 
 use realtime::pacing;
-use rig::doctor::{Asked, Finding};
+use rig::doctor::{Finding, Target};
 use rig::emulators::Embedded;
 use runs::out;
 use runs::plan::Plan;
@@ -73,10 +73,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         if let Some(late) = &judgement.lateness_us {
             for (when, [p50, p99, p999, max]) in [("idle", late.idle), ("loaded", late.loaded)] {
-                let said = format!(
+                let line = format!(
                     "      lateness {when}: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us"
                 );
-                out!("{}", folded(&said, 2));
+                out!("{}", folded(&line, 2));
             }
         }
     }
@@ -240,7 +240,7 @@ fn talk(setup: &Setup, plan: Option<&Plan>) -> miette::Result<Vec<Finding>> {
         };
     }
     let look = rig::doctor::look(setup, &instruments);
-    let mut findings = rig::doctor::judge(&look, &Asked { setup, plan });
+    let mut findings = rig::doctor::judge(&look, &Target { setup, plan });
     if let Some(v) = &setup.file.vibrometer {
         let settings = drivers::vibrometer::settings(v);
         findings.push(Finding::new(

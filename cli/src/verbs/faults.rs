@@ -52,7 +52,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let (begun, cpu_ns) = (std::time::Instant::now(), realtime::pacing::process_cpu_ns());
     let bar = studies::progress::bar(seeds, "scenes");
     let so_far: Arc<Mutex<Tally>> = Arc::default();
-    let kept = Arc::clone(&so_far);
+    let shared = Arc::clone(&so_far);
     studies::progress::on_interrupt(&bar, move |_| {
         let tally = so_far.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if json {
@@ -71,7 +71,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     })?;
     let tally = search(Search { first, seeds, pairs, twice, pace }, |chunk| {
         bar.inc(chunk.scenes);
-        let mut so_far = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut so_far = shared.lock().unwrap_or_else(PoisonError::into_inner);
         *so_far = std::mem::take(&mut *so_far).with(chunk.clone());
     });
     bar.finish_and_clear();

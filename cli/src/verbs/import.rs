@@ -133,7 +133,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     log.notes.iter().for_each(|note| say!("note: {note}"));
     log.assumed.iter().for_each(|what| say!("assumed in rig.toml: {what}"));
     if let Some(series) = &log.series {
-        let t = &series.told;
+        let t = &series.counts;
         say!(
             "of {} samples {} are in passes; left out: {} of changing speed, load or vibration, {} at beginnings, {} in short stretches; {} reversals",
             t.samples,
@@ -204,7 +204,7 @@ fn map_of(args: &Args, grid: &Grid) -> miette::Result<Map> {
     }
     let lacks = map.lacks(args.series);
     if !lacks.is_empty() {
-        // Told by the import itself, with everything that is missing.
+        // The import itself reports everything that is missing.
         return Ok(map);
     }
     if std::io::stdin().is_terminal() && std::io::stderr().is_terminal() {

@@ -56,8 +56,8 @@ mod tests {
         let words = ["muprime", "model", "point", "--amplitude-pp-m", "2um", "--speed-m-s", "20mm/s"];
         assert!(crate::parsed(words.map(Into::into)).is_ok());
         let wrong = ["muprime", "model", "point", "--amplitude-pp-m", "2N"];
-        let said = crate::parsed(wrong.map(Into::into)).err().map(|e| e.to_string()).unwrap_or_default();
-        assert!(said.contains("write 2um"), "{said}");
+        let message = crate::parsed(wrong.map(Into::into)).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(message.contains("write 2um"), "{message}");
         with_units(crate::command()).debug_assert();
     }
 }

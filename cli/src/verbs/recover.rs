@@ -37,9 +37,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         Ok(Recovery::Rewritten { messages, found }) => {
             let original = put_in_place(file, &part)?;
             if json {
-                let said = serde_json::json!({ "recovered": true, "messages": messages, "original": original,
+                let document = serde_json::json!({ "recovered": true, "messages": messages, "original": original,
                     "damaged": found.damaged_places, "because": found.sentences().join("; "), "integrity": found });
-                out!("{said}");
+                out!("{document}");
             } else {
                 say!("{}: {messages} messages saved; the original is {}", shown(), original.display());
                 tell(&found);

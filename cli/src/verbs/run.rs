@@ -27,7 +27,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 /// Lines on standard error.
-macro_rules! told {
+macro_rules! report {
     ($($text:tt)*) => { say!("{}", fitted(format!($($text)*))) };
 }
 
@@ -125,7 +125,7 @@ impl Watching {
     fn begin(args: &mut Args, runs: &Path) -> miette::Result<Self> {
         if let Some(listen) = args.dashboard.take() {
             let place = Place { listen, hosts: Vec::new(), allow_control: args.allow_control };
-            told!("dashboard: {}", place.serve(runs.to_path_buf())?.link());
+            report!("dashboard: {}", place.serve(runs.to_path_buf())?.link());
         }
         Ok(Watching { tui: args.tui, broker: args.publish.clone() })
     }
@@ -160,7 +160,7 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
     let signals = Signals::default();
     watch_signals(&signals)?;
     let planned = job.points()?.len();
-    // Up before anything moves, and down before the summary is told. What is said meanwhile is held and said then.
+    // Up before anything moves, and down before the summary. Output in between is held and printed then.
     let watch = match tui {
         true => Some(Watch::begin(&job.out, Lead::Own(signals.clone()), job.setup.hand_at_key())?),
         false => None,
@@ -255,7 +255,7 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
     if let (Some(publisher), Some(broker)) = (publisher, &broker)
         && let Some(missing) = publisher.end()
     {
-        told!("{}:{}: {missing}", broker.host, broker.port);
+        report!("{}:{}: {missing}", broker.host, broker.port);
     }
     let summary = summary?;
     Ok(summary.outcome == Outcome::Complete && summary.off.read_back)
@@ -357,29 +357,29 @@ fn tell(summary: &Summary, json: bool) {
         return;
     }
     if !summary.off.read_back {
-        told!("{}", summary.off.words());
+        report!("{}", summary.off.words());
     }
     if summary.finished_before {
-        told!("this run is already complete; nothing was measured");
+        report!("this run is already complete; nothing was measured");
     }
-    told!("{} of {} passes", summary.passes, summary.planned);
+    report!("{} of {} passes", summary.passes, summary.planned);
     if let Some(report) = &summary.loop_report {
         let [p50, _, p99, _, max] = report.lateness_ns.map(|ns| ns as f64 / 1e3);
-        told!(
+        report!(
             "loop: {} cycles, lateness median {p50:.0} us, 99 % {p99:.0} us, worst {max:.0} us; {} overruns, {} rows lost; CPUs {}",
             report.cycles,
             report.overruns,
             summary.record_lost,
-            if report.grants.cpus_kept_awake { "kept out of deep sleep" } else { "allowed to sleep deeply" }
+            if report.grants.cpus_kept_awake { "without deep sleep" } else { "with deep sleep" }
         );
     }
     if let Some(held) = summary.held.filter(|held| held.share >= 0.01) {
-        told!("{held}");
+        report!("{held}");
     }
     if let (Outcome::Tripped(trip), Some(stalls)) = (&summary.outcome, &summary.stalls)
         && let Some(stall) = stalls.within(Nanos(trip.at.0.saturating_sub(100_000_000)), trip.at)
     {
-        told!(
+        report!(
             "the computer itself stalled for {:.0} ms just before; see 'muprime doctor'",
             stall.lasted.seconds() * 1e3
         );
@@ -387,17 +387,17 @@ fn tell(summary: &Summary, json: bool) {
     if let (Outcome::WouldNotArm { blocking: Some(cause) }, Some(remedy)) =
         (&summary.outcome, &summary.remedy)
     {
-        told!("the rig did not arm: {}\n  {remedy}", cause.words());
+        report!("the rig did not arm: {}\n  {remedy}", cause.words());
     }
     if summary.passes < summary.planned {
-        told!("to resume, repeat the command with --out {}", summary.folder.display());
+        report!("to resume, repeat the command with --out {}", summary.folder.display());
     }
-    told!("{}", summary.agreement);
+    report!("{}", summary.agreement);
     if let Some(psi_star) = summary.psi_star {
-        told!("{psi_star}");
+        report!("{psi_star}");
     }
     if summary.model_departed {
-        told!("next: muprime diagnose {}", summary.folder.display());
+        report!("next: muprime diagnose {}", summary.folder.display());
     }
-    told!("report: {}", summary.folder.join("report.html").display());
+    report!("report: {}", summary.folder.join("report.html").display());
 }

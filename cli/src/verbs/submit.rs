@@ -108,32 +108,32 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         python: args.python,
         options: args.option,
     };
-    let said = submit(&study, &options)?;
-    let whole = said.missing == 0 || options.detach;
+    let submitted = submit(&study, &options)?;
+    let whole = submitted.missing == 0 || options.detach;
     if json {
-        out!("{}", serde_json::to_string(&said).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&submitted).into_diagnostic()?);
     } else {
-        if let Some(pilot) = said.pilot {
+        if let Some(pilot) = submitted.pilot {
             say!(
                 "pilot: {:.3} s a case, the longest of {} {:.3} s; {} tasks of {} cases, {:.0} s each at most",
                 pilot.mean_s,
                 pilot.cases,
                 pilot.longest_s,
-                said.tasks,
-                said.cases_a_task,
-                said.limit_s
+                submitted.tasks,
+                submitted.cases_a_task,
+                submitted.limit_s
             );
         }
         out!(
             "{}: {} of {} cases have a result, {} of them from before; {:.1} s",
-            said.out.display(),
-            said.cases - said.missing,
-            said.cases,
-            said.there,
-            said.wall_seconds
+            submitted.out.display(),
+            submitted.cases - submitted.missing,
+            submitted.cases,
+            submitted.there,
+            submitted.wall_seconds
         );
         if !whole {
-            out!("what the tasks said: {}", said.out.join("jobs").display());
+            out!("output of the tasks: {}", submitted.out.join("jobs").display());
         }
     }
     exit(if whole { DONE } else { FAILED })

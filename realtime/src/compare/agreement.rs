@@ -1,8 +1,8 @@
-//! What may be said at the end: that model and measurement agree, that they part, or that there is too little to say.
+//! The conclusion at the end: model and measurement agree, they disagree, or there is too little to decide.
 //!
-//! That no alarm came is no evidence by itself: two passes raise none, and neither does a filter that takes up what it
-//! should judge. So agreement needs passes with vibration, a scatter of their residuals that is the stated one, and
-//! power: the departure of `mu'` that would have been seen must be small.
+//! That no alarm came is no evidence by itself: two passes raise none, and neither does a filter that takes
+//! up what it should judge. So agreement needs passes with vibration, a scatter of their residuals that is
+//! the stated one, and power: the departure of `mu'` that would have been seen must be small.
 
 use super::{ALARM_LEVEL, PassComparison};
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Passes with vibration that must have been judged.
 pub const ENOUGH_PASSES: u32 = 8;
 /// Departure of `mu'`, the same at all amplitudes, that must have been visible: the difference of two laws at
-/// `Psi = 1` is 0.2 (0.34 against 0.55), half of it is asked.
+/// `Psi = 1` is 0.2 (0.34 against 0.55), half of it must be visible.
 pub const VISIBLE_DEPARTURE: f64 = 0.1;
 /// Standard deviations of the root mean square residual that are borne above one.
 const SCATTER_BORNE: f64 = 3.0;
@@ -117,8 +117,8 @@ impl std::fmt::Display for Agreement {
     }
 }
 
-/// How a departure of `mu'` that is the same in all passes with vibration would show, carried through the filter: what
-/// the shared parameters take up of it is not seen.
+/// How a departure of `mu'` that is the same in all passes with vibration would show, carried through the
+/// filter: what the shared parameters take up of it is not seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Power {
     taken_up: [f64; 3],
@@ -128,8 +128,8 @@ pub(super) struct Power {
 }
 
 impl Power {
-    /// Takes a pass: the force of a unit departure in N, the slope of the prediction, the filter's gain and the
-    /// innovation's variance; `z` where the pass was judged with vibration.
+    /// Takes a pass: the force of a unit departure in N, the slope of the prediction, the filter's gain and
+    /// the innovation's variance; `z` where the pass was judged with vibration.
     pub(super) fn push(
         &mut self,
         unit_n: f64,

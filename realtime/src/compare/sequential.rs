@@ -1,10 +1,10 @@
 //! A test that may be read after every pass without inflating its false alarms.
 //!
-//! Each bet below is an e-process: a product of likelihood ratios against N(0, 1) whose expectation stays at most 1
-//! under the null hypothesis, at every time (Ville's inequality; Ramdas et al., 'Game-theoretic statistics and
-//! safe anytime-valid inference', Statistical Science 38(4), 2023). So is their average, and the chance that it
-//! ever reaches 1/alpha is at most alpha. Residuals beyond four standard deviations count as four: a single
-//! accident must not end the agreement, and capping a bet only lowers it.
+//! Each bet below is an e-process: a product of likelihood ratios against N(0, 1) whose expectation stays at
+//! most 1 under the null hypothesis, at every time (Ville's inequality; Ramdas et al., 'Game-theoretic
+//! statistics and safe anytime-valid inference', Statistical Science 38(4), 2023). So is their average, and
+//! the chance that it ever reaches 1/alpha is at most alpha. Residuals beyond four standard deviations count
+//! as four: a single accident must not end the agreement, and capping a bet only lowers it.
 
 use models::condition::Condition;
 

@@ -89,7 +89,7 @@ fn scatter_beyond_the_stated_noise_is_no_agreement() {
     assert!(!matches!(Agreement::of(passes.last(), true), Agreement::Agrees { .. }));
 }
 
-/// The departure that is said to be visible is seen nine times in ten; half of it much more rarely.
+/// The departure that is reported as visible is seen nine times in ten; half of it much more rarely.
 #[test]
 fn the_stated_power_is_what_simulated_departures_show() {
     let conditions = sweep(24);

@@ -1,11 +1,11 @@
-//! What the loop's thread asks of the machine, and the machine's clocks: scheduling, memory, CPUs, sleep.
+//! Requests of the loop's thread to the machine, and the machine's clocks: scheduling, memory, CPUs, sleep.
 //!
-//! Nothing here is needed for safety: what is not granted is told in [`Grants`], and a loop that is late for the lack of it
+//! Nothing here is needed for safety: [`Grants`] lists what was refused, and a loop that is late for it
 //! trips.
 
 use serde::{Deserialize, Serialize};
 
-/// What the thread asked of the machine and what it got, told truthfully.
+/// What the thread requested of the machine and what it got.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Grants {
     /// Scheduling policy as read back: `fifo`, `other`, or a number.
@@ -21,7 +21,7 @@ pub struct Grants {
     /// CPUs that the thread may run on, as read back; empty where it was not pinned.
     #[serde(default)]
     pub pinned_to: Vec<usize>,
-    /// Why it could not be pinned, or the CPUs kept awake.
+    /// Why it could not be pinned, or the CPUs could not stay awake.
     #[serde(default)]
     pub pace_refused: Option<String>,
     /// Whether deep sleep of the CPUs is held off.
@@ -34,7 +34,7 @@ pub struct Grants {
 pub struct Pacing {
     /// FIFO priority to ask for, with locked memory; `None` leaves scheduling and memory alone.
     pub priority: Option<i32>,
-    /// CPU to run on and no other. Worth it on a CPU that is kept free of other work; on a shared one it is worse.
+    /// CPU to run on and no other. Worth it on a CPU that is free of other work; on a shared one it is worse.
     pub cpu: Option<usize>,
     /// Keeps CPUs out of deep sleep (`/dev/cpu_dma_latency`): a shorter wake-up for some watts.
     pub keep_cpus_awake: bool,
@@ -70,7 +70,7 @@ pub(crate) fn sleep_until(absolute_ns: u64) {
         tv_sec: (absolute_ns / 1_000_000_000) as libc::time_t,
         tv_nsec: (absolute_ns % 1_000_000_000) as libc::c_long,
     };
-    // SAFETY: `t` is a valid timespec; no remainder is asked for with an absolute deadline, so null is allowed.
+    // SAFETY: `t` is a valid timespec; an absolute deadline has no remainder, so null is allowed.
     // A signal may end the sleep early: then sleep again until the same deadline.
     while unsafe {
         libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &t, std::ptr::null_mut())

@@ -22,7 +22,7 @@ use parts::touch_new_pages;
 
 const PERIOD: Nanos = Nanos(5_000_000);
 
-/// What the rig was told, and what it is to do.
+/// The commands that the rig got, and what it is to do.
 #[derive(Default)]
 struct Scene {
     /// Every drive command, as enable.
@@ -150,7 +150,7 @@ impl Running {
         Running { scene, queue, life, rows, thread }
     }
 
-    /// The first row that is as asked, within ten seconds.
+    /// The first row with that property, within ten seconds.
     fn until(&mut self, what: &str, mut is: impl FnMut(&Row) -> bool) -> Row {
         let end = monotonic_ns() + 10_000_000_000;
         while monotonic_ns() < end {
@@ -334,7 +334,7 @@ fn a_process_that_was_stopped_trips_first_thing() {
     signal(libc::SIGSTOP);
     sleep_until(monotonic_ns() + 500_000_000);
     signal(libc::SIGCONT);
-    let said = lines.find(|line| line.contains("tripped")).unwrap();
+    let line = lines.find(|line| line.contains("tripped")).unwrap();
     child.wait().unwrap();
-    assert!(said.contains("tripped Suspended 0"), "{said}");
+    assert!(line.contains("tripped Suspended 0"), "{line}");
 }

@@ -80,31 +80,31 @@ impl Integrity {
         }
     }
 
-    /// What was found, a sentence a finding; empty where the record is complete.
+    /// The findings, one sentence each; empty if the record is complete.
     pub fn sentences(&self) -> Vec<String> {
-        let mut said = Vec::new();
+        let mut list = Vec::new();
         for Place { from, to, why } in &self.places {
-            said.push(format!("bytes {from} to {to} are damaged: {why}"));
+            list.push(format!("bytes {from} to {to} are damaged: {why}"));
         }
         let unlisted = self.damaged_places - self.places.len() as u64;
         if unlisted > 0 {
-            said.push(format!("{unlisted} more stretches are damaged, {} bytes in all", self.damaged_bytes));
+            list.push(format!("{unlisted} more stretches are damaged, {} bytes in all", self.damaged_bytes));
         }
-        said.extend(self.somewhere.clone());
+        list.extend(self.somewhere.clone());
         for Gap { topic, after, count } in &self.gaps {
             let what = match topic.as_str() {
                 super::CYCLES => "cycles",
                 super::PASSES => "passes",
                 _ => "events",
             };
-            said.push(format!("{count} {what} are missing after the first {after}"));
+            list.push(format!("{count} {what} are missing after the first {after}"));
         }
         if let Some(why) = &self.cut {
-            said.push(format!("the record is cut, and what followed is not known: {why}"));
+            list.push(format!("the record is cut, and what followed is not known: {why}"));
         }
         if let Some(why) = &self.recovered {
-            said.push(format!("the record was made whole by 'muprime recover', which had found: {why}"));
+            list.push(format!("the record was made whole by 'muprime recover', which had found: {why}"));
         }
-        said
+        list
     }
 }

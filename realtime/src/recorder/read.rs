@@ -49,14 +49,14 @@ const LONGEST: u64 = 64 << 20;
 const HEAD: usize = 9;
 /// Bytes that are looked through at once for the next good record: few at first, for it is mostly near.
 const WINDOWS: std::ops::RangeInclusive<usize> = 256..=64 * 1024;
-/// Bytes that are read for what turns out to be no record, in lengths of the file, and beyond them: bytes that look like heads of long
-/// chunks would otherwise cost the square of the file.
+/// Bytes that are read for what turns out to be no record, in lengths of the file, and beyond them: bytes
+/// that look like heads of long chunks would otherwise cost the square of the file.
 const IN_VAIN: (u64, u64) = (4, 1 << 20);
 /// What a look at something that is no record costs at least, in bytes: a place is looked up, and a buffer is filled.
 const A_LOOK: u64 = 8 * 1024;
 
-/// Reads whatever a record still holds, in the order it was written. Never panics, never invents: what a checksum does not
-/// vouch for is left out and noted in [`Reader::integrity`], and reading goes on behind it.
+/// Reads whatever a record still holds, in the order it was written. Never panics, never invents: what a
+/// checksum does not vouch for is left out and noted in [`Reader::integrity`], and reading goes on behind it.
 pub struct Reader<R> {
     from: R,
     /// Where the next record of the format begins.
@@ -148,7 +148,7 @@ impl<R: Read + Seek> Reader<R> {
         if !self.fill(HEAD as u64)? {
             return Ok(if self.body.is_empty() { Ok(None) } else { Err(Trouble::Short) });
         }
-        let head: [u8; HEAD] = self.body[..].try_into().expect("as many bytes as were asked for");
+        let head: [u8; HEAD] = self.body[..].try_into().expect("as many bytes as requested");
         let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
         Ok(Ok(Some((head[0], length, head))))
     }
@@ -178,8 +178,8 @@ impl<R: Read + Seek> Reader<R> {
         self.from.seek(SeekFrom::Start(to)).map(|_| ()).map_err(|e| Trouble::Bad(e.to_string()))
     }
 
-    /// The next place from `from` on where a sound record begins, by its checksum or by its form alone where it is the mark of the
-    /// data's end.
+    /// The next place from `from` on where a sound record begins, by its checksum or by its form alone where
+    /// it is the mark of the data's end.
     fn next_sound(&mut self, from: u64) -> Option<u64> {
         let mut window = Vec::new();
         let (mut base, mut length, size) = (from, *WINDOWS.start(), self.size(from).ok()?);

@@ -121,12 +121,12 @@ fn rewrite(
     to: impl Read + Write + Seek,
 ) -> Result<(), McapError> {
     let mut sink = Sink::begin(to)?;
-    let mut told = found.sentences().join("; ");
+    let mut findings = found.sentences().join("; ");
     for entry in entries {
         match entry {
-            // One record of what was found: that of an earlier recovery goes into it.
+            // One entry of findings: it includes those of an earlier recovery.
             Entry::Facts { name, facts } if name == RECOVERED => {
-                told.extend(facts.get("found").map(|before| format!("; before that: {before}")));
+                findings.extend(facts.get("found").map(|before| format!("; before that: {before}")));
             }
             Entry::Facts { name, facts } => sink.facts(&name, facts)?,
             Entry::File { name, time_ns, bytes } => sink.attach(time_ns, &name, &bytes)?,
@@ -137,6 +137,6 @@ fn rewrite(
             }
         }
     }
-    sink.facts(RECOVERED, BTreeMap::from([("found".to_string(), told)]))?;
+    sink.facts(RECOVERED, BTreeMap::from([("found".to_string(), findings)]))?;
     sink.end()
 }

@@ -1,7 +1,7 @@
 //! The end of a record: the indexes by which an ordinary reader finds its way, and the footer.
 //!
-//! They are read back from the file itself, a few thousand at a time: a writer that kept one entry a chunk in memory would
-//! grow for as long as the run lasts. Format: MCAP specification 0, "Summary section" (<https://mcap.dev/spec>).
+//! They are read back from the file, a few thousand at a time: in memory they would grow with the run.
+//! Format: MCAP specification 0, "Summary section" (<https://mcap.dev/spec>).
 
 use super::{TOPICS, schema};
 use mcap::McapError;

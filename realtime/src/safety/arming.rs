@@ -1,7 +1,7 @@
 //! The way from faulted to armed: one reset edge, the second switch-off channel proved, every cause clear.
 //!
-//! A reset clears and never restarts: what was asked for before it is forgotten, and the outputs stay at zero until a request
-//! comes in a later cycle. Where a second channel is fitted, it is opened and closed again before every arming, and its own
+//! A reset clears and never restarts: it drops earlier requests, and the outputs stay at zero until a request
+//! comes in a later cycle. A fitted second channel is opened and closed before every arming, and its own
 //! readback must show both.
 
 use super::cause::{Cause, Unit};
@@ -9,7 +9,7 @@ use super::rules::Breach;
 use super::{Decision, Safety, State, Trip};
 use crate::ports::{Nanos, NoData, SupplyCommand, SupplyState};
 
-/// Time within which the second channel must show that it did what it was told: ten times a contactor's, and a poll.
+/// Time within which the second channel must show the commanded state: ten times a contactor's, and a poll.
 pub(super) const SUPPLY_ACTS: Nanos = Nanos(500_000_000);
 /// Time that an amplifier may take to come back, with every other cause clear, once its supply is closed again.
 const RESTART: Nanos = Nanos(5_000_000_000);
@@ -17,22 +17,22 @@ const RESTART: Nanos = Nanos(5_000_000_000);
 /// What is being proved before the rig is armed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Proof {
-    /// The second channel is told to cut and must read cut.
+    /// The second channel is commanded to cut and must read cut.
     Opens,
-    /// It is told to restore and must read closed; the amplifier must come back.
+    /// It is commanded to restore and must read closed; the amplifier must come back.
     Closes,
 }
 
 /// Why the second channel was cut for cause, the gravest last: it stays until the channel is proved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum CutFor {
-    /// Somebody is about to reach into the rig: the program asked for it, and asks for the proof afterwards.
+    /// Somebody is about to reach into the rig: the program requested the cut, and will request the proof.
     Hands,
     /// Nothing was heard of the emergency stop: no person has done anything, and none has to undo it.
     Silence,
     /// The emergency stop was pressed.
     Pressed,
-    /// The amplifier stayed on when it was told to be off.
+    /// The amplifier stayed on after 'off'.
     Refusal,
 }
 
@@ -124,37 +124,37 @@ impl Safety {
         }
     }
 
-    /// Moves from state to state. Says what is new in the decision.
-    pub(super) fn advance(&mut self, step: &Step, said: &mut Decision) {
+    /// Moves from state to state. Enters what is new into the decision.
+    pub(super) fn advance(&mut self, step: &Step, decision: &mut Decision) {
         match self.state {
             State::Armed { .. } => {
                 if let Some(breach) = step.broken {
-                    self.trip(breach, step, said);
+                    self.trip(breach, step, decision);
                 }
             }
             State::Faulted(_) if step.reset_edge && step.besides_the_cut.is_none() => match step.supply {
-                Err(NoData::NotFitted) => self.arm(step.now, said),
+                Err(NoData::NotFitted) => self.arm(step.now, decision),
                 _ => self.state = State::Proving { proof: Proof::Opens, since: step.now },
             },
             State::Faulted(_) => {}
-            State::Proving { proof, since } => self.prove(step, proof, since, said),
+            State::Proving { proof, since } => self.prove(step, proof, since, decision),
         }
         if !self.is_proving() {
             self.supply_cut = self.supply_cut.max(step.cuts_the_supply);
         }
     }
 
-    fn prove(&mut self, step: &Step, proof: Proof, since: Nanos, said: &mut Decision) {
+    fn prove(&mut self, step: &Step, proof: Proof, since: Nanos, decision: &mut Decision) {
         let now = step.now;
         if let Some(breach) = step.besides_the_cut {
-            return self.trip(breach, step, said);
+            return self.trip(breach, step, decision);
         }
         match proof {
             Proof::Opens if step.shows(since, true) => {
                 self.state = State::Proving { proof: Proof::Closes, since: now };
                 self.watch.supply_is_cut();
             }
-            Proof::Closes if step.shows(since, false) && step.broken.is_none() => self.arm(now, said),
+            Proof::Closes if step.shows(since, false) && step.broken.is_none() => self.arm(now, decision),
             _ => {
                 let closed = step.shows(since, false);
                 let within = if proof == Proof::Closes && closed { RESTART } else { SUPPLY_ACTS };
@@ -163,30 +163,30 @@ impl Safety {
                     let cause = step.broken.filter(|_| closed).map_or(Cause::SupplySwitch, |b| b.cause);
                     let (value, bound) = (waited.seconds(), within.seconds());
                     let breach = Breach { cause, value, bound, unit: Unit::Second };
-                    self.trip(breach, step, said);
+                    self.trip(breach, step, decision);
                 }
             }
         }
     }
 
-    fn arm(&mut self, now: Nanos, said: &mut Decision) {
+    fn arm(&mut self, now: Nanos, decision: &mut Decision) {
         self.state = State::Armed { since: now };
-        (self.supply_cut, self.asked) = (None, false);
+        (self.supply_cut, self.requested) = (None, false);
         self.watch.lateral.forget_losses();
         self.watch.normal.forget_losses();
-        said.armed_now = true;
+        decision.armed_now = true;
     }
 
-    fn trip(&mut self, breach: Breach, step: &Step, said: &mut Decision) {
+    fn trip(&mut self, breach: Breach, step: &Step, decision: &mut Decision) {
         let Breach { cause, value, bound, unit } = breach;
         let trip = Trip { cause, value, bound, unit, cycle: step.cycle, at: step.now };
         self.state = State::Faulted(trip);
-        self.asked = false;
+        self.requested = false;
         self.watch.forget_the_hand();
-        said.tripped = Some(trip);
+        decision.tripped = Some(trip);
     }
 
-    /// What the second channel is told: closed, unless it is being proved, or was cut and has not been proved since.
+    /// The command to the second channel: closed, unless it is being proved, or was cut since its last proof.
     pub(super) fn supply(&self) -> SupplyCommand {
         match self.state {
             State::Proving { proof: Proof::Opens, .. } => SupplyCommand::Cut,

@@ -1,6 +1,6 @@
-//! What a trip is told by: its cause, the unit of its value, and what to do about it.
+//! The description of a trip: its cause, the unit of its value, and what to do about it.
 
-#![allow(clippy::disallowed_types, reason = "a trip is told to people beside the loop, never in it")]
+#![allow(clippy::disallowed_types, reason = "a trip is described for people beside the loop, never in it")]
 
 use super::{RULES, Trip};
 use serde::{Deserialize, Serialize};
@@ -58,7 +58,7 @@ pub enum Cause {
     DriveNoResponse,
     /// The amplifier echoes another set-point than it was given.
     EchoMismatch,
-    /// The amplifier stays on although it was told to be off.
+    /// The amplifier stays on although it was commanded off.
     RefusesOff,
     /// Too hot, or the temperature is not known where it must be.
     OverTemperature,
@@ -74,7 +74,7 @@ pub enum Cause {
     RequestRefused,
     /// The loop was held up for so long that nothing is known of the rig.
     Suspended,
-    /// The stage does not move as it is told: stalled, or faster.
+    /// The stage does not move as commanded: stalled, or faster.
     StageNotFollowing,
     /// Most lateral samples are lost.
     LateralLossy,
@@ -84,10 +84,10 @@ pub enum Cause {
     EmergencyStop,
     /// The guard is open, or nothing is known of it.
     Interlock,
-    /// The second switch-off channel does not do what it is told, or nothing is known of it.
+    /// The second switch-off channel does not follow its command, or nothing is known of it.
     SupplySwitch,
-    /// What must be there to switch off is not fitted: 1 a second channel beside an amplifier without watchdog; with a
-    /// human finger 2 a second channel, 3 an emergency stop, 4 a dead-man device.
+    /// What must be there to switch off is not fitted: 1 a second channel beside an amplifier without
+    /// watchdog; with a human finger 2 a second channel, 3 an emergency stop, 4 a dead-man device.
     Unguarded,
     /// With a human finger: too large a share of the last hour was vibrated.
     ExposureDuty,
@@ -97,7 +97,7 @@ pub enum Cause {
     AmplitudeSaturated,
     /// The amplitude's channel repeats itself while the plate is driven.
     AmplitudeFrozen,
-    /// The normal force is not that of the load that the stage was told to apply, or to lift off.
+    /// The normal force is not that of the load that the stage was commanded to apply, or to lift off.
     LoadImplausible,
 }
 
@@ -261,7 +261,7 @@ impl Cause {
                 "Look at the amplitude's sensor: its value stands still. If its noise is below one count, raise `amplitude_frozen_after`."
             }
             Self::LoadImplausible => {
-                "Look at the loading axis and zero the force sensor: the normal force is not the load that was asked for."
+                "Look at the loading axis and zero the force sensor: the normal force is not the requested load."
             }
         }
     }

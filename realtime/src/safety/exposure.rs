@@ -1,8 +1,8 @@
 //! How long and how strongly a finger has been vibrated: in one go, and over the last hour.
 //!
-//! Time is summed while the drive is commanded on or read back on. A go ends only with a rest of its full length. The hour is
-//! held in minutes: a minute counts until the whole of it is more than an hour ago, so no pause resets anything early. What an
-//! earlier run did is carried over from a ledger.
+//! Time is summed while the drive is commanded on or read back on. A go ends only with a rest of its full
+//! length. The hour is held in minutes: a minute counts until the whole of it is more than an hour ago, so no
+//! pause resets anything early. What an earlier run did is carried over from a ledger.
 
 use crate::ports::Nanos;
 use serde::{Deserialize, Serialize};
@@ -33,8 +33,8 @@ pub const PART_MINUTES: usize = 5;
 /// Parts of [`Exposed`].
 pub const PARTS: usize = 13;
 
-/// What a finger was exposed to before the run began, as a ledger kept it. Every part counts as if all of it had been in its
-/// newest minute: nothing is forgotten early.
+/// The exposure of a finger before the run began, from a ledger. Every part counts as if all of it had been
+/// in its newest minute: nothing is forgotten early.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Exposed {
     /// Time driven since the last rest of full length.

@@ -111,7 +111,7 @@ pub struct ChannelTiming {
 }
 
 impl ChannelTiming {
-    /// 50 readings a second with 20 ms of latency: what a relay's or a contact's channel has where nothing else is said.
+    /// 50 readings a second with 20 ms of latency: a relay's or a contact's channel by default.
     pub const SLOW: ChannelTiming =
         ChannelTiming { period: Nanos(20_000_000), latency: Nanos(20_000_000), periods: 3 };
 
@@ -201,8 +201,8 @@ pub struct Limits {
     pub temperature_fitted: bool,
     /// Equal raw samples in a row that count as frozen, 20 to 1000 (from the noise: `ceil(ln 1e-9 / ln p_equal)`).
     pub frozen_after: u32,
-    /// Equal raw amplitudes in a row, while driven, that count as frozen; `None` where the readback has no noise to be
-    /// frozen against: then only a new set-point shows it (SR-08, SR-22).
+    /// Equal raw amplitudes in a row, while driven, that count as frozen; `None` where the readback has no
+    /// noise to be frozen against: then only a new set-point shows it (SR-08, SR-22).
     #[serde(default)]
     pub amplitude_frozen_after: Option<u32>,
     /// A human finger is in the rig: second channel, emergency stop, dead-man device and exposure limits apply.
@@ -230,7 +230,7 @@ pub struct Limits {
     /// Whether the setup declares a second channel: then it is missed where the rig shows none.
     #[serde(default)]
     pub supply_required: bool,
-    /// Whether the stage applies the load that it is told; not where weights load the finger.
+    /// Whether the stage applies the commanded load; not where weights load the finger.
     #[serde(default = "yes")]
     pub load_commanded: bool,
     /// Deadlines among the last thousand that may be missed.

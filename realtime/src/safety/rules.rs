@@ -143,8 +143,8 @@ fn above(value: Option<f64>, bound: f64) -> Option<(f64, f64)> {
     value.filter(|v| *v > bound).map(|v| (v, bound))
 }
 
-/// A loop that was stopped for longer than an amplifier's own watchdog waits has lost its rig, not just a deadline.
-/// Stalls of a shared virtual machine were measured at 6 to 21 ms at worst.
+/// A loop that was stopped for longer than an amplifier's own watchdog waits has lost its rig, not just a
+/// deadline. Stalls of a shared virtual machine were measured at 6 to 21 ms at worst.
 const SUSPENDED_CYCLES: f64 = 50.0;
 /// Below this share of the samples that are due a channel is as good as lost.
 const LOSSY_SHARE: f64 = 0.25;
@@ -256,9 +256,9 @@ fn supply_switch(c: &Context<'_>) -> Option<(f64, f64)> {
             Some((c.now.since(state.taken_at).seconds(), limit))
         }
         Ok(state) => {
-            let told = c.watch.supply_told == SupplyCommand::Cut;
+            let cut = c.watch.supply_told == SupplyCommand::Cut;
             let waited = c.now.since(c.watch.supply_since);
-            broken(state.cut != told && waited > SUPPLY_ACTS, waited.seconds(), SUPPLY_ACTS.seconds())
+            broken(state.cut != cut && waited > SUPPLY_ACTS, waited.seconds(), SUPPLY_ACTS.seconds())
         }
     }
 }

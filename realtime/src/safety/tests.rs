@@ -10,7 +10,7 @@ mod arming;
 mod bounds;
 mod human;
 mod times;
-mod told;
+mod trip_text;
 
 const T: Nanos = Nanos(1_000_000);
 
@@ -167,12 +167,12 @@ fn starts_faulted_and_arms_only_on_an_edge_with_all_clear() {
     assert!(!decision.armed_now && !decision.drive.enable());
     safety.step(&limits, &healthy(3, &off), &request, Controls::default(), Nanos(3 * T.0));
     let decision = safety.step(&limits, &healthy(4, &off), &request, reset, Nanos(4 * T.0));
-    // Armed, and nothing driven: what was asked for before counts for nothing.
+    // Armed, and nothing driven: earlier requests count for nothing.
     assert!(decision.armed_now && !decision.drive.enable());
     let decision = safety.step(&limits, &healthy(5, &off), &request, Controls::default(), Nanos(5 * T.0));
     assert!(!decision.drive.enable());
-    let asked = Controls { new_request: true, ..Controls::default() };
-    let decision = safety.step(&limits, &healthy(6, &off), &request, asked, Nanos(6 * T.0));
+    let requested = Controls { new_request: true, ..Controls::default() };
+    let decision = safety.step(&limits, &healthy(6, &off), &request, requested, Nanos(6 * T.0));
     assert!(decision.drive.enable());
 }
 
@@ -475,7 +475,7 @@ fn any_channel() -> impl Strategy<Value = Result<Reading, NoData>> {
 }
 
 static DRIVEN: AtomicU32 = AtomicU32::new(0);
-static ASKED: AtomicU32 = AtomicU32::new(0);
+static REQUESTED: AtomicU32 = AtomicU32::new(0);
 
 /// A value within a limit, or one of its ends.
 fn legal(low: f64, high: f64) -> impl Strategy<Value = f64> {
@@ -550,9 +550,9 @@ proptest! {
             prop_assert!((0.0..=limits.normal_force_max_n).contains(&decision.stage.normal_force_n()));
         }
         DRIVEN.fetch_add(driven, Ordering::Relaxed);
-        let asked = ASKED.fetch_add(requests.len() as u32, Ordering::Relaxed) + requests.len() as u32;
+        let requested = REQUESTED.fetch_add(requests.len() as u32, Ordering::Relaxed) + requests.len() as u32;
         // A quarter of the cycles drive, over all cases so far: a faulted core would pass for nothing.
-        prop_assert!(asked < 2000 || DRIVEN.load(Ordering::Relaxed) > asked / 4);
+        prop_assert!(requested < 2000 || DRIVEN.load(Ordering::Relaxed) > requested / 4);
     }
 }
 

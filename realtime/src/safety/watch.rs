@@ -21,8 +21,8 @@ pub(super) struct ForceWatch {
     pub saturated_in_a_row: u32,
     /// One bit a cycle, newest lowest: was it at the end of the range?
     saturated: u64,
-    /// Since when every value shown is above the limit, believed or not, and the last of them: a counter that stands
-    /// still, or a sample at the end of its range, hides no overforce.
+    /// Since when every value shown is above the limit, believed or not, and the last of them: a counter that
+    /// stands still, or a sample at the end of its range, hides no overforce.
     pub over_since: Option<Nanos>,
     pub over_value: f64,
     /// One bit a cycle, newest lowest: was it a spike?
@@ -211,7 +211,7 @@ pub(super) struct Watch {
     /// m/s over the last two amplitude samples.
     pub amplitude_rate_m_s: f64,
     pub amplitude_fast_in_a_row: u32,
-    /// What the amplifier last said of its output.
+    /// The amplifier's last report of its output.
     amplifier_on: bool,
     /// Highest amplitude commanded within the last ring-down: measured may still be that high.
     pub ringing_pp_m: f64,
@@ -221,23 +221,23 @@ pub(super) struct Watch {
     /// Slowest speed commanded since then, and the fastest within the stage's response time, in m/s.
     pub slowest_m_s: f64,
     pub fastest_m_s: f64,
-    /// States in a row in which the stage was faster than it was told.
+    /// States in a row in which the stage was faster than commanded.
     pub fast_stage_in_a_row: u32,
     stage_sequence: u32,
     /// Normal load as last commanded in N, and since when.
     pub load_n: f64,
     pub load_since: Nanos,
-    /// What the second channel was last told, and since when.
+    /// The last command to the second channel, and since when.
     pub supply_told: SupplyCommand,
     pub supply_since: Nanos,
-    /// Whether the dead-man device is held, and whether it was seen released since the last trip: a hand that lets go and
-    /// grips again is a person who confirms.
+    /// Whether the dead-man device is held, and whether it was seen released since the last trip: a hand that
+    /// lets go and grips again is a person who confirms.
     pub hand_holds: bool,
     pub hand_let_go: bool,
 }
 
-/// Time within which a stage follows a new velocity: the slowest one for a reversal at full speed, and the age of its
-/// state.
+/// Time within which a stage follows a new velocity: the slowest one for a reversal at full speed, and the
+/// age of its state.
 pub(super) const STAGE_RESPONSE: Nanos = Nanos(300_000_000);
 /// Speeds below this are approach and hold: a stage may rest at them, m/s.
 pub(super) const CREEP_M_S: f64 = 1.5e-3;
@@ -347,8 +347,8 @@ impl Watch {
             let fast = stage.velocity_m_s.abs() > 1.5 * self.fastest_m_s + 0.02;
             self.fast_stage_in_a_row = if fast { self.fast_stage_in_a_row + 1 } else { 0 };
         }
-        // A lower set-point is on its way for as long as it may be sent and its effect may be read; then the plate
-        // rings down with its own time constant. The measured amplitude is judged against that.
+        // A lower set-point is on its way for as long as it may be sent and its effect may be read; then the
+        // plate rings down with its own time constant. The measured amplitude is judged against that.
         let on_its_way = Nanos(timing.command_expiry.0 + timing.amplifier.age_limit().0);
         if now.since(self.commanded_since) > on_its_way {
             let decay = (-timing.cycle.seconds() / timing.ring_time.seconds().max(1e-9)).exp();
@@ -361,15 +361,15 @@ impl Watch {
         self.hand_let_go = false;
     }
 
-    /// The supply is read back cut: whatever the amplifier said before, its output is off.
+    /// The supply is read back cut: whatever the amplifier reported before, its output is off.
     pub(super) fn supply_is_cut(&mut self) {
         self.amplifier_on = false;
     }
 
-    pub(super) fn commanded(&mut self, said: &Decision, now: Nanos) {
-        let (drive, stage) = (&said.drive, &said.stage);
-        if said.supply != self.supply_told {
-            (self.supply_told, self.supply_since) = (said.supply, now);
+    pub(super) fn commanded(&mut self, decision: &Decision, now: Nanos) {
+        let (drive, stage) = (&decision.drive, &decision.stage);
+        if decision.supply != self.supply_told {
+            (self.supply_told, self.supply_since) = (decision.supply, now);
         }
         if stage.normal_force_n() != self.load_n {
             (self.load_n, self.load_since) = (stage.normal_force_n(), now);
@@ -398,7 +398,7 @@ impl Watch {
         self.velocity_m_s
     }
 
-    /// Whether the amplifier stays on although it has long been told to be off: ten cycles after a fresh state
+    /// Whether the amplifier stays on although it has long been commanded off: ten cycles after a fresh state
     /// should have shown it.
     pub(super) fn refuses_off(&self, limits: &Limits, now: Nanos) -> bool {
         let grace = Nanos(limits.timing.amplifier.age_limit().0 + 10 * limits.timing.cycle.0);

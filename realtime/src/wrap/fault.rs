@@ -1,9 +1,9 @@
 //! Faults of channels, injected between a port and the loop.
 //!
-//! The vocabulary is that of PX4's failure injection (ok, off, stuck, garbage, wrong, slow, delayed, intermittent), the
-//! same in virtual time, on the wire and in a defects file. A few words are added for what only a reading can show
-//! ([`FaultMode::EXTRA`]); the virtual rig's instruments know PX4's alone. A wrapper is plain data around its port: no
-//! heap, no lock, and its random numbers come from a seed.
+//! The vocabulary is that of PX4's failure injection (ok, off, stuck, garbage, wrong, slow, delayed,
+//! intermittent), the same in virtual time, on the wire and in a defects file. A few words are added for what
+//! only a reading can show ([`FaultMode::EXTRA`]); the virtual rig's instruments know PX4's alone. A wrapper
+//! is plain data around its port: no heap, no lock, and its random numbers come from a seed.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::ports::{
@@ -272,20 +272,20 @@ struct Line<S: Sample> {
     shown: Option<S>,
     held: Option<S>,
     spiked: bool,
-    /// What each fault that strikes some samples made of the newest: a loop that turns faster than the instrument samples is
-    /// shown a sample many times, and one that was lost must not come after all.
+    /// What each fault that strikes some samples made of the newest: a loop that turns faster than the
+    /// instrument samples is shown a sample many times, and one that was lost must not come after all.
     struck: [Option<Result<S, NoData>>; FAULTS],
 }
 
 impl<S: Sample> Line<S> {
     fn new(target: [Target; 2], faults: &[Fault], seed: u64) -> Self {
-        let mut kept = [None; FAULTS];
+        let mut mine_only = [None; FAULTS];
         let mine = faults.iter().filter(|f| target.contains(&f.target));
-        for (slot, fault) in kept.iter_mut().zip(mine) {
+        for (slot, fault) in mine_only.iter_mut().zip(mine) {
             *slot = Some(*fault);
         }
         Line {
-            faults: kept,
+            faults: mine_only,
             dice: Dice(seed ^ ((target[0] as u64) << 56)),
             seen: [None; LINE],
             newest: 0,

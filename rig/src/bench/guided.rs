@@ -40,16 +40,16 @@ pub fn series(way: &SeriesOptions<'_>) -> miette::Result<String> {
         }
     };
     say!("{HELP}");
-    let mut kept = Kept::take_up(way.keep)?;
+    let mut series = Series::take_up(way.keep)?;
     let mut lines = std::io::stdin().lock().lines();
     loop {
-        ask!("reading {}> ", kept.rows.len() + 1);
+        ask!("reading {}> ", series.rows.len() + 1);
         let Some(line) = lines.next() else {
             miette::bail!(
                 help = "the same command goes on with them; delete that file to begin anew",
-                "the input ended before `done`: no series, no certificate. {} readings are kept in {}",
-                kept.rows.len(),
-                kept.part.display()
+                "the input ended before `done`: no series, no certificate. {} readings are in {}",
+                series.rows.len(),
+                series.part.display()
             );
         };
         let line = line.map_err(|e| miette::miette!("the terminal: {e}"))?;
@@ -58,8 +58,8 @@ pub fn series(way: &SeriesOptions<'_>) -> miette::Result<String> {
             [] => continue,
             ["done"] => break,
             ["undo"] => {
-                let row = kept.rows.pop();
-                kept.write()?;
+                let row = series.rows.pop();
+                series.write()?;
                 say!("{}", row.map_or("nothing to forget".into(), |r| format!("forgotten: {r}")));
                 continue;
             }
@@ -80,25 +80,25 @@ pub fn series(way: &SeriesOptions<'_>) -> miette::Result<String> {
         match taken {
             Ok(t) => {
                 // The middle of the readings that were averaged, which a link that went down may have put off.
-                let time_s = kept.time_s() - 0.5 * t.length_s;
-                kept.rows.push(format!(
+                let time_s = series.time_s() - 0.5 * t.length_s;
+                series.rows.push(format!(
                     "{time_s:.6},{axis},{mass},{},{},{branch},{}",
                     t.counts[0],
                     t.counts[1],
                     u8::from(t.saturated)
                 ));
-                kept.write()?;
-                // Said only once it is kept.
+                series.write()?;
+                // Printed only after it is stored.
                 say!("  lateral {:.2}, normal {:.2} counts{}", t.counts[0], t.counts[1], t.note);
             }
             Err(why) => say!("  no reading: {why}; try again"),
         }
     }
-    kept.finish(way.keep)
+    series.finish(way.keep)
 }
 
 /// The series so far, on the disk after every reading: a program that is ended, or a machine that is, loses none.
-struct Kept {
+struct Series {
     part: PathBuf,
     /// When the series began, in s since 1970: times count from there, also in a later session.
     began_unix_s: f64,
@@ -108,13 +108,13 @@ struct Kept {
 const BEGAN: &str = "# began_unix_s = ";
 const HEADER: &str = "time_s,axis,mass_kg,lateral_counts,normal_counts,branch,saturated";
 
-impl Kept {
+impl Series {
     /// Begins a series, or goes on with the one that an earlier session left.
-    fn take_up(keep: &Path) -> miette::Result<Kept> {
+    fn take_up(keep: &Path) -> miette::Result<Series> {
         let part = keep.with_extension("csv.part");
         let shown = part.display().to_string();
         if !part.exists() {
-            return Ok(Kept { part, began_unix_s: unix_s(), rows: Vec::new() });
+            return Ok(Series { part, began_unix_s: unix_s(), rows: Vec::new() });
         }
         let text = runs::input::text_of(&part)?;
         let mut lines = text.lines();
@@ -129,7 +129,7 @@ impl Kept {
             rows.len(),
             unix_s() - began_unix_s
         );
-        Ok(Kept { part, began_unix_s, rows })
+        Ok(Series { part, began_unix_s, rows })
     }
 
     fn time_s(&self) -> f64 {
@@ -166,7 +166,7 @@ fn unix_s() -> f64 {
 
 /// One reading; where a link goes down it is waited for, and the averaging begins anew.
 fn read(rig: &mut Rig, epoch: Instant, way: &SeriesOptions<'_>) -> Result<Taken, String> {
-    let asked = Instant::now();
+    let begun = Instant::now();
     let mut down = false;
     loop {
         let why = match average(rig, epoch, way.average_s) {
@@ -184,7 +184,7 @@ fn read(rig: &mut Rig, epoch: Instant, way: &SeriesOptions<'_>) -> Result<Taken,
         }
         down = true;
         loop {
-            if asked.elapsed().as_secs_f64() > way.reconnect_s {
+            if begun.elapsed().as_secs_f64() > way.reconnect_s {
                 return Err(format!("{why}, and did not come back within {:.0} s", way.reconnect_s));
             }
             std::thread::sleep(Duration::from_millis(50));

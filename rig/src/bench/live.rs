@@ -35,7 +35,7 @@ pub fn table(setup: &Setup, table: &LiveTable<'_>) -> miette::Result<String> {
     let _claim = RigClaim::take(setup)?;
     let drive = Drive::start(setup)?;
     let taken = take(table, &drive, &settings);
-    // Whatever became of the table: off first, and what is said of it was read back.
+    // Whatever became of the table: off first, and its report was read back.
     let off = drive.end();
     let _ = writeln!(std::io::stderr(), "{}", off.words());
     let text = match taken {

@@ -1,4 +1,4 @@
-//! What is asked for by what address.
+//! The handlers of the addresses.
 
 use super::server::Shared;
 use super::{pages, stream};
@@ -144,17 +144,17 @@ fn html(text: String) -> Response {
     ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], text).into_response()
 }
 
-/// What is asked of a run.
+/// A request to a run.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Asked {
+struct ControlRequest {
     ask: Ask,
 }
 
 async fn ask(
     State(shared): State<Arc<Shared>>,
     Path(name): Path<String>,
-    Json(Asked { ask }): Json<Asked>,
+    Json(ControlRequest { ask }): Json<ControlRequest>,
 ) -> Result<StatusCode, Response> {
     shared.guard.count().map_err(IntoResponse::into_response)?;
     if !shared.passes_on(ask) {
@@ -162,14 +162,14 @@ async fn ask(
         return Err((StatusCode::FORBIDDEN, why).into_response());
     }
     let folder = shared.folder(&name).ok_or_else(|| StatusCode::NOT_FOUND.into_response())?;
-    let asked = beside(move || match ask {
+    let answer = beside(move || match ask {
         // Answered as done only where the run shows it.
         Ask::Stop => live::stop(&folder).map(drop),
         ask => Viewer::connect(&folder)
             .and_then(|viewer| viewer.asking()?(ask))
-            .map_err(|why| format!("not asked: {why}")),
+            .map_err(|why| format!("no request was sent: {why}")),
     });
-    asked.await?.map_err(|why| (StatusCode::CONFLICT, why).into_response())?;
-    tracing::info!(run = name, ask = ask.word(), "asked for from a browser");
+    answer.await?.map_err(|why| (StatusCode::CONFLICT, why).into_response())?;
+    tracing::info!(run = name, ask = ask.word(), "requested from a browser");
     Ok(StatusCode::NO_CONTENT)
 }

@@ -1,5 +1,5 @@
-//! Who is let in. A literal list of hosts (comparing `Host` with `Origin` stops no rebinding of names), a literal list of origins, a
-//! token, and a bound on how often something may be asked.
+//! Access control: a literal list of hosts (comparing `Host` with `Origin` stops no rebinding of names), a
+//! literal list of origins, a token, and a bound on the rate of requests.
 
 use axum::http::{HeaderMap, StatusCode, header};
 use rand::TryRng;
@@ -7,7 +7,7 @@ use std::net::SocketAddr;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Name of the protocol that a live stream is asked for by; the token is the one after it.
+/// Name of the protocol of a live stream; the token is the one after it.
 pub const PROTOCOL: &str = "muprime";
 /// Asks that are passed on within [`WITHIN`] at most.
 const ASKS: usize = 20;
@@ -18,7 +18,7 @@ const WITHIN: Duration = Duration::from_secs(10);
 pub struct Guard {
     hosts: Vec<String>,
     token: String,
-    asked: Mutex<Vec<Instant>>,
+    recent: Mutex<Vec<Instant>>,
 }
 
 impl Guard {
@@ -34,7 +34,7 @@ impl Guard {
         let mut bytes = [0u8; 32];
         rand::rngs::SysRng.try_fill_bytes(&mut bytes).expect("the system gives random bytes");
         let token = bytes.iter().map(|b| format!("{b:02x}")).collect();
-        Guard { hosts, token, asked: Mutex::default() }
+        Guard { hosts, token, recent: Mutex::default() }
     }
 
     /// The token.
@@ -89,13 +89,13 @@ impl Guard {
     /// # Errors
     /// The status to answer with, where there were too many of late.
     pub fn count(&self) -> Result<(), StatusCode> {
-        let mut asked = self.asked.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut recent = self.recent.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let now = now();
-        asked.retain(|at| now.duration_since(*at) < WITHIN);
-        if asked.len() >= ASKS {
+        recent.retain(|at| now.duration_since(*at) < WITHIN);
+        if recent.len() >= ASKS {
             return Err(StatusCode::TOO_MANY_REQUESTS);
         }
-        asked.push(now);
+        recent.push(now);
         Ok(())
     }
 }

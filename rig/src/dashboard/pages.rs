@@ -1,6 +1,6 @@
 //! What is read from the disk for a browser.
 
-use crate::live::{Ended, Message, Progress, Run, Told};
+use crate::live::{Ended, Message, Progress, Run, TimedEvent};
 use miette::{IntoDiagnostic, WrapErr};
 use runs::catalogue::{Catalogue, RunEntry};
 use runs::run_dir::is_held;
@@ -76,7 +76,7 @@ pub fn compare(a: &Path, b: &Path) -> miette::Result<String> {
     runs::report::comparison::page(&compared)
 }
 
-/// What a viewer of a run that is over is told: the same messages as of one that goes on, without states.
+/// What a viewer of an ended run gets: the messages of a running one, without states.
 ///
 /// # Errors
 /// A folder that holds no run, or one that cannot be read.
@@ -104,7 +104,7 @@ pub fn past(folder: &Path) -> miette::Result<Vec<Message>> {
     messages.extend(run.events.iter().filter_map(|(at_s, event)| {
         // Events of a later version are left to that one.
         let event = serde_json::from_value(event.clone()).ok()?;
-        Some(Message::Event(Told::of(*at_s, event)))
+        Some(Message::Event(TimedEvent::of(*at_s, event)))
     }));
     messages.push(Message::Progress(progress));
     messages.push(Message::Ended(Box::new(match run.summary {

@@ -10,7 +10,7 @@ use tokio::sync::Semaphore;
 
 /// Connections at once, live streams among them.
 const CONNECTIONS: usize = 64;
-/// Time that the head of a request may take, also that of the next one on a connection that is kept.
+/// Time that the head of a request may take, also that of the next one on a connection that stays open.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
 /// Time that the other end may let pass without taking what was sent to it.
 const TAKEN_WITHIN: Duration = Duration::from_secs(5);
@@ -35,7 +35,7 @@ pub async fn serve(listener: TcpListener, routes: Router) {
             tokio::time::sleep(AGAIN).await;
             continue;
         };
-        // Whoever finds no place is not kept waiting: a browser comes again by itself.
+        // A client without a place does not wait: a browser comes again by itself.
         let Ok(place) = Arc::clone(&free).try_acquire_owned() else { continue };
         let routes = routes.clone();
         tokio::spawn(async move {

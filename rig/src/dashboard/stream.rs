@@ -1,5 +1,5 @@
-//! A live stream to a browser. What a viewer hears is passed on line by line; a browser that takes nothing is let go, and one that
-//! is slow is told fewer states, never fewer passes or events.
+//! A live stream to a browser. What a viewer hears is passed on line by line. A browser that reads nothing is
+//! disconnected; a slow one gets fewer states, never fewer passes or events.
 
 use super::guard::PROTOCOL;
 use super::server::Shared;
@@ -100,7 +100,7 @@ async fn pass_on(socket: &mut WebSocket, lines: &mut Receiver<String>) {
                 }
             }
             // Pings and a close; anything else is none of this stream's business, and its end.
-            said = socket.recv() => match said {
+            message = socket.recv() => match message {
                 Some(Ok(ws::Message::Ping(_) | ws::Message::Pong(_))) => {}
                 _ => return,
             }

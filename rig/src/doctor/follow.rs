@@ -59,7 +59,7 @@ pub struct ChannelReport {
     pub invalid_share: f64,
     /// Most samples in a row with the same raw value.
     pub equal_in_a_row: u32,
-    /// Samples that were told apart.
+    /// Number of distinct samples.
     pub samples: u64,
     /// Why the last look found no sample.
     pub missing: Option<NoData>,

@@ -8,7 +8,7 @@ use runs::plan::Plan;
 use runs::setup::{Setup, THERMOMETER};
 use serde::Serialize;
 
-/// What is said of one subject.
+/// The judgement of one subject.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Finding {
     /// Of what.
@@ -46,7 +46,7 @@ impl Finding {
 }
 
 /// What the look is judged for.
-pub struct Asked<'a> {
+pub struct Target<'a> {
     /// The rig.
     pub setup: &'a Setup,
     /// The plan that is to run, where one is named.
@@ -59,7 +59,7 @@ const BAD_SHARE: f64 = 0.01;
 const CAME_SHARE: f64 = 0.5;
 /// Looks that may find nothing valid, and samples at the range's ends.
 const INVALID_SHARE: f64 = 0.01;
-/// Samples that must have been seen before a channel is said to stand still.
+/// Samples that must have been seen before a channel counts as standing still.
 const SAMPLES_MIN: u64 = 20;
 /// Noise so many times what profile and setup state is not that channel's noise.
 const NOISE_TIMES: f64 = 10.0;
@@ -76,20 +76,20 @@ const LINK: &str = "look at cable and power, and at what else talks on this line
 const UNIT: &str = "look at unit, factor, type and byte order of the signal in its profile, and at `gain`";
 
 /// Judges what was found: one finding an instrument, one of the sweep, one of the plan.
-pub fn judge(look: &Look, asked: &Asked<'_>) -> Vec<Finding> {
-    let mut findings: Vec<Finding> = look.found.iter().map(|found| instrument(found, look, asked)).collect();
+pub fn judge(look: &Look, target: &Target<'_>) -> Vec<Finding> {
+    let mut findings: Vec<Finding> = look.found.iter().map(|found| instrument(found, look, target)).collect();
     let mended = findings.iter().all(|f| f.good);
     findings.extend(stalled(look));
     if look.found.iter().all(|f| f.answers.is_ok()) {
         findings.push(arming(look));
     }
-    if let Some(plan) = asked.plan {
-        findings.push(planned(look, asked.setup, plan, mended));
+    if let Some(plan) = target.plan {
+        findings.push(planned(look, target.setup, plan, mended));
     }
     findings
 }
 
-/// Where samples came late or not at all beside stalls of this computer: whose fault that is cannot be told.
+/// Samples came late or not at all beside stalls of this computer: the fault may be with either.
 fn stalled(look: &Look) -> Option<Finding> {
     let late = |found: &Found| {
         let mut problems = Vec::new();
@@ -99,29 +99,29 @@ fn stalled(look: &Look) -> Option<Finding> {
     };
     let stalls = &look.stalls;
     (stalls.count > 0 && look.found.iter().any(late)).then(|| {
-        let said = format!(
-            "kept its threads from running {} times for 3 ms and more during the look, {:.0} ms at most: low rates, old samples and \
+        let found = format!(
+            "did not run its threads {} times for 3 ms and more during the look, {:.0} ms at most: low rates, old samples and \
              missing answers may be its doing",
             stalls.count,
             stalls.worst.seconds() * 1e3
         );
         let advice = "end what else runs on it and look again; `muprime doctor` judges it";
-        Finding::new("this computer", false, said, advice)
+        Finding::new("this computer", false, found, advice)
     })
 }
 
-fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
+fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
     let subject = format!("{} `{}` at {}", found.role, found.id, found.address);
     let answers = match &found.answers {
         Ok(answers) => answers,
         Err(error) => {
-            let said = match error {
+            let problem = match error {
                 // The subject names the instrument already.
                 OpenError::Mismatch { problem, .. } | OpenError::Link { problem, .. } => problem.clone(),
                 other => other.to_string(),
             };
-            let advice = drivers::remedy::advice(&said);
-            return Finding::new(subject, false, said, advice);
+            let advice = drivers::remedy::advice(&problem);
+            return Finding::new(subject, false, problem, advice);
         }
     };
     let mut problems: Vec<Problem> = Vec::new();
@@ -142,15 +142,15 @@ fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
                     why.map_or("nothing came".into(), |why| why.to_string())
                 ),
             });
-            force(channel, asked, &mut problems);
+            force(channel, target, &mut problems);
         }
     }
     match (found.role, look.amplifier, look.stage) {
         ("amplifier", Some(state), _) => {
             let open = look.supply_is_open();
-            states.push(amplifier(state, asked.setup, open, &mut problems));
+            states.push(amplifier(state, target.setup, open, &mut problems));
         }
-        ("stage", _, Some(state)) => states.push(stage(state, asked.setup, &mut problems)),
+        ("stage", _, Some(state)) => states.push(stage(state, target.setup, &mut problems)),
         ("supply_relay", ..) => {
             let closed = look.supply.and_then(Result::ok).map(|s| !s.cut);
             states.push(closed.map_or("no state".into(), |c| if c { "closed" } else { "open" }.to_string()));
@@ -159,9 +159,9 @@ fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
         _ => {}
     }
     linked(answers, &mut problems);
-    let mut said = vec![states.join(", "), format!("{:.0} samples a second", answers.samples_per_s)];
-    said.retain(|part| !part.is_empty());
-    said.extend(problems.iter().map(|(problem, _)| problem.clone()));
+    let mut parts = vec![states.join(", "), format!("{:.0} samples a second", answers.samples_per_s)];
+    parts.retain(|part| !part.is_empty());
+    parts.extend(problems.iter().map(|(problem, _)| problem.clone()));
     let mut advice: Vec<&str> = Vec::new();
     for (_, one) in &problems {
         if !advice.contains(one) {
@@ -171,7 +171,7 @@ fn instrument(found: &Found, look: &Look, asked: &Asked<'_>) -> Finding {
     Finding {
         channels: found.channels.clone(),
         bad_answers_share: Some(answers.bad_share),
-        ..Finding::new(subject, problems.is_empty(), said.join("; "), advice.join("; "))
+        ..Finding::new(subject, problems.is_empty(), parts.join("; "), advice.join("; "))
     }
 }
 
@@ -180,7 +180,7 @@ fn timely(c: &ChannelReport, problems: &mut Vec<Problem>) {
     let name = c.name;
     if c.invalid_share > INVALID_SHARE {
         let why = c.missing.map_or("the instrument declared samples invalid".into(), |why| why.to_string());
-        let said =
+        let problem =
             format!("{name}: {:.0} % of the looks found no valid sample ({why})", c.invalid_share * 1e2);
         let advice = match c.missing {
             Some(NoData::Invalid | NoData::Corrupt) | None => {
@@ -188,31 +188,31 @@ fn timely(c: &ChannelReport, problems: &mut Vec<Problem>) {
             }
             _ => LINK,
         };
-        problems.push((said, advice));
+        problems.push((problem, advice));
         if c.invalid_share > 0.5 {
             return;
         }
     }
     if let Some([_, most, _]) = c.age_ms.filter(|[_, most, _]| *most > c.age_limit_ms) {
-        let said =
+        let problem =
             format!("{name}: samples are {most:.0} ms old, and stale from {:.0} ms on", c.age_limit_ms);
-        problems.push((said, "find what holds its samples up; state its true rate as `rate_hz`"));
+        problems.push((problem, "find what holds its samples up; state its true rate as `rate_hz`"));
     }
     if c.rate_hz < CAME_SHARE * c.due_hz {
-        let said = format!("{name}: {:.1} new samples a second, {:.0} are due", c.rate_hz, c.due_hz);
-        problems.push((said, "set the instrument to that rate, or state its true rate as `rate_hz`"));
+        let problem = format!("{name}: {:.1} new samples a second, {:.0} are due", c.rate_hz, c.due_hz);
+        problems.push((problem, "set the instrument to that rate, or state its true rate as `rate_hz`"));
     }
 }
 
 /// Samples at the ends of the range.
 fn saturated(c: &ChannelReport, problems: &mut Vec<Problem>) {
     if c.saturated_share > INVALID_SHARE {
-        let said = format!(
+        let problem = format!(
             "{}: {:.0} % of its samples are at the end of its range",
             c.name,
             c.saturated_share * 1e2
         );
-        problems.push((said, "unload and zero it, or use one of a larger range; a range in the profile that is too narrow does the same"));
+        problems.push((problem, "unload and zero it, or use one of a larger range; a range in the profile that is too narrow does the same"));
     }
 }
 
@@ -233,37 +233,37 @@ fn linked(answers: &Answers, problems: &mut Vec<Problem>) {
 }
 
 /// Values of an axis of force at rest.
-fn force(c: &ChannelReport, asked: &Asked<'_>, problems: &mut Vec<Problem>) {
-    let (limits, name) = (&asked.setup.config.limits, c.name);
+fn force(c: &ChannelReport, target: &Target<'_>, problems: &mut Vec<Problem>) {
+    let (limits, name) = (&target.setup.config.limits, c.name);
     let most = if name == "normal" { limits.normal_force_max_n } else { limits.lateral_force_max_n };
     let frozen_after = limits.frozen_after;
     let still = c.samples >= SAMPLES_MIN
         && (c.equal_in_a_row >= frozen_after || u64::from(c.equal_in_a_row) >= c.samples);
     if still {
-        let said = format!("{name}: frozen, one value {} times in a row", c.equal_in_a_row);
+        let problem = format!("{name}: frozen, one value {} times in a row", c.equal_in_a_row);
         problems.push((
-            said,
+            problem,
             "switch the sensor off and on; if its noise is below one count, raise `frozen_after`",
         ));
     }
     let Some(mean) = c.mean else { return };
     if mean.abs() > most {
-        let said = format!("{name}: {mean:.4e} N at rest, and the limit is {most} N");
-        problems.push((said, UNIT));
+        let problem = format!("{name}: {mean:.4e} N at rest, and the limit is {most} N");
+        problems.push((problem, UNIT));
     } else if name == "normal" && mean < -LOAD_ZERO_N {
-        let said = format!("normal: {mean:.3} N at rest, and compression is positive");
-        problems.push((said, "zero the sensor; if it is loaded, turn the axis round with `gain = -1`"));
+        let problem = format!("normal: {mean:.3} N at rest, and compression is positive");
+        problems.push((problem, "zero the sensor; if it is loaded, turn the axis round with `gain = -1`"));
     } else if name == "normal" && mean > LOAD_ZERO_N {
-        let said = format!("normal: {mean:.3} N at rest: a run trips over a load that it did not ask for");
-        problems.push((said, "lift the finger off and zero the sensor"));
+        let problem = format!("normal: {mean:.3} N at rest: a run trips over a load that it did not command");
+        problems.push((problem, "lift the finger off and zero the sensor"));
     }
-    let stated = [Some(asked.setup.config.estimate.sample_sd_n), stated_noise(asked.setup, name)];
+    let stated = [Some(target.setup.config.estimate.sample_sd_n), stated_noise(target.setup, name)];
     let stated = stated.into_iter().flatten().fold(0.0, f64::max);
     if let Some(noise) = c.noise_sd.filter(|sd| *sd > NOISE_TIMES * stated && mean.abs() <= most) {
-        let said =
+        let problem =
             format!("{name}: its noise is {:.1} mN, and {:.1} mN are stated", noise * 1e3, stated * 1e3);
         problems.push((
-            said,
+            problem,
             "look at cable, shield and ground, at the unit in its profile, and that nothing moves",
         ));
     }
@@ -307,8 +307,8 @@ fn amplifier(
         && !s.output_on
         && w.value.abs() > OFF_AMPLITUDE_PP_M
     {
-        let said = format!("it is off, and its plate is read at {:.2} um peak-to-peak", w.value * 1e6);
-        problems.push((said, "look at the amplitude's zero, unit and `measured_m_per_unit`"));
+        let problem = format!("it is off, and its plate is read at {:.2} um peak-to-peak", w.value * 1e6);
+        problems.push((problem, "look at the amplitude's zero, unit and `measured_m_per_unit`"));
     }
     format!(
         "output {}, set to {:.2} um peak-to-peak at {:.1} Hz",
@@ -328,8 +328,8 @@ fn stage(state: Result<StageState, NoData>, setup: &Setup, problems: &mut Vec<Pr
         problems.push(("it reports a FAULT".into(), "read the fault on the stage, and reset it there"));
     }
     if !(s.position_m >= left && s.position_m <= right) || s.at_limit {
-        let said = format!("outside its travel, {left} to {right} m");
-        problems.push((said, "move it between its ends by hand; look at `travel_min_m`, `travel_max_m` and at the unit of its position"));
+        let problem = format!("outside its travel, {left} to {right} m");
+        problems.push((problem, "move it between its ends by hand; look at `travel_min_m`, `travel_max_m` and at the unit of its position"));
     }
     if s.velocity_m_s.is_nan() || s.velocity_m_s.abs() > AT_REST_M_S {
         problems.push(("it moves at rest".into(), "find who moves it; look at the unit of its velocity"));
@@ -404,7 +404,7 @@ fn planned(look: &Look, setup: &Setup, plan: &Plan, mended: bool) -> Finding {
         let advice = "lift the finger off and zero the sensor; look at sign, unit and factor of its signal";
         return Finding::new(subject, false, found, advice);
     }
-    let found = if mended { "" } else { ", once what is said above is mended" };
+    let found = if mended { "" } else { ", once the problems above are solved" };
     Finding::new(subject, true, format!("{passes} passes can be made and seen{found}"), "")
 }
 
@@ -412,7 +412,7 @@ fn planned(look: &Look, setup: &Setup, plan: &Plan, mended: bool) -> Finding {
 mod tests {
     use super::*;
     use realtime::ports::Nanos;
-    use realtime::witness::StallReport;
+    use realtime::stall_monitor::StallReport;
 
     #[test]
     fn a_dead_weight_on_the_finger_is_no_zero_that_is_off() {
@@ -453,25 +453,25 @@ mod tests {
     }
 
     #[test]
-    fn stalls_of_this_computer_are_told_where_samples_came_late() {
+    fn stalls_of_this_computer_are_reported_where_samples_came_late() {
         let setup = Setup::load("virtual-ideal").unwrap();
         let of_computer = |look: &Look| {
-            let findings = judge(look, &Asked { setup: &setup, plan: None });
+            let findings = judge(look, &Target { setup: &setup, plan: None });
             assert!(findings[0].subject.starts_with("force"), "{findings:?}");
-            let said = findings.iter().find(|f| f.subject == "this computer").cloned();
-            (findings[0].good, said)
+            let finding = findings.iter().find(|f| f.subject == "this computer").cloned();
+            (findings[0].good, finding)
         };
-        let (good, said) = of_computer(&looked(0.48, 0.0, 7));
-        let said = said.unwrap();
-        assert!(!good && !said.good, "{said:?}");
-        assert!(said.found.contains("7 times") && said.found.contains("21 ms"), "{said:?}");
+        let (good, finding) = of_computer(&looked(0.48, 0.0, 7));
+        let finding = finding.unwrap();
+        assert!(!good && !finding.good, "{finding:?}");
+        assert!(finding.found.contains("7 times") && finding.found.contains("21 ms"), "{finding:?}");
         for (look, good, why) in [
-            (looked(0.48, 0.0, 0), false, "nothing is claimed that no witness saw"),
+            (looked(0.48, 0.0, 0), false, "nothing is claimed that no monitor saw"),
             (looked(1.0, 0.0, 7), true, "nothing is explained where nothing is wrong"),
             (looked(1.0, 1e3, 7), false, "no stall makes a wrong force"),
         ] {
-            let (found_good, said) = of_computer(&look);
-            assert_eq!((found_good, said.is_none()), (good, true), "{why}: {said:?}");
+            let (found_good, finding) = of_computer(&look);
+            assert_eq!((found_good, finding.is_none()), (good, true), "{why}: {finding:?}");
         }
     }
 }

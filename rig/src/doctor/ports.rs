@@ -1,4 +1,4 @@
-//! The instruments of a setup, each opened by itself and all kept open together.
+//! The instruments of a setup, each opened by itself; all stay open together.
 
 use super::Role;
 use drivers::endpoint::Endpoint;

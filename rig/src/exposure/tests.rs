@@ -59,7 +59,7 @@ fn written_twice(keeping: &Keeping) {
     }
 }
 
-/// A loop that drove for so long, kept until its ledger has noticed.
+/// A loop that drove for so long, and lives until its ledger has noticed.
 fn driven(ledger: Ledger, seconds: u64, dose_m2_s: f64) -> Keeping {
     let life = Arc::new(Lifeline::default());
     let keeping = ledger.keep(Arc::clone(&life), || panic!("it can be written")).unwrap();

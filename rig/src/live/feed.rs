@@ -1,7 +1,7 @@
-//! The run's end of the socket: takes the news without ever waiting, and tells them to every viewer.
+//! The run's end of the socket: takes the updates without ever waiting, and sends them to every viewer.
 #![allow(clippy::disallowed_methods, reason = "threads beside everything else")]
 
-use super::{Ask, Ended, Message, Progress, Run, State, Told, View, is_ours, place};
+use super::{Ask, Ended, Message, Progress, Run, State, TimedEvent, View, is_ours, place};
 use runs::sequence::MeasuredPass;
 use runs::session::{Signals, Update};
 use rustix::net::sockopt::socket_peercred;
@@ -15,7 +15,7 @@ use std::sync::mpsc::{
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Messages that wait to be told at most: several minutes of states in wall-clock time.
+/// Messages that wait to be sent at most: several minutes of states in wall-clock time.
 const QUEUE: usize = 4096;
 /// Lines that wait for a viewer at most.
 const VIEWER_QUEUE: usize = 1024;
@@ -59,10 +59,10 @@ impl Feed {
     pub fn news(&mut self, news: &Update<'_>) {
         let message = match news {
             Update::Pass(pass) => Message::Pass(Box::new((*pass).clone())),
-            Update::Event(event) => Message::Event(Told::of(self.now_s, (*event).clone())),
-            Update::State(glimpse) => {
-                self.now_s = glimpse.row.now.seconds();
-                Message::State(Box::new(State::of(glimpse)))
+            Update::Event(event) => Message::Event(TimedEvent::of(self.now_s, (*event).clone())),
+            Update::State(snapshot) => {
+                self.now_s = snapshot.row.now.seconds();
+                Message::State(Box::new(State::of(snapshot)))
             }
             Update::Off(off) if off.read_back => return,
             Update::Off(off) => Message::Off(off.words()),
@@ -83,7 +83,7 @@ impl Feed {
         }
         if self.lost > 0 {
             tracing::info!(
-                "{} messages were lost for those who watched: they came faster than they could be told",
+                "{} messages were lost for those who watched: they came faster than they could be sent",
                 self.lost
             );
         }
@@ -117,10 +117,10 @@ impl Feed {
         let mut view = View::default();
         view.take(Message::Run(Box::new(self.run.clone())));
         view.passes = std::mem::take(&mut self.before);
-        let (queue, told) = sync_channel(QUEUE);
+        let (queue, messages) = sync_channel(QUEUE);
         let (signals, viewers) = (self.signals.clone(), Vec::new());
         let teller = Teller { listener, signals, view, viewers, left_behind: 0 };
-        let tell = move || teller.tell(&told);
+        let tell = move || teller.tell(&messages);
         let teller = std::thread::Builder::new().name("viewers".into()).spawn(tell)?;
         Ok(Open { queue, teller })
     }

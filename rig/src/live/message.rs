@@ -1,4 +1,4 @@
-//! What is told of a run that goes on.
+//! The messages of a run in progress.
 
 use realtime::cycle::Phase;
 use realtime::ports::Channel;
@@ -20,10 +20,10 @@ pub enum Message {
     /// A pass that is safe on the disk.
     Pass(Box<MeasuredPass>),
     /// Something worth a line.
-    Event(Told),
+    Event(TimedEvent),
     /// How far it is.
     Progress(Progress),
-    /// The drive was not read back off: what to do, before the run's end is told.
+    /// The drive was not read back off: what to do, before the message of the run's end.
     Off(String),
     /// It is over; always last.
     Ended(Box<Ended>),
@@ -127,9 +127,9 @@ pub struct State {
 }
 
 impl State {
-    /// Of a glimpse of the loop.
-    pub fn of(glimpse: &Snapshot) -> Self {
-        let row = &glimpse.row;
+    /// Of a snapshot of the loop.
+    pub fn of(snapshot: &Snapshot) -> Self {
+        let row = &snapshot.row;
         let seen = &row.inputs.seen;
         let value = |channel: Channel| channel.ok().map(|r| r.value);
         let (amplifier, stage) = (seen.amplifier.ok(), seen.stage.ok());
@@ -153,14 +153,14 @@ impl State {
             residual: row.online.zip(row.mu_relative.ok()).map(|(o, mu)| mu.value - o.predicted),
             z: row.online.map(|o| o.z),
             blocking: row.waits_for,
-            extremes: glimpse.extremes,
+            extremes: snapshot.extremes,
         }
     }
 }
 
 /// An event, and when.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Told {
+pub struct TimedEvent {
     /// Loop time in s of the last state before it.
     pub at_s: f64,
     /// What happened.
@@ -170,11 +170,11 @@ pub struct Told {
     pub words: String,
 }
 
-impl Told {
+impl TimedEvent {
     /// An event at a time.
     pub fn of(at_s: f64, event: Event) -> Self {
         let words = runs::report::events::describe(&event);
-        Told { at_s, event, words }
+        TimedEvent { at_s, event, words }
     }
 }
 
@@ -198,7 +198,7 @@ pub struct Ended {
     pub remedy: Option<String>,
     /// Why there is no outcome.
     pub error: Option<String>,
-    /// What is said of the output: read back off, or not.
+    /// The state of the output: read back off, or not.
     pub off: Option<String>,
     /// What the comparison of all passes says.
     pub agreement: Option<String>,

@@ -1,4 +1,4 @@
-//! A stop that is asked for from outside a run's process, and is answered as done only where the run shows it.
+//! A stop that comes from outside a run's process, and is answered as done only where the run shows it.
 #![allow(clippy::disallowed_methods, reason = "somebody waits for a run to stop")]
 
 use super::{Ask, Heard, Message, Viewer};
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How long a run may take to show that it stops, asked by its feed and then by a signal.
+/// How long a run may take to show that it stops, first after a request by its feed, then after a signal.
 const BY_FEED: Duration = Duration::from_secs(3);
 const BY_SIGNAL: Duration = Duration::from_secs(15);
 /// Time between two looks.
@@ -43,7 +43,7 @@ pub fn stop(folder: &Path) -> Result<String, String> {
         return Ok(format!("it stops: SIGINT to process {number}"));
     }
     Err(format!(
-        "asked for by SIGINT to process {number}, and not shown: use the emergency stop if the rig does not obey"
+        "SIGINT was sent to process {number}, and the run does not show a stop: use the emergency stop if the rig does not obey"
     ))
 }
 
@@ -63,7 +63,7 @@ fn shows(mut viewer: Option<&mut Viewer>, folder: &Path, within: Duration) -> bo
         match viewer.as_mut().map(|viewer| viewer.hear(LOOK_EVERY)) {
             Some(Heard::Message(message)) => match *message {
                 Message::Ended(_) => return true,
-                Message::Event(told) if matches!(told.event, Event::StopRequested | Event::Tripped(_)) => {
+                Message::Event(event) if matches!(event.event, Event::StopRequested | Event::Tripped(_)) => {
                     return true;
                 }
                 _ => {}

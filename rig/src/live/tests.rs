@@ -59,7 +59,7 @@ fn seen(viewer: &mut Viewer, view: &mut View, done: impl Fn(&View) -> bool) {
 fn whoever_comes_late_has_the_same_picture() {
     let folder = tempfile::tempdir().unwrap();
     let mut feed = Feed::new(run(folder.path()), vec![pass(1), pass(2)], &Signals::default());
-    assert!(Viewer::connect(folder.path()).is_err(), "nothing was told yet");
+    assert!(Viewer::connect(folder.path()).is_err(), "nothing was sent yet");
     feed.news(&Update::Event(&Event::Armed));
     let (mut early, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut early, &mut view, |view| view.events.len() == 1);
@@ -126,7 +126,7 @@ fn a_viewer_that_reads_nothing_holds_nobody_up() {
     deaf.set_read_timeout(Some(SOON)).unwrap();
     let mut held = Vec::new();
     deaf.read_to_end(&mut held).unwrap();
-    assert!(held.len() < 2_000_000, "{} bytes were kept for it", held.len());
+    assert!(held.len() < 2_000_000, "{} bytes were held for it", held.len());
 }
 
 /// Viewers that take a few bytes now and then: the end of the run waits for all of them together, and not for each of their lines.
@@ -164,7 +164,7 @@ fn slow_viewers_hold_up_no_end() {
 }
 
 #[test]
-fn a_drive_that_is_not_off_is_told_before_the_end() {
+fn a_drive_that_is_not_off_is_reported_before_the_end() {
     let folder = tempfile::tempdir().unwrap();
     let mut feed = Feed::new(run(folder.path()), Vec::new(), &Signals::default());
     feed.news(&Update::Off(&runs::supervisor::OffReport::off()));

@@ -1,6 +1,6 @@
-//! The picture that messages add up to: what a viewer shows, and what a new one is told first.
+//! The picture that messages add up to: what a viewer shows, and what a new one gets first.
 
-use super::{Ended, Message, Progress, Run, State, Told};
+use super::{Ended, Message, Progress, Run, State, TimedEvent};
 use realtime::safety::Trip;
 use runs::sequence::{Event, MeasuredPass};
 use std::collections::VecDeque;
@@ -20,14 +20,14 @@ pub struct View {
     /// Its passes, those of earlier sessions too, in the order of measurement.
     pub passes: Vec<MeasuredPass>,
     /// The last events, oldest first.
-    pub events: VecDeque<Told>,
+    pub events: VecDeque<TimedEvent>,
     /// How far it is.
     pub progress: Progress,
     /// The trip that is latched.
     pub trip: Option<Trip>,
     /// Whether it rests before a pass.
     pub paused: bool,
-    /// What is said of a drive that was not read back off.
+    /// The warning about a drive that was not read back off.
     pub not_off: Option<String>,
     /// How it ended.
     pub ended: Option<Ended>,
@@ -38,20 +38,20 @@ impl View {
     pub fn take(&mut self, message: Message) {
         match message {
             Message::Run(run) => {
-                // A picture begins anew: whatever was seen of it before is told again.
+                // A new picture: everything seen before comes again.
                 let progress = Progress { made: run.made_before, planned: run.planned, remaining_s: 0.0 };
                 *self = View { run: Some(*run), progress, ..View::default() };
             }
             Message::State(state) => push(&mut self.states, *state, STATES),
             Message::Pass(pass) => self.passes.push(*pass),
-            Message::Event(told) => {
-                match &told.event {
+            Message::Event(event) => {
+                match &event.event {
                     Event::Tripped(trip) => self.trip = Some(*trip),
                     Event::Paused { .. } => self.paused = true,
                     Event::Resumed => self.paused = false,
                     _ => {}
                 }
-                push(&mut self.events, told, EVENTS);
+                push(&mut self.events, event, EVENTS);
             }
             Message::Progress(progress) => self.progress = progress,
             Message::Off(words) => self.not_off = Some(words),
@@ -63,7 +63,7 @@ impl View {
     pub fn messages(&self) -> Vec<Message> {
         let run = self.run.iter().map(|run| Message::Run(Box::new(run.clone())));
         let passes = self.passes.iter().map(|pass| Message::Pass(Box::new(pass.clone())));
-        let events = self.events.iter().map(|told| Message::Event(told.clone()));
+        let events = self.events.iter().map(|event| Message::Event(event.clone()));
         let progress = self.run.iter().map(|_| Message::Progress(self.progress));
         let states = self.states.iter().map(|state| Message::State(Box::new(state.clone())));
         let not_off = self.not_off.iter().map(|words| Message::Off(words.clone()));

@@ -46,7 +46,7 @@ impl Publisher {
             MqttOptions::new(format!("muprime-{}", std::process::id()), broker.host.as_str(), broker.port);
         options.set_keep_alive(Duration::from_secs(5));
         options.set_max_packet_size(LARGEST, LARGEST);
-        // Whoever follows is told when this program is gone without a word.
+        // Subscribers get this when the program is gone without a word.
         let will = LastWill::new(topic(&broker.prefix, "run"), r#"{"state":"lost"}"#, QoS::AtLeastOnce, true);
         options.set_last_will(will);
         if let Some(user) = &broker.user {

@@ -131,7 +131,7 @@ mod tests {
             let written = write(file, Preamble::default(), rows, &entries, &last, &lost, &clock);
             let _ = done_in.send((written.problem, lost.into_inner()));
         });
-        // Kept until the writer is done, as the sweep's thread does.
+        // Held until the writer is done, as the sweep's thread does.
         last_in.send(Last::new()).unwrap();
         let (problem, lost) = done.recv_timeout(Duration::from_secs(20)).expect("the writer ends");
         assert!(lost && problem.is_some());

@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// Who leads the run that is shown.
 pub enum Lead {
-    /// This process; it is asked by these.
+    /// This process, through these signals.
     Own(Signals),
     /// Another process.
     Other,
@@ -35,7 +35,7 @@ impl Hand {
         Hand { own, feed: Mutex::default() }
     }
 
-    /// From now on a run is asked this way; `None` where its feed is gone.
+    /// Sets the feed for requests to the run; `None` where its feed is gone.
     pub fn reach(&self, feed: Option<Asking>) {
         *self.feed.lock().unwrap_or_else(PoisonError::into_inner) = feed;
     }
@@ -45,11 +45,11 @@ impl Hand {
         feed.as_mut().is_some_and(|feed| feed(ask).is_ok())
     }
 
-    /// Stops the run; says how it was asked.
+    /// Stops the run; returns how.
     fn stop(&self, folder: &Path) -> String {
         if let Some(signals) = &self.own {
             signals.stops.fetch_add(1, Ordering::Relaxed);
-            return "stop asked for: the rig goes to its safe state first".into();
+            return "stop requested: the rig goes to its safe state first".into();
         }
         live::stop(folder).unwrap_or_else(|why| why)
     }
@@ -65,7 +65,7 @@ impl Hand {
         };
         match (done, ask) {
             (true, Ask::Pause) => {
-                "pause asked for: it rests after the pass that slides, no drive, lifted off".into()
+                "pause requested: it rests after the pass that slides, no drive, lifted off".into()
             }
             (true, _) => "it goes on".into(),
             (false, ask) => format!("no {}: the run's feed cannot be had", ask.word()),
@@ -96,7 +96,7 @@ fn take(shared: &Shared, pressed: &[u8]) {
         // What asks of the run does not wait for the picture: the lock of what is seen is taken for the note alone.
         match key {
             b's' | CTRL_C => {
-                shared.note("stop asked for".into());
+                shared.note("stop requested".into());
                 shared.note(shared.hand.stop(&shared.folder));
             }
             b'p' | b'r' => shared.note(rest(shared, if key == b'p' { Ask::Pause } else { Ask::Resume })),

@@ -18,7 +18,7 @@ use runs::sequence::Outcome;
 const WHOLE: [u16; 2] = [80, 24];
 /// Columns of the numbers.
 const NUMBERS: u16 = 39;
-/// A feed tells ten states a second; after so many seconds without any that is said.
+/// A feed sends ten states a second; after so many seconds without any the page warns.
 const SILENT_S: f64 = 2.0;
 
 /// What a page is drawn from.
@@ -158,7 +158,7 @@ fn state(page: &Page<'_>) -> (String, Style) {
         };
         let style = match ended.outcome {
             Some(Outcome::Complete) => look.strong(Color::Green),
-            // It was asked for.
+            // On request.
             Some(Outcome::Stopped) => look.heading(),
             _ => look.alarm(),
         };
@@ -209,9 +209,9 @@ fn progress(page: &Page<'_>) -> String {
     if view.ended.is_some() {
         return made;
     }
-    // The plan's times are told with the first pass.
+    // The plan's times come with the first pass.
     if p.remaining_s <= 0.0 {
-        return format!("{made}, time left: none told yet");
+        return format!("{made}, time left: not known yet");
     }
     let left = duration(p.remaining_s);
     if view.paused {
@@ -225,7 +225,7 @@ fn progress(page: &Page<'_>) -> String {
     format!("{made}, {left} left, ends about {clock} UTC")
 }
 
-/// What must not be overlooked: the trip with its remedy, how it ended, what is said of the output.
+/// What must not be overlooked: the trip with its remedy, how it ended, the state of the output.
 fn urgent(view: &View) -> Vec<String> {
     let mut lines = Vec::new();
     // Whether the output is off comes first: from the end's words, or until they come from the last reading.
@@ -247,9 +247,9 @@ fn urgent(view: &View) -> Vec<String> {
 
 /// Events, the newest first: loop time in s, and what happened.
 fn events(view: &View) -> impl Iterator<Item = String> + '_ {
-    view.events.iter().rev().map(|told| {
-        let words = describe(&told.event);
-        format!("{:8.1} s  {}", told.at_s, plain(words.lines().next().unwrap_or_default()))
+    view.events.iter().rev().map(|event| {
+        let words = describe(&event.event);
+        format!("{:8.1} s  {}", event.at_s, plain(words.lines().next().unwrap_or_default()))
     })
 }
 

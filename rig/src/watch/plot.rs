@@ -127,7 +127,7 @@ fn rounded_up(value: f64) -> f64 {
 /// Columns of the labels of mu'.
 const GUTTER: u16 = 5;
 
-/// `mu'` against amplitude: a mark for each pass, measured and predicted told apart by their shape.
+/// `mu'` against amplitude: a mark for each pass, measured and predicted with different shapes.
 pub fn curve(buffer: &mut Buffer, area: Rect, look: Look, view: &View) {
     if area.width < GUTTER + 8 || area.height < 4 {
         return;

@@ -60,9 +60,9 @@ struct Folder {
 }
 
 impl Folder {
-    /// Shows the passes of a run that nobody tells of, and its end once no process holds it.
+    /// Shows the passes of a run without a feed, and its end once no process holds it.
     fn look(&mut self, shared: &Shared, held: bool, why: &str) {
-        // What the feed told of the end is more than a folder holds.
+        // The feed's end is more complete than the folder's.
         if shared.seen().view.ended.is_some() && (self.ended || !self.read) && !held {
             return;
         }
@@ -117,10 +117,10 @@ fn planned(folder: &Path) -> Option<usize> {
     summary(folder).map(|summary| summary.planned)
 }
 
-/// What its record says that a run is of.
+/// What a run is of, from its record.
 fn run_of(folder: &Path) -> Option<Run> {
-    let mut said = run_dir::record_facts(folder).ok()?;
-    let mut fact = |name: &str| said.remove(name);
+    let mut facts = run_dir::record_facts(folder).ok()?;
+    let mut fact = |name: &str| facts.remove(name);
     let started_unix_s = fact("start_unix_ns").and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0) * 1e-9;
     Some(Run {
         folder: folder.into(),

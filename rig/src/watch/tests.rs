@@ -1,5 +1,5 @@
 use super::*;
-use crate::live::{Ended, Message, Progress, Run, State, Told};
+use crate::live::{Ended, Message, Progress, Run, State, TimedEvent};
 use models::condition::Condition;
 use models::pass::Pass;
 use ratatui::buffer::Buffer;
@@ -106,7 +106,7 @@ fn trip() -> Trip {
 fn living() -> View {
     let mut view = View::default();
     view.take(Message::Run(Box::new(run())));
-    view.take(Message::Event(Told::of(0.3, Event::Armed)));
+    view.take(Message::Event(TimedEvent::of(0.3, Event::Armed)));
     for n in 0..600 {
         view.take(Message::State(Box::new(state(f64::from(n) * 0.1))));
     }
@@ -126,9 +126,9 @@ fn living() -> View {
 
 fn states() -> Vec<(&'static str, View)> {
     let mut paused = living();
-    paused.take(Message::Event(Told::of(60.0, Event::Paused { point: 8 })));
+    paused.take(Message::Event(TimedEvent::of(60.0, Event::Paused { point: 8 })));
     let mut tripped = living();
-    tripped.take(Message::Event(Told::of(59.9, Event::Tripped(trip()))));
+    tripped.take(Message::Event(TimedEvent::of(59.9, Event::Tripped(trip()))));
     let mut ended = tripped.clone();
     ended.take(Message::Ended(Box::new(Ended {
         outcome: Some(Outcome::Tripped(trip())),

@@ -53,7 +53,7 @@ impl World {
 
 /// Where the answers of a person come from.
 pub enum Answers {
-    /// Nobody is asked: a virtual rig answers what it is asked for.
+    /// No questions: a virtual rig gives the answers.
     Simulated,
     /// The lines of a file, one an answer.
     File(VecDeque<String>),

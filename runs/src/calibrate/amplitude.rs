@@ -87,7 +87,7 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
         other => miette::bail!("--set-point {other}: set_point_pp_m or current_a"),
     };
     let mut sources = Sources::default();
-    let said = |path: &PathBuf| {
+    let refused = |path: &PathBuf| {
         let shown = path.display().to_string();
         move |e: AmplitudeError| miette::miette!("{shown}: no certificate: {e}")
     };
@@ -119,20 +119,20 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
             (path.clone(), table, Some(settings.to_string()))
         }
     };
-    let gain = fit(&table, form, args.vibrometer_relative_sd).map_err(said(&path))?;
+    let gain = fit(&table, form, args.vibrometer_relative_sd).map_err(refused(&path))?;
     let mut points = |path: &PathBuf, at: &str| points_of(&mut sources, path, at);
     let resonance = match &args.sweep {
         None => None,
-        Some(path) => Some(sweep(&points(path, "frequency_hz")?).map_err(said(path))?),
+        Some(path) => Some(sweep(&points(path, "frequency_hz")?).map_err(refused(path))?),
     };
     let shape = match &args.map {
         None => None,
-        Some(path) => Some(mode_shape(&points(path, "position_m")?).map_err(said(path))?),
+        Some(path) => Some(mode_shape(&points(path, "position_m")?).map_err(refused(path))?),
     };
     let exponent = if args.linear_droop { Exponent::Linear } else { Exponent::Hertz };
     let drooped = match &args.droop {
         None => None,
-        Some(path) => Some(droop(&points(path, "normal_force_n")?, exponent).map_err(said(path))?),
+        Some(path) => Some(droop(&points(path, "normal_force_n")?, exponent).map_err(refused(path))?),
     };
     let found = AmplitudeFit {
         gain,
@@ -177,7 +177,7 @@ fn live_table(args: &Args, bench: &dyn Bench) -> miette::Result<(PathBuf, String
     let text = bench.amplitudes(&setup, &table)?;
     let path = args.common.out.clone().unwrap_or_else(|| "amplitude.toml".into()).with_extension("csv");
     crate::files::write_whole(&path, &text)?;
-    say!("the table is kept in {}", path.display());
+    say!("the table is in {}", path.display());
     let settings = text.lines().next().and_then(|l| l.strip_prefix("# vibrometer: ")).unwrap_or_default();
     Ok((path, settings.to_string()))
 }

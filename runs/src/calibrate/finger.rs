@@ -69,7 +69,7 @@ pub struct Args {
 pub fn certified(args: &Args) -> miette::Result<Issued> {
     let mut sources = Sources::default();
     let mut found = FingerFit::default();
-    let said = |path: &PathBuf, e: FingerError| miette::miette!("{}: no certificate: {e}", path.display());
+    let refused = |path: &PathBuf, e: FingerError| miette::miette!("{}: no certificate: {e}", path.display());
     for (name, path) in
         [("normal_quasi_static", &args.normal_loop), ("lateral_quasi_static", &args.lateral_loop)]
     {
@@ -77,7 +77,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
         let rows = columns(&mut sources, path, ["displacement_m", "force_n", "up"], &["up"])?;
         let points: Vec<(f64, f64, bool)> = rows.iter().map(|r| (r[0], r[1], r[2] != 0.0)).collect();
         let stiffness =
-            quasi_static(&points, args.about_m, args.scale_relative_sd).map_err(|e| said(path, e))?;
+            quasi_static(&points, args.about_m, args.scale_relative_sd).map_err(|e| refused(path, e))?;
         found.stiffness.push((name.into(), stiffness));
     }
     for (name, path) in
@@ -92,20 +92,20 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
         let load = if name == "normal_ultrasonic" {
             args.normal_force_n.ok_or_else(|| {
                 miette::miette!(
-                    "--normal-ultrasonic needs --normal-force-n: whether contact was kept depends on it"
+                    "--normal-ultrasonic needs --normal-force-n: it decides whether contact was lost"
                 )
             })?
         } else {
             f64::INFINITY
         };
         let stiffness: Stiffness =
-            ultrasonic(&points, load, args.scale_relative_sd).map_err(|e| said(path, e))?;
+            ultrasonic(&points, load, args.scale_relative_sd).map_err(|e| refused(path, e))?;
         found.stiffness.push((name.into(), stiffness));
     }
     if let Some(path) = &args.friction {
         let bytes = sources.read(path)?;
-        let points = friction::read(bytes.as_slice()).map_err(|e| said(path, e))?;
-        found.friction = Some(friction::friction(&points).map_err(|e| said(path, e))?);
+        let points = friction::read(bytes.as_slice()).map_err(|e| refused(path, e))?;
+        found.friction = Some(friction::friction(&points).map_err(|e| refused(path, e))?);
     }
     if let Some(path) = &args.passes {
         let noise = PassNoise { pass_relative_sd: args.pass_relative_sd, force_sd_n: args.pass_force_sd_n };
@@ -115,7 +115,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
         let bytes = sources.read(path)?;
         let passes = models::pass::read_passes(bytes.as_slice())
             .map_err(|e| miette::miette!("{}: {e}", path.display()))?;
-        found.springs = Some(springs::springs(&passes, &noise).map_err(|e| said(path, e))?);
+        found.springs = Some(springs::springs(&passes, &noise).map_err(|e| refused(path, e))?);
     }
     if let Some(path) = &args.phases {
         let bytes = sources.read(path)?;
@@ -126,7 +126,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
             modulus_range_pa: (args.modulus_range_pa[0], args.modulus_range_pa[1]),
             elements: args.elements,
             modulus_only: args.modulus_only,
-            told: true,
+            shown: true,
         };
         let (modulus, skin) =
             inverse::analyse(&options, &points).map_err(|e| e.wrap_err(path.display().to_string()))?;

@@ -24,7 +24,7 @@ pub struct Args {
     /// Guided: how long a link that went down is waited for, in s
     #[arg(long, default_value_t = 60.0)]
     reconnect_s: f64,
-    /// Guided: where the series is kept [default: beside the certificate, .csv]
+    /// Guided: file for the series [default: beside the certificate, .csv]
     #[arg(long)]
     save_series: Option<PathBuf>,
     /// Local acceleration of free fall
@@ -79,7 +79,7 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
             };
             let text = bench.series(&options)?;
             let name = path.display().to_string();
-            say!("the series is kept in {name}");
+            say!("the series is in {name}");
             sources.add(&name, text.as_bytes());
             (name, text.into_bytes())
         }

@@ -19,7 +19,7 @@ const MODULI: [usize; 2] = [14, 7];
 /// half of it, a soft contact with about twice.
 const ABOUT: (f64, f64) = (0.4, 2.4);
 
-/// What the command was asked.
+/// Options of the analysis.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Frequency for a table without that column, Hz.
@@ -32,8 +32,8 @@ pub struct Options {
     pub elements: usize,
     /// Leave penalty and time alone.
     pub modulus_only: bool,
-    /// Say on standard error how far it is.
-    pub told: bool,
+    /// Print the progress on standard error.
+    pub shown: bool,
 }
 
 /// The modulus of elastic skin, and all three quantities unless only the modulus is wanted.
@@ -73,7 +73,7 @@ pub fn analyse(
     let base = base.with_normal_force_n(force);
     let search = Search { lowest_pa: low, highest_pa: high, model_sd_deg: MODEL_SD_DEG };
     let curves =
-        compute("the modulus", options.told, base, &amplitudes, SkinGrid::elastic((low, high), MODULI[0]))?;
+        compute("the modulus", options.shown, base, &amplitudes, SkinGrid::elastic((low, high), MODULI[0]))?;
     let elastic = identify(&points, &search, |e, w| curves.at(&Skin::elastic(e), w)).into_diagnostic()?;
     if options.modulus_only {
         return Ok((elastic, None));
@@ -81,23 +81,23 @@ pub fn analyse(
     let about = (ABOUT.0 * elastic.young_modulus_pa, ABOUT.1 * elastic.young_modulus_pa);
     let grid = SkinGrid::free(about, MODULI[1]);
     let half = RidgeCase { elements: options.elements / 2, ..base };
-    let curves = compute("penalty and retardation time", options.told, half, &amplitudes, grid.clone())?;
+    let curves = compute("penalty and retardation time", options.shown, half, &amplitudes, grid.clone())?;
     let skin = identify_skin(&points, &grid, &search, &elastic, |skin, w| curves.at(skin, w));
     Ok((elastic, Some(skin.into_diagnostic()?)))
 }
 
 fn compute(
     what: &str,
-    told: bool,
+    shown: bool,
     base: RidgeCase,
     amplitudes: &[PeakToPeak],
     grid: SkinGrid,
 ) -> miette::Result<PhaseCurves> {
     let runs = (amplitudes.len() * grid.len()) as u64;
-    if told {
+    if shown {
         say!("{what}: running the ridge {runs} times ({} amplitudes)", amplitudes.len());
     }
-    let target = if told { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
     let bar = ProgressBar::with_draw_target(Some(runs), target);
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} gone, {eta} to go");
     bar.set_style(style.into_diagnostic()?);

@@ -31,8 +31,8 @@ pub struct TemperatureFlag {
 }
 
 impl TemperatureRange {
-    /// The flag of a pass that begins with this temperature; `None` within the range. An amplifier without the channel
-    /// flags no pass: that is said once, when the rig is armed.
+    /// The flag of a pass that begins with this temperature; `None` within the range. An amplifier without
+    /// the channel flags no pass: a warning comes once, when the rig is armed.
     pub fn flag(&self, temperature_c: &Channel) -> Option<TemperatureFlag> {
         let (found_c, missing) = match temperature_c {
             Ok(reading) if self.holds(reading.value) => return None,
@@ -86,7 +86,7 @@ mod tests {
         }
         let lost = range.flag(&Err(NoData::Disconnected)).expect("flagged");
         assert!(lost.found_c.is_none() && lost.to_string().contains("the link is down"), "{lost}");
-        // An amplifier without a thermometer: said once, not with every pass.
+        // An amplifier without a thermometer: reported once, not with every pass.
         assert_eq!(range.flag(&Err(NoData::NotFitted)), None);
     }
 }

@@ -129,13 +129,13 @@ fn the_common_shift_is_that_of_the_full_matrix() {
 }
 
 #[test]
-fn the_same_seed_in_virtual_time_and_the_same_bytes_are_said() {
-    let said = |seed: &str, clock: &str| {
+fn the_same_seed_in_virtual_time_and_the_same_bytes_are_reported() {
+    let facts = |seed: &str, clock: &str| {
         crate::run_dir::RecordFacts::from([("seed".into(), seed.into()), ("clock".into(), clock.into())])
     };
-    let (two, three) = (said("2", "virtual"), said("3", "virtual"));
+    let (two, three) = (facts("2", "virtual"), facts("3", "virtual"));
     assert!(differences::warnings(&two, &three, false).is_empty());
-    assert!(differences::warnings(&said("2", "monotonic"), &said("2", "monotonic"), false).is_empty());
+    assert!(differences::warnings(&facts("2", "monotonic"), &facts("2", "monotonic"), false).is_empty());
     assert_eq!(differences::warnings(&two, &two, true).len(), 2);
     let differ = differences::between(&two, &three);
     assert_eq!((differ.len(), differ[0].what.as_str(), differ[0].b.as_deref()), (1, "seed", Some("3")));

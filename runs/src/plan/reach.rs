@@ -72,11 +72,11 @@ mod tests {
                 reach("normal_force_n", [0.0, 0.2], "`s` sees"),
             ])
             .unwrap_err();
-        let said = format!("{refused:?}");
-        assert!(said.contains("`a` takes") && said.contains("`s` sees"), "{said}");
+        let message = format!("{refused:?}");
+        assert!(message.contains("`a` takes") && message.contains("`s` sees"), "{message}");
     }
-    /// A stage that does less than the travel's usual speed: every sweep was refused at the wire, and told as
-    /// a stage that does not follow.
+    /// A stage that does less than the travel's usual speed: every sweep was refused at the wire, and
+    /// reported as a stage that does not follow.
     #[test]
     fn a_travel_is_no_faster_than_the_stage() {
         let reach = [Reach { column: "speed_m_s", range: [0.0, 0.1], by: "`s` takes".into() }];
@@ -91,8 +91,8 @@ mod tests {
             ("settle_s = 0.05", "settle_s = 0.05\napproach_speed_m_s = 0.15"),
         ] {
             let plan = Plan::parse("r", &text.replacen(from, to, 1)).unwrap();
-            let said = format!("{:?}", plan.check_reach(&reach).unwrap_err());
-            assert!(said.contains("`s` takes"), "{to}: {said}");
+            let message = format!("{:?}", plan.check_reach(&reach).unwrap_err());
+            assert!(message.contains("`s` takes"), "{to}: {message}");
         }
     }
 }

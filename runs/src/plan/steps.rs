@@ -76,7 +76,7 @@ impl Step {
         }
     }
 
-    /// What a virtual rig answers: the paper's moist skin where nothing else is said.
+    /// The answer of a virtual rig: the paper's moist skin by default.
     pub fn usual_number(&self) -> Option<f64> {
         self.number_name().map(|_| self.usual.unwrap_or(35.0))
     }

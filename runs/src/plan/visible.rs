@@ -12,7 +12,7 @@ use models::quantity::PeakToPeak;
 /// rounding of the two readings whose difference is taken; four leave a curve of some shape.
 pub const COUNTS_MIN: f64 = 4.0;
 
-/// What reads the lateral force, as far as it is known before the instrument is asked.
+/// What reads the lateral force, as far as it is known before the instrument is connected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LateralChannel {
     /// Instrument and signal, for messages.
@@ -31,8 +31,8 @@ impl LateralChannel {
         let mut bounds =
             vec![(self.pass_sd_n, format!("the setup's force_sd_n of a pass is {} mN", mn(self.pass_sd_n)))];
         if let Some(count) = self.count_n {
-            let said = format!("its count is {} mN, and {COUNTS_MIN} of them are needed", mn(count));
-            bounds.push((COUNTS_MIN * count, said));
+            let text = format!("its count is {} mN, and {COUNTS_MIN} of them are needed", mn(count));
+            bounds.push((COUNTS_MIN * count, text));
         }
         if let Some(noise) = self.noise_n {
             bounds.push((noise, format!("its noise is {} mN", mn(noise))));
@@ -150,11 +150,11 @@ amplitude_pp_m = [0.5e-6, 3e-6]
     #[test]
     fn a_count_too_coarse_for_the_sweep_is_refused_with_its_numbers() {
         assert_eq!(judge(PLAN, &channel(Some(0.0156), None)), Ok(()));
-        let said = judge(PLAN, &channel(Some(0.0313), None)).unwrap_err();
+        let refusal = judge(PLAN, &channel(Some(0.0313), None)).unwrap_err();
         for part in
             ["series 'a'", "3e-6 m", "Fn = 0.25 N", "(point ", "`s` (fx)", "its count is 31.3 mN", "125 mN"]
         {
-            assert!(said.contains(part), "{part}: {said}");
+            assert!(refusal.contains(part), "{part}: {refusal}");
         }
         // OnRobot's count is 0.1 N: useless for a fingertip at a quarter of a newton.
         assert!(judge(PLAN, &channel(Some(0.1), None)).is_err());
@@ -163,8 +163,8 @@ amplitude_pp_m = [0.5e-6, 3e-6]
     #[test]
     fn noise_above_the_change_is_refused() {
         assert_eq!(judge(PLAN, &channel(None, Some(0.06))), Ok(()));
-        let said = judge(PLAN, &channel(Some(1e-5), Some(0.126))).unwrap_err();
-        assert!(said.contains("its noise is 126 mN"), "{said}");
+        let refusal = judge(PLAN, &channel(Some(1e-5), Some(0.126))).unwrap_err();
+        assert!(refusal.contains("its noise is 126 mN"), "{refusal}");
         let rough = LateralChannel { pass_sd_n: 0.126, ..channel(Some(1e-5), None) };
         assert!(judge(PLAN, &rough).unwrap_err().contains("force_sd_n"));
     }
@@ -174,8 +174,8 @@ amplitude_pp_m = [0.5e-6, 3e-6]
     #[test]
     fn a_series_that_shows_nothing_is_refused_and_one_point_that_shows_something_is_enough() {
         let silent = PLAN.replace("[0.5e-6, 3e-6]", "[1e-8]");
-        let said = judge(&silent, &channel(Some(1e-5), None)).unwrap_err();
-        assert!(said.contains("expects is 0"), "{said}");
+        let refusal = judge(&silent, &channel(Some(1e-5), None)).unwrap_err();
+        assert!(refusal.contains("expects is 0"), "{refusal}");
         let both = PLAN.replace("[0.5e-6, 3e-6]", "[1e-8, 3e-6]");
         assert_eq!(judge(&both, &channel(Some(1e-5), None)), Ok(()));
         // Without vibration it is the friction itself that is measured: 125 mN.

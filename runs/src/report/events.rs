@@ -98,8 +98,8 @@ fn at_rig(event: &Event) -> String {
         Event::Disarmed { supply_open: false } => {
             "disarmed: the drive was read back off; the stage is at rest".into()
         }
-        Event::Asked { step, types: None } => format!("AT THE RIG: {step}; then press Enter"),
-        Event::Asked { step, types: Some(name) } => {
+        Event::OperatorStep { step, types: None } => format!("AT THE RIG: {step}; then press Enter"),
+        Event::OperatorStep { step, types: Some(name) } => {
             format!("AT THE RIG: {step}; then type {name} and press Enter")
         }
         Event::Answered { step, answer, answered_by, .. } => format!("{step}: {answer} ({answered_by})"),

@@ -44,7 +44,7 @@ pub fn head(pairs: &[(&str, String)]) -> String {
     format!("<dl class=\"head\">{items}</dl>\n")
 }
 
-/// A list of plain texts; what is said where there is none.
+/// A list of plain texts, or the text for none.
 pub fn list(items: impl IntoIterator<Item = impl Display>, none: &str) -> String {
     let items: String =
         items.into_iter().map(|item| format!("<li>{}</li>", escape(&item.to_string()))).collect();

@@ -78,7 +78,7 @@ fn scale(size: f64, unit: &str) -> (f64, &str) {
     fits.or(nearest).map_or((1.0, unit), |(factor, name)| (*factor, *name))
 }
 
-/// A p-value as it is read: what lies below one in a million is not told apart.
+/// A p-value as it is read: values below one in a million are not distinguished.
 pub fn p_value(p: f64) -> String {
     if p < 1e-6 { "p < 1e-6".into() } else { format!("p = {}", number(p)) }
 }

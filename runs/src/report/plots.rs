@@ -145,7 +145,7 @@ struct Frame<'a> {
     alt: &'a str,
 }
 
-/// A figure as SVG, wide and narrow; `draw` puts the curves in and is told the size of a mark.
+/// A figure as SVG, wide and narrow; `draw` puts the curves in and gets the size of a mark.
 fn figure(
     frame: &Frame<'_>,
     draw: impl for<'a> Fn(&mut Chart<'a>, u32) -> miette::Result<()>,
@@ -183,7 +183,7 @@ fn figure(
     Ok(text)
 }
 
-/// How many marks there are that are told apart by their shape alone.
+/// The number of marks that are distinguished by their shape alone.
 const MARKS: usize = 5;
 
 /// A mark whose shape is the series': disc, square, triangle, diamond, cross; hollow where it is not filled.
@@ -350,8 +350,8 @@ mod tests {
 
     #[test]
     fn a_mark_is_where_it_was_measured_or_the_caption_says_that_it_is_not() {
-        let said = |values: &[f64]| beyond(values.iter().copied(), mu_axis(values.iter().copied()));
-        assert_eq!(said(&[-0.1, 0.4, 1.4]), "");
-        assert!(said(&[0.4, 9.0]).contains("beyond the axis"));
+        let caption = |values: &[f64]| beyond(values.iter().copied(), mu_axis(values.iter().copied()));
+        assert_eq!(caption(&[-0.1, 0.4, 1.4]), "");
+        assert!(caption(&[0.4, 9.0]).contains("beyond the axis"));
     }
 }

@@ -14,20 +14,20 @@ use std::path::Path;
 /// # Errors
 /// A folder that cannot be read.
 pub fn damage_in(path: &Path) -> miette::Result<Vec<String>> {
-    let mut said = Vec::new();
+    let mut findings = Vec::new();
     for record in records_in(path)? {
         let file = File::open(&record).into_diagnostic().wrap_err_with(|| record.display().to_string())?;
         let found = realtime::recorder::inspect(BufReader::new(file));
-        said.extend(found.sentences().iter().map(|s| of_file(&record, s)));
+        findings.extend(found.sentences().iter().map(|s| of_file(&record, s)));
     }
-    said.extend(missing_records(path)?);
+    findings.extend(missing_records(path)?);
     if path.join(POINTS).exists() && path.join(JOURNAL).exists() {
         match passes_in(path) {
-            Ok(passes) => said.extend(differences(path, &passes)?),
-            Err(why) => said.push(format!("{why:#}")),
+            Ok(passes) => findings.extend(differences(path, &passes)?),
+            Err(why) => findings.push(format!("{why:#}")),
         }
     }
-    Ok(said)
+    Ok(findings)
 }
 
 /// A finding with the name of the file that it is about.
@@ -50,8 +50,8 @@ pub fn missing_records(path: &Path) -> miette::Result<Vec<String>> {
 /// # Errors
 /// A table that cannot be read.
 pub fn differences(path: &Path, passes: &[MeasuredPass]) -> miette::Result<Vec<String>> {
-    let (kept, _) = whole_table(&fs::read(path.join(POINTS)).into_diagnostic()?)?;
-    let differ = passes.iter().filter(|p| kept.iter().any(|k| k.point == p.pass.point && *k != p.pass));
+    let (table, _) = whole_table(&fs::read(path.join(POINTS)).into_diagnostic()?)?;
+    let differ = passes.iter().filter(|p| table.iter().any(|k| k.point == p.pass.point && *k != p.pass));
     Ok(differ
         .map(|p| format!("point {}: {POINTS} and {JOURNAL} differ: one of them was changed", p.pass.point))
         .collect())

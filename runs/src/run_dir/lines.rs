@@ -59,7 +59,7 @@ mod tests {
         for cut in two.len()..three.len() {
             let (passes, whole) = whole_table(&three[..cut]).unwrap();
             assert_eq!((passes.len(), whole), (2, two.len()), "cut at {cut}");
-            // Its size was kept, its sectors were not: all of them, or the first.
+            // Its size was written, its sectors were not: all of them, or the first.
             for hole in [two.len()..three.len(), two.len()..cut] {
                 let mut holed = three.clone();
                 holed[hole.clone()].fill(0);
@@ -73,7 +73,7 @@ mod tests {
         let mut wrong = three.clone();
         let sign = three.len() - 4;
         wrong[sign] = b'x';
-        assert!(whole_table(&wrong).is_err(), "a line that was whole and is damaged is said, never dropped");
+        assert!(whole_table(&wrong).is_err(), "a line that was whole and is damaged is never dropped");
         let mut middle = three.clone();
         middle[two.len() - 4] = 0;
         assert!(whole_table(&middle).is_err(), "only the last line can be torn");

@@ -5,8 +5,8 @@
 //! is not heard for its age limit is a silent emergency stop: the supply is cut, and stays cut until it is
 //! proved. Its amplifier then shows a fault for as long as its supply is open: that is no reason to wait,
 //! since the proof is what closes it. And a proof in which the loop was held up is broken off: it is made
-//! again, so often as a reset is asked for at all. Both are told. With a human finger no proof is made again:
-//! the hand at the dead-man device must let go and grip anew, and a person starts anew.
+//! again, as often as a reset may be requested at all. The sweep reports both. With a human finger no proof
+//! is repeated: the hand must release the dead-man device and grip it again, and a person starts again.
 
 use super::events::{Event, Outcome};
 use realtime::ports::Nanos;
@@ -15,9 +15,9 @@ use realtime::turn::Row;
 
 /// Time to wait for the rig to arm.
 const ARM_WITHIN: Nanos = Nanos(10_000_000_000);
-/// Nothing may have stood in the way for this long before a reset is asked for.
+/// Nothing may have stood in the way for this long before a reset is requested.
 const CLEAR_FOR: Nanos = Nanos(50_000_000);
-/// A reset that found something in its way is asked for again, so often in all. Each waits until nothing
+/// A reset that found something in its way is requested again, so often in all. Each waits for a clear way.
 /// stands in the way.
 const ASKS: u32 = 3;
 /// Time that the loop has to answer a reset.
@@ -28,9 +28,9 @@ const ANSWER_WITHIN: Nanos = Nanos(200_000_000);
 pub(super) enum Next {
     /// Nothing yet.
     Wait,
-    /// A reset is asked for; something may have to be told.
+    /// A reset is requested, perhaps with an event.
     Ask(Option<Event>),
-    /// A proof was disturbed and is to be made again: this is told.
+    /// A proof was disturbed and is to be repeated, with the event of it.
     Again(Event),
     /// The rig is armed.
     Armed,
@@ -43,18 +43,18 @@ pub(super) enum Next {
 pub(super) struct Arming {
     since: Option<Nanos>,
     clear_since: Option<Nanos>,
-    asked: Option<Nanos>,
+    requested: Option<Nanos>,
     asks: u32,
     /// What stood in the way last.
     in_the_way: Option<Cause>,
     /// The trip that disturbed a proof last.
     disturbed: Option<Trip>,
-    /// Longest lateness of a cycle since a reset was last asked for.
+    /// Longest lateness of a cycle since the last request of a reset.
     held_up: Nanos,
     /// Lateness of a cycle from which on it is an overrun by itself.
     overrun: Nanos,
     human_contact: bool,
-    /// That the supply was cut was told already.
+    /// The cut of the supply was reported already.
     cut_told: bool,
     /// The last cycle that was seen to prove the second channel.
     proving: Option<u64>,
@@ -65,7 +65,7 @@ impl Arming {
         Arming {
             since: None,
             clear_since: None,
-            asked: None,
+            requested: None,
             asks: 0,
             in_the_way: None,
             disturbed: None,
@@ -109,7 +109,7 @@ impl Arming {
             return Next::Again(self.disturbed_by(trip.cause));
         }
         self.proving = row.proving.then_some(row.cycle).or(self.proving);
-        // The second channel has not shown yet what it was told.
+        // The second channel has not yet shown the commanded state.
         let unproved = row.proving.then_some(Cause::SupplySwitch);
         if row.now.since(since) > ARM_WITHIN {
             let last = self.disturbed.filter(|_| row.waits_for.is_none());
@@ -119,13 +119,13 @@ impl Arming {
         self.in_the_way = row.waits_for.or(self.in_the_way);
         self.clear_since = if row.waits_for.is_none() { self.clear_since.or(Some(row.now)) } else { None };
         let clear = self.clear_since.is_some_and(|at| row.now.since(at) >= CLEAR_FOR);
-        let unanswered = self.asked.is_none_or(|at| row.now.since(at) > ANSWER_WITHIN) && !row.proving;
+        let unanswered = self.requested.is_none_or(|at| row.now.since(at) > ANSWER_WITHIN) && !row.proving;
         if !(clear && unanswered && self.asks < ASKS) {
             return Next::Wait;
         }
         // What was cut before anything was armed, and needs no person, was cut for a silent emergency stop.
         let event = (row.supply_cut && !self.cut_told).then(|| self.disturbed_by(Cause::EmergencyStop));
-        (self.asked, self.held_up, self.cut_told) = (Some(row.now), Nanos(0), false);
+        (self.requested, self.held_up, self.cut_told) = (Some(row.now), Nanos(0), false);
         self.asks += 1;
         Next::Ask(event)
     }
@@ -135,8 +135,8 @@ impl Arming {
     }
 
     /// Whether the proof is made again after a trip that broke it off: the loop itself was late, or was held
-    /// up while something that only grows old grew too old. A relay that does not do what it is told is not
-    /// among these, nor anything that an instrument says.
+    /// up while something that only grows old grew too old. A relay that does not follow its command is not
+    /// among these, nor anything that an instrument reports.
     fn is_made_again_after(&self, trip: &Trip) -> bool {
         let by_itself = matches!(trip.cause, Cause::Overrun | Cause::Suspended);
         let grew_old = match trip.cause {

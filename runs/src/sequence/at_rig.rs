@@ -24,10 +24,9 @@ use std::collections::{BTreeMap, VecDeque};
 const HOLDS_FOR: Nanos = Nanos(1_000_000_000);
 /// Time within which a disarmed rig must be read back off.
 const OFF_WITHIN: Nanos = Nanos(5_000_000_000);
-/// Time in which the finger leaves the plate, and the plate rings down: no person is asked and no zero is
-/// read before.
+/// Time in which the finger leaves the plate, and the plate rings down: no question or zero before.
 const LIFTED_AFTER: Nanos = Nanos(1_000_000_000);
-/// An operator who types a value beyond the tolerance is asked again so often.
+/// How often an operator who types a value beyond the tolerance gets the question again.
 const ASKS: u32 = 5;
 /// The answer that has the step before done once more.
 const AGAIN: &str = "again";
@@ -140,7 +139,7 @@ impl AtRig {
         }
     }
 
-    /// A reading that is fresh enough; what a person confirmed holds until another level is asked for.
+    /// A reading that is fresh enough; what a person confirmed holds until another level is requested.
     fn reading(&self, at: usize, now: Nanos) -> Option<Found> {
         let typed = |found: &Found| matches!(found.source, Source::Operator | Source::AnswersFile);
         let by_hand = self.means[at].is_some_and(|means| means.reads == By::Operator);
@@ -412,7 +411,7 @@ impl Sequence {
         };
         let level = at.zip(usual);
         out.question = Some(Question { usual: usual.filter(|_| types.is_some()), level });
-        out.events.push(Event::Asked { step, types });
+        out.events.push(Event::OperatorStep { step, types });
         self.at_rig.answer = None;
         self.at_rig.wait = Some(Wait::Answer { since: row.now });
     }
@@ -443,7 +442,7 @@ impl Sequence {
             (_, number) => !needs || number.is_some(),
         };
         if !fits {
-            // Asked again; what does not fit is in the record too.
+            // The question comes again; what does not fit is in the record too.
             return self.next_task(row, out);
         }
         let found = |value: f64| Found { value, at: row.now, source };
@@ -486,7 +485,7 @@ impl Sequence {
         }
         let again = by_hand && self.at_rig.asked_again < ASKS;
         if again {
-            // A gauge that shows something else: the operator is asked again.
+            // A gauge that shows something else: the question comes again.
             self.at_rig.asked_again += 1;
             return self.next_task(row, out);
         }

@@ -81,9 +81,9 @@ pub enum Event {
         /// ln of the evidence.
         log_evidence: f64,
     },
-    /// A stop was asked for (signal or operator).
+    /// A stop was requested (signal or operator).
     StopRequested,
-    /// The sweep rests before a pass, as the operator asked: no drive, lifted off, not armed.
+    /// The sweep rests before a pass, on the operator's request: no drive, lifted off, not armed.
     Paused {
         /// The pass that comes next.
         point: u32,
@@ -118,8 +118,9 @@ pub enum Event {
         /// The second channel was read back open; false where none is fitted.
         supply_open: bool,
     },
-    /// Something is asked of whoever stands at the rig.
-    Asked {
+    /// The operator at the rig must do something.
+    #[serde(rename = "asked")]
+    OperatorStep {
         /// What is to be done.
         step: String,
         /// Column or name of the number that is to be typed; none where a confirmation will do.
@@ -127,7 +128,7 @@ pub enum Event {
     },
     /// It was answered.
     Answered {
-        /// What was asked.
+        /// The step.
         step: String,
         /// The answer as it was given.
         answer: String,
@@ -135,7 +136,7 @@ pub enum Event {
         number: Option<f64>,
         /// By whom.
         answered_by: Source,
-        /// s after it was asked.
+        /// s after the question.
         after_s: f64,
     },
     /// The timer of a step ran down.
@@ -174,7 +175,7 @@ pub enum Event {
         /// What was found last.
         last: Option<f64>,
     },
-    /// It left the plan's tolerance during a pass: the pass is kept, and marked.
+    /// It left the plan's tolerance during a pass: the pass is stored, and marked.
     LevelLost {
         /// Which pass.
         point: u32,
@@ -199,7 +200,7 @@ pub enum Event {
 pub enum Outcome {
     /// Every pass was made.
     Complete,
-    /// Stopped on request; what was measured is kept.
+    /// Stopped on request; what was measured is stored.
     Stopped,
     /// A safety trip ended it.
     Tripped(Trip),
@@ -224,16 +225,16 @@ pub enum Outcome {
     },
     /// Nothing was heard of the loop.
     LoopLost,
-    /// Record, passes, catalogue, summary or report could not be written: a measurement that is not kept is
+    /// Record, passes, catalogue, summary or report could not be written: a measurement that is not stored is
     /// not made.
     RecordLost,
     /// What the finger was exposed to could not be written in time: nothing is driven that is not counted.
-    /// What was measured is kept.
+    /// What was measured is stored.
     ExposureNotKept,
 }
 
 impl Outcome {
-    /// What ended the sweep, or kept it from beginning, where a rule did.
+    /// The cause that ended the sweep or prevented it, where a rule did.
     pub fn cause(&self) -> Option<Cause> {
         match self {
             Outcome::Tripped(trip) => Some(trip.cause),
@@ -262,7 +263,7 @@ impl Outcome {
                 format!("{} was not reached: {last}", words(*wanted))
             }
             Outcome::LoopLost => "nothing was heard of the loop".into(),
-            Outcome::RecordLost => "the record could not be kept".into(),
+            Outcome::RecordLost => "the record could not be saved".into(),
             Outcome::ExposureNotKept => "the exposure of the finger could not be written in time".into(),
         }
     }
@@ -303,7 +304,7 @@ mod tests {
             Event::TemperatureBeyondCertificate { point: 1, flag },
             Event::TemperatureUnwatched { certificate: "c".into() },
             Event::Disarmed { supply_open: true },
-            Event::Asked { step: "s".into(), types: Some("t".into()) },
+            Event::OperatorStep { step: "s".into(), types: Some("t".into()) },
             Event::Answered {
                 step: "s".into(),
                 answer: "a".into(),
@@ -331,7 +332,7 @@ mod tests {
                 Event::ArmingDisturbed { .. } | Event::Zeros { .. } | Event::Tripped(_) => {}
                 Event::ModelDeparted { .. } | Event::Paused { .. } | Event::Resumed => {}
                 Event::PassRepeated { .. } | Event::TemperatureBeyondCertificate { .. } => {}
-                Event::TemperatureUnwatched { .. } | Event::Disarmed { .. } | Event::Asked { .. } => {}
+                Event::TemperatureUnwatched { .. } | Event::Disarmed { .. } | Event::OperatorStep { .. } => {}
                 Event::Answered { .. } | Event::Waited { .. } | Event::LevelSet { .. } => {}
                 Event::LevelReached { .. } | Event::LevelNotReached { .. } | Event::LevelLost { .. } => {}
             }
@@ -345,9 +346,9 @@ mod tests {
         let text = include_str!("../../../realtime/src/recorder/schemas/event.json");
         let schema: serde_json::Value = serde_json::from_str(text).unwrap();
         for event in every_kind() {
-            let told = serde_json::to_value(&event).unwrap();
-            for key in told.as_object().unwrap().keys() {
-                assert!(schema["properties"].get(key).is_some(), "'{key}' of {told}");
+            let document = serde_json::to_value(&event).unwrap();
+            for key in document.as_object().unwrap().keys() {
+                assert!(schema["properties"].get(key).is_some(), "'{key}' of {document}");
             }
         }
     }

@@ -38,8 +38,8 @@ impl Sequence {
         let before = std::mem::take(&mut self.temperature_flags);
         let point = self.points[self.next].number;
         let fresh = flags.iter().filter(|flag| !before.iter().any(|b| b.certificate == flag.certificate));
-        let told = fresh.map(|flag| Event::TemperatureBeyondCertificate { point, flag: flag.clone() });
-        out.events.extend(told);
+        let events = fresh.map(|flag| Event::TemperatureBeyondCertificate { point, flag: flag.clone() });
+        out.events.extend(events);
         self.temperature_flags = flags;
     }
 

@@ -1,7 +1,7 @@
 use super::*;
 use crate::plan::{Plan, Resolution};
 use crate::setup::Setup;
-use crate::supervisor::{self, Asked, End, VirtualLoop};
+use crate::supervisor::{self, End, Requests, VirtualLoop};
 use models::prediction::SpringSlider;
 use realtime::turn::Ports;
 use sim::virtual_rig::VirtualRig;
@@ -44,7 +44,7 @@ fn swept_on(
     let (asks, now) = (std::cell::Cell::new(false), std::cell::Cell::new(0.0));
     let mut ask = || {
         let end = ends.take_if(|(at, _)| now.get() >= *at).map(|(_, end)| end);
-        Asked { end, pause: asks.get() }
+        Requests { end, pause: asks.get() }
     };
     let (mut passes, mut events, mut rows, mut rests) = (Vec::new(), Vec::new(), Vec::new(), false);
     let outcome = supervisor::sweep(&mut rig, &mut sequence, &mut ask, &mut |row, _, reaction| {
@@ -118,7 +118,7 @@ fn a_pause_rests_without_drive_and_lifted_off_and_loses_no_pass() {
 fn each_end_from_outside_has_its_own_outcome() {
     let world = sim::world::WorldConfig::ideal();
     for (end, outcome) in [
-        (End::Asked, Outcome::Stopped),
+        (End::Requested, Outcome::Stopped),
         (End::NotKept, Outcome::RecordLost),
         (End::ExposureNotKept, Outcome::ExposureNotKept),
     ] {
@@ -130,7 +130,7 @@ fn each_end_from_outside_has_its_own_outcome() {
     }
 }
 
-/// A pause that nobody ends is ended by its limit, with the rig off; what was made is kept.
+/// A pause that nobody ends is ended by its limit, with the rig off; what was measured is stored.
 #[test]
 fn a_pause_has_an_end() {
     let world = sim::world::WorldConfig::ideal();
@@ -174,15 +174,15 @@ fn a_hand_on_the_finger_ends_no_step_and_an_output_that_comes_on_does() {
     let model: Arc<dyn FrictionModel> = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     let mut sequence =
         Sequence::new(points, plan.file.pass, model, &setup.tip, setup.file.noise).at_rig(&plan, &setup);
-    let (mut asked, mut outcome) = (0, None);
+    let (mut questions, mut outcome) = (0, None);
     for ms in 0..30_000 {
         (row.now, row.cycle) = (row.now.plus(Nanos(1_000_000)), row.cycle + 1);
         row.inputs.seen.amplifier.as_mut().unwrap().output_on = ms >= 20_000;
         let reaction = sequence.on_row(&row);
-        asked += usize::from(reaction.question.is_some());
+        questions += usize::from(reaction.question.is_some());
         outcome = outcome.or(reaction.outcome.map(|outcome| (ms, outcome)));
     }
-    assert_eq!(asked, 1);
+    assert_eq!(questions, 1);
     let (ms, outcome) = outcome.expect("an end");
     assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(Cause::RefusesOff) });
     assert!((22_000..23_000).contains(&ms), "{ms} ms");

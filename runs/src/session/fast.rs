@@ -8,7 +8,7 @@ use crate::files::Placed;
 use crate::plan::{Plan, Resolution};
 use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
 use crate::setup::Setup;
-use crate::supervisor::{self, Asked, End, OffReport, VirtualLoop};
+use crate::supervisor::{self, End, OffReport, Requests, VirtualLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use models::prediction::FrictionModel;
 use realtime::compare::Agreement;
@@ -46,24 +46,24 @@ pub fn run(
     let mut bench = Bench::open(&sequence, None, Some(air), answers)?;
     let ports = ports_of(&job, world);
     let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
-    let mut kept = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
+    let mut keeper = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
     let rig =
         VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports).from(Nanos::from_seconds(start_s));
-    let record = kept.new_record().and_then(|file| {
+    let record = keeper.new_record().and_then(|file| {
         let disk = file.handle()?;
         Ok((Recorder::begin(file, preamble).into_diagnostic()?, disk))
     });
     let (swept, off) = match record {
-        Ok(record) => sweep(rig, record, &mut kept, (&mut sequence, &mut bench), signals, news),
+        Ok(record) => sweep(rig, record, &mut keeper, (&mut sequence, &mut bench), signals, news),
         // Before the first row nothing has been driven.
         Err(why) => (Err(why), OffReport::off()),
     };
     let outcome = swept.unwrap_or_else(|why| {
-        tracing::error!("the record could not be kept: the sweep was stopped: {why:#}");
+        tracing::error!("the record could not be saved: the sweep was stopped: {why:#}");
         Outcome::RecordLost
     });
     let agreement = sequence.agreement(outcome == Outcome::Complete);
-    Ok(kept.end(outcome, agreement, None, 0, BTreeMap::new(), off))
+    Ok(keeper.end(outcome, agreement, None, 0, BTreeMap::new(), off))
 }
 
 /// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
@@ -84,22 +84,22 @@ fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> Ports {
 fn sweep(
     mut rig: VirtualLoop,
     (mut recorder, disk): (Recorder<Placed>, Placed),
-    kept: &mut Keeper,
+    keeper: &mut Keeper,
     (sequence, bench): (&mut Sequence, &mut Bench),
     signals: &Signals,
     news: &mut dyn FnMut(Update<'_>),
 ) -> (miette::Result<Outcome>, OffReport) {
-    // What cannot be kept ends the sweep.
+    // A failure to save ends the sweep.
     let unkept = RefCell::new(None);
     let mut knows = false;
     let mut ask = || {
         // In virtual time there is nothing to wait for: a pause would only fill the record.
-        let ends = |end| Asked { end, pause: false };
+        let ends = |end| Requests { end, pause: false };
         if !knows && unkept.borrow().is_some() {
             knows = true;
             return ends(Some(End::NotKept));
         }
-        ends((signals.stops.swap(0, Ordering::Relaxed) > 0).then_some(End::Asked))
+        ends((signals.stops.swap(0, Ordering::Relaxed) > 0).then_some(End::Requested))
     };
     let mut snapshots = Snapshots::default();
     let mut keep = |row: &Row, sequence: &Sequence, reaction: Reaction| -> miette::Result<()> {
@@ -108,7 +108,7 @@ fn sweep(
             news(Update::State(&snapshot));
         }
         keeper::record(&mut recorder, row.now, &reaction.events, reaction.pass.as_ref())?;
-        kept.keep(&reaction.events, reaction.pass.as_ref(), news)?;
+        keeper.keep(&reaction.events, reaction.pass.as_ref(), news)?;
         if reaction.pass.is_some() {
             disk.still_there()?;
             let (done, all) = sequence.progress();
@@ -125,7 +125,7 @@ fn sweep(
             *unkept.borrow_mut() = keep(row, sequence, reaction).err();
         }
     });
-    // The stop reaches the rig, so that the record shows the safe state; kept or not, off comes first.
+    // The stop reaches the rig, so that the record shows the safe state; saved or not, off comes first.
     let mut recorded = Ok(());
     let off = rig.end(&mut |row| {
         if recorded.is_ok() {
@@ -181,7 +181,7 @@ pub fn rehearse(
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let mut passes = Vec::new();
     let outcome =
-        supervisor::sweep(&mut rig, &mut sequence, &mut Asked::default, &mut |row, sequence, reaction| {
+        supervisor::sweep(&mut rig, &mut sequence, &mut Requests::default, &mut |row, sequence, reaction| {
             bench.serve(row.now, sequence, &reaction);
             passes.extend(reaction.pass);
         });

@@ -18,7 +18,7 @@ use realtime::pacing::LoopReport;
 use realtime::ports::Nanos;
 use realtime::recorder::Preamble;
 use realtime::safety::Cause;
-use realtime::witness::StallReport;
+use realtime::stall_monitor::StallReport;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -123,10 +123,10 @@ impl Keeper {
             return Ok(Summary { folder: dir.path().to_path_buf(), finished_before: true, ..summary });
         }
         let catalogue = Self::catalogue(&dir)?;
-        let kept = Self::enter(job, dir, catalogue, planned, unix_ns()).wrap_err(Unfinished::NotKept)?;
+        let keeper = Self::enter(job, dir, catalogue, planned, unix_ns()).wrap_err(Unfinished::NotKept)?;
         Ok(Summary {
             finished_before: true,
-            ..kept.end(Outcome::Complete, agreement, None, 0, BTreeMap::new(), OffReport::off())
+            ..keeper.end(Outcome::Complete, agreement, None, 0, BTreeMap::new(), OffReport::off())
         })
     }
 
@@ -168,7 +168,7 @@ impl Keeper {
     ///
     /// # Errors
     /// Whatever file system and SQLite say: the sweep must stop then. Passes that come until it has stopped may still be given
-    /// here: they are kept where they can be.
+    /// here: they are stored if possible.
     pub fn keep(
         &mut self,
         events: &[Event],
@@ -194,8 +194,8 @@ impl Keeper {
         self.catalogue.progress(&self.folder, self.passes as i64, self.departed)
     }
 
-    /// Ends the run: catalogue, summary, report. What cannot be written is said, and makes a sweep that went well one whose
-    /// record is lost; the summary is returned all the same.
+    /// Ends the run: catalogue, summary, report. A failure to write them is reported, and makes a sweep that
+    /// went well one whose record is lost; the summary is returned all the same.
     pub fn end(
         mut self,
         outcome: Outcome,
@@ -207,7 +207,7 @@ impl Keeper {
     ) -> Summary {
         let (loop_report, stalls, held) =
             machine.map_or((None, None, None), |(report, stalls, held)| (Some(report), Some(stalls), held));
-        // As far as they can be read: what cannot is said below.
+        // As far as they can be read: the rest is reported below.
         let passes = crate::run_dir::passes_in(self.dir.path()).unwrap_or_default();
         let rig = crate::input::rig_file(&self.dir.path().join("rig.toml")).ok();
         let mut summary = Summary {
@@ -235,12 +235,12 @@ impl Keeper {
         self.departed |= summary.model_departed;
         // The catalogue last: what it calls complete has its summary and its report.
         let written = [self.write_end(&summary), self.note_end(&summary)];
-        let mut kept = true;
+        let mut saved = true;
         for why in written.iter().filter_map(|w| w.as_ref().err()) {
-            kept = false;
-            tracing::error!("the end of the run could not be kept: {why:#}");
+            saved = false;
+            tracing::error!("the end of the run could not be saved: {why:#}");
         }
-        if !kept && matches!(summary.outcome, Outcome::Complete | Outcome::Stopped) {
+        if !saved && matches!(summary.outcome, Outcome::Complete | Outcome::Stopped) {
             summary.outcome = Outcome::RecordLost;
             // As far as it goes: one of the two has just failed.
             let _ = (self.write_end(&summary), self.note_end(&summary));

@@ -59,7 +59,7 @@ pub(super) fn if_this_program_dies(file: &SetupFile) -> String {
     };
     match waits(&file.stage) {
         Some(ms) => format!("{output}; the stage stops by itself{}", within(ms)),
-        None => format!("{output}; the stage goes on as it was told"),
+        None => format!("{output}; the stage continues at its last command"),
     }
 }
 
@@ -149,7 +149,7 @@ fn who_touches(file: &SetupFile, tip: &Fingertip, wrong: &mut Problems<'_>) {
         (false, _, Some(true)) => (
             &["limits", "human_contact"],
             format!("human_contact = true, and the fingertip '{}' is no person's", tip.name),
-            "who touches the plate is said by the fingertip: name one of kind = \"human\" as finger.tip",
+            "the fingertip decides who touches the plate: name one of kind = \"human\" as finger.tip",
         ),
         (true, true, Some(true)) => (
             &["limits", "human_contact"],

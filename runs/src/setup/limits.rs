@@ -77,7 +77,7 @@ const LINK_STALL_MAX_S: f64 = 0.05;
 /// Equal amplitudes in a row that count as frozen, where the profile states that the readback has noise.
 const FROZEN_AFTER: u32 = 200;
 
-/// Rates at which a channel may be read, by who it is: what [`Limits::checked`] demands of periods, said of rates.
+/// Rates at which a channel may be read, by who it is: the periods of [`Limits::checked`] as rates.
 fn rate(instrument: &InstrumentSetup, name: &'static str, low: f64) -> Result<f64, LimitError> {
     let stated = instrument.rate_hz.or_else(|| drivers::nominal_rate_hz(instrument));
     let value = stated.unwrap_or(100.0);
@@ -94,7 +94,7 @@ fn rate(instrument: &InstrumentSetup, name: &'static str, low: f64) -> Result<f6
 const FORCE_RATE_MIN_HZ: f64 = 20.0;
 const STATE_RATE_MIN_HZ: f64 = 10.0;
 
-/// The limits of a setup; every one that cannot be used is told of.
+/// The limits of a setup; every one that cannot be used is reported.
 pub(super) fn all_of(
     file: &SetupFile,
     person: bool,
@@ -102,17 +102,17 @@ pub(super) fn all_of(
     wrong: &mut Problems<'_>,
 ) -> Option<Limits> {
     let mut file = file.clone();
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     loop {
         let error = match of(&file, person, cycle) {
             Ok(limits) => return Some(limits),
             Err(error) => error,
         };
         let name = error.name();
-        if told.contains(&name) {
+        if reported.contains(&name) {
             return None;
         }
-        told.push(name);
+        reported.push(name);
         let remedy = match &error {
             LimitError::OutOfRange { value, low, high, .. } => unit_meant(name, *value, [*low, *high]),
             LimitError::AboveHard { value, hard, .. } => unit_meant(name, *value, [1e-3 * hard, *hard]),
@@ -126,7 +126,7 @@ pub(super) fn all_of(
                 wrong.add(&[name, "rate_hz"], error.to_string(), remedy);
             }
             "force" => wrong.add(&["force"], error.to_string(), remedy),
-            // The length of the travel is told by its upper end, and may be the lower one's fault.
+            // The length of the travel is reported by its upper end, and may be the lower one's fault.
             "travel_max_m" if file.limits.travel_max_m.is_none() => {
                 wrong.add(&["limits", "travel_min_m"], error.to_string(), remedy);
                 file.limits.travel_min_m = None;
@@ -137,7 +137,7 @@ pub(super) fn all_of(
     }
 }
 
-/// Takes a value that was told of out of the file, so that the others are looked at.
+/// Takes a reported value out of the file, so that the others are looked at.
 fn forget(file: &mut SetupFile, name: &str) {
     match name {
         "force" => file.force.iter_mut().for_each(|force| force.rate_hz = None),
@@ -227,7 +227,7 @@ fn of(file: &SetupFile, person: bool, cycle: Nanos) -> Result<Limits, LimitError
     }
     let pause = l.pause_max_s.unwrap_or(1.0);
     if !(1.0..=3600.0).contains(&pause) {
-        let needed = "from 1 to 3600: a rig that nobody uses is not kept waiting for longer";
+        let needed = "from 1 to 3600: an unused rig does not wait longer";
         return Err(LimitError::Unusable { name: "pause_max_s", value: pause, needed });
     }
     limits.checked()

@@ -45,15 +45,15 @@ pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Vec<Problem> {
             Ok(None) => return,
             Err(error) => return problems.push((place, error.to_string())),
         };
-        let kept = read.entry(found.id.clone()).or_insert_with(|| Arc::clone(&found));
-        if kept.text != found.text || kept.files != found.files {
-            let (a, b) = (kept.origin.display(), found.origin.display());
+        let stored = read.entry(found.id.clone()).or_insert_with(|| Arc::clone(&found));
+        if stored.text != found.text || stored.files != found.files {
+            let (a, b) = (stored.origin.display(), found.origin.display());
             let problem =
                 format!("{a} and {b} are two profiles of one id, `{}`: give one another `id`", found.id);
             return problems.push((place, problem));
         }
-        name.clone_from(&kept.id);
-        *source = Some(Arc::clone(kept));
+        name.clone_from(&stored.id);
+        *source = Some(Arc::clone(stored));
     };
     for instrument in &mut file.force {
         one(&mut instrument.profile, &mut instrument.source, vec!["force"]);
@@ -94,8 +94,8 @@ pub(super) fn fit(file: &SetupFile) -> Vec<Problem> {
             continue;
         }
         if file.virtual_rig.is_some() && instrument.address.starts_with("tcp:") {
-            let said = "the virtual rig serves a serial line as `pty` or at a path, not over TCP";
-            problems.push((place("address"), said.into()));
+            let problem = "the virtual rig serves a serial line as `pty` or at a path, not over TCP";
+            problems.push((place("address"), problem.into()));
             continue;
         }
         if file.virtual_rig.is_some() {
@@ -169,8 +169,8 @@ fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> 
         let mut share = 0.0;
         for (table, instrument, rtu) in shared {
             let profile = instrument.description().map_err(|error| (place(table), error.to_string()))?;
-            let said = if !rtu || profile.description.stream.is_some() {
-                "only units that are asked by Modbus RTU can share a line"
+            let problem = if !rtu || profile.description.stream.is_some() {
+                "only units of Modbus RTU that are polled can share a line"
             } else if !matches!(table, "force" | "safety_inputs") {
                 "what takes set-points needs a line of its own: another unit's silence would hold up an 'off'"
             } else {
@@ -183,15 +183,15 @@ fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> 
                 share += profile.line_share(setup).unwrap_or(0.0);
                 continue;
             };
-            return Err((place(table), format!("`{}` at {}: {said}", instrument.profile, path.display())));
+            return Err((place(table), format!("`{}` at {}: {problem}", instrument.profile, path.display())));
         }
         if share > 1.0 {
-            let said = format!(
+            let problem = format!(
                 "the units at {} take {:.0} % of its capacity together; state a lower `rate_hz`",
                 path.display(),
                 share * 1e2
             );
-            return Err((vec!["force"], said));
+            return Err((vec!["force"], problem));
         }
     }
     Ok(())
@@ -294,17 +294,17 @@ mod tests {
 
     #[test]
     fn a_profile_that_does_not_exist_is_refused_with_what_there_is() {
-        let said = changed("profile = \"muprime-force2\"", "profile = \"no-such-thing\"").unwrap_err();
+        let text = changed("profile = \"muprime-force2\"", "profile = \"no-such-thing\"").unwrap_err();
         assert!(
-            said.contains("no-such-thing") && said.contains("hbk-wtx110") && said.contains("profiles"),
-            "{said}"
+            text.contains("no-such-thing") && text.contains("hbk-wtx110") && text.contains("profiles"),
+            "{text}"
         );
     }
 
     #[test]
     fn an_instrument_that_cannot_be_what_it_is_named_for_is_refused() {
-        let said = changed("profile = \"muprime-amplifier\"", "profile = \"muprime-stage\"").unwrap_err();
-        assert!(said.contains("echo_amplitude"), "{said}");
+        let text = changed("profile = \"muprime-amplifier\"", "profile = \"muprime-stage\"").unwrap_err();
+        assert!(text.contains("echo_amplitude"), "{text}");
     }
 
     #[test]
@@ -315,8 +315,8 @@ mod tests {
                 format!("profile = \"muprime-force2\"\naddress = \"rtu:pty\"\nbaud = {baud}\nrate_hz = 100");
             changed(one, &other)
         };
-        let said = rtu(9600).unwrap_err();
-        assert!(said.contains("capacity"), "{said}");
+        let text = rtu(9600).unwrap_err();
+        assert!(text.contains("capacity"), "{text}");
         rtu(115_200).unwrap();
     }
 

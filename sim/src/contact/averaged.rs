@@ -1,11 +1,12 @@
 //! The resolved contact, averaged over cycles and remembered.
 //!
-//! A control loop at 1 kHz sees some thirty cycles of the plate a step; solving them anew at every step costs more than
-//! the step may. The mean friction is therefore computed once for each cell of the contact's operating space, with
-//! its slopes in amplitude, speed, load and friction, and read from there. A cell is computed when it is asked for
-//! twice running; what is passed through (a plate ringing up, a stiffness that drifts) is solved directly. Cells are kept
-//! in a table of fixed size: nothing is allocated while the world runs, and what a cell holds does not depend on what
-//! was read before. [`CELL`] sets the error; `averaging_error` in the tests measures it.
+//! A control loop at 1 kHz sees some thirty cycles of the plate a step; solving them at every step costs more
+//! time than the step has. The mean friction is therefore computed once for each cell of the contact's
+//! operating space, with its slopes in amplitude, speed, load and friction, and read from there. A cell is
+//! computed on its second request in a row; what is passed through (a plate ringing up, a stiffness that
+//! drifts) is solved directly. Cells are stored in a table of fixed size: nothing is allocated while the
+//! world runs, and what a cell holds does not depend on what was read before. [`CELL`] sets the error;
+//! `averaging_error` in the tests measures it.
 
 use super::resolved::{self, Settings};
 use super::{Contact, Steady};

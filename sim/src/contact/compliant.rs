@@ -1,9 +1,9 @@
 //! The march over a compliant, lossy skin: landings last, and give back part of what they took.
 //!
-//! Between ridge and plate stands a spring and dashpot that push but never pull. Free or touching, the ridge is a
-//! linear oscillator: its swing about the forced response is advanced by the exact transition matrix, so a step
-//! need only be short against the landing. With a stiff skin and full loss this is the rigid landing of
-//! [`super::resolved`]; without loss a ridge bounces, and its friction falls much further.
+//! Between ridge and plate stands a spring and dashpot that push but never pull. Free or touching, the ridge
+//! is a linear oscillator: its swing about the forced response is advanced by the exact transition matrix, so
+//! a step need only be short against the landing. With a stiff skin and full loss this is the rigid landing
+//! of [`super::resolved`]; without loss a ridge bounces, and its friction falls much further.
 
 use std::f64::consts::PI;
 
@@ -77,8 +77,8 @@ mod tests {
 
     #[test]
     fn a_ridge_with_mass_against_an_independent_march() {
-        // 2 um peak-to-peak, 27.5 kHz, 20 mm/s, 0.25 N, k_n 1 MN/m; a plain explicit march of 4000 steps a cycle,
-        // skin 30 times stiffer than the ridge: mu' for mass [kg], damping ratio, skin loss.
+        // 2 um peak-to-peak, 27.5 kHz, 20 mm/s, 0.25 N, k_n 1 MN/m; a plain explicit march of 4000 steps a
+        // cycle, skin 30 times stiffer than the ridge: mu' for mass [kg], damping ratio, skin loss.
         let mut contact = Contact::ideal(1e6, 1e6 / 2.66, 0.5, 0.25, 1e-6, 27_500.0, 0.02);
         contact.ridge.skin_ratio = 30.0;
         for (mass, zeta, loss, expected) in [

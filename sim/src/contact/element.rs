@@ -93,7 +93,7 @@ pub fn preload_for(mean: f64) -> f64 {
     if mean <= 0.0 {
         return -1.0;
     }
-    // sin(alpha) - alpha cos(alpha) = pi * mean, by Newton from the small-angle solution, kept in its bracket.
+    // sin(alpha) - alpha cos(alpha) = pi * mean, by Newton from the small-angle solution, in a bracket.
     let target = PI * mean;
     let (mut low, mut high) = (0.0_f64, PI);
     let mut alpha = (3.0 * target).cbrt().min(0.98 * PI);

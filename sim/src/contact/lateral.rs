@@ -1,10 +1,10 @@
 //! The lateral spring and its Coulomb slider, marched in time.
 //!
-//! While in contact the stretch grows by the drag of the plate. Where the spring's force would exceed the friction
-//! limit the slider slides: the force is the limit, and the stretch falls towards `limit / k_l`, no faster than
-//! the ridge recovers. Out of contact the force is zero and the stretch recovers towards zero. The recovery law
-//! binds the slip-back at touch-down too: without that a finite recovery would have no effect (physics of the
-//! paper's Fig. 13).
+//! While in contact the stretch grows by the drag of the plate. Where the spring's force would exceed the
+//! friction limit the slider slides: the force is the limit, and the stretch falls towards `limit / k_l`, no
+//! faster than the ridge recovers. Out of contact the force is zero and the stretch recovers towards zero.
+//! The recovery law binds the slip-back at touch-down too: without that a finite recovery would have no
+//! effect (physics of the paper's Fig. 13).
 
 use super::{Contact, Recovery};
 

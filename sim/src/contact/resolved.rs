@@ -1,11 +1,11 @@
 //! A ridge with mass and damping on a rigid vibrating plate, marched in time.
 //!
 //! In contact the ridge follows the plate, and the contact force is what that takes:
-//! `m z'' + c z' + k_n (z + d)`. Where it would turn negative the ridge flies: a damped oscillator about `-d`,
-//! advanced by its exact transition matrix, so that a light ridge needs no smaller step. Where it meets the plate
-//! it lands without rebound; the impulse counts in the mean normal force but not in the friction, because the
-//! massless lateral spring cannot pass it on. The static compression `d` is adjusted from cycle to cycle until
-//! the mean normal force is the one the finger presses with.
+//! `m z'' + c z' + k_n (z + d)`. Where it would turn negative the ridge flies: a damped oscillator about
+//! `-d`, advanced by its exact transition matrix, so that a light ridge needs no smaller step. Where it meets
+//! the plate it lands without rebound; the impulse counts in the mean normal force but not in the friction,
+//! because the massless lateral spring cannot pass it on. The static compression `d` is adjusted from cycle
+//! to cycle until the mean normal force is the one the finger presses with.
 
 use std::f64::consts::PI;
 

@@ -1,9 +1,9 @@
 //! A massless ridge marched through the cycle on a grid: for every law that has no closed cycle.
 //!
-//! With a pure sine the grid covers the contact phase alone, so that a short contact is as finely resolved as a
-//! long one; with a second harmonic it covers the whole cycle. The march repeats until the stretch at touch-down
-//! does; the map from one touch-down to the next never falls and never rises faster than its argument, so its
-//! fixed point is found by bisection where plain repetition is slow.
+//! With a pure sine the grid covers the contact phase alone, so that a short contact is as finely resolved as
+//! a long one; with a second harmonic it covers the whole cycle. The march repeats until the stretch at
+//! touch-down does; the map from one touch-down to the next never falls and never rises faster than its
+//! argument, so its fixed point is found by bisection where plain repetition is slow.
 
 use std::f64::consts::PI;
 
@@ -41,7 +41,7 @@ pub fn steady(contact: &Contact) -> Steady {
     sum
 }
 
-/// Static compression (m) at which the mean normal force is the one asked for.
+/// Static compression (m) at which the mean normal force is the requested one.
 fn preload_m(contact: &Contact, heights: &[f64]) -> f64 {
     let a = contact.sine_amplitude_m;
     let target = contact.normal_force_n / (contact.normal_stiffness_n_per_m * a);

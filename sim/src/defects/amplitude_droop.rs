@@ -1,7 +1,7 @@
 //! The finger loads the plate and its amplitude droops: the more contact area, the more.
 //!
-//! The area of a soft sphere grows as the 2/3 power of the load (Hertz); each area of skin takes power from the
-//! plate in proportion to the square of its speed, and to how much of the cycle it touches.
+//! The area of a soft sphere grows as the 2/3 power of the load (Hertz); each area of skin takes power from
+//! the plate in proportion to the square of its speed, and to how much of the cycle it touches.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 

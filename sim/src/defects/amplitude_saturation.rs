@@ -1,5 +1,5 @@
-//! The drive runs out of current: the amplitude bends smoothly to a ceiling that falls as the frequency rises, for a
-//! piezo draws current in proportion to both.
+//! The drive runs out of current: the amplitude bends smoothly to a ceiling that falls as the frequency
+//! rises, for a piezo draws current in proportion to both.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 

@@ -1,8 +1,8 @@
 //! The defects file: TOML, unknown keys refused with their place.
 //!
-//! A `[[defect]]` has a `name` and either all its `parameters` or a `seed` to draw them from (or both: what is given
-//! holds). A `[[channel]]` has a `channel` (force, amplifier, stage), a `fault` (ok, off, stuck, garbage, wrong, slow,
-//! delayed, intermittent), and may have `from_s`, `until_s` and a `strength`.
+//! A `[[defect]]` has a `name` and either all its `parameters` or a `seed` to draw them from (or both: what
+//! is given holds). A `[[channel]]` has a `channel` (force, amplifier, stage), a `fault` (ok, off, stuck,
+//! garbage, wrong, slow, delayed, intermittent), and may have `from_s`, `until_s` and a `strength`.
 
 use serde::Deserialize;
 

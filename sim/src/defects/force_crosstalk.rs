@@ -1,5 +1,5 @@
-//! The sensor's axes talk to each other: a share of the normal force shows in the lateral channel, and less of the lateral
-//! one in the normal channel.
+//! The sensor's axes talk to each other: a share of the normal force shows in the lateral channel, and less
+//! of the lateral one in the normal channel.
 
 use super::{Act, Forces, Kind, Parameter, Place, Surroundings, Values};
 

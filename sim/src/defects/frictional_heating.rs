@@ -1,5 +1,5 @@
-//! Rubbing warms the interface and lowers its shear strength: friction falls with the power rubbed, mu F U, found where heat
-//! made and friction left agree.
+//! Rubbing warms the interface and lowers its shear strength: friction falls with the power rubbed, mu F U,
+//! found where heat made and friction left agree.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;

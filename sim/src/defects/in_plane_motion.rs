@@ -1,5 +1,5 @@
-//! The plate does not move straight up and down: a share of its motion lies along the sliding direction, at the same
-//! frequency, so the ridges are dragged to and fro in every contact.
+//! The plate does not move straight up and down: a share of its motion lies along the sliding direction, at
+//! the same frequency, so the ridges are dragged to and fro in every contact.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;

@@ -1,6 +1,6 @@
-//! Part of the friction is carried by an area that grows as the 2/3 power of the force (Bowden and Tabor on a Hertzian
-//! junction), the rest is Coulomb's. It acts on the force of each instant, so it lowers friction under vibration even
-//! where nothing sticks.
+//! Part of the friction is carried by an area that grows as the 2/3 power of the force (Bowden and Tabor on a
+//! Hertzian junction), the rest is Coulomb's. It acts on the force of each instant, so it lowers friction
+//! under vibration even where nothing sticks.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;

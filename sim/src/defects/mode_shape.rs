@@ -1,6 +1,6 @@
-//! The plate vibrates in a standing wave with a travelling remainder: the amplitude under the finger depends on where it
-//! is, and a near field of bending at the driven edge.
-//! The half wave of a 2 mm glass plate is 14 mm at 25 kHz and shortens as the square root of the frequency.
+//! The plate vibrates in a standing wave with a travelling remainder: the amplitude under the finger depends
+//! on where it is, and a near field of bending at the driven edge. The half wave of a 2 mm glass plate is 14
+//! mm at 25 kHz and shortens as the square root of the frequency.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 

@@ -1,7 +1,7 @@
 //! Ridges that are damped on their normal spring: they follow the falling plate late and let go early.
 //!
-//! A light mass (0.1 mg) on spring and dashpot, landing without rebound; the damping is given by the ridge's retardation
-//! time.
+//! A light mass (0.1 mg) on spring and dashpot, landing without rebound; the damping is given by the ridge's
+//! retardation time.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;

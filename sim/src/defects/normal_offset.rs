@@ -1,5 +1,5 @@
-//! The zero of the normal force is off: the contact is loaded by the true force, the table holds another. The zero sinks in
-//! part while the finger warms the sensor.
+//! The zero of the normal force is off: the contact is loaded by the true force, the table holds another. The
+//! zero sinks in part while the finger warms the sensor.
 
 use super::{Act, Forces, Kind, Parameter, Place, Surroundings, Values};
 

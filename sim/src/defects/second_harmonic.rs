@@ -1,5 +1,5 @@
-//! The amplifier distorts: the plate carries a second harmonic, which sharpens or broadens each contact. It grows with the
-//! swing, as a distortion does.
+//! The amplifier distorts: the plate carries a second harmonic, which sharpens or broadens each contact. It
+//! grows with the swing, as a distortion does.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 use crate::contact::Contact;

@@ -1,4 +1,4 @@
-//! The stage stalls: from a time on its slide stands still, whatever it is told.
+//! The stage stalls: from a time on its slide stands still, whatever its command.
 
 use super::{Act, Kind, Parameter, Place, Values};
 use crate::world::WorldConfig;

@@ -7,8 +7,8 @@ use std::path::Path;
 use super::{Label, Set};
 
 impl Set {
-    /// Writes `points.csv`, `rig.toml` and `conditions.csv` to `open`, `label.toml` and `truth.csv` to `sealed`. Both
-    /// folders are made where they are missing.
+    /// Writes `points.csv`, `rig.toml` and `conditions.csv` to `open`, `label.toml` and `truth.csv` to
+    /// `sealed`. Both folders are made where they are missing.
     ///
     /// # Errors
     /// A folder or file that cannot be written.

@@ -1,10 +1,10 @@
 //! Form uncertainty: what a hypothesis may claim when a cause of its name need not have exactly its formula.
 //!
-//! A hypothesis is a model m and its change D net of recalibration. Its forces are m + D delta, where delta is a smooth
-//! function of the operating point: a Gaussian process of no mean, with a length of 1.5 standard deviations of each
-//! covariate and a standard deviation of 0.05, 0.15 or 0.35 (weights 0.4, 0.4, 0.2). Truth and imitator are granted the
-//! same. What is compared is twice the expected negative log likelihood over the noise of the table, at noise-free
-//! forces, so no draw of the noise decides.
+//! A hypothesis is a model m and its change D net of recalibration. Its forces are m + D delta, where delta
+//! is a smooth function of the operating point: a Gaussian process of no mean, with a length of 1.5 standard
+//! deviations of each covariate and a standard deviation of 0.05, 0.15 or 0.35 (weights 0.4, 0.4, 0.2). Truth
+//! and imitator are granted the same. What is compared is twice the expected negative log likelihood over the
+//! noise of the table, at noise-free forces, so no draw of the noise decides.
 
 use super::oracle::{Case, Fit};
 use crate::defects::Defects;
@@ -49,8 +49,8 @@ impl Kernel {
         Self { rows: (0..points.len()).map(|i| (0..=i).map(|j| near(i, j)).collect()).collect() }
     }
 
-    /// Twice the expected negative log likelihood, less that of an exact model without form uncertainty, of a residual
-    /// and a net change in standard deviations; `prior` is what the stiffnesses cost.
+    /// Twice the expected negative log likelihood, less that of an exact model without form uncertainty, of a
+    /// residual and a net change in standard deviations; `prior` is what the stiffnesses cost.
     ///
     /// The second number is the departure's standard deviation that costs least.
     pub(super) fn cost(&self, residual: &[f64], change: &[f64], prior: f64) -> (f64, f64) {

@@ -1,9 +1,9 @@
 //! Which other cause would imitate the data, at the size and shape at which it imitates them best.
 //!
-//! A search in three stages. A ladder of sizes for a few draws of the shapes, the nuisances following to first order;
-//! from the best rungs of two draws a bounded Levenberg-Marquardt search over nuisances, size and shapes together;
-//! and for causes that are dear to compute all this on a part of the passes first, the whole table being asked only
-//! where that comes near.
+//! A search in three stages. A ladder of sizes for a few draws of the shapes, the nuisances following to
+//! first order; from the best rungs of two draws a bounded Levenberg-Marquardt search over nuisances, size
+//! and shapes together; and for expensive causes all this on a part of the passes first, the whole table if
+//! that comes near.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +20,7 @@ const PART: usize = 36;
 const LIKE: f64 = 0.3;
 /// chi2 beyond the truth's under which a cause imitates the data.
 pub const NEAR: f64 = 10.0;
-/// Share of the gap's chi2 that departures from form could take up: an imitator that leaves more is not asked.
+/// Share of the gap's chi2 that departures from form could take up: one that leaves more is skipped.
 const FORM_MOST: f64 = 0.5;
 /// Share of the gap's chi2 to which a search is worth its steps.
 const SOUGHT: f64 = 0.05;
@@ -45,13 +45,13 @@ pub struct Imitator {
     pub name: String,
     /// The causes of the truth in whose place it stands alone; the others act beside it as they are.
     pub instead_of: Vec<String>,
-    /// chi2 that it leaves beyond what the truth leaves (which pays for its stiffnesses' scatter); below zero where
-    /// the imitation lies nearer to the stated calibration than the truth does.
+    /// chi2 that it leaves beyond what the truth leaves (which pays for its stiffnesses' scatter); below zero
+    /// where the imitation lies nearer to the stated calibration than the truth does.
     pub chi2_left: f64,
     /// The same as a share of what the recalibrated baseline leaves.
     pub share_left: f64,
-    /// The same once both, truth and imitator, may depart smoothly from their form ([`super::form`]); none where it leaves
-    /// too much for that to matter, and in the place of several causes.
+    /// The same once both, truth and imitator, may depart smoothly from their form ([`super::form`]); none
+    /// where it leaves too much for that to matter, and in the place of several causes.
     pub form_left: Option<f64>,
 }
 
@@ -111,9 +111,10 @@ impl Imitator {
 }
 
 impl Case<'_> {
-    /// Every library cause's best imitation of the data in the place of `truth`, best first. Left out are a cause that
-    /// is itself all of `truth`, and those that act beside it or cannot. `base` is the recalibrated baseline,
-    /// `truth_chi2` what the truth leaves. Dear causes are asked on part of the passes first unless `whole`.
+    /// Every library cause's best imitation of the data in the place of `truth`, best first. Left out are a
+    /// cause that is itself all of `truth`, and those that act beside it or cannot. `base` is the
+    /// recalibrated baseline, `truth_chi2` what the truth leaves. Expensive causes begin with a part unless
+    /// `whole`.
     pub fn imitators(&self, truth: &[Defect], base: &Fit, truth_chi2: f64, whole: bool) -> Vec<Imitator> {
         let part = self.part(base);
         let thinned = part.case(self);
@@ -138,8 +139,8 @@ impl Case<'_> {
             } else {
                 self.imitate(kind, base, truth_chi2, near, WORTH)
             };
-            // One of several true causes: no worse than from its own size and shapes, with the stiffnesses as the recalibrated
-            // baseline has them, and as this cause alone would have them.
+            // One of several true causes: no worse than from its own size and shapes, with the stiffnesses as
+            // the recalibrated baseline has them, and as this cause alone would have them.
             if let Some(own) = truth.iter().find(|d| d.kind.name == kind.name) {
                 let alone = self.fit_from(&self.nominal, &with(kind, own.values), STEPS);
                 for start in [base, &alone] {
@@ -178,24 +179,24 @@ impl Case<'_> {
         out
     }
 
-    /// A part of the passes that holds the gap in proportion: every so many of them in the order of what the baseline
-    /// leaves, each counting for as many.
+    /// A part of the passes that holds the gap in proportion: every so many of them in the order of what the
+    /// baseline leaves, each counting for as many.
     fn part(&self, base: &Fit) -> Part {
         let mut order: Vec<usize> = (0..self.known.len()).collect();
         let size = |i: usize| (base.residual_n[i] / self.sd_n[i]).abs();
         order.sort_by(|a, b| size(*a).total_cmp(&size(*b)));
         let every = order.len().div_ceil(PART).max(1);
-        let kept: Vec<usize> = order.iter().copied().skip(every / 2).step_by(every).collect();
-        let weight = (kept.len() as f64 / order.len() as f64).sqrt();
+        let thinned: Vec<usize> = order.iter().copied().skip(every / 2).step_by(every).collect();
+        let weight = (thinned.len() as f64 / order.len() as f64).sqrt();
         Part {
-            known: kept.iter().map(|i| self.known[*i]).collect(),
-            lateral_n: kept.iter().map(|i| self.lateral_n[*i]).collect(),
-            sd_n: kept.iter().map(|i| self.sd_n[*i] * weight).collect(),
+            known: thinned.iter().map(|i| self.known[*i]).collect(),
+            lateral_n: thinned.iter().map(|i| self.lateral_n[*i]).collect(),
+            sd_n: thinned.iter().map(|i| self.sd_n[*i] * weight).collect(),
         }
     }
 
-    /// The rungs of each draw's ladder that leave least, best first: chi2 with the nuisances refitted to first order,
-    /// and the parameters.
+    /// The rungs of each draw's ladder that leave least, best first: chi2 with the nuisances refitted to
+    /// first order, and the parameters.
     fn ladder(&self, kind: &'static Kind, base: &Fit) -> Vec<(f64, Values)> {
         let sides = if matches!(kind.parameters[0].draw, Draw::Log | Draw::Linear) { 1 } else { 2 };
         // Every side of the size with the first shape over its range.
@@ -308,8 +309,8 @@ impl Case<'_> {
         (0..NUISANCES + kind.parameters.len()).map(one).collect()
     }
 
-    /// Cost of an imitation that may depart from its form, from the optimum without departures: where the departure takes
-    /// up what is smooth, another size may do better.
+    /// Cost of an imitation that may depart from its form, from the optimum without departures: where the
+    /// departure takes up what is smooth, another size may do better.
     fn form_cost(&self, kind: &'static Kind, start: [f64; UNKNOWNS], kernel: &Kernel, base: &Fit) -> f64 {
         let mut x = start;
         let mut model = self.run(kind, &x);
@@ -356,8 +357,8 @@ impl Case<'_> {
     }
 }
 
-/// The damped step, nuisances held within a factor, parameters within their ranges: those that a step would carry out
-/// stay at the bound and the others follow.
+/// The damped step, nuisances held within a factor, parameters within their ranges: those that a step would
+/// carry out stay at the bound and the others follow.
 fn bounded_step(
     kind: &Kind,
     a: &[[f64; UNKNOWNS]; UNKNOWNS],
@@ -462,7 +463,7 @@ mod tests {
             let found = case.imitators(&[Defect { kind: truth, values }], &base, 0.0, false);
             for imitator in found.iter().filter(|i| !DEAR.contains(&i.name.as_str())) {
                 let kind = Kind::named(&imitator.name).unwrap();
-                // The best rung with its nuisances refitted in full: what a ladder alone would have said.
+                // The best rung with its nuisances refitted in full: the result of a ladder alone.
                 let rung = case.fit(&with(kind, case.ladder(kind, &base)[0].1), 3).chi2.min(base.chi2);
                 // Where not even that mends a quarter of the gap no search follows, and the rung counts to first order.
                 if rung < 0.75 * base.chi2 {

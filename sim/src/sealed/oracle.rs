@@ -1,8 +1,8 @@
-//! What the generator knows of a set that no diagnoser can know: from its noise-free forces, how large the gap is once
-//! the baseline is recalibrated, and how strongly the data speak for the truth.
+//! What the generator knows of a set that no diagnoser can know: from its noise-free forces, how large the
+//! gap is once the baseline is recalibrated, and how strongly the data speak for the truth.
 //!
-//! The baseline here is this world's own ideal contact. Recalibration means: stiffnesses and mu0 refitted, the
-//! stiffnesses under their stated scatter, by Gauss-Newton steps on their logarithms.
+//! The baseline here is this world's own ideal contact. Recalibration means: stiffnesses and mu0 refitted,
+//! the stiffnesses under their stated scatter, by Gauss-Newton steps on their logarithms.
 
 use crate::defects::{Defect, Defects, Kind, compatible};
 use crate::finger::Finger;

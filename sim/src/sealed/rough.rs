@@ -1,5 +1,5 @@
-//! Sealed sets whose scatter is not what rig.toml states: bad passes, heavy tails, scatter that lasts, shifts between runs, a
-//! repeatability stated too small.
+//! Sealed sets whose scatter is not what rig.toml states: bad passes, heavy tails, scatter that lasts, shifts
+//! between runs, a repeatability stated too small.
 
 use serde::{Deserialize, Serialize};
 

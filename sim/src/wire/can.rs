@@ -61,8 +61,8 @@ impl CanPort for EmulatedAdapter {
             match self.port.read(&mut buffer) {
                 Ok(count) => {
                     let waiting = &mut self.waiting;
-                    self.reader.push(&buffer[..count], |said| {
-                        if let SlcanSaid::Frame(frame) = said {
+                    self.reader.push(&buffer[..count], |message| {
+                        if let SlcanSaid::Frame(frame) = message {
                             waiting.push_back(frame);
                         }
                     });
@@ -132,15 +132,15 @@ struct Broadcast {
     due: Nanos,
 }
 
-/// A group of messages that is asked for.
-struct Asked {
+/// A group of messages that is sent on request.
+struct OnRequest {
     frame: FrameId,
     parts: Vec<Part>,
     request: Vec<u8>,
 }
 
 enum Instrument {
-    Plain { device: Box<Device>, base: u32, broadcasts: Vec<Broadcast>, asked: Vec<Asked> },
+    Plain { device: Box<Device>, base: u32, broadcasts: Vec<Broadcast>, on_request: Vec<OnRequest> },
     Drive(Box<Drive>),
 }
 
@@ -151,20 +151,20 @@ impl Instrument {
         if profile.description.link.kind == LinkKind::Canopen {
             return Self::Drive(Box::new(Drive::new(device, u8::try_from(base).unwrap_or(1))));
         }
-        let (mut broadcasts, mut asked) = (Vec::new(), Vec::new());
+        let (mut broadcasts, mut on_request) = (Vec::new(), Vec::new());
         for (index, frame) in profile.frames().iter().enumerate() {
             let FrameKind::Messages(group, parts) = &frame.kind else { continue };
             let message = &profile.description.message[*group];
             let (frame, parts) = (FrameId(index), parts.clone());
             match &message.request {
-                Some(request) => asked.push(Asked { frame, parts, request: request.clone() }),
+                Some(request) => on_request.push(OnRequest { frame, parts, request: request.clone() }),
                 None => {
                     let period = Nanos::from_seconds(1.0 / message.rate_hz).0.max(1);
                     broadcasts.push(Broadcast { frame, parts, period, due: Nanos(0) });
                 }
             }
         }
-        Self::Plain { device: Box::new(device), base, broadcasts, asked }
+        Self::Plain { device: Box::new(device), base, broadcasts, on_request }
     }
 
     /// When the instrument has something to say by itself.
@@ -206,13 +206,13 @@ impl Bus {
             let (mut plant, now) = self.plant.now();
             for instrument in &mut self.instruments {
                 match instrument {
-                    Instrument::Plain { device, base, broadcasts, asked } => {
+                    Instrument::Plain { device, base, broadcasts, on_request } => {
                         if let Some(CanEvent::Frame(frame, _)) = heard
                             && frame.id == *base
-                            && let Some(asked) = asked.iter().find(|asked| asked.request == frame.data())
+                            && let Some(group) = on_request.iter().find(|group| group.request == frame.data())
                         {
-                            let bytes = device.frame(asked.frame, &mut *plant, now);
-                            out.extend(split(*base, &asked.parts, &bytes));
+                            let bytes = device.frame(group.frame, &mut *plant, now);
+                            out.extend(split(*base, &group.parts, &bytes));
                         }
                         for broadcast in broadcasts.iter_mut().filter(|one| one.due <= now) {
                             let bytes = device.frame(broadcast.frame, &mut *plant, now);

@@ -116,8 +116,8 @@ impl Device {
         Ok(Self { sources, commands, blocks, constants, reads: 0, profile })
     }
 
-    /// Mounts a force sensor: `signal` shows the force of an axis by `force = gain * signal - offset_n`, all in SI units. What
-    /// the profile's emulator does not show otherwise stays as it is.
+    /// Mounts a force sensor: `signal` shows the force of an axis by `force = gain * signal - offset_n`, all
+    /// in SI units. What the profile's emulator does not show otherwise stays as it is.
     pub fn mount(&mut self, signal: &str, axis: Quantity, gain: f64, offset_n: f64) {
         let Some(signal) = self.profile.signal(signal) else { return };
         if let Some(Source::World { quantity, per_si, offset, .. }) = &mut self.sources[signal.0] {
@@ -200,9 +200,9 @@ impl Device {
         for index in 0..self.profile.frames().len() {
             let FrameKind::Poll(poll) = self.profile.frames()[index].kind else { continue };
             let spans = self.profile.frames()[index].spans.clone();
-            let asked = self.profile.description.poll[poll].table == table
+            let polled = self.profile.description.poll[poll].table == table
                 && spans.iter().any(|span| overlaps(span.address, span.count));
-            if asked {
+            if polled {
                 let bytes = self.frame(FrameId(index), plant, now);
                 let mut rest = bytes.as_slice();
                 for span in spans {

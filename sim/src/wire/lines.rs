@@ -44,7 +44,7 @@ impl LineInstrument {
         Self { device, plant, error: false, feeds }
     }
 
-    /// An amplifier or a stage without a heartbeat has no watchdog: the world's is kept fed for it.
+    /// An amplifier or a stage without a heartbeat has no watchdog: the emulator feeds the world's for it.
     pub fn live(&mut self) {
         for beat in &self.feeds {
             let (mut plant, now) = self.plant.now();
@@ -68,50 +68,50 @@ impl LineInstrument {
     pub fn answer(&mut self, line: &str) -> Vec<u8> {
         let plant = self.plant.clone();
         let (mut plant, now) = plant.now();
-        let said = self.say(line.trim(), &mut *plant, now);
-        match said {
-            Said::Nothing => Vec::new(),
-            Said::Block(block) => block,
-            Said::Line(line) => [line.into_bytes(), self.end()].concat(),
+        let answer = self.say(line.trim(), &mut *plant, now);
+        match answer {
+            Answer::Nothing => Vec::new(),
+            Answer::Block(block) => block,
+            Answer::Line(line) => [line.into_bytes(), self.end()].concat(),
         }
     }
 
-    fn say(&mut self, line: &str, plant: &mut dyn Plant, now: Nanos) -> Said {
+    fn say(&mut self, line: &str, plant: &mut dyn Plant, now: Nanos) -> Answer {
         let description = &self.device.profile().description;
         if line.is_empty() {
-            return Said::Nothing;
+            return Answer::Nothing;
         }
         if let Some(query) = description.link.error_query.as_ref().filter(|query| query.send == line) {
             let ok = query.ok.first().cloned().unwrap_or_default();
-            let said =
+            let status =
                 if self.error { "-113,\"Undefined header\"".into() } else { format!("{ok}\"No error\"") };
             self.error = false;
-            return Said::Line(said);
+            return Answer::Line(status);
         }
         if let Some(init) = description.init.iter().find(|init| init.send.as_deref() == Some(line)) {
             return init
                 .expect
                 .as_ref()
                 .and_then(|all| all.first())
-                .map_or(Said::Nothing, |start| Said::Line(start.clone()));
+                .map_or(Answer::Nothing, |start| Answer::Line(start.clone()));
         }
         if let Some(choice) = &description.link.choice
             && let Some(which) = number_in(&choice.ask, line)
         {
             let name = description.emulator.names.get(which);
-            return name.map_or(Said::Nothing, |name| Said::Line(name.clone()));
+            return name.map_or(Answer::Nothing, |name| Answer::Line(name.clone()));
         }
         if let Some((frame, index, which)) = self.query(line) {
             let query = &description.query[index];
             // A wrong unit answers as plausibly as the right one.
             let tenfold = if query.name.as_ref() == "range" { 10f64.powi(which as i32) } else { 1.0 };
             if description.link.choice.is_some() && which >= description.emulator.names.len() {
-                return Said::Nothing;
+                return Answer::Nothing;
             }
             let bytes = self.device.frame(frame, plant, now);
             return match self.device.profile().frames()[frame.0].write_line(&bytes, tenfold) {
-                Some(line) => Said::Line(line),
-                None => Said::Block(bytes),
+                Some(line) => Answer::Line(line),
+                None => Answer::Block(bytes),
             };
         }
         match self.set(line) {
@@ -119,14 +119,14 @@ impl LineInstrument {
                 for (set, value) in heard {
                     self.error |= self.device.set(set, value, plant).is_err();
                 }
-                answer.map_or(Said::Nothing, Said::Line)
+                answer.map_or(Answer::Nothing, Answer::Line)
             }
             None => {
                 self.error = true;
                 let unknown = self.device.profile().description.link.unsolicited.last().cloned();
                 let zeros =
                     |alarm: String| Pattern::parse(&alarm).map_or(alarm, |pattern| pattern.write(&[], 0));
-                unknown.map(zeros).map_or(Said::Nothing, Said::Line)
+                unknown.map(zeros).map_or(Answer::Nothing, Answer::Line)
             }
         }
     }
@@ -171,7 +171,7 @@ fn number_in(question: &str, line: &str) -> Option<usize> {
     }
 }
 
-enum Said {
+enum Answer {
     Nothing,
     Line(String),
     Block(Vec<u8>),

@@ -19,8 +19,8 @@ use tokio_modbus::server::tcp::Server;
 
 /// More clients than this are turned away, so that no flood exhausts the host.
 pub const MOST_CLIENTS: usize = 32;
-/// Where all places are taken, a client that has asked nothing for so long makes room for a new one: the rule of the Modbus
-/// messaging guide (V1.0b, 4.2.2), which closes the connection that was unused for longest.
+/// Where all places are taken, a client without a request for so long makes room for a new one: the rule of
+/// the Modbus messaging guide (V1.0b, 4.2.2), which closes the connection that was unused for longest.
 pub const IDLE: Duration = Duration::from_secs(2);
 /// The world is brought up to now at least so often: the first question after a long silence is answered as fast as any.
 const KEEP_UP: Duration = Duration::from_millis(50);

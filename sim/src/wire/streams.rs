@@ -26,13 +26,13 @@ pub struct NetworkStream {
 /// Those who are sent to.
 enum Ears {
     Tcp(TcpListener, Vec<TcpStream>),
-    /// Whoever asked last, or the port that the profile states.
+    /// The last client, or the port that the profile states.
     Udp(UdpSocket, Option<SocketAddr>),
 }
 
 impl NetworkStream {
-    /// Serves an instrument's stream at `address` (port 0 for any free one): over TCP to whoever connects, in datagrams to
-    /// whoever has sent one, or to the profile's `local_port` on this machine.
+    /// Serves an instrument's stream at `address` (port 0 for any free one): over TCP to whoever connects, in
+    /// datagrams to whoever has sent one, or to the profile's `local_port` on this machine.
     ///
     /// # Errors
     /// Where the address cannot be bound, or the profile has no stream.
@@ -91,8 +91,8 @@ fn serve(mut ears: Ears, mut device: Device, stream: &Stream, plant: &SharedPlan
                 clients.retain_mut(|client| sent.iter().all(|frame| client.write_all(frame).is_ok()));
             }
             Ears::Udp(socket, to) => {
-                let mut asked = [0; 1500];
-                while let Ok((_, from)) = socket.recv_from(&mut asked) {
+                let mut datagram = [0; 1500];
+                while let Ok((_, from)) = socket.recv_from(&mut datagram) {
                     if device.profile().description.link.local_port.is_none() {
                         *to = Some(from);
                     }

@@ -9,8 +9,8 @@ use models::quantity::PeakToPeak;
 use realtime::ports::Nanos;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// An operator's hands at the virtual rig: weights to hang on the force sensor, a vibrometer to look with. What they do
-/// reaches the world with the next look at it by an instrument.
+/// An operator's hands at the virtual rig: weights to hang on the force sensor, a vibrometer to look with.
+/// What they do reaches the world with the next look at it by an instrument.
 #[derive(Clone, Default)]
 pub struct Hands(Arc<Mutex<Bench>>);
 
@@ -57,8 +57,8 @@ pub struct WorldPlant {
     supply_guard: Watchdog,
 }
 
-/// Time that the stage moves on without a new heartbeat: twice that of the amplifier's watchdog, so that the plate is quiet before
-/// the finger leaves it.
+/// Time that the stage moves on without a new heartbeat: twice that of the amplifier's watchdog, so that the
+/// plate is quiet before the finger leaves it.
 pub const STAGE_HEARTBEAT_WITHIN: Nanos = Nanos(100_000_000);
 /// Time that the switch in the supply stays closed without a new heartbeat: what the profiles of watchdog outputs have as `timeout_ms`.
 pub const SUPPLY_HEARTBEAT_WITHIN: Nanos = Nanos(200_000_000);

@@ -78,8 +78,8 @@ impl Default for WorldConfig {
 }
 
 impl WorldConfig {
-    /// The world of the model's own assumptions: massless, no defects. Noise, repeatability and the fingertip's
-    /// scatter about its nominal stiffnesses are those its rig.toml states.
+    /// The world of the model's own assumptions: massless, no defects. Noise, repeatability and the
+    /// fingertip's scatter about its nominal stiffnesses are those its rig.toml states.
     pub fn ideal() -> Self {
         Self::default()
     }
@@ -171,8 +171,8 @@ impl WorldConfig {
         Ok(())
     }
 
-    /// Standard deviation of a pass's mean force (N): the sensor's wander and what is left of its white noise.
-    /// `seconds` is the length of the pass's steady part.
+    /// Standard deviation of a pass's mean force (N): the sensor's wander and what is left of its white
+    /// noise. `seconds` is the length of the pass's steady part.
     pub fn pass_force_sd_n(&self, axis: usize, seconds: f64) -> f64 {
         let s = &self.sensor;
         // Mean of a wander with correlation time T over t: variance 2 T/t (1 - T/t (1 - exp(-t/T))).

@@ -1,8 +1,8 @@
 //! A fingertip that is the paper's finite element ridge instead of a slider on springs, read from its table.
 //!
-//! It is a truth of another kind for whoever tests a law against the virtual rig: the ridge has mass, layers and a changing contact, and no
-//! closed form. Its plate may move by a multiple of the stroke, which is how a reading of the paper's `w` is built
-//! (`models::reading`).
+//! It is a truth of another kind for whoever tests a law against the virtual rig: the ridge has mass, layers
+//! and a changing contact, and no closed form. Its plate may move by a multiple of the stroke, which is how a
+//! reading of the paper's `w` is built (`models::reading`).
 
 use super::{ConfigError, WorldConfig};
 use crate::contact::{Contact, Steady};

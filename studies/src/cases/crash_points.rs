@@ -19,7 +19,7 @@ pub const STEPS: [&str; 9] = [
 /// Ends this process by SIGKILL where [`VARIABLE`] names this step: nothing is cleaned up, nothing flushed.
 pub fn here(step: &'static str) {
     debug_assert!(STEPS.contains(&step));
-    if std::env::var_os(VARIABLE).is_some_and(|asked| asked == step) {
+    if std::env::var_os(VARIABLE).is_some_and(|named| named == step) {
         // As a kill would: nothing is cleaned up.
         std::process::abort();
     }

@@ -1,5 +1,5 @@
-//! Engines that stand at institutes. Add one: a file here, and a line in [`ENGINES`]. What an engine is asked for is little: to run
-//! commands, to say whether they may still come to something, to end them. What is done is seen in the folder alone.
+//! Engines of institutes. To add one, add a file here and a line in [`ENGINES`]. An engine only runs
+//! commands, reports whether they may still succeed, and ends them. The folder alone shows the results.
 
 pub mod python;
 pub mod slurm;
@@ -143,11 +143,11 @@ mod tests {
     #[test]
     fn a_shell_gives_back_what_was_quoted() {
         for word in ["plain", "with space", "it's", "$HOME `x` \"y\" \\", ""] {
-            let said = std::process::Command::new("sh")
+            let output = std::process::Command::new("sh")
                 .arg("-c")
                 .arg(format!("printf %s {}", quoted(word)))
                 .output();
-            assert_eq!(said.unwrap().stdout, word.as_bytes());
+            assert_eq!(output.unwrap().stdout, word.as_bytes());
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The file of cases: JSON lines. The first says what they are; where they do not follow from it, one line a case comes after it.
 //!
-//! Lines that `muprime cases` writes are padded to one length, which the header states: the millionth case is then found without
-//! reading those before it. A file from elsewhere need not be.
+//! Lines that `muprime cases` writes are padded to one length, which the header states: the millionth case is
+//! then found without reading those before it. A file from elsewhere need not be.
 
 use miette::{Context, IntoDiagnostic};
 use serde::{Deserialize, Serialize};

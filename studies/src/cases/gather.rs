@@ -69,8 +69,8 @@ pub fn holes(there: &[Range<u64>], cases: u64) -> Vec<Range<u64>> {
 /// Gathers a study into a file, whole or not at all.
 ///
 /// # Errors
-/// Holes, duplicates that differ, shards of other cases, of another version or of another build (unless `any_build`), a shard that
-/// is damaged, a disk that is full: no file is written then.
+/// Holes, duplicates that differ, shards of other cases, of another version or of another build (unless
+/// `any_build`), a shard that is damaged, a disk that is full: no file is written then.
 pub fn gather(study: &Study, to: &Path, any_build: bool) -> miette::Result<Gathered> {
     let there = study.ranges_there()?;
     let cases = study.file.header.cases;

@@ -1,5 +1,5 @@
-//! What is missing, how long a case takes, and the ranges that an engine's tasks get. Times size the ranges and bound the tasks; no
-//! result depends on them.
+//! What is missing, how long a case takes, and the ranges that an engine's tasks get. Times size the ranges
+//! and bound the tasks; no result depends on them.
 #![allow(clippy::disallowed_methods, reason = "a pilot measures wall-clock time")]
 
 use super::study::Study;
@@ -37,7 +37,7 @@ pub struct Plan {
     pub limit_s: f64,
 }
 
-/// Runs cases spread over what is missing, one at a time, for `budget` at most; what comes of them is not kept.
+/// Runs cases spread over what is missing, one at a time, for `budget` at most; their results are dropped.
 ///
 /// # Errors
 /// A case that cannot be made.

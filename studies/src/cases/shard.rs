@@ -41,14 +41,14 @@ pub struct Entry {
 
 /// The schema of a kind's results.
 pub fn schema(kind: &Kind) -> Arc<Schema> {
-    let told = |words: &str| HashMap::from([("description".to_string(), words.to_string())]);
+    let description = |words: &str| HashMap::from([("description".to_string(), words.to_string())]);
     let mut fields = vec![
         Field::new("index", DataType::UInt64, false)
-            .with_metadata(told("index of the case in its file, from 0")),
+            .with_metadata(description("index of the case in its file, from 0")),
         Field::new("key", DataType::FixedSizeBinary(32), false)
-            .with_metadata(told("SHA-256 of version and inputs of the case")),
+            .with_metadata(description("SHA-256 of version and inputs of the case")),
         Field::new("failed", DataType::Utf8, true)
-            .with_metadata(told("why there is no result; missing where there is one")),
+            .with_metadata(description("why there is no result; missing where there is one")),
     ];
     for column in kind.columns {
         let (data, unit) = match column.cells {
@@ -57,7 +57,7 @@ pub fn schema(kind: &Kind) -> Arc<Schema> {
             Type::Flag => (DataType::Boolean, None),
             Type::Text => (DataType::Utf8, None),
         };
-        let mut about = told(column.words);
+        let mut about = description(column.words);
         about.extend(unit.map(|unit| ("unit".to_string(), unit.to_string())));
         fields.push(Field::new(column.name, data, true).with_metadata(about));
     }
@@ -212,8 +212,8 @@ impl Reader {
         let builder = ParquetRecordBatchReaderBuilder::try_new(file)
             .into_diagnostic()
             .wrap_err_with(|| shown.clone())?;
-        let told = builder.metadata().file_metadata();
-        let (rows, values) = (told.num_rows(), told.key_value_metadata().cloned().unwrap_or_default());
+        let file = builder.metadata().file_metadata();
+        let (rows, values) = (file.num_rows(), file.key_value_metadata().cloned().unwrap_or_default());
         let fact = |kv: KeyValue| Some((kv.key.strip_prefix("muprime.")?.to_string(), kv.value?));
         let facts: Facts = values.into_iter().filter_map(fact).collect();
         let same = |a: &Field, b: &Field| a.name() == b.name() && a.data_type() == b.data_type();

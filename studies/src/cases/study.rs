@@ -1,5 +1,5 @@
-//! A file of cases and the folder of its results. `study.json` in the folder says of which cases they are; `shards/` holds them,
-//! `parts/` what is being written, `jobs/` what was handed to engines.
+//! A file of cases and the folder of its results. `study.json` in the folder says of which cases they are;
+//! `shards/` holds them, `parts/` what is being written, `jobs/` what was handed to engines.
 
 use super::crash_points;
 use super::file::CaseFile;
@@ -18,7 +18,7 @@ const SCHEMA: &str = "muprime.study/1";
 
 /// `study.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Told {
+pub struct Manifest {
     schema: String,
     /// The file of cases, absolute.
     pub cases: PathBuf,
@@ -70,7 +70,7 @@ impl Study {
         runs::files::make_folder(out)?;
         let out = out.canonicalize().into_diagnostic()?;
         let study = Study { out, ..study };
-        let told = Told {
+        let manifest = Manifest {
             schema: SCHEMA.into(),
             cases: study.file.path.clone(),
             header: study.file.digest.clone(),
@@ -82,7 +82,7 @@ impl Study {
             Ok(bytes) => study.same(&bytes)?,
             Err(why) if why.kind() == std::io::ErrorKind::NotFound => {
                 let (part, mut file) = study.part("study.json")?;
-                let text = serde_json::to_vec(&told).into_diagnostic()?;
+                let text = serde_json::to_vec(&manifest).into_diagnostic()?;
                 file.write_all(&text)
                     .and_then(|()| file.sync_all())
                     .into_diagnostic()
@@ -108,16 +108,16 @@ impl Study {
         let bytes = fs::read(&place)
             .into_diagnostic()
             .wrap_err_with(|| format!("{}: no study: {} cannot be read", out.display(), place.display()))?;
-        let told: Told =
+        let manifest: Manifest =
             serde_json::from_slice(&bytes).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
-        let study = Study::of(cases.unwrap_or(&told.cases), out.canonicalize().into_diagnostic()?)?;
+        let study = Study::of(cases.unwrap_or(&manifest.cases), out.canonicalize().into_diagnostic()?)?;
         study.same(&bytes)?;
         Ok(study)
     }
 
     /// Refuses a folder whose `study.json` is of other cases.
-    fn same(&self, told: &[u8]) -> miette::Result<()> {
-        let there: Told = serde_json::from_slice(told)
+    fn same(&self, manifest: &[u8]) -> miette::Result<()> {
+        let there: Manifest = serde_json::from_slice(manifest)
             .into_diagnostic()
             .wrap_err_with(|| self.out.join("study.json").display().to_string())?;
         if (there.schema.as_str(), &there.header) == (SCHEMA, &self.file.digest) {

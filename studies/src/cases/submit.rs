@@ -1,5 +1,5 @@
-//! Hands what is missing to an engine and follows what comes into the folder. The same call again goes on: a job that is still at
-//! work is followed, and only what is missing then is handed over.
+//! Hands what is missing to an engine and follows what comes into the folder. The same call again goes on: a
+//! job that is still at work is followed, and only what is missing then is handed over.
 #![allow(clippy::disallowed_methods, reason = "somebody waits in wall-clock time")]
 
 use super::engines::{self, Engine, Handed, Job};
@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 
 /// How often the folder is looked at.
 const LOOK: Duration = Duration::from_millis(500);
-/// How often the engine is asked whether it is still at work: schedulers do not like to be asked.
+/// Period of the queries whether the engine is still at work: schedulers limit them.
 const ASK: Duration = Duration::from_secs(5);
 /// How often what an engine left undone is handed over again, where something came of the last time, or of the one before.
 const ROUNDS: usize = 4;
@@ -94,21 +94,20 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     let first = length(&missing()?);
     let bar = progress::bar(cases, "cases");
     bar.set_position(cases - first);
-    let (out, asked) = (study.out.display().to_string(), options.engine.clone());
+    let (out, by) = (study.out.display().to_string(), options.engine.clone());
     // Once: several studies may be submitted by one command.
-    static ASKED: std::sync::Once = std::sync::Once::new();
-    let first_time = !ASKED.is_completed();
-    ASKED.call_once(|| ());
-    let told = move |done| {
-        let goes_on =
-            if asked == "local" || asked == "dask" { "is over" } else { "goes on without this command" };
+    static SUBMITTED: std::sync::Once = std::sync::Once::new();
+    let first_time = !SUBMITTED.is_completed();
+    SUBMITTED.call_once(|| ());
+    let report = move |done| {
+        let goes_on = if by == "local" || by == "dask" { "is over" } else { "goes on without this command" };
         say!("{done} of {cases} cases are in {out}; what was at work {goes_on}");
         say!("the same command goes on from there; `muprime submit --cancel --out {out}` ends what runs");
     };
     if first_time {
-        progress::on_interrupt(&bar, told)?;
+        progress::on_interrupt(&bar, report)?;
     }
-    let mut said = Submitted {
+    let mut submitted = Submitted {
         out: study.out.clone(),
         engine: options.engine.clone(),
         cases,
@@ -136,44 +135,44 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     let (mut before, mut in_vain) = (u64::MAX, 0);
     for _ in 0..ROUNDS {
         let holes = missing()?;
-        said.missing = length(&holes);
-        in_vain += u32::from(said.missing >= before);
+        submitted.missing = length(&holes);
+        in_vain += u32::from(submitted.missing >= before);
         if holes.is_empty() || in_vain > 1 {
             break;
         }
-        before = said.missing;
-        if said.pilot.is_none() {
-            said.pilot = Some(match options.case_s {
+        before = submitted.missing;
+        if submitted.pilot.is_none() {
+            submitted.pilot = Some(match options.case_s {
                 Some(mean_s) => Pilot { cases: 0, mean_s, longest_s: mean_s },
                 None => plan::measure(study, &holes, options.pilot, Duration::from_secs(20))?,
             });
         }
-        let Some(pilot) = said.pilot else { break };
+        let Some(pilot) = submitted.pilot else { break };
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
         let plan =
             plan::cut(&holes, &pilot, options.workers.unwrap_or(cores), options.task_s, options.limit_s);
-        said.tasks += plan.ranges.len();
-        (said.cases_a_task, said.limit_s) = (plan.cases_a_task, plan.limit_s);
+        submitted.tasks += plan.ranges.len();
+        (submitted.cases_a_task, submitted.limit_s) = (plan.cases_a_task, plan.limit_s);
         match engine {
             None => here(study, &plan, options.workers.unwrap_or(cores), &bar)?,
             Some(engine) => {
                 let (folder, handed) = hand_over(study, engine, &plan, options)?;
-                said.ids.extend(handed.ids.clone());
+                submitted.ids.extend(handed.ids.clone());
                 if options.detach {
                     break;
                 }
                 follow(study, engine, &folder, handed, &bar)?;
             }
         }
-        said.missing = length(&missing()?);
+        submitted.missing = length(&missing()?);
     }
     bar.finish_and_clear();
-    said.wall_seconds = begun.elapsed().as_secs_f64();
-    Ok(said)
+    submitted.wall_seconds = begun.elapsed().as_secs_f64();
+    Ok(submitted)
 }
 
-/// Runs a plan on this machine: the same worker, on the threads of a pool. A case that cannot be made leaves its range undone and
-/// the others not; a disk that is full ends it.
+/// Runs a plan on this machine: the same worker, on the threads of a pool. A case that cannot be made leaves
+/// its range undone and the others not; a disk that is full ends it.
 fn here(study: &Study, plan: &Plan, threads: u64, bar: &ProgressBar) -> miette::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build().into_diagnostic()?;
     let program = program()?;
@@ -271,7 +270,7 @@ fn follow(
     mut handed: Handed,
     bar: &ProgressBar,
 ) -> miette::Result<()> {
-    let (cases, mut asked) = (study.file.header.cases, Instant::now());
+    let (cases, mut last_query) = (study.file.header.cases, Instant::now());
     let mut over = false;
     loop {
         let missing = length(&holes(&study.ranges_there()?, cases));
@@ -280,10 +279,10 @@ fn follow(
             break;
         }
         std::thread::sleep(LOOK);
-        if asked.elapsed() >= ASK || handed.child.is_some() {
+        if last_query.elapsed() >= ASK || handed.child.is_some() {
             // What ended a moment ago may not be seen in the folder yet: it is looked at once more.
             over = !(engine.alive)(&mut handed);
-            asked = Instant::now();
+            last_query = Instant::now();
         }
     }
     if let Some(child) = &mut handed.child {
@@ -301,7 +300,7 @@ fn at_work(out: &Path) -> miette::Result<Vec<(PathBuf, Job)>> {
 /// Cancels the jobs of a folder that have not ended. Returns the engine's names of them.
 ///
 /// # Errors
-/// An engine that cannot be asked.
+/// An engine that does not answer.
 pub fn cancel(out: &Path) -> miette::Result<Vec<String>> {
     let mut ids = Vec::new();
     for (folder, job) in at_work(out)? {

@@ -152,9 +152,9 @@ pub fn entry(study: &Study, index: u64, case: Case) -> Entry {
     let key = study.kind.key(&case.inputs);
     let ran = catch_unwind(AssertUnwindSafe(case.run));
     let outcome: Outcome = ran.unwrap_or_else(|panic| {
-        let said =
+        let message =
             panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
-        Err(format!("a fault of the program: {}", said.unwrap_or("it says no more")))
+        Err(format!("a fault of the program: {}", message.unwrap_or("no message")))
     });
     Entry { index, key, outcome }
 }

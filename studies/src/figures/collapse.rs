@@ -1,5 +1,5 @@
-//! Fig. 12: the study of Fig. 9 against Psi of Eq. 17, and Psi* refitted: on all points, on those of the caption, where contact is lost,
-//! and curve by curve.
+//! Fig. 12: the study of Fig. 9 against Psi of Eq. 17, and Psi* refitted: on all points, on those of the
+//! caption, where contact is lost, and curve by curve.
 
 use super::plot::{Chart, Series};
 use super::reading::{self, Reading};
@@ -22,7 +22,7 @@ struct Plotted {
 }
 
 impl Plotted {
-    fn of(point: &StudyPoint, kept: &store::Kept, reading: Reading) -> Plotted {
+    fn of(point: &StudyPoint, run: &store::StoredRun, reading: Reading) -> Plotted {
         let (c, panel) = (&point.case, point.panel);
         let w_m = reading.w_m(c.amplitude);
         Plotted {
@@ -30,8 +30,8 @@ impl Plotted {
             value: panel.values().iter().position(|v| *v == point.value).unwrap_or(0),
             w_m,
             psi: c.speed_m_s / (w_m * c.frequency_hz * c.mu0 * (1.0 + c.poisson_ratio)),
-            mu_relative: kept.mu_relative,
-            contact_fraction: kept.contact_fraction,
+            mu_relative: run.mu_relative,
+            contact_fraction: run.contact_fraction,
         }
     }
 
@@ -61,7 +61,7 @@ fn fitted<'a>(chosen: impl Iterator<Item = &'a Plotted>) -> Option<psi_fit::PsiF
 pub fn collapse(study: Study, out: &Path) -> miette::Result<Reproduced> {
     let Study { base, reading, .. } = study;
     let found = study.whole(out)?;
-    let all: Vec<Plotted> = found.iter().map(|(point, kept)| Plotted::of(point, kept, reading)).collect();
+    let all: Vec<Plotted> = found.iter().map(|(point, run)| Plotted::of(point, run, reading)).collect();
     let drawn: Vec<&Plotted> = all.iter().filter(|p| p.is_drawn()).collect();
     let mut series: Vec<Series> = Vec::new();
     for panel in Panel::ALL {

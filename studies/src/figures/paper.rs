@@ -1,6 +1,6 @@
 //! A figure as a journal prints it: the charts as lettered panels of one sheet of 85 or 174 mm (one or two columns), letters of 7 to 8
-//! points, axis titles with units, no title and no grid within; series told apart by dash and mark as well as by colour. As SVG, and
-//! as PDF; both are drawn by the same strokes.
+//! points, axis titles with units, no title and no grid within; series distinguished by dash and mark as well
+//! as by colour. As SVG, and as PDF; both are drawn by the same strokes.
 
 use super::pdf::PdfBackend;
 use super::plot::{Chart, Series, Stated};
@@ -167,7 +167,7 @@ fn tick(value: f64) -> String {
 }
 
 /// A name of a legend: columns of the study in words, with the units in which people say them.
-fn said(name: &str) -> String {
+fn legend(name: &str) -> String {
     let (column, value) = name.split_once(' ').map_or((name, None), |(c, v)| (c, v.parse::<f64>().ok()));
     let (words, symbol, factor, unit) = match column {
         "frequency_hz" => ("frequency", "f", 1e-3, " kHz"),
@@ -250,7 +250,7 @@ where
         }
         let at = mark(k, (x + 80, y), 16, colour, true);
         area.draw(&at)?;
-        area.draw(&words(k, &said(&series.name)))?;
+        area.draw(&words(k, &legend(&series.name)))?;
     }
     for (n, stated) in (chart.series.len()..).zip(&chart.stated) {
         let (x, y) = place(n);

@@ -47,7 +47,7 @@ pub fn forces(reading: Reading) -> miette::Result<Reproduced> {
 /// Fig. 11: phase shift for normal stiffnesses of 0.2 to 4 MN/m at 0.5 N, both readings of section 4.1.
 pub fn phase_shift(reading: Reading) -> miette::Result<Reproduced> {
     let mut charts = Vec::new();
-    let mut told = Vec::new();
+    let mut lines = Vec::new();
     for kn in [0.2e6, 4e6] {
         // Eq. 7 at 0.5 N: the sine's amplitude is F_n / k_n there.
         let first = spring_slider::critical_amplitude(0.5, kn);
@@ -58,7 +58,7 @@ pub fn phase_shift(reading: Reading) -> miette::Result<Reproduced> {
                 spring_slider::solve(&condition(reading, w_um * 1e-6, 0.5), &finger).into_diagnostic()?;
             Ok(format!("{:.0}", cycle.touch_down_deg))
         };
-        told.push(format!(
+        lines.push(format!(
             "k_n {} MN/m: contact is lost from {:.2} um, touch-down at {} deg at 1.35 um, {} at 2.5 um and {} at 5 um",
             kn / 1e6,
             1e6 * reading.w_m(first),
@@ -94,7 +94,7 @@ pub fn phase_shift(reading: Reading) -> miette::Result<Reproduced> {
     }
     Ok(Reproduced {
         charts,
-        lines: told.into_iter().chain(["paper: 0.2 to 4 MN/m give phases like the measured ones (transition at 0.4 to 1.3 um, about 90 deg beyond), rising from zero at the loss of contact, the later the softer the spring; so here with the time of touch-down, while the acceleration's peak (just before separation) starts from 360 deg".into()]).collect(),
+        lines: lines.into_iter().chain(["paper: 0.2 to 4 MN/m give phases like the measured ones (transition at 0.4 to 1.3 um, about 90 deg beyond), rising from zero at the loss of contact, the later the softer the spring; so here with the time of touch-down, while the acceleration's peak (just before separation) starts from 360 deg".into()]).collect(),
     })
 }
 

@@ -13,9 +13,9 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::sync::Mutex;
 
-/// What is kept of a run.
+/// The stored results of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Kept {
+pub struct StoredRun {
     /// Content key of the case.
     pub key: String,
     /// mu'.
@@ -36,9 +36,9 @@ pub struct Kept {
     pub cycles: usize,
 }
 
-impl Kept {
-    fn of(key: String, case: &RidgeCase, run: &RidgeRun) -> Kept {
-        Kept {
+impl StoredRun {
+    fn of(key: String, case: &RidgeCase, run: &RidgeRun) -> StoredRun {
+        StoredRun {
             key,
             mu_relative: run.mu_relative,
             mu_relative_sd: run.mu_relative_sd,
@@ -53,7 +53,7 @@ impl Kept {
 }
 
 /// Results by content key.
-pub type Results = HashMap<String, Kept>;
+pub type Results = HashMap<String, StoredRun>;
 
 /// Reads what is there; a last line cut short by a stop is left out, with a word.
 pub fn read(path: &Path) -> miette::Result<Results> {
@@ -63,9 +63,9 @@ pub fn read(path: &Path) -> miette::Result<Results> {
     };
     let lines: Vec<String> = BufReader::new(file).lines().collect::<Result<_, _>>().into_diagnostic()?;
     for (n, line) in lines.iter().enumerate() {
-        match serde_json::from_str::<Kept>(line) {
-            Ok(kept) => {
-                results.insert(kept.key.clone(), kept);
+        match serde_json::from_str::<StoredRun>(line) {
+            Ok(run) => {
+                results.insert(run.key.clone(), run);
             }
             Err(_) if n + 1 == lines.len() => {
                 say!("{}: the last line was cut short; its case is run again", path.display());
@@ -100,17 +100,17 @@ pub fn complete(
     let bar = crate::progress::bar(todo.len() as u64, "cases");
     let (kept_in, of) = (path.display().to_string(), todo.len());
     crate::progress::on_interrupt(&bar, move |done| {
-        say!("partial: {done} of {of} cases are kept in {kept_in}; the same command goes on with the others");
+        say!("partial: {done} of {of} cases are stored in {kept_in}; to run the others, repeat the command");
     })?;
     let run = |(key, case): &(String, RidgeCase)| {
-        let outcome = ridge::run(case, settings).map(|run| Kept::of(key.clone(), case, &run));
+        let outcome = ridge::run(case, settings).map(|run| StoredRun::of(key.clone(), case, &run));
         bar.inc(1);
         match outcome {
-            Ok(kept) => {
-                let line = serde_json::to_string(&kept).into_diagnostic()? + "\n";
+            Ok(stored) => {
+                let line = serde_json::to_string(&stored).into_diagnostic()? + "\n";
                 let mut file = file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
                 file.write_all(line.as_bytes()).into_diagnostic()?;
-                Ok(Some(kept))
+                Ok(Some(stored))
             }
             Err(why) => {
                 bar.suspend(|| say!("{why}: {case:?}"));
@@ -118,10 +118,10 @@ pub fn complete(
             }
         }
     };
-    let new: Vec<Option<Kept>> = todo.par_iter().map(run).collect::<miette::Result<_>>()?;
+    let new: Vec<Option<StoredRun>> = todo.par_iter().map(run).collect::<miette::Result<_>>()?;
     bar.finish_and_clear();
     let failed = new.iter().filter(|k| k.is_none()).count();
-    results.extend(new.into_iter().flatten().map(|kept| (kept.key.clone(), kept)));
+    results.extend(new.into_iter().flatten().map(|run| (run.key.clone(), run)));
     Ok((results, failed))
 }
 

@@ -1,7 +1,7 @@
 //! The diagnosis scored blind on sealed sets of the independent simulation.
 //!
-//! The diagnoser gets the table, rig.toml and the hidden conditions of a set; label and truth are opened only by
-//! [`score`], after the verdict stands. Every figure comes with its number of sets and an interval.
+//! The diagnoser gets the table, rig.toml and the hidden conditions of a set; label and truth are opened only
+//! by [`score`], after the verdict stands. Every figure comes with its number of sets and an interval.
 
 pub mod distance;
 pub mod further;
@@ -16,14 +16,14 @@ use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use models::covariate;
 use rayon::prelude::*;
-use reliability::{Entry, told};
+use reliability::{Entry, identifiable};
 use serde::Serialize;
 use sim::sealed::{Ask, DETECTABLE, PAIR_LEAVES, Set, Stratum, generate};
 use std::collections::BTreeMap;
 
 /// rms gap over floor on the hidden passes that the truth must leave to be detectable.
 const ABOVE_FLOOR: f64 = 1.0;
-/// What a diagnoser said about one set, beside the truth.
+/// A diagnoser's answer on one set, beside the truth.
 #[derive(Debug, Clone, Serialize)]
 pub struct Scored {
     /// Seed of the set.
@@ -127,7 +127,7 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
         wanted.push((t - f.recalibrated).abs() > 2.0 * sd);
     }
     let shrink = |left: f64| (recalibrated > 0.0).then(|| 1.0 - (left / recalibrated).sqrt());
-    let said: Vec<bool> = conditions
+    let named: Vec<bool> = conditions
         .passes
         .iter()
         .map(|p| {
@@ -139,8 +139,8 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
             })
         })
         .collect();
-    let both = said.iter().zip(&wanted).filter(|(a, b)| **a && **b).count() as f64;
-    let sizes = (said.iter().filter(|x| **x).count() + wanted.iter().filter(|x| **x).count()) as f64;
+    let both = named.iter().zip(&wanted).filter(|(a, b)| **a && **b).count() as f64;
+    let sizes = (named.iter().filter(|x| **x).count() + wanted.iter().filter(|x| **x).count()) as f64;
     let region_f1 = wanted.iter().any(|x| *x).then(|| 2.0 * both / sizes.max(1.0));
 
     let gain = label.chi2_gain;
@@ -230,7 +230,7 @@ pub struct Figure {
     pub ci95: Option<[f64; 2]>,
     /// Number of sets behind it.
     pub n: usize,
-    /// What was asked for.
+    /// The requirement.
     pub target: &'static str,
 }
 
@@ -334,10 +334,10 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let regions: Vec<f64> = all.iter().filter(detectable).filter_map(|s| s.region_f1).collect();
     let faint_regions: Vec<f64> = all.iter().filter(faint).filter_map(|s| s.region_f1).collect();
     let (pairs, murky_pairs): (Vec<&Scored>, Vec<&Scored>) = pairs.iter().partition(|s| s.decidable);
-    let told_sets = all.iter().filter(|s| told(s));
+    let identifiable_sets = all.iter().filter(|s| identifiable(s));
     let coverage: Vec<f64> = all.iter().map(|s| s.covered).collect();
     let promised = |s: &&Scored| Some((s.claimed_ci95?, s.achieved?));
-    let kept = gapped.iter().filter_map(promised).map(|(ci, a)| ci[0] <= a && a <= ci[1]).collect();
+    let contained = gapped.iter().filter_map(promised).map(|(ci, a)| ci[0] <= a && a <= ci[1]).collect();
     let near = |s: &&&Scored, band: usize| {
         s.distance.is_some_and(|d| distance::BANDS.partition_point(|b| *b <= d) == band)
     };
@@ -374,8 +374,8 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
         statistic("where: mean F1 of the regions", ">= 0.80", &regions, mean),
         statistic("  gap below the floor: mean F1", "reported", &faint_regions, mean),
         calibration("calibration error of the first entry, debiased", all.iter()),
-        calibration("  of sets whose truth can be told", told_sets),
-        share("achieved shrinkage inside its 95 % interval", "0.90 to 0.98", kept),
+        calibration("  of sets with an identifiable truth", identifiable_sets),
+        share("achieved shrinkage inside its 95 % interval", "0.90 to 0.98", contained),
         statistic("hidden passes inside 95 % predictive intervals", "0.90 to 0.98", &coverage, mean),
     ]
 }

@@ -1,4 +1,4 @@
-//! The single problems of a refusal: each with its place in the file, as far as that can be told, and a remedy.
+//! The single problems of a refusal, each with its place in the file if it is known, and a remedy.
 
 use super::{KINDS, text_of};
 use runs::input::Problems;
@@ -90,12 +90,12 @@ fn offset(text: &str, line: usize, column: usize) -> usize {
     (before + column - 1).min(text.len())
 }
 
-/// Where the key stands that a problem names, or the line that it tells.
+/// Where the key stands that a problem names, or the line that it gives.
 fn place_named(text: &str, problem: &str) -> Option<usize> {
-    let told = problem.split_once("line ").or_else(|| problem.split_once("line: ")).and_then(|(_, rest)| {
+    let line = problem.split_once("line ").or_else(|| problem.split_once("line: ")).and_then(|(_, rest)| {
         rest.chars().take_while(char::is_ascii_digit).collect::<String>().parse::<usize>().ok()
     });
-    if let Some(line) = told {
+    if let Some(line) = line {
         let column = problem.split_once(", column ").map_or("", |(_, rest)| rest);
         let column = column.chars().take_while(char::is_ascii_digit).collect::<String>().parse().unwrap_or(1);
         return Some(offset(text, line.max(1), column));

@@ -1,5 +1,5 @@
-//! The shape of a file against the JSON Schema of its kind: every key that is unknown or missing and every value of another type,
-//! where a reader would stop at the first.
+//! The shape of a file against the JSON Schema of its kind: every key that is unknown or missing and every
+//! value of another type, where a reader would stop at the first.
 
 use runs::input::Problems;
 use serde_json::{Map, Value};
@@ -85,9 +85,9 @@ pub fn toml(schema: &Value, text: &str, problems: &mut Problems<'_>) {
     wrong.into_iter().for_each(|w| problems.add_at(w.place, w.problem, w.remedy));
 }
 
-/// The text as it may have been meant, so that its values can be judged as well: misspelt keys by the names that are nearest, numbers
-/// in quotation marks without them, and without what else has no place. Lines stay where they are. `None` where that
-/// leaves a text that the schema does not admit either.
+/// The text as it may have been meant, so that its values can be judged as well: misspelt keys by the names
+/// that are nearest, numbers in quotation marks without them, and without what else has no place. Lines stay
+/// where they are. `None` where that leaves a text that the schema does not admit either.
 pub fn as_meant(schema: &Value, text: &str) -> Option<String> {
     let mut meant = text.to_string();
     let mut mends: Vec<(Range<usize>, String)> =
@@ -127,12 +127,12 @@ fn node(root: &Value, schema: &Value, value: &Node<'_>, path: &str, wrong: &mut 
     for of in ["anyOf", "oneOf"] {
         let Some(choices) = schema[of].as_array() else { continue };
         let tried = choices.iter().map(|choice| {
-            let mut said = Vec::new();
-            node(root, choice, value, path, &mut said);
-            said
+            let mut problems = Vec::new();
+            node(root, choice, value, path, &mut problems);
+            problems
         });
         let mut tried: Vec<Vec<Wrong>> = tried.collect();
-        if tried.iter().all(|said| !said.is_empty()) {
+        if tried.iter().all(|problems| !problems.is_empty()) {
             // The choice that is nearest is the one that was meant.
             tried.sort_by_key(Vec::len);
             wrong.extend(tried.into_iter().next().unwrap_or_default());
@@ -324,23 +324,23 @@ mod tests {
     use super::*;
     use crate::schemas::schema::Kind;
 
-    fn said(kind: Kind, text: &str) -> String {
+    fn problems_of(kind: Kind, text: &str) -> String {
         let mut problems = Problems::of("file", text);
         toml(&kind.schema(), text, &mut problems);
         problems.end().err().map(|e| format!("{e}")).unwrap_or_default()
     }
 
     #[test]
-    fn all_that_is_misshapen_is_told_at_once() {
+    fn all_that_is_misshapen_is_reported_at_once() {
         let plan = runs::plan::bundled_text("first-sweep").unwrap();
-        assert_eq!(said(Kind::Plan, plan), "");
+        assert_eq!(problems_of(Kind::Plan, plan), "");
         let wrong = plan
             .replacen("seed", "sead", 1)
             .replacen("speed_m_s = 0.02", "speed_m_s = \"fast\"", 1)
             .replacen("normal_force_n", "normal_force", 1);
-        let said = said(Kind::Plan, &wrong);
+        let message = problems_of(Kind::Plan, &wrong);
         for part in ["sead is not known", "speed_m_s is text", "normal_force_n is missing"] {
-            assert!(said.contains(part), "{part}: {said}");
+            assert!(message.contains(part), "{part}: {message}");
         }
     }
 
@@ -348,7 +348,7 @@ mod tests {
     fn no_bundled_file_is_misshapen() {
         for bundled in crate::schemas::bundled::all() {
             let kind = Kind::ALL.into_iter().find(|k| k.name() == bundled.kind).unwrap();
-            assert_eq!(said(kind, bundled.text), "", "{}", bundled.name);
+            assert_eq!(problems_of(kind, bundled.text), "", "{}", bundled.name);
         }
     }
 

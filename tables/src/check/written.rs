@@ -41,7 +41,7 @@ pub(super) fn record(path: &Path) -> miette::Result<()> {
     let found = realtime::recorder::inspect(std::io::BufReader::new(file));
     match found.sentences().as_slice() {
         [] => Ok(()),
-        said => miette::bail!(help = remedy(Some("record")), "{}: {}", path.display(), said.join("; ")),
+        found => miette::bail!(help = remedy(Some("record")), "{}: {}", path.display(), found.join("; ")),
     }
 }
 
@@ -75,24 +75,24 @@ pub(super) fn run_folder(path: &Path) -> miette::Result<usize> {
         );
     }
     let mut passes = 0;
-    let mut said = Vec::new();
+    let mut problems = Vec::new();
     for part in PARTS.iter().map(|part| path.join(part)).filter(|part| part.exists()) {
         let name = part.display().to_string();
         match kind_of(&name).and_then(|kind| judge(kind, &name, &On::default(), None)) {
             Ok(good) => passes = good.passes.unwrap_or(passes),
-            // A run that has just begun has too few passes for a diagnosis; what is wrong with its table is told below.
+            // A run that has just begun has too few passes for a diagnosis; its table is checked below.
             Err(_) if part.ends_with("points.csv") => {}
-            Err(why) => said.extend(problems_of(&why).into_iter().map(|p| p.problem)),
+            Err(why) => problems.extend(problems_of(&why).into_iter().map(|p| p.problem)),
         }
     }
-    said.extend(runs::run_dir::damage_in(path)?);
-    if said.is_empty() {
+    problems.extend(runs::run_dir::damage_in(path)?);
+    if problems.is_empty() {
         return Ok(passes);
     }
     Err(miette::miette!(
         help = "`muprime recover` repairs records; `muprime report` says what a damaged run still tells",
         "{}",
-        said.join("; ")
+        problems.join("; ")
     ))
 }
 

@@ -1,5 +1,5 @@
-//! The table as one Arrow record batch, with the unit and the meaning of every column in its field's metadata and the facts
-//! of the run in the schema's; and that batch as an IPC file.
+//! The table as one Arrow record batch, with the unit and the meaning of every column in its field's metadata
+//! and the facts of the run in the schema's; and that batch as an IPC file.
 
 use super::columns::{Cells, Column, Table};
 use super::facts::Facts;
@@ -28,9 +28,9 @@ pub fn batch(table: &Table, facts: &Facts) -> miette::Result<RecordBatch> {
             Cells::Texts(v) => Arc::new(StringArray::from(v.clone())),
         }
     };
-    let told = facts.iter().map(|(name, fact)| (format!("muprime.{name}"), fact.clone()));
+    let metadata = facts.iter().map(|(name, fact)| (format!("muprime.{name}"), fact.clone()));
     let schema = Schema::new(table.iter().map(field).collect::<Vec<_>>())
-        .with_metadata(told.collect::<HashMap<_, _>>());
+        .with_metadata(metadata.collect::<HashMap<_, _>>());
     RecordBatch::try_new(Arc::new(schema), table.iter().map(array).collect()).into_diagnostic()
 }
 

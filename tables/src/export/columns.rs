@@ -1,4 +1,4 @@
-//! The columns of an export: those of the point table, then what the comparison said.
+//! The columns of an export: those of the point table, then the results of the comparison.
 
 use super::unit;
 use models::covariate::{self, Covariate};

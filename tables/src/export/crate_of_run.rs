@@ -1,6 +1,6 @@
-//! The run's folder described as a Research Object Crate: `ro-crate-metadata.json` beside its files, by which repositories and
-//! search engines read what it holds (RO-Crate 1.1, <https://w3id.org/ro/crate/1.1>). Every file is listed with its size, its
-//! SHA-256 and what it is.
+//! The run's folder described as a Research Object Crate: `ro-crate-metadata.json` beside its files, by which
+//! repositories and search engines read what it holds (RO-Crate 1.1, <https://w3id.org/ro/crate/1.1>). Every
+//! file is listed with its size, its SHA-256 and what it is.
 
 use super::facts::Facts;
 use calibration::certificate::sha256_hex;
@@ -113,15 +113,15 @@ fn address_of(licence: &str) -> String {
 }
 
 fn description(run: &RunData, facts: &Facts) -> String {
-    let told = |name: &str| facts.get(name).cloned().unwrap_or_else(|| "not stated".into());
+    let fact = |name: &str| facts.get(name).cloned().unwrap_or_else(|| "not stated".into());
     format!(
         "{} passes of a friction sweep on an ultrasonically vibrating plate. Sample: {}. Setup: {}. Compared with the model {}. \
          Units: {}.",
         run.passes.len(),
-        told("sample"),
-        told("setup"),
-        told("model"),
-        told("units")
+        fact("sample"),
+        fact("setup"),
+        fact("model"),
+        fact("units")
     )
 }
 

@@ -1,5 +1,5 @@
-//! What goes with the numbers wherever they go: who, on what, with which instruments, certificates and versions, under which
-//! licence.
+//! What goes with the numbers wherever they go: who, on what, with which instruments, certificates and
+//! versions, under which licence.
 
 use runs::report::RunData;
 use std::collections::BTreeMap;
@@ -18,8 +18,8 @@ pub struct Stated {
     pub organisation: Option<String>,
 }
 
-/// The facts of a run: those of its record, and what its folder says of instruments and certificates. A licence that is
-/// stated now stands in place of the record's. What is not known is not there.
+/// The facts of a run: those of its record, and what its folder says of instruments and certificates. A
+/// licence that is stated now stands in place of the record's. What is not known is not there.
 pub fn of(run: &RunData, stated: &Stated) -> Facts {
     let mut facts = run.facts.clone();
     facts.remove(realtime::recorder::CHECKSUM);
@@ -48,6 +48,6 @@ pub fn of(run: &RunData, stated: &Stated) -> Facts {
 }
 
 fn outcome(summary: &runs::session::Summary) -> String {
-    let told = serde_json::to_value(&summary.outcome).unwrap_or_default();
-    told["outcome"].as_str().unwrap_or("unknown").to_string()
+    let outcome = serde_json::to_value(&summary.outcome).unwrap_or_default();
+    outcome["outcome"].as_str().unwrap_or("unknown").to_string()
 }

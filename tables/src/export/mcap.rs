@@ -61,8 +61,8 @@ struct Flat {
     text: Vec<u8>,
 }
 
-/// A quantity that holds from one change to the next. The last cycle before a change is told too: so a line from message to
-/// message is the step that it was.
+/// A quantity that holds from one change to the next. The last cycle before a change is written too, so that
+/// a line from message to message is the step that it was.
 #[derive(Default)]
 struct Held {
     value: Option<Option<f64>>,

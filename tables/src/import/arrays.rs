@@ -53,8 +53,8 @@ impl Beside {
     }
 }
 
-/// One table of arrays of one length: that of the arrays that `wanted` names, else the commonest; `of` names an array, a structure
-/// or a group.
+/// One table of arrays of one length: that of the arrays that `wanted` names, else the commonest; `of` names
+/// an array, a structure or a group.
 ///
 /// # Errors
 /// No arrays, several lengths that are as common, a name that is not there.

@@ -79,8 +79,8 @@ fn reading(cell: &Cell) -> Option<Reading> {
     Some(Reading { seconds, dated: date.is_some(), two })
 }
 
-/// The times of a column in s from the earliest, row by row, and what is to be noted of them; no times at all where none is
-/// written as a clock's.
+/// The times of a column in s from the earliest, row by row, and what is to be noted of them; no times at all
+/// where none is written as a clock's.
 ///
 /// # Errors
 /// In words: times of two fields that may be either, clocks beside numbers, a clock without a date that jumps.
@@ -141,8 +141,8 @@ pub fn times(grid: &Grid, column: usize, stated: &str) -> Result<(Vec<Option<f64
     Ok((all.into_iter().map(|s| s.map(counted)).collect(), notes))
 }
 
-/// What the order of the rows says against their times: `Err` where a clock began again, `Ok` with a note where the rows are
-/// sorted otherwise.
+/// What the order of the rows says against their times: `Err` where a clock began again, `Ok` with a note
+/// where the rows are sorted otherwise.
 pub fn order(values: &[&Values], accepted: bool) -> Result<Option<String>, String> {
     let mut runs: Vec<(Option<&str>, Vec<(u64, f64)>)> = Vec::new();
     for v in values {

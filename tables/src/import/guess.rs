@@ -11,8 +11,8 @@ fn column_of(grid: &Grid, index: usize) -> Vec<f64> {
     grid.rows.iter().filter_map(number).collect()
 }
 
-/// A map from the headers: names that usually mean one thing, with the units that the headers state. A header that two columns
-/// answer to is left to the reader.
+/// A map from the headers: names that usually mean one thing, with the units that the headers state. A header
+/// that two columns answer to is left to the reader.
 pub fn guess(grid: &Grid) -> Vec<Taken> {
     let mut taken: Vec<Taken> = Vec::new();
     for (index, header) in grid.header.iter().enumerate() {

@@ -187,10 +187,10 @@ impl Source {
                 continue;
             }
             let taken = self.next_block(grid, &pending, &mut block, &row);
-            let kept = pending.len() - taken;
+            let rest = pending.len() - taken;
             pending
                 .drain(..)
-                .take(kept)
+                .take(rest)
                 .filter(|(_, comment)| !comment)
                 .for_each(|(r, _)| self.put(grid, r, block, wide));
             self.put(grid, row, block, wide);

@@ -74,8 +74,8 @@ impl Map {
         entries.iter().flat_map(|e| parted(e)).filter_map(header).collect()
     }
 
-    /// Reads the entries of `--map`: `HEADER=TARGET[:UNIT]`, parted by commas; a header with a comma in double quotes; `#3` is
-    /// the third column.
+    /// Reads the entries of `--map`: `HEADER=TARGET[:UNIT]`, parted by commas; a header with a comma in
+    /// double quotes; `#3` is the third column.
     ///
     /// # Errors
     /// Everything that is wrong with them at once.
@@ -106,8 +106,8 @@ impl Map {
         if wrong.is_empty() { Ok(()) } else { Err(wrong) }
     }
 
-    /// What stands in the way of a table: columns that are given twice, and all that are missing with what would give each. The
-    /// position of a series says speed and direction as well.
+    /// What stands in the way of a table: columns that are given twice, and all that are missing with what
+    /// would give each. The position of a series says speed and direction as well.
     pub fn lacks(&self, series: bool) -> Vec<String> {
         let mut wrong = Vec::new();
         let all: Vec<usize> =
@@ -280,8 +280,8 @@ pub fn way(text: &str) -> Option<f64> {
     (value.abs() == 1.0).then_some(value)
 }
 
-/// The map under another header of the source: the same columns, wherever they are there and whatever their units. `None` where
-/// that header has none of them.
+/// The map under another header of the source: the same columns, wherever they are there and whatever their
+/// units. `None` where that header has none of them.
 ///
 /// # Errors
 /// In words: a column that is missing there, units that are not stated in both places.
@@ -375,7 +375,7 @@ mod tests {
 
     #[test]
     fn strokes_and_bare_letters() {
-        for (header, said) in [
+        for (header, expected) in [
             ("Amplitude (µm p-p)", "amplitude_pp:um"),
             ("Amplitude [um pp]", "amplitude_pp:um"),
             ("peak-to-peak amplitude (um)", "amplitude_pp:um"),
@@ -388,7 +388,7 @@ mod tests {
             ("f (kHz)", "frequency:kHz"),
         ] {
             let found = guessed(&format!("\"{header}\";b\n1;2\n"));
-            assert!(found.ends_with(&format!("={said}")), "{header}: {found}");
+            assert!(found.ends_with(&format!("={expected}")), "{header}: {found}");
         }
         for header in ["F", "amp", "F (N)", "w", "Peak load (N)", "speed;rpm"] {
             let units = header.split_once(';').map_or(String::new(), |(_, unit)| format!("{unit};N\n"));

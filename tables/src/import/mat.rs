@@ -1,5 +1,5 @@
-//! MAT files of version 5 (the form that MATLAB writes with `-v7` and `-v6`, and scipy.io.savemat): numeric arrays, also within structures.
-//! 'MAT-File Format', The MathWorks, chapter 1. Version 7.3 is HDF5.
+//! MAT files of version 5 (the form that MATLAB writes with `-v7` and `-v6`, and scipy.io.savemat): numeric
+//! arrays, also within structures. 'MAT-File Format', The MathWorks, chapter 1. Version 7.3 is HDF5.
 
 use super::arrays::{Array, Beside, number, single, table};
 use super::grid::{Cell, Grid};

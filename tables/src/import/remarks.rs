@@ -15,8 +15,8 @@ pub struct Range {
     pub low_median_high: [f64; 3],
 }
 
-/// What tribometers do, from rock friction at nanometres a second to pin on disk: values beyond are another unit more often than
-/// another machine.
+/// What tribometers do, from rock friction at nanometres a second to pin on disk: values beyond are another
+/// unit more often than another machine.
 const USUAL: [(&Covariate, [f64; 2]); 6] = [
     (&covariate::AMPLITUDE, [1e-8, 1e-4]),
     (&covariate::FREQUENCY, [1e3, 1e6]),
@@ -75,7 +75,7 @@ fn slip(value: f64, [low, high]: [f64; 2]) -> Option<&'static str> {
 
 /// Everything that looks wrong, in sentences.
 pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
-    let mut said = Vec::new();
+    let mut list = Vec::new();
     let conditions: Vec<Condition> = passes.iter().map(|p| p.condition(1.0)).collect();
     for (c, usual) in USUAL.iter().filter(|(c, _)| columns.contains(&c.name)) {
         let sizes = sorted(conditions.iter().filter_map(|q| c.of(q)).map(f64::abs).filter(|v| *v > 0.0));
@@ -84,7 +84,7 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
             if c.name == covariate::POSITION.name { sizes.last() } else { sizes.get(sizes.len() / 2) };
         let Some(typical) = typical else { continue };
         if let Some(words) = slip(*typical, *usual) {
-            said.push(format!(
+            list.push(format!(
                 "{} is {typical:.3e}, {words} for a tribometer ({:.0e} to {:.0e}): is its unit right?",
                 c.name, usual[0], usual[1]
             ));
@@ -92,7 +92,7 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
     }
     let ratios = sorted(passes.iter().filter_map(|p| Some((p.lateral_force_n? / p.normal_force_n).abs())));
     if let Some(words) = ratios.get(ratios.len() / 2).and_then(|r| slip(*r, RATIO).map(|w| (r, w))) {
-        said.push(format!(
+        list.push(format!(
             "lateral_force_n over normal_force_n is {:.3e}, {} for friction: is the unit of one of them wrong?",
             words.0, words.1
         ));
@@ -100,21 +100,21 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
     let fastest = conditions.iter().map(|c| std::f64::consts::PI * c.frequency_hz * c.amplitude.metres());
     let fastest = fastest.fold(0.0, f64::max);
     if fastest > PLATE_SPEED {
-        said.push(format!(
+        list.push(format!(
             "the plate would move at {fastest:.3e} m/s (pi f w); no actuator does: is the unit of the amplitude or of the frequency right?"
         ));
     }
     match Table::measured(passes) {
-        Err(DataError::Unsigned) => said.push(
+        Err(DataError::Unsigned) => list.push(
             "the lateral force has one sign in both directions, and the same size: friction turns with the direction. If these are \
              magnitudes, map the column as friction_force in place of lateral_force; as it is, diagnose refuses the table"
                 .into(),
         ),
-        Err(error) => said.push(format!("diagnose will refuse the table: {error}")),
+        Err(error) => list.push(format!("diagnose will refuse the table: {error}")),
         Ok(_) => {
             let against = passes.iter().filter(|p| p.friction_force_n().is_some_and(|f| f < 0.0)).count();
             if 2 * against > passes.len() {
-                said.push(format!(
+                list.push(format!(
                     "friction pushes along the sliding in {against} of {} passes: does the sensor's axis or the sign of the direction point \
                      the other way? A minus before the unit turns a column (lateral_force:-N)",
                     passes.len()
@@ -122,5 +122,5 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
             }
         }
     }
-    said
+    list
 }

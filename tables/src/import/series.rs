@@ -33,7 +33,7 @@ const STILL: f64 = 1e-4;
 
 /// What became of the samples.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Told {
+pub struct Counts {
     /// Samples read.
     pub samples: usize,
     /// Samples in passes.
@@ -54,7 +54,7 @@ pub struct Told {
 ///
 /// # Errors
 /// In words: time that does not rise, no path, no steady stretch.
-pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, Told), String> {
+pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, Counts), String> {
     let times: Vec<f64> = samples.iter().filter_map(|s| s.get(Id::Time)).collect();
     if times.len() < samples.len() {
         return Err("a series needs a time in every row (map a column to time)".into());
@@ -75,23 +75,23 @@ pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, T
     }
     let path = path(samples, &times)?;
     let turns = turning_points(&path);
-    let mut told =
-        Told { samples: samples.len(), reversals: turns.len().saturating_sub(2), ..Told::default() };
+    let mut counts =
+        Counts { samples: samples.len(), reversals: turns.len().saturating_sub(2), ..Counts::default() };
     let legs: Vec<(usize, (Vec<f64>, usize))> =
         turns.windows(2).map(|leg| (leg[0], velocities(&times, &path, leg[0], leg[1]))).collect();
     let fastest = legs.iter().flat_map(|(_, (slopes, _))| slopes).fold(0.0f64, |m, v| m.max(v.abs()));
     let still = STILL * fastest;
     let ranges: Vec<(usize, usize)> =
         legs.iter().flat_map(|(from, (slopes, half))| steady(samples, slopes, *half, *from, still)).collect();
-    told.stretches = ranges.len();
+    counts.stretches = ranges.len();
     let stretched: usize = ranges.iter().map(|r| r.1 - r.0).sum();
-    told.changing = samples.len() - stretched;
+    counts.changing = samples.len() - stretched;
     let (mut passes, mut spreads) = (Vec::new(), Vec::new());
     for (from, to) in ranges {
         let lasts = times[to - 1] - times[from];
         let settled = times[from] + how.settle_s.unwrap_or(0.2 * lasts);
         let begin = from + times[from..to].partition_point(|t| *t < settled);
-        told.settling += begin - from;
+        counts.settling += begin - from;
         let mut at = begin;
         while at < to {
             let end = match how.window_s {
@@ -102,12 +102,12 @@ pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, T
             // The rest of a stretch that is shorter than half a window is no pass of its own.
             let rest = how.window_s.is_some_and(|w| at > begin && times[end - 1] - times[at] < 0.5 * w);
             if end - at < FEWEST || rest {
-                told.too_short += end - at;
+                counts.too_short += end - at;
             } else {
                 let (pass, spread) = mean(&samples[at..end], &path[at..end], &times[at..end]);
                 passes.push(pass);
                 spreads.push(spread);
-                told.in_passes += end - at;
+                counts.in_passes += end - at;
             }
             at = end;
         }
@@ -116,10 +116,10 @@ pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, T
         return Err(format!(
             "no steady stretch of sliding among {} samples: {} are of changing speed, load or vibration, {} of beginnings, {} in stretches \
              of fewer than {FEWEST} samples",
-            told.samples, told.changing, told.settling, told.too_short
+            counts.samples, counts.changing, counts.settling, counts.too_short
         ));
     }
-    Ok((passes, spreads, told))
+    Ok((passes, spreads, counts))
 }
 
 /// Takes off a last sample that is the one before it once more, as some recorders write their end.
@@ -219,8 +219,8 @@ fn velocities(times: &[f64], path: &[f64], from: usize, to: usize) -> (Vec<f64>,
     }
 }
 
-/// Slope of the path about every sample of a leg, by least squares over the window, and the median of its relative standard
-/// error. Sums from the leg's start make every window a difference of two.
+/// Slope of the path about every sample of a leg, by least squares over the window, and the median of its
+/// relative standard error. Sums from the leg's start make every window a difference of two.
 fn slopes(times: &[f64], path: &[f64], from: usize, to: usize, half: usize) -> (Vec<f64>, f64) {
     let middle = from + (to - from) / 2;
     let mut sums = vec![[0.0; 5]];
@@ -264,8 +264,8 @@ fn steady(samples: &[Values], slopes: &[f64], h: usize, from: usize, still: f64)
             .collect()
     };
     let known = |id: &Id| samples[from..to].iter().any(|s| s.get(*id).is_some());
-    let mut kept: Vec<Vec<f64>> = vec![slopes.to_vec(), smooth(Id::NormalForce)];
-    kept.extend(
+    let mut tracks: Vec<Vec<f64>> = vec![slopes.to_vec(), smooth(Id::NormalForce)];
+    tracks.extend(
         [Id::AmplitudePp, Id::AmplitudePeak, Id::AmplitudeRms, Id::Frequency]
             .into_iter()
             .filter(known)
@@ -275,7 +275,7 @@ fn steady(samples: &[Values], slopes: &[f64], h: usize, from: usize, still: f64)
     let is_steady = |k: usize| {
         let (a, b) = (k.saturating_sub(h), (k + h).min(n - 1));
         let same = |v: &Vec<f64>| (v[b] - v[a]).abs() <= STEADY * v[k].abs();
-        slopes[k].abs() > still && kept.iter().all(same) && samples[from + a].run == samples[from + b].run
+        slopes[k].abs() > still && tracks.iter().all(same) && samples[from + a].run == samples[from + b].run
     };
     let (mut ranges, mut begin) = (Vec::new(), None);
     for k in 0..=n {

@@ -38,7 +38,7 @@ macro_rules! targets {
         pub enum Id { $(#[doc = $words] $id),* }
         /// How many targets there are.
         pub const COUNT: usize = [$($name),*].len();
-        /// Every target, in the order in which people are told of them.
+        /// Every target, in the order of presentation.
         pub static TARGETS: &[Target] =
             &[$(Target { name: $name, column: $column, kind: $kind, words: $words, headers: &[$($header),*] }),*];
     };

@@ -34,13 +34,13 @@ pub fn read(bytes: &[u8], marks: Marks) -> miette::Result<Grid> {
         line.starts_with(['#', '%', '!']) || line.starts_with("//")
     };
     let lines: Vec<(u64, &str)> = (1..).zip(text.lines()).filter(|(_, l)| !l.trim().is_empty()).collect();
-    let (said, data): (Vec<_>, Vec<_>) = lines.into_iter().partition(|(_, line)| comment(line));
+    let (heads, data): (Vec<_>, Vec<_>) = lines.into_iter().partition(|(_, line)| comment(line));
     // A decimal mark that is stated does not separate cells.
     let serves = |c: char| marks.delimiter.map_or(marks.decimal != Some(c), |d| d == c);
     let tried: Vec<_> = DELIMITERS.iter().filter(|(c, _)| serves(*c)).map(|(c, _)| *c).collect();
     let tried = if tried.is_empty() { marks.delimiter.into_iter().collect() } else { tried };
-    let spoken = |line: &str| line.trim_start().trim_start_matches(['#', '%', '!', '/']).trim().to_string();
-    let remarks: Vec<(u64, String)> = said.iter().map(|(place, line)| (*place, spoken(line))).collect();
+    let bare = |line: &str| line.trim_start().trim_start_matches(['#', '%', '!', '/']).trim().to_string();
+    let remarks: Vec<(u64, String)> = heads.iter().map(|(place, line)| (*place, bare(line))).collect();
     // The largest share of numbers in rows of one width; of equals the first.
     let scored = |d: &char| (*d, score(&data, &remarks, *d));
     let best = tried.iter().map(scored).reduce(|a, b| if b.1 > a.1 { b } else { a });
@@ -78,8 +78,8 @@ pub fn read(bytes: &[u8], marks: Marks) -> miette::Result<Grid> {
     let format = format!("text, {encoding}, separated by {named}{mark}");
     let source = Source { format, comma, comments, places: false, blanks: delimiter == Some(' ') };
     let mut grid = source.find(rows);
-    if let Some((first, _)) = said.first() {
-        grid.notes.push(format!("{} comment lines were passed over, the first in line {first}", said.len()));
+    if let Some((first, _)) = heads.first() {
+        grid.notes.push(format!("{} comment lines were passed over, the first in line {first}", heads.len()));
     }
     Ok(grid)
 }

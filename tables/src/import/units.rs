@@ -206,8 +206,8 @@ impl Unit {
         })
     }
 
-    /// The unit that a header seems to state, whatever its case, and its spelling: `MN` is millinewton and `mhz` megahertz, the
-    /// readings that a tribometer can have.
+    /// The unit that a header seems to state, whatever its case, and its spelling: `MN` is millinewton and
+    /// `mhz` megahertz, the readings that a tribometer can have.
     pub fn guess(dimension: Dimension, text: &str) -> Option<(String, Unit)> {
         let text = plain(text);
         let small = text.to_lowercase();
@@ -406,7 +406,7 @@ mod tests {
         ] {
             assert_eq!(Unit::parse(dimension, text), None, "{text}");
         }
-        for (dimension, said, meant) in [
+        for (dimension, written, meant) in [
             (Dimension::Force, "MN", "mN"),
             (Dimension::Force, "mn", "mN"),
             (Dimension::Frequency, "KHZ", "kHz"),
@@ -414,7 +414,7 @@ mod tests {
             (Dimension::Length, "[µm]", "um"),
         ] {
             let unit = Unit::parse(dimension, meant).unwrap();
-            assert_eq!(Unit::guess(dimension, said), Some((meant.to_string(), unit)), "{said}");
+            assert_eq!(Unit::guess(dimension, written), Some((meant.to_string(), unit)), "{written}");
         }
         assert_eq!(Unit::parse(Dimension::Force, "MN"), Some(Unit::ten(6)));
     }

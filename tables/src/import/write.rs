@@ -17,8 +17,8 @@ pub fn columns(map: &Map, series: bool) -> Vec<&'static str> {
     let all = required.chain(["lateral_force_n"]).chain(of_series).chain(optional);
     let all = all.chain(["phase_shift_deg", "replicate", "run", "session"]);
     let may_lack = |c: &str| !["time_s", "speed_m_s", "direction"].contains(&c);
-    let kept = all.filter(|c| map.gives(c) || !may_lack(c) || series && of_series.contains(c));
-    std::iter::once("point").chain(kept).collect()
+    let columns = all.filter(|c| map.gives(c) || !may_lack(c) || series && of_series.contains(c));
+    std::iter::once("point").chain(columns).collect()
 }
 
 /// The point table, numbers with as many digits as it takes to read them back unchanged.
@@ -55,8 +55,8 @@ pub fn table(passes: &[Pass], columns: &[&'static str]) -> miette::Result<String
     String::from_utf8(writer.into_inner().into_diagnostic()?).into_diagnostic()
 }
 
-/// Relative standard deviation from pass to pass, from neighbours in time of one setting: a bad pass and a slow drift hardly
-/// count. `None` with fewer than eight such pairs.
+/// Relative standard deviation from pass to pass, from neighbours in time of one setting: a bad pass and a
+/// slow drift hardly count. `None` with fewer than eight such pairs.
 pub fn repeatability(passes: &[Pass]) -> Option<(f64, usize)> {
     let mut settings: BTreeMap<Vec<i64>, Vec<&Pass>> = BTreeMap::new();
     for p in passes.iter().filter(|p| p.lateral_force_n.is_some()) {

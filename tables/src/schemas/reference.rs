@@ -31,8 +31,8 @@ pub fn page() -> String {
     page
 }
 
-/// The objects of a schema: the root without a name, then the definitions in the order of their names. An enumeration of
-/// objects is told variant by variant.
+/// The objects of a schema: the root without a name, then the definitions in the order of their names. An
+/// enumeration of objects has one for each variant.
 pub fn objects(schema: &Value) -> Vec<(String, Value)> {
     let mut all = Vec::new();
     push(&mut all, String::new(), schema);
@@ -55,12 +55,12 @@ fn push(all: &mut Vec<(String, Value)>, name: String, schema: &Value) {
     }
 }
 
-/// The definitions that are no table of keys: words to choose from, and values that may be written in more than one way. The tables'
-/// types link to them.
+/// The definitions that are no table of keys: words to choose from, and values that may be written in more
+/// than one way. The tables' types link to them.
 fn choices(page: &mut String, kind: Kind, schema: &Value) {
-    let told: Vec<String> = objects(schema).into_iter().map(|(name, _)| name).collect();
+    let tables: Vec<String> = objects(schema).into_iter().map(|(name, _)| name).collect();
     let definitions = schema.get("$defs").and_then(Value::as_object);
-    for (name, definition) in definitions.into_iter().flatten().filter(|(name, _)| !told.contains(name)) {
+    for (name, definition) in definitions.into_iter().flatten().filter(|(name, _)| !tables.contains(name)) {
         let words =
             |of: &Value| of.get("description").and_then(Value::as_str).map(one_line).unwrap_or_default();
         let _ = write!(page, "\n### {} `{name}`\n\n{}\n\n", kind.name(), words(definition));

@@ -107,8 +107,8 @@ impl Kind {
     }
 }
 
-/// The row of a point table: its columns by the targets of the import, which have words for all of them, with the ranges of the
-/// covariates.
+/// The row of a point table: its columns by the targets of the import, which have words for all of them, with
+/// the ranges of the covariates.
 fn table() -> Value {
     let mut properties = Map::new();
     for target in TARGETS {

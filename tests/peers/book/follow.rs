@@ -66,9 +66,9 @@ fn settled(command: &Command, folder: &Path, wall_clock: bool) -> (String, Optio
     let mut attempt = 1;
     loop {
         let began = realtime::pacing::monotonic_ns();
-        let witnesses = realtime::witness::Witnesses::start(began).expect("threads start");
+        let monitor = realtime::stall_monitor::StallMonitor::start(began).expect("threads start");
         let (said, status) = answer(command, folder);
-        let stalls = witnesses.finish();
+        let stalls = monitor.finish();
         let came: Vec<&str> = said.lines().collect();
         let right = status == Some(command.status) && agrees(&command.answer, &came, command.near);
         if right || stalls.count == 0 || attempt == ATTEMPTS {

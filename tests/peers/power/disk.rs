@@ -1,8 +1,8 @@
 //! What a disk holds after the power was cut: all that was synced, and of the rest anything.
 //!
-//! As strict as POSIX: data are safe once their file was synced, names once their folder was. Of what was not, every sector of
-//! 512 bytes may be there or not, in any order, and a file may have its length before its data. The changes of one folder come in
-//! their order, as in every journal of names.
+//! As strict as POSIX: data are safe once their file was synced, names once their folder was. Of what was
+//! not, every sector of 512 bytes may be there or not, in any order, and a file may have its length before
+//! its data. The changes of one folder come in their order, as in every journal of names.
 
 use super::log::{Inode, Op};
 use rand_chacha::ChaCha8Rng;
@@ -62,8 +62,8 @@ fn write(to: &mut Vec<u8>, at: usize, bytes: &[u8]) {
     to[at..at + bytes.len()].copy_from_slice(bytes);
 }
 
-/// Lays the disk as it is after `ops` and a power cut into the empty folder `into`, which stands for `root`. Syncs that `deaf`
-/// picks do nothing.
+/// Lays the disk as it is after `ops` and a power cut into the empty folder `into`, which stands for `root`.
+/// Syncs that `deaf` picks do nothing.
 pub fn after_a_cut(ops: &[Op], root: &Path, into: &Path, rng: &mut ChaCha8Rng, deaf: &dyn Fn(&Op) -> bool) {
     let mut files: BTreeMap<Inode, File> = BTreeMap::new();
     let mut safe = Names { folders: vec![root.to_path_buf()], ..Names::default() };

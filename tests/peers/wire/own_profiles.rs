@@ -1,5 +1,5 @@
-//! The profiles of `docs/profiles.md`, as a laboratory would write them: each against an instrument in Python, and its own
-//! emulator against its own driver.
+//! The profiles of `docs/profiles.md`, as a laboratory would write them: each against an instrument in
+//! Python, and its own emulator against its own driver.
 
 use super::lines::{plant, pty, setup, socat_pair};
 use drivers::InstrumentSetup;
@@ -237,8 +237,8 @@ fn each_examples_own_emulator_and_driver_mean_the_same() {
     });
 }
 
-/// A whole sweep whose forces come by way of the board in Python: the virtual rig's friction, behind a protocol that this
-/// program knows from the file alone.
+/// A whole sweep whose forces come by way of the board in Python: the virtual rig's friction, behind a
+/// protocol that this program knows from the file alone.
 #[test]
 fn a_sweep_with_the_board_as_its_force_sensor() {
     wall::again_beside_a_stall(|| {

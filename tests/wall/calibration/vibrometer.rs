@@ -245,8 +245,8 @@ fn settings_are_read_back_or_refused_with_the_reason() {
     assert_eq!(doctor.status.code(), Some(1));
 }
 
-/// The delay that is read back is taken off each decoder line by line: with it on the skin's channel alone the phase moves
-/// by 360 f delay, 80.8 degrees; with it on both it cancels.
+/// The delay that is read back is taken off each decoder line by line: with it on the skin's channel alone
+/// the phase moves by 360 f delay, 80.8 degrees; with it on both it cancels.
 #[test]
 fn the_delay_read_back_is_taken_off_in_phase() {
     let folder = tempfile::tempdir().unwrap();

@@ -260,8 +260,8 @@ impl Bench {
         Nanos(u64::try_from(self.epoch.elapsed().as_nanos()).unwrap())
     }
 
-    /// Samples of the lateral axis at the time of their arrival, once each, until a time. (The driver's own stamps take the
-    /// shortest transport off, and with it a constant delay: they cannot show it.)
+    /// Samples of the lateral axis at the time of their arrival, once each, until a time. (The driver's own
+    /// stamps take the shortest transport off, and with it a constant delay: they cannot show it.)
     fn listen(&mut self, until: Nanos, samples: &mut Vec<(f64, f64)>) {
         let mut last = None;
         while self.now() < until {
@@ -276,8 +276,8 @@ impl Bench {
     }
 }
 
-/// The longest that a sample may take on the bus in s: a period of sampling or polling at 500 Hz, the world's tick, and
-/// what a loopback and a busy machine's scheduler add to the fastest of many samples.
+/// The longest that a sample may take on the bus in s: a period of sampling or polling at 500 Hz, the world's
+/// tick, and what a loopback and a busy machine's scheduler add to the fastest of many samples.
 const BUS_S: f64 = 5e-3;
 
 #[test]

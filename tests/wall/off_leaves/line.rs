@@ -17,8 +17,8 @@ pub enum Kind {
     Late(Duration),
     /// Every answer is other bytes.
     Garbage,
-    /// Set-points are refused: in registers the blocks, and the amplitude (a stage: the load) by itself; in lines see
-    /// `Trouble::refused_line`.
+    /// Set-points are refused: in registers the blocks, and the amplitude (a stage: the load) by itself; in
+    /// lines see `Trouble::refused_line`.
     Refused,
     /// What is sent comes back, and no answer.
     Echo,
@@ -107,8 +107,8 @@ impl Trouble {
         (pass, back)
     }
 
-    /// SCPI: every other switch is not taken, and the next question for errors is answered with one. slcan: service data are
-    /// aborted, and every other frame of process data is ignored.
+    /// SCPI: every other switch is not taken, and the next question for errors is answered with one. slcan:
+    /// service data are aborted, and every other frame of process data is ignored.
     fn refused_line(&self, line: &[u8]) -> Option<Vec<u8>> {
         let another = || self.refusals.fetch_add(1, Ordering::AcqRel).is_multiple_of(2);
         if line.starts_with(b"OUTP1 0") && another() {

@@ -227,8 +227,8 @@ fn the_doctor_goes_on_after_an_instrument_that_fails() {
     });
 }
 
-/// A sensor whose count is 10 mN cannot show what a quarter of a newton's tenth is to show: refused by the plan and the
-/// profile alone, before any instrument is spoken to (none is there).
+/// A sensor whose count is 10 mN cannot show what a quarter of a newton's tenth is to show: refused by the
+/// plan and the profile alone, before any instrument is spoken to (none is there).
 #[test]
 fn a_sweep_that_the_sensor_cannot_see_is_refused_before_anything_is_touched() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
 //! The main job on every bus: the same plan, world and seed give the same friction in every pass.
 //!
-//! Passes differ by the sensors' noise and the instants of sampling. What they may differ by is the uncertainty that
-//! each run states for each `mu'`, which follows from the repeatability in its setup.
+//! Passes differ by the sensors' noise and the instants of sampling. What they may differ by is the
+//! uncertainty that each run states for each `mu'`, which follows from the repeatability in its setup.
 
 use runs::sequence::MeasuredPass;
 use std::collections::BTreeMap;
@@ -13,8 +13,8 @@ use tests::file;
 /// `mu'` of each pass, its standard uncertainty, and whether the plate vibrated, by the number of the pass.
 type Passes = BTreeMap<u64, (f64, f64, bool)>;
 
-/// The seeds of the two comparisons that a bus may have. The passes share their reference, so that by chance one in some
-/// thirty comparisons lies above the bound; a difference of the bus does so under both seeds.
+/// The seeds of the two comparisons that a bus may have. The passes share their reference, so that by chance
+/// one in some thirty comparisons lies above the bound; a difference of the bus does so under both seeds.
 const SEEDS: [u64; 2] = [11, 12];
 
 /// Sweeps on that setup, inside what `prefix` starts, and returns the passes.
@@ -35,8 +35,8 @@ fn sweep(setup: &str, seed: u64, folder: &Path, prefix: Option<&Path>) -> Passes
         });
         (folder, output)
     };
-    // The emulators answer within a millisecond or two: a refusal because an answer stayed away while the rig was being
-    // opened is the machine's, and there is no record of stalls before there is a loop.
+    // The emulators answer within a millisecond or two: a refusal because an answer stayed away while the rig
+    // was being opened is the machine's, and there is no record of stalls before there is a loop.
     let unanswered = |output: &std::process::Output| {
         output.status.code() == Some(2) && tests::texts(output).1.contains("no answer within")
     };
@@ -58,8 +58,8 @@ fn read(out: &Path) -> Passes {
     passes.filter_map(found).collect()
 }
 
-/// Compares two runs pass by pass, each difference in units of its own standard uncertainty, and says whether they agree
-/// within them.
+/// Compares two runs pass by pass, each difference in units of its own standard uncertainty, and says whether
+/// they agree within them.
 fn same(setup: &str, reference: &Passes, found: &Passes) -> bool {
     let points = |passes: &Passes| passes.keys().copied().collect::<Vec<_>>();
     assert_eq!(points(reference), points(found), "{setup}: the same seed gives the same passes");

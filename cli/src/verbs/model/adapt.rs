@@ -92,9 +92,9 @@ fn run_study(
         python: args.python.clone(),
         options: args.option.clone(),
     };
-    let said = submit(&study, &options)?;
-    if said.missing > 0 {
-        miette::bail!("{name}: {} cases have no result; the same command goes on", said.missing);
+    let submitted = submit(&study, &options)?;
+    if submitted.missing > 0 {
+        miette::bail!("{name}: {} cases have no result; the same command goes on", submitted.missing);
     }
     let table = args.out.join(format!("{name}.parquet"));
     gather(&study, &table, false)?;

@@ -1,4 +1,4 @@
-//! The flags that say under which condition a model is asked, with the paper's defaults.
+//! The flags for the condition of a model, with the paper's defaults.
 
 use clap::Args;
 use models::condition::Condition;

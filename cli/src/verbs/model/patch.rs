@@ -51,7 +51,7 @@ pub fn run(args: &PatchArgs, json: bool) -> miette::Result<ExitCode> {
         Err(why) => return refused(why),
     };
     if json {
-        let told: Vec<serde_json::Value> = rows
+        let document: Vec<serde_json::Value> = rows
             .iter()
             .map(|(what, fit)| {
                 serde_json::json!({
@@ -60,7 +60,7 @@ pub fn run(args: &PatchArgs, json: bool) -> miette::Result<ExitCode> {
                 })
             })
             .collect();
-        out!("{}", serde_json::to_string(&told).into_diagnostic()?);
+        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
         return Ok(ExitCode::SUCCESS);
     }
     for (what, fit) in rows {

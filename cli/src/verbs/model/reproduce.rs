@@ -160,8 +160,8 @@ fn one(args: &ReproduceArgs, figure: Figure, name: &str, reading: Reading, json:
     runs::files::write_whole(&args.out.join(format!("{file}.txt")), format!("{text}\n"))?;
     if json {
         let lines = &reproduced.lines;
-        let told = serde_json::json!({"figure": name, "reading": reading.name(), "files": files, "comparison": lines});
-        out!("{told}");
+        let document = serde_json::json!({"figure": name, "reading": reading.name(), "files": files, "comparison": lines});
+        out!("{document}");
     } else {
         let read =
             if figure == Figure::Fig6 { String::new() } else { format!(", w read as {}", reading.name()) };
@@ -204,7 +204,7 @@ pub fn write_fig_9_table(file: &Path, study: Study, results: &store::Results) ->
     for point in study.points() {
         let c = &point.case;
         let key = content_key(c, &figures::settings());
-        let Some(kept) = results.get(&key) else { continue };
+        let Some(run) = results.get(&key) else { continue };
         let psi = c.speed_m_s / (c.amplitude.metres() * c.frequency_hz * c.mu0 * (1.0 + c.poisson_ratio));
         csv.write_record([
             point.panel.variable().to_string(),
@@ -216,14 +216,14 @@ pub fn write_fig_9_table(file: &Path, study: Study, results: &store::Results) ->
             c.mu0.to_string(),
             c.young_modulus_pa.to_string(),
             format!("{psi:.6}"),
-            format!("{:.6}", kept.mu_relative),
-            format!("{:.6}", kept.mu_relative_sd),
-            format!("{:.6}", kept.reaction_over_load),
-            format!("{:.6}", kept.contact_fraction),
-            kept.phase_shift_deg.map_or(String::new(), |p| format!("{p:.2}")),
-            kept.period_doubled.to_string(),
-            kept.steady.to_string(),
-            kept.cycles.to_string(),
+            format!("{:.6}", run.mu_relative),
+            format!("{:.6}", run.mu_relative_sd),
+            format!("{:.6}", run.reaction_over_load),
+            format!("{:.6}", run.contact_fraction),
+            run.phase_shift_deg.map_or(String::new(), |p| format!("{p:.2}")),
+            run.period_doubled.to_string(),
+            run.steady.to_string(),
+            run.cycles.to_string(),
             key,
         ])
         .into_diagnostic()?;

@@ -14,7 +14,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 use studies::figures::Study;
 use studies::figures::reading::{self, Reading};
-use studies::figures::store::{self, Kept};
+use studies::figures::store::{self, StoredRun};
 
 /// Cases that are not in the table, on which its interpolation is judged.
 const HELD_OUT: usize = 200;
@@ -132,10 +132,10 @@ fn surrogate(out: &Path) -> miette::Result<(PathBuf, usize, usize)> {
     Ok((file, points.len() + held_out.len(), failed))
 }
 
-fn table_result(kept: &Kept) -> TableResult {
+fn table_result(run: &StoredRun) -> TableResult {
     TableResult {
-        mu_relative: kept.mu_relative,
-        phase_shift_deg: kept.phase_shift_deg.unwrap_or(0.0),
-        contact_fraction: kept.contact_fraction,
+        mu_relative: run.mu_relative,
+        phase_shift_deg: run.phase_shift_deg.unwrap_or(0.0),
+        contact_fraction: run.contact_fraction,
     }
 }

@@ -1,4 +1,4 @@
-//! What is said to be granted is held against what the kernel says of the thread.
+//! The reported grants are compared with what the kernel reports of the thread.
 
 use super::*;
 use std::sync::{Mutex, MutexGuard};
@@ -29,8 +29,8 @@ fn locked_kib() -> u64 {
     line.split_whitespace().nth(1).unwrap().parse().unwrap()
 }
 
-/// Whether the kernel gives a thread of this process FIFO, and locks its memory: asked by other ways than those of the code, and
-/// given back.
+/// Whether the kernel gives a thread of this process FIFO, and locks its memory. The test uses other calls
+/// than the code, and gives both back.
 fn what_the_kernel_allows() -> (bool, bool) {
     std::thread::spawn(|| {
         let wanted = libc::sched_param { sched_priority: 37 };
@@ -56,7 +56,7 @@ fn what_the_kernel_allows() -> (bool, bool) {
 #[test]
 fn what_is_granted_is_what_the_kernel_says() {
     let _alone = alone();
-    let asked = std::thread::spawn(|| {
+    let thread = std::thread::spawn(|| {
         let allowed = what_the_kernel_allows();
         let grants = ask_for_real_time(37);
         let (priority, policy) = (stat(40), stat(41));
@@ -65,7 +65,7 @@ fn what_is_granted_is_what_the_kernel_says() {
         let slack_ns = unsafe { libc::prctl(libc::PR_GET_TIMERSLACK, 0, 0, 0, 0) };
         (grants, priority, policy, child, locked_kib(), slack_ns, allowed)
     });
-    let (grants, priority, policy, child, locked, slack_ns, allowed) = asked.join().unwrap();
+    let (grants, priority, policy, child, locked, slack_ns, allowed) = thread.join().unwrap();
     // SAFETY: gives the process's pages back; takes no pointers.
     unsafe { libc::munlockall() };
     match &grants.policy_refused {
@@ -78,11 +78,11 @@ fn what_is_granted_is_what_the_kernel_says() {
     assert_eq!(grants.memory_locked, locked > 0, "{locked} KiB are locked");
     assert_eq!(grants.memory_locked, grants.lock_refused.is_none());
     assert_eq!((named == "fifo", grants.memory_locked), allowed, "{grants:?}");
-    // A FIFO thread has no slack, whatever was asked.
+    // A FIFO thread has no slack, whatever was requested.
     assert!(slack_ns <= 1, "{slack_ns}");
 }
 
-/// No such priority: the reason is told, and the class stays.
+/// No such priority: the reason is reported, and the class stays.
 #[test]
 fn a_priority_that_is_none_is_refused_with_the_reason() {
     let _alone = alone();
@@ -95,8 +95,8 @@ fn a_priority_that_is_none_is_refused_with_the_reason() {
 
 #[test]
 fn a_bare_priority_asks_for_nothing_else() {
-    let asked = Pacing::from(Some(7));
-    assert_eq!(asked, Pacing { priority: Some(7), cpu: None, keep_cpus_awake: false, spin_ns: 0 });
+    let pacing = Pacing::from(Some(7));
+    assert_eq!(pacing, Pacing { priority: Some(7), cpu: None, keep_cpus_awake: false, spin_ns: 0 });
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn a_touched_stack_makes_no_faults() {
         std::hint::black_box(&used);
     }
     let _alone = alone();
-    // A stack of an ended thread is used again, pages and all; one as large as this is not kept.
+    // A stack of an ended thread is used again, pages and all; one as large as this is released.
     let on_a_new_stack = |touches: bool| {
         let thread = std::thread::Builder::new().stack_size(64 << 20).spawn(move || {
             if touches {

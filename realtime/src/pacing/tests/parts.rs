@@ -1,4 +1,4 @@
-//! The parts of the loop's thread, each by itself: the first deadline, what is counted, and what the ports are told at the end.
+//! The parts of the loop's thread, each by itself: first deadline, counts, and last commands.
 
 use super::*;
 use crate::ports::{SupplyState, SupplySwitch};
@@ -74,7 +74,7 @@ fn a_stall_of_hours_counts_ten_seconds_of_deadlines() {
     let (stall, period) = (3600 * LONGEST_NS, 100_000_000);
     count_deadlines(&mut histogram, stall, stall / period, period);
     assert_eq!(histogram.len(), 101);
-    assert!(histogram.min() >= LONGEST_NS / 100 * 99, "all of them longer than is told apart");
+    assert!(histogram.min() >= LONGEST_NS / 100 * 99, "all of them above the resolved range");
 }
 
 #[test]
@@ -96,21 +96,21 @@ fn deadlines_stay_on_their_grid_until_one_is_missed() {
     assert_eq!(deadline_after(100, 175, 10), 185);
 }
 
-/// What the ports were told, in its order, and which of them panics at being told.
+/// The commands to the ports, in order, and which of the ports panics.
 #[derive(Default)]
-struct Told {
+struct EndLog {
     by: Vec<&'static str>,
     panics: [bool; 3],
 }
 
-struct End(Arc<Mutex<Told>>);
+struct End(Arc<Mutex<EndLog>>);
 
 impl End {
     fn tell(&self, which: usize, what: &'static str) {
         let panics = {
-            let mut told = self.0.lock().unwrap();
-            told.by.push(what);
-            told.panics[which]
+            let mut log = self.0.lock().unwrap();
+            log.by.push(what);
+            log.panics[which]
         };
         assert!(!panics, "{what} is too much");
     }
@@ -156,18 +156,18 @@ impl SupplySwitch for End {
     }
 }
 
-/// The supply is cut where the amplifier could not be told, and only there: a cut wants a proof before the next run.
+/// The supply is cut only if the amplifier's command failed: a cut needs a proof before the next run.
 #[test]
-fn a_port_that_panics_at_the_end_keeps_no_other_from_being_told() {
-    let told = |panics| {
-        let told = Arc::new(Mutex::new(Told { by: Vec::new(), panics }));
-        let end = || Box::new(End(Arc::clone(&told)));
+fn a_port_that_panics_at_the_end_leaves_the_others_commanded() {
+    let commands = |panics| {
+        let log = Arc::new(Mutex::new(EndLog { by: Vec::new(), panics }));
+        let end = || Box::new(End(Arc::clone(&log)));
         let mut ports = Ports::new(end(), end(), end()).with_supply(end());
         switch_off(&mut ports, Nanos(7));
-        told.lock().unwrap().by.clone()
+        log.lock().unwrap().by.clone()
     };
-    assert_eq!(told([false, false, false]), ["off", "stop"]);
-    assert_eq!(told([true, false, false]), ["off", "stop", "cut"]);
-    assert_eq!(told([false, true, false]), ["off", "stop"]);
-    assert_eq!(told([true, true, true]), ["off", "stop", "cut"]);
+    assert_eq!(commands([false, false, false]), ["off", "stop"]);
+    assert_eq!(commands([true, false, false]), ["off", "stop", "cut"]);
+    assert_eq!(commands([false, true, false]), ["off", "stop"]);
+    assert_eq!(commands([true, true, true]), ["off", "stop", "cut"]);
 }

@@ -45,8 +45,8 @@ pub(super) fn messages(
     let mut messages = VecDeque::new();
     while let Some(event) = linear.next_event() {
         match event.map_err(|e| e.to_string())? {
-            LinearReadEvent::ReadRequest(asked) => {
-                let read = bytes.read(linear.insert(asked)).map_err(|e| e.to_string())?;
+            LinearReadEvent::ReadRequest(length) => {
+                let read = bytes.read(linear.insert(length)).map_err(|e| e.to_string())?;
                 linear.notify_read(read);
             }
             LinearReadEvent::Record { opcode, data } => {
@@ -80,8 +80,8 @@ pub(super) fn messages(
     Ok(messages)
 }
 
-/// Whether the lengths of uncompressed records fill their chunk. The MCAP library (0.26) takes them as they are, and counts
-/// below zero where one is too long.
+/// Whether the lengths of uncompressed records fill their chunk. The MCAP library (0.26) takes them as they
+/// are, and counts below zero where one is too long.
 fn fits(mut records: &[u8]) -> bool {
     while let Some((head, rest)) = records.split_first_chunk::<9>() {
         let length =

@@ -20,8 +20,8 @@ pub(super) fn known(opcode: u8) -> bool {
     [op::HEADER, op::CHUNK, op::MESSAGE_INDEX, op::ATTACHMENT, op::METADATA, op::DATA_END].contains(&opcode)
 }
 
-/// Length of a record from which reading can go on, if one may begin here: of a kind that carries a checksum, or the mark of the data's
-/// end.
+/// Length of a record from which reading can go on, if one may begin here: of a kind that carries a checksum,
+/// or the mark of the data's end.
 pub(super) fn may_begin(bytes: &[u8]) -> Option<u64> {
     let head = bytes.first_chunk::<HEAD>()?;
     let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
@@ -88,8 +88,8 @@ fn length_of(record: &Record<'_>) -> Option<usize> {
     })
 }
 
-/// Whether an attachment has room for its length and its checksum behind its times, its name and its kind. The MCAP library
-/// (0.26) takes that for granted.
+/// Whether an attachment has room for its length and its checksum behind its times, its name and its kind.
+/// The MCAP library (0.26) takes that for granted.
 fn ends(attachment: &[u8]) -> bool {
     let after_text = |at: usize| {
         let length = attachment.get(at..)?.first_chunk::<4>()?;

@@ -1,4 +1,4 @@
-//! From faulted to armed: one edge, the second channel proved, and nothing that was asked before.
+//! From faulted to armed: one edge, the second channel proved, and no earlier request.
 
 use super::*;
 use crate::ports::SupplyState;
@@ -6,23 +6,23 @@ use crate::ports::SupplyState;
 const RESET: Controls =
     Controls { reset: true, stop: false, dead_man: false, new_request: false, open_supply: false };
 
-/// A rig with a relay that does what it is told so many cycles later.
+/// A rig with a relay that follows its command so many cycles later.
 struct Relayed {
     bench: Bench,
-    told: Vec<SupplyCommand>,
+    sent: Vec<SupplyCommand>,
     delay: usize,
-    /// What it shows whatever it is told.
+    /// What it shows whatever the command.
     stuck: Option<bool>,
 }
 
 impl Relayed {
     fn new(delay: usize, stuck: Option<bool>) -> Self {
-        Relayed { bench: Bench::new(), told: Vec::new(), delay, stuck }
+        Relayed { bench: Bench::new(), sent: Vec::new(), delay, stuck }
     }
 
     fn cut(&self) -> bool {
-        let told = self.told.len().checked_sub(self.delay + 1).map(|i| self.told[i]);
-        self.stuck.unwrap_or(told == Some(SupplyCommand::Cut))
+        let command = self.sent.len().checked_sub(self.delay + 1).map(|i| self.sent[i]);
+        self.stuck.unwrap_or(command == Some(SupplyCommand::Cut))
     }
 
     fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> Decision {
@@ -39,7 +39,7 @@ impl Relayed {
             },
             controls,
         );
-        self.told.push(decision.supply);
+        self.sent.push(decision.supply);
         decision
     }
 
@@ -62,10 +62,10 @@ impl Relayed {
 fn the_second_channel_is_opened_and_closed_before_every_arming() {
     let mut rig = Relayed::new(5, None);
     assert_eq!(rig.arm(100), (None, true));
-    assert!(rig.told.contains(&SupplyCommand::Cut) && rig.told.last() == Some(&SupplyCommand::Restore));
+    assert!(rig.sent.contains(&SupplyCommand::Cut) && rig.sent.last() == Some(&SupplyCommand::Restore));
     // And again after a trip.
     rig.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
-    let cuts = |rig: &Relayed| rig.told.iter().filter(|t| **t == SupplyCommand::Cut).count();
+    let cuts = |rig: &Relayed| rig.sent.iter().filter(|t| **t == SupplyCommand::Cut).count();
     let before = cuts(&rig);
     assert_eq!(rig.arm(100), (None, true));
     assert!(cuts(&rig) > before);
@@ -85,7 +85,7 @@ fn a_disarmed_rig_keeps_its_supply_open_until_the_channel_is_proved() {
     }
     assert_eq!(rig.cycle(|_| {}, Controls::default()).waits_for, None, "a program may ask for the reset");
     assert_eq!(rig.arm(100), (None, true));
-    assert_eq!(rig.told.last(), Some(&SupplyCommand::Restore));
+    assert_eq!(rig.sent.last(), Some(&SupplyCommand::Restore));
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn a_second_channel_that_opens_and_does_not_close_again_keeps_the_rig_from_armin
     });
     let (cycles, trip) = tripped.unwrap();
     assert!(trip.cause == Cause::SupplySwitch && trip.bound == 0.5 && trip.value > 0.5, "{trip:?}");
-    // 500 ms, and the cycles in which the cut was seen and the closing told.
+    // 500 ms, and the cycles in which the cut was seen and the closing commanded.
     assert!((500..=504).contains(&cycles), "{cycles}");
     assert!(!rig.cycle(|_| {}, Controls::default()).drive.enable());
 }
@@ -198,7 +198,7 @@ fn a_reset_clears_and_never_restarts() {
     let mut bench = Bench::armed();
     assert!(bench.last.enable());
     bench.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
-    // Asked for again while it stands faulted, and in the very cycle of the reset: neither counts.
+    // Requested again while it stands faulted, and in the very cycle of the reset: neither counts.
     bench.cycle(|_| {}, Controls { new_request: true, ..Controls::default() });
     let armed = bench.cycle(|_| {}, Controls { new_request: true, ..RESET });
     assert!(armed.armed_now);
@@ -233,8 +233,8 @@ fn faulted_without_supply(s: &mut Observation) {
     }
 }
 
-/// A board that is heard again: the supply that was cut for its silence is what makes the amplifier show a fault. Nothing stands in
-/// the way of the proof, which closes it; and until that proof it stays cut.
+/// A board that is heard again: the supply that was cut for its silence is what makes the amplifier show a
+/// fault. Nothing stands in the way of the proof, which closes it; and until that proof it stays cut.
 #[test]
 fn a_supply_cut_for_a_silent_board_before_arming_is_proved_and_the_fault_it_explains_is_not_waited_for() {
     let closed = |s: &mut Observation, at: u64| {
@@ -305,9 +305,9 @@ fn a_supply_cut_for_a_pressed_stop_or_a_refusal_waits_for_a_person() {
     }
 }
 
-/// A relay that does not close is not told as its amplifier's fault, in the proof and before it.
+/// A relay that does not close is not reported as its amplifier's fault, in the proof and before it.
 #[test]
-fn an_open_supply_is_told_as_the_relay_and_not_as_the_amplifier() {
+fn an_open_supply_is_reported_as_the_relay_and_not_as_the_amplifier() {
     let mut rig = Relayed::new(0, Some(true));
     for _ in 0..600 {
         let decision = rig.cycle(faulted_without_supply, Controls::default());

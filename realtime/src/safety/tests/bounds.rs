@@ -42,7 +42,7 @@ fn the_measured_amplitude_is_held_to_what_was_commanded() {
     for (value, remark) in [(0.7 * w, None), (0.7 * w * (1.0 - 1e-12), Some(Remark::AmplitudeSags))] {
         assert_eq!(bench().cycle(|s| *measured(s) = value, Controls::default()).remark, remark);
     }
-    // At rest a sensor may be as noisy as that, and the plate is not said to sag.
+    // At rest a sensor may be as noisy as that, and no sag is reported.
     let mut rest = bench();
     rest.request.amplitude = PeakToPeak::ZERO;
     assert_eq!(trips(&mut rest, 100, |_| {}), None);
@@ -81,9 +81,9 @@ fn the_echo_is_held_to_what_was_sent() {
         });
         assert_eq!(got.map(|t| t.cause), trip.then_some(Cause::EchoMismatch), "{off_m} {off_hz}");
         if let Some(trip) = got {
-            let (said, told) =
+            let (shown, commanded) =
                 if off_hz == 0.0 { (2e-6 + off_m, 2e-6) } else { (27_500.0 + off_hz, 27_500.0) };
-            assert_eq!((trip.value, trip.bound), (said, told));
+            assert_eq!((trip.value, trip.bound), (shown, commanded));
         }
     }
     // Switched off by somebody else, echoes as they were: nothing else shows it where no amplitude is measured.
@@ -478,8 +478,8 @@ fn beyond_the_travel_only_the_way_back_is_let_through() {
     }
 }
 
-/// Every value of a setup has two hard ends: at each it is taken, beyond each it is refused by its name with the range; what is
-/// no number, zero where nothing is, and what is absurd are beyond.
+/// Every value of a setup has two hard ends: at each it is taken, beyond each it is refused by its name with
+/// the range; what is no number, zero where nothing is, and what is absurd are beyond.
 #[test]
 fn every_range_is_closed_at_both_ends() {
     type Set = fn(&mut Limits, f64);
@@ -603,7 +603,7 @@ fn an_overforce_trips_whatever_the_counter_says() {
 /// Near its load, or near zero when lifted off; less than the load is a lost contact, not a fault.
 #[test]
 fn the_normal_force_is_held_to_the_load() {
-    let told = |load_n: f64, shows: f64, commanded: bool| {
+    let trip_of = |load_n: f64, shows: f64, commanded: bool| {
         let mut bench = bench();
         bench.limits.load_commanded = commanded;
         bench.request.normal_force_n = load_n;
@@ -618,8 +618,8 @@ fn the_normal_force_is_held_to_the_load() {
         (0.0, -0.301, false),
     ] {
         let bound = (Cause::LoadImplausible, 1.5 * load + 0.3);
-        assert_eq!(told(load, shows, true), (!fits).then_some(bound), "{load} N, {shows} N");
-        assert_eq!(told(load, shows, false), None, "weights load this finger");
+        assert_eq!(trip_of(load, shows, true), (!fits).then_some(bound), "{load} N, {shows} N");
+        assert_eq!(trip_of(load, shows, false), None, "weights load this finger");
     }
 }
 

@@ -240,8 +240,8 @@ fn the_hour_slides_and_forgets_nothing_early() {
         let (time, dose) = exposure.in_the_last_hour();
         // What was driven within the last 3600 s exactly is never more than what the window says, and at most a minute less.
         let exact = 600u64.saturating_sub(s.saturating_sub(3600)).min(600);
-        let said = time.0 / second;
-        assert!(said >= exact && said <= exact + 61, "{s}: {said} s said, {exact} s driven");
+        let seconds = time.0 / second;
+        assert!(seconds >= exact && seconds <= exact + 61, "{s}: {seconds} s counted, {exact} s driven");
         assert!((dose - 0.01 * time.seconds()).abs() < 1e-9);
     }
     assert_eq!(exposure.in_the_last_hour().0, Nanos(0));

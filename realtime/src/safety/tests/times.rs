@@ -65,7 +65,7 @@ fn a_plate_may_ring_down_with_its_time_constant_and_no_slower() {
     }
 }
 
-/// A stage that goes on at the speed it had while it was told to be slower: its speed may fade in 300 ms.
+/// A stage that stays at its earlier speed after a slower command: its speed may fade in 300 ms.
 #[test]
 fn a_stage_may_slow_down_with_its_response_time_and_no_slower() {
     let mut bench = Bench::armed();
@@ -92,14 +92,14 @@ fn a_stage_may_slow_down_with_its_response_time_and_no_slower() {
     }
 }
 
-/// Speeds from creeping on are asked for; the slowest since the start is what counts.
+/// Speeds from creeping on are commanded; the slowest since the start counts.
 #[test]
-fn a_stage_owes_a_fifth_of_the_slowest_speed_it_was_told() {
+fn a_stage_owes_a_fifth_of_the_slowest_commanded_speed() {
     let mut bench = Bench::armed();
     bench.request.velocity_m_s = -1.5e-3;
     let (cause, cycles) = bench.until_off(|s| stage(s).velocity_m_s = 0.0);
     assert_eq!((cause, cycles), (Cause::StageNotFollowing, 311));
-    // Told 100 mm/s, then 10: a fifth of the slower one will do, and the time is not begun anew by a faster one.
+    // 100 mm/s is commanded, then 10: a fifth of the slower one will do; a faster one restarts no time.
     let mut bench = Bench::armed();
     for velocity in [0.1, 0.01, 0.1] {
         bench.request.velocity_m_s = velocity;
@@ -109,7 +109,7 @@ fn a_stage_owes_a_fifth_of_the_slowest_speed_it_was_told() {
         }
     }
     assert_eq!(bench.until_off(|s| stage(s).velocity_m_s = 0.0019).1, 1);
-    // Told to stand still in between, it has its time anew.
+    // A commanded standstill in between restarts its time.
     let mut bench = Bench::armed();
     bench.request.velocity_m_s = 0.0;
     for _ in 0..400 {
@@ -141,7 +141,7 @@ fn the_supply_is_cut_to_the_cycle() {
     bench.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
     let cut = (1..100).find(|_| is_cut(&bench.cycle(|s| amplifier(s).output_on = true, Controls::default())));
     assert_eq!(cut, Some(9 + 10 + 1));
-    // On while it is told to be on, and off while it is told to be off, is no reason.
+    // Following its commands, on or off, is not a reason.
     let mut bench = Bench::armed();
     for _ in 0..100 {
         assert!(!is_cut(&bench.cycle(|_| {}, Controls::default())));
@@ -294,7 +294,7 @@ fn a_stage_is_given_its_time_and_a_fifth_of_its_speed() {
         assert_eq!(cause, Cause::StageNotFollowing);
         cycles
     };
-    // `armed` has asked for this speed for sixty cycles already; a new direction starts the time anew.
+    // `armed` has commanded this speed for sixty cycles already; a new direction restarts the time.
     assert_eq!((after(0.19, 0.02), after(0.19, -0.02)), (251, 311));
     assert_eq!(after(-1.0, -0.02), after(0.0, -0.02), "the wrong way is not following");
     let mut bench = Bench::armed();
@@ -302,7 +302,7 @@ fn a_stage_is_given_its_time_and_a_fifth_of_its_speed() {
         let decision = bench.cycle(|s| stage(s).velocity_m_s = 0.2001 * 0.02, Controls::default());
         assert_eq!(decision.tripped, None, "a fifth will do");
     }
-    // Slower than creeping nothing is asked of it.
+    // Below the creeping speed the rule does not apply.
     let mut bench = Bench::armed();
     bench.request.velocity_m_s = 1.4e-3;
     for _ in 0..800 {

@@ -22,7 +22,7 @@ const ARM_WITHIN_S: f64 = 10.0;
 /// Time to reach an amplitude in s: the loop limits its rate.
 const REACH_WITHIN_S: f64 = 10.0;
 
-/// What the loop said last.
+/// The loop's last report.
 #[derive(Default)]
 struct Seen {
     row: Option<Row>,
@@ -56,7 +56,7 @@ impl Drive {
         }
         let rig = drivers::open(&setup.instruments(), epoch).map_err(|e| miette::miette!("{e}"))?;
         // Nobody records here: what the ring for a record loses is not missed.
-        let (rig, reins, _) = WallLoop::start(Parts {
+        let (rig, handle, _) = WallLoop::start(Parts {
             config: setup.config,
             model: Arc::new(model),
             // The raw set-point is what is calibrated: a certificate of the setup is not applied.
@@ -70,7 +70,7 @@ impl Drive {
         let seen = Arc::new(Mutex::new(Seen::default()));
         let ended = Arc::new(AtomicBool::new(false));
         let (note, stop, done) = (Arc::clone(&seen), Arc::clone(&interrupted), Arc::clone(&ended));
-        let watch = move || watch(reins, &note, &stop, &done);
+        let watch = move || watch(handle, &note, &stop, &done);
         let watching = std::thread::Builder::new().name("watch".into()).spawn(watch).into_diagnostic()?;
         Ok(Drive { rig, seen, interrupted, ended, watching: Some(watching) })
     }
@@ -154,14 +154,14 @@ impl Drive {
 }
 
 /// Notes the loop's rows. A signal stops the drive from here, since whoever asks the questions may wait for an answer.
-fn watch(mut reins: LoopHandle, seen: &Mutex<Seen>, interrupted: &AtomicBool, ended: &AtomicBool) {
+fn watch(mut handle: LoopHandle, seen: &Mutex<Seen>, interrupted: &AtomicBool, ended: &AtomicBool) {
     let mut stopped = false;
     while !ended.load(Ordering::Acquire) {
         if !stopped && interrupted.load(Ordering::Relaxed) {
             stopped = true;
-            reins.stop();
+            handle.stop();
         }
-        if let Some(row) = reins.next_row() {
+        if let Some(row) = handle.next_row() {
             let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
             seen.tripped = row.tripped.or(seen.tripped);
             seen.row = Some(row);

@@ -21,7 +21,7 @@ pub fn section(result: &Diagnosis) -> String {
         .map(|h| {
             let alias = match h.alias_class.get(1..) {
                 Some(others) if !others.is_empty() => {
-                    format!("<br><small>not told from {}</small>", escape(&others.join(", ")))
+                    format!("<br><small>not separable from {}</small>", escape(&others.join(", ")))
                 }
                 _ => String::new(),
             };
@@ -39,15 +39,15 @@ pub fn section(result: &Diagnosis) -> String {
         .hypotheses
         .first()
         .map_or(Vec::new(), |h| h.alias_class.iter().flat_map(|name| name.split('+')).collect());
-    let mut told: Vec<&str> = Vec::new();
+    let mut shown: Vec<&str> = Vec::new();
     let mut cards = String::new();
     for h in listed {
         let cause = h.probability > EXPLAINED || h.effects.iter().any(|e| class.contains(&e.as_str()));
-        if !cause || h.effects.iter().all(|e| told.contains(&e.as_str())) {
+        if !cause || h.effects.iter().all(|e| shown.contains(&e.as_str())) {
             continue;
         }
         cards += &card(h);
-        told.extend(h.effects.iter().map(String::as_str));
+        shown.extend(h.effects.iter().map(String::as_str));
     }
     format!("<h2>Which cause</h2>{}{cards}", table("Hypotheses", head, &rows))
 }

@@ -6,7 +6,7 @@ use diagnosis::next::Experiment;
 use diagnosis::verdict::Diagnosis;
 use models::covariate::{self, Covariate};
 
-/// Nats from which odds are no longer told apart: a million to one.
+/// Nats from which odds are no longer distinguished: a million to one.
 const BEYOND: f64 = 13.8;
 
 /// The section.
@@ -37,9 +37,9 @@ fn one(e: &Experiment) -> String {
             escape(&e.text)
         );
     }
-    let told: Vec<&Covariate> =
+    let planned: Vec<&Covariate> =
         covariate::planned().filter(|c| e.conditions.iter().any(|k| c.of(k).is_some())).collect();
-    let heads: String = told
+    let heads: String = planned
         .iter()
         .map(|c| {
             let (_, unit) = c.shown;
@@ -51,7 +51,7 @@ fn one(e: &Experiment) -> String {
         .conditions
         .iter()
         .map(|k| {
-            let cells: String = told
+            let cells: String = planned
                 .iter()
                 .map(|c| {
                     c.of(k).map_or("<td class=\"n\">&ndash;</td>".into(), |v| {

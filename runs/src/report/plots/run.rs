@@ -89,7 +89,7 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
                 band(chart, &edge(-2.0), &edge(2.0), colour)?;
                 line(chart, edge(0.0), colour, (i > 0).then_some(3 * i as i32))?;
             }
-            // Asked of the model of the run itself, at the conditions that were measured.
+            // Predictions of the run's own model, at the measured conditions.
             let strokes = of_speed.iter().filter_map(|p| {
                 let (w, predicted) = (value(p)?.0, p.comparison?.predicted.clamp(axis[0], axis[1]));
                 let half = 0.012 * widest;

@@ -4,7 +4,7 @@
 use crate::plan::{Plan, Resolution};
 use crate::sequence::{Event, Outcome, Sequence};
 use crate::setup::Setup;
-use crate::supervisor::{self, Asked, Loop, VirtualLoop};
+use crate::supervisor::{self, Loop, Requests, VirtualLoop};
 use models::prediction::{FrictionModel, SpringSlider};
 use realtime::cycle::Command;
 use realtime::ports::{Amplifier, AmplifierState, Contacts, Nanos, NoData, SafetyInputs};
@@ -30,7 +30,7 @@ struct Before {
     pressed: [u64; 2],
     /// The amplifier has a fault of its own.
     faulty: bool,
-    /// The sweep is told of a human finger.
+    /// The sweep has a human finger.
     human: bool,
 }
 
@@ -39,18 +39,18 @@ struct Before {
 struct Board {
     rig: SharedRig,
     pressed: Arc<AtomicBool>,
-    kept: Option<(Nanos, Contacts)>,
+    stored: Option<(Nanos, Contacts)>,
 }
 
 impl SafetyInputs for Board {
     fn read(&mut self, now: Nanos) -> Contacts {
-        let held = self.kept.filter(|(before, _)| now.since(*before).0 > 10 * MS);
-        let mut seen = held.map_or_else(|| self.rig.read(now), |(_, kept)| kept);
+        let held = self.stored.filter(|(before, _)| now.since(*before).0 > 10 * MS);
+        let mut seen = held.map_or_else(|| self.rig.read(now), |(_, stored)| stored);
         if let (None, Ok(contact)) = (held, &mut seen.emergency_stop) {
             contact.closed = !self.pressed.load(Ordering::Relaxed);
         }
         seen.dead_man = Err(NoData::NotFitted);
-        self.kept = Some((now, seen));
+        self.stored = Some((now, seen));
         seen
     }
 }
@@ -117,14 +117,14 @@ fn swept(before: Before) -> (Outcome, Vec<Event>, Vec<Row>) {
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
     let points = plan.points(1, &setup.config.limits, &resolution).unwrap();
     let model: Arc<dyn FrictionModel> = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
-    let mut told: Limits = setup.config.limits;
-    told.human_contact = before.human;
+    let mut limits: Limits = setup.config.limits;
+    limits.human_contact = before.human;
     let mut sequence =
         Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
-            .guarded_by(&told);
+            .guarded_by(&limits);
     let [force, rig, stage] = VirtualRig::new(&sim::world::WorldConfig::ideal(), 1).unwrap().split();
     let pressed = Arc::new(AtomicBool::new(false));
-    let board = Board { rig: stage.clone(), pressed: Arc::clone(&pressed), kept: None };
+    let board = Board { rig: stage.clone(), pressed: Arc::clone(&pressed), stored: None };
     let amplifier = Generator { rig, faulty: before.faulty };
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()))
         .with_supply(Box::new(stage))
@@ -133,7 +133,7 @@ fn swept(before: Before) -> (Outcome, Vec<Event>, Vec<Row>) {
     let mut held = Held { rig, before, pressed, now: 0, cycle: 0, proving: 0, proofs: 0 };
     let (mut events, mut rows) = (Vec::new(), Vec::new());
     let outcome =
-        supervisor::sweep(&mut held, &mut sequence, &mut Asked::default, &mut |row, _, reaction| {
+        supervisor::sweep(&mut held, &mut sequence, &mut Requests::default, &mut |row, _, reaction| {
             rows.push(*row);
             events.extend(reaction.events);
         });
@@ -155,11 +155,11 @@ fn disturbed(events: &[Event]) -> Vec<(Cause, u64)> {
     events.iter().filter_map(of).collect()
 }
 
-/// The supply was cut for a board that was not heard for 120 ms, and its amplifier showed a fault for that:
-/// for ten seconds the sweep waited for what only its own proof could clear, and told the amplifier's fault
+/// The supply was cut for a board that was silent for 120 ms, and its amplifier showed a fault for that. For
+/// ten seconds the sweep waited for what only its own proof could clear, and reported the amplifier's fault
 /// as the cause.
 #[test]
-fn a_stall_before_arming_is_told_and_the_second_channel_proved() {
+fn a_stall_before_arming_is_reported_and_the_second_channel_proved() {
     let (outcome, events, _) = swept(Before::default());
     assert_eq!((outcome, disturbed(&events)), (Outcome::Complete, vec![]), "{events:?}");
     // Of 120 deadlines in a thousand, more than the limit were missed: armed before they are forgotten, the
@@ -194,7 +194,7 @@ fn a_proof_that_a_stall_broke_off_is_made_again_and_told() {
     }
 }
 
-/// Pressed and released while the rig arms: whoever pressed it is asked to start anew.
+/// Pressed and released while the rig arms: whoever pressed it must start the run again.
 #[test]
 fn a_stop_that_was_pressed_before_arming_is_not_cleared_by_the_sweep() {
     let (outcome, events, rows) = swept(Before { pressed: [10, 300], ..Before::default() });

@@ -52,15 +52,15 @@ fn begun(folder: &Path, job: &Job, ids: &[String]) -> miette::Result<Handed> {
         let _ = to.write_all(&serde_json::to_vec(job).into_diagnostic()?);
     }
     let mut line = String::new();
-    if let Some(said) = child.stdout.take() {
-        BufReader::new(said).read_line(&mut line).into_diagnostic()?;
+    if let Some(stdout) = child.stdout.take() {
+        BufReader::new(stdout).read_line(&mut line).into_diagnostic()?;
     }
     let named: Option<Vec<String>> = serde_json::from_str(&line).ok();
     let Some(ids) = named else {
         let _ = child.kill();
         let _ = child.wait();
         let log = std::fs::read_to_string(folder.join("log.txt")).unwrap_or_default();
-        let last = log.lines().rev().find(|l| l.contains("Error")).unwrap_or("it said nothing").to_string();
+        let last = log.lines().rev().find(|l| l.contains("Error")).unwrap_or("no output").to_string();
         return Err(miette!(
             "{} takes no tasks: {last} (all of it: {})",
             job.engine,
@@ -74,8 +74,8 @@ fn alive(handed: &mut Handed) -> bool {
     handed.child.as_mut().is_some_and(|child| matches!(child.try_wait(), Ok(None)))
 }
 
-/// Their workers look for the file `cancelled` in the job's folder, which is there by now: those that wait end at once, those at work
-/// after their portion.
+/// Their workers look for the file `cancelled` in the job's folder, which is there by now: those that wait
+/// end at once, those at work after their portion.
 fn cancel(_: &Job) -> miette::Result<()> {
     Ok(())
 }

@@ -44,7 +44,7 @@ fn submit(folder: &Path, job: &Job) -> miette::Result<Handed> {
     for first in (0..job.ranges.len()).step_by(ARRAY) {
         let last = ARRAY.min(job.ranges.len() - first) - 1;
         let at_once = job.workers.map(|n| format!("%{n}")).unwrap_or_default();
-        let said = ran(Command::new("sbatch")
+        let output = ran(Command::new("sbatch")
             .args(["--parsable", "--requeue", "--open-mode=append", "--ntasks=1", "--cpus-per-task=1"])
             .arg(format!("--job-name=muprime-{}", job.kind))
             .arg(format!("--array=0-{last}{at_once}"))
@@ -54,12 +54,12 @@ fn submit(folder: &Path, job: &Job) -> miette::Result<Handed> {
             .arg(format!("--export=ALL,MUPRIME_FIRST={first}"))
             .args(&job.options)
             .arg(&path))?;
-        if !said.status.success() {
+        if !output.status.success() {
             let _ = cancel(&Job { ids, ..job.clone() });
-            return Err(miette!("sbatch refuses: {}", String::from_utf8_lossy(&said.stderr).trim()));
+            return Err(miette!("sbatch refuses: {}", String::from_utf8_lossy(&output.stderr).trim()));
         }
-        let told = String::from_utf8_lossy(&said.stdout);
-        ids.push(told.trim().split(';').next().unwrap_or_default().to_string());
+        let stdout = String::from_utf8_lossy(&output.stdout);
+        ids.push(stdout.trim().split(';').next().unwrap_or_default().to_string());
         numbers(&ids)?;
     }
     Ok(Handed { ids, child: None })
@@ -70,26 +70,26 @@ fn again(_: &Path, job: &Job) -> miette::Result<Handed> {
     Ok(Handed { ids: job.ids.clone(), child: None })
 }
 
-/// A controller that does not answer says nothing about its jobs: they may go on. Tasks that Slurm holds (it does so where it
-/// could not start them, as after a controller that died) never start by themselves: where nothing else is left they are taken
-/// back, and what is missing is handed over anew.
+/// A controller that does not answer says nothing about its jobs: they may go on. Tasks that Slurm holds (it
+/// does so where it could not start them, as after a controller that died) never start by themselves: where
+/// nothing else is left they are taken back, and what is missing is handed over again.
 fn alive(handed: &mut Handed) -> bool {
-    let asked = Command::new("squeue")
+    let answer = Command::new("squeue")
         .args(["--noheader", "--format=%t %r", "--jobs"])
         .arg(handed.ids.join(","))
         .output();
-    match asked {
-        Ok(said) if said.status.success() => {
-            let told = String::from_utf8_lossy(&said.stdout).into_owned();
-            let all_held = told
+    match answer {
+        Ok(output) if output.status.success() => {
+            let listed = String::from_utf8_lossy(&output.stdout).into_owned();
+            let all_held = listed
                 .lines()
                 .all(|line| line.starts_with("PD") && (line.contains("JobHeld") || line.contains("held")));
-            if all_held && !told.trim().is_empty() {
+            if all_held && !listed.trim().is_empty() {
                 let _ = Command::new("scancel").args(&handed.ids).output();
             }
             !all_held
         }
-        Ok(said) => !String::from_utf8_lossy(&said.stderr).contains("Invalid job id"),
+        Ok(output) => !String::from_utf8_lossy(&output.stderr).contains("Invalid job id"),
         Err(_) => true,
     }
 }
@@ -98,12 +98,12 @@ fn cancel(job: &Job) -> miette::Result<()> {
     if job.ids.is_empty() {
         return Ok(());
     }
-    let said = ran(Command::new("scancel").args(numbers(&job.ids)?))?;
-    let told = String::from_utf8_lossy(&said.stderr).into_owned();
-    if said.status.success() || told.contains("Invalid job id") {
+    let output = ran(Command::new("scancel").args(numbers(&job.ids)?))?;
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    if output.status.success() || stderr.contains("Invalid job id") {
         return Ok(());
     }
-    Err(miette!("scancel: {}", told.trim()))
+    Err(miette!("scancel: {}", stderr.trim()))
 }
 
 #[cfg(test)]

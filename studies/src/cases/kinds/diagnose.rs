@@ -72,22 +72,22 @@ fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
             miette::bail!("without {name}: no such effect; `muprime model effects` lists them");
         }
     }
-    let said = serde_json::to_string(&settings).unwrap_or_default();
+    let rest = serde_json::to_string(&settings).unwrap_or_default();
     let folder = folder.to_path_buf();
     Ok(Box::new(move |index, given| {
-        let asked: Line = line(index, given)?;
-        let (table_path, rig_path) = asked.files(&folder);
+        let case: Line = line(index, given)?;
+        let (table_path, rig_path) = case.files(&folder);
         // What cannot be read is no answer about the table: the case is not run, and another try may read it.
         let bytes = bytes_of(&table_path, MAX_TABLE_BYTES)
             .wrap_err_with(|| format!("case {index}: cannot read the table {}", table_path.display()))?;
         let rig = text_of(&rig_path)
             .wrap_err_with(|| format!("case {index}: cannot read the rig's calibration"))?;
-        let damage = if folder.join(&asked.data).is_dir() {
-            runs::run_dir::damage_in(&folder.join(&asked.data))?
+        let damage = if folder.join(&case.data).is_dir() {
+            runs::run_dir::damage_in(&folder.join(&case.data))?
         } else {
             Vec::new()
         };
-        let inputs = format!("{} {} {said} {damage:?}", sha256_hex(&bytes), sha256_hex(rig.as_bytes()));
+        let inputs = format!("{} {} {rest} {damage:?}", sha256_hex(&bytes), sha256_hex(rig.as_bytes()));
         let settings = settings.clone();
         let run = move || {
             // The file's own name says nothing of its contents: a reason holds none.

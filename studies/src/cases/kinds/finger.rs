@@ -63,22 +63,22 @@ impl Default for Settings {
 
 fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
     let settings: Settings = super::settings(header)?;
-    let said = serde_json::to_string(&settings).unwrap_or_default();
+    let rest = serde_json::to_string(&settings).unwrap_or_default();
     let folder = folder.to_path_buf();
     Ok(Box::new(move |index, given| {
-        let asked: Line = line(index, given)?;
-        let path = folder.join(&asked.phases);
+        let case: Line = line(index, given)?;
+        let path = folder.join(&case.phases);
         let bytes = bytes_of(&path, MAX_TABLE_BYTES).wrap_err_with(|| format!("case {index}"))?;
         let inputs =
-            format!("{} {:?} {:?} {said}", sha256_hex(&bytes), asked.frequency_hz, asked.normal_force_n);
+            format!("{} {:?} {:?} {rest}", sha256_hex(&bytes), case.frequency_hz, case.normal_force_n);
         let [low, high] = settings.modulus_range_pa;
         let options = Options {
-            frequency_hz: asked.frequency_hz,
-            normal_force_n: asked.normal_force_n,
+            frequency_hz: case.frequency_hz,
+            normal_force_n: case.normal_force_n,
             modulus_range_pa: (low, high),
             elements: settings.elements,
             modulus_only: settings.modulus_only,
-            told: false,
+            shown: false,
         };
         let run = move || {
             let points = read_phases(bytes.as_slice()).map_err(|e| e.to_string())?;

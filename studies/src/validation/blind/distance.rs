@@ -1,9 +1,9 @@
 //! How far a sealed cause lies from the library's law of its name: no diagnosis should be scored on its own formulae alone.
 //!
-//! The noise-free forces of a set are fitted by every law of the true effect, sizes, shapes, stiffnesses and `mu0` free
-//! (least squares, noise of a tenth of a per cent). The distance is what the best of them leaves, over what the
-//! recalibrated baseline leaves, root mean square in units of full friction: 0 for the library's own formula, 1 for a
-//! cause of which the law explains nothing.
+//! The noise-free forces of a set are fitted by every law of the true effect, sizes, shapes, stiffnesses and
+//! `mu0` free (least squares, noise of a tenth of a per cent). The distance is what the best of them leaves,
+//! over what the recalibrated baseline leaves, root mean square in units of full friction: 0 for the
+//! library's own formula, 1 for a cause of which the law explains nothing.
 
 use super::Scored;
 use diagnosis::data::{RigFile, Table};
@@ -14,15 +14,15 @@ use models::rig_file::PassNoise;
 use sim::sealed::Set;
 use std::collections::BTreeMap;
 
-/// Scatter that the fit of noise-free forces is told: of a pass, relative, and of a force over the mean one.
+/// Stated scatter for the fit of noise-free forces: of a pass, relative, and of a force over the mean one.
 const EXACT: f64 = 1e-3;
 /// Rounds of the last search.
 const ROUNDS: usize = 30;
 /// Ends of the three bands in which figures are printed.
 pub const BANDS: [f64; 2] = [0.05, 0.15];
 
-/// Distance of a set's one cause from the library's law of its name; none for sets of no, two, or other causes, and where the
-/// hidden passes cannot be fitted.
+/// Distance of a set's one cause from the library's law of its name; none for sets of no, two, or other
+/// causes, and where the hidden passes cannot be fitted.
 pub fn distance(set: &Set) -> Option<f64> {
     let [cause] = set.label.causes.as_slice() else { return None };
     if !cause.in_library {

@@ -31,9 +31,9 @@ pub struct Bin {
 /// Bounds of the bins: entries gather at both ends.
 const BOUNDS: [f64; 10] = [0.001, 0.01, 0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95, 0.99];
 
-/// Whether the truth of a set can be told at all: no cause, or one whose gap the data show; two where no single one all but
-/// explains both. For any other set no gap, or another cause, may be as good a word.
-pub fn told(s: &Scored) -> bool {
+/// Whether the truth of a set is identifiable: no cause, or one whose gap the data show; two where no single
+/// one all but explains both. For any other set no gap, or another cause, may be as good a word.
+pub fn identifiable(s: &Scored) -> bool {
     let shown = s.chi2_gain >= DETECTABLE && s.gap_over_floor >= ABOVE_FLOOR;
     let both = s.stratum != Stratum::Pair || s.best_single_leaves.is_some_and(|x| x >= PAIR_LEAVES);
     s.stratum == Stratum::None || (shown && both)

@@ -101,7 +101,7 @@ impl Answers {
     }
 }
 
-/// Diagnoses `count` sets of each of some truths under one kind of scatter; `progress` is told each answer.
+/// Diagnoses `count` sets of each of some truths under one kind of scatter; `progress` gets each answer.
 ///
 /// # Errors
 /// A set that the diagnosis refuses, and a truth that is no cause.

@@ -1,7 +1,7 @@
 //! Coverage of the parameter intervals: sets made with the library's own forms and Gaussian noise as stated.
 //!
-//! The inverse crime on purpose: an interval is one of the library's form, so only data of that form can say whether it
-//! covers. These sets say nothing about naming, and no figure of naming is taken from them.
+//! The inverse crime on purpose: an interval is one of the library's form, so only data of that form can say
+//! whether it covers. These sets say nothing about naming, and no figure of naming is taken from them.
 
 use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
@@ -13,7 +13,7 @@ use serde::Serialize;
 use sim::noise::Noise;
 use sim::sealed::{Ask, Stratum, generate};
 
-/// What one set said of the size of its effect.
+/// The size of the effect from one set.
 #[derive(Debug, Clone, Serialize)]
 pub struct Covered {
     /// Seed of the set.

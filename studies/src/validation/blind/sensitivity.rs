@@ -1,7 +1,7 @@
 //! How much the verdict depends on each constant: halved, and doubled, on the same sealed sets.
 //!
-//! Constants of the verdict rule are tried on finished fits; those of the fits need a diagnosis of their own each. What is
-//! reported beside the verdict does not enter the score and is left out.
+//! Constants of the verdict rule are tried on finished fits; those of the fits need a diagnosis of their own
+//! each. What is reported beside the verdict does not enter the score and is left out.
 
 use diagnosis::Verdict;
 use diagnosis::constants::{self, Constants, Stage};
@@ -35,16 +35,16 @@ pub struct Row {
     pub probability: f64,
 }
 
-/// What one set's verdict says.
+/// The verdict on one set.
 #[derive(Clone, PartialEq)]
-struct Said {
+struct Answer {
     verdict: Verdict,
     leader: Vec<&'static str>,
     right: bool,
     probability: f64,
 }
 
-fn said(set: &Set, fitted: &mut Fitted) -> Said {
+fn answer(set: &Set, fitted: &mut Fitted) -> Answer {
     let decision = decide(fitted);
     let mut truth: Vec<&str> = set.label.causes.iter().map(|c| c.name.as_str()).collect();
     truth.sort_unstable();
@@ -64,7 +64,7 @@ fn said(set: &Set, fitted: &mut Fitted) -> Said {
         let named = decision.verdict == Verdict::Named && leader == truth;
         (named, true_place.map_or(0.0, |i| decision.probabilities[i]))
     };
-    Said { verdict: decision.verdict, leader, right, probability }
+    Answer { verdict: decision.verdict, leader, right, probability }
 }
 
 fn fitted(set: &Set, constants: Constants, pairs: bool) -> miette::Result<Fitted> {
@@ -74,48 +74,48 @@ fn fitted(set: &Set, constants: Constants, pairs: bool) -> miette::Result<Fitted
     Ok(fit_all(&table, &rig, &options))
 }
 
-/// Every change on every set: what the set said, in the order of the changes, the unchanged constants first.
+/// The answers of one set under every change, in the order of the changes, the unchanged constants first.
 fn tried(
     set: &Set,
     base: &Constants,
     changes: &[(Stage, Constants)],
     pairs: bool,
-) -> miette::Result<Vec<Said>> {
+) -> miette::Result<Vec<Answer>> {
     let mut own = fitted(set, base.clone(), pairs)?;
     // A decision settles the leader's law: each begins with what was fitted.
     let as_fitted = own.candidates.clone();
-    let mut list = vec![said(set, &mut own)];
+    let mut list = vec![answer(set, &mut own)];
     for (stage, constants) in changes {
         list.push(if *stage == Stage::Decision {
             own.problem.constants = Arc::new(constants.clone());
             own.candidates.clone_from(&as_fitted);
-            said(set, &mut own)
+            answer(set, &mut own)
         } else {
-            said(set, &mut fitted(set, constants.clone(), pairs)?)
+            answer(set, &mut fitted(set, constants.clone(), pairs)?)
         });
     }
     Ok(list)
 }
 
-/// The study: what is changed, and what the sets have said so far.
+/// The study: the changes, and the answers so far.
 pub struct Study {
     labels: Vec<(&'static str, f64)>,
     changes: Vec<(Stage, Constants)>,
     base: Constants,
     pairs: bool,
-    said: Mutex<Vec<Vec<Said>>>,
+    answers: Mutex<Vec<Vec<Answer>>>,
 }
 
 impl Study {
-    /// Of the constants that `asked` picks.
+    /// Of the constants that `picks` accepts.
     ///
     /// # Errors
     /// A constant that cannot be scaled.
-    pub fn new(options: &Options, asked: &dyn Fn(&constants::Row) -> bool) -> miette::Result<Self> {
+    pub fn new(options: &Options, picks: &dyn Fn(&constants::Row) -> bool) -> miette::Result<Self> {
         let base = (*options.constants).clone();
         let mut labels = vec![("as it is", 1.0)];
         let mut changes = Vec::new();
-        for row in base.rows().iter().filter(|r| r.stage != Stage::Report && asked(r)) {
+        for row in base.rows().iter().filter(|r| r.stage != Stage::Report && picks(r)) {
             for factor in FACTORS {
                 let mut constants = base.clone();
                 constants.scale(row.name, factor).map_err(|e| miette::miette!("{e}"))?;
@@ -123,7 +123,7 @@ impl Study {
                 changes.push((row.stage, constants));
             }
         }
-        Ok(Study { labels, changes, base, pairs: options.pairs, said: Mutex::default() })
+        Ok(Study { labels, changes, base, pairs: options.pairs, answers: Mutex::default() })
     }
 
     /// Tries `count` sets from a seed; `each` is called after each.
@@ -139,8 +139,8 @@ impl Study {
     ) -> miette::Result<()> {
         let sets: Vec<Set> = super::sets(seed, count, stratum).collect();
         sets.par_iter().try_for_each(|set| {
-            let said = tried(set, &self.base, &self.changes, self.pairs)?;
-            self.said.lock().unwrap_or_else(PoisonError::into_inner).push(said);
+            let answer = tried(set, &self.base, &self.changes, self.pairs)?;
+            self.answers.lock().unwrap_or_else(PoisonError::into_inner).push(answer);
             each();
             Ok(())
         })
@@ -149,9 +149,10 @@ impl Study {
     /// A row for each change, from the sets so far.
     #[must_use]
     pub fn rows(&self) -> Vec<Row> {
-        let all = self.said.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let all = self.answers.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let row = |(i, &(constant, factor)): (usize, &(&'static str, f64))| {
-            let of = |test: &dyn Fn(&Said, &Said) -> bool| all.iter().filter(|s| test(&s[i], &s[0])).count();
+            let of =
+                |test: &dyn Fn(&Answer, &Answer) -> bool| all.iter().filter(|s| test(&s[i], &s[0])).count();
             // In the order of size: the sum does not depend on which set was done first.
             let mut probabilities: Vec<f64> = all.iter().map(|s| s[i].probability).collect();
             probabilities.sort_by(f64::total_cmp);

@@ -68,7 +68,7 @@ pub enum Core {
     Sleeps,
     /// What strikes never reaches it.
     Deaf,
-    /// It trips in time, and says that a deadline was missed, or a stop asked for.
+    /// It trips in time, and says that a deadline was missed, or a stop requested.
     Mistaken,
 }
 
@@ -87,7 +87,7 @@ pub struct Found {
     pub measured_off: Option<u64>,
     /// What was not as it must be; empty is good.
     pub wrong: Vec<String>,
-    /// SHA-256 over the rows, where asked for.
+    /// SHA-256 over the rows, if requested.
     pub hash: Option<String>,
 }
 
@@ -161,7 +161,7 @@ impl Scene {
         world
     }
 
-    /// What is asked of the loop in a cycle.
+    /// The request to the loop in a cycle.
     fn request(&self, cycle: u64) -> Request {
         let driven = |amplitude: f64, velocity_m_s: f64| Request {
             amplitude: PeakToPeak::from_metres(amplitude),
@@ -544,9 +544,9 @@ impl Watch {
     }
 }
 
-/// Two faults of one amplifier can hide each other: a rogue master that sets half the amplitude makes a readback of twice the
-/// amplitude right, and its heartbeat feeds the watchdog that a cut link would have let fire. What then counts is the slower of
-/// the two bounds, from the later strike on.
+/// Two faults of one amplifier can hide each other: a rogue master that sets half the amplitude makes a
+/// readback of twice the amplitude right, and its heartbeat feeds the watchdog that a cut link would have let
+/// fire. What then counts is the slower of the two bounds, from the later strike on.
 fn interact(scene: &Scene) -> bool {
     use realtime::wrap::fault::Target;
     let amplifier = |s: &Strike| {

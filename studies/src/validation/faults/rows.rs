@@ -1,10 +1,10 @@
 //! The list: what strikes, what must follow, for which cause, within how many cycles. Add a fault: one line.
 //!
-//! Numbers to 50 are those of the project's fault list (docs/safety.md); what no row of it names comes after. Bounds count from the first
-//! cycle whose inputs show the fault, that cycle included. They are stated in what the limits allow for (the age of a force
-//! sample or of a state, the time in which a set-point must show), so that they hold at every [`Pace`]. Garbage is random over
-//! 400 N: one sample in some hundreds is plausible by chance, so its bound allows for that. Two spikes side by side are an
-//! overforce.
+//! Numbers to 50 are those of the project's fault list (docs/safety.md); what no row of it names comes after.
+//! Bounds count from the first cycle whose inputs show the fault, that cycle included. They are stated in
+//! what the limits allow for (the age of a force sample or of a state, the time in which a set-point must
+//! show), so that they hold at every [`Pace`]. Garbage is random over 400 N: one sample in some hundreds is
+//! plausible by chance, so its bound allows for that. Two spikes side by side are an overforce.
 
 use super::tamper::Tamper;
 use realtime::ports::Nanos;
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Moment {
-    /// Armed, nothing asked for.
+    /// Armed, nothing requested.
     Idle,
     /// Sliding, the amplitude climbing in steps.
     Ramp,
@@ -54,9 +54,9 @@ pub enum What {
     },
     /// The controller stands still for so many ms; the rig does not.
     Paused(u64),
-    /// A stop is asked for.
+    /// A stop is requested.
     Stop,
-    /// A stop is asked for, and the amplifier does not obey its enable.
+    /// A stop is requested, and the amplifier does not obey its enable.
     StopRefused,
     /// The dead-man input is released, with a human finger.
     DeadMan,
@@ -301,8 +301,8 @@ rows! {
     52 "relay_falls_open" ALL What::RelayFalls => Off(cycles(2).state_ages(1)), AmplifierFault | SupplySwitch | AmplifierStale;
 }
 
-/// Rows of the fault list that strike what this bench does not hold (threads, files, the network): the tests that strike them.
-/// Number, fault, tests (a file of the workspace and a test in it), and what is to be said beside.
+/// Rows of the fault list that strike what this bench does not hold (threads, files, the network): the tests
+/// that strike them. Number, fault, tests (a file of the workspace and a test in it), and a remark.
 pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)], &str)] = &[
     (
         12,

@@ -83,8 +83,8 @@ pub fn scene_of(seed: u64, pairs: bool, pace: Pace) -> Scene {
     Scene { moment, seed, strikes, pace }
 }
 
-/// Two faults can strike together where they share a moment and neither hides the other: what strikes one channel twice,
-/// or alters what an instrument shows before a channel loses it, is judged one by one only.
+/// Two faults can strike together where they share a moment and neither hides the other: what strikes one
+/// channel twice, or alters what an instrument shows before a channel loses it, is judged one by one only.
 fn compatible(a: usize, b: usize) -> bool {
     use super::rows::What::{Channel, Paused, Shown};
     use realtime::wrap::fault::Target;
@@ -102,8 +102,8 @@ fn compatible(a: usize, b: usize) -> bool {
     share && apart
 }
 
-/// Runs the seeds; whoever waits is told of each part.
-pub fn search(what: Search, told: impl Fn(&Tally) + Sync) -> Tally {
+/// Runs the seeds; `report` gets each part.
+pub fn search(what: Search, report: impl Fn(&Tally) + Sync) -> Tally {
     let seeds: Vec<u64> = (what.first..what.first.saturating_add(what.seeds)).collect();
     seeds
         .par_chunks(64)
@@ -112,7 +112,7 @@ pub fn search(what: Search, told: impl Fn(&Tally) + Sync) -> Tally {
             for seed in chunk {
                 tally.take(&scene_of(*seed, what.pairs, what.pace), what.twice);
             }
-            told(&tally);
+            report(&tally);
             tally
         })
         .reduce(Tally::default, Tally::with)

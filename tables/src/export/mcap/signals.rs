@@ -89,7 +89,7 @@ pub const SIGNALS: [Signal; 24] = [
     signal("/loop/lateness_s", "how late the cycle began", |r| Some(r.inputs.seen.lateness.0 as f64 * 1e-9)),
     holding("/safety/armed", "1 while the rig is armed", |r| flag(r.armed)),
     holding("/safety/tripped", "1 in the cycle in which a trip was latched", |r| flag(r.tripped.is_some())),
-    holding("/safety/supply_cut", "1 while the supply is told to be cut", |r| flag(r.supply_cut)),
+    holding("/safety/supply_cut", "1 while the supply is commanded to be cut", |r| flag(r.supply_cut)),
     holding("/sweep/point", "number of the point that the cycle belongs to; none between passes", |r| {
         let between = matches!(r.marker.phase, Phase::Idle | Phase::Zero);
         (!between).then(|| f64::from(r.marker.point))

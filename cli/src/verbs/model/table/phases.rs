@@ -11,8 +11,8 @@ pub fn lines(study: Study, results: &store::Results) -> Vec<String> {
         for value in panel.values() {
             let mut curve: Vec<(f64, f64)> = Vec::new();
             for p in points.iter().filter(|p| p.panel == panel && p.value == value) {
-                let kept = results.get(&content_key(&p.case, &figures::settings()));
-                if let Some(phase) = kept.and_then(|k| k.phase_shift_deg) {
+                let stored = results.get(&content_key(&p.case, &figures::settings()));
+                if let Some(phase) = stored.and_then(|k| k.phase_shift_deg) {
                     let lead = if phase > 270.0 { phase - 360.0 } else { phase };
                     curve.push((1e6 * study.reading.w_m(p.case.amplitude), lead));
                 }

@@ -3,8 +3,8 @@
 use super::*;
 use std::sync::{Arc, Mutex};
 
-/// The commands that arrive at an amplifier, by their count, each with the cycle in which it arrived. One leaves in each cycle,
-/// and the state is asked after each.
+/// The commands that arrive at an amplifier, by their count, each with the cycle in which it arrived. One
+/// leaves in each cycle, and the state is read after each.
 fn arrived(faults: &[Fault], seed: u64, cycles: u64) -> Vec<(u32, u64)> {
     let log = Arc::new(Mutex::new(Vec::new()));
     let into = Arc::clone(&log);
@@ -38,7 +38,7 @@ fn commands_are_lost_in_the_time_of_the_fault_and_only_there() {
     }
 }
 
-/// What is said of a reading can be done to no command.
+/// Faults of readings apply to no command.
 #[test]
 fn faults_of_readings_leave_commands_alone() {
     for mode in [

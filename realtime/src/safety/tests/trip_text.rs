@@ -1,4 +1,4 @@
-//! How a trip is told: its unit, its requirement, what to do about it.
+//! The description of a trip: its unit, its requirement, what to do about it.
 
 use super::*;
 
@@ -23,7 +23,7 @@ fn every_cause_has_a_unit_a_requirement_and_a_remedy_of_its_own_kind() {
     assert!(RULES.iter().all(|rule| !rule.units.is_empty()));
 }
 
-/// A healthy rig is armed, then shows or is asked for something: the trip that follows.
+/// A healthy rig is armed, then shows or gets something: the trip that follows.
 fn tripped(request: Request, change: impl Fn(&mut Observation)) -> Trip {
     let mut bench = Bench::armed();
     bench.request = request;
@@ -44,23 +44,23 @@ fn a_trip_is_told_in_its_unit() {
         }
     });
     assert_eq!(force.unit, Unit::Newton);
-    let said = force.to_string();
+    let text = force.to_string();
     assert!(
-        said.starts_with("the normal force is above its limit: 40 N (limit ") && said.ends_with(" s [SR-04]"),
-        "{said}"
+        text.starts_with("the normal force is above its limit: 40 N (limit ") && text.ends_with(" s [SR-04]"),
+        "{text}"
     );
 
     let silent = tripped(slow, |seen| seen.forces.lateral = Err(NoData::Disconnected));
-    let said = silent.to_string();
-    assert!(silent.unit == Unit::Second && said.contains(": no data (limit 0.0"), "{said}");
+    let text = silent.to_string();
+    assert!(silent.unit == Unit::Second && text.contains(": no data (limit 0.0"), "{text}");
 
     // One rule, several units: the trip has that of what broke it.
     let much = Request { amplitude: PeakToPeak::from_metres(9e-6), frequency_hz: 27_500.0, ..slow };
-    let said = tripped(much, |_| {}).to_string();
-    assert!(said.contains("9 um (limit ") && said.contains("[SR-30]"), "{said}");
+    let text = tripped(much, |_| {}).to_string();
+    assert!(text.contains("9 um (limit ") && text.contains("[SR-30]"), "{text}");
     let high = Request { amplitude: PeakToPeak::from_metres(1e-6), frequency_hz: 2e6, ..slow };
-    let said = tripped(high, |_| {}).to_string();
-    assert!(said.contains("2000000 Hz (limit "), "{said}");
+    let text = tripped(high, |_| {}).to_string();
+    assert!(text.contains("2000000 Hz (limit "), "{text}");
 }
 
 #[test]

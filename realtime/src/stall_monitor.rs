@@ -1,10 +1,10 @@
-//! Witnesses of the machine's stalls: one idle thread a CPU, at ordinary priority, that notes when it was not let run.
+//! Monitor of the machine's stalls: one idle thread a CPU, at ordinary priority, that records its delays.
 //!
-//! In wall-clock time a trip for stale data may come from the rig or from the machine: a shared virtual machine takes
-//! a CPU away for milliseconds, and drivers (or an embedded virtual rig) on it fall silent. A witness tells which. It
-//! sleeps to absolute deadlines as the loop does, but as an ordinary thread, bound to its CPU: what delays it delays
-//! the drivers there too.
-#![allow(clippy::disallowed_methods, reason = "a witness measures how late ordinary threads wake")]
+//! In wall-clock time a trip for stale data may come from the rig or from the machine: a shared virtual
+//! machine takes a CPU away for milliseconds, and drivers (or an embedded virtual rig) on it fall silent. The
+//! monitor shows which. A thread of it sleeps to absolute deadlines as the loop does, but as an ordinary
+//! thread, bound to its CPU: what delays it delays the drivers there too.
+#![allow(clippy::disallowed_methods, reason = "the monitor measures how late ordinary threads wake")]
 
 use crate::pacing::{monotonic_ns, sleep_until};
 use crate::ports::Nanos;
@@ -13,13 +13,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-/// Sleep of a witness.
+/// Sleep of a monitor thread.
 const PERIOD_NS: u64 = 1_000_000;
 /// Delays from here on are noted: the age that the fastest channels are allowed.
 const STALL_NS: u64 = 3_000_000;
-/// Stalls kept a CPU, the latest; all are counted.
-const KEPT: usize = 256;
-/// More witnesses than this tell nothing new.
+/// Latest stalls that are stored for each CPU; all are counted.
+const STORED: usize = 256;
+/// Most monitored CPUs: more show nothing new.
 const CPUS: usize = 16;
 
 /// One delay of an ordinary thread.
@@ -27,13 +27,13 @@ const CPUS: usize = 16;
 pub struct Stall {
     /// Loop time at which it was over.
     pub until: Nanos,
-    /// How long the thread was kept from running.
+    /// How long the thread could not run.
     pub lasted: Nanos,
     /// On which CPU.
     pub cpu: usize,
 }
 
-/// What the witnesses saw. Stored in every run in wall-clock time.
+/// The monitor's report. Stored in every run in wall-clock time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StallReport {
     /// Delays of 3 ms and more, all CPUs.
@@ -52,14 +52,14 @@ impl StallReport {
     }
 }
 
-/// The running witnesses.
-pub struct Witnesses {
+/// The running monitor.
+pub struct StallMonitor {
     end: Arc<AtomicBool>,
     threads: Vec<JoinHandle<StallReport>>,
 }
 
-impl Witnesses {
-    /// Starts one witness a CPU; `origin_ns` is the loop's time zero on the monotonic clock.
+impl StallMonitor {
+    /// Starts one thread a CPU; `origin_ns` is the loop's time zero on the monotonic clock.
     ///
     /// # Errors
     /// A thread that the system refuses.
@@ -69,10 +69,10 @@ impl Witnesses {
         let mut threads = Vec::with_capacity(cpus);
         for cpu in 0..cpus {
             let end = Arc::clone(&end);
-            let builder = std::thread::Builder::new().name(format!("witness-{cpu}")).stack_size(64 * 1024);
+            let builder = std::thread::Builder::new().name(format!("monitor-{cpu}")).stack_size(64 * 1024);
             threads.push(builder.spawn(move || watch(cpu, origin_ns, &end))?);
         }
-        Ok(Witnesses { end, threads })
+        Ok(StallMonitor { end, threads })
     }
 
     /// Ends them and gathers what they saw.
@@ -91,14 +91,14 @@ impl Witnesses {
 
 fn watch(cpu: usize, origin_ns: u64, end: &AtomicBool) -> StallReport {
     bind_to(cpu);
-    let mut seen = StallReport { latest: Vec::with_capacity(KEPT), ..StallReport::default() };
+    let mut seen = StallReport { latest: Vec::with_capacity(STORED), ..StallReport::default() };
     let mut deadline = monotonic_ns() + PERIOD_NS;
     while !end.load(Ordering::Relaxed) {
         sleep_until(deadline);
         let now = monotonic_ns();
         let late = now.saturating_sub(deadline);
         if late >= STALL_NS {
-            if seen.latest.len() == KEPT {
+            if seen.latest.len() == STORED {
                 seen.latest.remove(0);
             }
             let lasted = Nanos(late);
@@ -111,7 +111,7 @@ fn watch(cpu: usize, origin_ns: u64, end: &AtomicBool) -> StallReport {
     seen
 }
 
-/// Binds the calling thread to a CPU. Where that is not allowed the witness still sees what happens to it.
+/// Binds the calling thread to a CPU. Where that is not allowed the thread still sees what happens to it.
 fn bind_to(cpu: usize) {
     // SAFETY: `set` is plain data, valid when zeroed; CPU_SET stays inside it as `cpu` is below CPUS; the call reads
     // it for the calling thread (pid 0) only.
@@ -136,10 +136,10 @@ mod tests {
     }
 
     #[test]
-    fn witnesses_start_and_end() {
-        let witnesses = Witnesses::start(monotonic_ns()).unwrap();
+    fn the_monitor_starts_and_ends() {
+        let monitor = StallMonitor::start(monotonic_ns()).unwrap();
         std::thread::sleep(std::time::Duration::from_millis(20));
-        let report = witnesses.finish();
+        let report = monitor.finish();
         assert!(report.count as usize >= report.latest.len());
     }
 }
