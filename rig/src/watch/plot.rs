@@ -2,9 +2,9 @@
 
 use super::style::Look;
 use crate::live::{State, View};
-use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
-use ratatui::style::{Modifier, Style};
+use ratatui_core::buffer::Buffer;
+use ratatui_core::layout::Rect;
+use ratatui_core::style::{Modifier, Style};
 
 /// Length of a trace in s.
 const LAST_S: f64 = 60.0;

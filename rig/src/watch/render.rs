@@ -2,10 +2,11 @@
 
 use super::{Look, NOTED_FOR, Page, Shared, draw};
 use crate::terminal;
-use ratatui::backend::{Backend, CrosstermBackend};
-use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
+use ratatui_core::buffer::{Buffer, Cell};
+use ratatui_core::layout::Rect;
+use ratatui_core::style::{Color, Modifier};
 use runs::session::unix_ns;
+use std::io::Write;
 use std::time::Duration;
 
 /// Time between two pages: what changes is a few hundred bytes.
@@ -62,12 +63,45 @@ impl Screen {
         let page = page(area);
         let shown = self.shown.replace(page);
         if let (Some(shown), Some(page)) = (&shown, &self.shown) {
-            let changed = shown.diff(page);
-            if !changed.is_empty() && CrosstermBackend::new(&mut bytes).draw(changed.into_iter()).is_err() {
-                return false;
-            }
+            bytes.extend(sequences(&shown.diff(page)));
         }
         write(&bytes)
+    }
+}
+
+/// What makes a terminal show these cells: the cursor's moves, the styles and the signs. The style is the
+/// terminal's own again at the end.
+fn sequences(changed: &[(u16, u16, &Cell)]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let (mut next, mut style) = (None, (Color::Reset, Modifier::empty()));
+    for &(x, y, cell) in changed {
+        // A terminal counts rows and columns from 1. Writing to memory does not fail.
+        if next != Some((x, y)) {
+            let _ = write!(bytes, "\x1b[{};{}H", y + 1, x + 1);
+        }
+        // A sign of two columns moves the cursor by two: the next one is placed.
+        next = Some((x + 1, y));
+        if style != (cell.fg, cell.modifier) {
+            style = (cell.fg, cell.modifier);
+            let bold = if cell.modifier.contains(Modifier::BOLD) { ";1" } else { "" };
+            let reversed = if cell.modifier.contains(Modifier::REVERSED) { ";7" } else { "" };
+            let _ = write!(bytes, "\x1b[0{bold}{reversed};{}m", colour(cell.fg));
+        }
+        bytes.extend_from_slice(cell.symbol().as_bytes());
+    }
+    if !changed.is_empty() {
+        bytes.extend_from_slice(b"\x1b[0m");
+    }
+    bytes
+}
+
+/// A colour of signs as a terminal numbers it; the view uses no other.
+fn colour(colour: Color) -> u8 {
+    match colour {
+        Color::Red => 31,
+        Color::Green => 32,
+        Color::Yellow => 33,
+        _ => 39,
     }
 }
 
@@ -84,4 +118,24 @@ fn write(mut bytes: &[u8]) -> bool {
         }
     }
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ratatui_core::style::Style;
+
+    #[test]
+    fn only_changed_cells_are_written_with_their_styles() {
+        let area = Rect::new(0, 0, 12, 2);
+        let (before, mut after) = (Buffer::empty(area), Buffer::empty(area));
+        assert!(sequences(&before.diff(&after)).is_empty());
+        let alarm = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD | Modifier::REVERSED);
+        after.set_string(3, 0, "STOP", alarm);
+        after.set_string(7, 0, "!", Style::new());
+        after.set_string(0, 1, "手x", Style::new().fg(Color::Green));
+        let written = String::from_utf8(sequences(&before.diff(&after))).unwrap();
+        let first = "\x1b[1;4H\x1b[0;1;7;31mSTOP\x1b[0;39m!";
+        assert_eq!(written, format!("{first}\x1b[2;1H\x1b[0;32m手\x1b[2;3Hx\x1b[0m"));
+    }
 }

@@ -1,6 +1,6 @@
 //! What a terminal can show: colours, and signs beyond ASCII.
 
-use ratatui::style::{Color, Modifier, Style};
+use ratatui_core::style::{Color, Modifier, Style};
 
 /// What a terminal can show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

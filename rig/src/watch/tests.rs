@@ -2,8 +2,8 @@ use super::*;
 use crate::live::{Ended, Message, Progress, Run, State, TimedEvent};
 use models::condition::Condition;
 use models::pass::Pass;
-use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
+use ratatui_core::buffer::Buffer;
+use ratatui_core::layout::Rect;
 use realtime::compare::PassComparison;
 use realtime::cycle::Phase;
 use realtime::ports::Nanos;
@@ -279,8 +279,8 @@ fn colours_only_repeat_what_words_say() {
     let colours = |look| {
         let coloured = |view: &View| {
             let buffer = shown(view, (80, 24), look);
-            let plain = |c: &ratatui::buffer::Cell| {
-                c.fg == ratatui::style::Color::Reset && c.bg == ratatui::style::Color::Reset
+            let plain = |c: &ratatui_core::buffer::Cell| {
+                c.fg == ratatui_core::style::Color::Reset && c.bg == ratatui_core::style::Color::Reset
             };
             buffer.content().iter().filter(|cell| !plain(cell)).count()
         };
