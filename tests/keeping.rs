@@ -77,6 +77,35 @@ fn runs_in_virtual_time_are_catalogued_when_they_were_made() {
     assert_eq!((&runs[0]["folder"], &runs[1]["folder"]), (&"a".into(), &"b".into()), "newest first");
 }
 
+#[test]
+fn a_run_that_was_copied_in_is_listed_and_one_without_a_summary_has_no_ending() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, made) = (plan(folder.path(), 2), folder.path().join("elsewhere/made"));
+    assert_eq!(sweep(&plan, &made).arg("--fast").status().unwrap().code(), Some(0));
+    let runs = folder.path().join("runs");
+    let list = || {
+        let output = muprime().args(["--json", "runs", "--folder"]).arg(&runs).output().unwrap();
+        (output.status.code(), documents(&output).pop())
+    };
+    std::fs::create_dir(&runs).unwrap();
+    assert_eq!(list().0, Some(2), "a folder without a run is refused");
+    for name in ["copied", "killed"] {
+        std::fs::create_dir(runs.join(name)).unwrap();
+        for file in std::fs::read_dir(&made).unwrap().map(|file| file.unwrap()) {
+            std::fs::copy(file.path(), runs.join(name).join(file.file_name())).unwrap();
+        }
+    }
+    std::fs::remove_file(runs.join("killed/summary.json")).unwrap();
+    let listed = list().1.unwrap();
+    for (i, (name, outcome)) in [("killed", ""), ("copied", "complete")].into_iter().enumerate() {
+        let run = &listed[i];
+        assert_eq!((&run["folder"], &run["outcome"]), (&name.into(), &outcome.into()), "{listed}");
+        assert_eq!((&run["plan"], &run["setup"]), (&"keeping".into(), &listed[0]["setup"]), "{listed}");
+        let passes = points(&made).len();
+        assert_eq!((&run["passes"], &run["planned"]), (&passes.into(), &passes.into()), "{listed}");
+    }
+}
+
 /// The offset drift of the virtual rig, measured in one go and in two sessions: named in both.
 #[test]
 fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {

@@ -18,14 +18,7 @@ fn hard(victim: &Path, place: &Path) {
 /// Links in the place of every file that a run writes: what they lead to stays as it is, and a run that is made all the same is whole.
 #[test]
 fn a_run_destroys_nothing_that_a_planted_link_leads_to() {
-    let names = [
-        "run/.lock",
-        "run/run.toml.new",
-        "catalogue.sqlite",
-        "catalogue.sqlite-journal",
-        "catalogue.sqlite-wal",
-    ];
-    for name in names {
+    for name in ["run/.lock", "run/run.toml.new"] {
         for (kind, plant) in [("symbolic", symbolic as fn(&Path, &Path)), ("hard", hard)] {
             let folder = tempfile::tempdir().unwrap();
             let victim = folder.path().join("victim");

@@ -84,7 +84,7 @@ fn over_instruments(
     let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
         miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
     })?;
-    let mut keeper = Keeper::begin(&job, dir, planned, start_unix_ns)?;
+    let mut keeper = Keeper::begin(&job, dir, planned)?;
     let file = keeper.new_record()?;
     let preamble = keeper::preamble(&job, start_unix_ns)?;
 

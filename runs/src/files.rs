@@ -31,21 +31,6 @@ pub fn open_plain(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     Err(io::Error::other("it is no plain file of its own: a link, a pipe or a device stands there"))
 }
 
-/// Refuses a place where a link, a pipe or a file with another name stands; nothing may stand there.
-///
-/// # Errors
-/// Something of that kind.
-pub fn refuse_planted(path: &Path) -> miette::Result<()> {
-    if fs::symlink_metadata(path).is_ok_and(|found| !(found.is_file() && found.nlink() == 1)) {
-        miette::bail!(
-            help = "see what it is, and remove it",
-            "{} is no plain file of its own",
-            path.display()
-        );
-    }
-    Ok(())
-}
-
 /// Makes a new file, to be written beside its place. What an earlier program left under that name, or somebody planted there, loses the
 /// name and is not touched.
 ///

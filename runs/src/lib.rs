@@ -14,7 +14,7 @@
 //! | [`supervisor`] | the one way to lead a loop: stop first, switch off, read back; and the loop in virtual time |
 //! | [`session`] | a sweep from its job to its summary, in virtual time |
 //! | [`ambient`] | levels of the air: who sets them, who reads them, who answers at the rig |
-//! | [`run_dir`], [`catalogue`] | a run's folder and its reader; the catalogue of runs |
+//! | [`run_dir`], [`catalogue`] | a run's folder and its reader; the list of runs |
 //! | [`report`], [`compare`] | the pages of a run and of a verdict; two runs side by side |
 //! | [`verdict`] | a verdict for people at a terminal, and the plan of the next experiment |
 //! | [`version`] | what this program is: the build, and the models that it holds |

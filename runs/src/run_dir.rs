@@ -1,6 +1,6 @@
 //! A run's folder: the record, the point table, rig.toml, the report; and how a killed run is taken up again.
 //!
-//! A pass is acknowledged (on stdout, in the catalogue) only after its line is in `points.csv` and synced.
+//! A pass is acknowledged (on stdout) only after its line is in `points.csv` and synced.
 
 mod damage;
 mod lines;
@@ -27,6 +27,15 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
+    /// Name of the plan.
+    #[serde(default)]
+    pub plan: String,
+    /// Name of the setup.
+    #[serde(default)]
+    pub setup: String,
+    /// Passes planned; 0 where no folder has been opened for them.
+    #[serde(default)]
+    pub planned: usize,
     /// SHA-256 of the setup's text.
     pub setup_sha256: String,
     /// SHA-256 of the plan's text.
@@ -99,6 +108,8 @@ const POINTS: &str = "points.csv";
 /// The journal in a run's folder: a line a pass, safe on the disk before the next one begins.
 pub const JOURNAL: &str = "passes.jsonl";
 const SESSIONS: &str = "sessions.jsonl";
+/// The file that says how a run ended; there is none from a session's beginning to its end.
+pub const SUMMARY: &str = "summary.json";
 
 impl RunDir {
     /// Makes a new folder, or takes up one that an earlier session of the same plan, setup, seed and model left.
@@ -108,12 +119,9 @@ impl RunDir {
     /// before [`RunDir::begin`].
     pub fn open(path: &Path, identity: &Identity) -> miette::Result<Self> {
         let shown = path.display();
-        let file = path.join(IDENTITY);
         let mut before_notes = Notes::default();
-        if file.exists() {
-            let text = crate::input::text_of(&file)?;
-            let before: Identity =
-                toml::from_str(&text).map_err(|e| miette::miette!("{shown}/{IDENTITY}: {e}"))?;
+        if path.join(IDENTITY).exists() {
+            let before = identity_in(path)?;
             let parts = [
                 ("setup", before.setup_sha256 == identity.setup_sha256),
                 ("plan", before.plan_sha256 == identity.plan_sha256),
@@ -211,6 +219,11 @@ impl RunDir {
             text.push(b'\n');
         }
         self.stay();
+        // How an earlier session ended is no longer how the run ended. The next file makes the removal safe.
+        let summary = self.path.join(SUMMARY);
+        if summary.symlink_metadata().is_ok() {
+            fs::remove_file(&summary).into_diagnostic().wrap_err(SUMMARY)?;
+        }
         // What this session says of itself goes beside what the run is of.
         let identity = toml::to_string(&self.identity).into_diagnostic()?;
         write_plain(&self.path.join(IDENTITY), identity.as_bytes())?;
@@ -306,6 +319,15 @@ fn is_record(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let number = name.strip_prefix("run-").and_then(|rest| rest.strip_suffix(".mcap"));
     number.is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// What the run in a folder is of.
+///
+/// # Errors
+/// A file that cannot be read, or holds something else.
+pub fn identity_in(path: &Path) -> miette::Result<Identity> {
+    let file = path.join(IDENTITY);
+    toml::from_str(&crate::input::text_of(&file)?).map_err(|e| miette::miette!("{}: {e}", file.display()))
 }
 
 /// Whether a session of a run has begun in a folder.

@@ -214,7 +214,7 @@ impl Begun {
     /// The summary of a run that is complete: nothing is driven.
     ///
     /// # Errors
-    /// Whatever file system and SQLite say.
+    /// Whatever the file system says.
     pub fn finish(self, job: &Job) -> miette::Result<Summary> {
         Keeper::finish(job, self.dir, self.planned, self.sequence.agreement(true))
     }
@@ -228,6 +228,9 @@ impl Job {
             .as_ref()
             .map_or_else(|| self.model.name().to_string(), |(_, text)| sha256_hex(text.as_bytes()));
         Identity {
+            plan: self.plan.file.name.clone(),
+            setup: self.setup.file.name.clone(),
+            planned: 0,
             setup_sha256: self.setup.sha256(),
             plan_sha256: sha256_hex(self.plan.text.as_bytes()),
             seed: self.seed,
@@ -286,7 +289,7 @@ impl Job {
         let points = self.points()?;
         let planned = points.len();
         let answers = self.setup.answers(self.answers.as_deref(), self.asks_a_person())?;
-        let mut dir = RunDir::open(&self.out, &self.identity())?;
+        let mut dir = RunDir::open(&self.out, &Identity { planned, ..self.identity() })?;
         self.notes = dir.notes().clone();
         let left = dir.left_of(points);
         let session = dir.plan_session(keeper::unix_ns(), self.plan.file.pass.measure_s, self.fast);

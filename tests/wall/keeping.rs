@@ -98,41 +98,6 @@ fn a_record_that_is_removed_in_mid_run_stops_the_sweep_and_is_said() {
     });
 }
 
-#[test]
-fn a_catalogue_that_is_locked_or_removed_in_mid_run_stops_the_sweep_and_every_pass_is_kept() {
-    wall::in_wall_clock_time(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let mut lock = None;
-        let run = struck(&made(folder.path(), "locked"), |out| {
-            let db = rusqlite::Connection::open(out.with_file_name("catalogue.sqlite")).unwrap();
-            db.execute_batch("BEGIN IMMEDIATE").unwrap();
-            lock = Some(db);
-        });
-        drop(lock);
-        assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
-        assert!(run.stderr.contains("catalogue") && run.stderr.contains("locked"), "{}", run.stderr);
-        let kept = points(&run.out);
-        assert!(run.acknowledged.len() > 2 && run.acknowledged == kept, "{:?} {kept:?}", run.acknowledged);
-        let summary: Summary =
-            serde_json::from_slice(&std::fs::read(run.out.join("summary.json")).unwrap()).unwrap();
-        assert_eq!(summary.passes, kept.len());
-        assert!(run.out.join("report.html").exists());
-
-        let run = struck(&made(folder.path(), "removed"), |out| {
-            std::fs::remove_file(out.with_file_name("catalogue.sqlite")).unwrap();
-        });
-        assert_eq!((run.status, &run.outcome), (Some(1), &"record_lost".into()), "{}", run.stderr);
-        assert!(run.stderr.contains("catalogue.sqlite was removed or replaced"), "{}", run.stderr);
-        assert_eq!(run.acknowledged, points(&run.out));
-    });
-}
-
-fn made(folder: &Path, name: &str) -> PathBuf {
-    let path = folder.join(name);
-    std::fs::create_dir(&path).unwrap();
-    path
-}
-
 /// The disk fills while the record is being ended: the last tens of kilobytes are its index.
 #[test]
 fn a_disk_that_fills_at_the_very_end_hangs_nobody() {

@@ -1,7 +1,7 @@
-//! `muprime runs`: the catalogue.
+//! `muprime runs`: the runs of a folder.
 
 use miette::IntoDiagnostic;
-use runs::catalogue::{Catalogue, runs_folder};
+use runs::catalogue::{existing, runs_folder};
 use runs::out;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,10 +23,10 @@ pub struct Args {
 /// Lists.
 ///
 /// # Errors
-/// A catalogue that cannot be read.
+/// A folder that holds no run, or cannot be read.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let folder = args.folder.unwrap_or_else(runs_folder);
-    let mut runs = Catalogue::existing(&folder)?.all()?;
+    let mut runs = existing(&folder)?;
     runs.retain(|r| args.plan.as_ref().is_none_or(|p| r.plan.contains(p.as_str())));
     runs.retain(|r| !args.unfinished || r.outcome != "complete");
     if json {

@@ -2,7 +2,7 @@
 
 use miette::{IntoDiagnostic, WrapErr};
 use rig::watch::{Lead, Watch};
-use runs::catalogue::{Catalogue, runs_folder};
+use runs::catalogue::{existing, runs_folder};
 use runs::out;
 use runs::sequence::MeasuredPass;
 use std::io::{BufRead, BufReader, IsTerminal};
@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Folder of the run [default: the newest of the catalogue]
+    /// Folder of the run [default: the newest]
     run: Option<PathBuf>,
 }
 
@@ -26,8 +26,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         Some(run) => run,
         None => {
             let folder = runs_folder();
-            let newest = Catalogue::existing(&folder)?.all()?.into_iter().next();
-            folder.join(newest.ok_or_else(|| miette::miette!("there is no run yet"))?.folder)
+            folder.join(&existing(&folder)?[0].folder)
         }
     };
     let journal = run.join("passes.jsonl");

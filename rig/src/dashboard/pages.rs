@@ -2,7 +2,7 @@
 
 use crate::live::{Ended, Message, Progress, Run, TimedEvent};
 use miette::{IntoDiagnostic, WrapErr};
-use runs::catalogue::{Catalogue, RunEntry};
+use runs::catalogue::{RunEntry, runs_in};
 use runs::run_dir::is_held;
 use runs::setup::Guards;
 use serde::Serialize;
@@ -11,7 +11,7 @@ use std::path::Path;
 /// Largest page that is served, in bytes.
 const LARGEST: u64 = 32 << 20;
 
-/// A line of the catalogue.
+/// A run in the list.
 #[derive(Serialize)]
 pub struct Listed {
     #[serde(flatten)]
@@ -22,16 +22,12 @@ pub struct Listed {
     pages: Vec<String>,
 }
 
-/// The catalogue, newest first; no runs where there is no catalogue yet.
+/// The runs of a folder, newest first; none where there is no folder yet.
 ///
 /// # Errors
-/// A catalogue that cannot be read.
+/// A folder that cannot be read.
 pub fn runs(folder: &Path) -> miette::Result<Vec<Listed>> {
-    if !folder.join("catalogue.sqlite").exists() {
-        return Ok(Vec::new());
-    }
-    let all = Catalogue::existing(folder)?.all()?;
-    Ok(all
+    Ok(runs_in(folder)?
         .into_iter()
         .map(|entry| {
             let run = folder.join(&entry.folder);

@@ -114,7 +114,8 @@ fn summary(folder: &Path) -> Option<Summary> {
 }
 
 fn planned(folder: &Path) -> Option<usize> {
-    summary(folder).map(|summary| summary.planned)
+    let begun = run_dir::identity_in(folder).ok().map(|run| run.planned).filter(|planned| *planned > 0);
+    begun.or_else(|| Some(summary(folder)?.planned))
 }
 
 /// What a run is of, from its record.

@@ -1,4 +1,4 @@
-//! What a sweep tells: its passes, events and end, as the record, the catalogue and the report hold them.
+//! What a sweep tells: its passes, events and end, as the record and the report hold them.
 
 use crate::ambient::{AIR, Level, Source, shown};
 use crate::certificates::temperature::TemperatureFlag;
@@ -10,7 +10,7 @@ use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip};
 use serde::{Deserialize, Serialize};
 
-/// A finished pass with its comparison: what the record, the catalogue and the report hold.
+/// A finished pass with its comparison: what the record and the report hold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredPass {
     /// The row of the point table.
@@ -225,7 +225,7 @@ pub enum Outcome {
     },
     /// Nothing was heard of the loop.
     LoopLost,
-    /// Record, passes, catalogue, summary or report could not be written: a measurement that is not stored is
+    /// Record, passes, summary or report could not be written: a measurement that is not stored is
     /// not made.
     RecordLost,
     /// What the finger was exposed to could not be written in time: nothing is driven that is not counted.

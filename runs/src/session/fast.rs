@@ -46,7 +46,7 @@ pub fn run(
     let mut bench = Bench::open(&sequence, None, Some(air), answers)?;
     let ports = ports_of(&job, world);
     let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
-    let mut keeper = Keeper::begin(&job, dir, planned, keeper::unix_ns())?;
+    let mut keeper = Keeper::begin(&job, dir, planned)?;
     let rig =
         VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports).from(Nanos::from_seconds(start_s));
     let record = keeper.new_record().and_then(|file| {

@@ -1,11 +1,11 @@
-//! Keeps what a sweep yields: record, point table, catalogue. It runs beside the loop and may touch files.
+//! Writes what a sweep yields: record, point table, summary, report. It runs beside the loop, so it may touch
+//! files.
 #![allow(clippy::disallowed_methods, reason = "a run says when it began")]
 
 use super::{Job, Notes, Summary, Unfinished, Update};
 use crate::ambient::levels_of;
-use crate::catalogue::{Catalogue, RunEntry};
 use crate::files::Placed;
-use crate::run_dir::RunDir;
+use crate::run_dir::{RunDir, SUMMARY};
 use crate::sequence::{Event, MeasuredPass, Outcome};
 use crate::setup::Guards;
 use crate::supervisor::OffReport;
@@ -23,8 +23,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Name of the file that says how a run ended.
-const SUMMARY: &str = "summary.json";
 /// Name of the file in a record that a replay needs.
 pub const REPLAYABLE: &str = "loop.json";
 
@@ -41,14 +39,9 @@ pub struct Replayable {
 /// The open files of a run.
 pub struct Keeper {
     dir: RunDir,
-    catalogue: Catalogue,
-    folder: String,
     passes: usize,
     planned: usize,
     protocol: BTreeMap<String, toml::Value>,
-    departed: bool,
-    /// The catalogue could not be written: it is left alone until the end.
-    unnoted: bool,
     guards: Guards,
 }
 
@@ -95,21 +88,19 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
 }
 
 impl Keeper {
-    /// Opens the catalogue, begins a session of the run and enters it.
+    /// Begins a session of the run.
     ///
     /// # Errors
-    /// Whatever file system and SQLite say: a refusal as long as nothing stays behind.
-    pub fn begin(job: &Job, mut dir: RunDir, planned: usize, start_unix_ns: u64) -> miette::Result<Self> {
-        let catalogue = Self::catalogue(&dir)?;
-        dir.begin().wrap_err(Unfinished::NotKept)?;
-        Self::enter(job, dir, catalogue, planned, start_unix_ns).wrap_err(Unfinished::NotKept)
+    /// Whatever the file system says.
+    pub fn begin(job: &Job, mut dir: RunDir, planned: usize) -> miette::Result<Self> {
+        dir.begin().and_then(|()| Self::of(job, dir, planned)).wrap_err(Unfinished::NotKept)
     }
 
     /// The end of a run whose passes were all made in earlier sessions: nothing is driven. What an earlier session wrote at its
     /// end stays; where none came so far, it is written now.
     ///
     /// # Errors
-    /// Whatever file system and SQLite say.
+    /// Whatever the file system says.
     pub fn finish(
         job: &Job,
         mut dir: RunDir,
@@ -122,53 +113,24 @@ impl Keeper {
         if let Some(summary) = written.filter(|s| s.outcome == Outcome::Complete && s.passes == planned) {
             return Ok(Summary { folder: dir.path().to_path_buf(), finished_before: true, ..summary });
         }
-        let catalogue = Self::catalogue(&dir)?;
-        let keeper = Self::enter(job, dir, catalogue, planned, unix_ns()).wrap_err(Unfinished::NotKept)?;
+        let keeper = Self::of(job, dir, planned).wrap_err(Unfinished::NotKept)?;
         Ok(Summary {
             finished_before: true,
             ..keeper.end(Outcome::Complete, agreement, None, 0, BTreeMap::new(), OffReport::off())
         })
     }
 
-    fn catalogue(dir: &RunDir) -> miette::Result<Catalogue> {
-        let runs = dir
-            .path()
-            .parent()
-            .filter(|p| !p.as_os_str().is_empty())
-            .map_or_else(|| std::path::PathBuf::from("."), std::path::Path::to_path_buf);
-        Catalogue::open(&runs)
-    }
-
-    fn enter(
-        job: &Job,
-        dir: RunDir,
-        catalogue: Catalogue,
-        planned: usize,
-        start_unix_ns: u64,
-    ) -> miette::Result<Self> {
+    fn of(job: &Job, dir: RunDir, planned: usize) -> miette::Result<Self> {
         dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())?;
-        let folder = dir.path().file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        let passes = dir.made.len();
-        catalogue.begin(&RunEntry {
-            folder: folder.clone(),
-            plan: job.plan.file.name.clone(),
-            setup: job.setup.file.name.clone(),
-            started_unix_s: start_unix_ns as f64 * 1e-9,
-            outcome: String::new(),
-            passes: passes as i64,
-            planned: planned as i64,
-            departed: false,
-        })?;
-        let guards = job.setup.guards();
-        let (protocol, departed, unnoted) = (job.plan.protocol(), false, false);
-        Ok(Keeper { dir, catalogue, folder, passes, planned, protocol, departed, unnoted, guards })
+        let (passes, protocol, guards) = (dir.made.len(), job.plan.protocol(), job.setup.guards());
+        Ok(Keeper { dir, passes, planned, protocol, guards })
     }
 
     /// Keeps what a row led to and passes it on. Returns the pass, once it is safe.
     ///
     /// # Errors
-    /// Whatever file system and SQLite say: the sweep must stop then. Passes that come until it has stopped may still be given
-    /// here: they are stored if possible.
+    /// Whatever the file system says: the sweep must stop then. Passes that come until it has stopped may still
+    /// be given here: they are written where they can be.
     pub fn keep(
         &mut self,
         events: &[Event],
@@ -176,28 +138,20 @@ impl Keeper {
         news: &mut dyn FnMut(Update<'_>),
     ) -> miette::Result<()> {
         for event in events {
-            self.departed |= matches!(event, Event::ModelDeparted { .. });
             news(Update::Event(event));
         }
         if let Some(pass) = pass {
             self.dir.keep(pass)?;
             self.passes += 1;
-            let noted = if self.unnoted { Ok(()) } else { self.note() };
-            self.unnoted |= noted.is_err();
             news(Update::Pass(pass));
-            return noted;
         }
         Ok(())
     }
 
-    fn note(&self) -> miette::Result<()> {
-        self.catalogue.progress(&self.folder, self.passes as i64, self.departed)
-    }
-
-    /// Ends the run: catalogue, summary, report. A failure to write them is reported, and makes a sweep that
-    /// went well one whose record is lost; the summary is returned all the same.
+    /// Ends the run: summary, report. What cannot be written is logged, and makes a sweep that went well one
+    /// whose record is lost; the summary is returned all the same.
     pub fn end(
-        mut self,
+        self,
         outcome: Outcome,
         agreement: Agreement,
         machine: Option<(LoopReport, StallReport, Option<HeldBack>)>,
@@ -232,18 +186,13 @@ impl Keeper {
             finished_before: false,
             guards: self.guards.clone(),
         };
-        self.departed |= summary.model_departed;
-        // The catalogue last: what it calls complete has its summary and its report.
-        let written = [self.write_end(&summary), self.note_end(&summary)];
-        let mut saved = true;
-        for why in written.iter().filter_map(|w| w.as_ref().err()) {
-            saved = false;
+        if let Err(why) = self.write_end(&summary) {
             tracing::error!("the end of the run could not be saved: {why:#}");
-        }
-        if !saved && matches!(summary.outcome, Outcome::Complete | Outcome::Stopped) {
-            summary.outcome = Outcome::RecordLost;
-            // As far as it goes: one of the two has just failed.
-            let _ = (self.write_end(&summary), self.note_end(&summary));
+            if matches!(summary.outcome, Outcome::Complete | Outcome::Stopped) {
+                summary.outcome = Outcome::RecordLost;
+                // As far as it goes: it has just failed.
+                let _ = self.write_end(&summary);
+            }
         }
         summary
     }
@@ -253,13 +202,6 @@ impl Keeper {
         self.dir.write(SUMMARY, &text).wrap_err("the summary")?;
         let html = crate::report::html(self.dir.path()).wrap_err("the report")?;
         self.dir.write("report.html", html.as_bytes()).wrap_err("the report")
-    }
-
-    fn note_end(&self, summary: &Summary) -> miette::Result<()> {
-        let word = serde_json::to_value(&summary.outcome).into_diagnostic()?;
-        let word = word.get("outcome").and_then(|o| o.as_str()).unwrap_or("?").to_string();
-        self.note()?;
-        self.catalogue.end(&self.folder, &word)
     }
 
     /// A new record file of the run.

@@ -110,9 +110,7 @@ pub fn after_a_cut(ops: &[Op], root: &Path, into: &Path, rng: &mut ChaCha8Rng, d
         let _ = std::fs::create_dir(place(folder));
     }
     for (path, inode) in &safe.files {
-        // The index of the write-ahead log is memory that is mapped: SQLite makes it anew.
-        let shown = path.extension().is_none_or(|e| e != "sqlite-shm");
-        if shown && place(path).parent().is_some_and(Path::exists) {
+        if place(path).parent().is_some_and(Path::exists) {
             std::fs::write(place(path), survived(files.get(inode).cloned().unwrap_or_default(), rng))
                 .unwrap();
         }
