@@ -99,7 +99,7 @@ impl<'a> Problems<'a> {
 
 /// The unit that a key's name ends with.
 pub fn unit_of(key: &str) -> &'static str {
-    const UNITS: [(&str, &str); 10] = [
+    const UNITS: [(&str, &str); 12] = [
         ("_n_per_m", "N/m"),
         ("_m_per_s", "m/s"),
         ("_n_s", "N/s"),
@@ -110,6 +110,8 @@ pub fn unit_of(key: &str) -> &'static str {
         ("_n", "N"),
         ("_s", "s"),
         ("_c", "deg C"),
+        ("_pct", "%"),
+        ("_au", "a.u."),
     ];
     UNITS.iter().find(|(ending, _)| key.ends_with(ending)).map_or("", |(_, unit)| unit)
 }

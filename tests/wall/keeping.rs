@@ -1,6 +1,5 @@
 //! What is kept of a run in wall-clock time: files that vanish or lock in the middle, disks that fill at the end.
 
-use runs::session::Summary;
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};

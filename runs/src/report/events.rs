@@ -100,7 +100,11 @@ fn at_rig(event: &Event) -> String {
         }
         Event::OperatorStep { step, types: None } => format!("AT THE RIG: {step}; then press Enter"),
         Event::OperatorStep { step, types: Some(name) } => {
-            format!("AT THE RIG: {step}; then type {name} and press Enter")
+            let what = match crate::input::unit_of(name) {
+                "" => name.clone(),
+                unit => format!("the value in {unit}"),
+            };
+            format!("AT THE RIG: {step}; then type {what} and press Enter")
         }
         Event::Answered { step, answer, answered_by, .. } => format!("{step}: {answer} ({answered_by})"),
         Event::Waited { step, waited_s } => format!("{step}: waited {waited_s:.0} s"),
