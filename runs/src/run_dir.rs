@@ -55,7 +55,8 @@ pub struct Identity {
     pub protocol: BTreeMap<String, toml::Value>,
 }
 
-/// One session of a run: from its start until its end, a stop or a crash. A run that is taken up again has several.
+/// One session of a run: from its start until its end, a stop or a crash. A run that is taken up again has
+/// several.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Session {
@@ -72,7 +73,8 @@ pub struct RunDir {
     path: PathBuf,
     points: Placed,
     journal: Placed,
-    /// Held, and so locked, for as long as this lives: the system frees it with the process, whatever ends that.
+    /// Held, and so locked, for as long as this lives: the system frees it with the process, whatever ends
+    /// that.
     _lock: File,
     /// Passes that an earlier session has made.
     pub made: Vec<Pass>,
@@ -112,11 +114,12 @@ const SESSIONS: &str = "sessions.jsonl";
 pub const SUMMARY: &str = "summary.json";
 
 impl RunDir {
-    /// Makes a new folder, or takes up one that an earlier session of the same plan, setup, seed and model left.
+    /// Makes a new folder, or takes up one that an earlier session of the same plan, setup, seed and model
+    /// left.
     ///
     /// # Errors
-    /// A folder of another run, or one that a living process holds. Nothing is left behind then, nor where this is dropped
-    /// before [`RunDir::begin`].
+    /// A folder of another run, or one that a living process holds. Nothing is left behind then, nor where
+    /// this is dropped before [`RunDir::begin`].
     pub fn open(path: &Path, identity: &Identity) -> miette::Result<Self> {
         let shown = path.display();
         let mut before_notes = Notes::default();
@@ -314,7 +317,8 @@ pub fn records_in(path: &Path) -> miette::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Whether it is named as a session's record: `run-NUMBER.mcap`. What else ends so was exported into the folder.
+/// Whether it is named as a session's record: `run-NUMBER.mcap`. What else ends so was exported into the
+/// folder.
 fn is_record(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let number = name.strip_prefix("run-").and_then(|rest| rest.strip_suffix(".mcap"));
@@ -350,8 +354,8 @@ pub fn sessions_in(path: &Path) -> miette::Result<Vec<Session>> {
     crate::input::text_of(&file)?.lines().enumerate().map(read).collect()
 }
 
-/// The passes of a run with their comparisons, each point once: a pass whose table line was lost with a power cut is
-/// not counted, one that was journalled twice counts once.
+/// The passes of a run with their comparisons, each point once: a pass whose table line was lost with a power
+/// cut is not counted, one that was journalled twice counts once.
 ///
 /// # Errors
 /// A folder that holds no run, or a table or journal that is damaged.

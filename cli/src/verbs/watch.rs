@@ -17,7 +17,8 @@ pub struct Args {
     run: Option<PathBuf>,
 }
 
-/// Shows a run until somebody leaves it; with `--json`, or where no terminal is, prints passes as they come until the run has ended.
+/// Shows a run until somebody leaves it; with `--json`, or where no terminal is, prints passes as they come
+/// until the run has ended.
 ///
 /// # Errors
 /// No run there.

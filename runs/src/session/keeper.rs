@@ -26,8 +26,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Name of the file in a record that a replay needs.
 pub const REPLAYABLE: &str = "loop.json";
 
-/// What the loop was built from, so that its rows can be run again; the model is that of the finger where the record holds
-/// no model file.
+/// What the loop was built from, so that its rows can be run again; the model is that of the finger where the
+/// record holds no model file.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Replayable {
     /// Limits, timing, estimate.
@@ -96,8 +96,8 @@ impl Keeper {
         dir.begin().and_then(|()| Self::of(job, dir, planned)).wrap_err(Unfinished::NotKept)
     }
 
-    /// The end of a run whose passes were all made in earlier sessions: nothing is driven. What an earlier session wrote at its
-    /// end stays; where none came so far, it is written now.
+    /// The end of a run whose passes were all made in earlier sessions: nothing is driven. What an earlier
+    /// session wrote at its end stays; where none came so far, it is written now.
     ///
     /// # Errors
     /// Whatever the file system says.
@@ -129,8 +129,8 @@ impl Keeper {
     /// Keeps what a row led to and passes it on. Returns the pass, once it is safe.
     ///
     /// # Errors
-    /// Whatever the file system says: the sweep must stop then. Passes that come until it has stopped may still
-    /// be given here: they are written where they can be.
+    /// Whatever the file system says: the sweep must stop then. Passes that come until it has stopped may
+    /// still be given here: they are written where they can be.
     pub fn keep(
         &mut self,
         events: &[Event],
