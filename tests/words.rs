@@ -81,6 +81,26 @@ fn schemas_know_the_keys_of_what_is_bundled() {
     }
 }
 
+/// `init --out` writes the file and the schema that its first line names, and overwrites nothing.
+#[test]
+fn init_writes_a_file_with_its_schema() {
+    let folder = tempfile::tempdir().unwrap();
+    for kind in ["plan", "setup", "fingertip", "profile"] {
+        let file = folder.path().join(format!("my-{kind}.toml"));
+        let begin = || muprime().args(["init", kind, "--out"]).arg(&file).output().unwrap();
+        assert_eq!(begin().status.code(), Some(0));
+        assert_eq!(begin().status.code(), Some(2), "a file that is there stays");
+        let text = std::fs::read_to_string(&file).unwrap();
+        let schema = text.lines().next().unwrap().strip_prefix("#:schema ./").unwrap();
+        let schema = std::fs::read_to_string(folder.path().join(schema)).unwrap();
+        assert!(
+            serde_json::from_str::<serde_json::Value>(&schema).unwrap()["properties"].is_object(),
+            "{kind}"
+        );
+        assert_eq!(muprime().arg("check").arg(&file).output().unwrap().status.code(), Some(0), "{kind}");
+    }
+}
+
 /// What `init` prints is approved by `check`, and the plan and the setup run together.
 #[test]
 fn what_is_begun_is_approved_and_runs() {

@@ -75,6 +75,7 @@ pub mod modbus;
 pub mod modbus_rtu;
 pub mod modbus_tcp;
 pub mod off;
+pub mod peek;
 pub mod ports;
 pub mod remedy;
 pub mod serial;

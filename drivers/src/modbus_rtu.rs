@@ -36,9 +36,7 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
         tracing::warn!(path, "the adapter holds bytes back for up to {late} ms; set its latency_timer to 1");
     }
     session.spawn(move |session| {
-        let line = SharedLine::open(&path, baud, &format)?;
-        let (answer_ms, silence) = (link.response_timeout_ms, rtu::silence_s(baud));
-        let mut wire = Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence };
+        let mut wire = Rtu::open(&path, baud, &format, unit, link.response_timeout_ms)?;
         let health = session.endpoint.health();
         health.count(&health.connections);
         let stream = session.endpoint.profile().description.stream.clone();
@@ -68,7 +66,8 @@ fn write_request(unit: u8, table: Table, address: u16, registers: &[u16]) -> Req
     }
 }
 
-struct Rtu {
+/// A unit on a line.
+pub struct Rtu {
     line: SharedLine,
     unit: u8,
     answer_ms: u32,
@@ -77,6 +76,25 @@ struct Rtu {
 }
 
 impl Rtu {
+    /// A unit on the line at `path`; answers may take `answer_ms`.
+    ///
+    /// # Errors
+    /// Where the port is not there, is in use, or the format makes no sense.
+    pub fn open(path: &str, baud: u32, format: &str, unit: u8, answer_ms: u32) -> Result<Self, Ended> {
+        let line = SharedLine::open(path, baud, format)?;
+        Ok(Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence: rtu::silence_s(baud) })
+    }
+
+    /// Reads registers, as bytes in the order of the wire.
+    ///
+    /// # Errors
+    /// See [`Trouble`].
+    pub fn read_registers(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
+        let request = rtu::read(self.unit, read_function(table), address, count);
+        let answer = self.ask(&request)?;
+        self.judged(rtu::registers(&request, &answer))
+    }
+
     /// Writes the safe set-points, every block of them, and needs no answer. The 'off' that is answered and read back follows.
     fn send_unanswered_off(&mut self, session: &Session) -> Result<(), Ended> {
         let profile = session.endpoint.profile();
@@ -203,9 +221,7 @@ impl Registers for Rtu {
         address: u16,
         count: u16,
     ) -> Result<Vec<u8>, Trouble> {
-        let request = rtu::read(self.unit, read_function(table), address, count);
-        let answer = self.ask(&request)?;
-        self.judged(rtu::registers(&request, &answer))
+        self.read_registers(table, address, count)
     }
 
     fn write(

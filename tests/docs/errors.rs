@@ -119,8 +119,13 @@ const TYPED: &[&str] = &[
     "calibrate force weights.csv",
     "calibrate amplitude --table weights.csv --operator A --serial S",
     "doctor --setup nosuch",
+    "doctor peek tcp:127.0.0.1:1 0..3",
+    "doctor peek rtu:nosuch 0..3",
+    "doctor peek rtu:nosuch 0..999",
+    "doctor peek rtu:nosuch",
     "show nosuch",
     "init nosuch",
+    "init plan --out words.csv",
     "schema nosuch",
     "doc profile nosuch",
     "completions nosuch",
@@ -229,7 +234,7 @@ pub fn page() -> (String, Vec<String>) {
             told = vec![lines.collect::<Vec<_>>().join(" ")];
         }
         let told =
-            told.join(". ").replace('\n', " ").replace('|', "\\|").replace('<', "&lt;").replace("..", ".");
+            told.join(". ").replace('\n', " ").replace('|', "\\|").replace('<', "&lt;").replace(".. ", ". ");
         page.push_str(&format!(
             "| `{typed}` | {} |\n",
             told.split_whitespace().collect::<Vec<_>>().join(" ")

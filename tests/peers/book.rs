@@ -55,6 +55,13 @@ fn told(page: &Page, seen: &Followed) {
     update(page, &seen.came);
 }
 
+/// The drawings are those of their script, whose cycle is that of the spring-slider.
+#[test]
+fn the_pictures_are_as_their_script_draws_them() {
+    let drawn = python().arg(file("book/pictures.py")).arg("--check").output().unwrap();
+    assert!(drawn.status.success(), "{}", texts(&drawn).1);
+}
+
 /// Every block of every chapter is run or says why not; what is run answers what the page says.
 #[test]
 fn the_chapters_do_what_they_say() {

@@ -10,5 +10,7 @@ mod line_peers;
 mod lines;
 #[path = "wire/own_profiles.rs"]
 mod own_profiles;
+#[path = "wire/peek.rs"]
+mod peek;
 #[path = "wire/peers.rs"]
 mod peers;

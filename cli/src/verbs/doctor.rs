@@ -1,5 +1,7 @@
 //! `muprime doctor`: judges this machine truthfully, and talks to the instruments of a setup.
 
+mod peek;
+
 use realtime::pacing;
 use rig::doctor::{Finding, Target};
 use rig::emulators::Embedded;
@@ -16,7 +18,10 @@ use std::time::{Duration, Instant};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct Args {
+    #[command(subcommand)]
+    what: Option<What>,
     /// Setup whose instruments are talked to
     #[arg(long)]
     setup: Option<String>,
@@ -29,6 +34,12 @@ pub struct Args {
     /// Only the setup's instruments, not the machine: the exit status then speaks of them alone
     #[arg(long, requires = "setup")]
     instruments_only: bool,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Show the registers, CAN frames or lines of an instrument without a profile; it never writes
+    Peek(peek::Args),
 }
 
 #[derive(Debug, Serialize)]
@@ -51,6 +62,9 @@ struct Lateness {
 /// # Errors
 /// A setup or a plan that cannot be used.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    if let Some(What::Peek(args)) = &args.what {
+        return peek::run(args, json);
+    }
     let setup = args.setup.as_deref().map(Setup::load).transpose()?;
     let (findings, lateness_us) =
         if args.instruments_only { (Vec::new(), None) } else { judge(args.seconds) };

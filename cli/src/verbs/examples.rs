@@ -39,6 +39,10 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ),
     ("doctor", "muprime doctor\nmuprime doctor --setup my-setup.toml --instruments-only"),
     (
+        "doctor peek",
+        "muprime doctor peek rtu:/dev/ttyUSB0 100..103 --unit 3\nmuprime doctor peek tcp:192.168.1.20:502 0..11 --table input\nmuprime doctor peek can0\nmuprime doctor peek /dev/ttyUSB0 --baud 115200",
+    ),
+    (
         "diagnose",
         "muprime diagnose runs/monday\nmuprime diagnose points.csv --rig rig.toml --report out.html --save-model MODEL.toml",
     ),
@@ -84,7 +88,7 @@ pub const EXAMPLES: &[(&str, &str)] = &[
         muprime import stroke.txt --series --map 't=time:s, x=position:mm, Fz=normal_force:-N, Fx=lateral_force:N' --set amplitude_pp_m=0 -o stroke",
     ),
     ("schema", "muprime schema plan"),
-    ("init", "muprime init setup"),
+    ("init", "muprime init setup\nmuprime init plan --out my-plan.toml"),
     ("show", "muprime show\nmuprime show first-sweep\nmuprime show --sample moist --out moist"),
     ("doc profile", "muprime doc profile my-sensor.toml\nmuprime doc profile labjack-t7"),
     ("man", "muprime man man1"),

@@ -1,6 +1,9 @@
 //! `muprime init KIND`: a commented file to begin with.
 
-use runs::out;
+use miette::IntoDiagnostic;
+use runs::files::write_whole;
+use runs::{out, say};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use tables::schemas::init::{Kind, text};
 
@@ -9,13 +12,27 @@ use tables::schemas::init::{Kind, text};
 pub struct Args {
     /// What to begin
     kind: Kind,
+    /// Write it to this file, and its schema beside it, by which editors complete and check
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
 }
 
-/// Prints the file.
+/// Prints the file, or writes it with its schema.
 ///
 /// # Errors
-/// None.
+/// A file that is there already, or cannot be written.
 pub fn run(args: &Args) -> miette::Result<ExitCode> {
-    out!("{}", text(args.kind).trim_end());
+    let text = text(args.kind);
+    let Some(path) = &args.out else {
+        out!("{}", text.trim_end());
+        return super::exit(super::DONE);
+    };
+    if path.exists() {
+        miette::bail!(help = "give another name with --out", "{} is there already", path.display());
+    }
+    let schema = path.with_file_name(format!("{}.schema.json", args.kind.name()));
+    write_whole(path, text)?;
+    write_whole(&schema, serde_json::to_string_pretty(&args.kind.schema()).into_diagnostic()?)?;
+    say!("{} and {}; next: muprime check {}", path.display(), schema.display(), path.display());
     super::exit(super::DONE)
 }

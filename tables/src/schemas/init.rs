@@ -13,14 +13,33 @@ pub enum Kind {
     Profile,
 }
 
-/// The file. Its first line names the schema that editors complete by, as `muprime schema KIND` prints it.
+impl Kind {
+    /// Its name, as it is typed.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Plan => "plan",
+            Kind::Setup => "setup",
+            Kind::Fingertip => "fingertip",
+            Kind::Profile => "profile",
+        }
+    }
+
+    /// Its schema.
+    pub fn schema(self) -> serde_json::Value {
+        use super::schema::Kind as Schema;
+        match self {
+            Kind::Plan => Schema::Plan,
+            Kind::Setup => Schema::Setup,
+            Kind::Fingertip => Schema::Fingertip,
+            Kind::Profile => Schema::Profile,
+        }
+        .schema()
+    }
+}
+
+/// The file. Its first line names the schema that editors complete by; `init KIND --out FILE` writes it beside.
 pub fn text(kind: Kind) -> String {
-    let name = match kind {
-        Kind::Plan => "plan",
-        Kind::Setup => "setup",
-        Kind::Fingertip => "fingertip",
-        Kind::Profile => "profile",
-    };
+    let name = kind.name();
     format!(
         "#:schema ./{name}.schema.json\n# The line above lets editors complete and check: `muprime schema {name} > {name}.schema.json` writes that file.\n{}",
         body(kind)

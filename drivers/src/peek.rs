@@ -1,0 +1,196 @@
+//! A look at an instrument that has no profile yet: registers, CAN frames or bytes. It reads, for a bounded
+//! time, and writes nothing.
+
+use super::modbus::Trouble;
+use super::modbus_rtu::Rtu;
+use super::modbus_tcp::{Tcp, resolve};
+use super::remedy::advice;
+use super::serial::Line;
+use super::session::Ended;
+use instruments::bus::CanEvent;
+use instruments::schema::Table;
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::time::{Duration, Instant};
+
+/// How long a connection may take, and how long an answer, in ms.
+const PATIENCE_MS: u32 = 1000;
+/// Most registers in one request, of Modbus.
+pub const MOST_REGISTERS: u16 = 125;
+/// Most bytes that are listened to.
+pub const MOST_BYTES: usize = 4096;
+
+/// What is at the address.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// A serial line, by its path.
+    Serial(String),
+    /// `host:port`.
+    Tcp(String),
+    /// A CAN interface, or `slcan:PATH`.
+    Can(String),
+}
+
+impl Place {
+    /// The place that an address means: `rtu:PATH` or `PATH`, `tcp:HOST:PORT`, `can:NAME` or `slcan:PATH`.
+    #[must_use]
+    pub fn of(address: &str) -> Self {
+        let interface =
+            |name: &str| name.strip_prefix("vcan").or(name.strip_prefix("can")).map(str::is_empty);
+        if let Some(host) = address.strip_prefix("tcp:") {
+            Self::Tcp(host.into())
+        } else if let Some(name) = address.strip_prefix("can:") {
+            Self::Can(name.into())
+        } else if address.starts_with("slcan:")
+            || (interface(address) == Some(false) && !address.contains('/'))
+        {
+            Self::Can(address.into())
+        } else {
+            Self::Serial(address.strip_prefix("rtu:").unwrap_or(address).into())
+        }
+    }
+}
+
+/// How a serial line or a bus runs.
+#[derive(Debug, Clone)]
+pub struct Speed {
+    /// Symbols per second of a serial line.
+    pub baud: u32,
+    /// Its format, such as `8N1`.
+    pub format: String,
+    /// Bits per second of a CAN bus behind a serial adapter.
+    pub bitrate: u32,
+}
+
+/// An error in words, with what to look at.
+fn words(ended: &Ended) -> String {
+    let problem = ended.to_string();
+    format!("{problem}; {}", advice(&problem))
+}
+
+/// Reads `count` registers from `first` on, over Modbus TCP or RTU.
+///
+/// # Errors
+/// Nobody there, or an answer that is no good, in words with the remedy.
+pub fn registers(
+    place: &Place,
+    speed: &Speed,
+    unit: u8,
+    table: Table,
+    (first, count): (u16, u16),
+) -> Result<Vec<u16>, String> {
+    let read = match place {
+        Place::Tcp(host) => {
+            let address = resolve(host, Some(502))?;
+            let runtime = tokio::runtime::Builder::new_current_thread()
+                .enable_all()
+                .build()
+                .map_err(|error| error.to_string())?;
+            let clock = Instant::now().into();
+            let connected = Tcp::connect((&runtime, &clock), address, unit, PATIENCE_MS, PATIENCE_MS);
+            connected.map_err(|ended| words(&ended))?.read_registers(table, first, count)
+        }
+        Place::Serial(path) => Rtu::open(path, speed.baud, &speed.format, unit, PATIENCE_MS)
+            .map_err(|ended| words(&ended))?
+            .read_registers(table, first, count),
+        Place::Can(name) => return Err(format!("{name} is a CAN bus and has no registers; leave them out")),
+    };
+    let bytes = read.map_err(|trouble| match trouble {
+        Trouble::Refused(why) => format!("the instrument refused: {why}"),
+        Trouble::Corrupt(why) => format!("{why}; check speed, format and wiring of the line"),
+        Trouble::Ended(ended) => words(&ended),
+    })?;
+    Ok(bytes.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect())
+}
+
+/// Frames of one identifier.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Frames {
+    /// How many came.
+    pub count: u32,
+    /// The data of the last one.
+    pub data: Vec<u8>,
+}
+
+/// Listens to a CAN bus; frames by identifier, and whether that has 29 bits.
+///
+/// # Errors
+/// No bus, or one that fails, in words.
+pub fn frames(name: &str, bitrate: u32, long: Duration) -> Result<BTreeMap<(u32, bool), Frames>, String> {
+    let mut port = super::can::open(name, bitrate).map_err(|ended| words(&ended))?;
+    let (until, mut seen) = (Instant::now() + long, BTreeMap::<_, Frames>::new());
+    while Instant::now() < until {
+        match port.receive(until).map_err(|error| error.to_string())? {
+            Some(CanEvent::Frame(frame, _)) => {
+                let of = seen.entry((frame.id, frame.extended)).or_default();
+                *of = Frames { count: of.count + 1, data: frame.data().to_vec() };
+            }
+            Some(CanEvent::BusOff | CanEvent::Passive) => return Err(super::can::PASSIVE.into()),
+            Some(CanEvent::Warning | CanEvent::Other) | None => {}
+        }
+    }
+    Ok(seen)
+}
+
+/// Listens to a serial line or a TCP server, and returns the bytes that came.
+///
+/// # Errors
+/// Nobody there, or a line that fails, in words.
+pub fn bytes(place: &Place, speed: &Speed, long: Duration) -> Result<Vec<u8>, String> {
+    let until = Instant::now() + long;
+    let (mut came, mut buffer) = (Vec::new(), [0; 512]);
+    let mut next: Box<dyn FnMut(&mut [u8]) -> Result<usize, Ended>> = match place {
+        Place::Serial(path) => {
+            let mut line = Line::open(path, speed.baud, &speed.format).map_err(|ended| words(&ended))?;
+            Box::new(move |buffer| line.read(buffer, until))
+        }
+        Place::Tcp(host) => {
+            let address = resolve(host, None)?;
+            let patience = Duration::from_millis(PATIENCE_MS.into());
+            let connected = std::net::TcpStream::connect_timeout(&address, patience);
+            let mut stream = connected.map_err(|error| words(&error.into()))?;
+            Box::new(move |buffer| {
+                let left = until.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
+                stream.set_read_timeout(Some(left))?;
+                match stream.read(buffer) {
+                    Err(e)
+                        if matches!(
+                            e.kind(),
+                            std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
+                        ) =>
+                    {
+                        Ok(0)
+                    }
+                    other => Ok(other?),
+                }
+            })
+        }
+        Place::Can(name) => return Err(format!("{name} is a CAN bus and has no lines")),
+    };
+    while Instant::now() < until && came.len() < MOST_BYTES {
+        match next(&mut buffer).map_err(|ended| words(&ended))? {
+            0 => break,
+            count => came.extend_from_slice(&buffer[..count]),
+        }
+    }
+    came.truncate(MOST_BYTES);
+    Ok(came)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Place;
+
+    #[test]
+    fn addresses_say_what_is_there() {
+        let serial = Place::Serial("/dev/ttyUSB0".into());
+        assert_eq!(Place::of("rtu:/dev/ttyUSB0"), serial);
+        assert_eq!(Place::of("/dev/ttyUSB0"), serial);
+        assert_eq!(Place::of("tcp:10.0.0.7:502"), Place::Tcp("10.0.0.7:502".into()));
+        for name in ["can0", "vcan1", "slcan:/dev/ttyACM0"] {
+            assert_eq!(Place::of(name), Place::Can(name.into()));
+        }
+        assert_eq!(Place::of("can:mybus"), Place::Can("mybus".into()));
+        assert_eq!(Place::of("can/port"), Place::Serial("can/port".into()));
+    }
+}
