@@ -55,21 +55,26 @@ pub fn odds_base10(log: f64) -> String {
     if log > 6.0 { "odds above 1e6 to 1".into() } else { format!("odds of {:.0} to 1", 10f64.powf(log)) }
 }
 
+/// An effect's or a parameter's name in words.
+fn plain(name: &str) -> String {
+    name.replace('_', " ")
+}
+
 /// What a terminal shows.
 pub fn terminal(result: &Diagnosis) -> String {
     let r = &result.report;
     let mut text = format!("{}\n\nHypotheses\n", r.text);
     for h in r.hypotheses.iter().filter(|h| h.probability > 0.005).take(8) {
-        let name = if h.effects.is_empty() { "no gap".to_string() } else { h.effects.join(" + ") };
+        let name = if h.effects.is_empty() { "no gap".to_string() } else { plain(&h.effects.join(" + ")) };
         text.push_str(&format!("  {:>7}  {name}", probability(h.probability)));
         if h.alias_class.len() > 1 {
-            text.push_str(&format!("  (cannot be separated from {})", h.alias_class[1..].join(", ")));
+            text.push_str(&format!("  (cannot be separated from {})", plain(&h.alias_class[1..].join(", "))));
         }
         text.push('\n');
         if h.probability > 0.05 {
             for p in &h.parameters {
                 let value = crate::report::human::with_interval(p.value, p.ci95, p.unit);
-                text.push_str(&format!("         {} = {value}\n", p.name));
+                text.push_str(&format!("         {} = {value}\n", plain(&p.name)));
             }
         }
     }
@@ -80,7 +85,7 @@ pub fn terminal(result: &Diagnosis) -> String {
         text.push_str(&format!("  {} ({} against no gap)\n", d.text, odds_base10(d.log10_odds_vs_no_gap)));
     }
     if !r.at_least.is_empty() {
-        text.push_str(&format!("\nAt least {}; the rest is open\n", r.at_least.join(", ")));
+        text.push_str(&format!("\nAt least {}; the rest is open\n", plain(&r.at_least.join(", "))));
     }
     let g = &r.gap;
     let share = |rmse: Option<f64>| {
@@ -115,7 +120,7 @@ pub fn terminal(result: &Diagnosis) -> String {
         for e in r.next_experiment.iter().take(4) {
             text.push_str(&format!("  {}", e.text));
             if e.conditions.is_empty() {
-                let [a, b] = &e.separates;
+                let [a, b] = e.separates.each_ref().map(|name| plain(name));
                 text.push_str(&format!(
                     " (separates {a} from {b}: {} expected)",
                     diagnosis::next::odds(e.expected_nats)
@@ -127,7 +132,7 @@ pub fn terminal(result: &Diagnosis) -> String {
     if !r.not_testable.is_empty() {
         text.push_str("\nThis table cannot test\n");
         for n in &r.not_testable {
-            text.push_str(&format!("  {}: {}\n", n.effect, n.because));
+            text.push_str(&format!("  {}: {}\n", plain(&n.effect), n.because));
         }
     }
     for remark in &r.remarks {

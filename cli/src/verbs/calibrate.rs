@@ -5,6 +5,7 @@ use miette::IntoDiagnostic;
 use rig::bench::AtTheBench;
 use runs::calibrate::{Issued, What, certified, verify};
 use runs::out;
+use runs::report::human::{number, to_its_uncertainty};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -80,18 +81,13 @@ fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
 fn show(certificate: &Certificate, out: &Path) {
     out!("{} certificate for {}: {}", certificate.kind, certificate.instrument.serial, out.display());
     for p in &certificate.parameters {
-        out!(
-            "  {:<34} {:>14.6e} +- {:.1e} {}  95 %: {:.6e} to {:.6e}",
-            p.name,
-            p.value,
-            p.standard_uncertainty,
-            p.unit,
-            p.ci95[0],
-            p.ci95[1]
-        );
+        let sd = p.standard_uncertainty;
+        let [value, sd, low, high] = [p.value, sd, p.ci95[0], p.ci95[1]].map(|x| to_its_uncertainty(x, sd));
+        out!("  {:<34} {value} +- {sd} {} (95 %: {low} to {high})", p.name.replace('_', " "), p.unit);
     }
     let r = &certificate.residuals;
-    out!("  residuals: {} of sd {:.3e}, largest {:.3e} {}", r.count, r.sd, r.largest, r.unit);
+    let [sd, largest] = [r.sd, r.largest].map(number);
+    out!("  residuals: {} with sd {sd}, largest {largest} {}", r.count, r.unit);
     for remark in &certificate.remarks {
         out!("  note: {remark}");
     }

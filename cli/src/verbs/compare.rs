@@ -73,13 +73,13 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     }
     let worst = result.furthest_first();
     if !worst.is_empty() {
-        w.push_str("largest differences (w peak-to-peak; second minus first, in standard deviations):\n");
-        w.push_str("     w, um  f, kHz  U, mm/s  F, N  first second difference (sd)\n");
+        w.push_str("largest differences (w peak-to-peak; difference: second minus first):\n");
+        w.push_str("  w, um  f, kHz  U, mm/s  F, N  first  second  difference    sd\n");
     }
     for p in worst.iter().take(PRINTED) {
         let _ = writeln!(
             w,
-            "  {:6.3} um {:6.2} kHz {:+6.1} mm/s {:.2} N  {:.3} {:.3}  {:+.3} ({:+.1})",
+            "  {:5.2} {:7.1} {:+8.1} {:5.2}  {:5.2} {:7.2} {:+11.3} {:+5.1}",
             p.amplitude_pp_m * 1e6,
             p.frequency_hz / 1e3,
             p.speed_m_s * f64::from(p.direction) * 1e3,

@@ -2,6 +2,7 @@
 
 mod sample;
 
+use runs::print::folded;
 use runs::{out, say};
 use sample::Sample;
 use std::path::PathBuf;
@@ -40,7 +41,9 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
             }
         }
         (None, _) if json => all.iter().for_each(|b| out!("{}", serde_json::json!(b))),
-        (None, _) => all.iter().for_each(|b| out!("{:<10} {:<26} {}", b.kind, b.name, b.about())),
+        (None, _) => all
+            .iter()
+            .for_each(|b| out!("{}", folded(&format!("{:<10} {:<26} {}", b.kind, b.name, b.about()), 38))),
         (Some(name), _) => {
             let Some(found) = all.iter().find(|b| b.name == name) else {
                 miette::bail!(

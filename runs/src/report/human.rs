@@ -43,6 +43,16 @@ pub fn number(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
+/// A value to the second digit of its standard uncertainty: `119.53` for 119.5273 with 0.36.
+pub fn to_its_uncertainty(value: f64, sd: f64) -> String {
+    let small = |x: f64| x != 0.0 && !(1e-3..1e6).contains(&x.abs());
+    if !sd.is_finite() || sd <= 0.0 || small(value) || small(sd) {
+        return number(value);
+    }
+    let digits = (1 - sd.log10().floor() as i32).max(0) as usize;
+    format!("{value:.digits$}")
+}
+
 /// A value with its interval and unit, in one scale: `0.0766 [0.05, 0.11] 1/um²`. Units that are not listed stay as they are, and a
 /// pure number has none.
 pub fn with_interval(value: f64, [low, high]: [f64; 2], unit: &str) -> String {
@@ -86,6 +96,14 @@ pub fn p_value(p: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::{number, p_value, with_interval};
+
+    #[test]
+    fn values_end_with_their_uncertainty() {
+        let shown = |value, sd| super::to_its_uncertainty(value, sd);
+        assert_eq!([shown(119.5273, 0.36), shown(0.36, 0.36)], ["119.53", "0.36"]);
+        assert_eq!([shown(3300.077, 24.0), shown(1.5e-7, 1e-9)], ["3300", "1.50\u{d7}10\u{207b}\u{2077}"]);
+        assert_eq!(shown(2.0, 0.0), "2");
+    }
 
     #[test]
     fn quantities_are_read_near_one() {

@@ -15,9 +15,15 @@ pub struct Bundled {
 }
 
 impl Bundled {
-    /// Its first comment, which says what it is.
-    pub fn about(&self) -> &'static str {
-        self.text.lines().find_map(|l| l.strip_prefix("# ")).unwrap_or_default()
+    /// The first sentences of its first comment, which say what it is; of a fingertip the material.
+    pub fn about(&self) -> String {
+        let lines = self.text.lines().skip_while(|line| !line.starts_with("# "));
+        let comment: Vec<&str> = lines.map_while(|line| line.strip_prefix("# ")).collect();
+        let material = || self.text.lines().find_map(|line| line.strip_prefix("material = "));
+        let Some(all) = Some(comment.join(" ")).filter(|all| !all.is_empty()) else {
+            return material().unwrap_or_default().trim_matches('"').to_string();
+        };
+        all.split_inclusive(". ").take(2).collect::<String>().trim_end().to_string()
     }
 }
 

@@ -1,8 +1,10 @@
 //! `muprime model effects`: the library of candidate effects.
 
 use clap::Args;
+use effects::effect::Prior;
 use miette::IntoDiagnostic;
 use runs::out;
+use runs::report::human::number;
 use std::process::ExitCode;
 
 /// Arguments.
@@ -41,12 +43,24 @@ pub fn run(args: &EffectsArgs, json: bool) -> miette::Result<ExitCode> {
             out!("  law: {}", law.name);
             for p in law.parameters {
                 let zero = p.zero.map_or_else(|| "none (a shape)".into(), |z| z.to_string());
-                let (unit, prior) = (p.unit, serde_json::to_string(&p.prior).into_diagnostic()?);
+                let (unit, prior) = (p.unit, prior(p.prior));
                 out!("    {} [{unit}]: zero {zero}, prior {prior}, {} to {}", p.name, p.lower, p.upper);
             }
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A prior in words.
+fn prior(prior: Prior) -> String {
+    match prior {
+        Prior::Normal(sd) => format!("normal with sd {}", number(sd)),
+        Prior::HalfNormal(sd) => format!("not negative, half normal with sd {}", number(sd)),
+        Prior::LogNormal(median, sd) => {
+            format!("positive, median {}, sd of the logarithm {sd}", number(median))
+        }
+        Prior::Uniform(low, high) => format!("uniform from {low} to {high}"),
+    }
 }
 
 /// A unit variant as the JSON writes it.
