@@ -1,8 +1,8 @@
 //! The control loop with your own force port, in virtual time:
 //! `cargo run --release -p muprime-tests --example own_loop`.
 //!
-//! A port is whatever implements [`ForceSensor`]. This one reads another port and corrects its lateral gain, as
-//! a driver for a laboratory's own sensor would apply its calibration. Safety rules, sweep and comparison are
+//! A port is whatever implements [`ForceSensor`]. This one reads another port and corrects its lateral gain,
+//! as a driver for a laboratory's own sensor would apply its calibration. Safety rules, sweep and comparison are
 //! those of `muprime run`.
 
 use models::prediction::{FrictionModel, SpringSlider};

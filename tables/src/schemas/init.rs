@@ -37,7 +37,7 @@ impl Kind {
     }
 }
 
-/// The file. Its first line names the schema that editors complete by; `init KIND --out FILE` writes it beside.
+/// The file. Its first line names the schema by which editors complete; `init --out` writes it beside.
 pub fn text(kind: Kind) -> String {
     let name = kind.name();
     format!(
