@@ -2,8 +2,8 @@
 //! `cargo run --release -p muprime-tests --example own_loop`.
 //!
 //! A port is whatever implements [`ForceSensor`]. This one reads another port and corrects its lateral gain,
-//! as a driver for a laboratory's own sensor would apply its calibration. Safety rules, sweep and comparison are
-//! those of `muprime run`.
+//! as a driver for a laboratory's own sensor would apply its calibration. Safety rules, sweep and
+//! comparison are those of `muprime run`.
 
 use models::prediction::{FrictionModel, SpringSlider};
 use realtime::cycle::{Command, CycleState};
