@@ -319,6 +319,6 @@ mod tests {
         });
         let most = off::OFF_WITHIN + Duration::from_secs(120);
         let (over, took) = ended.recv_timeout(2 * most).expect("it hangs");
-        assert!(over.unwrap_err().contains("did not show it") && took < most, "{took:?}");
+        assert!(over.unwrap_err().contains("did not show 'off'") && took < most, "{took:?}");
     }
 }
