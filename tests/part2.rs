@@ -71,7 +71,9 @@ fn every_defect_under_the_plan_of_part_2() {
         .par_iter()
         .map(|&(name, seed)| {
             let verdict = verdict("virtual-ideal", Some((name, seed)), 40 + seed);
-            (name, judged(&verdict, name))
+            let judged = judged(&verdict, name);
+            println!("{name}, seed {seed}: {judged}");
+            (name, judged)
         })
         .collect();
     let mut table = BTreeMap::<&str, BTreeMap<&str, u32>>::new();

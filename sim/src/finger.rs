@@ -126,8 +126,21 @@ pub struct Pad {
 impl Pad {
     /// The pad's lateral force (N) after `dt` seconds at a velocity, the contact carrying at most `limit_n`.
     pub fn step(&mut self, stiffness_n_per_m: f64, velocity_m_s: f64, limit_n: f64, dt: f64) -> f64 {
-        let bound = limit_n / stiffness_n_per_m;
+        // A plate that moves in its plane can push the contact forward on the average: that holds no stretch.
+        let bound = limit_n.max(0.0) / stiffness_n_per_m;
         self.stretch_m = (self.stretch_m + velocity_m_s * dt).clamp(-bound, bound);
         stiffness_n_per_m * self.stretch_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Pad;
+
+    #[test]
+    fn a_contact_that_carries_nothing_holds_no_stretch() {
+        let mut pad = Pad::default();
+        assert!(pad.step(1e3, 0.02, 0.1, 1.0) > 0.09);
+        assert_eq!(pad.step(1e3, 0.02, -1e-3, 1.0), 0.0);
     }
 }

@@ -12,9 +12,6 @@ use std::process::{Child, ChildStdout, Stdio};
 use std::time::{Duration, Instant};
 use tests::{muprime, rounds, served};
 
-#[path = "dies/guest.rs"]
-mod guest;
-
 /// Keys of an amplifier's table and of [limits] that its profile needs.
 const AMPLIFIERS: &[(&str, &str, &str)] = &[
     ("muprime-amplifier", "address = \"127.0.0.1:0\"", ""),
@@ -48,14 +45,6 @@ fn setup(amplifier: &(&str, &str, &str), supply: &str) -> String {
         at("[amplifier]", profile, keys),
         at("[stage]", "muprime-stage", "address = \"127.0.0.1:0\""),
     )
-}
-
-/// The amplifier's clock, its output, and the last heartbeat that it got.
-#[derive(Clone, Copy)]
-struct Seen {
-    time_s: f64,
-    on: bool,
-    heartbeat: f64,
 }
 
 /// A served rig that is looked at over a pipe.
@@ -93,23 +82,13 @@ impl Rig {
         setup.lines().map(line).collect()
     }
 
-    /// What the emulator shows.
-    fn seen(&mut self) -> Seen {
+    /// Time of the emulator in s, and whether its output is on.
+    fn look(&mut self) -> (f64, bool) {
         self.process.stdin.as_mut().unwrap().write_all(b"look\n").unwrap();
         let mut line = String::new();
         self.out.read_line(&mut line).unwrap();
         let seen: serde_json::Value = serde_json::from_str(&line).unwrap();
-        Seen {
-            time_s: seen["time_s"].as_f64().unwrap(),
-            on: seen["output_on"].as_bool().unwrap(),
-            heartbeat: seen["heartbeat"].as_f64().unwrap(),
-        }
-    }
-
-    /// Time of the emulator in s, and whether its output is on.
-    fn look(&mut self) -> (f64, bool) {
-        let seen = self.seen();
-        (seen.time_s, seen.on)
+        (seen["time_s"].as_f64().unwrap(), seen["output_on"].as_bool().unwrap())
     }
 }
 
