@@ -342,7 +342,7 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)], &str)] = &[
         "CAN warning, passive",
         &[
             ("drivers/src/can.rs", "a_controller_that_warns_is_noted_and_a_passive_one_ends_the_link"),
-            ("drivers/src/socketcan.rs", "error_frames_are_told_apart"),
+            ("drivers/src/socketcan.rs", "error_frames_are_classified"),
             ("tests/wall/can_kernel.rs", "a_warning_is_noted_and_a_passive_controller_ends_the_link"),
         ],
         "",
@@ -467,7 +467,7 @@ pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)], &str)] = &[
         &[
             (
                 "runs/src/sequence/arming/tests.rs",
-                "a_stall_before_arming_is_told_and_the_second_channel_proved",
+                "a_stall_before_arming_is_reported_and_the_second_channel_proved",
             ),
             ("runs/src/sequence/arming/tests.rs", "a_proof_that_a_stall_broke_off_is_made_again_and_told"),
             (
