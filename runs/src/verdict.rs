@@ -74,7 +74,7 @@ pub fn terminal(result: &Diagnosis) -> String {
         if h.probability > 0.05 {
             for p in &h.parameters {
                 let value = crate::report::human::with_interval(p.value, p.ci95, p.unit);
-                text.push_str(&format!("         {} = {value}\n", plain(&p.name)));
+                text.push_str(&format!("         {} = {value}\n", plain(p.name)));
             }
         }
     }

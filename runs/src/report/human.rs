@@ -46,7 +46,7 @@ pub fn number(value: f64) -> String {
 /// A value to the second digit of its standard uncertainty: `119.53` for 119.5273 with 0.36.
 pub fn to_its_uncertainty(value: f64, sd: f64) -> String {
     let small = |x: f64| x != 0.0 && !(1e-3..1e6).contains(&x.abs());
-    if !sd.is_finite() || sd <= 0.0 || small(value) || small(sd) {
+    if !sd.is_finite() || sd <= 0.0 || small(value) {
         return number(value);
     }
     let digits = (1 - sd.log10().floor() as i32).max(0) as usize;
@@ -102,7 +102,7 @@ mod tests {
         let shown = |value, sd| super::to_its_uncertainty(value, sd);
         assert_eq!([shown(119.5273, 0.36), shown(0.36, 0.36)], ["119.53", "0.36"]);
         assert_eq!([shown(3300.077, 24.0), shown(1.5e-7, 1e-9)], ["3300", "1.50\u{d7}10\u{207b}\u{2077}"]);
-        assert_eq!(shown(2.0, 0.0), "2");
+        assert_eq!([shown(2.0, 0.0), shown(54.98706, 9.9e-4)], ["2", "54.98706"]);
     }
 
     #[test]
