@@ -10,7 +10,7 @@ use realtime::cycle::{Command, CycleState};
 use realtime::ports::{ForceSensor, Forces, Nanos};
 use realtime::turn::{Ports, Tick, turn};
 use runs::plan::{Plan, Resolution};
-use runs::sequence::Sequence;
+use runs::sequence::{Outcome, Sequence};
 use runs::setup::Setup;
 use sim::virtual_rig::VirtualRig;
 use sim::world::WorldConfig;
@@ -34,8 +34,12 @@ impl<S: ForceSensor> ForceSensor for Corrected<S> {
     }
 }
 
-/// Runs a sweep and prints relative friction against amplitude.
-pub fn main() {
+fn main() {
+    println!("{:?}", sweep());
+}
+
+/// Runs a sweep, prints relative friction against amplitude, and returns how it ended.
+pub fn sweep() -> Outcome {
     let setup = Setup::load("virtual-ideal").expect("a bundled setup");
     let plan = Plan::load("first-sweep").expect("a bundled plan");
     let config = setup.config;
@@ -69,8 +73,8 @@ pub fn main() {
             }
         }
         if let Some(outcome) = reaction.outcome {
-            println!("{outcome:?}");
-            return;
+            return outcome;
         }
     }
+    unreachable!("the counter has no end")
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use tests::{file, muprime, texts};
 
 #[path = "../examples/own_loop.rs"]
+#[allow(dead_code, reason = "its main is the example's own")]
 mod own_loop;
 
 /// Files of a folder of examples, by their paths in the repository.
@@ -49,5 +50,5 @@ fn every_plan_runs_on_the_setup_of_the_examples() {
 
 #[test]
 fn the_own_loop_runs_a_whole_sweep() {
-    own_loop::main();
+    assert_eq!(own_loop::sweep(), runs::sequence::Outcome::Complete);
 }

@@ -9,7 +9,7 @@ use realtime::ports::Nanos;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// A link tries this long to switch off and to read it back, lost connections made anew included; then it is
+/// A link tries this long to switch off and to read it back, reconnections included; then it is
 /// given up, and [`Closed::NotReadBack`] says so.
 pub const OFF_WITHIN: Duration = Duration::from_secs(2);
 /// An answer on the way to 'off' may take this long, in ms, where the profile allows less: a slow answer is still one.

@@ -5,12 +5,11 @@ use super::modbus::Trouble;
 use super::modbus_rtu::Rtu;
 use super::modbus_tcp::{Tcp, resolve};
 use super::remedy::advice;
-use super::serial::Line;
 use super::session::Ended;
+use super::transport::Address;
 use instruments::bus::CanEvent;
 use instruments::schema::Table;
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::time::{Duration, Instant};
 
 /// How long a connection may take, and how long an answer, in ms.
@@ -137,40 +136,22 @@ pub fn frames(name: &str, bitrate: u32, long: Duration) -> Result<BTreeMap<(u32,
 /// # Errors
 /// Nobody there, or a line that fails, in words.
 pub fn bytes(place: &Place, speed: &Speed, long: Duration) -> Result<Vec<u8>, String> {
-    let until = Instant::now() + long;
-    let (mut came, mut buffer) = (Vec::new(), [0; 512]);
-    let mut next: Box<dyn FnMut(&mut [u8]) -> Result<usize, Ended>> = match place {
-        Place::Serial(path) => {
-            let mut line = Line::open(path, speed.baud, &speed.format).map_err(|ended| words(&ended))?;
-            Box::new(move |buffer| line.read(buffer, until))
-        }
-        Place::Tcp(host) => {
-            let address = resolve(host, None)?;
-            let patience = Duration::from_millis(PATIENCE_MS.into());
-            let connected = std::net::TcpStream::connect_timeout(&address, patience);
-            let mut stream = connected.map_err(|error| words(&error.into()))?;
-            Box::new(move |buffer| {
-                let left = until.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
-                stream.set_read_timeout(Some(left))?;
-                match stream.read(buffer) {
-                    Err(e)
-                        if matches!(
-                            e.kind(),
-                            std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
-                        ) =>
-                    {
-                        Ok(0)
-                    }
-                    other => Ok(other?),
-                }
-            })
-        }
+    let address = match place {
+        Place::Serial(path) => Address::Serial(path.clone(), speed.baud, speed.format.clone()),
+        Place::Tcp(host) => Address::Tcp(resolve(host, None)?),
         Place::Can(name) => return Err(format!("{name} is a CAN bus and has no lines")),
     };
+    let patience = Duration::from_millis(PATIENCE_MS.into());
+    let mut transport = address.open(patience).map_err(|ended| words(&ended))?;
+    let until = Instant::now() + long;
+    let (mut came, mut buffer) = (Vec::new(), [0; 512]);
     while Instant::now() < until && came.len() < MOST_BYTES {
-        match next(&mut buffer).map_err(|ended| words(&ended))? {
-            0 => break,
-            count => came.extend_from_slice(&buffer[..count]),
+        match transport.read(&mut buffer, until) {
+            Ok(0) => break,
+            Ok(count) => came.extend_from_slice(&buffer[..count]),
+            // A server that closes after its words has shown them.
+            Err(_) if !came.is_empty() => break,
+            Err(ended) => return Err(words(&ended)),
         }
     }
     came.truncate(MOST_BYTES);

@@ -78,7 +78,7 @@ pub struct SeriesOptions<'a> {
     pub average_s: f64,
     /// How long a link that went down is waited for, in s.
     pub reconnect_s: f64,
-    /// Where the series will be stored; until it is whole, each reading stands in the `.part` file beside.
+    /// Where the series will be stored; until it is whole, each reading is in the `.part` file beside.
     pub keep: &'a Path,
 }
 

@@ -120,7 +120,8 @@ pub fn unit_of(key: &str) -> &'static str {
 pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String> {
     let unit = unit_of(key);
     let within = |v: f64| v.is_finite() && v.abs() >= low && v.abs() <= high;
-    if unit.is_empty() || value == 0.0 || within(value) {
+    // Nobody writes thousandths of a per cent, of a degree or of arbitrary units.
+    if matches!(unit, "" | "%" | "a.u." | "deg C") || value == 0.0 || within(value) {
         return None;
     }
     let prefixes: [(f64, &str); 4] = if value.abs() > high {
@@ -284,4 +285,18 @@ pub fn place_of(text: &str, path: &[&str]) -> Option<std::ops::Range<usize>> {
         here = here.get(*name)?.get_ref().as_table()?;
     }
     here.get(*last).map(toml::Spanned::span)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unit_meant;
+
+    #[test]
+    fn a_prefix_is_suggested_for_units_that_take_one() {
+        let of = |key, value| unit_meant(key, value, [1.0, 100.0]);
+        assert!(of("frequency_hz", 5000.0).is_some_and(|words| words.contains("mHz meant?")));
+        for key in ["relative_humidity_pct", "skin_moisture_au", "temperature_c"] {
+            assert_eq!(of(key, 5000.0), None, "{key}");
+        }
+    }
 }

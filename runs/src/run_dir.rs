@@ -55,8 +55,7 @@ pub struct Identity {
     pub protocol: BTreeMap<String, toml::Value>,
 }
 
-/// One session of a run: from its start until its end, a stop or a crash. A run that is taken up again has
-/// several.
+/// One session of a run: from its start until its end, a stop or a crash. A resumed run has several.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Session {

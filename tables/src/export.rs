@@ -92,7 +92,7 @@ pub fn arrow_bytes(run: &RunData) -> miette::Result<Vec<u8>> {
 }
 
 /// Exports the run in `folder` and returns where it stands: `to`, or the format's own name in the folder. A
-/// licence that is stated now stands in place of the one that the run was made with.
+/// licence that is stated now replaces the one that the run was made with.
 ///
 /// # Errors
 /// Whatever the file system or the format's library says; a crate of a run without a licence, or at another

@@ -23,7 +23,7 @@ pub fn jacobian(model: impl Fn(&[f64]) -> Vec<f64>, at: &[f64], step: &[f64]) ->
 /// The bound of independent Gaussian readings with these standard deviations: covariance of the parameters.
 pub fn independent(jacobian: &DMatrix<f64>, sd: &[f64]) -> DMatrix<f64> {
     let whitened = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |i, k| jacobian[(i, k)] / sd[i]);
-    (whitened.transpose() * whitened).try_inverse().expect("the truth can be told from these readings")
+    (whitened.transpose() * whitened).try_inverse().expect("these readings determine the truth")
 }
 
 /// Fisher information of correlated Gaussian readings.

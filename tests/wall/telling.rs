@@ -10,10 +10,13 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tests::served::{self, AmplifierWatch, ServedRig};
 use tests::{muprime, rounds, unhurried};
-use wall::{cut_by_a_stall, unless_the_machine_stalls, wait_until};
+use wall::{Stopwatch, cut_by_a_stall, unless_the_machine_stalls, wait_until};
 
 /// No sweep here takes a tenth of it: one that still runs then waits for somebody.
 const WAITS_FOR_EVER: Duration = Duration::from_secs(90);
+
+/// A sweep with any two listeners: alone it takes 4 s, and each listener has one bound of some seconds for everything.
+const NO_LONGER: Duration = Duration::from_secs(25);
 
 const PLAN: &str = "name = \"told\"\nseed = 3\nreference_every = 4\n[pass]\nsettle_s = 0.05\nmeasure_s = 0.1\napproach_speed_m_s = 0.2\n\
     [base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.05\nnormal_force_n = 0.25\n\
@@ -234,7 +237,9 @@ fn each_listener_beside_each_holds_up_nothing() {
         let mut slowest = Duration::ZERO;
         for &pair in &pairs {
             let what = format!("{pair:?}");
+            let watch = Stopwatch::start();
             let took = keeps_all(&what, |folder, out| with_both(pair, folder, out));
+            watch.judge(took < NO_LONGER, &format!("{what}: ended after {took:.1?}"));
             println!("{what}: ended after {:.1} s", took.as_secs_f64());
             slowest = slowest.max(took);
         }

@@ -2,7 +2,7 @@
 //! `k_l / k_n`, which decides the law of friction (Eq. 16).
 //!
 //! Least squares on the forces in `ln k_n`, `ln (k_l / k_n)` and `ln mu_0` with no prior: each pass weighs by
-//! what the rig repeats to. The interval of the ratio is its profile, `k_n` and `mu_0` searched anew at each
+//! what the rig repeats to. The interval of the ratio is its profile, `k_n` and `mu_0` sought again at each
 //! value. Where the passes scatter more than stated, the interval is as much wider.
 
 use super::FingerError;

@@ -139,15 +139,13 @@ fn at_the_bench(hands: &Hands, plant: &SharedPlant) {
             },
             ["look"] => {
                 let (mut guard, _) = plant.now();
-                let on = guard.measure(Quantity::OutputOn) != 0.0;
-                let heartbeat = guard.measure(Quantity::Heartbeat);
-                let velocity_m_s = guard.measure(Quantity::Velocity);
+                let (on, velocity_m_s) =
+                    (guard.measure(Quantity::OutputOn) != 0.0, guard.measure(Quantity::Velocity));
                 drop(guard);
                 let seen = hands.look();
                 serde_json::json!({
                     "time_s": seen.time_s, "frequency_hz": seen.frequency_hz,
                     "amplitude_pp_m": seen.amplitude_pp_m, "output_on": on, "velocity_m_s": velocity_m_s,
-                    "heartbeat": heartbeat,
                 })
             }
             _ => serde_json::json!({ "error": format!("`{line}`: hang LATERAL_N NORMAL_N, or look") }),

@@ -189,7 +189,7 @@ impl Check {
         }
     }
 
-    /// The check of `body`, as it stands in the frame. `high_first`: its high byte comes first; left out, so
+    /// The check of `body`, as the frame has it. `high_first`: its high byte comes first; left out, so
     /// it is with checks that are not reflected, as is usual.
     #[must_use]
     pub fn of(self, body: &[u8], high_first: Option<bool>) -> Vec<u8> {

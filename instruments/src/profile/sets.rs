@@ -78,7 +78,7 @@ impl Profile {
     }
 
     /// The set-point that a line of text carries, as an emulator hears it: its own value, and those of others
-    /// that stand in the line. A line without a number is 1.
+    /// that the line holds. A line without a number is 1.
     #[must_use]
     pub fn heard(&self, set: SetId, line: &str) -> Option<Vec<(SetId, f64)>> {
         let (pattern, owners) = self.sets[set.0].line.as_ref()?;

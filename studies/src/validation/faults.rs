@@ -1,5 +1,5 @@
 //! Controller, virtual rig and faults in virtual time, from one seed: each fault of the list strikes in each
-//! phase, and the reaction is held against its bound.
+//! phase, and the reaction is compared with its bound.
 //!
 //! `rows` is the list, `bench` runs one scene, `search` runs many seeds over all cores and makes a failure small.
 

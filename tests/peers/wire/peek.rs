@@ -37,6 +37,16 @@ fn registers_of_pymodbus_over_tcp() {
     assert!(!found[0]["error"].as_str().unwrap().contains("os error"), "{found:?}");
 }
 
+/// The example of a foreign controller reads five fresh samples of the virtual rig.
+#[test]
+fn the_example_of_a_foreign_controller_reads_the_rig() {
+    let output = python().arg(file("examples/read_rig.py")).arg(muprime().get_program()).output().unwrap();
+    let (out, err) = texts(&output);
+    let samples: std::collections::BTreeSet<&str> =
+        out.lines().filter_map(|line| line.strip_prefix("sample ")?.split(':').next()).collect();
+    assert!(output.status.success() && samples.len() == 5, "{out}{err}");
+}
+
 /// pymodbus over a serial line, and a unit that is not there.
 #[test]
 fn registers_of_pymodbus_over_a_serial_line() {

@@ -33,8 +33,8 @@ pub struct Args {
     #[arg(long, default_value_t = 500_000)]
     bitrate: u32,
     /// How long to listen to lines or frames, in s (at most 60)
-    #[arg(long, default_value_t = 2.0)]
-    seconds: f64,
+    #[arg(long, default_value = "2", value_parser = duration)]
+    seconds: Duration,
 }
 
 /// Tables of Modbus.
@@ -48,6 +48,12 @@ enum Kind {
     Coil,
     /// Discrete inputs (function 2)
     Discrete,
+}
+
+/// How long to listen.
+fn duration(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().filter(|s| (0.1..=60.0).contains(s));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "give 0.1 to 60 seconds".into())
 }
 
 /// First register and count.
@@ -69,7 +75,7 @@ fn range(text: &str) -> Result<(u16, u16), String> {
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let place = Place::of(&args.address);
     let speed = Speed { baud: args.baud, format: args.format.clone(), bitrate: args.bitrate };
-    let long = Duration::from_secs_f64(args.seconds.clamp(0.1, 60.0));
+    let long = args.seconds;
     let failed = |why: String| miette::miette!("{}: {why}", args.address);
     if let Some((first, count)) = args.registers {
         let table = match args.table {
@@ -123,7 +129,10 @@ fn registers(first: u16, found: &[u16], json: bool) {
             let signed = pair.map(|pair| pair.map(u32::cast_signed));
             out!(
                 "{}",
-                json!({ "register": at, "u16": word, "i16": word.cast_signed(), "u32": pair, "i32": signed, "f32": floats })
+                json!({
+                    "register": at, "u16": word, "i16": word.cast_signed(), "u32": pair, "i32": signed,
+                    "f32": floats,
+                })
             );
             continue;
         }
@@ -190,6 +199,14 @@ mod tests {
         assert_eq!(range("0..124"), Ok((0, 125)));
         for wrong in ["0..125", "5..4", "a..b", "0..65536", "", "-1..2"] {
             assert!(range(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn no_duration_is_cut_silently() {
+        assert_eq!(duration("0.5"), Ok(Duration::from_millis(500)));
+        for wrong in ["0", "61", "nan", "inf", "-1", "soon"] {
+            assert!(duration(wrong).is_err(), "{wrong}");
         }
     }
 

@@ -234,7 +234,7 @@ fn faulted_without_supply(s: &mut Observation) {
 }
 
 /// A board that is heard again: the supply that was cut for its silence is what makes the amplifier show a
-/// fault. Nothing stands in the way of the proof, which closes it; and until that proof it stays cut.
+/// fault. Nothing prevents the proof, which closes it; until that proof it stays cut.
 #[test]
 fn a_supply_cut_for_a_silent_board_before_arming_is_proved_and_the_fault_it_explains_is_not_waited_for() {
     let closed = |s: &mut Observation, at: u64| {
