@@ -9,6 +9,8 @@
 
 pub mod asperities;
 pub mod impact;
+mod retarded;
+mod stick;
 pub mod sweep;
 
 use std::f64::consts::PI;
@@ -178,14 +180,21 @@ fn closed_form(c: &Contact) -> f64 {
     let pull = c.adhesion / scale;
     let load = c.load_ratio();
     let phi = half_contact_angle(load, pull);
-    let carried = if phi >= PI { load + pull } else { arc_load(phi) };
+    let carried = match (phi >= PI, pull == 0.0) {
+        (true, _) => load + pull,
+        // The angle is the one that carries the load.
+        (false, true) => load,
+        (false, false) => arc_load(phi),
+    };
     (carried - lost_to_stick(phi, c.drag()) / (2.0 * PI)) * c.mu0 * scale
 }
 
+/// Angle (rad) below which a difference of sines loses digits, and a series is exact to 1e-12.
+const SMALL_ANGLE: f64 = 1e-2;
+
 /// Mean of `(cos psi - cos phi)+` over a cycle.
 pub fn arc_load(phi: f64) -> f64 {
-    // The difference loses digits below about 1e-3 rad; its series is exact to 1e-12 there.
-    if phi < 1e-2 {
+    if phi < SMALL_ANGLE {
         phi.powi(3) / (3.0 * PI) * (1.0 - 0.1 * phi * phi)
     } else {
         (phi.sin() - phi * phi.cos()) / PI
@@ -202,23 +211,27 @@ pub fn half_contact_angle(load: f64, pull: f64) -> f64 {
         return angles().at(load);
     }
     // With pull, the balance first falls and then rises with phi; the loaded branch is the upper one.
-    let balance = |phi: f64| arc_load(phi) - pull * phi / PI - load;
-    if balance(PI) <= 0.0 {
+    let balance = |phi: f64| {
+        let (sin, cos) = phi.sin_cos();
+        let carried = if phi < SMALL_ANGLE { arc_load(phi) } else { (sin - phi * cos) / PI };
+        (carried - pull * phi / PI - load, (phi * sin - pull) / PI)
+    };
+    if balance(PI).0 <= 0.0 {
         return PI;
     }
     let (mut low, mut high) = (half_contact_angle(load, 0.0), PI);
     let mut phi = low;
     for _ in 0..60 {
-        let value = balance(phi);
+        let (value, slope) = balance(phi);
         if value > 0.0 {
             high = phi;
         } else {
             low = phi;
         }
-        let slope = (phi * phi.sin() - pull) / PI;
         let newton = phi - value / slope;
         let next = if slope > 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if (next - phi).abs() < 1e-13 * phi {
+        // Newton squares the error: what is left is below 1e-12.
+        if (next - phi).abs() < 1e-7 * phi {
             return next;
         }
         phi = next;
@@ -303,46 +316,5 @@ fn angle_by_bisection(load: f64) -> f64 {
 ///
 /// `phi` is the half contact angle (pi: never leaves), `drag` the rate of stretch per radian.
 pub fn lost_to_stick(phi: f64, drag: f64) -> f64 {
-    // Sticking begins where the limit rises faster than the spring: at touch-down, or later if the finger
-    // touches on the lower half of the plate's motion, where the limit rises slowly at first.
-    let (sin_phi, cos_phi) = phi.sin_cos();
-    let (start, sin_start, rise) = if phi <= 0.5 * PI {
-        if drag >= sin_phi {
-            return 0.0;
-        }
-        (-phi, -sin_phi, cos_phi)
-    } else {
-        if drag >= 1.0 {
-            return 0.0;
-        }
-        let late = -PI + drag.asin();
-        if late > -phi { (late, -drag, -(1.0 - drag * drag).sqrt()) } else { (-phi, -sin_phi, cos_phi) }
-    };
-    // cos(x) - rise - drag (x - start) is concave: its second root is sought from a parabola through both
-    // touch-downs and the top, by Halley's rule (sine and cosine come together).
-    let mut x = (-start - drag * start * start / (1.0 - rise)).max(start * 0.9);
-    let (mut low, mut high) = (start, -start);
-    let (mut sin, mut cos) = x.sin_cos();
-    for _ in 0..40 {
-        let gap = cos - rise - drag * (x - start);
-        let slope = -sin - drag;
-        // Left of the maximum the gap rises: the root lies to the right whatever its sign.
-        if gap > 0.0 || slope >= 0.0 {
-            low = x;
-        } else {
-            high = x;
-        }
-        let step = if slope < 0.0 { gap / (slope + 0.5 * gap * cos / slope) } else { f64::NAN };
-        let next = x - step;
-        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-        let moved = (next - x).abs();
-        x = next;
-        (sin, cos) = x.sin_cos();
-        // The integral is stationary in the root, and the step converges in its third power.
-        if moved < 3e-3 {
-            break;
-        }
-    }
-    let span = x - start;
-    (sin - sin_start - rise * span - 0.5 * drag * span * span).max(0.0)
+    stick::lost(phi, phi.sin_cos(), drag)
 }

@@ -4,7 +4,7 @@
 //! the load. The onset of intermittent contact loses its kink, and the last asperities keep touching at
 //! amplitudes where a single slider would fly.
 
-use crate::contact::{Contact, arc_load, lost_to_stick};
+use crate::contact::{Contact, SMALL_ANGLE, arc_load, stick};
 use std::f64::consts::PI;
 
 /// Distribution of the heights.
@@ -70,7 +70,8 @@ pub fn mean_friction(c: &Contact) -> f64 {
         }
         let newton = depth - (value - load) / slope.max(1e-12);
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if (next - depth).abs() < 1e-12 * (1.0 + depth.abs()) {
+        // Newton squares the error: what is left is below 1e-12.
+        if (next - depth).abs() < 1e-7 * (1.0 + depth.abs()) {
             depth = next;
             break;
         }
@@ -86,8 +87,9 @@ pub fn mean_friction(c: &Contact) -> f64 {
             return 0.0;
         }
         if plain {
-            let phi = (-own_depth).clamp(-1.0, 1.0).acos();
-            return (carries - lost_to_stick(phi, drag) / (2.0 * PI)) * c.mu0 * unit;
+            let cos = (-own_depth).clamp(-1.0, 1.0);
+            let lost = stick::lost(cos.acos(), ((1.0 - cos * cos).sqrt(), cos), drag);
+            return (carries - lost / (2.0 * PI)) * c.mu0 * unit;
         }
         crate::contact::mean_friction(&Contact {
             asperity_height: 0.0,
@@ -109,6 +111,9 @@ fn one_load(depth: f64) -> (f64, f64) {
         (0.0, 0.0)
     } else {
         let phi = (-depth).acos();
-        (arc_load(phi), phi / PI)
+        // `arc_load` with the sine and the cosine at hand.
+        let load =
+            if phi < SMALL_ANGLE { arc_load(phi) } else { ((1.0 - depth * depth).sqrt() + phi * depth) / PI };
+        (load, phi / PI)
     }
 }

@@ -6,6 +6,7 @@
 //! force is zero and the stretch recovers; the next contact starts from what is left. The other two ways of
 //! [`SlipBack`] change what the stretch does while it slips, not the force.
 
+use crate::contact::retarded::Retarded;
 use crate::contact::{Contact, SlipBack, half_contact_angle};
 use std::f64::consts::PI;
 
@@ -13,6 +14,9 @@ use std::f64::consts::PI;
 pub const POINTS: usize = 96;
 /// The same where a search only looks for places to begin: within 1e-2 (tested).
 pub const COARSE_POINTS: usize = 24;
+
+/// Share of the largest stretch within which a cycle ends as it began.
+const SETTLED: f64 = 1e-7;
 
 /// Mean friction over the periodic steady state, N.
 pub fn mean_friction(c: &Contact) -> f64 {
@@ -25,7 +29,7 @@ pub fn mean_friction(c: &Contact) -> f64 {
     let load = c.load_ratio();
     let (arc, airborne) = if c.normal_retardation_time > 0.0 {
         let lag = omega * c.normal_retardation_time;
-        let contact = retarded_contact(load, lag);
+        let contact = Retarded::carrying(load, lag);
         let mut turn = Turn::new(contact.start, contact.arc / points as f64);
         for f in limits.iter_mut() {
             *f = scale * (turn.sin + contact.depth + lag * turn.cos).max(0.0) + c.adhesion;
@@ -63,31 +67,35 @@ pub fn mean_friction(c: &Contact) -> f64 {
     if c.inverse_recovery_speed == 0.0 && c.lateral_relaxation_time == 0.0 && !always {
         return lateral.cycle(limits, 0.0).0 * arc / (2.0 * PI);
     }
-    let (mut mean, mut left) = lateral.cycle(limits, 0.0);
-    let (mut x0, mut gap0) = (0.0, left);
-    if left > 0.0 {
-        let beyond = if lateral.drawn > 0.0 { c.speed * c.lateral_relaxation_time } else { 0.0 };
-        let top = limits.iter().fold(0.0f64, |a, &b| a.max(b)) + c.speed * dt + beyond;
-        let (mut x1, mut gap1) = (top, lateral.cycle(limits, top).1 - top);
-        for _ in 0..40 {
-            if (x1 - x0).abs() < 1e-7 * top || gap0 == gap1 {
-                break;
-            }
-            // Regula falsi (Illinois) keeps the bracket: no cycle is iterated to death near the threshold.
-            let x = (x0 * gap1 - x1 * gap0) / (gap1 - gap0);
-            (mean, left) = lateral.cycle(limits, x);
-            let gap = left - x;
-            if gap.abs() < 1e-7 * top {
-                break;
-            }
-            if gap > 0.0 {
-                (x0, gap0) = (x, gap);
-                gap1 *= 0.5;
-            } else {
-                (x1, gap1) = (x, gap);
-                gap0 *= 0.5;
-            }
+    // Where the slip forgets what it began with, the map is flat: one look from above finds its fixed
+    // point. Below lies what keeps its stretch, where the map is all but a shift: a secant crosses that in
+    // a few looks.
+    let beyond = if lateral.drawn > 0.0 { c.speed * c.lateral_relaxation_time } else { 0.0 };
+    let top = limits.iter().fold(0.0f64, |a, &b| a.max(b)) + c.speed * dt + beyond;
+    let (mut low, mut high) = ((0.0, f64::NAN), (top, f64::NAN));
+    let (mut x, mut last) = (top, None::<(f64, f64)>);
+    let mut mean = 0.0;
+    for _ in 0..60 {
+        let (force, left) = lateral.cycle(limits, x);
+        mean = force;
+        let gap = left - x;
+        if gap.abs() < SETTLED * top {
+            break;
         }
+        if gap > 0.0 {
+            low = (x, gap)
+        } else {
+            high = (x, gap)
+        }
+        if high.0 - low.0 < SETTLED * top {
+            break;
+        }
+        let next = match last {
+            Some((x0, gap0)) if gap0 != gap => x - gap * (x - x0) / (gap - gap0),
+            _ => left,
+        };
+        last = Some((x, gap));
+        x = if next > low.0 && next < high.0 { next } else { 0.5 * (low.0 + high.0) };
     }
     mean * arc / (2.0 * PI)
 }
@@ -162,6 +170,26 @@ impl Lateral {
 
     /// Mean force over the contact and the stretch at the next touch-down, under limits given as stretches.
     fn cycle(&self, limits: &[f64], start: f64) -> (f64, f64) {
+        // The loop is compiled once for each way to slip back: its steps wait for each other.
+        if self.drawn > 0.0 {
+            self.contact(limits, start, |x, before, limit| {
+                let excess = (x - before).max(0.0);
+                let added = self.advance - (limit - before) + (x - before).min(0.0);
+                (limit + excess * self.keep_step + added * self.drawn).max(limit)
+            })
+        } else if self.knee > 0.0 && self.rate_step.is_finite() {
+            self.contact(limits, start, |x, _, limit| softened(x, self.rate_step, self.knee).max(limit))
+        } else {
+            self.contact(limits, start, |x, _, limit| {
+                (limit + (x - limit) * self.keep_step - self.rate_step).max(limit)
+            })
+        }
+    }
+
+    /// The same, `slipped` being the stretch after a step of slip: from the stretch and the limit before
+    /// it, and the limit after it.
+    #[inline(always)]
+    fn contact(&self, limits: &[f64], start: f64, slipped: impl Fn(f64, f64, f64) -> f64) -> (f64, f64) {
         let mut x = start;
         let mut before = limits[0];
         let mut held = x.min(before);
@@ -179,30 +207,22 @@ impl Lateral {
                     let corner = x + part * self.advance;
                     sum += 0.5 * (corner - part * limit - (1.0 - part) * x.min(before));
                 }
-                x = if self.drawn > 0.0 {
-                    let excess = (x - before).max(0.0);
-                    let added = self.advance - (limit - before) + (x - before).min(0.0);
-                    (limit + excess * self.keep_step + added * self.drawn).max(limit)
-                } else if x <= limit {
-                    limit
-                } else {
-                    self.recover(x, limit, self.rate_step, self.keep_step)
-                };
+                x = if self.drawn == 0.0 && x <= limit { limit } else { slipped(x, before, limit) };
                 held = limit;
             }
             before = limit;
             sum += held;
         }
         sum -= 0.5 * held;
-        let left = self.recover(x, 0.0, self.rate_airborne, self.keep_airborne);
-        (self.stiffness * sum / (limits.len() - 1) as f64, left)
+        (self.stiffness * sum / (limits.len() - 1) as f64, self.recovered(x))
     }
 
-    fn recover(&self, x: f64, floor: f64, rate: f64, keep: f64) -> f64 {
-        if self.knee > 0.0 && rate.is_finite() {
-            return softened(x, rate, self.knee).max(floor);
+    /// What is left of a stretch at the end of the flight.
+    fn recovered(&self, x: f64) -> f64 {
+        if self.knee > 0.0 && self.rate_airborne.is_finite() {
+            return softened(x, self.rate_airborne, self.knee).max(0.0);
         }
-        (floor + (x - floor) * keep - rate).max(floor)
+        (x * self.keep_airborne - self.rate_airborne).max(0.0)
     }
 }
 
@@ -215,12 +235,13 @@ fn softened(x: f64, rate: f64, knee: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;
     }
-    let (own, lost) = (x / knee, rate / knee);
-    // Most steps of a sweep lose little: there the midpoint rule is exact to a part in 1e7.
-    let speed = |y: f64| y / (1.0 + y);
-    if lost < LITTLE * (1.0 + own) {
-        return knee * (own - lost * speed(own - 0.5 * lost * speed(own)));
+    let (whole, lost) = (x + knee, rate * knee);
+    // Most steps of a sweep lose little: there the rule of Rosenbrock (one step of the linearised law, by its
+    // midpoint) is exact to a part in 1e6.
+    if rate < LITTLE * whole {
+        return x - rate * x * whole / (whole * whole + 0.5 * lost);
     }
+    let (own, lost) = (x / knee, rate / knee);
     // In z = ln(y/x) the equation is convex and rises: Newton from the left of the root needs no guard.
     let mut z = -lost / (1.0 + own);
     for _ in 0..12 {
@@ -233,42 +254,6 @@ fn softened(x: f64, rate: f64, knee: f64) -> f64 {
         }
     }
     x * z.exp()
-}
-
-/// A contact of the massless spring with a dashpot beside it (Kelvin-Voigt).
-struct Retarded {
-    start: f64,
-    arc: f64,
-    depth: f64,
-}
-
-/// Finds depth and contact interval (phases of the plate's sine) of the retarded spring for a mean load.
-fn retarded_contact(load: f64, lag: f64) -> Retarded {
-    let reach = (1.0 + lag * lag).sqrt();
-    let peak = 1f64.atan2(lag); // phase of the largest force
-    // Full contact: the force stays positive for the whole cycle.
-    if load >= reach {
-        return Retarded { start: peak - PI, arc: 2.0 * PI, depth: load };
-    }
-    let at = |depth: f64| -> (f64, Retarded) {
-        let end = peak + (-depth / reach).clamp(-1.0, 1.0).acos();
-        let left = end.sin() + depth; // compression at lift-off, recovering exponentially
-        let meet = |theta: f64| theta.sin() + depth - left * (-(theta - end) / lag).exp();
-        // The skin meets the plate again between the plate's lowest point and its next highest.
-        let lowest = if meet(1.5 * PI) < 0.0 { 1.5 * PI } else { end + 1e-6 };
-        let Some(again) = root(lowest, 2.5 * PI, 1e-8, meet) else {
-            return (0.0, Retarded { start: end - 2.0 * PI, arc: 1e-6, depth });
-        };
-        let start = again - 2.0 * PI;
-        let mean =
-            (start.cos() - end.cos() + depth * (end - start) + lag * (end.sin() - start.sin())) / (2.0 * PI);
-        (mean, Retarded { start, arc: end - start, depth })
-    };
-    match root(-reach + 1e-9, reach - 1e-9, 1e-9, |depth| at(depth).0 - load) {
-        Some(depth) => at(depth).1,
-        // Between a contact that lasts almost the whole cycle and one that never ends.
-        None => Retarded { start: peak - PI, arc: 2.0 * PI, depth: load },
-    }
 }
 
 /// Root of a function that rises through zero between two ends, by regula falsi (Illinois).
@@ -303,4 +288,29 @@ pub(crate) fn root(low: f64, high: f64, width: f64, f: impl Fn(f64) -> f64) -> O
         }
     }
     Some(0.5 * (a + b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::softened;
+
+    /// The law of recovery in small steps.
+    #[test]
+    fn a_softened_recovery_follows_its_law() {
+        for knee in [1e-8, 1e-7, 2e-6] {
+            for x in [1e-9, 3e-8, 1e-6] {
+                for lost in [1e-3, 0.019, 0.021, 0.5, 4.0] {
+                    let rate = lost * (x + knee);
+                    let h = rate / 100_000.0;
+                    let mut y: f64 = x;
+                    for _ in 0..100_000 {
+                        let middle = y - 0.5 * h * y / (y + knee);
+                        y -= h * middle / (middle + knee);
+                    }
+                    let found = softened(x, rate, knee);
+                    assert!((found - y).abs() < 2e-6 * x, "{knee} {x} {lost}: {found} is {y}");
+                }
+            }
+        }
+    }
 }
