@@ -14,6 +14,8 @@ static LAWS: [Law; 4] = [
         &[
             Parameter::positive("adhesive_force", "N", 0.06, 1.0),
             Parameter::shape("load_of_half_attraction", "N", 0.04, 1.0),
+            // Peeling takes more force the faster it goes.
+            Parameter::signed("speed_exponent", "1", 0.1, 0.0, 0.4).bending(),
         ],
     ),
     Law::new("JKR", &[Parameter::positive("pull_off_force", "N", 0.015, 0.5)]),
@@ -41,12 +43,13 @@ impl Effect for Adhesion {
     fn needs(&self) -> &'static [Need] {
         &[Need::Loads]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
         if law == 0 {
             c.adhesion = theta[0];
         } else if law == 2 {
             c.attraction = if theta[0] > 0.0 {
-                Attraction::Developing { force: theta[0], scale: theta[1] }
+                let force = theta[0] * (c.speed / design.reference_speed_m_s).powf(theta[2]);
+                Attraction::Developing { force, scale: theta[1] }
             } else {
                 Attraction::None
             };

@@ -8,11 +8,16 @@ pub struct AmplitudeDroop;
 /// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer while the finger is pressed on it.";
 
-static LAWS: [Law; 3] = [
-    Law::new("impedance by load", &[Parameter::positive("droop_per_load", "1/N", 0.7, 10.0)])
-        .seen_by(CHECK, 0.05),
-    Law::new("impedance by Hertz area", &[Parameter::positive("droop_at_one_newton", "N^-2/3", 0.5, 8.0)])
-        .seen_by(CHECK, 0.05),
+static LAWS: [Law; 2] = [
+    // The contact area of a sphere grows as the 2/3 power of the load, that of a flat pad hardly.
+    Law::new(
+        "impedance by a power of the load",
+        &[
+            Parameter::positive("droop_at_reference_load", "1", 0.2, 3.0),
+            Parameter::shape("load_exponent", "1", 0.8, 0.3).bending(),
+        ],
+    )
+    .seen_by(CHECK, 0.015),
     Law::new("linear loss", &[Parameter::positive("droop_per_load", "1/N", 0.4, 3.0)]).seen_by(CHECK, 0.05),
 ];
 
@@ -35,10 +40,12 @@ impl Effect for AmplitudeDroop {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Loads]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
         c.amplitude_pp *= match law {
-            0 => 1.0 / (1.0 + theta[0] * c.normal_force),
-            1 => 1.0 / (1.0 + theta[0] * c.normal_force.max(0.0).powf(2.0 / 3.0)),
+            0 => {
+                let relative = (c.normal_force / design.reference_load_n).max(0.0);
+                1.0 / (1.0 + theta[0] * relative.powf(theta[1]))
+            }
             _ => (1.0 - theta[0] * c.normal_force).max(0.02),
         };
     }

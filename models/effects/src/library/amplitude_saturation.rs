@@ -15,6 +15,8 @@ static LAWS: [Law; 3] = [
         &[
             Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6),
             Parameter::shape("sharpness", "1", 4.0, 0.6),
+            // A current that is limited drives less the higher the frequency; a voltage, the same.
+            Parameter::signed("frequency_exponent", "1", 0.5, -1.0, 2.0).bending(),
         ],
     )
     .seen_by(CHECK, 2e4),
@@ -40,7 +42,7 @@ impl Effect for AmplitudeSaturation {
     fn needs(&self) -> &'static [Need] {
         &[Need::Vibration, Need::Amplitudes]
     }
-    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
+    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
         let x = theta[0] * c.amplitude_pp;
         c.amplitude_pp *= match law {
             0 => {
@@ -50,7 +52,10 @@ impl Effect for AmplitudeSaturation {
                     1.0
                 }
             }
-            1 => (1.0 + x.powf(theta[1])).powf(-1.0 / theta[1]),
+            1 => {
+                let x = x * (c.frequency / design.reference_frequency_hz).powf(theta[2]);
+                (1.0 + x.powf(theta[1])).powf(-1.0 / theta[1])
+            }
             _ => {
                 if x > 1e-6 {
                     x.tanh() / x

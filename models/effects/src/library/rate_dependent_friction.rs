@@ -5,6 +5,9 @@ use super::prelude::*;
 /// See the module.
 pub struct RateDependentFriction;
 
+/// Most by which a curve changes mu0, in e-folds: beyond the speeds of a table a polynomial runs away.
+const MOST_E_FOLDS: f64 = 2.0;
+
 static LAWS: [Law; 4] = [
     Law::new("power", &[Parameter::signed("exponent", "1", 0.12, -0.6, 0.8)]),
     Law::new(
@@ -14,9 +17,17 @@ static LAWS: [Law; 4] = [
             Parameter::shape("stribeck_speed", "m/s", 0.025, 0.8),
         ],
     ),
-    Law::new("linear", &[Parameter::signed("slope", "s/m", 4.0, -4.0, 60.0)]),
     // Thermally activated sliding; the first term of rate-and-state friction.
     Law::new("logarithmic", &[Parameter::signed("slope_per_log_speed", "1", 0.12, -0.4, 0.6)]),
+    // Any smooth law of speed: linear, one that rises and falls again, or bends at a speed of its own.
+    Law::new(
+        "curve",
+        &[
+            Parameter::signed("exponent", "1", 0.12, -0.6, 0.8),
+            Parameter::signed("bend_per_e_fold", "1", 0.7, -5.0, 5.0).bending(),
+            Parameter::signed("change_of_bend_per_e_fold", "1", 0.4, -3.0, 3.0).bending(),
+        ],
+    ),
 ];
 
 impl Effect for RateDependentFriction {
@@ -46,8 +57,11 @@ impl Effect for RateDependentFriction {
                 let part = |u: f64| 1.0 + theta[0] * (-(u / theta[1]).powi(2)).exp();
                 part(c.speed)
             }
-            2 => (1.0 + theta[0] * (c.speed - reference)).max(0.05),
-            _ => (1.0 + theta[0] * (c.speed / reference).ln()).max(0.05),
+            2 => (1.0 + theta[0] * (c.speed / reference).ln()).max(0.05),
+            _ => {
+                let x = (c.speed / reference).ln();
+                (theta[0] * x * (1.0 + x * (theta[1] + x * theta[2]))).clamp(-MOST_E_FOLDS, MOST_E_FOLDS).exp()
+            }
         };
     }
 }
