@@ -119,6 +119,7 @@ def work(browser):
     page.click("button:text-is('Diagnose')")
     page.wait_for_selector("button:text-is('Diagnose again')")
     words = page.inner_text("main")
+    faults.extend(f"the page says {bad}" for bad in ["null", "undefined", "NaN"] if bad in words)
     faults.extend(f"after the diagnosis: no {one}" for one in ["diagnosis.html", "corrected-model.toml or next-plan.toml"] if not any(name in words for name in one.split(" or ")))
     page.screenshot(path=out / "diagnosed.png", full_page=True)
     page.goto(f"{base}/#/")

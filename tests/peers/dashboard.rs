@@ -201,7 +201,18 @@ fn runs_are_sorted_annotated_compared_and_diagnosed() {
     for (name, seed) in [("over", "3"), ("second", "4"), ("elsewhere", "5")] {
         let out = if name == "elsewhere" { folder.path().join(name) } else { runs.join(name) };
         let mut run = muprime();
-        run.args(["run", "first-sweep", "--setup", "virtual-ideal", "--fast", "--sample", "pad", "--seed", seed, "--out"]);
+        run.args([
+            "run",
+            "first-sweep",
+            "--setup",
+            "virtual-ideal",
+            "--fast",
+            "--sample",
+            "pad",
+            "--seed",
+            seed,
+            "--out",
+        ]);
         let made = run.arg(&out).output().unwrap();
         assert!(made.status.code().is_some_and(|code| code < 2), "{}", texts(&made).1);
     }

@@ -253,6 +253,13 @@ fn conditions(runs: &[Read], groups: &[String]) -> Vec<AtCondition> {
             differences,
         }
     };
+    let setting =
+        |p: &Pass| [p.normal_force_n, p.frequency_hz, p.amplitude.metres(), p.direction.sign() * p.speed_m_s];
+    let order = |a: &Pass, b: &Pass| {
+        let each = setting(a).into_iter().zip(setting(b));
+        each.map(|(a, b)| a.total_cmp(&b)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+    };
+    found.sort_by(|a, b| order(a.0, b.0));
     found.iter().map(at).collect()
 }
 

@@ -38,7 +38,7 @@ async function fetched(address) {
 const began = (run) => new Date(run.started_unix_s * 1000).toISOString().slice(0, 16).replace("T", " ");
 const outcome = (run) => (run.live ? "goes on" : run.outcome.replaceAll("_", " ") || "no ending") + (run.departed ? ", disagrees with the model" : "");
 const runLink = (name) => el("a", { href: `#/run/${part(name)}` }, name);
-// What is not known is a blank cell with a reason in words, and comes last in every order.
+// What is not known has a reason in words, and comes last in every order.
 const COLUMNS = [
   { name: "run", of: (r) => r.folder, cell: (r) => runLink(r.folder) }, { name: "began, UTC", of: (r) => r.started_unix_s, cell: began, wide: true },
   { name: "plan", of: (r) => r.plan, wide: true }, { name: "operator", of: (r) => r.operator }, { name: "sample", of: (r) => r.sample },
@@ -192,12 +192,14 @@ async function finished({ run, diagnosing, undiagnosed }) {
   const fileButton = (file) => button(file, () => download(`${address}/files/${part(file)}`, file, result));
   const followed = ["corrected-model.toml", "next-plan.toml"].filter((file) => run.files.includes(file));
   const { report, start } = await made(`${address}/report`, explore);
-  main.replaceChildren(
+  const parts = [
     el("p", { class: "keys" }, diagnose, el("label", { for: "file" }, "File"), choose, fetchFile, result), annotations(run),
     several("Verdict:", [run.verdict ?? "no diagnosis yet", ...run.pages.filter((page) => page !== "report.html").map((page) => el("a", { href: `#/page/${part(name)}/${part(page)}` }, page))]),
     several("From the verdict:", followed.map(fileButton)),
     several("Its model or plan comes from:", run.lineage.before.map(runLink)), several("Runs with its corrected model or next plan:", run.lineage.after.map(runLink)),
-    report);
+    report,
+  ];
+  main.replaceChildren(...parts.filter(Boolean));
   start();
   if (diagnosing) waits().catch((why) => { result.textContent = why.message; });
   return () => { here = false; };
