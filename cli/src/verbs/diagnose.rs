@@ -45,7 +45,8 @@ pub struct Args {
     /// Where a plan of the best next experiment goes, for `muprime run`.
     #[arg(long)]
     pub save_plan: Option<PathBuf>,
-    /// Write page, verdict, corrected model and next plan into the run's folder, where the dashboard finds them.
+    /// Write page, verdict, corrected model and next plan into the run's folder, where the
+    /// dashboard finds them.
     #[arg(long)]
     pub in_folder: bool,
     /// Try single effects only.

@@ -173,7 +173,8 @@ async fn annotate(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Begins a diagnosis beside everything else. While any run of the folder goes on there is none: it would take that loop's processor.
+/// Begins a diagnosis beside everything else. While any run of the folder goes on there is none: it
+/// would take that loop's processor.
 async fn diagnose(
     State(shared): State<Arc<Shared>>,
     Path(name): Path<String>,

@@ -65,7 +65,8 @@ fn next(file: &mut File) -> std::io::Result<Option<Bytes>> {
     Ok((n > 0).then(|| piece.into()))
 }
 
-/// The body of an answer. A file that cannot be read further ends it early, so that nobody takes it for whole.
+/// The body of an answer. A file that cannot be read further ends it early, so that nobody takes it for
+/// whole.
 struct Pieces(Receiver<std::io::Result<Bytes>>);
 
 impl hyper::body::Body for Pieces {

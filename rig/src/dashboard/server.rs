@@ -16,7 +16,7 @@ pub(super) struct Shared {
     pub guard: Guard,
     /// Live streams at present.
     pub streams: AtomicUsize,
-    /// The diagnosis that is under way, and what kept others from a verdict.
+    /// The diagnosis that is under way, and why others have no verdict.
     pub diagnoses: Mutex<Diagnoses>,
 }
 

@@ -1,4 +1,5 @@
-//! What people add to a run afterwards: tags and a note, in a file of their own. The record and the table stay as they are.
+//! What people add to a run afterwards: tags and a note, in a file of their own. The record and the
+//! table stay as they are.
 
 use crate::files::write_whole;
 use crate::input::{parse_toml, text_of};

@@ -31,7 +31,8 @@ pub(super) fn section(run: &RunData, traces: &[Trace]) -> String {
     )
 }
 
-/// The library, the figures and what is done with them, in the page itself: one that is opened as a file can import no module.
+/// The library, the figures and what is done with them, in the page itself: one that is opened as a
+/// file can import no module.
 pub(super) fn script(then: &str) -> String {
     let imported = EXPLORE.split_once('\n').map_or("", |(_, rest)| rest);
     let figures = format!("{FIGURES}\n{imported}").replace("\nexport ", "\n");

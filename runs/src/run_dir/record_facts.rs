@@ -14,7 +14,8 @@ const HEAD: usize = 64;
 /// What the records of a run say of it: facts by name, and its files' keys by `file: key`.
 pub type RecordFacts = BTreeMap<String, String>;
 
-/// The facts at the head of a run's first record; none where there is no record that says any. It reads no cycle.
+/// The facts at the head of a run's first record; none where there is no record that says any. It reads
+/// no cycle.
 pub fn header_facts(folder: &Path) -> RecordFacts {
     let head = |path: &std::path::PathBuf| {
         let reader = Reader::new(BufReader::new(File::open(path).ok()?)).only(recorder::EVENTS);

@@ -1,4 +1,5 @@
-//! A verdict in the folder of its run: the page, the document, the corrected model and the next plan, under names that the catalogue knows.
+//! A verdict in the folder of its run: the page, the document, the corrected model and the next plan,
+//! under names that the catalogue knows.
 
 use crate::input::{MAX_TABLE_BYTES, bytes_of, rig_file};
 use crate::report::{about, diagnosis::page};
@@ -41,7 +42,8 @@ pub fn diagnose_run(run: &Path) -> miette::Result<()> {
     write(run, &result, &rig, &html, &damage_in(run)?)
 }
 
-/// Writes a verdict into the folder of its run. A model or a plan of an earlier verdict goes where this one has none.
+/// Writes a verdict into the folder of its run. A model or a plan of an earlier verdict goes where this
+/// one has none.
 ///
 /// # Errors
 /// Whatever the file system says.
