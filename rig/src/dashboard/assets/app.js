@@ -305,9 +305,9 @@ function runPage(name, control, listed) {
     const edge = (key, i) => states.map((s) => s.extremes[key]?.[i] ?? null);
     const value = (key) => states.map((s) => s[key] ?? null);
     const around = (k) => states.map((s) => (s.predicted == null ? null : s.predicted + k * (s.predicted_sd ?? 0)));
-    charts.forces.setData([x, edge("lateral_force_n", 1), edge("lateral_force_n", 0), value("lateral_force_n"), edge("normal_force_n", 1), edge("normal_force_n", 0), value("normal_force_n")]);
-    charts.mu.setData([x, edge("mu_relative", 1), edge("mu_relative", 0), value("mu_relative"), around(2), around(-2), value("predicted")]);
-    charts.late.setData([x, states.map((s) => s.extremes.lateness_s * 1e6)]);
+    charts.forces.chart.setData([x, edge("lateral_force_n", 1), edge("lateral_force_n", 0), value("lateral_force_n"), edge("normal_force_n", 1), edge("normal_force_n", 0), value("normal_force_n")]);
+    charts.mu.chart.setData([x, edge("mu_relative", 1), edge("mu_relative", 0), value("mu_relative"), around(2), around(-2), value("predicted")]);
+    charts.late.chart.setData([x, states.map((s) => s.extremes.lateness_s * 1e6)]);
     const s = states.at(-1);
     // Of a run that is over nothing is told of single cycles: its record has them.
     for (const one of ["forces", "mu", "late"]) figures[one].show(Boolean(s));
