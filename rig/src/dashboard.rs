@@ -10,6 +10,7 @@
 //! | the empty page and its script | a `Host` that is on the list |
 //! | data, live messages | that, an `Origin` on the list where there is one, and the token |
 //! | stop a run | the same |
+//! | write tags and notes, diagnose a run that is over | the same |
 //! | pause, go on | the same, and a server that was started with `--allow-control` |
 //!
 //! The token is new at every start, is part of the address's fragment (which no browser sends), and is
@@ -17,6 +18,8 @@
 
 #[cfg(feature = "dashboard")]
 mod api;
+#[cfg(feature = "dashboard")]
+mod download;
 #[cfg(feature = "dashboard")]
 mod guard;
 #[cfg(feature = "dashboard")]

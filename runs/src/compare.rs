@@ -16,6 +16,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 pub mod differences;
 mod folders;
+pub mod groups;
 
 pub use folders::Compared;
 

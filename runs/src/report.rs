@@ -5,6 +5,7 @@ pub mod comparison;
 pub mod diagnosis;
 pub mod events;
 mod explore;
+pub mod groups;
 pub mod html;
 pub mod human;
 pub(crate) mod levels;
@@ -23,8 +24,8 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-pub use explore::{FIGURES, UPLOT, UPLOT_STYLE};
-pub use html::escape;
+pub use explore::{EXPLORE, FIGURES, UPLOT, UPLOT_STYLE};
+pub use html::{escape, scoped_style};
 
 /// Everything a report is made of, read from a run's folder.
 pub struct RunData {

@@ -16,7 +16,7 @@ use lines::{whole_passes, whole_table};
 pub use lock::{claim, holder, is_held};
 use miette::{Context, IntoDiagnostic};
 use models::pass::{self, Pass};
-pub use record_facts::{RecordFacts, record_facts};
+pub use record_facts::{RecordFacts, header_facts, record_facts};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, OpenOptions};

@@ -1,5 +1,7 @@
 //! A verdict for people: what a terminal shows, and the plan of the experiment that tells most.
 
+pub mod files;
+
 use diagnosis::certificates;
 use diagnosis::verdict::{Diagnosis, probability};
 use models::condition::Condition;
@@ -19,6 +21,11 @@ pub fn words(result: &Diagnosis, rig: &RigFile) -> String {
         text.push('\n');
     }
     text
+}
+
+/// The plan of the experiment that tells most; none where no conditions would tell more.
+pub fn next_plan(result: &Diagnosis) -> Option<String> {
+    result.report.next_experiment.iter().find(|e| !e.conditions.is_empty()).map(plan)
 }
 
 /// The plan of a designed experiment, one series a condition: those that tell most first, grouped by pressure, since

@@ -102,8 +102,18 @@ tried("token", ask(lines={"Authorization": None}, address=f"/api/runs/{run}/ask?
 tried("token", ask(lines={"Authorization": f"Basic {base64.b64encode(token.encode()).decode()}"}))
 tried("token", stream({"Sec-WebSocket-Protocol": None}))
 tried("token", stream(protocols=token))
-for address in ["/api/runs", "/api/about", f"/api/runs/{run}/past", f"/api/runs/{run}/pages/report.html", f"/api/compare?a={run}&b={run}"]:
+for address in ["/api/runs", "/api/about", f"/api/runs/{run}", f"/api/runs/{run}/report", f"/api/runs/{run}/files/points.csv", f"/api/runs/{run}/pages/report.html", f"/api/compare?runs={run}/{run}"]:
     tried("token", f"GET {address} HTTP/1.1\r\nHost: {place}\r\nConnection: close\r\n\r\n".encode())
+# What writes has the same guard, and takes no more than its bounds.
+noted = b'{"tags":["x"],"note":"y"}'
+for what, body in [("annotations", noted), ("diagnose", b"{}")]:
+    address = f"/api/runs/{run}/{what}"
+    tried("token", ask(lines={"Authorization": None}, address=address, body=body))
+    tried("host", ask(lines={"Host": "evil.example"}, address=address, body=body))
+    tried("origin", ask(lines={"Origin": "http://evil.example"}, address=address, body=body))
+    tried("method", ask(method="GET", address=address, body=b""))
+for body in [b"", b"{", b'{"tags":"x"}', b'{"path":"/etc/passwd"}', b'{"note":"' + b"x" * 2001 + b'"}', b'{"note":"' + b"x" * 40000 + b'"}', b'{"tags":["a,b"]}']:
+    tried("body", ask(address=f"/api/runs/{run}/annotations", body=body))
 # Reads change nothing, and nothing but a known word is passed on.
 for method in ["GET", "HEAD", "PUT", "DELETE", "PATCH", "TRACE"]:
     tried("method", ask(method=method))
@@ -118,6 +128,9 @@ for name in ["..", "%2e%2e", "..%2f..%2fetc", "%2Fetc%2Fpasswd", "nothing", "a%0
     tried("path", stream(address=f"/api/live/{name}"))
     tried("path", ask(method="GET", address=f"/api/runs/{run}/pages/{name}", body=b""))
 tried("path", ask(method="GET", address=f"/api/runs/{run}/pages/points.csv", body=b""))
+for name in ["..", "..%2fover%2fpoints.csv", "%2Fetc%2Fpasswd", "nothing", "sessions.jsonl", "a%00b"]:
+    tried("path", ask(method="GET", address=f"/api/runs/{run}/files/{name}", body=b""))
+    tried("path", ask(address=f"/api/runs/{name}/annotations", body=noted))
 tried("path", ask(method="GET", address=f"/api/runs/{run}/pages/..%2f{run}%2freport.html", body=b""))
 tried("head", b"GET / HTTP/1.1\r\nHost: " + place.encode() + b"\r\nX: " + b"x" * 100000 + b"\r\n\r\n")
 tried("head", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + os.urandom(200))

@@ -1,8 +1,8 @@
 """Opens a dashboard in a real Chromium at three widths, light and dark, and does with it what a person does.
 
-    dashboard.py views|keys FOLDER LINK LIVE OTHER
+    dashboard.py views|keys|work FOLDER LINK LIVE OTHER
 
-`views` looks at every page, `keys` pauses and stops LIVE by the keyboard. LINK is the address with its token; LIVE a run that goes on, OTHER one that is over. Looks for: requests to anywhere else, scripts of a
+`views` looks at every page, `keys` pauses and stops LIVE by the keyboard, `work` sorts, filters, annotates, compares, downloads and diagnoses. LINK is the address with its token; LIVE a run that goes on, OTHER one that is over. Looks for: requests to anywhere else, scripts of a
 name that ran, a page wider than its window, what axe-core calls serious or critical, plots that stay empty, keys that do nothing.
 Writes pictures into FOLDER. Prints one JSON document; every list in it should be empty but for `pictures`.
 """
@@ -31,10 +31,12 @@ WIDER = "() => document.documentElement.scrollWidth - document.documentElement.c
 def settled(page, where):
     page.goto(f"{base}/#/{where}")
     page.wait_for_selector("h1")
-    if where.startswith(("page/", "compare/")):
-        kind = "Two runs" if where.startswith("compare/") else "report.html"
-        page.frame_locator(f"iframe[title='{kind}']").locator("h1").wait_for(timeout=WITHIN_MS)
-    if where.startswith("run/"):
+    if where.startswith("page/"):
+        page.frame_locator("iframe[title='report.html']").locator("h1").wait_for(timeout=WITHIN_MS)
+    if where.startswith("compare/") or where == f"run/{quote(other)}":
+        page.wait_for_selector(".report h1")
+        page.wait_for_timeout(500)
+    elif where.startswith("run/"):
         page.wait_for_selector("dl.now dd", state="attached")
         page.wait_for_function("() => !document.querySelector('dl.now dd').textContent.startsWith('0 of 0')", timeout=WITHIN_MS)
         page.wait_for_timeout(1500)
@@ -57,11 +59,11 @@ def views(browser):
                 settled(page, where)
                 if name in ("live", "over"):
                     drawn, words = page.evaluate(DRAWN), page.inner_text("main")
-                    if len(drawn) != (6 if name == "live" else 3) or min(drawn) < 8:
+                    if len(drawn) != (7 if name == "live" else 6) or min(drawn) < 8:
                         faults.append(f"{view}: plots {drawn}")
                     if name == "over":
                         # The plan has five speeds, one that two digits would split: each has a mark of its own, and the key names all.
-                        key = page.locator("figcaption", has_text="passes;").first.inner_text()
+                        key = page.locator("#explore figcaption", has_text="passes;").first.inner_text()
                         faults.extend(f"{view}: {speed} mm/s in {key}" for speed in [5, 10, 12.5, 30, 80] if f": {speed} mm/s" not in key)
                         alike = page.evaluate("async () => { const { SERIES } = await import('/plots.js'); return SERIES.length - new Set(SERIES.map(s => `${s.kind} ${s.hollow}`)).size; }")
                         if alike or "difference" not in words:
@@ -80,6 +82,65 @@ def views(browser):
                     page.pdf(path=out / "live.pdf", format="A4")
                     page.emulate_media(media="screen")
             page.close()
+
+
+def work(browser):
+    page = browser.new_page(viewport={"width": 1600, "height": 900})
+    page.set_default_timeout(WITHIN_MS)
+    page.on("console", lambda m: ran.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda e: ran.append(str(e)))
+    page.goto(link)
+    page.wait_for_selector("tbody tr")
+    column = lambda n: page.eval_on_selector_all("tbody tr", f"rows => rows.map(r => r.cells[{n}].textContent)")
+    first = lambda: column(2)
+    if page.locator("tbody svg.thumb circle").count() < 20:
+        faults.append("a run has no picture")
+    for key, order in [("run", sorted(first())), ("run", sorted(first(), reverse=True))]:
+        page.click(f"th button:text-is('{key}')")
+        if first() != order:
+            faults.append(f"sorted by {key}: {first()}")
+    for words, want in [("PAD copied", ["copied"]), ("nothing-of-this", [])]:
+        page.fill("#search", words)
+        if first() != want:
+            faults.append(f"filter {words}: {first()}")
+    page.fill("#search", "")
+    # Tags and a note: markup stays text, and they are there when the list is read again.
+    page.click("tbody a:text-is('copied')")
+    page.wait_for_selector(".report h1")
+    page.fill("#tags", "dry, tip 3,dry")
+    page.fill("#note", "<b onclick=x>second</b> try")
+    page.click("button:text-is('Save')")
+    page.wait_for_selector("text=written")
+    for file in ["report", "points.csv"]:
+        page.select_option("#file", label=file)
+        with page.expect_download() as got:
+            page.click("button:text-is('Download')")
+        got.value.save_as(out / f"fetched-{file}")
+    page.click("button:text-is('Diagnose')")
+    page.wait_for_selector("button:text-is('Diagnose again')")
+    words = page.inner_text("main")
+    faults.extend(f"the page says {bad}" for bad in ["null", "undefined", "NaN"] if bad in words)
+    faults.extend(f"after the diagnosis: no {one}" for one in ["diagnosis.html", "corrected-model.toml or next-plan.toml"] if not any(name in words for name in one.split(" or ")))
+    page.screenshot(path=out / "diagnosed.png", full_page=True)
+    page.goto(f"{base}/#/")
+    page.wait_for_selector("tbody tr")
+    page.fill("#search", "tip 3")
+    if first() != ["copied"] or "<b onclick=x>second</b> try" not in page.inner_text("tbody") or "no diagnosis" in page.inner_text("tbody"):
+        faults.append(f"the list after the notes: {page.inner_text('tbody')}")
+    page.fill("#search", "")
+    for box in page.locator("tbody input[type=checkbox]").all():
+        box.check()
+    page.click("button:text-is('Compare the chosen runs')")
+    page.wait_for_selector(".report h1")
+    if "3 runs" not in page.inner_text("h1") or page.locator("#explore figure canvas").count() != 2:
+        faults.append(f"compared: {page.inner_text('h1')}")
+    page.screenshot(path=out / "compared.png", full_page=True)
+    page.select_option("#by", "day")
+    page.wait_for_selector("p[role=alert]:has-text('one group')")
+    # A refusal is an answer that the browser logs.
+    ran[:] = [one for one in ran if "422" not in one]
+    pictures.extend(["diagnosed", "compared"])
+    page.close()
 
 
 def keys(browser):
@@ -119,6 +180,6 @@ def keys(browser):
 
 with sync_playwright() as p:
     browser = p.chromium.launch(executable_path=chromium, timeout=WITHIN_MS, args=["--no-sandbox", "--disable-gpu"])
-    (views if what == "views" else keys)(browser)
+    {"views": views, "keys": keys, "work": work}[what](browser)
     browser.close()
 print(json.dumps({"faults": faults, "asked": asked, "ran": ran, "pictures": pictures}))

@@ -193,6 +193,50 @@ fn every_page_in_a_real_browser() {
     assert!(live.passes() > 3);
 }
 
+/// What a person does with runs that are over; the record and the contract's files stay as they were.
+#[test]
+fn runs_are_sorted_annotated_compared_and_diagnosed() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = folder.path().join("runs");
+    for (name, seed) in [("over", "3"), ("second", "4"), ("elsewhere", "5")] {
+        let out = if name == "elsewhere" { folder.path().join(name) } else { runs.join(name) };
+        let mut run = muprime();
+        run.args([
+            "run",
+            "first-sweep",
+            "--setup",
+            "virtual-ideal",
+            "--fast",
+            "--sample",
+            "pad",
+            "--seed",
+            seed,
+            "--out",
+        ]);
+        let made = run.arg(&out).output().unwrap();
+        assert!(made.status.code().is_some_and(|code| code < 2), "{}", texts(&made).1);
+    }
+    // A folder that comes from elsewhere is a run like the others.
+    let copied = runs.join("copied");
+    std::fs::rename(folder.path().join("elsewhere"), &copied).unwrap();
+    let contract = ["points.csv", "passes.jsonl", "rig.toml", "run.toml", "summary.json", "sessions.jsonl"];
+    let contents = || contract.map(|name| std::fs::read(copied.join(name)).ok());
+    let before = contents();
+    let served = Served::start(&runs, &[]);
+    let pictures = pictures(folder.path());
+    let seen = browser("work", &pictures, &served);
+    for list in ["faults", "asked", "ran"] {
+        assert_eq!(seen[list], serde_json::json!([]), "{list}");
+    }
+    assert_eq!(contents(), before);
+    let notes = runs::catalogue::Annotations::read(&copied).unwrap();
+    assert_eq!(notes.tags, ["dry", "tip 3"]);
+    assert_eq!(notes.note, "<b onclick=x>second</b> try");
+    assert_eq!(std::fs::read(pictures.join("fetched-points.csv")).ok(), before[0], "the table as it is");
+    let page = std::fs::read_to_string(pictures.join("fetched-report")).unwrap();
+    assert!(page.starts_with("<!doctype html>") && page.contains("run-data"));
+}
+
 /// By the keyboard: pause, go on, stop. What a session does when it is told to rest is tried elsewhere, in wall-clock time.
 #[test]
 fn a_browser_pauses_and_stops_a_run() {

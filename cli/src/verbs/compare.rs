@@ -1,6 +1,7 @@
-//! `muprime compare RUN_A RUN_B`: two runs side by side.
+//! `muprime compare RUN_A RUN_B [RUN]...`: two runs side by side, or more of them by groups.
 
 use runs::compare::Compared;
+use runs::compare::groups::{GroupBy, Grouped, MOST_COMPARED};
 use runs::print::folded;
 use runs::{out, say};
 use std::fmt::Write;
@@ -19,6 +20,12 @@ pub struct Args {
     run_a: PathBuf,
     /// Folder of the second run
     run_b: PathBuf,
+    /// Folders of more runs: then all are compared by groups
+    #[arg(value_name = "RUN")]
+    more: Vec<PathBuf>,
+    /// What more than two runs are grouped by [default: run]
+    #[arg(long)]
+    by: Option<GroupBy>,
     /// Where a page with both of them goes (one HTML file)
     #[arg(long)]
     report: Option<PathBuf>,
@@ -31,6 +38,9 @@ pub struct Args {
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.run_a, "run")?;
     super::there(&args.run_b, "run")?;
+    if !args.more.is_empty() || args.by.is_some() {
+        return run_groups(args, json);
+    }
     let compared = Compared::of([&args.run_a, &args.run_b])?;
     if let Some(page) = &args.report {
         runs::files::write_whole(page, runs::report::comparison::page(&compared)?)?;
@@ -41,6 +51,32 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     } else {
         out!("{}", folded(&terminal(&compared), 2));
     }
+    super::exit(super::DONE)
+}
+
+/// Compares more than two runs, or two groups of them.
+fn run_groups(args: &Args, json: bool) -> miette::Result<ExitCode> {
+    let folders: Vec<PathBuf> = [&args.run_a, &args.run_b].into_iter().chain(&args.more).cloned().collect();
+    if folders.len() > MOST_COMPARED {
+        miette::bail!("{} runs are more than {MOST_COMPARED}", folders.len());
+    }
+    args.more.iter().try_for_each(|run| super::there(run, "run"))?;
+    let grouped = Grouped::of(&folders, args.by.unwrap_or_default())?;
+    if let Some(page) = &args.report {
+        runs::files::write_whole(page, runs::report::groups::page(&grouped)?)?;
+        say!("report: {}", page.display());
+    }
+    if json {
+        out!("{}", serde_json::json!(grouped));
+        return super::exit(super::DONE);
+    }
+    let mut text = grouped.warnings.iter().map(|w| format!("note: {w}\n")).collect::<String>();
+    let _ = writeln!(text, "{}", grouped.words());
+    for group in &grouped.groups {
+        let mu0: Vec<String> = group.mu0.iter().map(|mu0| format!("{mu0:.3}")).collect();
+        let _ = writeln!(text, "{}: runs {}, mu_0 {}", group.name, group.runs.len(), mu0.join(", "));
+    }
+    out!("{}", folded(text.trim_end(), 2));
     super::exit(super::DONE)
 }
 

@@ -45,6 +45,10 @@ pub struct Args {
     /// Where a plan of the best next experiment goes, for `muprime run`.
     #[arg(long)]
     pub save_plan: Option<PathBuf>,
+    /// Write page, verdict, corrected model and next plan into the run's folder, where the
+    /// dashboard finds them.
+    #[arg(long)]
+    pub in_folder: bool,
     /// Try single effects only.
     #[arg(long)]
     pub no_pairs: bool,
@@ -65,6 +69,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         let folder = args.data.parent().unwrap_or(Path::new("."));
         (args.data.clone(), folder.join("rig.toml"))
     };
+    if args.in_folder && !args.data.is_dir() {
+        miette::bail!(help = "give the folder of a run", "--in-folder: {} is a table", args.data.display());
+    }
     let rig_path = args.rig.as_deref().unwrap_or(&beside);
     let rig = runs::input::rig_file(rig_path)
         .wrap_err_with(|| format!("the rig's calibration {} (name it with --rig)", rig_path.display()))?;
@@ -112,12 +119,12 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
     }
     if let Some(out) = &args.save_plan {
-        match result.report.next_experiment.iter().find(|e| !e.conditions.is_empty()) {
-            Some(experiment) => write_text(out, &runs::verdict::plan(experiment))?,
+        match runs::verdict::next_plan(&result) {
+            Some(plan) => write_text(out, &plan)?,
             None => say!("no plan written to {}: no conditions would tell more", out.display()),
         }
     }
-    if let Some(out) = &args.report {
+    if args.report.is_some() || args.in_folder {
         let about = if args.data.is_dir() {
             about::of_run(
                 &args.data,
@@ -130,12 +137,18 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             [named, about::of_rig(&rig)].concat()
         };
         let page = runs::report::diagnosis::page(&result, &table, &about)?;
-        write_text(out, &page)?;
-        say!("report: {}", out.display());
-        // The run that this is the table of.
-        let run = table_path.parent().filter(|run| run.join("passes.jsonl").exists());
-        if let Some(run) = run {
-            keep_in_run(run, out, &page);
+        if args.in_folder {
+            runs::verdict::files::write(&args.data, &result, &rig, &page, &damage)?;
+            say!("verdict: {}", args.data.join(runs::verdict::files::PAGE).display());
+        }
+        if let Some(out) = &args.report {
+            write_text(out, &page)?;
+            say!("report: {}", out.display());
+            // The run that this is the table of.
+            let run = table_path.parent().filter(|run| run.join("passes.jsonl").exists());
+            if let Some(run) = run.filter(|_| !args.in_folder) {
+                keep_in_run(run, out, &page);
+            }
         }
     }
     if json {
@@ -151,7 +164,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
 fn keep_in_run(run: &Path, page: &Path, text: &str) {
     let inside = || Some(page.canonicalize().ok()?.parent()? == run.canonicalize().ok()?);
     if inside() == Some(false) {
-        let copy = run.join("diagnosis.html");
+        let copy = run.join(runs::verdict::files::PAGE);
         match write_text(&copy, text) {
             Ok(()) => say!("the dashboard lists its copy: {}", copy.display()),
             Err(why) => say!("the dashboard will not list this page: {why}"),

@@ -1,42 +1,107 @@
-//! `muprime runs`: the runs of a folder.
+//! `muprime runs`: the runs of a folder, and their tags and notes.
 
 use miette::IntoDiagnostic;
-use runs::catalogue::{existing, runs_folder};
+use runs::catalogue::{Annotations, RunEntry, SortBy, existing, runs_folder, sort};
 use runs::out;
-use std::path::PathBuf;
+use runs::print::folded;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// Folder of one run, to tag it or to write its note; without it all runs are listed
+    run: Option<PathBuf>,
     /// Folder of the runs [default: $MUPRIME_RUNS or ./runs]
-    #[arg(long)]
+    #[arg(long, conflicts_with = "run")]
     folder: Option<PathBuf>,
     /// Only runs whose plan's name contains this
-    #[arg(long)]
+    #[arg(long, conflicts_with = "run")]
     plan: Option<String>,
     /// Only runs that did not end by themselves
-    #[arg(long)]
+    #[arg(long, conflicts_with = "run")]
     unfinished: bool,
+    /// Only runs whose texts contain each of these words: operator, sample, tip, tags, note and the rest
+    #[arg(long, value_name = "WORDS", conflicts_with = "run")]
+    find: Option<String>,
+    /// Column to sort by
+    #[arg(long, value_name = "COLUMN", default_value = "started", conflicts_with = "run")]
+    sort: SortBy,
+    /// Tag to add to the run (may be repeated)
+    #[arg(long, value_name = "TAG", requires = "run")]
+    tag: Vec<String>,
+    /// Tag to take off the run (may be repeated)
+    #[arg(long, value_name = "TAG", requires = "run")]
+    untag: Vec<String>,
+    /// Note of the run, in place of the one before
+    #[arg(long, value_name = "TEXT", requires = "run")]
+    note: Option<String>,
 }
 
-/// Lists.
+/// Lists, or annotates one run.
 ///
 /// # Errors
-/// A folder that holds no run, or cannot be read.
+/// A folder that holds no run, or cannot be read; tags or a note that are too long.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
+    if let Some(run) = &args.run {
+        let annotations = annotate(run, &args)?;
+        if json {
+            out!("{}", serde_json::to_string(&annotations).into_diagnostic()?);
+        } else {
+            let tags = if annotations.tags.is_empty() { "none".into() } else { annotations.tags.join(", ") };
+            out!("tags: {tags}");
+            out!("note: {}", if annotations.note.is_empty() { "none" } else { &annotations.note });
+        }
+        return super::exit(super::DONE);
+    }
     let folder = args.folder.unwrap_or_else(runs_folder);
     let mut runs = existing(&folder)?;
     runs.retain(|r| args.plan.as_ref().is_none_or(|p| r.plan.contains(p.as_str())));
     runs.retain(|r| !args.unfinished || r.outcome != "complete");
+    runs.retain(|r| args.find.as_ref().is_none_or(|words| r.has(words)));
+    sort(&mut runs, args.sort);
     if json {
         out!("{}", serde_json::to_string(&runs).into_diagnostic()?);
         return super::exit(super::DONE);
     }
     for r in runs {
-        let outcome = if r.outcome.is_empty() { "no ending".into() } else { r.outcome.replace('_', " ") };
-        let departed = if r.departed { "  disagrees" } else { "" };
-        out!("{:40} {:>5}/{:<5} {outcome:12} {}{departed}", r.folder, r.passes, r.planned, r.setup);
+        out!("{:40} {:>5}/{:<5} {}", r.folder, r.passes, r.planned, r.outcome_words());
+        out!("{}", folded(&format!("  {}", details(&r)), 4));
     }
     super::exit(super::DONE)
+}
+
+/// The tags and the note after the changes; written only where there are any.
+fn annotate(run: &Path, args: &Args) -> miette::Result<Annotations> {
+    super::there(run, "run")?;
+    let before = Annotations::read(run)?;
+    let mut after = before.clone();
+    after.tags.extend(args.tag.iter().cloned());
+    after.tags.retain(|tag| !args.untag.contains(tag));
+    after.note = args.note.clone().unwrap_or(after.note);
+    let after = after.checked()?;
+    if after != before {
+        after.clone().write(run)?;
+    }
+    Ok(after)
+}
+
+/// What is known of a run, in one line; what is not known is left out.
+fn details(r: &RunEntry) -> String {
+    let named = |name: &str, value: Option<String>| {
+        value.filter(|value| !value.is_empty()).map(|value| format!("{name} {value}"))
+    };
+    let known = [
+        r.operator.clone(),
+        r.sample.clone(),
+        named("tip", r.tip.clone()),
+        named("setup", Some(r.setup.clone())),
+        named("model", Some(r.model.clone())),
+        named("seed", r.seed.map(|seed| seed.to_string())),
+        named("mu_0", r.mu0.map(|mu0| format!("{mu0:.3}"))),
+        named("tags:", Some(r.tags.join(", "))),
+        named("note:", Some(r.note.lines().next().unwrap_or_default().into())),
+        r.verdict.clone(),
+    ];
+    known.into_iter().flatten().collect::<Vec<_>>().join("; ")
 }

@@ -1,7 +1,7 @@
 //! The handlers of the addresses.
 
 use super::server::Shared;
-use super::{pages, stream};
+use super::{download, pages, stream};
 use crate::live::{self, Ask, Viewer};
 use axum::extract::{Path, Query, Request, State};
 use axum::http::{StatusCode, header};
@@ -9,13 +9,18 @@ use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
-use runs::report::{FIGURES, UPLOT, UPLOT_STYLE};
+use runs::catalogue::Annotations;
+use runs::compare::groups::{GroupBy, MOST_COMPARED};
+use runs::report::{EXPLORE, FIGURES, UPLOT, UPLOT_STYLE};
+use runs::verdict::files::diagnose_run;
 use serde::Deserialize;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 /// Largest body of a request in bytes.
 const BODY: usize = 256;
+/// The same of one with tags and a note.
+const ANNOTATIONS_BODY: usize = 32 * 1024;
 /// Time that a body may take in all.
 const BODY_WITHIN: Duration = Duration::from_secs(5);
 /// What pages may load and from where: this server, and styles and pictures that stand in a report.
@@ -27,7 +32,11 @@ pub fn routes(shared: Arc<Shared>) -> Router {
     let data = Router::new()
         .route("/api/about", get(about))
         .route("/api/runs", get(runs))
-        .route("/api/runs/{name}/past", get(past))
+        .route("/api/runs/{name}", get(run))
+        .route("/api/runs/{name}/report", get(report))
+        .route("/api/runs/{name}/files/{file}", get(file))
+        .route("/api/runs/{name}/annotations", post(annotate))
+        .route("/api/runs/{name}/diagnose", post(diagnose))
         .route("/api/runs/{name}/pages/{page}", get(page))
         .route("/api/runs/{name}/ask", post(ask))
         .route("/api/compare", get(compare))
@@ -38,6 +47,11 @@ pub fn routes(shared: Arc<Shared>) -> Router {
         .route("/app.css", get(|| asset("text/css", include_str!("assets/app.css"))))
         .route("/app.js", get(|| asset("text/javascript", include_str!("assets/app.js"))))
         .route("/plots.js", get(|| asset("text/javascript", FIGURES)))
+        .route("/explore.js", get(|| asset("text/javascript", EXPLORE)))
+        .route(
+            "/report.css",
+            get(|| async { asset("text/css", &runs::report::scoped_style(".report")).await }),
+        )
         .route("/uplot.css", get(|| asset("text/css", UPLOT_STYLE)))
         .route("/uplot.js", get(|| asset("text/javascript", UPLOT)))
         .merge(data)
@@ -46,8 +60,8 @@ pub fn routes(shared: Arc<Shared>) -> Router {
         .with_state(shared)
 }
 
-async fn asset(kind: &'static str, text: &'static str) -> Response {
-    ([(header::CONTENT_TYPE, kind)], text).into_response()
+async fn asset(kind: &'static str, text: &str) -> Response {
+    ([(header::CONTENT_TYPE, kind)], text.to_string()).into_response()
 }
 
 /// Before everything else: the right host, and no foreign page; after everything, what a browser is to keep to.
@@ -71,7 +85,8 @@ async fn at_this_place(State(shared): State<Arc<Shared>>, request: Request, next
 /// Before whatever reads it: a body that is small and whole.
 async fn with_body(request: Request, next: Next) -> Response {
     let (head, body) = request.into_parts();
-    match tokio::time::timeout(BODY_WITHIN, axum::body::to_bytes(body, BODY)).await {
+    let most = if head.uri.path().ends_with("/annotations") { ANNOTATIONS_BODY } else { BODY };
+    match tokio::time::timeout(BODY_WITHIN, axum::body::to_bytes(body, most)).await {
         Ok(Ok(body)) => next.run(Request::from_parts(head, body.into())).await,
         Ok(Err(_)) => StatusCode::PAYLOAD_TOO_LARGE.into_response(),
         Err(_) => (StatusCode::REQUEST_TIMEOUT, [(header::CONNECTION, "close")]).into_response(),
@@ -92,7 +107,7 @@ fn refused(status: StatusCode, request: &Request) -> Response {
 }
 
 /// What went wrong, for a page.
-fn failed(why: &miette::Report) -> Response {
+fn failed_to(why: &miette::Report) -> Response {
     (StatusCode::UNPROCESSABLE_ENTITY, format!("{why:#}")).into_response()
 }
 
@@ -108,36 +123,121 @@ async fn about(State(shared): State<Arc<Shared>>) -> Response {
 
 async fn runs(State(shared): State<Arc<Shared>>) -> Result<Response, Response> {
     let found = beside(move || pages::runs(&shared.options.runs)).await?;
-    Ok(found.map_or_else(|why| failed(&why), |runs| Json(runs).into_response()))
+    Ok(found.map_or_else(|why| failed_to(&why), |runs| Json(runs).into_response()))
 }
 
-async fn past(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Result<Response, Response> {
-    let folder = shared.folder(&name).ok_or_else(|| StatusCode::NOT_FOUND.into_response())?;
-    let found = beside(move || pages::past(&folder)).await?;
-    Ok(found.map_or_else(|why| failed(&why), |messages| Json(messages).into_response()))
+/// Folder of a run, or the answer that there is none.
+fn folder(shared: &Shared, name: &str) -> Result<std::path::PathBuf, Response> {
+    shared.folder(name).ok_or_else(|| StatusCode::NOT_FOUND.into_response())
+}
+
+async fn run(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Result<Response, Response> {
+    folder(&shared, &name)?;
+    let (diagnosing, failed) = {
+        let diagnoses = shared.diagnoses.lock().unwrap_or_else(PoisonError::into_inner);
+        (diagnoses.under_way.as_ref() == Some(&name), diagnoses.failed.get(&name).cloned())
+    };
+    let found = beside(move || pages::run(&shared.options.runs, &name)).await?;
+    Ok(found.map_or_else(
+        |why| failed_to(&why),
+        |run| {
+            Json(serde_json::json!({ "run": run, "diagnosing": diagnosing, "undiagnosed": failed }))
+                .into_response()
+        },
+    ))
+}
+
+async fn report(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Result<Response, Response> {
+    let folder = folder(&shared, &name)?;
+    let found = beside(move || runs::report::html(&folder)).await?;
+    Ok(found.map_or_else(|why| failed_to(&why), html))
+}
+
+async fn file(
+    State(shared): State<Arc<Shared>>,
+    Path((name, file)): Path<(String, String)>,
+) -> Result<Response, Response> {
+    let folder = folder(&shared, &name)?;
+    let found = beside(move || download::file(&folder, &file)).await?;
+    found.ok_or_else(|| StatusCode::NOT_FOUND.into_response())
+}
+
+async fn annotate(
+    State(shared): State<Arc<Shared>>,
+    Path(name): Path<String>,
+    Json(annotations): Json<Annotations>,
+) -> Result<StatusCode, Response> {
+    shared.guard.count().map_err(IntoResponse::into_response)?;
+    let folder = folder(&shared, &name)?;
+    beside(move || annotations.write(&folder)).await?.map_err(|why| failed_to(&why))?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Begins a diagnosis beside everything else. While any run of the folder goes on there is none: it
+/// would take that loop's processor.
+async fn diagnose(
+    State(shared): State<Arc<Shared>>,
+    Path(name): Path<String>,
+) -> Result<StatusCode, Response> {
+    shared.guard.count().map_err(IntoResponse::into_response)?;
+    let folder = folder(&shared, &name)?;
+    let refused = |why: &str| (StatusCode::CONFLICT, why.to_string()).into_response();
+    let runs = shared.options.runs.clone();
+    if beside(move || pages::any_live(&runs)).await? {
+        return Err(refused("a run goes on: diagnose when it is over"));
+    }
+    {
+        let mut diagnoses = shared.diagnoses.lock().unwrap_or_else(PoisonError::into_inner);
+        if diagnoses.under_way.is_some() {
+            return Err(refused("another diagnosis is under way"));
+        }
+        diagnoses.failed.remove(&name);
+        diagnoses.under_way = Some(name.clone());
+    }
+    tokio::task::spawn_blocking(move || {
+        let found = std::panic::catch_unwind(|| diagnose_run(&folder));
+        let mut diagnoses = shared.diagnoses.lock().unwrap_or_else(PoisonError::into_inner);
+        diagnoses.under_way = None;
+        let why = match found {
+            Ok(Ok(())) => return,
+            Ok(Err(why)) => format!("{why:#}"),
+            Err(_) => "the diagnosis failed; `muprime diagnose` on this folder shows why".into(),
+        };
+        diagnoses.failed.insert(name, why);
+    });
+    Ok(StatusCode::ACCEPTED)
 }
 
 async fn page(
     State(shared): State<Arc<Shared>>,
     Path((name, page)): Path<(String, String)>,
 ) -> Result<Response, Response> {
-    let folder = shared.folder(&name).ok_or_else(|| StatusCode::NOT_FOUND.into_response())?;
+    let folder = folder(&shared, &name)?;
     let found = beside(move || pages::page(&folder, &page)).await?;
-    Ok(found.map_or_else(|why| failed(&why), html))
+    Ok(found.map_or_else(|why| failed_to(&why), html))
 }
 
-/// Two runs.
+/// Runs to compare.
 #[derive(Deserialize)]
-struct Two {
-    a: String,
-    b: String,
+struct Several {
+    /// Their names, between slashes: no name has one.
+    runs: String,
+    /// What more than two are grouped by.
+    by: Option<GroupBy>,
 }
 
-async fn compare(State(shared): State<Arc<Shared>>, Query(two): Query<Two>) -> Result<Response, Response> {
-    let folder = |name: &str| shared.folder(name).ok_or_else(|| StatusCode::NOT_FOUND.into_response());
-    let (a, b) = (folder(&two.a)?, folder(&two.b)?);
-    let found = beside(move || pages::compare(&a, &b)).await?;
-    Ok(found.map_or_else(|why| failed(&why), html))
+async fn compare(
+    State(shared): State<Arc<Shared>>,
+    Query(several): Query<Several>,
+) -> Result<Response, Response> {
+    let folders: Result<Vec<_>, _> = several.runs.split('/').map(|name| folder(&shared, name)).collect();
+    let folders = folders?;
+    if !(2..=MOST_COMPARED).contains(&folders.len()) {
+        return Err((StatusCode::UNPROCESSABLE_ENTITY, format!("2 to {MOST_COMPARED} runs are compared"))
+            .into_response());
+    }
+    let found = beside(move || pages::compare(&folders, several.by)).await?;
+    Ok(found.map_or_else(|why| failed_to(&why), html))
 }
 
 fn html(text: String) -> Response {
@@ -161,7 +261,7 @@ async fn ask(
         let why = "this dashboard was started without --allow-control: it stops runs, and nothing else";
         return Err((StatusCode::FORBIDDEN, why).into_response());
     }
-    let folder = shared.folder(&name).ok_or_else(|| StatusCode::NOT_FOUND.into_response())?;
+    let folder = folder(&shared, &name)?;
     let answer = beside(move || match ask {
         // Answered as done only where the run shows it.
         Ask::Stop => live::stop(&folder).map(drop),

@@ -1,12 +1,13 @@
 //! What is read from the disk for a browser.
 
-use crate::live::{Ended, Message, Progress, Run, TimedEvent};
+use super::download::files_in;
 use miette::{IntoDiagnostic, WrapErr};
-use runs::catalogue::{RunEntry, runs_in};
+use runs::catalogue::{Lineage, RunEntry, lineage, runs_in};
+use runs::compare::Compared;
+use runs::compare::groups::{GroupBy, Grouped};
 use runs::run_dir::is_held;
-use runs::setup::Guards;
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Largest page that is served, in bytes.
 const LARGEST: u64 = 32 << 20;
@@ -20,6 +21,19 @@ pub struct Listed {
     live: bool,
     /// Names of the HTML pages in its folder.
     pages: Vec<String>,
+    /// Measured `mu'` against amplitude, as SVG.
+    picture: Option<String>,
+}
+
+/// A run with what belongs to it.
+#[derive(Serialize)]
+pub struct Described {
+    #[serde(flatten)]
+    listed: Listed,
+    /// Names of the files that may be downloaded.
+    files: Vec<String>,
+    /// Runs before it and after it.
+    lineage: Lineage,
 }
 
 /// The runs of a folder, newest first; none where there is no folder yet.
@@ -27,13 +41,30 @@ pub struct Listed {
 /// # Errors
 /// A folder that cannot be read.
 pub fn runs(folder: &Path) -> miette::Result<Vec<Listed>> {
-    Ok(runs_in(folder)?
-        .into_iter()
-        .map(|entry| {
-            let run = folder.join(&entry.folder);
-            Listed { live: is_held(&run), pages: pages_in(&run), entry }
-        })
-        .collect())
+    Ok(runs_in(folder)?.into_iter().map(|entry| listed(folder, entry)).collect())
+}
+
+fn listed(folder: &Path, mut entry: RunEntry) -> Listed {
+    let run = folder.join(&entry.folder);
+    let picture = entry.thumbnail.take();
+    Listed { live: is_held(&run), pages: pages_in(&run), picture, entry }
+}
+
+/// One run of a folder.
+///
+/// # Errors
+/// A folder that cannot be read, or holds no run of that name.
+pub fn run(folder: &Path, name: &str) -> miette::Result<Described> {
+    let mut all = runs_in(folder)?;
+    let lineage = lineage(folder, &all, name);
+    let at = all.iter().position(|run| run.folder == name);
+    let entry = all.swap_remove(at.ok_or_else(|| miette::miette!("no session of this run has begun"))?);
+    Ok(Described { listed: listed(folder, entry), files: files_in(&folder.join(name)), lineage })
+}
+
+/// Whether a process drives any run of a folder.
+pub fn any_live(folder: &Path) -> bool {
+    std::fs::read_dir(folder).is_ok_and(|all| all.flatten().any(|entry| is_held(&entry.path())))
 }
 
 fn pages_in(run: &Path) -> Vec<String> {
@@ -63,52 +94,13 @@ pub fn page(run: &Path, name: &str) -> miette::Result<String> {
     std::fs::read_to_string(&path).into_diagnostic().wrap_err_with(|| name.to_string())
 }
 
-/// The comparison of two runs.
+/// The comparison of two runs, or of more by groups.
 ///
 /// # Errors
 /// Runs that cannot be compared.
-pub fn compare(a: &Path, b: &Path) -> miette::Result<String> {
-    let compared = runs::compare::Compared::of([a, b])?;
-    runs::report::comparison::page(&compared)
-}
-
-/// What a viewer of an ended run gets: the messages of a running one, without states.
-///
-/// # Errors
-/// A folder that holds no run, or one that cannot be read.
-pub fn past(folder: &Path) -> miette::Result<Vec<Message>> {
-    let run = runs::report::read(folder)?;
-    let fact = |name: &str| run.facts.get(name).cloned();
-    let planned = run.summary.as_ref().map_or(run.passes.len(), |s| s.planned);
-    let of = Run {
-        folder: folder.to_path_buf(),
-        plan: fact("plan").unwrap_or_default(),
-        setup: fact("setup").unwrap_or_default(),
-        model: fact("model").unwrap_or_default(),
-        operator: fact("operator"),
-        sample: fact("sample"),
-        started_unix_s: fact("start_unix_ns").and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0) * 1e-9,
-        fast: fact("clock").as_deref() == Some("virtual"),
-        process: 0,
-        planned,
-        made_before: 0,
-        guards: Guards::of_facts(fact),
-    };
-    let mut messages = vec![Message::Run(Box::new(of))];
-    let progress = Progress { made: run.passes.len(), planned, remaining_s: 0.0 };
-    messages.extend(run.passes.iter().map(|pass| Message::Pass(Box::new(pass.clone()))));
-    messages.extend(run.events.iter().filter_map(|(at_s, event)| {
-        // Events of a later version are left to that one.
-        let event = serde_json::from_value(event.clone()).ok()?;
-        Some(Message::Event(TimedEvent::of(*at_s, event)))
-    }));
-    messages.push(Message::Progress(progress));
-    messages.push(Message::Ended(Box::new(match run.summary {
-        Some(summary) => Ended::of(&Ok(summary)),
-        None => {
-            let error = "the run has no ending: it was killed, or it still goes on".to_string();
-            Ended { outcome: None, remedy: None, error: Some(error), off: None, agreement: None }
-        }
-    })));
-    Ok(messages)
+pub fn compare(runs: &[PathBuf], by: Option<GroupBy>) -> miette::Result<String> {
+    match runs {
+        [a, b] if by.is_none() => runs::report::comparison::page(&Compared::of([a, b])?),
+        more => runs::report::groups::page(&Grouped::of(more, by.unwrap_or_default())?),
+    }
 }

@@ -4,10 +4,11 @@ use super::guard::Guard;
 use super::{Options, api, serve};
 use crate::live::Ask;
 use miette::{IntoDiagnostic, WrapErr};
+use std::collections::BTreeMap;
 use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
+use std::sync::{Arc, Mutex};
 
 /// What all requests share.
 pub(super) struct Shared {
@@ -15,6 +16,17 @@ pub(super) struct Shared {
     pub guard: Guard,
     /// Live streams at present.
     pub streams: AtomicUsize,
+    /// The diagnosis that is under way, and why others have no verdict.
+    pub diagnoses: Mutex<Diagnoses>,
+}
+
+/// Diagnoses at the request of browsers.
+#[derive(Default)]
+pub(super) struct Diagnoses {
+    /// The run of the one that is under way: there is one at a time.
+    pub under_way: Option<String>,
+    /// Why a run has no verdict, by its name.
+    pub failed: BTreeMap<String, String>,
 }
 
 impl Shared {
@@ -51,7 +63,8 @@ impl Dashboard {
         let address = listener.local_addr().into_diagnostic()?;
         let guard = Guard::new(address, &options.hosts);
         let token = guard.token().to_string();
-        let shared = Arc::new(Shared { options, guard, streams: AtomicUsize::new(0) });
+        let shared =
+            Arc::new(Shared { options, guard, streams: AtomicUsize::new(0), diagnoses: Mutex::default() });
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().into_diagnostic()?;
         std::thread::Builder::new()
             .name("dashboard".into())

@@ -55,7 +55,7 @@ impl Compared {
     }
 }
 
-fn noise(folder: &Path) -> miette::Result<PassNoise> {
+pub(super) fn noise(folder: &Path) -> miette::Result<PassNoise> {
     Ok(crate::input::rig_file(&folder.join("rig.toml"))?.noise)
 }
 

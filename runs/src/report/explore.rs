@@ -8,6 +8,8 @@ use models::quantity::PeakToPeak;
 
 /// The figures of the dashboard and of a run's page, a module.
 pub const FIGURES: &str = include_str!("assets/plots.js");
+/// What a run's page does with them, a module.
+pub const EXPLORE: &str = include_str!("explore.js");
 /// The library that draws them.
 pub const UPLOT: &str = include_str!("assets/uPlot.iife.min.js");
 /// Its style.
@@ -20,14 +22,22 @@ pub(super) fn section(run: &RunData, traces: &[Trace]) -> String {
     }
     // No markup can begin within the data.
     let data = data(run, traces).to_string().replace('<', "\\u003c");
-    // The dashboard's figures are a module; a page that is opened as a file can import none.
-    let figures = FIGURES.replace("\nexport ", "\n");
     format!(
-        "<section id=\"explore\" hidden></section><style>{}</style>\
-         <script type=\"application/json\" id=\"run-data\">{data}</script>\n<script>{}\ndocument.addEventListener(\"DOMContentLoaded\", () => {{\n{figures}\n{}\n}});</script>\n",
-        UPLOT_STYLE,
-        UPLOT,
-        include_str!("explore.js")
+        "<section id=\"explore\" hidden></section><style>{UPLOT_STYLE}</style>\
+         <script type=\"application/json\" id=\"run-data\">{data}</script>\n{}",
+        script(
+            "explore(document.getElementById(\"explore\"), JSON.parse(document.getElementById(\"run-data\").textContent), document);"
+        )
+    )
+}
+
+/// The library, the figures and what is done with them, in the page itself: one that is opened as a
+/// file can import no module.
+pub(super) fn script(then: &str) -> String {
+    let imported = EXPLORE.split_once('\n').map_or("", |(_, rest)| rest);
+    let figures = format!("{FIGURES}\n{imported}").replace("\nexport ", "\n");
+    format!(
+        "<script>{UPLOT}\ndocument.addEventListener(\"DOMContentLoaded\", () => {{\n{figures}\n{then}\n}});</script>\n"
     )
 }
 

@@ -26,8 +26,17 @@ pub fn shell(title: &str, body: &str) -> String {
         "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>muprime: {title}</title>\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><style>{}</style></head><body><main>\n\
          {body}</main></body></html>\n",
-        include_str!("style.css")
+        STYLE
     )
+}
+
+const STYLE: &str = include_str!("style.css");
+
+/// The style of a page for a part of another page, the one that this selector names.
+pub fn scoped_style(selector: &str) -> String {
+    // What a page is as a whole is that part, and its media rules stay within it.
+    let nested = STYLE.replace(":root{", "&{").replace("body{", "&{");
+    format!("{selector}{{{nested}}}")
 }
 
 /// A paragraph below a figure or a table.

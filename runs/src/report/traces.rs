@@ -26,6 +26,10 @@ pub struct Trace {
     pub normal: [Vec<Option<i64>>; 2],
     /// The same of the running `mu'`, in thousandths.
     pub mu: [Vec<Option<i64>>; 2],
+    /// Position of the plate in the middle of each stretch in um; none where it was not read.
+    pub position_um: Vec<Option<i64>>,
+    /// Lateness of the latest cycle of each stretch in us; zero in virtual time.
+    pub late_us: Vec<i64>,
     /// Time from which the pass is averaged, in ms.
     pub measured_from_ms: Option<i64>,
 }
@@ -66,9 +70,15 @@ fn trace(rows: &[Row]) -> Option<Trace> {
         };
         [f64::min, f64::max].map(|pick| stretches.iter().map(|rows| all(rows, pick)).collect::<Vec<_>>())
     };
+    let middle = |rows: &&[Row]| rows[rows.len() / 2];
+    let position = |row: Row| Some((row.inputs.seen.stage.ok()?.position_m * 1e6).round() as i64);
+    let late =
+        |rows: &&[Row]| rows.iter().map(|row| row.inputs.seen.lateness.0 / 1_000).max().unwrap_or(0) as i64;
     Some(Trace {
         point,
-        t_ms: stretches.iter().map(|rows| ms(&rows[rows.len() / 2])).collect(),
+        t_ms: stretches.iter().map(|rows| ms(&middle(rows))).collect(),
+        position_um: stretches.iter().map(|rows| position(middle(rows))).collect(),
+        late_us: stretches.iter().map(late).collect(),
         lateral: ends(1e4, |r| r.inputs.seen.forces.lateral.ok().map(|f| f.value)),
         normal: ends(1e4, |r| r.inputs.seen.forces.normal.ok().map(|f| f.value)),
         mu: ends(1e3, |r| r.mu_relative.ok().map(|m| m.value)),

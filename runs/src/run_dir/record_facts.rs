@@ -8,8 +8,25 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
+/// Entries of a record among which its facts are.
+const HEAD: usize = 64;
+
 /// What the records of a run say of it: facts by name, and its files' keys by `file: key`.
 pub type RecordFacts = BTreeMap<String, String>;
+
+/// The facts at the head of a run's first record; none where there is no record that says any. It reads
+/// no cycle.
+pub fn header_facts(folder: &Path) -> RecordFacts {
+    let head = |path: &std::path::PathBuf| {
+        let reader = Reader::new(BufReader::new(File::open(path).ok()?)).only(recorder::EVENTS);
+        let header = |entry| match entry {
+            Entry::Facts { name, facts } if name == recorder::HEADER => Some(facts),
+            _ => None,
+        };
+        reader.take(HEAD).find_map(header)
+    };
+    records_in(folder).ok().and_then(|all| head(all.first()?)).unwrap_or_default()
+}
 
 /// What the first record of a run says of it.
 ///

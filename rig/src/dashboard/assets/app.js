@@ -1,4 +1,5 @@
-import { figure, levels, marks, SERIES, traces, WITHIN } from "/plots.js";
+import { explore, exploreGroups, passFigures } from "/explore.js";
+import { button, el, figure, levels, marks, save, shown, traces, WITHIN } from "/plots.js";
 
 // The token comes with the address's fragment, which is never sent, and stays with this tab.
 const given = new URLSearchParams(location.hash.slice(1)).get("token");
@@ -14,22 +15,6 @@ const NONE = "none";
 const STATES = 600;
 
 const get = (address, options = {}) => fetch(address, { ...options, headers: { ...options.headers, Authorization: `Bearer ${token}` } });
-
-// Marks that turn text round or that nobody sees are written out, as in the other views.
-const hidden = /[\u061c\u200b\u200e\u200f\u2028-\u202e\u2060\u2066-\u2069\ufeff]/g;
-const shown = (text) => (typeof text === "string" ? text.replace(hidden, (c) => `\\u${c.charCodeAt(0).toString(16).padStart(4, "0")}`) : text);
-
-// Elements are made of text, never of markup: names in records may hold some.
-function el(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
-    else if (value === true) made.setAttribute(name, "");
-    else if (value !== false && value != null) made.setAttribute(name, value);
-  }
-  made.append(...children.filter((c) => c != null).map(shown));
-  return made;
-}
 
 const fixed = (value, digits, unit = "") => (value == null ? NONE : `${value.toFixed(digits)}${unit}`);
 const signed = (value, digits, unit = "") => (value == null ? NONE : `${value >= 0 ? "+" : ""}${value.toFixed(digits)}${unit}`);
@@ -50,59 +35,177 @@ async function fetched(address) {
 
 // --- the catalogue -------------------------------------------------------------------------------------------------
 
+const began = (run) => new Date(run.started_unix_s * 1000).toISOString().slice(0, 16).replace("T", " ");
+const outcome = (run) => (run.live ? "goes on" : run.outcome.replaceAll("_", " ") || "no ending") + (run.departed ? ", disagrees with the model" : "");
+const runLink = (name) => el("a", { href: `#/run/${part(name)}` }, name);
+// What is not known has a reason in words, and comes last in every order.
+const COLUMNS = [
+  { name: "run", of: (r) => r.folder, cell: (r) => runLink(r.folder) }, { name: "began, UTC", of: (r) => r.started_unix_s, cell: began, wide: true },
+  { name: "plan", of: (r) => r.plan, wide: true }, { name: "operator", of: (r) => r.operator }, { name: "sample", of: (r) => r.sample },
+  { name: "tip", of: (r) => r.tip, wide: true }, { name: "setup", of: (r) => r.setup, wide: true }, { name: "model", of: (r) => r.model, wide: true },
+  { name: "seed", of: (r) => r.seed, number: true, wide: true }, { name: "\u03bc\u2080", of: (r) => r.mu0, cell: (r) => r.mu0.toFixed(3), number: true },
+  { name: "passes", of: (r) => r.passes, cell: (r) => `${r.passes} of ${r.planned}`, number: true }, { name: "outcome", of: outcome },
+  { name: "verdict", of: (r) => r.verdict, without: "no diagnosis" }, { name: "tags", of: (r) => r.tags.join(", "), without: NONE }, { name: "note", of: (r) => r.note, without: NONE },
+];
+const empty = (value) => value == null || value === "";
+
+function thumbnail(run) {
+  if (!run.picture) return el("span", { class: "note" }, "no pass with \u03bc'");
+  // The one markup that is taken as it comes: this program draws it, of numbers alone.
+  const made = el("template");
+  made.innerHTML = run.picture;
+  return made.content;
+}
+
 async function catalogue() {
   const runs = await (await fetched("/api/runs")).json();
   const chosen = new Set();
-  const compare = el("button", { type: "button", disabled: true, onclick: () => { location.hash = `#/compare/${[...chosen].map(part).join("/")}`; } }, "Compare the two chosen runs");
+  const compare = button("Compare the chosen runs", () => { location.hash = `#/compare/${[...chosen].map(part).join("/")}`; }, { disabled: true });
   const body = el("tbody");
   const count = el("p", { class: "note", role: "status" });
   const search = el("input", { type: "search", id: "search", autocomplete: "off" });
+  const order = { column: COLUMNS[1], down: true };
   const row = (run) => {
     const box = el("input", { type: "checkbox", "aria-label": `choose ${run.folder}`, onchange: (event) => {
       if (event.target.checked) chosen.add(run.folder); else chosen.delete(run.folder);
-      compare.disabled = chosen.size !== 2;
+      compare.disabled = chosen.size < 2;
     } });
     box.checked = chosen.has(run.folder);
     const pages = run.pages.map((page) => el("a", { href: `#/page/${part(run.folder)}/${part(page)}` }, page));
-    const began = new Date(run.started_unix_s * 1000).toISOString().slice(0, 16).replace("T", " ");
-    const outcome = run.live ? "goes on" : run.outcome.replaceAll("_", " ") || "no ending";
-    return el("tr", {},
-      el("td", {}, box),
-      el("td", {}, el("a", { href: `#/run/${part(run.folder)}` }, run.folder)),
-      el("td", { class: "wide" }, began), el("td", { class: "wide" }, run.plan), el("td", { class: "wide" }, run.setup),
-      el("td", { class: "n" }, `${run.passes} of ${run.planned}`),
-      el("td", {}, outcome + (run.departed ? ", disagrees with the model" : "")),
-      el("td", {}, ...pages.flatMap((page, i) => (i ? [", ", page] : [page]))));
+    const cell = (column) => {
+      const value = column.of(run);
+      return el("td", { class: `${column.number ? "n" : ""} ${column.wide ? "wide" : ""}` }, empty(value) ? column.without ?? "not stated" : column.cell ? column.cell(run) : String(value));
+    };
+    return el("tr", {}, el("td", {}, box), el("td", {}, thumbnail(run)), ...COLUMNS.map(cell), el("td", {}, ...pages.flatMap((page, i) => (i ? [", ", page] : [page]))));
   };
+  const compared = (a, b) => (typeof a === "number" ? a - b : String(a).localeCompare(String(b), "en", { numeric: true }));
   const show = () => {
     const wanted = search.value.trim().toLowerCase().split(/\s+/);
     const found = runs.filter((run) => {
-      const text = `${run.folder} ${run.plan} ${run.setup} ${run.live ? "goes on" : run.outcome} ${run.departed ? "departed" : ""}`.toLowerCase();
+      const text = COLUMNS.map((c) => c.of(run) ?? "").join("\n").toLowerCase();
       return wanted.every((word) => text.includes(word));
     });
+    const { of } = order.column;
+    found.sort((a, b) => empty(of(a)) - empty(of(b)) || (empty(of(a)) ? 0 : compared(of(a), of(b)) * (order.down ? -1 : 1)));
     body.replaceChildren(...found.map(row));
     count.textContent = `${found.length} of ${runs.length} runs`;
+    for (const head of heads) {
+      const mine = head.column === order.column;
+      head.cell.setAttribute("aria-sort", mine ? (order.down ? "descending" : "ascending") : "none");
+    }
   };
+  const heads = COLUMNS.map((column) => ({ column, cell: el("th", { scope: "col", class: `${column.number ? "n" : ""} ${column.wide ? "wide" : ""}` }, button(column.name, () => {
+    order.down = order.column === column && !order.down;
+    order.column = column;
+    show();
+  }, { class: "sort" })) }));
   search.addEventListener("input", show);
   show();
-  const head = (text, kind) => el("th", { scope: "col", class: kind }, text);
+  const head = (text) => el("th", { scope: "col" }, text);
   main.replaceChildren(
     el("h1", {}, "Runs"),
     el("p", { class: "keys" }, el("label", { for: "search" }, "Search"), search, compare), count,
     el("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Runs" },
-      el("table", {}, el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "two"), head("run"), head("began, UTC", "wide"), head("plan", "wide"), head("setup", "wide"), head("passes", "n"), head("outcome"), head("pages"))), body)));
+      el("table", {}, el("thead", {}, el("tr", {}, head("choose"), head("\u03bc' against w"), ...heads.map((h) => h.cell), head("pages"))), body)));
 }
 
-// --- pages that were written ---------------------------------------------------------------------------------------
+// --- pages that were written, and those that are made here -----------------------------------------------------------
 
-// Without script and without an origin: a report asks for nothing.
+// A file of a folder may come from anywhere: it is shown without script and without an origin.
 async function written(title, address) {
   const page = new DOMParser().parseFromString(await (await fetched(address)).text(), "text/html");
   for (const script of page.querySelectorAll("script")) script.remove();
   main.replaceChildren(el("h1", {}, title), el("iframe", { sandbox: "", srcdoc: `<!doctype html>${page.documentElement.outerHTML}`, title }));
 }
 
-// --- a run ---------------------------------------------------------------------------------------------------------
+// A page that this program has just made, as a part of this one, with the figures that it has as a file.
+async function made(address, script) {
+  const page = new DOMParser().parseFromString(await (await fetched(address)).text(), "text/html");
+  const data = page.getElementById("run-data")?.textContent;
+  for (const one of page.querySelectorAll("script, style")) one.remove();
+  const report = el("div", { class: "report" }, ...page.querySelector("main").childNodes);
+  return { report, start: () => { if (data) script(report.querySelector("#explore"), JSON.parse(data), report); } };
+}
+
+async function comparison(names) {
+  const by = el("select", { id: "by", onchange: () => show() }, ...[["", "the runs themselves"], ["tip", "tip"], ["moisture", "moisture"], ["day", "day"], ["model", "model"]].map(([value, words]) => el("option", { value }, words)));
+  const place = el("div", { role: "status" });
+  const show = async () => {
+    const query = `runs=${part(names.join("/"))}${by.value ? `&by=${by.value}` : ""}`;
+    place.replaceChildren("The comparison is being made.");
+    try {
+      const { report, start } = await made(`/api/compare?${query}`, exploreGroups);
+      place.replaceChildren(report);
+      start();
+    } catch (why) {
+      place.replaceChildren(el("p", { role: "alert" }, why.message));
+    }
+  };
+  main.replaceChildren(el("p", { class: "keys" }, el("label", { for: "by" }, "Compare by"), by, ...names.map(runLink)), place);
+  await show();
+}
+
+// --- a run -----------------------------------------------------------------------------------------------------------
+
+const post = (address, what) => get(address, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(what) });
+
+// Tags and note, to be changed; they go into a file of their own in the run's folder.
+function annotations({ folder, tags, note }) {
+  const tagged = el("input", { id: "tags", autocomplete: "off", value: tags.join(", ") });
+  const text = el("textarea", { id: "note", rows: 2 }, note);
+  const result = el("span", { role: "status", class: "note" });
+  const write = async () => {
+    const answer = await post(`/api/runs/${part(folder)}/annotations`, { tags: tagged.value.split(","), note: text.value }).catch(() => null);
+    result.textContent = !answer ? "not written: the dashboard does not answer" : answer.ok ? "written" : `not written: ${(await answer.text()) || answer.status}`;
+  };
+  return el("div", { class: "keys" }, el("label", { for: "tags" }, "Tags"), tagged, el("label", { for: "note" }, "Note"), text, button("Save", write), result);
+}
+
+async function download(address, name, result) {
+  try {
+    save(name, await (await fetched(address)).blob());
+  } catch (why) {
+    result.textContent = `${name}: ${why.message}`;
+  }
+}
+
+// What can be done with a run that is over, what it led to, and its report.
+async function finished({ run, diagnosing, undiagnosed }) {
+  const name = run.folder;
+  const address = `/api/runs/${part(name)}`;
+  const result = el("span", { role: "status", class: "note" }, undiagnosed ? `no verdict: ${undiagnosed}` : "");
+  let here = true;
+  const waits = async () => {
+    diagnose.disabled = true;
+    result.textContent = "diagnosis under way";
+    while (here && (await (await fetched(address)).json()).diagnosing) await new Promise((go) => setTimeout(go, 500));
+    if (here) route();
+  };
+  const diagnose = button(run.verdict ? "Diagnose again" : "Diagnose", async () => {
+    const answer = await post(`${address}/diagnose`, {}).catch(() => null);
+    if (answer?.ok) waits().catch((why) => { result.textContent = why.message; });
+    else result.textContent = `refused: ${answer ? (await answer.text()) || answer.status : "the dashboard does not answer"}`;
+  });
+  const choose = el("select", { id: "file" }, el("option", { value: "" }, "report"), ...run.files.map((file) => el("option", { value: file }, file)));
+  const fetchFile = button("Download", () => (choose.value ? download(`${address}/files/${part(choose.value)}`, choose.value, result) : download(`${address}/report`, `${name}-report.html`, result)));
+  const several = (words, items) => (items.length ? el("p", {}, words, ...items.flatMap((item, i) => (i ? [", ", item] : [" ", item]))) : null);
+  const fileButton = (file) => button(file, () => download(`${address}/files/${part(file)}`, file, result));
+  const followed = ["corrected-model.toml", "next-plan.toml"].filter((file) => run.files.includes(file));
+  const { report, start } = await made(`${address}/report`, explore);
+  const parts = [
+    el("p", { class: "keys" }, diagnose, el("label", { for: "file" }, "File"), choose, fetchFile, result), annotations(run),
+    several("Verdict:", [run.verdict ?? "no diagnosis yet", ...run.pages.filter((page) => page !== "report.html").map((page) => el("a", { href: `#/page/${part(name)}/${part(page)}` }, page))]),
+    several("From the verdict:", followed.map(fileButton)),
+    several("Its model or plan comes from:", run.lineage.before.map(runLink)), several("Runs with its corrected model or next plan:", run.lineage.after.map(runLink)),
+    report,
+  ];
+  main.replaceChildren(...parts.filter(Boolean));
+  start();
+  if (diagnosing) waits().catch((why) => { result.textContent = why.message; });
+  return () => { here = false; };
+}
+
+// --- a run that goes on ---------------------------------------------------------------------------------------------
 
 class Picture {
   constructor() { this.clear(null); }
@@ -147,7 +250,7 @@ const FACTORS = [
   { name: "position, mm", of: (p) => p.pass.position_m * 1e3, count: (values) => new Set(values.map((v) => Math.round(v / 10))).size },
 ];
 
-function runPage(name, control) {
+function runPage(name, control, listed) {
   const picture = new Picture();
   const title = el("h1", {}, name);
   const about = el("p", { class: "note" });
@@ -182,20 +285,19 @@ function runPage(name, control) {
   const head = (text) => el("th", { scope: "col", class: "n" }, text);
   const table = el("div", { class: "scroll passes", tabindex: "0", role: "region", "aria-label": "Passes" }, el("table", {},
     el("thead", {}, el("tr", {}, ...["point", "w, um", "f, kHz", "U, mm/s", "load, N", "\u03bc'", "predicted", "difference", "surprise, sd"].map(head))), rows));
-  main.replaceChildren(title, about, keys, said, trip, now, plots, el("h2", {}, "Events"), events, passes, el("p", { class: "note" }, "Difference: measured less predicted \u03bc'. Surprise: the force against what the model lets expect after the passes before, which have corrected its stiffnesses and \u03bc\u2080. The two can differ in sign."), table);
+  const over = el("p", { hidden: true }, button("Show the finished run", () => route()));
+  main.replaceChildren(title, about, keys, said, trip, over, listed ? annotations(listed) : "", now, plots, el("h2", {}, "Events"), events, passes, el("p", { class: "note" }, "Difference: measured less predicted \u03bc'. Surprise: the force against what the model lets expect after the passes before, which have corrected its stiffnesses and \u03bc\u2080. The two can differ in sign."), table);
 
   const figures = {
-    forces: figure(plots, "Forces"), mu: figure(plots, "Relative friction now"), w: figure(plots, "Relative friction against amplitude"),
-    psi: figure(plots, "Relative friction against \u03a8"), map: figure(plots, "Surprise over the conditions"), late: figure(plots, "Lateness of the loop"),
+    forces: figure(plots, "Forces"), mu: figure(plots, "Relative friction now"), map: figure(plots, "Surprise over the conditions"), late: figure(plots, "Lateness of the loop"),
   };
   const charts = {
     forces: traces(figures.forces.plot, "lateral force, N", [{ colour: "--a", band: true }, { colour: "--b", band: true, dash: [8, 4], right: true }], "normal force, N"),
     mu: traces(figures.mu.plot, "relative friction \u03bc'", [{ colour: "--a", band: true }, { colour: "--c", band: true, dash: [8, 4] }], null, [-0.1, 1.4]),
-    w: marks(figures.w.plot, "amplitude w, um peak to peak", "relative friction \u03bc'", true),
-    psi: marks(figures.psi.plot, "\u03a8 (Eq. 17)", "relative friction \u03bc'", true),
     map: marks(figures.map.plot, "amplitude w, um peak to peak", FACTORS[0].name, false),
     late: traces(figures.late.plot, "latest of 0.1 s, us", [{ colour: "--a" }]),
   };
+  const ofPasses = passFigures(plots, null);
 
   function drawStates() {
     const states = picture.states;
@@ -203,9 +305,9 @@ function runPage(name, control) {
     const edge = (key, i) => states.map((s) => s.extremes[key]?.[i] ?? null);
     const value = (key) => states.map((s) => s[key] ?? null);
     const around = (k) => states.map((s) => (s.predicted == null ? null : s.predicted + k * (s.predicted_sd ?? 0)));
-    charts.forces.setData([x, edge("lateral_force_n", 1), edge("lateral_force_n", 0), value("lateral_force_n"), edge("normal_force_n", 1), edge("normal_force_n", 0), value("normal_force_n")]);
-    charts.mu.setData([x, edge("mu_relative", 1), edge("mu_relative", 0), value("mu_relative"), around(2), around(-2), value("predicted")]);
-    charts.late.setData([x, states.map((s) => s.extremes.lateness_s * 1e6)]);
+    charts.forces.chart.setData([x, edge("lateral_force_n", 1), edge("lateral_force_n", 0), value("lateral_force_n"), edge("normal_force_n", 1), edge("normal_force_n", 0), value("normal_force_n")]);
+    charts.mu.chart.setData([x, edge("mu_relative", 1), edge("mu_relative", 0), value("mu_relative"), around(2), around(-2), value("predicted")]);
+    charts.late.chart.setData([x, states.map((s) => s.extremes.lateness_s * 1e6)]);
     const s = states.at(-1);
     // Of a run that is over nothing is told of single cycles: its record has them.
     for (const one of ["forces", "mu", "late"]) figures[one].show(Boolean(s));
@@ -230,19 +332,11 @@ function runPage(name, control) {
 
   function drawPasses() {
     const compared = picture.passes.filter((p) => p.comparison && p.comparison.mu_relative != null && p.pass.amplitude > 0);
-    const speed = (p) => p.pass.speed_m_s * 1e3;
-    const speeds = levels(compared.map(speed), WITHIN.speed);
-    // Speeds beyond the last mark share it, and the key says so: no mark stands for a speed that is not its own.
-    const mark = (index) => SERIES[Math.min(index, SERIES.length - 1)];
-    const place = (x) => (p) => ({ x: x(p), y: p.comparison.mu_relative, sd: p.comparison.mu_relative_sd, predicted: p.comparison.predicted, predicted_sd: p.comparison.predicted_sd, ...mark(speeds.index(speed(p))) });
-    const key = SERIES.map((one) => [one.name, speeds.names.filter((_, i) => mark(i) === one)])
-      .filter(([, of]) => of.length).map(([name, of]) => `${name}: ${of.join(", ")} mm/s`).join("; ");
-    const tail = "All frequencies and loads. Strokes: predicted, with twice its standard uncertainty.";
-    charts.w.set(compared.map(place((p) => p.pass.amplitude * 1e6)));
-    figures.w.say(compared.length ? `${compared.length} passes; ${key}. ${tail}` : "No pass with vibration yet.");
-    const known = compared.filter((p) => p.psi_eq17 != null);
-    charts.psi.set(known.map(place((p) => p.psi_eq17)));
-    figures.psi.say(known.length ? `${known.length} passes; ${key}. ${tail}` : "No pass with a \u03a8 yet: it needs vibration and a friction without it.");
+    ofPasses(picture.passes.map(({ pass, comparison: c, psi_eq17 }) => ({
+      point: pass.point, time_s: pass.time_s, w_um: pass.amplitude * 1e6, f_khz: pass.frequency_hz / 1e3, u_mm_s: pass.speed_m_s * 1e3, direction: pass.direction ?? 1,
+      normal_n: pass.normal_force_n, lateral_n: pass.lateral_force_n, psi: psi_eq17, mu: c?.mu_relative, mu_sd: c?.mu_relative_sd, predicted: c?.predicted, predicted_sd: c?.predicted_sd, surprise: c?.z,
+      mu0: pass.amplitude === 0 && pass.lateral_force_n != null ? (pass.direction ?? 1) * pass.lateral_force_n / pass.normal_force_n : null,
+    })));
     const judged = compared.filter((p) => Number.isFinite(p.comparison.z));
     const count = (factor) => factor.count(judged.map(factor.of));
     const factor = FACTORS.reduce((best, one) => (count(one) > count(best) ? one : best), FACTORS[0]);
@@ -272,6 +366,7 @@ function runPage(name, control) {
     const ended = picture.ended;
     state.textContent = ended ? (ended.outcome?.outcome ?? "failed").replaceAll("_", " ") : picture.trip ? "tripped" : picture.paused ? "paused" : last?.armed ? "armed" : last ? "not armed" : "waiting";
     stop.hidden = pause.hidden = Boolean(ended);
+    over.hidden = !ended;
     pause.disabled = Boolean(run?.fast);
     pause.textContent = picture.paused ? "Go on" : "Pause";
     const lines = [picture.trip?.words, ended?.error, ended && !picture.trip && ended.outcome?.outcome !== "stopped" ? ended.remedy : null, ended?.off ?? picture.off, ended?.agreement].filter(Boolean);
@@ -298,10 +393,6 @@ function runPage(name, control) {
   let pauseMs = 500;
   let timer = setInterval(() => { if (document.visibilityState === "visible") draw(); }, 250);
   let heard = 0;
-  async function past() {
-    for (const message of await (await fetched(`/api/runs/${part(name)}/past`)).json()) picture.take(message);
-    link.textContent = "";
-  }
   function follow() {
     const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/live/${part(name)}`;
     let any = false;
@@ -317,8 +408,8 @@ function runPage(name, control) {
       if (!open) return;
       if (picture.ended) { link.textContent = "the run is over"; return; }
       if (!any && !picture.run) {
-        // Nobody tells of it: it is over, or was run elsewhere.
-        try { await past(); return; } catch (why) { said.textContent = why.message; }
+        // Nobody tells of it: it may be over.
+        try { if (!(await (await fetched(`/api/runs/${part(name)}`)).json()).run.live) { route(); return; } } catch (why) { said.textContent = why.message; }
       }
       link.textContent = heard ? `connection lost; the last word came ${Math.round((Date.now() - heard) / 1000)} s ago` : "waiting for the run";
       setTimeout(() => open && follow(), pauseMs);
@@ -341,15 +432,26 @@ async function route() {
   try {
     if (page === "run") {
       const { control } = await (await fetched("/api/about")).json();
-      leave = runPage(rest[0], control);
+      // A run of which no pass is there yet has no entry: it is followed all the same.
+      const found = await get(`/api/runs/${part(rest[0])}`);
+      const described = found.ok ? await found.json() : null;
+      if (!described && found.status !== 422) await fetched(`/api/runs/${part(rest[0])}`);
+      leave = described && !described.run.live ? await finished(described) : runPage(rest[0], control, described?.run);
     } else if (page === "page") await written(rest[1], `/api/runs/${part(rest[0])}/pages/${part(rest[1])}`);
-    else if (page === "compare") await written("Two runs", `/api/compare?a=${part(rest[0])}&b=${part(rest[1])}`);
+    else if (page === "compare") await comparison(rest);
     else await catalogue();
   } catch (why) {
     main.replaceChildren(el("h1", {}, "This cannot be shown"), el("p", { role: "alert" }, why.message), el("p", {}, el("a", { href: "#/" }, "All runs")));
   }
   main.focus();
 }
+// A link within a report is to a place on it, not to another page.
+main.addEventListener("click", (event) => {
+  const place = event.target.closest(".report a[href^='#']:not([href^='#/'])")?.getAttribute("href").slice(1);
+  if (place == null) return;
+  event.preventDefault();
+  document.getElementById(place)?.scrollIntoView();
+});
 addEventListener("hashchange", route);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", route);
 route();

@@ -32,15 +32,95 @@ function axes(xTitle, yTitle, right) {
   return all;
 }
 
-function kept(chart, plot) {
-  new ResizeObserver(() => plot.isConnected && chart.setSize({ width: Math.max(plot.clientWidth, 200), height: HEIGHT })).observe(plot);
-  return chart;
+// A chart that a drag enlarges and a double click shows whole, whose axes may be logarithmic, and which follows its frame's width.
+// `ready` gets the chart whenever it is made anew.
+function chartOf(plot, options, ready) {
+  const zoom = {};
+  const log = {};
+  const own = { chart: null, zoomed: () => Object.keys(zoom).length > 0 };
+  const whole = (u) => {
+    for (const key of Object.keys(zoom)) delete zoom[key];
+    u.setData(u.data);
+  };
+  const select = (u) => {
+    const { left, top, width, height } = u.select;
+    if (width < 8 && height < 8) return;
+    zoom.x = [u.posToVal(left, "x"), u.posToVal(left + width, "x")];
+    for (const key of Object.keys(u.scales)) if (key !== "x") zoom[key] = [u.posToVal(top + height, key), u.posToVal(top, key)];
+    u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+    u.setData(u.data);
+  };
+  const padded = (key) => (_, low, high) => {
+    if (low == null) return log[key] ? [0.1, 1] : [0, 1];
+    if (log[key]) return [(low > 0 ? low : high / 1e3) / 1.15, high * 1.15];
+    const margin = 0.06 * (high - low || Math.abs(high) || 1);
+    return [low - margin, high + margin];
+  };
+  const make = () => {
+    const data = own.chart?.data ?? options.series.map(() => []);
+    own.chart?.destroy();
+    const scales = Object.fromEntries(Object.entries(options.scales).map(([key, scale]) => {
+      const range = Array.isArray(scale.range) ? () => scale.range : !log[key] && scale.range ? scale.range : padded(key);
+      return [key, { ...scale, distr: log[key] ? 3 : 1, range: (...all) => zoom[key] ?? range(...all) }];
+    }));
+    const cursor = { points: { show: false }, drag: { x: true, y: true, uni: 20, setScale: false }, bind: { dblclick: (u) => () => whole(u) }, ...options.cursor };
+    const hooks = { ...options.hooks, setSelect: [select] };
+    own.chart = new uPlot({ ...options, scales, cursor, hooks, legend: { show: false }, width: Math.max(plot.clientWidth, 200), height: HEIGHT }, data, plot);
+    ready?.(own.chart);
+  };
+  own.log = (key, on) => { log[key] = on; delete zoom[key]; make(); };
+  own.isLog = (key) => Boolean(log[key]);
+  make();
+  new ResizeObserver(() => plot.isConnected && own.chart.setSize({ width: Math.max(plot.clientWidth, 200), height: HEIGHT })).observe(plot);
+  return own;
 }
 
-const plain = { legend: { show: false }, cursor: { show: false } };
+// Marks that turn text round or that nobody sees are written out, as in the other views.
+const hidden = /[\u061c\u200b\u200e\u200f\u2028-\u202e\u2060\u2066-\u2069\ufeff]/g;
+export const shown = (text) => (typeof text === "string" ? text.replace(hidden, (c) => `\\u${c.charCodeAt(0).toString(16).padStart(4, "0")}`) : text);
+
+// Elements are made of text, never of markup: names in records may hold some.
+export function el(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (value === true) made.setAttribute(name, "");
+    else if (value !== false && value != null) made.setAttribute(name, value);
+  }
+  made.append(...children.filter((c) => c != null).map(shown));
+  return made;
+}
+
+export function save(name, content) {
+  const link = el("a", { href: URL.createObjectURL(content), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+// A picture on the page's ground, as a PNG.
+export function savePng(name, source, width, height) {
+  const canvas = el("canvas", { width, height });
+  const ctx = canvas.getContext("2d");
+  ctx.fillStyle = css("--paper");
+  ctx.fillRect(0, 0, width, height);
+  ctx.drawImage(source, 0, 0, width, height);
+  canvas.toBlob((blob) => save(`${name}.png`, blob));
+}
+
+export const button = (text, click, more = {}) => el("button", { type: "button", onclick: click, ...more }, text);
+
+// Under a chart: linear or logarithmic, the whole of it, a picture. Returns the line of buttons.
+export function tools(own, name, axes) {
+  const log = axes.map(([key, words]) => button(`log ${words}`, (event) => {
+    own.log(key, !own.isLog(key));
+    event.target.setAttribute("aria-pressed", String(own.isLog(key)));
+  }, { "aria-pressed": "false", class: "switch" }));
+  const png = button("PNG", () => { const { canvas } = own.chart.ctx; savePng(name, canvas, canvas.width, canvas.height); });
+  return [...log, png];
+}
 
 // Values against loop time: bands between the least and the greatest of all cycles, and lines.
-export function traces(plot, yTitle, series, right, fixed) {
+export function traces(plot, yTitle, series, right, fixed, over) {
   const drawn = [{}];
   const bands = [];
   for (const one of series) {
@@ -52,8 +132,10 @@ export function traces(plot, yTitle, series, right, fixed) {
     }
     drawn.push({ scale, stroke: colour, width: 2, dash: one.dash, points: { show: false }, spanGaps: false });
   }
-  const options = { ...plain, width: Math.max(plot.clientWidth, 200), height: HEIGHT, scales: { x: { time: false }, ...(fixed && { y: { range: fixed } }) }, axes: axes("loop time, s", yTitle, right), series: drawn, bands };
-  return kept(new uPlot(options, drawn.map(() => []), plot), plot);
+  const scales = { x: { time: false, range: (_, low, high) => (low == null ? [0, 1] : [low, high]) }, y: fixed ? { range: fixed } : {}, ...(right && { right: {} }) };
+  // Charts of the same time have one crosshair.
+  const cursor = { sync: { key: "time" } };
+  return chartOf(plot, { scales, cursor, hooks: { draw: over ? [over] : [] }, axes: axes("loop time, s", yTitle, right), series: drawn, bands });
 }
 
 // How series differ: by mark, by whether it is filled, and by colour. No two are alike.
@@ -94,11 +176,15 @@ export function levels(values, within) {
 }
 
 // Marks at places: `points` of { x, y, sd, predicted, predicted_sd, kind, size, hollow, colour }.
-export function marks(plot, xTitle, yTitle, yFromZero) {
+export function marks(plot, xTitle, yTitle, yFromZero, ready) {
   let points = [];
+  let own = null;
+  // A logarithm shows nothing at zero and below.
+  const drawable = (p) => !own || ((p.x > 0 || !own.isLog("x")) && (p.y > 0 || !own.isLog("y")));
   const draw = (u) => {
     const ctx = u.ctx;
     const px = devicePixelRatio;
+    const colours = Object.fromEntries([...COLOURS, "--ink"].map((name) => [name, css(name)]));
     const at = (x, y) => [u.valToPos(x, "x", true), u.valToPos(y, "y", true)];
     ctx.save();
     ctx.beginPath();
@@ -106,13 +192,14 @@ export function marks(plot, xTitle, yTitle, yFromZero) {
     const room = 14 * px;
     ctx.rect(u.bbox.left - room, u.bbox.top - room, u.bbox.width + 2 * room, u.bbox.height + 2 * room);
     ctx.clip();
-    for (const p of points) {
+    const drawn = points.filter(drawable);
+    for (const p of drawn) {
       if (p.predicted != null) {
         const [x, y] = at(p.x, p.predicted);
         const half = u.valToPos(p.predicted - 2 * (p.predicted_sd ?? 0), "y", true) - y;
-        ctx.fillStyle = css("--grey") + "33";
+        ctx.fillStyle = colours["--grey"] + "33";
         ctx.fillRect(x - 5 * px, y - half, 10 * px, 2 * half);
-        ctx.strokeStyle = css("--ink");
+        ctx.strokeStyle = colours["--ink"];
         ctx.lineWidth = 2 * px;
         ctx.beginPath();
         ctx.moveTo(x - 7 * px, y);
@@ -120,8 +207,8 @@ export function marks(plot, xTitle, yTitle, yFromZero) {
         ctx.stroke();
       }
     }
-    for (const p of points) {
-      const colour = css(p.colour);
+    for (const p of drawn) {
+      const colour = colours[p.colour];
       const [x, y] = at(p.x, p.y);
       ctx.strokeStyle = colour;
       ctx.fillStyle = colour + (p.faint ? "77" : "");
@@ -141,15 +228,24 @@ export function marks(plot, xTitle, yTitle, yFromZero) {
     const margin = 0.06 * (high - low || Math.abs(high) || 1);
     return [fromZero ? Math.min(0, low) : low - margin, high + margin];
   };
-  const options = { ...plain, width: Math.max(plot.clientWidth, 200), height: HEIGHT, scales: { x: { time: false, range: range(true) }, y: { range: range(yFromZero) } }, axes: axes(xTitle, yTitle), series: [{}, { stroke: "transparent", points: { show: false } }, { stroke: "transparent", points: { show: false } }], hooks: { draw: [draw] } };
-  const chart = kept(new uPlot(options, [[], [], []], plot), plot);
+  const scales = { x: { time: false, range: range(true) }, y: { range: range(yFromZero) } };
+  own = chartOf(plot, { scales, axes: axes(xTitle, yTitle), series: [{}, { stroke: "transparent", points: { show: false } }, { stroke: "transparent", points: { show: false } }], hooks: { draw: [draw] } }, (u) => {
+    // An axis that became logarithmic holds fewer marks.
+    if (own) show(u);
+    ready?.(u);
+  });
+  const show = (u) => {
+    const sorted = points.filter(drawable).sort((a, b) => a.x - b.x);
+    const high = (p) => Math.max(p.y + (p.sd ?? 0), p.predicted ?? p.y);
+    const low = (p) => Math.min(p.y - (p.sd ?? 0), p.predicted ?? p.y);
+    u.setData([sorted.map((p) => p.x), sorted.map(high), sorted.map((p) => (own.isLog("y") ? p.y : low(p)))]);
+  };
   return {
-    plot: chart,
+    own,
     set(all, yName) {
       points = all;
-      const sorted = [...all].sort((a, b) => a.x - b.x);
-      if (yName) chart.axes[1].label = yName;
-      chart.setData([sorted.map((p) => p.x), sorted.map((p) => Math.max(p.y + (p.sd ?? 0), p.predicted ?? p.y)), sorted.map((p) => Math.min(p.y - (p.sd ?? 0), p.predicted ?? p.y))]);
+      if (yName) own.chart.axes[1].label = yName;
+      show(own.chart);
     },
   };
 }

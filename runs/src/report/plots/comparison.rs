@@ -1,9 +1,10 @@
-//! The figures of two runs.
+//! The figures of two runs and of more.
 
 use super::{
     COLOURS, Frame, GREY, NARROW, SERIES, Span, WIDE, band, beyond, figure, line, mark_name, measured,
     mu_axis, series_key,
 };
+use crate::compare::groups::{GroupDifference, Grouped};
 use crate::compare::{Comparison, Mean, Paired};
 use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
 
@@ -118,4 +119,79 @@ fn widest(result: &Comparison) -> f64 {
 fn capital(word: &str) -> String {
     let mut all = word.chars();
     all.next().map_or_else(String::new, |first| first.to_uppercase().chain(all).collect())
+}
+
+/// The mean `mu'` of each group against amplitude, a mark a group, a little beside each other.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn group_overlay(grouped: &Grouped) -> miette::Result<String> {
+    let of = |g: usize| grouped.conditions.iter().filter_map(move |c| Some((c, c.means[g]?)));
+    let all = |g: usize| of(g).map(|(c, m)| (c.amplitude_pp_m * 1e6, m.mu_relative, m.sd)).collect();
+    by_group(grouped, 0, all, ("relative friction \u{3bc}'", "Relative friction", "one standard uncertainty"))
+}
+
+/// The differences of each later group from the first, with intervals of 95 %.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn group_differences(grouped: &Grouped) -> miette::Result<String> {
+    let of = |g: usize| grouped.conditions.iter().filter_map(move |c| Some((c, c.differences[g - 1]?)));
+    let half = |d: &GroupDifference| 0.5 * (d.interval_95[1] - d.interval_95[0]);
+    let all = |g: usize| of(g).map(|(c, d)| (c.amplitude_pp_m * 1e6, d.difference, half(&d))).collect();
+    let words = (
+        "difference of \u{3bc}' from the first",
+        "Difference of relative friction from the first",
+        "the interval of 95 %",
+    );
+    by_group(grouped, 1, all, words)
+}
+
+/// Marks of the groups from this one on; the words are the axis, what is shown, and what the bars are.
+fn by_group(
+    grouped: &Grouped,
+    from: usize,
+    of: impl Fn(usize) -> Vec<(f64, f64, f64)>,
+    (axis, shown, bars): (&str, &str, &str),
+) -> miette::Result<String> {
+    let points: Vec<Vec<(f64, f64, f64)>> =
+        (0..grouped.groups.len()).map(|g| if g < from { Vec::new() } else { of(g) }).collect();
+    let all = || points.iter().flatten();
+    if all().count() == 0 {
+        return Ok("<p>No condition is in common.</p>".into());
+    }
+    let widest = 1.05 * all().map(|p| p.0).fold(0.1, f64::max);
+    let ends = all().flat_map(|p| [p.1 - p.2, p.1 + p.2]);
+    let span = if from == 0 {
+        mu_axis(ends)
+    } else {
+        let [low, high] = ends.fold([-0.01, 0.01], |[l, h]: [f64; 2], v| [l.min(v), h.max(v)]);
+        [low - 0.05 * (high - low), high + 0.05 * (high - low)]
+    };
+    let alt =
+        format!("{shown} against amplitude, {} marks of {} groups.", all().count(), points.len() - from);
+    let frame = Frame {
+        sizes: [WIDE, NARROW],
+        x: (Span::linear(0.0..widest), "amplitude w, \u{b5}m peak to peak"),
+        y: (Span::linear(span[0]..span[1]), axis),
+        alt: &alt,
+    };
+    let svg = figure(&frame, |chart, size| {
+        if from > 0 {
+            line(chart, vec![(0.0, 0.0), (widest, 0.0)], GREY, Some(4))?;
+        }
+        for (g, of) in points.iter().enumerate() {
+            let aside = 0.003 * widest * (g as f64 - 0.5 * (points.len() - 1) as f64);
+            let moved: Vec<_> = of.iter().map(|(x, y, sd)| (x + aside, *y, *sd)).collect();
+            measured(chart, g, size, COLOURS[g % COLOURS.len()], &moved, span)?;
+        }
+        Ok(())
+    })?;
+    let names: Vec<String> = grouped.groups.iter().map(|g| g.name.clone()).collect();
+    let key = series_key(&names, "").replace(" ;", ";");
+    Ok(format!(
+        "<figure>{svg}<figcaption>{}. Bars: {bars}. All speeds, frequencies and loads.{}</figcaption></figure>",
+        crate::report::html::escape(&capital(&key)),
+        beyond(all().map(|p| p.1), span)
+    ))
 }

@@ -1,0 +1,108 @@
+//! The page of more than two runs: their groups on one figure, and the differences at each condition.
+
+use super::explore::script;
+use super::html::{escape, glossary, list, note, shell, table};
+use super::plots::comparison::{group_differences, group_overlay};
+use crate::compare::groups::{AtCondition, GroupBy, Grouped};
+use std::fmt::Write;
+
+/// The page.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn page(compared: &Grouped) -> miette::Result<String> {
+    let runs: usize = compared.groups.iter().map(|g| g.runs.len()).sum();
+    let title = match compared.by {
+        GroupBy::Run => format!("{runs} runs"),
+        GroupBy::Tip => format!("{runs} runs by tip"),
+        GroupBy::Moisture => format!("{runs} runs by moisture"),
+        GroupBy::Day => format!("{runs} runs by day"),
+        GroupBy::Model => format!("{runs} runs by model"),
+    };
+    let mut html = format!(
+        "<h1>{title}</h1><div class=\"verdict undecided\"><p>{}</p></div>",
+        escape(&compared.words())
+    );
+    html += &groups(compared);
+    if !compared.warnings.is_empty() {
+        let _ = write!(html, "<h2>Caution</h2>{}", list(&compared.warnings, ""));
+    }
+    let data = serde_json::to_string(compared).map_err(|e| miette::miette!("{e}"))?.replace('<', "\\u003c");
+    let _ = write!(
+        html,
+        "<section id=\"explore\" hidden></section><script type=\"application/json\" id=\"run-data\">{data}</script>\n\
+         <h2>Relative friction of all groups</h2>{}<h2>Differences from the first group</h2>{}",
+        group_overlay(compared)?,
+        group_differences(compared)?
+    );
+    html += &conditions(compared);
+    html += &glossary();
+    html += &script(
+        "exploreGroups(document.getElementById(\"explore\"), JSON.parse(document.getElementById(\"run-data\").textContent), document);",
+    );
+    Ok(shell(&title, &html))
+}
+
+fn groups(compared: &Grouped) -> String {
+    let row = |group: &crate::compare::groups::Group| {
+        let runs: Vec<String> = group
+            .runs
+            .iter()
+            .zip(&group.mu0)
+            .map(|(run, mu0)| {
+                let name = run.file_name().unwrap_or(run.as_os_str()).to_string_lossy();
+                format!("{} ({mu0:.3})", escape(&name))
+            })
+            .collect();
+        format!(
+            "<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td>{}</td></tr>\n",
+            escape(&group.name),
+            group.runs.len(),
+            runs.join(", ")
+        )
+    };
+    let rows: String = compared.groups.iter().map(row).collect();
+    let head = "<th scope=\"col\">group</th><th scope=\"col\" class=\"n\">runs</th><th scope=\"col\">folders (\u{3bc}<sub>0</sub>)</th>";
+    table("Groups", head, &rows)
+}
+
+fn conditions(compared: &Grouped) -> String {
+    let column = |name: &str| format!("<th scope=\"col\" class=\"n\">{name}</th>");
+    let mut head = ["w, \u{b5}m", "f, kHz", "U, mm/s", "load, N"].map(column).concat();
+    head += &compared.groups.iter().map(|g| column(&escape(&g.name))).collect::<String>();
+    let less = |g: &crate::compare::groups::Group| column(&format!("{} less first", escape(&g.name)));
+    head += &compared.groups[1..].iter().map(less).collect::<String>();
+    let row = |c: &AtCondition| {
+        let mut cells = format!(
+            "<td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td><td class=\"n\">{:+.1}</td><td class=\"n\">{:.2}</td>",
+            c.amplitude_pp_m * 1e6,
+            c.frequency_hz / 1e3,
+            c.velocity_m_s * 1e3,
+            c.normal_force_n
+        );
+        for mean in &c.means {
+            let text =
+                mean.map_or("not measured".into(), |m| format!("{:.3} &plusmn; {:.3}", m.mu_relative, m.sd));
+            let _ = write!(cells, "<td class=\"n\">{text}</td>");
+        }
+        for d in &c.differences {
+            let text = d.map_or("&ndash;".into(), |d| {
+                let [low, high] = d.interval_95;
+                let one = if d.between_runs { "" } else { "*" };
+                format!("{:+.3} ({low:+.3} to {high:+.3}){one}", d.difference)
+            });
+            let apart = d.is_some_and(|d| d.interval_95[0] > 0.0 || d.interval_95[1] < 0.0);
+            let _ = write!(cells, "<td class=\"n{}\">{text}</td>", if apart { " out" } else { "" });
+        }
+        format!("<tr>{cells}</tr>\n")
+    };
+    let rows: String = compared.conditions.iter().map(row).collect();
+    format!(
+        "<h2>Condition by condition</h2>{}{}",
+        note(
+            "Differences have intervals of 95 %, each for itself; those without zero are bold. *: a group of one run, whose interval \
+             leaves out how far another run would lie."
+        ),
+        table("All conditions", &head, &rows)
+    )
+}
