@@ -113,7 +113,7 @@ impl Parameter {
     pub fn at_load(self, load_n: f64) -> Self {
         let power = match self.unit {
             "N" | "N/K" | "kg" => 1.0,
-            "1/N" | "1/W" | "K/N" => -1.0,
+            "1/N" | "1/W" => -1.0,
             _ => return self,
         };
         let factor = (load_n / STATED_AT_N).powf(power);

@@ -1,6 +1,5 @@
 //! From a run to its verdict, from there to the corrected model and the next plan, and to the runs that
-//! used them. The links are hashes
-//! of the files, so they hold wherever the folders were copied from.
+//! used them. The links are hashes of the files, so they hold wherever the folders were copied from.
 
 use super::RunEntry;
 use crate::run_dir::identity_in;

@@ -9,9 +9,8 @@ const SIZE: [f64; 2] = [96.0, 32.0];
 /// Marks at most: a list of many runs stays small.
 const MOST: usize = 60;
 
-/// The picture; none without a pass with vibration whose `mu'` is known. Its axes begin at zero and
-/// reach to 1.1 and
-/// to the largest amplitude; what lies beyond is drawn at the end.
+/// The picture; none without a pass with vibration whose `mu'` is known. Its axes begin at zero and reach to
+/// 1.1 and to the largest amplitude; what lies beyond is drawn at the end.
 pub fn thumbnail(passes: &[MeasuredPass]) -> Option<String> {
     let driven = passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO);
     let points: Vec<(f64, f64)> = driven

@@ -1,10 +1,9 @@
 //! More than two runs: grouped by tip, moisture, day or model, and how the groups differ at each condition.
 //!
 //! A run is the unit where a group has several: its passes share one mounting, one day and one `mu_0`,
-//! so they are not independent. The
-//! uncertainty of a group's mean is the scatter between its runs, or what the stated noise makes of it
-//! where that is more. A group of
-//! one run has the stated noise alone, and its interval does not hold how far another run would lie.
+//! so they are not independent. The uncertainty of a group's mean is the scatter between its runs, or what
+//! the stated noise makes of it where that is more. A group of one run has the stated noise alone, and its
+//! interval does not hold how far another run would lie.
 
 use super::{Reference, Side, folders::noise, same};
 use crate::report::RunData;

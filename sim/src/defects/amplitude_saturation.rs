@@ -1,5 +1,5 @@
-//! The drive runs out of current: the amplitude bends smoothly to a ceiling that falls as the frequency
-//! rises, for a piezo draws current in proportion to both.
+//! The drive runs out of current and clips: the plate, a resonator, follows the fundamental of what is left,
+//! whose ceiling falls as the frequency rises, for a piezo draws current in proportion to both.
 
 use super::{Act, Kind, Parameter, Place, Surroundings, Values};
 
@@ -14,10 +14,9 @@ pub(super) static KIND: Kind = Kind {
     act: Act { setup: None, plate: Some(act), contact: None, forces: None },
 };
 
-/// How sharp the bend is (-).
-const SHARPNESS: f64 = 6.0;
-
 fn act(v: &Values, at: &Surroundings, pp_m: f64) -> f64 {
     let inverse = v[0] * (at.frequency_hz.max(1.0) / 25e3).powf(v[1]);
-    pp_m / (1.0 + (pp_m * inverse).powf(SHARPNESS)).powf(1.0 / SHARPNESS)
+    // The describing function of a clipped sine; its ceiling is 4/pi of where clipping begins.
+    let open = (pp_m * inverse).recip().min(1.0);
+    pp_m * std::f64::consts::FRAC_2_PI * (open.asin() + open * (1.0 - open * open).sqrt())
 }

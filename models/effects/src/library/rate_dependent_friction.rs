@@ -60,7 +60,9 @@ impl Effect for RateDependentFriction {
             2 => (1.0 + theta[0] * (c.speed / reference).ln()).max(0.05),
             _ => {
                 let x = (c.speed / reference).ln();
-                (theta[0] * x * (1.0 + x * (theta[1] + x * theta[2]))).clamp(-MOST_E_FOLDS, MOST_E_FOLDS).exp()
+                (theta[0] * x * (1.0 + x * (theta[1] + x * theta[2])))
+                    .clamp(-MOST_E_FOLDS, MOST_E_FOLDS)
+                    .exp()
             }
         };
     }

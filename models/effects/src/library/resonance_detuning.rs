@@ -10,14 +10,6 @@ pub struct ResonanceDetuning;
 /// What sees it without friction.
 const CHECK: &str = "Retune the drive (sweep its frequency) at the start and the end of a run.";
 
-/// A finger stiffens what it is pressed on: the resonance rises with the load.
-const STIFFENING: Parameter = Parameter::signed("stiffening_by_load", "1/N", 0.15, -3.0, 3.0).bending();
-/// The same as a change of the tuning point.
-const STIFFENING_K: Parameter = Parameter::signed("stiffening_by_load", "K/N", 1.0, -20.0, 20.0).bending();
-/// A neighbouring mode swings along, a quarter of a period apart at the resonance: the fall is not the same
-/// on both sides of it.
-const NEIGHBOUR: Parameter = Parameter::signed("neighbour_over_mode", "1", 0.25, -1.5, 1.5).bending();
-
 static LAWS: [Law; 6] = [
     Law::new("warming (temperature)", &[Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0)])
         .needs(&[Need::Temperatures])
@@ -54,8 +46,6 @@ static LAWS: [Law; 6] = [
             Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0),
             Parameter::signed("tuning_point_above_first", "K", 3.0, -20.0, 20.0),
             Parameter::signed("softening_at_largest_amplitude", "K", 2.0, -20.0, 20.0),
-            STIFFENING_K,
-            NEIGHBOUR,
         ],
     )
     .needs(&[Need::Temperatures])
@@ -67,8 +57,6 @@ static LAWS: [Law; 6] = [
             Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
             Parameter::signed("tuning_point", "1", 0.3, -2.0, 2.0),
             Parameter::signed("softening_at_largest_amplitude", "1", 0.3, -3.0, 3.0),
-            STIFFENING,
-            NEIGHBOUR,
         ],
     )
     .seen_by(CHECK, 0.05),
@@ -100,29 +88,25 @@ impl Effect for ResonanceDetuning {
             return;
         }
         let swing = (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).powi(2);
-        let pressed = c.normal_force - design.reference_load_n;
-        let (off, neighbour) = match law {
-            0 => (theta[0] * pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c), 0.0),
+        let off = match law {
+            0 => theta[0] * pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c),
             1 => {
                 let tau = theta[1] * design.duration_s.max(1e-9);
-                (-theta[0] * (-pass.time_s / tau).exp_m1(), 0.0)
+                -theta[0] * (-pass.time_s / tau).exp_m1()
             }
             2 => {
                 let r = pass.frequency_hz / (design.reference_frequency_hz * theta[1]);
-                (theta[0] * (r - 1.0 / r), 0.0)
+                theta[0] * (r - 1.0 / r)
             }
             4 => {
                 let warmer = pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
-                (theta[0] * (warmer - theta[1] + theta[2] * swing - theta[3] * pressed), theta[4])
+                theta[0] * (warmer - theta[1] + theta[2] * swing)
             }
             _ => {
                 let tau = theta[1] * design.duration_s.max(1e-9);
-                let later = -(-pass.time_s / tau).exp_m1();
-                (theta[0] * (later - theta[2] + theta[3] * swing - theta[4] * pressed), theta[5])
+                theta[0] * (-(-pass.time_s / tau).exp_m1() - theta[2] + theta[3] * swing)
             }
         };
-        // The mode's response is 1/(1 + i off); the neighbour's adds a quarter of a period apart.
-        let response = 1.0 / (1.0 + off * off);
-        c.amplitude_pp *= (neighbour - off * response).hypot(response) / neighbour.hypot(1.0);
+        c.amplitude_pp /= (1.0 + off * off).sqrt();
     }
 }

@@ -80,8 +80,12 @@ impl Effect for SqueezeFilm {
             0 => c.solid_share *= film_share(theta[0] * c.half_amplitude(), air, c.normal_force / size),
             1 => {
                 let film = theta[1] * AIR_SCALE_N * air * size;
-                c.solid_share *=
-                    finite_film_share(theta[0] * c.half_amplitude(), film, [theta[2], theta[3]], c.normal_force);
+                c.solid_share *= finite_film_share(
+                    theta[0] * c.half_amplitude(),
+                    film,
+                    [theta[2], theta[3]],
+                    c.normal_force,
+                );
             }
             2 => c.solid_share *= share_by_powers(theta, pass, design, c),
             _ => c.friction_factor *= share_by_powers(theta, pass, design, c),
