@@ -91,10 +91,18 @@ const STANDS_OUT: f64 = 3.0;
 
 fn pairs(result: &Comparison) -> String {
     let column = |name: &str| format!("<th scope=\"col\" class=\"n\">{name}</th>");
-    let head: String =
-        ["w, um", "f, kHz", "U, mm/s", "load, N", "\u{3bc}' first", "\u{3bc}' second", "difference", "in sd"]
-            .map(column)
-            .concat();
+    let head: String = [
+        "w, \u{b5}m",
+        "f, kHz",
+        "U, mm/s",
+        "load, N",
+        "\u{3bc}' first",
+        "\u{3bc}' second",
+        "difference",
+        "in sd",
+    ]
+    .map(column)
+    .concat();
     let single = result.pairs.iter().all(|p| p.a.passes == 1 && p.b.passes == 1);
     let mean = |m: &Mean| match single {
         true => format!("{:.3}", m.mu_relative),

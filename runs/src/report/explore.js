@@ -26,7 +26,7 @@ function seriesOf(x, factor, chosen) {
 }
 
 // A figure with a legend that shows and hides its series, words under the pointer, and its numbers as a file.
-export function clickable(root, { title, x, y, zero, file, by, describe, rows, choose, note }) {
+export function clickable(root, { title, x, y, log, zero, file, by, describe, rows, choose, note }) {
   const box = figure(root, title);
   const keys = el("p", { class: "legend" });
   const chosen = by && el("select", { "aria-label": `series of ${title}`, onchange: () => set(passes) }, ...FACTORS.map((f, i) => el("option", { value: i }, `by ${f.name}`)));
@@ -53,7 +53,7 @@ export function clickable(root, { title, x, y, zero, file, by, describe, rows, c
   });
   box.plot.before(keys);
   box.plot.append(tip);
-  const more = [...tools(chart.own, file, [["x", x.split(",")[0].split(" ").at(-1)], ["y", y.split(" ").at(-1)]]), button("CSV", () => saveCsv(file, inSight().map((p) => (rows ? rows(p.pass) : p.pass))))];
+  const more = [...tools(chart.own, file, log), button("CSV", () => saveCsv(file, inSight().map((p) => (rows ? rows(p.pass) : p.pass))))];
   function legend() {
     keys.replaceChildren(...(chosen ? [chosen] : []), ...series.map((one) => button(`${one.sign} ${one.label}`, (event) => {
       if (!off.delete(one.label)) off.add(one.label);
@@ -78,9 +78,9 @@ export function clickable(root, { title, x, y, zero, file, by, describe, rows, c
 export function passFigures(root, choose) {
   const key = (all, series) => `${all.length} passes; ${series.map((one) => `${one.style.name}: ${one.label}`).join("; ")}. Strokes: predicted, with twice its standard uncertainty.`;
   const common = { y: `relative friction ${MU}`, zero: true, describe: words, choose, note: key };
-  const w = clickable(root, { ...common, title: "Relative friction against amplitude", x: "amplitude w, \u00b5m peak to peak", file: "mu-against-amplitude", by: (all, factor) => seriesOf((p) => p.w_um, factor, all) });
-  const psi = clickable(root, { ...common, title: "Relative friction against \u03a8", x: "\u03a8 (Eq. 17)", file: "mu-against-psi", by: (all, factor) => seriesOf((p) => p.psi, factor, all) });
-  const drift = clickable(root, { title: "Friction without vibration over the run", x: "loop time, s", y: "\u03bc\u2080", zero: false, file: "mu0-drift", describe: words, choose });
+  const w = clickable(root, { ...common, title: "Relative friction against amplitude", x: "amplitude w, \u00b5m peak to peak", log: [["x", "w"], ["y", MU]], file: "mu-against-amplitude", by: (all, factor) => seriesOf((p) => p.w_um, factor, all) });
+  const psi = clickable(root, { ...common, title: "Relative friction against \u03a8", x: "\u03a8 (Eq. 17)", log: [["x", "\u03a8"], ["y", MU]], file: "mu-against-psi", by: (all, factor) => seriesOf((p) => p.psi, factor, all) });
+  const drift = clickable(root, { title: "Friction without vibration over the run", x: "loop time, s", y: "\u03bc\u2080", log: [], zero: false, file: "mu0-drift", describe: words, choose });
   return (passes) => {
     const driven = passes.filter((p) => p.w_um > 0 && p.mu != null);
     w.set(driven);
@@ -213,8 +213,8 @@ export function exploreGroups(root, { groups, conditions }, page) {
   const x = "amplitude w, \u00b5m peak to peak";
   const mean = (c, g) => c.means[g] && { value: c.means[g].mu_relative, half: c.means[g].sd, runs: c.means[g].runs };
   const less = (c, g) => { const d = c.differences[g - 1]; return d && { value: d.difference, half: (d.interval_95[1] - d.interval_95[0]) / 2 }; };
-  clickable(root, { title: "Relative friction of each group", x, y: `relative friction ${MU}`, zero: true, file: "groups", rows, describe: (p) => `${p.group}, ${at(p.condition)}: ${MU} ${p.value.toFixed(3)} \u00b1 ${p.half.toFixed(3)}, runs ${p.runs}` }).set(series(0, mean));
-  clickable(root, { title: `Difference from ${groups[0].name}`, x, y: `difference of ${MU}`, zero: false, file: "differences", rows, describe: (p) => `${p.group} less ${groups[0].name}, ${at(p.condition)}: ${p.value.toFixed(3)}, 95 % within \u00b1 ${p.half.toFixed(3)}` }).set(series(1, less));
+  clickable(root, { title: "Relative friction of each group", x, y: `relative friction ${MU}`, log: [["x", "w"], ["y", MU]], zero: true, file: "groups", rows, describe: (p) => `${p.group}, ${at(p.condition)}: ${MU} ${p.value.toFixed(3)} \u00b1 ${p.half.toFixed(3)}, runs ${p.runs}` }).set(series(0, mean));
+  clickable(root, { title: `Difference from ${groups[0].name}`, x, y: `difference of ${MU}`, log: [["x", "w"]], zero: false, file: "differences", rows, describe: (p) => `${p.group} less ${groups[0].name}, ${at(p.condition)}: ${p.value.toFixed(3)}, 95 % within \u00b1 ${p.half.toFixed(3)}` }).set(series(1, less));
   staticFiles(page);
   root.hidden = false;
 }

@@ -13,6 +13,8 @@ const link = document.getElementById("link");
 const where = document.getElementById("where");
 const NONE = "none";
 const STATES = 600;
+// A state comes every 0.1 s; from this on some are missing.
+const GAP_S = 0.5;
 
 const get = (address, options = {}) => fetch(address, { ...options, headers: { ...options.headers, Authorization: `Bearer ${token}` } });
 
@@ -284,7 +286,7 @@ function runPage(name, control, listed) {
   const rows = el("tbody");
   const head = (text) => el("th", { scope: "col", class: "n" }, text);
   const table = el("div", { class: "scroll passes", tabindex: "0", role: "region", "aria-label": "Passes" }, el("table", {},
-    el("thead", {}, el("tr", {}, ...["point", "w, um", "f, kHz", "U, mm/s", "load, N", "\u03bc'", "predicted", "difference", "surprise, sd"].map(head))), rows));
+    el("thead", {}, el("tr", {}, ...["point", "w, \u00b5m", "f, kHz", "U, mm/s", "load, N", "\u03bc'", "predicted", "difference", "surprise, sd"].map(head))), rows));
   const over = el("p", { hidden: true }, button("Show the finished run", () => route()));
   main.replaceChildren(title, about, keys, said, trip, over, listed ? annotations(listed) : "", now, plots, el("h2", {}, "Events"), events, passes, el("p", { class: "note" }, "Difference: measured less predicted \u03bc'. Surprise: the force against what the model lets expect after the passes before, which have corrected its stiffnesses and \u03bc\u2080. The two can differ in sign."), table);
 
@@ -294,20 +296,23 @@ function runPage(name, control, listed) {
   const charts = {
     forces: traces(figures.forces.plot, "lateral force, N", [{ colour: "--a", band: true }, { colour: "--b", band: true, dash: [8, 4], right: true }], "normal force, N"),
     mu: traces(figures.mu.plot, "relative friction \u03bc'", [{ colour: "--a", band: true }, { colour: "--c", band: true, dash: [8, 4] }], null, [-0.1, 1.4]),
-    map: marks(figures.map.plot, "amplitude w, um peak to peak", FACTORS[0].name, false),
-    late: traces(figures.late.plot, "latest of 0.1 s, us", [{ colour: "--a" }]),
+    map: marks(figures.map.plot, "amplitude w, \u00b5m peak to peak", FACTORS[0].name, false),
+    late: traces(figures.late.plot, "latest of 0.1 s, \u00b5s", [{ colour: "--a" }]),
   };
   const ofPasses = passFigures(plots, null);
 
   function drawStates() {
     const states = picture.states;
-    const x = states.map((s) => s.time_s);
-    const edge = (key, i) => states.map((s) => s.extremes[key]?.[i] ?? null);
-    const value = (key) => states.map((s) => s[key] ?? null);
-    const around = (k) => states.map((s) => (s.predicted == null ? null : s.predicted + k * (s.predicted_sd ?? 0)));
+    // Where states were left out for a slow page, nothing is drawn.
+    const gap = (i) => i > 0 && states[i].time_s - states[i - 1].time_s > GAP_S;
+    const seen = states.flatMap((s, i) => (gap(i) ? [{ time_s: states[i - 1].time_s + GAP_S / 2, extremes: {} }, s] : [s]));
+    const x = seen.map((s) => s.time_s);
+    const edge = (key, i) => seen.map((s) => s.extremes[key]?.[i] ?? null);
+    const value = (key) => seen.map((s) => s[key] ?? null);
+    const around = (k) => seen.map((s) => (s.predicted == null ? null : s.predicted + k * (s.predicted_sd ?? 0)));
     charts.forces.chart.setData([x, edge("lateral_force_n", 1), edge("lateral_force_n", 0), value("lateral_force_n"), edge("normal_force_n", 1), edge("normal_force_n", 0), value("normal_force_n")]);
     charts.mu.chart.setData([x, edge("mu_relative", 1), edge("mu_relative", 0), value("mu_relative"), around(2), around(-2), value("predicted")]);
-    charts.late.chart.setData([x, states.map((s) => s.extremes.lateness_s * 1e6)]);
+    charts.late.chart.setData([x, seen.map((s) => (s.extremes.lateness_s == null ? null : s.extremes.lateness_s * 1e6))]);
     const s = states.at(-1);
     // Of a run that is over nothing is told of single cycles: its record has them.
     for (const one of ["forces", "mu", "late"]) figures[one].show(Boolean(s));
@@ -316,18 +321,18 @@ function runPage(name, control, listed) {
     const span = (key, digits) => { const e = s.extremes[key]; return e ? `${e[0].toFixed(digits)} to ${e[1].toFixed(digits)}` : NONE; };
     figures.forces.say(`Line: lateral; dashes: normal (right). Bands: least and greatest of all cycles. Last 0.1 s: lateral ${span("lateral_force_n", 3)} N, normal ${span("normal_force_n", 3)} N.`);
     figures.mu.say(`Line: measured, with the least and the greatest of all cycles; dashes: predicted, with twice its standard uncertainty; what lies beyond the axis is a turn. Now ${fixed(s.mu_relative, 3)} and ${fixed(s.predicted, 3)}.`);
-    figures.late.say(`How late the latest cycle of each 0.1 s began. Now ${fixed(s.extremes.lateness_s * 1e6, 0)} us, over ${s.extremes.cycles} cycles.`);
+    figures.late.say(`How late the latest cycle of each 0.1 s began. Now ${fixed(s.extremes.lateness_s * 1e6, 0)} \u00b5s, over ${s.extremes.cycles} cycles.`);
     cells.phase.textContent = `${s.point === 4294967295 ? NONE : s.point}, ${s.phase}`;
     cells.mu.textContent = s.mu_relative == null ? NONE : `${fixed(s.mu_relative, 3)} \u00b1 ${fixed(s.mu_relative_sd, 3)}`;
     cells.predicted.textContent = s.predicted == null ? NONE : `${fixed(s.predicted, 3)} \u00b1 ${fixed(s.predicted_sd, 3)}`;
     cells.z.textContent = s.z == null ? NONE : `${signed(s.residual, 3)} (${signed(s.z, 1)} sd)`;
     cells.lateral.textContent = signed(s.lateral_force_n, 4, " N");
     cells.normal.textContent = fixed(s.normal_force_n, 4, " N");
-    cells.w.textContent = fixed(s.amplitude_pp_m == null ? null : s.amplitude_pp_m * 1e6, 3, " um");
+    cells.w.textContent = fixed(s.amplitude_pp_m == null ? null : s.amplitude_pp_m * 1e6, 3, " \u00b5m");
     cells.f.textContent = fixed(s.frequency_hz == null ? null : s.frequency_hz / 1e3, 3, " kHz");
     cells.output.textContent = s.output_on == null ? "not read" : s.output_on ? "on" : "off";
     cells.temperature.textContent = fixed(s.temperature_c, 1, " \u00b0C");
-    cells.late.textContent = fixed(Math.max(...states.slice(-10).map((one) => one.extremes.lateness_s)) * 1e6, 0, " us");
+    cells.late.textContent = fixed(Math.max(...states.slice(-10).map((one) => one.extremes.lateness_s)) * 1e6, 0, " \u00b5s");
   }
 
   function drawPasses() {

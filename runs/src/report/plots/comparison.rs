@@ -24,7 +24,7 @@ pub fn overlay(result: &Comparison) -> miette::Result<String> {
     );
     let frame = Frame {
         sizes: [WIDE, NARROW],
-        x: (Span::linear(0.0..widest), "amplitude w, um peak to peak"),
+        x: (Span::linear(0.0..widest), "amplitude w, \u{b5}m peak to peak"),
         y: (Span::linear(mu[0]..mu[1]), "relative friction \u{3bc}'"),
         alt: &alt,
     };
@@ -78,7 +78,7 @@ pub fn differences(result: &Comparison) -> miette::Result<String> {
     );
     let frame = Frame {
         sizes: [WIDE, NARROW],
-        x: (Span::linear(0.0..widest), "amplitude w, um peak to peak"),
+        x: (Span::linear(0.0..widest), "amplitude w, \u{b5}m peak to peak"),
         y: (Span::linear(low..high), "difference of \u{3bc}', second less first"),
         alt: &alt,
     };

@@ -66,7 +66,7 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     );
     let frame = Frame {
         sizes: [WIDE, NARROW],
-        x: (Span::linear(0.0..widest), "amplitude w, um peak to peak"),
+        x: (Span::linear(0.0..widest), "amplitude w, \u{b5}m peak to peak"),
         y: (Span::linear(axis[0]..axis[1]), "relative friction \u{3bc}'"),
         alt: &alt,
     };
