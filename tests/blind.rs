@@ -266,7 +266,7 @@ fn a_saved_model_comes_back() {
 }
 
 /// A zero that sinks: one cause, whose form departs from the library's so that a second cause mends it. The
-/// verdict leaves open whether there is one; the cause stands in the class. Attraction that grows with the
+/// verdict leaves open whether there is one; the class has the cause. Attraction that grows with the
 /// speed was such a form until the library had it: it is named alone.
 #[test]
 fn a_companion_that_may_be_a_form_of_its_own_is_not_named() {

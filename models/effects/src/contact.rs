@@ -194,10 +194,15 @@ const SMALL_ANGLE: f64 = 1e-2;
 
 /// Mean of `(cos psi - cos phi)+` over a cycle.
 pub fn arc_load(phi: f64) -> f64 {
+    arc_load_of(phi, phi.sin_cos())
+}
+
+/// The same where sine and cosine are at hand.
+fn arc_load_of(phi: f64, (sin, cos): (f64, f64)) -> f64 {
     if phi < SMALL_ANGLE {
         phi.powi(3) / (3.0 * PI) * (1.0 - 0.1 * phi * phi)
     } else {
-        (phi.sin() - phi * phi.cos()) / PI
+        (sin - phi * cos) / PI
     }
 }
 
@@ -213,8 +218,7 @@ pub fn half_contact_angle(load: f64, pull: f64) -> f64 {
     // With pull, the balance first falls and then rises with phi; the loaded branch is the upper one.
     let balance = |phi: f64| {
         let (sin, cos) = phi.sin_cos();
-        let carried = if phi < SMALL_ANGLE { arc_load(phi) } else { (sin - phi * cos) / PI };
-        (carried - pull * phi / PI - load, (phi * sin - pull) / PI)
+        (arc_load_of(phi, (sin, cos)) - pull * phi / PI - load, (phi * sin - pull) / PI)
     };
     if balance(PI).0 <= 0.0 {
         return PI;
@@ -237,6 +241,11 @@ pub fn half_contact_angle(load: f64, pull: f64) -> f64 {
         phi = next;
     }
     phi
+}
+
+/// Makes the tables that any contact asks for, so that none is made inside a control loop.
+pub fn prepare() {
+    let _ = (angles(), stick::guesses());
 }
 
 /// The inverse of [`arc_load`], tabulated: Hermite cubics in the fourth root of the load, and in the root of

@@ -201,6 +201,7 @@ impl Corrected {
             effect.prepare(law, &theta);
             effects.push(Compiled { effect, law, theta });
         }
+        crate::contact::prepare();
         effects.sort_by_key(|c| {
             crate::library().iter().position(|e| e.name() == c.effect.name()).unwrap_or(usize::MAX)
         });

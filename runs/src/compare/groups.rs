@@ -118,8 +118,15 @@ impl Grouped {
     /// Reads runs and compares their groups.
     ///
     /// # Errors
-    /// A folder that holds no run, a run without a pass without vibration, fewer than two groups.
+    /// A folder that holds no run, a run that is given twice or has no pass without vibration, fewer than two
+    /// groups.
     pub fn of(folders: &[PathBuf], by: GroupBy) -> miette::Result<Self> {
+        let mut given = std::collections::BTreeSet::new();
+        for folder in folders {
+            if !given.insert(folder.canonicalize().unwrap_or_else(|_| folder.clone())) {
+                miette::bail!(help = "give each run once", "{}: the run is given twice", folder.display());
+            }
+        }
         let runs: Vec<Read> = folders.iter().map(|folder| read(folder, by)).collect::<miette::Result<_>>()?;
         let mut names: Vec<String> = runs.iter().map(|run| run.group.clone()).collect();
         if by != GroupBy::Run {
@@ -311,6 +318,15 @@ fn warnings(runs: &[Read], folders: &[PathBuf]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A run that counted twice would make an interval too narrow.
+    #[test]
+    fn a_run_that_is_given_twice_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let twice = [folder.path().join("."), folder.path().to_path_buf()];
+        let why = Grouped::of(&twice, GroupBy::Day).unwrap_err().to_string();
+        assert!(why.contains("given twice"), "{why}");
+    }
 
     #[test]
     fn scatter_between_runs_makes_welchs_interval_and_one_run_says_so() {

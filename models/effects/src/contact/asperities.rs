@@ -4,7 +4,7 @@
 //! the load. The onset of intermittent contact loses its kink, and the last asperities keep touching at
 //! amplitudes where a single slider would fly.
 
-use crate::contact::{Contact, SMALL_ANGLE, arc_load, stick};
+use crate::contact::{Contact, arc_load_of, stick};
 use std::f64::consts::PI;
 
 /// Distribution of the heights.
@@ -111,9 +111,6 @@ fn one_load(depth: f64) -> (f64, f64) {
         (0.0, 0.0)
     } else {
         let phi = (-depth).acos();
-        // `arc_load` with the sine and the cosine at hand.
-        let load =
-            if phi < SMALL_ANGLE { arc_load(phi) } else { ((1.0 - depth * depth).sqrt() + phi * depth) / PI };
-        (load, phi / PI)
+        (arc_load_of(phi, ((1.0 - depth * depth).sqrt(), -depth)), phi / PI)
     }
 }

@@ -16,8 +16,7 @@ pub(super) fn lost(phi: f64, (sin_phi, cos_phi): (f64, f64), drag: f64) -> f64 {
     // touches on the lower half of the plate's motion, where the limit rises slowly at first.
     if drag < sin_phi {
         let began = Began { start: -phi, sin: -sin_phi, cos: cos_phi, drag };
-        let guess = |guesses: &Guesses| phi * (2.0 * guesses.early(phi, drag / sin_phi) - 1.0);
-        return began.lost(guess(guesses()));
+        return began.lost(phi * (2.0 * guesses().early(phi, drag / sin_phi) - 1.0));
     }
     if phi <= 0.5 * PI || drag >= 1.0 {
         return 0.0;
@@ -81,15 +80,15 @@ impl Began {
 /// Cells of the guesses in each direction.
 const CELLS: usize = 64;
 
-/// Guesses of the root. Nodes stand evenly in the roots of what the root is not smooth in.
-struct Guesses {
+/// Guesses of the root, made on first use: see [`super::prepare`]. Nodes stand evenly in the roots of what the root is not smooth in.
+pub(super) struct Guesses {
     /// Where sticking begins at touch-down: the root's share of the contact.
     early: Vec<[f32; CELLS + 1]>,
     /// Where it begins later, below and above half of the largest rate.
     late: [[f32; CELLS + 1]; 2],
 }
 
-fn guesses() -> &'static Guesses {
+pub(super) fn guesses() -> &'static Guesses {
     static GUESSES: OnceLock<Guesses> = OnceLock::new();
     GUESSES.get_or_init(|| {
         let share = |i: usize| i as f64 / CELLS as f64;

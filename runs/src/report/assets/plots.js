@@ -33,7 +33,7 @@ function axes(xTitle, yTitle, right) {
 }
 
 // A chart that a drag enlarges and a double click shows whole, whose axes may be logarithmic, and which follows its frame's width.
-// `ready` gets the chart whenever it is made anew.
+// `ready` gets the chart each time it is made.
 function chartOf(plot, options, ready) {
   const zoom = {};
   const log = {};
