@@ -23,7 +23,7 @@ pub(super) fn section(run: &RunData, traces: &[Trace]) -> String {
     // No markup can begin within the data.
     let data = data(run, traces).to_string().replace('<', "\\u003c");
     format!(
-        "<section id=\"explore\" hidden></section><style>{UPLOT_STYLE}</style>\
+        "<section id=\"explore\" hidden></section>\
          <script type=\"application/json\" id=\"run-data\">{data}</script>\n{}",
         script(
             "explore(document.getElementById(\"explore\"), JSON.parse(document.getElementById(\"run-data\").textContent), document);"
@@ -31,13 +31,13 @@ pub(super) fn section(run: &RunData, traces: &[Trace]) -> String {
     )
 }
 
-/// The library, the figures and what is done with them, in the page itself: one that is opened as a
-/// file can import no module.
+/// The library with its style, the figures and what is done with them, in the page itself: one that is opened
+/// as a file can import no module.
 pub(super) fn script(then: &str) -> String {
     let imported = EXPLORE.split_once('\n').map_or("", |(_, rest)| rest);
     let figures = format!("{FIGURES}\n{imported}").replace("\nexport ", "\n");
     format!(
-        "<script>{UPLOT}\ndocument.addEventListener(\"DOMContentLoaded\", () => {{\n{figures}\n{then}\n}});</script>\n"
+        "<style>{UPLOT_STYLE}</style><script>{UPLOT}\ndocument.addEventListener(\"DOMContentLoaded\", () => {{\n{figures}\n{then}\n}});</script>\n"
     )
 }
 
@@ -74,4 +74,14 @@ fn data(run: &RunData, traces: &[Trace]) -> serde_json::Value {
         serde_json::json!({ "lateral_n": limits.lateral_force_max_n, "normal_n": limits.normal_force_max_n })
     });
     serde_json::json!({ "passes": passes, "traces": traces, "events": events, "limits": limits })
+}
+
+#[cfg(test)]
+mod tests {
+    /// Without the library's style its figures lie over what follows them.
+    #[test]
+    fn the_script_comes_with_the_librarys_style() {
+        let page = super::script("start();");
+        assert!(page.find(".uplot").is_some_and(|style| style < page.find("<script>").unwrap()));
+    }
 }

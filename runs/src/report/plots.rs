@@ -324,7 +324,8 @@ pub(crate) fn series_key(values: &[String], unit: &str) -> String {
         SERIES => values[series..].join(", "),
         _ => values[series].clone(),
     };
-    let marks = (0..values.len().min(SERIES)).map(|i| format!("{}: {} {unit}", mark_name(i), of(i)));
+    let marks = (0..values.len().min(SERIES))
+        .map(|i| format!("{}: {} {unit}", mark_name(i), of(i)).trim_end().to_string());
     marks.collect::<Vec<_>>().join("; ")
 }
 

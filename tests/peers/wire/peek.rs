@@ -37,29 +37,19 @@ fn registers_of_pymodbus_over_tcp() {
     assert!(!found[0]["error"].as_str().unwrap().contains("os error"), "{found:?}");
 }
 
-/// The example of a foreign controller reads five fresh samples of the virtual rig.
-#[test]
-fn the_example_of_a_foreign_controller_reads_the_rig() {
-    let output = python().arg(file("examples/read_rig.py")).arg(muprime().get_program()).output().unwrap();
-    let (out, err) = texts(&output);
-    let samples: std::collections::BTreeSet<&str> =
-        out.lines().filter_map(|line| line.strip_prefix("sample ")?.split(':').next()).collect();
-    assert!(output.status.success() && samples.len() == 5, "{out}{err}");
-}
-
-/// pymodbus over a serial line, and a unit that is not there.
+/// pymodbus over a serial line, and a unit that it does not have: it refuses that.
 #[test]
 fn registers_of_pymodbus_over_a_serial_line() {
     let (_pair, ours, theirs) = socat_pair();
     let (_server, _) =
         start(python().arg(file("tests/peers/rtu_server.py")).arg(&theirs).args(["-1234", "25"]));
     let address = format!("rtu:{ours}");
-    let (status, found) = peek(&[&address, "180..183", "--unit", "10"]);
+    let (status, found) = peek(&[&address, "180..183", "--unit", "9"]);
     assert_eq!((status, found.len()), (Some(0), 4));
     assert_eq!((&found[0]["i16"], &found[2]["u16"]), (&(-1234).into(), &25.into()));
     let (status, found) = peek(&[&address, "180", "--unit", "44"]);
     assert_eq!(status, Some(2));
-    assert!(found[0]["error"].as_str().unwrap().contains("no answer within"), "{found:?}");
+    assert!(found[0]["error"].as_str().unwrap().contains("the instrument refused"), "{found:?}");
     assert_eq!(peek(&[&address]).0, Some(2), "registers are needed");
 }
 
@@ -69,7 +59,9 @@ fn lines_and_frames_that_come_by_themselves() {
     let talk = |said: &'static [u8]| {
         let (mut port, path) = pty();
         std::thread::spawn(move || {
-            while port.write_all(said).is_ok() {
+            // Nobody has opened the line yet, or has left it: then a write fails, and the next may not.
+            for _ in 0..500 {
+                let _ = port.write_all(said);
                 std::thread::sleep(Duration::from_millis(20));
             }
         });

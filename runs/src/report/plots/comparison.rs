@@ -188,7 +188,7 @@ fn by_group(
         Ok(())
     })?;
     let names: Vec<String> = grouped.groups.iter().map(|g| g.name.clone()).collect();
-    let key = series_key(&names, "").replace(" ;", ";");
+    let key = series_key(&names, "");
     Ok(format!(
         "<figure>{svg}<figcaption>{}. Bars: {bars}. All speeds, frequencies and loads.{}</figcaption></figure>",
         crate::report::html::escape(&capital(&key)),
