@@ -161,7 +161,7 @@ const WRONG: &[Wrong] = &[
     ("tip.toml", "stiffness_relative_sd = 0.05", "stiffness_relative_sd = -1", "stiffness_relative_sd"),
     ("rig.toml", "3.9e6", "-3.9e6", "normal_stiffness_n_per_m"),
     ("rig.toml", "pass_relative_sd", "pass_sd", "pass_sd"),
-    ("rig.toml", "0.0008", "\"0.8 mN\"", "force_sd_n"),
+    ("rig.toml", "0.0008", "\"0.8 mX\"", "force_sd_n"),
     ("rig.toml", "amplitude_gain_sd = 0.02", "amplitude_gain_sd = 20", "amplitude_gain_sd"),
     ("run/points.csv", "speed_m_s", "speed_mm_s", "speed_m_s"),
     ("run/points.csv", "point,", "point,point,", "twice"),

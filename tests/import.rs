@@ -255,7 +255,7 @@ fn slipped_units_and_lost_signs_are_remarked_on() {
     assert_eq!(right, "[]");
     let slipped = remarks("slipped.csv", ["nm", "mHz", "lateral_force:uN"], false);
     assert!(
-        slipped.contains("amplitude_pp_m is") && slipped.contains("a thousand times too small"),
+        slipped.contains("amplitude_pp_m: 0.00151") && slipped.contains("a thousand times too small"),
         "{slipped}"
     );
     assert!(

@@ -89,9 +89,17 @@ pub fn keep_unread() {
 /// # Errors
 /// It is not: says what is beside it.
 pub fn there(path: &Path, what: &str) -> miette::Result<()> {
-    if path.exists() {
-        return Ok(());
+    const RUN: [&str; 5] = ["points.csv", ::runs::run_dir::JOURNAL, "run.toml", "run-1.mcap", "sessions"];
+    if path.is_dir() && what.starts_with("run") && !RUN.iter().any(|name| path.join(name).exists())
+        || !path.exists()
+    {
+        return Err(not_there(path, what));
     }
+    Ok(())
+}
+
+/// What is there instead of it.
+fn not_there(path: &Path, what: &str) -> miette::Report {
     let folder = ::runs::catalogue::runs_folder();
     let mut runs: Vec<String> = std::fs::read_dir(&folder)
         .into_iter()
@@ -105,11 +113,15 @@ pub fn there(path: &Path, what: &str) -> miette::Result<()> {
         [] => format!("there are no runs in {}; muprime run makes one", folder.display()),
         all => format!("runs here: {}", all.iter().rev().take(8).cloned().collect::<Vec<_>>().join(", ")),
     };
-    Err(miette::miette!(help = help, "there is no {what} at '{}'", path.display()))
+    miette::miette!(help = help, "there is no {what} at '{}'", path.display())
 }
 
 /// An error in words: without the numbers that a system counts its errors by, and without the language's own sentences.
 pub fn plain(error: &str) -> String {
+    /// A line may have been folded between the words, with the margin of an answer.
+    fn gap(text: &str) -> &str {
+        text.trim_start_matches(|c: char| c.is_whitespace() || c == '│')
+    }
     const SENTENCES: [(&str, &str); 4] = [
         ("invalid digit found in string", "a whole number is expected"),
         ("cannot parse integer from empty string", "a whole number is expected"),
@@ -119,13 +131,15 @@ pub fn plain(error: &str) -> String {
     let error = SENTENCES.iter().fold(error.to_string(), |text, (from, to)| text.replace(from, to));
     let mut rest = error.as_str();
     let mut text = String::new();
-    while let Some((before, after)) = rest.split_once(" (os error ") {
-        let Some((number, behind)) = after.split_once(')') else { break };
-        if number.is_empty() || !number.chars().all(|c| c.is_ascii_digit()) {
-            break;
-        }
-        text.push_str(before);
-        rest = behind;
+    while let Some((before, after)) = rest.split_once("(os") {
+        let number = gap(after).strip_prefix("error").map(gap);
+        let behind =
+            number.and_then(|n| n.trim_start_matches(|c: char| c.is_ascii_digit()).strip_prefix(')'));
+        text.push_str(if behind.is_some() { before.trim_end_matches([' ', '\n', '│']) } else { before });
+        rest = behind.unwrap_or_else(|| {
+            text.push_str("(os");
+            after
+        });
     }
     text + rest
 }
@@ -139,6 +153,18 @@ pub fn exit(status: u8) -> miette::Result<ExitCode> {
 mod tests {
     use super::*;
     use ::runs::session::Unfinished;
+
+    #[test]
+    fn numbers_of_the_system_are_left_out() {
+        for (error, better) in [
+            ("a: No such file (os error 2)", "a: No such file"),
+            ("× a: Connection\n  │ refused (os\n  │ error 111); b", "× a: Connection\n  │ refused; b"),
+            ("× no such file\n  │ (os error 2)\n", "× no such file\n"),
+            ("(os/2)", "(os/2)"),
+        ] {
+            assert_eq!(plain(error), better);
+        }
+    }
 
     #[test]
     fn refused_means_that_nothing_was_touched() {

@@ -215,7 +215,7 @@ constants! {
     gapless_sd: f64 = 2.0, "Deviations of the mean square's scatter within which held-out passes show no gap to shrink.", "two standard deviations";
     misstated: f64 = 1.25, "Factor from which a statement of repeatability is reported as wrong.", JUDGEMENT;
     stands_out_sd: f64 = 2.0, "Deviations of a pass by which the gap at a condition must stand out.", "two standard deviations";
-    least_contraction: f64 = 0.05, "Least contraction of the prior variance before a pull of a stiffness is stated.", JUDGEMENT;
+    least_contraction: f64 = 0.05, "Least contraction of the prior variance before a pull of a stiffness, or an interval of a parameter, is stated.", JUDGEMENT;
 
     design_least_nats: f64 = 0.05, "Nats below which an experiment is not worth asking for.", JUDGEMENT;
     settled_probability: f64 = 0.99, "Probability of no gap from which there is nothing to part.", JUDGEMENT;

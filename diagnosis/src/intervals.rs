@@ -16,8 +16,10 @@ pub enum Shape {
     Bounded,
     /// One end only.
     OneSided,
-    /// The data does not say.
+    /// The fall never reaches either end.
     Flat,
+    /// The table adds nothing to what was assumed: value and interval are the prior's.
+    Prior,
 }
 
 /// A parameter with its interval.
@@ -49,6 +51,7 @@ pub fn estimates(problem: &Problem, best: &Posterior, basis: &DMatrix<f64>) -> V
     }
     let covariance = problem.covariance(&phi);
     let floor = cost(problem, best, &covariance, &best.u, &best.prediction);
+    let precision = problem.prior_precision(&best.members);
     best.members
         .iter()
         .zip(Layout::of(&best.members).members())
@@ -64,6 +67,7 @@ pub fn estimates(problem: &Problem, best: &Posterior, basis: &DMatrix<f64>) -> V
                     let value = p.value(best.u[k]);
                     let [low, high] = ends.map(|e| e.unwrap_or(f64::NAN));
                     let shape = match (ends[0], ends[1]) {
+                        _ if assumed(problem, best, &precision, k) => Shape::Prior,
                         (Some(_), Some(_)) => Shape::Bounded,
                         (None, None) => Shape::Flat,
                         _ => Shape::OneSided,
@@ -80,6 +84,7 @@ pub fn estimates(problem: &Problem, best: &Posterior, basis: &DMatrix<f64>) -> V
 /// Intervals from the curvature at the mode, for hypotheses that do not lead.
 pub fn curvature(problem: &Problem, e: &Posterior) -> Vec<Estimate> {
     let parameters = e.members.iter().flat_map(|m| m.parameters(&problem.design));
+    let precision = problem.prior_precision(&e.members);
     parameters
         .zip(NUISANCES..)
         .map(|(p, at)| {
@@ -91,10 +96,19 @@ pub fn curvature(problem: &Problem, e: &Posterior) -> Vec<Estimate> {
                 value: p.value(u),
                 ci95: [p.value((u - reach).max(low)), p.value((u + reach).min(high))],
                 unit: p.unit,
-                shape: if u - reach < low || u + reach > high { Shape::OneSided } else { Shape::Bounded },
+                shape: match u - reach < low || u + reach > high {
+                    _ if assumed(problem, e, &precision, at) => Shape::Prior,
+                    true => Shape::OneSided,
+                    false => Shape::Bounded,
+                },
             }
         })
         .collect()
+}
+
+/// Whether the table hardly narrows the prior of a coordinate.
+fn assumed(problem: &Problem, e: &Posterior, precision: &[f64], k: usize) -> bool {
+    1.0 - e.covariance[(k, k)] * precision[k] < problem.constants.least_contraction
 }
 
 fn cost(problem: &Problem, best: &Posterior, c: &Covariance, u: &[f64], m: &DVector<f64>) -> f64 {

@@ -207,9 +207,9 @@ mod tests {
         let empty = region(&bounds, &passes, 0.08, None).text;
         assert_eq!(
             empty,
-            "nothing was measured at amplitude 2 to 3 um pp; only the verdict's model puts 8 % of its gap there"
+            "nothing was measured at amplitude 2 to 3 \u{b5}m; only the verdict's model puts 8 % of its gap there"
         );
         let seen = region(&bounds, &passes, 0.08, Some(0.002)).text;
-        assert_eq!(seen, "8 % of the gap: amplitude 2 to 3 um pp (p = 2.0e-3)");
+        assert_eq!(seen, "8 % of the gap: amplitude 2 to 3 \u{b5}m (p = 2.0e-3)");
     }
 }

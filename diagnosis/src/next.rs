@@ -76,8 +76,8 @@ pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Dec
                 conditions: chosen.iter().map(|&i| grid[i]).collect(),
                 text: format!(
                     "{PASSES} more passes would separate {} from {} and the rest ({} expected)",
-                    names[0],
-                    names[1],
+                    names[0].replace('_', " "),
+                    names[1].replace('_', " "),
                     odds(nats)
                 ),
                 separates: names,

@@ -52,13 +52,17 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
 /// # Errors
 /// Where it stands for no address.
 pub fn resolve(address: &str, port: Option<u16>) -> Result<SocketAddr, String> {
+    if address.starts_with('/') {
+        return Err(format!("`{address}` is a serial line, and the profile uses TCP: write rtu:{address}"));
+    }
     let with_port = if address.to_socket_addrs().is_ok() {
         address.to_string()
     } else {
         format!("{address}:{}", port.ok_or("neither the address nor the profile names a port")?)
     };
-    let mut found =
-        with_port.to_socket_addrs().map_err(|error| format!("`{address}` cannot be resolved: {error}"))?;
+    let mut found = with_port
+        .to_socket_addrs()
+        .map_err(|_| format!("no machine is called `{address}`; give its name or IP address"))?;
     found.next().ok_or_else(|| format!("`{address}` stands for no address"))
 }
 

@@ -190,7 +190,7 @@ impl Session {
             }
             last_words = ended.to_string();
             health.problem(last_words.clone());
-            tracing::warn!(instrument = self.endpoint.profile().id(), %ended, "the link went down");
+            tracing::info!(instrument = self.endpoint.profile().id(), %ended, "the link went down");
             if self.tell(Err(last_words.clone())) {
                 return self.closed(last_words); // whoever opened the rig wants to know, not to wait
             }

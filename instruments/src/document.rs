@@ -1,7 +1,7 @@
 //! A profile as a page for people, generated so that it cannot drift from what the drivers do.
 
 use crate::profile::{Frame, FrameKind};
-use crate::schema::{Description, Init, Link, Table};
+use crate::schema::{Description, Init, Link, LinkKind, Severity, Stamp, Table, Verified};
 use crate::{Profile, SignalId};
 use std::fmt::Write;
 
@@ -10,9 +10,14 @@ use std::fmt::Write;
 pub fn markdown(profile: &Profile) -> String {
     let d = &profile.description;
     let mut page = format!("# {}\n\n", d.profile.id);
-    let roles = d.profile.roles.iter().map(|role| format!("{role:?}")).collect::<Vec<_>>().join(", ");
+    let roles = d.profile.roles.iter().map(spaced).collect::<Vec<_>>().join(", ");
     let (maker, models) = (&d.profile.maker, d.profile.models.join(", "));
-    let _ = writeln!(page, "{maker}: {models}. Roles: {roles}. Tried: {:?}.", d.profile.verified);
+    let tried = match d.profile.verified {
+        Verified::EmulatorOnly => "against emulators and independent programs, never on hardware",
+        Verified::Bench => "on a bench",
+        Verified::Published => "on a bench, with published results",
+    };
+    let _ = writeln!(page, "{maker}: {models}. Roles: {roles}. Tried {tried}.");
     let firmware = d.profile.firmware.as_ref().map(|firmware| format!("Firmware: {firmware}."));
     for text in [Some(d.profile.notes.clone()), firmware].into_iter().flatten().filter(|t| !t.is_empty()) {
         let _ = writeln!(page, "\n{text}");
@@ -28,18 +33,44 @@ pub fn markdown(profile: &Profile) -> String {
     let refused = d.signature.iter().map(|one| {
         vec![format!("not {}", code(one.when.as_ref())), format!("refused at connection: {}", one.text)]
     });
-    let faults =
-        d.fault.iter().map(|one| vec![code(one.when.as_ref()), format!("{:?}: {}", one.severity, one.text)]);
+    let faults = d
+        .fault
+        .iter()
+        .map(|one| vec![code(one.when.as_ref()), format!("{}: {}", severity(one.severity), one.text)]);
     table(&mut page, "when | then", refused.chain(faults));
     let _ = writeln!(
         page,
-        "\nTime: {:?}, {} ms late, give or take {} ms. Golden vectors: {}.",
-        d.time.stamp,
+        "\nTime of a sample: {}, {} ms late, \u{b1} {} ms. Test vectors: {}.",
+        match d.time.stamp {
+            Stamp::Device => "by the instrument's clock",
+            Stamp::Arrival => "when the answer arrived",
+        },
         d.time.latency_ms,
         d.time.jitter_ms,
         d.vector.len()
     );
     page
+}
+
+/// A name of the schema in words: 'ForceLateral' is 'force lateral'.
+fn spaced(name: &impl std::fmt::Debug) -> String {
+    let mut words = String::new();
+    for c in format!("{name:?}").chars() {
+        if c.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(c.to_lowercase());
+    }
+    words
+}
+
+/// What follows from a state of the instrument.
+fn severity(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Stop => "the rig stops",
+        Severity::Degrade => "the sample counts as degraded",
+        Severity::Log => "noted",
+    }
 }
 
 /// A table, where it has rows.
@@ -54,7 +85,14 @@ fn table(page: &mut String, heads: &str, rows: impl Iterator<Item = Vec<String>>
 
 /// What is fixed of the link.
 fn link(link: &Link) -> String {
-    let mut parts = vec![format!("{:?}", link.kind)];
+    let kind = match link.kind {
+        LinkKind::ModbusTcp => "Modbus TCP".into(),
+        LinkKind::ModbusRtu => "Modbus RTU".into(),
+        LinkKind::Canopen => "CANopen".into(),
+        LinkKind::Serial => "serial line".into(),
+        kind => format!("{kind:?}").to_uppercase(),
+    };
+    let mut parts = vec![kind];
     let mut add =
         |name: &str, value: Option<String>| parts.extend(value.map(|value| format!("{name} {value}")));
     add("port", link.port.map(|port| port.to_string()));

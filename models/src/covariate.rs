@@ -108,7 +108,7 @@ pub static TIME: Covariate = Covariate {
 pub static AMPLITUDE: Covariate = Covariate {
     name: "amplitude_pp_m",
     words: "amplitude",
-    shown: (1e6, "um pp"),
+    shown: (1e6, "\u{b5}m"),
     range: [0.0, 1e-3],
     from: true,
     needed: "a number of metres, zero to 1e-3 (peak to peak)",
@@ -228,7 +228,7 @@ pub static AMBIENT_PRESSURE: Covariate = Covariate {
 pub static TEMPERATURE: Covariate = Covariate {
     name: "temperature_c",
     words: "temperature",
-    shown: (1.0, "degrees C"),
+    shown: (1.0, "\u{b0}C"),
     range: [-273.15, 1000.0],
     from: true,
     needed: "a temperature in degrees Celsius, -273.15 to 1000",

@@ -21,7 +21,7 @@ class Parameter:
     value: float
     unit: str
     ci95: tuple[float, float] | None
-    """Its interval of 95 %, where the table gives one."""
+    """Its interval of 95 %; `None` where the table adds nothing to what was assumed."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,8 @@ def diagnose(
                 probability=h["probability"],
                 alias_class=tuple(h["alias_class"]),
                 parameters=tuple(
-                    Parameter(p["name"], p["value"], p["unit"], _interval(p.get("ci95"))) for p in h["parameters"]
+                    Parameter(p["name"], p["value"], p["unit"], None if p["shape"] == "prior" else _interval(p.get("ci95")))
+                    for p in h["parameters"]
                 ),
             )
             for h in told["hypotheses"]

@@ -5,7 +5,7 @@
 //! for the references of both runs. Calibration that both runs share (gains, stiffnesses) cancels in a difference and is left out.
 
 use crate::report::RunData;
-use crate::report::human::p_value;
+use crate::report::human::{p_value, quantity};
 use crate::report::levels;
 use models::pass::Pass;
 use models::quantity::PeakToPeak;
@@ -82,13 +82,14 @@ pub struct Paired {
 impl Paired {
     /// The condition in words.
     pub fn setting(&self) -> String {
-        format!(
-            "{:.2} um pp, {:.1} kHz, {:.1} mm/s, {:.2} N",
-            self.amplitude_pp_m * 1e6,
-            self.frequency_hz / 1e3,
-            self.speed_m_s * f64::from(self.direction) * 1e3,
-            self.normal_force_n
-        )
+        let speed = self.speed_m_s * f64::from(self.direction);
+        let parts = [
+            (self.amplitude_pp_m, "m"),
+            (self.frequency_hz, "Hz"),
+            (speed, "m/s"),
+            (self.normal_force_n, "N"),
+        ];
+        parts.map(|(value, unit)| quantity(value, unit)).join(", ")
     }
 
     /// The difference in standard deviations.

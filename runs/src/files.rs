@@ -61,8 +61,9 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
 /// What is there and is no ordinary file, such as a terminal or a pipe, is written to as it is. A link of this user stays a link.
 ///
 /// # Errors
-/// Whatever the file system says, with the file's name; a link that another user has put there.
+/// Whatever the file system says, with the file's name; a link of another user; a file of another program.
 pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
+    replaceable(path, bytes.as_ref())?;
     let written = named(path).and_then(|path| {
         if fs::metadata(&path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
             return fs::write(path, bytes.as_ref());
@@ -70,6 +71,34 @@ pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
         put(&path, bytes.as_ref())
     });
     written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
+/// Bytes of an earlier file in which its origin is looked for.
+const HEAD: usize = 4096;
+
+/// Whether an output may take the place of what has that name: nothing, an empty file, or an earlier output,
+/// which begins as the new one does (its first column, or the mark of a binary format) or names this program.
+/// A person who mixes up two names loses no data.
+///
+/// # Errors
+/// Another file is there.
+pub fn replaceable(path: &Path, output: &[u8]) -> miette::Result<()> {
+    let mut head = Vec::new();
+    let plain = fs::metadata(path).is_ok_and(|there| there.is_file());
+    if !plain || File::open(path).and_then(|f| f.take(HEAD as u64).read_to_end(&mut head)).is_err() {
+        return Ok(());
+    }
+    let text = !matches!(output.first(), Some(b'<' | b'{' | b'#'));
+    let begins = output.iter().position(|b| b",;\t\n".contains(b)).unwrap_or(output.len()).min(6);
+    let alike = text && begins > 2 && head.starts_with(&output[..begins]);
+    if head.is_empty() || alike || head.windows(7).any(|word| word.eq_ignore_ascii_case(b"muprime")) {
+        return Ok(());
+    }
+    miette::bail!(
+        help = "give a name that is free, or remove the file",
+        "{} exists, and muprime did not write it: nothing was replaced",
+        path.display()
+    )
 }
 
 /// Writes a file of a run's or a study's folder, to which others may write, in the same way; a link that stands there is replaced, and what
@@ -235,10 +264,10 @@ mod tests {
     fn a_file_is_replaced_whole_and_nothing_is_left_beside_it() {
         let folder = folder("whole");
         let (path, link) = (folder.join("report.html"), folder.join("link"));
-        write_whole(&path, b"first").unwrap();
+        write_whole(&path, b"muprime, first").unwrap();
         std::os::unix::fs::symlink(&path, &link).unwrap();
-        write_whole(&link, b"second").unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"second");
+        write_whole(&link, b"muprime, second").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"muprime, second");
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         // A folder is in the way: the old file stays, and nothing else does.
         fs::create_dir_all(folder.join("taken/by/files")).unwrap();
@@ -248,6 +277,28 @@ mod tests {
         assert_eq!(names, ["link", "report.html", "taken"]);
         write_whole(Path::new("/dev/null"), b"a device stays one").unwrap();
         assert!(!fs::metadata("/dev/null").unwrap().is_file());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// A table and notes of a person stay, an earlier output is replaced.
+    #[test]
+    fn an_output_replaces_only_outputs() {
+        let folder = folder("outputs");
+        let path = folder.join("mine");
+        let model = b"schema = \"muprime.model/1\"\n".as_slice();
+        for (there, output, replaced) in [
+            ("amplitude,force\n1,2\n", model, false),
+            ("# my notes\n", b"# a plan\n", false),
+            ("point,amplitude\n1,2\n", b"point,speed\n1,2\n", true),
+            ("<!doctype html><p>my page", b"<!doctype html>", false),
+            ("<!doctype html><meta name=generator content=muprime>", b"<!doctype html>", true),
+            ("", model, true),
+        ] {
+            fs::write(&path, there).unwrap();
+            let written = write_whole(&path, output);
+            assert_eq!(written.is_ok(), replaced, "{there}");
+            assert_eq!(fs::read(&path).unwrap(), if replaced { output } else { there.as_bytes() });
+        }
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -3,8 +3,12 @@
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use models::rig_file::{RigFile, RigFileError};
 use serde::de::DeserializeOwned;
+use std::borrow::Cow;
 use std::io::Read;
+use std::ops::Range;
 use std::path::Path;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 /// A file that cannot be used, with the place.
 #[derive(Debug, thiserror::Error, Diagnostic)]
@@ -24,7 +28,7 @@ impl BadInput {
     pub fn new(
         name: &str,
         text: &str,
-        place: Option<std::ops::Range<usize>>,
+        place: Option<Range<usize>>,
         problem: impl Into<String>,
         remedy: impl Into<Option<String>>,
     ) -> Self {
@@ -66,7 +70,7 @@ impl<'a> Problems<'a> {
     /// One more, at a place.
     pub fn add_at(
         &mut self,
-        place: Option<std::ops::Range<usize>>,
+        place: Option<Range<usize>>,
         problem: impl Into<String>,
         remedy: impl Into<Option<String>>,
     ) {
@@ -129,8 +133,8 @@ pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String
     } else {
         [(1e3, "k"), (1e6, "M"), (1e-3, "m"), (1e-6, "u")]
     };
-    // A force a few times too large is a slip of another kind.
-    if unit == "N" && value.abs() > high && value.abs() < 50.0 * high {
+    // A force a few times too large is a slip of another kind, and so is a value that was written in small units.
+    if value.abs() > high && (value.abs() < 1.0 || unit == "N" && value.abs() < 50.0 * high) {
         return None;
     }
     let (factor, prefix) = prefixes.into_iter().find(|(factor, _)| within(value * factor))?;
@@ -217,12 +221,38 @@ pub fn bytes_of(path: &Path, most: u64) -> miette::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// A TOML text with its quantities in SI: `amplitude_pp_m = "2um"` becomes `2e-6`, filled up with blanks, so
+/// that places stay. The unit is that of the key; other texts stay as they are.
+pub fn in_si(text: &str) -> Cow<'_, str> {
+    fn quantities(value: &Spanned<DeValue<'_>>, unit: &str, found: &mut Vec<(Range<usize>, f64)>) {
+        match value.get_ref() {
+            DeValue::Table(table) => {
+                table.iter().for_each(|(k, v)| quantities(v, unit_of(k.get_ref()), found))
+            }
+            DeValue::Array(list) => list.iter().for_each(|v| quantities(v, unit, found)),
+            DeValue::String(text) if !unit.is_empty() && text.parse::<f64>().is_err() => {
+                found.extend(crate::quantity::parse(text, unit).map(|si| (value.span(), si)));
+            }
+            _ => {}
+        }
+    }
+    let Ok(table) = DeTable::parse(text) else { return text.into() };
+    let mut found = Vec::new();
+    table.get_ref().iter().for_each(|(k, v)| quantities(v, unit_of(k.get_ref()), &mut found));
+    let mut si = Cow::from(text);
+    found.sort_by_key(|(at, _)| std::cmp::Reverse(at.start));
+    for (at, value) in found {
+        si.to_mut().replace_range(at.clone(), &format!("{:width$}", format!("{value:e}"), width = at.len()));
+    }
+    si
+}
+
 /// Parses TOML.
 ///
 /// # Errors
 /// What TOML or the schema says, with the place. Unknown keys are errors wherever the schema says so.
 pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, BadInput> {
-    toml::from_str(text).map_err(|e| BadInput::new(name, text, e.span(), in_words(e.message()), None))
+    toml::from_str(&in_si(text)).map_err(|e| BadInput::new(name, text, e.span(), in_words(e.message()), None))
 }
 
 /// Reads a rig.toml.
@@ -277,19 +307,32 @@ pub fn usual(key: &str) -> [f64; 2] {
 
 /// Where the value of a key stands: `path` names tables and the key, for instance `["limits", "speed_max_m_s"]`.
 /// `None` where the key is not in the file (a default was used).
-pub fn place_of(text: &str, path: &[&str]) -> Option<std::ops::Range<usize>> {
-    let table = toml::de::DeTable::parse(text).ok()?;
-    let mut here: &toml::de::DeTable<'_> = table.get_ref();
+pub fn place_of(text: &str, path: &[&str]) -> Option<Range<usize>> {
+    let table = DeTable::parse(text).ok()?;
+    let mut here: &DeTable<'_> = table.get_ref();
     let (last, tables) = path.split_last()?;
     for name in tables {
         here = here.get(*name)?.get_ref().as_table()?;
     }
-    here.get(*last).map(toml::Spanned::span)
+    here.get(*last).map(Spanned::span)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::unit_meant;
+    use super::{in_si, unit_meant};
+
+    #[test]
+    fn quantities_with_units_are_their_si_numbers_in_the_same_place() {
+        let text = "about = \"2um\"\n[base]\nw_m = \"2um\" # 2um\nf_hz = [\"27.5kHz\", 3e4]\nu_m_s = {v_m_s = \"20mm/s\"}\nn_n = \"two\"\n";
+        let si = in_si(text);
+        assert_eq!(si.len(), text.len());
+        for part in
+            ["about = \"2um\"", "w_m = 2e-6  # 2um", "[2.75e4   , 3e4]", "v_m_s = 2e-2    }", "n_n = \"two\""]
+        {
+            assert!(si.contains(part), "{si}");
+        }
+        assert_eq!(in_si("no = toml = text"), "no = toml = text");
+    }
 
     #[test]
     fn a_prefix_is_suggested_for_units_that_take_one() {

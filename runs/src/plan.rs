@@ -246,6 +246,14 @@ impl Plan {
         if file.directions.is_empty() || listed.into_iter().any(|d| *d != 1 && *d != -1) {
             wrong.add(&["directions"], "directions are 1, -1 or both", None);
         }
+        for (index, series) in file.series.iter().enumerate() {
+            for (covariate, _) in series.lists().into_iter().filter(|(_, list)| list.is_empty()) {
+                if let Some(place) = points::series_place(text, index, covariate.name) {
+                    let problem = format!("{} lists no value", covariate.name);
+                    wrong.add_at(Some(place), problem, "list its values, or leave the key out".to_string());
+                }
+            }
+        }
         if !(1..=1000).contains(&file.replicates) {
             wrong.add(&["replicates"], "replicates are 1 to 1000", None);
         }

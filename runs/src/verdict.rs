@@ -2,7 +2,9 @@
 
 pub mod files;
 
+use crate::report::human::{quantity, with_interval};
 use diagnosis::certificates;
+use diagnosis::intervals::{Estimate, Shape};
 use diagnosis::verdict::{Diagnosis, probability};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
@@ -41,7 +43,7 @@ pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
     let of = |c: &Condition, k: &Covariate| k.of(c).map(|v| (k.name, v));
     let listed = |k: &&Covariate| k.name != covariate::DIRECTION.name;
     let mut text = format!(
-        "name = \"next-experiment\"\nabout = {about}\nrandomise = false\n\n[base]\n{}",
+        "# Written by muprime diagnose.\nname = \"next-experiment\"\nabout = {about}\nrandomise = false\n\n[base]\n{}",
         covariate::planned()
             .filter(|k| listed(k) && based(k))
             .filter_map(|k| of(base, k))
@@ -67,6 +69,16 @@ fn plain(name: &str) -> String {
     name.replace('_', " ")
 }
 
+/// A parameter's value with its interval, or as assumed where the table adds nothing to the prior.
+pub fn estimate(p: &Estimate) -> String {
+    match p.shape {
+        Shape::Prior => {
+            format!("{} (as assumed; this table does not determine it)", quantity(p.value, p.unit))
+        }
+        _ => with_interval(p.value, p.ci95, p.unit),
+    }
+}
+
 /// What a terminal shows.
 pub fn terminal(result: &Diagnosis) -> String {
     let r = &result.report;
@@ -80,8 +92,7 @@ pub fn terminal(result: &Diagnosis) -> String {
         text.push('\n');
         if h.probability > 0.05 {
             for p in &h.parameters {
-                let value = crate::report::human::with_interval(p.value, p.ci95, p.unit);
-                text.push_str(&format!("         {} = {value}\n", plain(p.name)));
+                text.push_str(&format!("         {} = {}\n", plain(p.name), estimate(p)));
             }
         }
     }

@@ -33,7 +33,7 @@ use targets::{Id, Kind, TARGETS};
 use values::{Dropped, Values};
 
 pub use grid::Grid;
-pub use remarks::Range;
+pub use remarks::{Range, of_table as remarks_of};
 pub use series::{Counts, Cut};
 pub use text::Marks;
 

@@ -97,7 +97,7 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     let [a, b] = result.references;
     let _ = writeln!(
         w,
-        "mu_0: {:.4} +- {:.4} and {:.4} +- {:.4}",
+        "mu_0: {:.3} \u{b1} {:.3} and {:.3} \u{b1} {:.3}",
         a.mu0,
         a.mu0 * a.relative_sd,
         b.mu0,
@@ -110,7 +110,7 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     let worst = result.furthest_first();
     if !worst.is_empty() {
         w.push_str("largest differences (w peak-to-peak; difference: second minus first):\n");
-        w.push_str("  w, um  f, kHz  U, mm/s  F, N  first  second  difference    sd\n");
+        w.push_str("  w, \u{b5}m  f, kHz  U, mm/s  F, N  first  second  difference    sd\n");
     }
     for p in worst.iter().take(PRINTED) {
         let _ = writeln!(

@@ -81,6 +81,11 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let passes = parse_passes(&table_path, &bytes)?;
     let table =
         Table::measured(&passes).into_diagnostic().wrap_err_with(|| table_path.display().to_string())?;
+    if !args.data.is_dir() && !json {
+        tables::import::remarks_of(&passes)
+            .iter()
+            .for_each(|r| say!("{}", folded(&format!("warning: {r}"), 4)));
+    }
     for name in &args.without {
         if effects::by_name(name).is_none() {
             miette::bail!("--without {name}: no such effect; `muprime model effects` lists them");
@@ -98,6 +103,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         None => None,
     };
+    // Before the work, not after it.
+    for out in [&args.predictions, &args.save_model, &args.report, &args.save_plan].into_iter().flatten() {
+        runs::files::replaceable(out, b"point,")?;
+    }
     let bar = studies::progress::bar(1000, "per mille");
     let progress = follow(&bar, json)?;
     let options =

@@ -1,8 +1,10 @@
 //! `muprime import FILE --map '...' -o DIR`: a foreign table made into a point table.
 
 use miette::IntoDiagnostic;
+use models::covariate;
 use runs::files::{make_folder, write_whole};
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
+use runs::report::human::number;
 use runs::{ask, out, say};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -127,8 +129,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     say!("{source}: {}; {} rows", log.format, log.rows);
     for range in &log.ranges {
-        let [low, median, high] = range.low_median_high;
-        say!("  {:<22} {} to {}, median {}", range.column, short(low), short(high), short(median));
+        let known = covariate::by_name(range.column);
+        let (words, (factor, unit)) = known.map_or(("lateral force", (1e3, "mN")), |c| (c.words, c.shown));
+        let [low, median, high] = range.low_median_high.map(|value| number(value * factor));
+        say!("  {words:<22} {low} to {high} {unit}, median {median}");
     }
     log.notes.iter().for_each(|note| say!("note: {note}"));
     log.assumed.iter().for_each(|what| say!("assumed in rig.toml: {what}"));
@@ -162,19 +166,6 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         args.out.display()
     );
     super::exit(super::DONE)
-}
-
-/// Four digits, with a power of ten where the number is far from one.
-fn short(value: f64) -> String {
-    let size = value.abs();
-    if value == 0.0 {
-        return "0".into();
-    }
-    if (1e-3..1e5).contains(&size) {
-        let digits = (3.0 - size.log10().floor()).clamp(0.0, 6.0);
-        return format!("{value:.*}", digits as usize);
-    }
-    format!("{value:.3e}")
 }
 
 /// The map that was stated, or the guessed one once it is confirmed.

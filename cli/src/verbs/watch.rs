@@ -80,7 +80,7 @@ fn show(line: &str, json: bool) {
     let c = p.comparison;
     let number = |v: Option<f64>| v.map_or("  --".to_string(), |v| format!("{v:.3}"));
     out!(
-        "point {:4}  w {:6.3} um  f {:6.2} kHz  U {:6.1} mm/s  Fn {:.3} N  mu' {} predicted {} z {}{}",
+        "pass {:4}  w {:6.2} \u{b5}m  f {:6.2} kHz  U {:6.1} mm/s  Fn {:.3} N  mu' {} predicted {} z {}{}",
         p.pass.point,
         p.pass.amplitude.micrometres(),
         p.pass.frequency_hz / 1e3,
@@ -89,6 +89,6 @@ fn show(line: &str, json: bool) {
         number(c.and_then(|c| c.mu_relative)),
         number(c.map(|c| c.predicted)),
         number(c.map(|c| c.z)),
-        if c.is_some_and(|c| c.departed) { "  MODEL DEPARTED" } else { "" }
+        if c.is_some_and(|c| c.departed) { "  DISAGREES WITH THE MODEL" } else { "" }
     );
 }

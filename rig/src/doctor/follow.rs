@@ -3,6 +3,7 @@
 use realtime::estimate::Moments;
 use realtime::ports::{Nanos, NoData, Quality};
 use realtime::safety::ChannelTiming;
+use runs::report::human::quantity;
 use serde::Serialize;
 
 /// What was seen of a channel in one look of the loop.
@@ -130,24 +131,22 @@ impl Follow {
 impl ChannelReport {
     /// Two lines for people.
     pub fn words(&self) -> String {
-        let (scale, unit, decimals) = match self.unit {
-            "m" => (1e6, "um", 3),
-            "N" => (1.0, "N", 4),
-            unit => (1.0, unit, 4),
-        };
-        let noise = self.noise_sd.map_or("-".into(), |sd| format!("{:.2e} {unit}", sd * scale));
+        let noise = self.noise_sd.map_or("-".into(), |sd| quantity(sd, self.unit));
         let value = match (self.mean, self.missing) {
             // What is on or off has no noise.
             (Some(_), None) if self.unit == "1" => String::new(),
-            (Some(mean), _) => format!("{:+.decimals$} {unit}, noise {noise}, ", mean * scale),
+            (Some(mean), _) => format!("{}, noise {noise}, ", quantity(mean, self.unit)),
             (None, why) => why.map_or("nothing, ".into(), |why| format!("{why}, ")),
         };
         let ages = self.age_ms.map_or("-".into(), |[half, most, all]| {
-            format!("{half:.1}, {most:.1}, {all:.1} of {:.1} ms", self.age_limit_ms)
+            format!(
+                "median {half:.1}, 99 % {most:.1}, greatest {all:.1} ms (limit {:.0} ms)",
+                self.age_limit_ms
+            )
         });
         let share = |share: f64| format!("{:.1} %", share * 1e2);
         format!(
-            "{}: {value}{:.0} of {:.0} /s\n        ages 50/99/100 %: {ages}; saturated {}, invalid {}",
+            "{}: {value}{:.0} of {:.0} samples a second\n        age of samples: {ages}; saturated {}, invalid {}",
             self.name,
             self.rate_hz,
             self.due_hz,

@@ -5,6 +5,7 @@ use drivers::OpenError;
 use realtime::ports::{AmplifierState, Contact, NoData, StageState};
 use realtime::safety::RULES;
 use runs::plan::Plan;
+use runs::report::human::quantity;
 use runs::setup::{Setup, THERMOMETER};
 use serde::Serialize;
 
@@ -135,7 +136,7 @@ fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
         }
         if found.role == "force" {
             states.push(match (channel.mean, channel.missing) {
-                (Some(mean), None) => format!("{} {mean:+.4} N", channel.name),
+                (Some(mean), None) => format!("{} {}", channel.name, quantity(mean, "N")),
                 (_, why) => format!(
                     "{} missing: {}",
                     channel.name,
@@ -248,7 +249,7 @@ fn force(c: &ChannelReport, target: &Target<'_>, problems: &mut Vec<Problem>) {
     }
     let Some(mean) = c.mean else { return };
     if mean.abs() > most {
-        let problem = format!("{name}: {mean:.4e} N at rest, and the limit is {most} N");
+        let problem = format!("{name}: {} at rest, and the limit is {most} N", quantity(mean, "N"));
         problems.push((problem, UNIT));
     } else if name == "normal" && mean < -LOAD_ZERO_N {
         let problem = format!("normal: {mean:.3} N at rest, and compression is positive");
@@ -307,14 +308,14 @@ fn amplifier(
         && !s.output_on
         && w.value.abs() > OFF_AMPLITUDE_PP_M
     {
-        let problem = format!("it is off, and its plate is read at {:.2} um peak-to-peak", w.value * 1e6);
+        let problem = format!("it is off, and its plate is read at {} peak-to-peak", quantity(w.value, "m"));
         problems.push((problem, "look at the amplitude's zero, unit and `measured_m_per_unit`"));
     }
     format!(
-        "output {}, set to {:.2} um peak-to-peak at {:.1} Hz",
+        "output {}, set to {} peak-to-peak at {}",
         if s.output_on { "ON" } else { "off" },
-        s.echoed_amplitude.metres() * 1e6,
-        s.echoed_frequency_hz
+        quantity(s.echoed_amplitude.metres(), "m"),
+        quantity(s.echoed_frequency_hz, "Hz")
     )
 }
 
@@ -334,7 +335,7 @@ fn stage(state: Result<StageState, NoData>, setup: &Setup, problems: &mut Vec<Pr
     if s.velocity_m_s.is_nan() || s.velocity_m_s.abs() > AT_REST_M_S {
         problems.push(("it moves at rest".into(), "find who moves it; look at the unit of its velocity"));
     }
-    format!("at {:.3} mm, {:.2} mm/s", s.position_m * 1e3, s.velocity_m_s * 1e3)
+    format!("at {}, {}", quantity(s.position_m, "m"), quantity(s.velocity_m_s, "m/s"))
 }
 
 fn contacts(look: &Look, states: &mut Vec<String>, problems: &mut Vec<Problem>) {

@@ -1,7 +1,7 @@
 //! What people add to a run afterwards: tags and a note, in a file of their own. The record and the
 //! table stay as they are.
 
-use crate::files::write_whole;
+use crate::files::write_plain;
 use crate::input::{parse_toml, text_of};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -70,7 +70,7 @@ impl Annotations {
             miette::bail!("{} holds no run", run.display());
         }
         let text = toml::to_string(&self.checked()?).map_err(|e| miette::miette!("{e}"))?;
-        write_whole(&run.join(ANNOTATIONS), text)
+        write_plain(&run.join(ANNOTATIONS), text)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::Plan;
 use crate::input::{self, BadInput, Problems, unit_meant};
+use crate::report::human::quantity;
 use models::condition::{Ambient, Condition};
 use models::covariate::Covariate;
 use models::quantity::{Direction, PeakToPeak};
@@ -179,7 +180,8 @@ impl Plan {
                     "change the plan, or the [limits] of the setup below the hard limits".into()
                 });
                 let low = if low == f64::MIN_POSITIVE { 0.0 } else { low };
-                let problem = format!("{name} = {value:e} is outside what {by}, {low:e} to {high:e}");
+                let [value, low, high] = [value, low, high].map(|v| quantity(v, input::unit_of(name)));
+                let problem = format!("{name} = {value} is outside what {by}, {low} to {high}");
                 wrong.add_at(place, problem, remedy);
             }
         }

@@ -3,6 +3,7 @@
 
 use super::{PassTimes, Plan};
 use crate::input::{Problems, place_of};
+use crate::report::human::quantity;
 use models::covariate::Covariate;
 
 /// The values of one setting that an instrument takes or sees.
@@ -34,8 +35,11 @@ impl Plan {
             (place_of(&self.text, &["pass", "approach_speed_m_s"]), of_speed(reaches))
             && speed > taken.range[1] * (1.0 + ROUNDING)
         {
-            let problem =
-                format!("the travel's speed is {speed} m/s; {} at most {:e} m/s", taken.by, taken.range[1]);
+            let problem = format!(
+                "the travel's speed is {speed} m/s; {} at most {}",
+                taken.by,
+                quantity(taken.range[1], "m/s")
+            );
             let remedy = "leave the key out, or change the `range` of the set-point in a profile of your own";
             wrong.add_at(Some(place), problem, remedy.to_string());
         }

@@ -4,6 +4,7 @@
 use super::points::series_place;
 use super::{Plan, Point, Resolution};
 use crate::input::BadInput;
+use crate::report::human::quantity;
 use models::condition::Condition;
 use models::prediction::FrictionModel;
 use models::quantity::PeakToPeak;
@@ -77,11 +78,15 @@ impl Plan {
                 .iter()
                 .find(|p| p.condition == Condition { direction: p.condition.direction, ..*best })
                 .map_or(String::new(), |p| format!(" (point {})", p.number));
-            let Condition { frequency_hz, speed_m_s, normal_force_n, .. } = best;
-            let amplitude_pp_m = best.amplitude.metres();
+            let [w, f, u, n] = [
+                quantity(best.amplitude.metres(), "m"),
+                quantity(best.frequency_hz, "Hz"),
+                quantity(best.speed_m_s, "m/s"),
+                quantity(best.normal_force_n, "N"),
+            ];
             let problem = format!(
-                "series '{}': the largest change of lateral force that {} expects is {} mN, at w = {amplitude_pp_m:e} m, \
-                 f = {frequency_hz} Hz, U = {speed_m_s} m/s, Fn = {normal_force_n} N{number}; {} sees no less than {} mN: {because}",
+                "series '{}': the largest change of lateral force that {} expects is {} mN, at w = {w}, f = {f}, \
+                 U = {u}, Fn = {n}{number}; {} sees no less than {} mN: {because}",
                 series.name,
                 model.name(),
                 mn(change_n),

@@ -1,7 +1,7 @@
 //! The shape of a file against the JSON Schema of its kind: every key that is unknown or missing and every
 //! value of another type, where a reader would stop at the first.
 
-use runs::input::Problems;
+use runs::input::{Problems, in_si, unit_of};
 use serde_json::{Map, Value};
 use std::ops::Range;
 use toml::Spanned;
@@ -73,7 +73,8 @@ struct Wrong {
 }
 
 fn all_wrong(schema: &Value, text: &str) -> Option<Vec<Wrong>> {
-    let table = DeTable::parse(text).ok()?;
+    let text = in_si(text);
+    let table = DeTable::parse(&text).ok()?;
     let mut wrong = Vec::new();
     object(schema, schema, &entries(table.get_ref()), "", Some(0..0), &mut wrong);
     Some(wrong)
@@ -155,7 +156,14 @@ fn node(root: &Value, schema: &Value, value: &Node<'_>, path: &str, wrong: &mut 
             _ => None,
         };
         let mend = value.span().zip(number);
-        wrong.push(Wrong { place: value.span(), problem, remedy: None, mend });
+        let key = path.rsplit('.').next().and_then(|key| key.split('[').next()).unwrap_or_default();
+        let remedy = match &is {
+            Is::Text(text) if admits(schema, &Is::Number) && !unit_of(key).is_empty() => {
+                runs::quantity::parse(text, unit_of(key)).err()
+            }
+            _ => None,
+        };
+        wrong.push(Wrong { place: value.span(), problem, remedy, mend });
         return;
     }
     if let (Some(list), Is::Text(text)) = (schema["enum"].as_array(), &is)

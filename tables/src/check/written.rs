@@ -19,18 +19,13 @@ pub(super) fn table(path: &Path) -> miette::Result<Good> {
     };
     let help = remedy(Some("table"));
     let passes = passes.map_err(|e| miette::miette!(help = help.clone(), "{e}"))?;
-    let columns: Vec<&'static str> = models::covariate::REQUIRED
-        .iter()
-        .chain(models::covariate::OPTIONAL.iter())
-        .map(|c| c.name)
-        .collect();
     let mut good = Good { kind: "table", passes: Some(passes.len()), remarks: Vec::new() };
     if passes.iter().all(|p| p.lateral_force_n.is_none()) {
         passes.iter().try_for_each(diagnosis::data::check).into_diagnostic()?;
         good.kind = "table of conditions";
     } else {
         diagnosis::data::Table::measured(&passes).into_diagnostic()?;
-        good.remarks = remarks::remarks(&passes, &columns);
+        good.remarks = remarks::of_table(&passes);
     }
     Ok(good)
 }

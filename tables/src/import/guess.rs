@@ -11,6 +11,13 @@ fn column_of(grid: &Grid, index: usize) -> Vec<f64> {
     grid.rows.iter().filter_map(number).collect()
 }
 
+/// Whether a column has another value in every row: it counts the rows, and groups none of them.
+fn all_differ(grid: &Grid, index: usize) -> bool {
+    let mut values: Vec<_> = grid.rows.iter().filter_map(|r| Some(grid.cell(r, index)?.shown())).collect();
+    values.sort();
+    values.len() > 3 && values.windows(2).all(|pair| pair[0] != pair[1])
+}
+
 /// A map from the headers: names that usually mean one thing, with the units that the headers state. A header
 /// that two columns answer to is left to the reader.
 pub fn guess(grid: &Grid) -> Vec<Taken> {
@@ -21,6 +28,9 @@ pub fn guess(grid: &Grid) -> Vec<Taken> {
         let inner = || header.split_once('.').filter(|(_, name)| name.len() > 1);
         let found = meant(header, row_of_units).or_else(|| meant(inner()?.1, row_of_units));
         let Some((target, unit)) = found else { continue };
+        if target == Id::Run as usize && all_differ(grid, index) {
+            continue;
+        }
         let signed = |c: &Cell| c.digits(grid.comma).is_some_and(|d| d.starts_with('-'));
         let negative = grid.rows.iter().any(|r| grid.cell(r, index).is_some_and(signed));
         let target = match target {

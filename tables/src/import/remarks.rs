@@ -4,6 +4,7 @@ use diagnosis::data::{DataError, Table};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::pass::Pass;
+use runs::report::human::number;
 use serde::Serialize;
 
 /// A column's range, in SI.
@@ -73,6 +74,12 @@ fn slip(value: f64, [low, high]: [f64; 2]) -> Option<&'static str> {
     .find_map(|(factor, words)| within(value * factor).then_some(words))
 }
 
+/// Everything that looks wrong in a point table, in sentences.
+pub fn of_table(passes: &[Pass]) -> Vec<String> {
+    let all = covariate::REQUIRED.iter().chain(covariate::OPTIONAL.iter());
+    remarks(passes, &all.map(|c| c.name).collect::<Vec<_>>())
+}
+
 /// Everything that looks wrong, in sentences.
 pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
     let mut list = Vec::new();
@@ -84,25 +91,34 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
             if c.name == covariate::POSITION.name { sizes.last() } else { sizes.get(sizes.len() / 2) };
         let Some(typical) = typical else { continue };
         if let Some(words) = slip(*typical, *usual) {
+            let (factor, unit) = c.shown;
+            let [typical, low, high] = [*typical, usual[0], usual[1]].map(|v| number(v * factor));
             list.push(format!(
-                "{} is {typical:.3e}, {words} for a tribometer ({:.0e} to {:.0e}): is its unit right?",
-                c.name, usual[0], usual[1]
+                "{}: {typical} {unit} is {words} for a tribometer ({low} to {high} {unit}): is its unit right?",
+                c.name
             ));
         }
     }
     let ratios = sorted(passes.iter().filter_map(|p| Some((p.lateral_force_n? / p.normal_force_n).abs())));
     if let Some(words) = ratios.get(ratios.len() / 2).and_then(|r| slip(*r, RATIO).map(|w| (r, w))) {
         list.push(format!(
-            "lateral_force_n over normal_force_n is {:.3e}, {} for friction: is the unit of one of them wrong?",
-            words.0, words.1
+            "lateral over normal force is {}, {} for friction: is the unit of one of them wrong?",
+            number(*words.0),
+            words.1
         ));
     }
     let fastest = conditions.iter().map(|c| std::f64::consts::PI * c.frequency_hz * c.amplitude.metres());
     let fastest = fastest.fold(0.0, f64::max);
     if fastest > PLATE_SPEED {
         list.push(format!(
-            "the plate would move at {fastest:.3e} m/s (pi f w); no actuator does: is the unit of the amplitude or of the frequency right?"
+            "the plate would move at {} m/s (pi f w); no actuator does: is the unit of the amplitude or of the frequency right?",
+            number(fastest)
         ));
+    }
+    let mut runs: Vec<_> = passes.iter().filter_map(|p| p.run.as_deref()).collect();
+    runs.sort_unstable();
+    if passes.len() > 3 && runs.len() == passes.len() && runs.windows(2).all(|pair| pair[0] != pair[1]) {
+        list.push("every pass is a run of its own: if the column 'run' counts the rows, leave it out".into());
     }
     match Table::measured(passes) {
         Err(DataError::Unsigned) => list.push(

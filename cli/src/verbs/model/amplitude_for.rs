@@ -7,6 +7,7 @@ use miette::IntoDiagnostic;
 use models::inverse;
 use models::quantity::PeakToPeak;
 use models::surrogate::Surrogate;
+use runs::report::human::{number, quantity, to_its_uncertainty};
 use runs::{out, say};
 use std::process::ExitCode;
 
@@ -69,13 +70,22 @@ pub fn run(args: &AmplitudeForArgs, json: bool) -> miette::Result<ExitCode> {
             })
         );
     } else {
+        let w = answer.amplitude.metres();
         out!(
-            "{} for mu' = {wanted:.4} (lateral force {:.5} N){}; drive power {:.2} times that of 1 um; {}",
-            answer.amplitude,
-            answer.prediction.lateral_force_n,
-            answer.amplitude_sd_m.map_or(String::new(), |sd| format!(", +- {:.3} um by the law", sd * 1e6)),
-            answer.relative_drive_power,
-            if answer.is_valid() { "within the table" } else { "OUTSIDE the table: an extrapolation" }
+            "w = {} peak-to-peak for mu' = {} (lateral force {}); drive power {} times that of 1 \u{b5}m; {}",
+            match answer.amplitude_sd_m {
+                Some(sd) =>
+                    format!("{} \u{b1} {} \u{b5}m", to_its_uncertainty(w * 1e6, sd * 1e6), number(sd * 1e6)),
+                None => quantity(w, "m"),
+            },
+            number(wanted),
+            quantity(answer.prediction.lateral_force_n, "N"),
+            number(answer.relative_drive_power),
+            if answer.is_valid() {
+                "inside the fitted range"
+            } else {
+                "OUTSIDE the fitted range: an extrapolation"
+            }
         );
     }
     Ok(ExitCode::SUCCESS)

@@ -11,6 +11,7 @@ use models::reading::Reading;
 use models::spring_slider;
 use models::surrogate::Surrogate;
 use runs::out;
+use runs::report::human::quantity;
 use serde::Serialize;
 use std::process::ExitCode;
 
@@ -157,20 +158,20 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
     } else {
         // A law without an error of its own says nothing of how far off it is: no uncertainty is not an uncertainty of zero.
         let sd = match answer.mu_relative_sd {
-            sd if sd > 0.0 => format!(" +- {sd:.4}"),
+            sd if sd > 0.0 => format!(" \u{b1} {sd:.3}"),
             _ => String::new(),
         };
         out!(
-            "{}: mu' = {:.4}{sd}, lateral force {:.5} N, contact {:.1} % of the time, phase shift {:.1} deg",
+            "{}: mu' = {:.3}{sd}, lateral force {}, contact {:.0} % of the time, phase shift {:.0} deg",
             answer.model,
             answer.mu_relative,
-            answer.lateral_force_n,
+            quantity(answer.lateral_force_n, "N"),
             100.0 * answer.contact_fraction,
             answer.phase_shift_deg
         );
         for read in &answer.readings {
             out!(
-                "  where {}: mu' = {:.4} +- {:.4}",
+                "  where {}: mu' = {:.3} \u{b1} {:.3}",
                 read.reading.words(),
                 read.mu_relative,
                 read.mu_relative_sd

@@ -10,6 +10,7 @@ use models::reading::Reading;
 use models::ridge::{
     self, FrictionRule, RidgeCase, RidgeError, RidgeProfile, RidgeRun, RunSettings, Strain, case,
 };
+use runs::report::human::{number, quantity};
 use runs::{out, say};
 use serde::Serialize;
 use start::OtherStart;
@@ -178,21 +179,21 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
     };
     let [stroke, sine] = Reading::ALL.map(law);
     out!(
-        "mu' = {:.4} +- {:.4}   (Eq. 20: {stroke:.4} with the paper's w as the stroke, {sine:.4} as the sine's amplitude)",
+        "mu' = {:.3} \u{b1} {:.3}   (Eq. 20: {stroke:.3} if the paper's w is peak-to-peak, {sine:.3} if it is the sine's amplitude)",
         run.mu_relative,
         run.mu_relative_sd,
     );
     out!(
-        "lateral force {:.5} N, mean reaction {:.5} N for {} N applied, greatest {:.4} N",
-        run.lateral_force_n,
-        run.mean_reaction_force_n,
-        case.normal_force_n,
-        run.peak_reaction_force_n
+        "lateral force {}, mean reaction {} for {} applied, greatest {}",
+        quantity(run.lateral_force_n, "N"),
+        quantity(run.mean_reaction_force_n, "N"),
+        quantity(case.normal_force_n, "N"),
+        quantity(run.peak_reaction_force_n, "N")
     );
     out!(
-        "contact {:.1} % of the time, phase shift {}, {}{}",
+        "contact {:.0} % of the time, phase shift {}, {}{}",
         100.0 * run.contact_fraction,
-        run.phase_shift_deg.map_or("none".into(), |p| format!("{p:.1} deg")),
+        run.phase_shift_deg.map_or("none".into(), |p| format!("{p:.0} deg")),
         if run.steady { "steady" } else { "NOT steady" },
         if run.period_doubled { ", period doubled" } else { "" }
     );
@@ -210,8 +211,8 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
         out!("{}", other.words(&run));
     } else if start::is_lightly_damped(&case) {
         out!(
-            "lightly damped: below {:e} /s the answer may depend on how the run began; --both-starts tells",
-            start::LIGHTLY_DAMPED_PER_S
+            "lightly damped: below {} /s the answer may depend on how the run began; try --both-starts",
+            number(start::LIGHTLY_DAMPED_PER_S)
         );
     }
     Ok(ExitCode::SUCCESS)

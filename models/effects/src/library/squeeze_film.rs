@@ -19,7 +19,7 @@ const FARTHEST: f64 = 60.0;
 const STEEPEST: f64 = 1e-6;
 
 /// What sees it without friction.
-const CHECK: &str = "Repeat the largest amplitudes at 0.2 atm.";
+const CHECK: &str = "Repeat the largest amplitudes at an ambient pressure of 20 kPa.";
 
 /// Shapes of a film whose lift goes with powers of amplitude, frequency and load, and which ends between a
 /// slow fade (`1/(1 + lift)`, and slower) and a steep one (`exp(-lift)`).

@@ -1,7 +1,6 @@
 //! Which cause: the ranking, and each cause that is left with its mechanism, its source and its size.
 
 use crate::report::html::{bar, escape, table};
-use crate::report::human::with_interval;
 use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
 
 /// Probability from which a hypothesis is listed, and from which its effects are explained.
@@ -77,7 +76,7 @@ fn card(h: &Hypothesis) -> String {
             format!(
                 "<tr><th scope=\"row\">{}</th><td>{}</td></tr>",
                 escape(&p.name.replace('_', " ")),
-                escape(&with_interval(p.value, p.ci95, p.unit))
+                escape(&crate::verdict::estimate(p))
             )
         })
         .collect();
