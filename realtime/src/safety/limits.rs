@@ -203,7 +203,6 @@ pub struct Limits {
     pub frozen_after: u32,
     /// Equal raw amplitudes in a row, while driven, that count as frozen; `None` where the readback has no
     /// noise to be frozen against: then only a new set-point shows it (SR-08, SR-22).
-    #[serde(default)]
     pub amplitude_frozen_after: Option<u32>,
     /// A human finger is in the rig: second channel, emergency stop, dead-man device and exposure limits apply.
     pub human_contact: bool,
