@@ -2,16 +2,14 @@
 
 mod studies;
 
+use super::prelude::*;
 use ::studies::progress::Study;
 use ::studies::validation::blind::distance::by_cause;
 use ::studies::validation::blind::reliability::{diagram, identifiable};
 use ::studies::validation::blind::{Scored, confusion, figures, run as score_all};
 use diagnosis::constants::Constants;
 use diagnosis::hypotheses::Options;
-use miette::IntoDiagnostic;
-use runs::{out, say};
 use sim::sealed::Stratum;
-use std::process::ExitCode;
 use std::sync::Arc;
 
 /// Score the diagnosis on sealed sets of the independent simulation.

@@ -1,15 +1,11 @@
 //! `muprime cases`: writes files of cases.
 
-use super::{DONE, exit};
-use miette::{Context, IntoDiagnostic};
+use super::prelude::*;
 use models::ridge::Steady;
-use runs::out;
 use serde::Serialize;
 use serde_json::Value;
 use sim::sealed::Stratum;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use studies::cases::file::{self, Header, SCHEMA};
 use studies::cases::kinds::{self, blind, diagnose, faults, finger, noop, ridge, table};
 use studies::validation::faults::Pace;

@@ -1,12 +1,10 @@
 //! `muprime import FILE --map '...' -o DIR`: a foreign table made into a point table.
 
-use miette::IntoDiagnostic;
+use super::prelude::*;
 use runs::files::{make_folder, write_whole};
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
 use runs::{ask, out, say};
 use std::io::IsTerminal;
-use std::path::PathBuf;
-use std::process::ExitCode;
 use tables::import::guess::guess;
 use tables::import::map::Map;
 use tables::import::{Cut, Grid, Imported, Marks, Wanted, guessed_lines, import, read};
@@ -123,7 +121,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     write_whole(&args.out.join("import.json"), &written)?;
     if json {
         out!("{}", serde_json::to_string(&log).into_diagnostic()?);
-        return super::exit(super::DONE);
+        return exit(DONE);
     }
     say!("{source}: {}; {} rows", log.format, log.rows);
     for range in &log.ranges {
@@ -161,7 +159,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         args.out.join("points.csv").display(),
         args.out.display()
     );
-    super::exit(super::DONE)
+    exit(DONE)
 }
 
 /// Four digits, with a power of ten where the number is far from one.

@@ -1,10 +1,6 @@
 //! `muprime submit`: runs what is missing of a study, here or on an engine.
 
-use super::{DONE, FAILED, exit};
-use miette::IntoDiagnostic;
-use runs::{out, say};
-use std::path::PathBuf;
-use std::process::ExitCode;
+use super::prelude::*;
 use studies::cases::study::Study;
 use studies::cases::submit::{Options, cancel, submit};
 

@@ -1,13 +1,12 @@
 //! The studies of `muprime blind` beside the score: other scatter, other constants, the library's own forms, further passes.
 
+use super::super::prelude::*;
 use super::Args;
 use diagnosis::constants::{Row, Stage};
 use diagnosis::hypotheses::Options;
-use runs::{out, say};
 use serde_json::Value;
 use sim::sealed::Stratum;
 use sim::sealed::rough::{RoughSet, Roughness};
-use std::process::ExitCode;
 use std::sync::Arc;
 use studies::progress::Study;
 use studies::validation::blind::further::{self, LIMIT, Race};
