@@ -102,7 +102,6 @@ impl Chamber {
     }
 
     /// What was read last.
-    #[must_use]
     pub fn air(&self) -> Air {
         lock(&self.shared).air.clone()
     }

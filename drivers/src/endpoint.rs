@@ -8,7 +8,8 @@ mod view;
 
 use super::health::Health;
 use super::ports::{
-    self, AmplifierLink, AmplifierPort, ContactsPort, ForcePort, StageLink, StagePort, SupplyLink, SupplyPort,
+    self, AmplifierPort, ContactsPort, DriveSetPoint, ForcePort, Link, StagePort, StageSetPoint, SupplyPort,
+    SupplySetPoint,
 };
 use super::setup::{AxisSetup, InstrumentSetup};
 use super::timebase::{Counter, DeviceClock, Step};
@@ -20,8 +21,7 @@ use orders::Orders;
 use realtime::ports::{
     AmplifierState, Contact, Contacts, Forces, Nanos, NoData, Reading, StageState, SupplyState,
 };
-use ringbuf::HeapProd;
-use ringbuf::traits::Producer;
+use realtime::queue::Ring;
 use std::sync::Arc;
 use view::View;
 
@@ -75,10 +75,10 @@ struct StageSignals {
 }
 
 enum Part {
-    Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: HeapProd<Forces> },
-    Amplifier { signals: AmplifierSignals, link: AmplifierLink },
-    Stage { signals: StageSignals, link: StageLink, dead_weight_n: Option<f64> },
-    Supply { closed: SignalId, link: SupplyLink },
+    Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: Ring<Forces> },
+    Amplifier { signals: AmplifierSignals, link: Link<AmplifierState, DriveSetPoint> },
+    Stage { signals: StageSignals, link: Link<StageState, StageSetPoint>, dead_weight_n: Option<f64> },
+    Supply { closed: SignalId, link: Link<SupplyState, SupplySetPoint> },
     Contacts(ContactsLink),
 }
 
@@ -86,7 +86,7 @@ enum Part {
 struct ContactsLink {
     signals: [Option<SignalId>; 3],
     last: Contacts,
-    ring: HeapProd<Contacts>,
+    ring: Ring<Contacts>,
 }
 
 /// Names of the safety contacts' signals.
@@ -109,7 +109,7 @@ impl ContactsLink {
         if signals.iter().all(Option::is_none) {
             return Err(format!("none of the contacts {} is there and wired", CONTACTS.join(", ")));
         }
-        let (ring, port) = ports::contacts();
+        let (ring, port) = ports::sensor(Contacts::missing(NoData::NeverRead));
         Ok((Self { signals, last: Contacts::missing(NoData::NotFitted), ring }, port))
     }
 
@@ -127,7 +127,7 @@ impl ContactsLink {
                 touched = true;
             }
         }
-        touched.then(|| self.ring.try_push(self.last).is_err())
+        touched.then(|| self.ring.push(self.last).is_err())
     }
 
     fn lost(&mut self, reason: NoData) {
@@ -135,7 +135,7 @@ impl ContactsLink {
         for (signal, contact) in self.signals.iter().zip(contact) {
             *contact = Err(if signal.is_some() { reason } else { NoData::NotFitted });
         }
-        let _ = self.ring.try_push(self.last);
+        let _ = self.ring.push(self.last);
     }
 }
 
@@ -201,7 +201,7 @@ impl Endpoint {
             ));
         }
         let axes = (lateral.is_some(), normal.is_some());
-        let (ring, port) = ports::force();
+        let (ring, port) = ports::sensor(Forces::missing(NoData::NeverRead));
         let part = Part::Force { lateral, normal, last: Forces::missing(NoData::NotFitted), ring };
         Ok((Self::new(profile, part), (port, axes)))
     }
@@ -236,7 +236,7 @@ impl Endpoint {
         for set in ["amplitude", "frequency", "enable"] {
             need_set(&profile, set)?;
         }
-        let (link, port) = ports::amplifier();
+        let (link, port) = ports::port();
         Ok((Self::new(profile, Part::Amplifier { signals, link }), port))
     }
 
@@ -256,7 +256,7 @@ impl Endpoint {
         if profile.set("load").is_none() && dead_weight_n.is_none() {
             return Err("the instrument loads nothing: say the weight that does, as `dead_weight_n`".into());
         }
-        let (link, port) = ports::stage();
+        let (link, port) = ports::port();
         Ok((Self::new(profile, Part::Stage { signals, link, dead_weight_n }), port))
     }
 
@@ -267,7 +267,7 @@ impl Endpoint {
     pub fn supply(profile: Profile) -> Result<(Self, SupplyPort), String> {
         let closed = need(&profile, "closed")?;
         need_set(&profile, "closed")?;
-        let (link, port) = ports::supply();
+        let (link, port) = ports::port();
         let endpoint = Self::new(profile, Part::Supply { closed, link });
         if endpoint.safe_set_points().is_empty() {
             return Err(
@@ -315,19 +315,16 @@ impl Endpoint {
     }
 
     /// The instrument's profile.
-    #[must_use]
     pub fn profile(&self) -> &Profile {
         &self.profile
     }
 
     /// The counters, for whoever wants to look.
-    #[must_use]
     pub fn health(&self) -> Arc<Health> {
         Arc::clone(&self.health)
     }
 
     /// The latest value of a signal in its unit; NaN where there was none.
-    #[must_use]
     pub fn value(&self, signal: SignalId) -> f64 {
         self.values.get(signal)
     }
@@ -423,7 +420,7 @@ impl Endpoint {
                         touched = true;
                     }
                 }
-                touched && ring.try_push(*last).is_err()
+                touched && ring.push(*last).is_err()
             }
             Part::Amplifier { signals, link } if view.profile.frame_of(signals.output_on) == frame => {
                 let flag =
@@ -441,7 +438,7 @@ impl Endpoint {
                 };
                 let vibrates = state.amplitude.is_ok_and(|read| read.value > OFF_AMPLITUDE_PP_M);
                 self.orders.read_back(state.output_on || vibrates, mark.arrived);
-                link.states.try_push(Ok(state)).is_err()
+                link.states.push(Ok(state)).is_err()
             }
             Part::Stage { signals, link, .. } if view.profile.frame_of(signals.position) == frame => {
                 let flag =
@@ -457,13 +454,13 @@ impl Endpoint {
                 // A velocity that is no number is none at rest.
                 let rests = state.velocity_m_s.abs() <= AT_REST_M_S;
                 self.orders.read_back(!rests, mark.arrived);
-                link.states.try_push(Ok(state)).is_err()
+                link.states.push(Ok(state)).is_err()
             }
             Part::Supply { closed, link } if view.profile.frame_of(*closed) == frame => {
                 let closed = view.values.get(*closed) != 0.0;
                 self.orders.read_back(closed, mark.arrived);
                 let state = SupplyState { cut: !closed, taken_at: mark.taken_at, sequence: mark.sequence };
-                link.states.try_push(Ok(state)).is_err()
+                link.states.push(Ok(state)).is_err()
             }
             Part::Contacts(contacts) => match contacts.take(&view) {
                 Some(full) => full,

@@ -32,7 +32,6 @@ pub enum Place {
 
 impl Place {
     /// The place that an address means: `rtu:PATH` or `PATH`, `tcp:HOST:PORT`, `can:NAME` or `slcan:PATH`.
-    #[must_use]
     pub fn of(address: &str) -> Self {
         let interface =
             |name: &str| name.strip_prefix("vcan").or(name.strip_prefix("can")).map(str::is_empty);

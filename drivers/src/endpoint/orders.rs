@@ -8,7 +8,6 @@ use super::{ALARM_HOLDS, Endpoint, Part};
 use crate::Role;
 use instruments::{Profile, SetId};
 use realtime::ports::{Nanos, NoData};
-use ringbuf::traits::Producer;
 
 /// Set-points that switch an output off leave before all others, in this order.
 const OFF_FIRST: [&str; 3] = ["enable", "velocity", "amplitude"];
@@ -79,11 +78,11 @@ impl Endpoint {
                 for (axis, force) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
                     *force = Err(if axis.is_some() { reason } else { NoData::NotFitted });
                 }
-                ring.try_push(*last).is_ok()
+                ring.push(*last).is_ok()
             }
-            Part::Amplifier { link, .. } => link.states.try_push(Err(reason)).is_ok(),
-            Part::Stage { link, .. } => link.states.try_push(Err(reason)).is_ok(),
-            Part::Supply { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+            Part::Amplifier { link, .. } => link.states.push(Err(reason)).is_ok(),
+            Part::Stage { link, .. } => link.states.push(Err(reason)).is_ok(),
+            Part::Supply { link, .. } => link.states.push(Err(reason)).is_ok(),
             Part::Contacts(contacts) => {
                 contacts.lost(reason);
                 true
@@ -169,13 +168,11 @@ impl Endpoint {
     }
 
     /// Whether what was handed out last drives or moves.
-    #[must_use]
     pub fn wants_on(&self) -> bool {
         self.orders.wanted.as_ref().is_some_and(|wanted| wanted.on)
     }
 
     /// The set-points that make the rig safe, those that switch off first; they may be sent at any time.
-    #[must_use]
     pub fn safe_set_points(&self) -> Vec<(SetId, f64)> {
         safe_set_points(&self.profile)
     }
@@ -202,7 +199,6 @@ impl Endpoint {
     }
 
     /// What the instrument is to the rig.
-    #[must_use]
     pub fn role(&self) -> Role {
         match self.part {
             Part::Force { .. } => Role::Force,
@@ -214,19 +210,16 @@ impl Endpoint {
     }
 
     /// Whether there is anything to switch off: a drive, a stage or a supply that takes safe set-points.
-    #[must_use]
     pub fn is_actuator(&self) -> bool {
         !self.role().only_measures() && !self.safe_set_points().is_empty()
     }
 
     /// Whether the instrument may be on: it was driven, or showed itself on, and has not shown 'off' since.
-    #[must_use]
     pub fn owes_off(&self) -> bool {
         self.is_actuator() && (self.orders.driven || self.orders.shown.is_some_and(|(on, _)| on))
     }
 
     /// Whether the instrument has shown 'off' after the last 'off' that it was sent.
-    #[must_use]
     pub fn reads_off(&self) -> bool {
         self.orders.shown_off() && !self.orders.driven
     }
