@@ -1,6 +1,7 @@
 //! Worked examples of the GUM (JCGM 100:2008, annex H).
 //!
-//! The numbers on the right of each assertion are printed there; they are met to half a unit of their last digit.
+//! The numbers on the right of each assertion are printed there, and are met to half a unit of their last
+//! digit.
 
 use calibration::regression::linear;
 use calibration::uncertainty::Input;

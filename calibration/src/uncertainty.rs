@@ -1,4 +1,4 @@
-//! Measurement uncertainty by the GUM (JCGM 100:2008): type A evaluation here, coverage factors in [`student`].
+//! Measurement uncertainty by the GUM (JCGM 100:2008): type A evaluation; coverage factors in [`student`].
 //!
 //! `tests/gum.rs` reproduces the worked examples H.2 and H.3.
 

@@ -316,11 +316,6 @@ impl World {
         self.amplifier.supply_closed()
     }
 
-    /// Closes the supply relay again and clears the amplifier's fault, by hand at the bench.
-    pub fn restore_supply(&mut self) {
-        self.amplifier.restore_supply();
-    }
-
     /// The hands at the safety contacts.
     pub fn operator(&self) -> Operator {
         self.operator
@@ -359,11 +354,6 @@ impl World {
     /// The air around the rig, to give its chamber a set-point.
     pub fn room_mut(&mut self) -> &mut Room {
         &mut self.room
-    }
-
-    /// Averages computed so far.
-    pub fn computed(&self) -> u64 {
-        self.averager.computed()
     }
 
     /// What is true now: for scoring only.

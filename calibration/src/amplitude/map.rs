@@ -25,14 +25,6 @@ pub struct ModeShape {
     pub range_m: [f64; 2],
 }
 
-impl ModeShape {
-    /// Amplitude at a position relative to that at the antinode.
-    pub fn relative(&self, position_m: f64) -> f64 {
-        let wave = (2.0 * PI * (position_m - self.antinode_at_m[0]) / self.wavelength_m[0]).cos().abs();
-        1.0 - self.standing_share[0] * (1.0 - wave)
-    }
-}
-
 /// Fits a map: `at` is the position in m; the scatter is taken as proportional to the amplitude above a floor.
 /// The wavelength is sought from a third of the mapped length (over three points at least) to twenty times it.
 ///

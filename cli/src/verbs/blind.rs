@@ -22,8 +22,8 @@ pub struct Args {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// One stratum only: none, single, pair, alias or outside; all in their shares without it.
-    #[arg(long)]
-    pub stratum: Option<String>,
+    #[arg(long, value_parser = stratum_of)]
+    pub stratum: Option<Stratum>,
     /// Try single effects only.
     #[arg(long)]
     pub no_pairs: bool,
@@ -58,20 +58,18 @@ pub struct Args {
     pub verbose: bool,
 }
 
+/// A stratum by its name.
+pub fn stratum_of(text: &str) -> Result<Stratum, String> {
+    serde_json::from_value(serde_json::Value::String(text.into()))
+        .map_err(|_| "none, single, pair, alias or outside is needed".to_string())
+}
+
 /// Makes, diagnoses and scores the sets.
 ///
 /// # Errors
-/// An unknown stratum.
+/// No thread or no signals for Ctrl-C, a set that cannot be made or written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    let stratum = match args.stratum.as_deref() {
-        None => None,
-        Some("none") => Some(Stratum::None),
-        Some("single") => Some(Stratum::Single),
-        Some("pair") => Some(Stratum::Pair),
-        Some("alias") => Some(Stratum::Alias),
-        Some("outside") => Some(Stratum::Outside),
-        Some(other) => miette::bail!("--stratum {other}: none, single, pair, alias or outside is needed"),
-    };
+    let stratum = args.stratum;
     if let Some(folder) = &args.write {
         let (sets, to) = (args.sets, folder.display().to_string());
         let study = Study::begin(sets as u64, "sets", move |_: Vec<()>, done| {

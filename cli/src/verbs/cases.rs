@@ -101,7 +101,7 @@ struct Blind {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// One stratum only: none, single, pair, alias or outside
-    #[arg(long, value_parser = stratum_of)]
+    #[arg(long, value_parser = super::blind::stratum_of)]
     stratum: Option<Stratum>,
     /// Try single effects only
     #[arg(long)]
@@ -164,11 +164,6 @@ struct Noop {
     /// Hashes of each: some five million a second
     #[arg(long, default_value_t = 0)]
     hashes: u64,
-}
-
-fn stratum_of(text: &str) -> Result<Stratum, String> {
-    serde_json::from_value(Value::String(text.into()))
-        .map_err(|_| "none, single, pair, alias or outside is needed".to_string())
 }
 
 /// Files that were named, absolute: a study may stand elsewhere.

@@ -21,11 +21,6 @@ pub fn nmt(command: Nmt, node: u8) -> CanFrame {
     frame(0, &[command as u8, node])
 }
 
-/// The synchronisation frame.
-pub fn sync() -> CanFrame {
-    frame(0x80, &[])
-}
-
 fn frame(id: u32, data: &[u8]) -> CanFrame {
     CanFrame::new(id, data).unwrap_or_else(|| unreachable!("identifiers here have 11 bits and data 8 bytes"))
 }

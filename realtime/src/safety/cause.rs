@@ -6,8 +6,8 @@ use super::{RULES, Trip};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// One line a cause: what happened, and what a person at the rig does about it. A remark before it says what the
-/// words leave out.
+/// One line a cause: what happened, and what a person at the rig does about it. A remark before it says
+/// what the words leave out.
 macro_rules! causes {
     ($($(#[$doc:meta])* $cause:ident $words:literal => $remedy:expr;)*) => {
         /// Why the rig is, or would be, faulted.

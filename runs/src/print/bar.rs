@@ -28,7 +28,8 @@ struct State {
 }
 
 impl Bar {
-    /// A bar of so many parts, called `what`; hidden where nobody would see it: a log holds no bars. Nothing is drawn yet.
+    /// A bar of so many parts, called `what`. Nothing is drawn yet. It is hidden unless it is wanted and
+    /// standard error is a terminal: a log holds no bars.
     pub fn new(length: u64, what: &str, wanted: bool) -> Self {
         Bar(Arc::new(Mutex::new(State {
             length,

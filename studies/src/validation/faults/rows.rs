@@ -303,8 +303,8 @@ rows! {
 
 macro_rules! elsewhere {
     ($($number:literal $fault:literal: $($file:literal $test:ident),+;)*) => {
-        /// Rows of the fault list that strike what this bench does not hold (threads, files, the network): the tests
-        /// that strike them. Number, fault, tests (a file of the workspace and a test in it).
+        /// Rows of the fault list that strike what this bench does not hold (threads, files, the network):
+        /// the tests that strike them. Number, fault, tests (a file of the workspace and a test in it).
         pub const ELSEWHERE: &[(u32, &str, &[(&str, &str)])] = &[
             $(($number, $fault, &[$(($file, stringify!($test))),+]),)*
         ];
