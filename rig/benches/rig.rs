@@ -163,5 +163,5 @@ fn modbus_round_trip_driver(bencher: Bencher<'_, '_>) {
         link.response_timeout_ms,
     )
     .unwrap();
-    bencher.bench_local(|| wire.read_registers(table, poll.address, poll.count).unwrap());
+    bencher.bench_local(|| wire.read(table, poll.address, poll.count).unwrap());
 }

@@ -42,8 +42,6 @@ pub struct Truth {
     pub normal_force_n: f64,
     /// Lateral force on the sensor's side of the pad, before the sensor (N), signed.
     pub lateral_force_n: f64,
-    /// The contact's mean friction limit under steady sliding (N).
-    pub friction_n: f64,
     /// Velocity of the stage (m/s).
     pub velocity_m_s: f64,
     /// Position of the stage (m).
@@ -206,7 +204,6 @@ impl World {
             frequency_hz: frequency,
             normal_force_n: normal,
             lateral_force_n: lateral,
-            friction_n: steady.lateral_force_n,
             velocity_m_s: velocity,
             position_m: at.position_m,
             contact_fraction: steady.contact_fraction,
