@@ -17,7 +17,8 @@ pub struct ModeShape {
     pub wavelength_m: [f64; 2],
     /// Standing share `d` with its standard uncertainty.
     pub standing_share: [f64; 2],
-    /// The fit, parameters in this order after the amplitude at an antinode in m; residuals relative to the amplitude.
+    /// The fit, parameters in this order after the amplitude at an antinode in m; residuals relative to the
+    /// amplitude.
     pub fit: Fit,
     /// First and last position.
     pub range_m: [f64; 2],

@@ -48,7 +48,8 @@ pub fn sweep(points: &[AmplitudePoint]) -> Result<Resonance, AmplitudeError> {
     })
 }
 
-/// Parameters: f0, ln Q, ln w0, tilt (near -1/2 where a constant force drives a displacement, 0 for a pure Lorentzian); amplitudes weighted by their scatter.
+/// Parameters: f0, ln Q, ln w0, tilt (near -1/2 where a constant force drives a displacement, 0 for a pure
+/// Lorentzian); amplitudes weighted by their scatter.
 fn best(points: &[AmplitudePoint], top: &AmplitudePoint, width: f64) -> Result<Fit, FitError> {
     let scatter = relative_scatter(points);
     let y: Vec<f64> = points.iter().zip(&scatter).map(|(p, s)| p.amplitude_pp_m / s).collect();
