@@ -6,10 +6,9 @@ use super::prelude::*;
 use ::studies::progress::Study;
 use ::studies::validation::blind::distance::by_cause;
 use ::studies::validation::blind::reliability::{diagram, identifiable};
-use ::studies::validation::blind::{Scored, confusion, figures, run as score_all};
+use ::studies::validation::blind::{Scored, Settings, confusion, figures, run as score_all};
 use diagnosis::constants::Constants;
 use diagnosis::hypotheses::Options;
-use sim::sealed::Stratum;
 use std::sync::Arc;
 
 /// Score the diagnosis on sealed sets of the independent simulation.
@@ -18,18 +17,8 @@ pub struct Args {
     /// Number of sets.
     #[arg(long, default_value_t = 100)]
     pub sets: usize,
-    /// Seed of the first set.
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
-    /// One stratum only: none, single, pair, alias or outside; all in their shares without it.
-    #[arg(long, value_parser = stratum_of)]
-    pub stratum: Option<Stratum>,
-    /// Try single effects only.
-    #[arg(long)]
-    pub no_pairs: bool,
-    /// Leave an effect out of the library (may be repeated).
-    #[arg(long, value_name = "EFFECT")]
-    pub without: Vec<String>,
+    #[command(flatten)]
+    pub of: Settings,
     /// Write the sets to this folder (open and sealed parts apart) for other diagnosers; none is scored.
     #[arg(long, value_name = "DIR")]
     pub write: Option<std::path::PathBuf>,
@@ -58,18 +47,12 @@ pub struct Args {
     pub verbose: bool,
 }
 
-/// A stratum by its name.
-pub fn stratum_of(text: &str) -> Result<Stratum, String> {
-    serde_json::from_value(serde_json::Value::String(text.into()))
-        .map_err(|_| "none, single, pair, alias or outside is needed".to_string())
-}
-
 /// Makes, diagnoses and scores the sets.
 ///
 /// # Errors
 /// No thread or no signals for Ctrl-C, a set that cannot be made or written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    let stratum = args.stratum;
+    let stratum = args.of.stratum;
     if let Some(folder) = &args.write {
         let (sets, to) = (args.sets, folder.display().to_string());
         let study = Study::begin(sets as u64, "sets", move |_: Vec<()>, done| {
@@ -79,7 +62,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 out!("partial: {done} of {sets} sets are in {to}");
             }
         })?;
-        for set in ::studies::validation::blind::sets(args.seed, sets, stratum) {
+        for set in ::studies::validation::blind::sets(args.of.seed, sets, stratum) {
             let name = format!("{:06}", set.label.seed % 1_000_003);
             set.write(&folder.join("open").join(&name), &folder.join("sealed").join(&name))
                 .into_diagnostic()?;
@@ -106,8 +89,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let options = Options {
         constants: Arc::new(constants),
-        pairs: !args.no_pairs,
-        without: args.without.clone(),
+        pairs: !args.of.no_pairs,
+        without: args.of.without.clone(),
         ..Options::default()
     };
     if let Some(kind) = args.noise.as_deref() {
@@ -116,7 +99,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(picked) = args.sensitivity.as_deref() {
         return studies::sensitivity(&args, picked, stratum, &options, json);
     }
-    let (seed, sets) = (args.seed, args.sets);
+    let (seed, sets) = (args.of.seed, args.sets);
     let study = Study::begin(sets as u64, "sets", move |scored: Vec<Scored>, done| {
         if !json {
             out!("partial: {done} of {sets} sets");
