@@ -21,7 +21,8 @@ use orders::Orders;
 use realtime::ports::{
     AmplifierState, Contact, Contacts, Forces, Nanos, NoData, Reading, StageState, SupplyState,
 };
-use realtime::queue::Ring;
+use ringbuf::HeapProd;
+use ringbuf::traits::Producer;
 use std::sync::Arc;
 use view::View;
 
@@ -75,7 +76,7 @@ struct StageSignals {
 }
 
 enum Part {
-    Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: Ring<Forces> },
+    Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: HeapProd<Forces> },
     Amplifier { signals: AmplifierSignals, link: Link<AmplifierState, DriveSetPoint> },
     Stage { signals: StageSignals, link: Link<StageState, StageSetPoint>, dead_weight_n: Option<f64> },
     Supply { closed: SignalId, link: Link<SupplyState, SupplySetPoint> },
@@ -86,7 +87,7 @@ enum Part {
 struct ContactsLink {
     signals: [Option<SignalId>; 3],
     last: Contacts,
-    ring: Ring<Contacts>,
+    ring: HeapProd<Contacts>,
 }
 
 /// Names of the safety contacts' signals.
@@ -127,7 +128,7 @@ impl ContactsLink {
                 touched = true;
             }
         }
-        touched.then(|| self.ring.push(self.last).is_err())
+        touched.then(|| self.ring.try_push(self.last).is_err())
     }
 
     fn lost(&mut self, reason: NoData) {
@@ -135,7 +136,7 @@ impl ContactsLink {
         for (signal, contact) in self.signals.iter().zip(contact) {
             *contact = Err(if signal.is_some() { reason } else { NoData::NotFitted });
         }
-        let _ = self.ring.push(self.last);
+        let _ = self.ring.try_push(self.last);
     }
 }
 
@@ -420,7 +421,7 @@ impl Endpoint {
                         touched = true;
                     }
                 }
-                touched && ring.push(*last).is_err()
+                touched && ring.try_push(*last).is_err()
             }
             Part::Amplifier { signals, link } if view.profile.frame_of(signals.output_on) == frame => {
                 let flag =
@@ -438,7 +439,7 @@ impl Endpoint {
                 };
                 let vibrates = state.amplitude.is_ok_and(|read| read.value > OFF_AMPLITUDE_PP_M);
                 self.orders.read_back(state.output_on || vibrates, mark.arrived);
-                link.states.push(Ok(state)).is_err()
+                link.states.try_push(Ok(state)).is_err()
             }
             Part::Stage { signals, link, .. } if view.profile.frame_of(signals.position) == frame => {
                 let flag =
@@ -454,13 +455,13 @@ impl Endpoint {
                 // A velocity that is no number is none at rest.
                 let rests = state.velocity_m_s.abs() <= AT_REST_M_S;
                 self.orders.read_back(!rests, mark.arrived);
-                link.states.push(Ok(state)).is_err()
+                link.states.try_push(Ok(state)).is_err()
             }
             Part::Supply { closed, link } if view.profile.frame_of(*closed) == frame => {
                 let closed = view.values.get(*closed) != 0.0;
                 self.orders.read_back(closed, mark.arrived);
                 let state = SupplyState { cut: !closed, taken_at: mark.taken_at, sequence: mark.sequence };
-                link.states.push(Ok(state)).is_err()
+                link.states.try_push(Ok(state)).is_err()
             }
             Part::Contacts(contacts) => match contacts.take(&view) {
                 Some(full) => full,

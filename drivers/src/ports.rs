@@ -8,8 +8,9 @@ use realtime::ports::{
     Amplifier, AmplifierState, Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs, Stage, StageState,
     SupplyCommand, SupplyState, SupplySwitch,
 };
-use realtime::queue::{Ring, ring};
 use realtime::safety::{DriveCommand, StageCommand};
+use ringbuf::traits::{Consumer, Split};
+use ringbuf::{HeapCons, HeapProd, HeapRb};
 
 /// Samples that wait for the loop at most: a quarter of a second at 1 kHz.
 const SAMPLES: usize = 256;
@@ -73,8 +74,8 @@ impl From<StageCommand> for StageSetPoint {
 }
 
 /// The newest of what waits in a ring, else the last one.
-fn latest<T: Copy>(ring: &Ring<T>, last: &mut T) -> T {
-    while let Some(newer) = ring.pop() {
+fn latest<T: Copy>(ring: &mut HeapCons<T>, last: &mut T) -> T {
+    while let Some(newer) = ring.try_pop() {
         *last = newer;
     }
     *last
@@ -82,7 +83,7 @@ fn latest<T: Copy>(ring: &Ring<T>, last: &mut T) -> T {
 
 /// The loop's side of an instrument that only measures.
 pub struct SensorPort<T> {
-    ring: Ring<T>,
+    ring: HeapCons<T>,
     last: T,
 }
 
@@ -92,20 +93,20 @@ pub type ForcePort = SensorPort<Forces>;
 pub type ContactsPort = SensorPort<Contacts>;
 
 /// The ring into which the link pushes, and a port that shows `none` until then.
-pub fn sensor<T>(none: T) -> (Ring<T>, SensorPort<T>) {
-    let ring = ring(SAMPLES);
-    (Ring::clone(&ring), SensorPort { ring, last: none })
+pub fn sensor<T>(none: T) -> (HeapProd<T>, SensorPort<T>) {
+    let (producer, ring) = HeapRb::new(SAMPLES).split();
+    (producer, SensorPort { ring, last: none })
 }
 
 impl ForceSensor for ForcePort {
     fn read(&mut self, _now: Nanos) -> Forces {
-        latest(&self.ring, &mut self.last)
+        latest(&mut self.ring, &mut self.last)
     }
 }
 
 impl SafetyInputs for ContactsPort {
     fn read(&mut self, _now: Nanos) -> Contacts {
-        latest(&self.ring, &mut self.last)
+        latest(&mut self.ring, &mut self.last)
     }
 }
 
@@ -144,7 +145,7 @@ pub fn compose(mut ports: Vec<(ForcePort, (bool, bool))>) -> Result<Box<dyn Forc
 
 /// The loop's side of an instrument with states of type `S` that takes set-points of type `C`.
 pub struct Port<S, C> {
-    states: Ring<Result<S, NoData>>,
+    states: HeapCons<Result<S, NoData>>,
     commands: Mailbox<C>,
     last: Result<S, NoData>,
 }
@@ -152,7 +153,7 @@ pub struct Port<S, C> {
 /// The ends that the link of such an instrument holds.
 pub struct Link<S, C> {
     /// Into the loop.
-    pub states: Ring<Result<S, NoData>>,
+    pub states: HeapProd<Result<S, NoData>>,
     /// Out of the loop.
     pub commands: Mailbox<C>,
 }
@@ -166,8 +167,9 @@ pub type SupplyPort = Port<SupplyState, SupplySetPoint>;
 
 /// A port, and the ends that the link holds.
 pub fn port<S, C>() -> (Link<S, C>, Port<S, C>) {
-    let (states, commands) = (ring(SAMPLES), Mailbox::default());
-    let link = Link { states: Ring::clone(&states), commands: commands.clone() };
+    let (into_loop, states) = HeapRb::new(SAMPLES).split();
+    let commands = Mailbox::default();
+    let link = Link { states: into_loop, commands: commands.clone() };
     (link, Port { states, commands, last: Err(NoData::NeverRead) })
 }
 
@@ -184,7 +186,7 @@ impl Amplifier for AmplifierPort {
     }
 
     fn state(&mut self, _now: Nanos) -> Result<AmplifierState, NoData> {
-        latest(&self.states, &mut self.last)
+        latest(&mut self.states, &mut self.last)
     }
 }
 
@@ -195,7 +197,7 @@ impl Stage for StagePort {
     }
 
     fn state(&mut self, _now: Nanos) -> Result<StageState, NoData> {
-        latest(&self.states, &mut self.last)
+        latest(&mut self.states, &mut self.last)
     }
 }
 
@@ -218,6 +220,6 @@ impl SupplySwitch for SupplyPort {
     }
 
     fn state(&mut self, _now: Nanos) -> Result<SupplyState, NoData> {
-        latest(&self.states, &mut self.last)
+        latest(&mut self.states, &mut self.last)
     }
 }

@@ -10,12 +10,14 @@ mod machine;
 use crate::clock::Participant;
 use crate::cycle::{Config, CycleState};
 use crate::ports::{Nanos, SupplyCommand};
-use crate::queue::{CommandQueue, Ring};
+use crate::queue::CommandQueue;
 use crate::safety::{DriveCommand, StageCommand};
 use crate::turn::{Ports, Row, Tick, turn};
 use hdrhistogram::Histogram;
 use machine::{keep_cpus_awake, pin_to, thread_faults, wait_until};
 use models::prediction::FrictionModel;
+use ringbuf::HeapProd;
+use ringbuf::traits::Producer;
 use serde::{Deserialize, Serialize};
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
@@ -75,9 +77,9 @@ pub struct LoopParts {
     /// Commands in.
     pub commands: Arc<CommandQueue>,
     /// Rows out, to the record.
-    pub rows: Ring<Row>,
+    pub rows: HeapProd<Row>,
     /// The same rows, to the sweep: so that a slow disk cannot hold the sweep up.
-    pub watch: Ring<Row>,
+    pub watch: HeapProd<Row>,
     /// End and heartbeat.
     pub life: Arc<Lifeline>,
     /// CLOCK_MONOTONIC in ns that counts as loop time zero. Drivers stamp with the same origin.
@@ -115,7 +117,7 @@ impl Grid {
 /// `pacing` is what to ask of the machine; a bare FIFO priority, or `None`, will do.
 pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
     let pacing = pacing.into();
-    let LoopParts { config, model, mut ports, commands, rows, watch, life, origin_ns, held } = parts;
+    let LoopParts { config, model, mut ports, commands, mut rows, mut watch, life, origin_ns, held } = parts;
     // On the machine's scale, whichever clock it is.
     let now_ns = || held.as_ref().map_or_else(monotonic_ns, |clock| origin_ns + clock.now().0);
     let period = config.limits.timing.cycle.0;
@@ -166,10 +168,10 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
         };
         // After the commands have left: a long stall has many deadlines.
         count_deadlines(&mut lateness_histogram, late, missed, period);
-        if rows.push(row).is_err() {
+        if rows.try_push(row).is_err() {
             ring_drops += 1;
         }
-        if watch.push(row).is_err() {
+        if watch.try_push(row).is_err() {
             watch_drops += 1;
         }
         let (driven, dose_m2_s) = state.exposure();

@@ -1,22 +1,10 @@
-//! Rings between threads, and commands on their way to the loop, where a stop never waits.
+//! Commands on their way to the loop, where a stop never waits.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::cycle::Command;
 use crate::turn::Commands;
 use crossbeam_queue::ArrayQueue;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// A ring of a fixed number of places from one thread to another: neither end blocks, locks or allocates.
-pub type Ring<T> = Arc<ArrayQueue<T>>;
-
-/// A ring of so many places.
-///
-/// # Panics
-/// No place at all.
-pub fn ring<T>(places: usize) -> Ring<T> {
-    Arc::new(ArrayQueue::new(places))
-}
 
 /// Commands to the loop, from any thread. The loop's end neither blocks nor allocates.
 ///

@@ -9,6 +9,8 @@ use realtime::pacing::{self, Lifeline, LoopParts, Pacing};
 use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Stage, StageState};
 use realtime::safety::{DriveCommand, StageCommand};
 use realtime::turn::Ports;
+use ringbuf::HeapRb;
+use ringbuf::traits::Split;
 use runs::setup::Setup;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -47,7 +49,8 @@ fn main() {
         }
     }
     let setup = Setup::load("virtual").expect("bundled");
-    let (rows, watch) = (realtime::queue::ring(16), realtime::queue::ring(16));
+    let (rows, _keep) = HeapRb::new(16).split();
+    let (watch, _keep_too) = HeapRb::new(16).split();
     let life = Arc::new(Lifeline::default());
     let parts = LoopParts {
         config: setup.config,

@@ -115,7 +115,7 @@ fn over_instruments(
     let writing = {
         let lost = RaisedByPanic(Arc::clone(&lost));
         let clock = clock.join(writer::SLACK);
-        let write = move || writer::write(file, preamble, &row_out, &notes, &last_out, &lost.0, &clock);
+        let write = move || writer::write(file, preamble, row_out, &notes, &last_out, &lost.0, &clock);
         std::thread::Builder::new().name("recorder".into()).spawn(write).into_diagnostic()?
     };
 

@@ -8,8 +8,10 @@ use realtime::clock::{Clock, Participant};
 use realtime::cycle::{Command, Config};
 use realtime::pacing::{self, Lifeline, LoopParts, LoopReport, Pacing};
 use realtime::ports::Nanos;
-use realtime::queue::{CommandQueue, Ring, ring};
+use realtime::queue::CommandQueue;
 use realtime::turn::{Ports, Row};
+use ringbuf::traits::{Consumer, Split};
+use ringbuf::{HeapCons, HeapProd, HeapRb};
 use runs::supervisor::{Loop, OffReport};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -73,20 +75,21 @@ impl WallLoop {
     ///
     /// # Errors
     /// No thread can be had; the links are closed then.
-    pub fn start(parts: Parts) -> miette::Result<(Self, LoopHandle, Ring<Row>)> {
-        let (record, watch) = (ring::<Row>(RING), ring::<Row>(RING));
-        let rig = Self::start_into(parts, Arc::clone(&record), Arc::clone(&watch))?;
+    pub fn start(parts: Parts) -> miette::Result<(Self, LoopHandle, HeapCons<Row>)> {
+        let (rows, record) = HeapRb::<Row>::new(RING).split();
+        let (watch, watched) = HeapRb::<Row>::new(RING).split();
+        let rig = Self::start_into(parts, rows, watch)?;
         let handle = LoopHandle {
             commands: Arc::clone(&rig.commands),
             life: Arc::clone(&rig.life),
-            watch,
+            watch: watched,
             heard: rig.clock.now(),
             clock: rig.clock.join(SWEEP_SLACK),
         };
         Ok((rig, handle, record))
     }
 
-    fn start_into(parts: Parts, rows: Ring<Row>, watch: Ring<Row>) -> miette::Result<Self> {
+    fn start_into(parts: Parts, rows: HeapProd<Row>, watch: HeapProd<Row>) -> miette::Result<Self> {
         let Parts { config, model, ports, links, pacing, origin_ns } = parts;
         let commands = Arc::new(CommandQueue::new(QUEUE));
         let life = Arc::new(Lifeline::default());
@@ -185,7 +188,7 @@ fn send(commands: &CommandQueue, life: &Lifeline, clock: &Clock, rest: &dyn Fn()
 pub struct LoopHandle {
     commands: Arc<CommandQueue>,
     life: Arc<Lifeline>,
-    watch: Ring<Row>,
+    watch: HeapCons<Row>,
     heard: Nanos,
     clock: Participant,
 }
@@ -208,7 +211,7 @@ impl LoopHandle {
 
 impl Loop for LoopHandle {
     fn next_row(&mut self) -> Option<Row> {
-        let row = self.watch.pop();
+        let row = self.watch.try_pop();
         match row {
             Some(_) => self.heard = self.clock.now(),
             // Only one that has answered every row lets a held clock go on.

@@ -7,8 +7,6 @@
 //! dropped. Text may come from an instrument or a file: control characters, which could rewrite what a person
 //! sees on a terminal, are shown as `\u001b` and the like; colours and line ends stay.
 
-pub mod bar;
-
 use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::fmt::Write as _;

@@ -1,17 +1,28 @@
 //! Long computations at a terminal: a bar with the time that is left, and what there is so far where somebody presses Ctrl-C.
 
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
 use runs::leave::leave_now;
-use runs::print::bar::Bar;
 use runs::say;
+use std::io::IsTerminal;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Status of what Ctrl-C ended: 128 and the number of the signal.
 pub const INTERRUPTED: u8 = 130;
 
-/// A bar on standard error with the time that is left.
-pub fn bar(length: u64, what: &str) -> Bar {
-    Bar::new(length, what, true)
+/// A bar on standard error with the time that is left, hidden where that is no terminal: a log holds no bars.
+pub fn bar(length: u64, what: &str) -> ProgressBar {
+    let target = if std::io::stderr().is_terminal() {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
+    let bar = ProgressBar::with_draw_target(Some(length), target);
+    let template = format!("{{bar:30}} {{pos}}/{{len}} {what}, {{eta}} to go {{msg}}");
+    if let Ok(style) = ProgressStyle::with_template(&template) {
+        bar.set_style(style);
+    }
+    bar
 }
 
 /// On Ctrl-C the bar goes, `partial` says what there is so far (it gets the bar's position), and the program
@@ -19,7 +30,7 @@ pub fn bar(length: u64, what: &str) -> Bar {
 ///
 /// # Errors
 /// The system gives no thread or no signals.
-pub fn on_interrupt(bar: &Bar, partial: impl FnOnce(u64) + Send + 'static) -> miette::Result<()> {
+pub fn on_interrupt(bar: &ProgressBar, partial: impl FnOnce(u64) + Send + 'static) -> miette::Result<()> {
     let mut caught = signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT]).into_diagnostic()?;
     let bar = bar.clone();
     let mut partial = Some(partial);
@@ -51,7 +62,7 @@ pub fn on_interrupt(bar: &Bar, partial: impl FnOnce(u64) + Send + 'static) -> mi
 /// A study of many parts at a terminal: how many are done, and what they found, for who presses Ctrl-C.
 pub struct Study<T> {
     /// Its bar.
-    pub bar: Bar,
+    pub bar: ProgressBar,
     found: Arc<Mutex<Vec<T>>>,
 }
 

@@ -4,6 +4,7 @@ use models::prediction::SpringSlider;
 use realtime::cycle::Command;
 use realtime::ports::Nanos;
 use realtime::turn::Ports;
+use ringbuf::traits::Consumer;
 use runs::setup::Setup;
 use sim::world::WorldConfig;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -96,7 +97,7 @@ fn the_loops_thread_allocates_nothing_behind_real_drivers() {
     let (mut driven, mut last_asked) = (0u64, 0);
     let began = std::time::Instant::now();
     while counted.load(Ordering::Acquire) == u64::MAX && began.elapsed().as_secs() < 60 {
-        while record.pop().is_some() {}
+        while record.try_pop().is_some() {}
         let Some(row) = reins.next_row() else { continue };
         driven += u64::from(row.drive_pp_m > 0.0 && COUNTED.contains(&row.cycle));
         if row.cycle > last_asked + 60 {

@@ -7,10 +7,10 @@ use diagnosis::document::{document, predictions};
 use diagnosis::hypotheses::Options;
 use diagnosis::progress::{Progress, Stage};
 use diagnosis::verdict::diagnose;
+use indicatif::ProgressBar;
 use miette::{Context, IntoDiagnostic};
 use models::pass::Pass;
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
-use runs::print::bar::Bar;
 use runs::print::folded;
 use runs::report::about;
 use runs::{out, say};
@@ -173,7 +173,7 @@ fn keep_in_run(run: &Path, page: &Path, text: &str) {
 }
 
 /// A bar that follows a diagnosis; Ctrl-C prints the effects that lead so far.
-fn follow(bar: &Bar, json: bool) -> miette::Result<Progress> {
+fn follow(bar: &ProgressBar, json: bool) -> miette::Result<Progress> {
     let reached: Arc<Mutex<Option<Stage>>> = Arc::default();
     let latest = Arc::clone(&reached);
     studies::progress::on_interrupt(bar, move |_| {

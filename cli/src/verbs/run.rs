@@ -3,6 +3,7 @@
 pub mod campaign;
 
 use super::dashboard::Place;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
 use models::prediction::{FrictionModel, SpringSlider};
 use realtime::ports::Nanos;
@@ -12,7 +13,6 @@ use rig::publish::{Broker, Publisher};
 use rig::watch::{Lead, Watch};
 use runs::catalogue::runs_folder;
 use runs::plan::Plan;
-use runs::print::bar::Bar;
 use runs::print::{self, clean, folded};
 use runs::sequence::{Event, Outcome};
 use runs::session::{Job, Notes, Signals, Summary, Update, unix_ns};
@@ -165,8 +165,7 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
         true => Some(Watch::begin(&job.out, Lead::Own(signals.clone()), job.setup.hand_at_key())?),
         false => None,
     };
-    // Not drawn yet: its first line too may find a terminal that takes nothing.
-    let bar = Bar::new(planned as u64, "passes", !json && !tui);
+    let bar = progress_bar(json || tui, planned as u64);
     // Looked at once: while it is drawn, whoever asks it anything waits for the terminal.
     let hidden = bar.is_hidden();
     let say = |text: String| {
@@ -226,7 +225,7 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
                 let bar = bar.clone();
                 print::draw("", move || {
                     bar.set_position((planned.saturating_sub(all) + made) as u64);
-                    bar.set_left(format!("{left_s:.0} s to go"));
+                    bar.set_message(format!("{left_s:.0} s to go"));
                 });
             }
             Update::Off(off) if !off.read_back => {
@@ -339,6 +338,17 @@ fn watch_signals(signals: &Signals) -> miette::Result<()> {
         })
         .into_diagnostic()?;
     Ok(())
+}
+
+/// A bar that was not drawn yet: the first line of it too may find a terminal that takes nothing.
+fn progress_bar(json: bool, planned: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(planned), ProgressDrawTarget::stderr());
+    if json || !std::io::stderr().is_terminal() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} passes, {msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
 }
 
 fn tell(summary: &Summary, json: bool) {

@@ -8,6 +8,7 @@ use super::{ALARM_HOLDS, Endpoint, Part};
 use crate::Role;
 use instruments::{Profile, SetId};
 use realtime::ports::{Nanos, NoData};
+use ringbuf::traits::Producer;
 
 /// Set-points that switch an output off leave before all others, in this order.
 const OFF_FIRST: [&str; 3] = ["enable", "velocity", "amplitude"];
@@ -78,11 +79,11 @@ impl Endpoint {
                 for (axis, force) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
                     *force = Err(if axis.is_some() { reason } else { NoData::NotFitted });
                 }
-                ring.push(*last).is_ok()
+                ring.try_push(*last).is_ok()
             }
-            Part::Amplifier { link, .. } => link.states.push(Err(reason)).is_ok(),
-            Part::Stage { link, .. } => link.states.push(Err(reason)).is_ok(),
-            Part::Supply { link, .. } => link.states.push(Err(reason)).is_ok(),
+            Part::Amplifier { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+            Part::Stage { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+            Part::Supply { link, .. } => link.states.try_push(Err(reason)).is_ok(),
             Part::Contacts(contacts) => {
                 contacts.lost(reason);
                 true

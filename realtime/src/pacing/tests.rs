@@ -8,10 +8,11 @@ use crate::estimate::EstimateConfig;
 use crate::ports::{
     Amplifier, AmplifierState, ForceSensor, Forces, NoData, Quality, Reading, Stage, StageState,
 };
-use crate::queue::ring;
 use crate::safety::{Cause, Limits, Request};
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
+use ringbuf::HeapRb;
+use ringbuf::traits::{Consumer, Observer, Split};
 use std::sync::Mutex;
 use std::time::Duration;
 
@@ -107,7 +108,7 @@ struct Running {
     scene: Arc<Mutex<Scene>>,
     queue: Arc<CommandQueue>,
     life: Arc<Lifeline>,
-    rows: Ring<Row>,
+    rows: ringbuf::HeapCons<Row>,
     thread: std::thread::JoinHandle<LoopReport>,
 }
 
@@ -132,14 +133,15 @@ impl Running {
         let rig = Rig { scene: Arc::clone(&scene), sequence: 0, last: DriveCommand::off(0, PERIOD) };
         let queue = Arc::new(CommandQueue::new(64));
         let life = Arc::new(Lifeline::default());
-        let rows = ring::<Row>(rows);
+        let (rows_in, rows) = HeapRb::<Row>::new(rows).split();
+        let (watch, _) = HeapRb::<Row>::new(1).split();
         let parts = LoopParts {
             config: Config { limits: limits.checked().unwrap(), estimate, exposed: Default::default() },
             model: Arc::new(SpringSlider::new(models::finger::Finger::paper()).unwrap()),
             ports: Ports::new(Box::new(rig.clone()), Box::new(rig.clone()), Box::new(rig)),
             commands: Arc::clone(&queue),
-            rows: Arc::clone(&rows),
-            watch: ring(1),
+            rows: rows_in,
+            watch,
             life: Arc::clone(&life),
             origin_ns: monotonic_ns(),
             held: None,
@@ -152,7 +154,7 @@ impl Running {
     fn until(&mut self, what: &str, mut is: impl FnMut(&Row) -> bool) -> Row {
         let end = monotonic_ns() + 10_000_000_000;
         while monotonic_ns() < end {
-            match self.rows.pop() {
+            match self.rows.try_pop() {
                 Some(row) if is(&row) => return row,
                 Some(_) => {}
                 None => sleep_until(monotonic_ns() + 1_000_000),
@@ -217,12 +219,12 @@ trait LastCycle {
     fn try_iter_last_cycle(&mut self) -> u64;
 }
 
-impl LastCycle for Ring<Row> {
+impl LastCycle for ringbuf::HeapCons<Row> {
     /// Number of the newest row that waits, or of the next one.
     fn try_iter_last_cycle(&mut self) -> u64 {
         loop {
             let mut last = None;
-            while let Some(row) = self.pop() {
+            while let Some(row) = self.try_pop() {
                 last = Some(row.cycle);
             }
             match last {
@@ -248,7 +250,7 @@ fn a_full_ring_is_counted_and_holds_nothing_up() {
     let Running { life, thread, rows, .. } = running;
     life.end.store(true, Ordering::Relaxed);
     let report = thread.join().unwrap();
-    assert_eq!((report.ring_drops, rows.len()), (report.cycles - 1, 1));
+    assert_eq!((report.ring_drops, rows.occupied_len()), (report.cycles - 1, 1));
 }
 
 #[test]

@@ -3,9 +3,9 @@
 use miette::IntoDiagnostic;
 use realtime::clock::Participant;
 use realtime::ports::Nanos;
-use realtime::queue::Ring;
 use realtime::recorder::{Preamble, Recorder};
 use realtime::turn::Row;
+use ringbuf::traits::Consumer;
 use runs::files::Placed;
 use runs::sequence::{Event, MeasuredPass};
 use runs::session::keeper;
@@ -40,7 +40,7 @@ pub(super) struct Written {
 pub(super) fn write(
     file: Placed,
     preamble: Preamble,
-    rows: &Ring<Row>,
+    mut rows: impl Consumer<Item = Row>,
     entries: &Receiver<Entry>,
     last: &Receiver<Last>,
     lost: &AtomicBool,
@@ -48,16 +48,16 @@ pub(super) fn write(
 ) -> Written {
     let mut written = Written::default();
     let mut ended = false;
-    if let Err(problem) = record(file, preamble, rows, entries, last, &mut ended, clock) {
+    if let Err(problem) = record(file, preamble, &mut rows, entries, last, &mut ended, clock) {
         lost.store(true, Ordering::Relaxed);
         written.problem = Some(format!("{problem:#}"));
         // The last words come once: where they have, none are waited for.
         while !ended {
             clock.promise(clock.now());
-            written.lost_rows += std::iter::from_fn(|| rows.pop()).count() as u64;
+            written.lost_rows += rows.pop_iter().count() as u64;
             ended = !matches!(last.recv_timeout(Duration::from_millis(20)), Err(RecvTimeoutError::Timeout));
         }
-        written.lost_rows += std::iter::from_fn(|| rows.pop()).count() as u64;
+        written.lost_rows += rows.pop_iter().count() as u64;
     }
     written
 }
@@ -65,7 +65,7 @@ pub(super) fn write(
 fn record(
     file: Placed,
     preamble: Preamble,
-    rows: &Ring<Row>,
+    rows: &mut impl Consumer<Item = Row>,
     entries: &Receiver<Entry>,
     last: &Receiver<Last>,
     ended: &mut bool,
@@ -77,7 +77,7 @@ fn record(
     let last = loop {
         clock.promise(clock.now());
         let mut idle = true;
-        while let Some(row) = rows.pop() {
+        while let Some(row) = rows.try_pop() {
             recorder.row(&row).into_diagnostic()?;
             idle = false;
         }
@@ -102,7 +102,7 @@ fn record(
         }
     };
     *ended = true;
-    while let Some(row) = rows.pop() {
+    while let Some(row) = rows.try_pop() {
         recorder.row(&row).into_diagnostic()?;
     }
     recorder.end(last).into_diagnostic()?;
@@ -113,6 +113,7 @@ fn record(
 mod tests {
     use super::*;
     use realtime::clock::Clock;
+    use ringbuf::traits::Split;
     use std::sync::mpsc::channel;
 
     /// A record that takes everything and cannot be ended: its index is made from what is read back, and it cannot be read.
@@ -121,13 +122,13 @@ mod tests {
         let path = std::env::temp_dir().join(format!("muprime-writer-{}.mcap", std::process::id()));
         let mut options = std::fs::OpenOptions::new();
         let file = Placed::open(&path, options.create_new(true).write(true)).unwrap();
-        let rows = realtime::queue::ring::<Row>(8);
+        let (_rows_in, rows) = ringbuf::HeapRb::<Row>::new(8).split();
         let (_entries_in, entries) = channel::<Entry>();
         let (last_in, last) = channel::<Last>();
         let (done_in, done) = channel();
         std::thread::spawn(move || {
             let (lost, clock) = (AtomicBool::new(false), Clock::from(Instant::now()).join(SLACK));
-            let written = write(file, Preamble::default(), &rows, &entries, &last, &lost, &clock);
+            let written = write(file, Preamble::default(), rows, &entries, &last, &lost, &clock);
             let _ = done_in.send((written.problem, lost.into_inner()));
         });
         // Held until the writer is done, as the sweep's thread does.

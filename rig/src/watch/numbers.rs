@@ -28,6 +28,16 @@ fn band(mu: Option<f64>, sd: Option<f64>) -> String {
     }
 }
 
+/// A span of seconds as people say it.
+pub fn duration(seconds: f64) -> String {
+    let whole = seconds.max(0.0).round() as u64;
+    match (whole / 3600, whole / 60 % 60, whole % 60) {
+        (0, 0, s) => format!("{s} s"),
+        (0, m, s) => format!("{m} min {s:02} s"),
+        (h, m, _) => format!("{h} h {m:02} min"),
+    }
+}
+
 /// What the loop does, in a word.
 pub fn phase(phase: Phase) -> &'static str {
     match phase {

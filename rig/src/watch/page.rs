@@ -1,7 +1,7 @@
 //! The page: what stands where. Eighty columns and twenty-four rows hold everything; more room goes to the curve, the traces and the
 //! events, less room keeps what is needed first.
 
-use super::numbers::{of_state, phase, plain};
+use super::numbers::{duration, of_state, phase, plain};
 use super::plot::{curve, trace};
 use super::style::Look;
 use super::{Keys, Source};
@@ -11,7 +11,6 @@ use ratatui_core::buffer::Buffer;
 use ratatui_core::layout::Rect;
 use ratatui_core::style::{Color, Style};
 use realtime::safety::Cause;
-use runs::print::bar::duration;
 use runs::report::events::describe;
 use runs::sequence::Outcome;
 

@@ -2,11 +2,11 @@
 //! over the whole range of moduli as elastic skin, then about what was found with penalty and retardation time
 //! free as well.
 
-use crate::print::bar::Bar;
 use crate::say;
 use calibration::identify::skin::{IdentifiedSkin, identify_skin};
 use calibration::identify::{Identified, Search, identify};
 use calibration::phase::table::PhasePoint;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
 use models::quantity::PeakToPeak;
 use models::ridge::{PhaseCurves, RidgeCase, Skin, SkinGrid};
@@ -97,7 +97,10 @@ fn compute(
     if shown {
         say!("{what}: running the ridge {runs} times ({} amplitudes)", amplitudes.len());
     }
-    let bar = Bar::new(runs, "runs", shown);
+    let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let bar = ProgressBar::with_draw_target(Some(runs), target);
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} gone, {eta} to go");
+    bar.set_style(style.into_diagnostic()?);
     let curves = PhaseCurves::compute(base, amplitudes, grid, || bar.inc(1)).into_diagnostic();
     bar.finish_and_clear();
     curves

@@ -8,9 +8,9 @@ use super::plan::{self, Pilot, Plan};
 use super::study::{Study, program};
 use super::worker::{Done, work};
 use crate::progress;
+use indicatif::ProgressBar;
 use miette::{Context, IntoDiagnostic};
 use rayon::prelude::*;
-use runs::print::bar::Bar;
 use runs::say;
 use runs::session::Unfinished;
 use serde::Serialize;
@@ -76,7 +76,7 @@ fn seconds_of(text: &str) -> Result<f64, String> {
 }
 
 /// What a submission came to.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Submitted {
     /// Folder of the study.
     pub out: PathBuf,
@@ -137,7 +137,12 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
         cases,
         there: cases - first,
         missing: first,
-        ..Submitted::default()
+        pilot: None,
+        tasks: 0,
+        cases_a_task: 0,
+        limit_s: 0.0,
+        ids: Vec::new(),
+        wall_seconds: 0.0,
     };
     for (folder, job) in at_work(&study.out)? {
         match engine.filter(|engine| engine.name == job.engine) {
@@ -192,7 +197,7 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
 
 /// Runs a plan on this machine: the same worker, on the threads of a pool. A case that cannot be made leaves
 /// its range undone and the others not; a disk that is full ends it.
-fn here(study: &Study, plan: &Plan, threads: u64, bar: &Bar) -> miette::Result<()> {
+fn here(study: &Study, plan: &Plan, threads: u64, bar: &ProgressBar) -> miette::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build().into_diagnostic()?;
     let program = program()?;
     let first = Mutex::new(None);
@@ -287,7 +292,7 @@ fn follow(
     engine: &Engine,
     folder: &Path,
     mut handed: Handed,
-    bar: &Bar,
+    bar: &ProgressBar,
 ) -> miette::Result<()> {
     let (cases, mut last_query) = (study.file.header.cases, Instant::now());
     let mut over = false;
