@@ -36,7 +36,7 @@ pub struct Options {
     #[arg(long, value_name = "N")]
     pub workers: Option<u64>,
     /// Time limit of one task, as in 30:00 or 2:00:00 (from a pilot if left out)
-    #[arg(long = "time", id = "time", value_parser = seconds_of)]
+    #[arg(long = "time", id = "time", value_name = "TIME", value_parser = seconds_of)]
     pub limit_s: Option<f64>,
     /// Seconds that a task is meant to take
     #[arg(long, default_value_t = 300.0, value_name = "S")]

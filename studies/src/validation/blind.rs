@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Seed of the benchmark: of its first set
+    /// Seed of the first set
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// One stratum only: none, single, pair, alias or outside; all in their shares without it
