@@ -128,6 +128,18 @@ pub struct BudgetLine {
     pub unit: String,
 }
 
+impl BudgetLine {
+    /// A line of that source.
+    pub fn new(
+        source: impl Into<String>,
+        evaluation: Evaluation,
+        standard_uncertainty: f64,
+        unit: &str,
+    ) -> Self {
+        BudgetLine { source: source.into(), evaluation, standard_uncertainty, unit: unit.into() }
+    }
+}
+
 /// Type of evaluation of an uncertainty (GUM 0.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Evaluation {

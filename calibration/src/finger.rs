@@ -97,12 +97,12 @@ impl FingerFit {
             values.push(s.loss_tangent[0]);
             dofs.push(s.degrees_of_freedom);
             blocks.push(DMatrix::from_element(1, 1, s.loss_tangent[1].powi(2)));
-            budget.push(BudgetLine {
-                source: format!("{name}: force and displacement calibration"),
-                evaluation: Evaluation::B,
-                standard_uncertainty: s.scale_relative_sd,
-                unit: "1".into(),
-            });
+            budget.push(BudgetLine::new(
+                format!("{name}: force and displacement calibration"),
+                Evaluation::B,
+                s.scale_relative_sd,
+                "1",
+            ));
             range.insert(format!("{name}.displacement_m"), s.range_m);
             count += s.points as u64;
             (sd, largest, unit) = (s.residual_sd_n, s.largest_residual_n, "N".into());

@@ -4,7 +4,6 @@
 //! from [`correlate`]; this room makes of them one delay with its uncertainty, and a jitter.
 
 pub mod clock;
-pub mod correlate;
 
 use crate::certificate::{BudgetLine, Evaluation, Kind, Outcome, Residuals, parameters};
 use crate::uncertainty::Input;
@@ -107,12 +106,12 @@ pub fn outcome(channels: &[ChannelDelay], clocks: &[(String, clock::ClockFit)]) 
         // The standard uncertainty of a standard deviation of n Gaussian values (GUM E.4.3).
         uncertainties.push(c.jitter_s / (2.0 * (c.edges as f64 - 1.0)).sqrt());
         dofs.push(c.edges as f64 - 1.0);
-        budget.push(BudgetLine {
-            source: format!("scatter of {} edges of {}", c.edges, c.channel),
-            evaluation: Evaluation::A,
-            standard_uncertainty: c.jitter_s / (c.edges as f64).sqrt(),
-            unit: "s".into(),
-        });
+        budget.push(BudgetLine::new(
+            format!("scatter of {} edges of {}", c.edges, c.channel),
+            Evaluation::A,
+            c.jitter_s / (c.edges as f64).sqrt(),
+            "s",
+        ));
     }
     for (channel, clock) in clocks {
         names.push((format!("{channel}.clock_rate_error"), "1"));

@@ -71,9 +71,6 @@ pub enum FitError {
         /// Where.
         place: &'static str,
     },
-    /// The given covariance of the observations is not positive definite.
-    #[error("the covariance of the observations is not positive definite")]
-    Covariance,
     /// The iteration of a non-linear fit did not settle.
     #[error("the fit did not converge in {iterations} iterations")]
     NotConverged {

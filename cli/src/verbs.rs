@@ -37,6 +37,15 @@ pub mod submit;
 pub mod virtual_rig;
 pub mod watch;
 
+/// What nearly every verb needs.
+mod prelude {
+    pub use super::{DONE, FAILED, REFUSED, exit};
+    pub use ::runs::{out, say};
+    pub use miette::{IntoDiagnostic, WrapErr};
+    pub use std::path::{Path, PathBuf};
+    pub use std::process::ExitCode;
+}
+
 use miette::IntoDiagnostic;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

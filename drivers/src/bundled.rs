@@ -31,13 +31,11 @@ const FILES: &[(&str, &str)] = &[
 ];
 
 /// The text of a file that a profile names.
-#[must_use]
 pub fn file(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
 /// The text of the profile of that name.
-#[must_use]
 pub fn text(id: &str) -> Option<&'static str> {
     PROFILES.iter().find(|(known, _)| *known == id).map(|(_, text)| *text)
 }

@@ -5,7 +5,7 @@
 //! again after an outage.
 
 use super::InstrumentSetup;
-use super::modbus::{Blocks, Trouble};
+use super::modbus::{Blocks, Registers, Trouble};
 use super::modbus_tcp::{Tcp, resolve};
 use instruments::profile::FrameKind;
 use instruments::schema::{LinkKind, Role};
@@ -102,7 +102,6 @@ impl Chamber {
     }
 
     /// What was read last.
-    #[must_use]
     pub fn air(&self) -> Air {
         lock(&self.shared).air.clone()
     }
@@ -182,7 +181,7 @@ impl Talk {
                     Some(own) => (own, block.address + described.register),
                     None => (&registers[..], block.address),
                 };
-                match wire.write_registers(block.table, at, own) {
+                match wire.write(block.table, at, own) {
                     Ok(()) => self.taken[index] = Some(*value),
                     Err(Trouble::Refused(why) | Trouble::Corrupt(why)) => {
                         problem = Some(format!("{} {value} was refused: {why}", QUANTITIES[index]));
@@ -202,7 +201,7 @@ impl Talk {
             let table = self.profile.description.poll[poll].table;
             let mut bytes = Vec::new();
             for span in &frame.spans {
-                let part = wire.read_registers(table, span.address, span.count);
+                let part = wire.read(table, span.address, span.count);
                 bytes.extend(part.map_err(|trouble| format!("{trouble:?}"))?);
             }
             self.profile.decode(FrameId(index), &bytes, &mut values).map_err(|error| error.to_string())?;

@@ -8,7 +8,8 @@ mod view;
 
 use super::health::Health;
 use super::ports::{
-    self, AmplifierLink, AmplifierPort, ContactsPort, ForcePort, StageLink, StagePort, SupplyLink, SupplyPort,
+    self, AmplifierPort, ContactsPort, DriveSetPoint, ForcePort, Link, StagePort, StageSetPoint, SupplyPort,
+    SupplySetPoint,
 };
 use super::setup::{AxisSetup, InstrumentSetup};
 use super::timebase::{Counter, DeviceClock, Step};
@@ -76,9 +77,9 @@ struct StageSignals {
 
 enum Part {
     Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: HeapProd<Forces> },
-    Amplifier { signals: AmplifierSignals, link: AmplifierLink },
-    Stage { signals: StageSignals, link: StageLink, dead_weight_n: Option<f64> },
-    Supply { closed: SignalId, link: SupplyLink },
+    Amplifier { signals: AmplifierSignals, link: Link<AmplifierState, DriveSetPoint> },
+    Stage { signals: StageSignals, link: Link<StageState, StageSetPoint>, dead_weight_n: Option<f64> },
+    Supply { closed: SignalId, link: Link<SupplyState, SupplySetPoint> },
     Contacts(ContactsLink),
 }
 
@@ -109,7 +110,7 @@ impl ContactsLink {
         if signals.iter().all(Option::is_none) {
             return Err(format!("none of the contacts {} is there and wired", CONTACTS.join(", ")));
         }
-        let (ring, port) = ports::contacts();
+        let (ring, port) = ports::sensor(Contacts::missing(NoData::NeverRead));
         Ok((Self { signals, last: Contacts::missing(NoData::NotFitted), ring }, port))
     }
 
@@ -201,7 +202,7 @@ impl Endpoint {
             ));
         }
         let axes = (lateral.is_some(), normal.is_some());
-        let (ring, port) = ports::force();
+        let (ring, port) = ports::sensor(Forces::missing(NoData::NeverRead));
         let part = Part::Force { lateral, normal, last: Forces::missing(NoData::NotFitted), ring };
         Ok((Self::new(profile, part), (port, axes)))
     }
@@ -236,7 +237,7 @@ impl Endpoint {
         for set in ["amplitude", "frequency", "enable"] {
             need_set(&profile, set)?;
         }
-        let (link, port) = ports::amplifier();
+        let (link, port) = ports::port();
         Ok((Self::new(profile, Part::Amplifier { signals, link }), port))
     }
 
@@ -256,7 +257,7 @@ impl Endpoint {
         if profile.set("load").is_none() && dead_weight_n.is_none() {
             return Err("the instrument loads nothing: say the weight that does, as `dead_weight_n`".into());
         }
-        let (link, port) = ports::stage();
+        let (link, port) = ports::port();
         Ok((Self::new(profile, Part::Stage { signals, link, dead_weight_n }), port))
     }
 
@@ -267,7 +268,7 @@ impl Endpoint {
     pub fn supply(profile: Profile) -> Result<(Self, SupplyPort), String> {
         let closed = need(&profile, "closed")?;
         need_set(&profile, "closed")?;
-        let (link, port) = ports::supply();
+        let (link, port) = ports::port();
         let endpoint = Self::new(profile, Part::Supply { closed, link });
         if endpoint.safe_set_points().is_empty() {
             return Err(
@@ -315,19 +316,16 @@ impl Endpoint {
     }
 
     /// The instrument's profile.
-    #[must_use]
     pub fn profile(&self) -> &Profile {
         &self.profile
     }
 
     /// The counters, for whoever wants to look.
-    #[must_use]
     pub fn health(&self) -> Arc<Health> {
         Arc::clone(&self.health)
     }
 
     /// The latest value of a signal in its unit; NaN where there was none.
-    #[must_use]
     pub fn value(&self, signal: SignalId) -> f64 {
         self.values.get(signal)
     }

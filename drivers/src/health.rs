@@ -23,7 +23,6 @@ macro_rules! counters {
 
         impl Health {
             /// The counters now.
-            #[must_use]
             pub fn report(&self) -> HealthReport {
                 HealthReport {
                     $($name: self.$name.load(Ordering::Relaxed),)+

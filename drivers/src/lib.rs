@@ -242,7 +242,6 @@ impl Links {
     }
 
     /// The time that they stamp with.
-    #[must_use]
     pub const fn clock(&self) -> &Clock {
         &self.clock
     }
@@ -406,7 +405,6 @@ fn start(
 
 /// Samples per second of a profile's regular samples: of its stream, its polls, its
 /// messages or its queries. `None` for a profile that does not hold or has none.
-#[must_use]
 pub fn nominal_rate_hz(instrument: &InstrumentSetup) -> Option<f64> {
     let profile = instrument.description().ok()?;
     let d = &profile.description;

@@ -81,7 +81,6 @@ pub struct Library {
 
 impl Library {
     /// These folders; one that does not exist holds nothing.
-    #[must_use]
     pub fn of(folders: Vec<PathBuf>) -> Self {
         Self { folders }
     }
@@ -126,7 +125,6 @@ impl Library {
     }
 
     /// Ids of the files in the folders.
-    #[must_use]
     pub fn ids(&self) -> Vec<String> {
         let entries = self.folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
         let id = |entry: std::fs::DirEntry| {

@@ -40,19 +40,16 @@ impl<T> Mailbox<T> {
     }
 
     /// Takes the newest command.
-    #[must_use]
     pub fn take(&self) -> Option<T> {
         self.0.newest.pop()
     }
 
     /// Whether an 'off' came since the last call of [`Mailbox::take_off`].
-    #[must_use]
     pub fn off_waits(&self) -> bool {
         self.0.off.load(Ordering::Acquire)
     }
 
     /// The same, and forgets it: whoever asks sends it.
-    #[must_use]
     pub fn take_off(&self) -> bool {
         self.0.off.swap(false, Ordering::AcqRel)
     }

@@ -25,20 +25,13 @@ pub trait Registers {
     ///
     /// # Errors
     /// See [`Trouble`].
-    fn read(&mut self, session: &Session, table: Table, address: u16, count: u16)
-    -> Result<Vec<u8>, Trouble>;
+    fn read(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble>;
 
     /// Writes neighbouring registers of a table that can be written.
     ///
     /// # Errors
     /// See [`Trouble`].
-    fn write(
-        &mut self,
-        session: &Session,
-        table: Table,
-        address: u16,
-        registers: &[u16],
-    ) -> Result<(), Trouble>;
+    fn write(&mut self, table: Table, address: u16, registers: &[u16]) -> Result<(), Trouble>;
 
     /// A function of the maker's own with its byte; only over RTU.
     ///
@@ -163,7 +156,7 @@ impl Conversation {
     ) -> Result<(), Ended> {
         // The first read that brings nothing ends the sample.
         let spans = session.endpoint.profile().frames()[frame.0].spans.clone();
-        let read = |span: &Span| wire.read(session, poll.table, span.address, span.count);
+        let read = |span: &Span| wire.read(poll.table, span.address, span.count);
         let answer: Result<Vec<Vec<u8>>, Trouble> = spans.iter().map(read).collect();
         let answer = answer.map(|parts| parts.concat());
         let arrived = session.now();
@@ -198,7 +191,7 @@ impl Conversation {
     ) -> Result<(), Trouble> {
         let mut outcome = Ok(());
         for (block, registers) in self.blocks.put(session.endpoint.profile(), set_points) {
-            match wire.write(session, block.table, block.address, &registers) {
+            match wire.write(block.table, block.address, &registers) {
                 Err(Trouble::Ended(ended)) => return Err(Trouble::Ended(ended)),
                 written => outcome = outcome.and(written),
             }
@@ -219,7 +212,7 @@ impl Conversation {
         let first = usize::from(described.register);
         let registers = described.number.map_or(1, |number| number.bytes().div_ceil(2));
         let own = words.get(first..first + registers).unwrap_or(&words);
-        wire.write(session, block.table, block.address + described.register, own)
+        wire.write(block.table, block.address + described.register, own)
     }
 
     /// Tells 'the instrument refused' from 'we could not talk'. A few bad answers are borne.
@@ -254,9 +247,9 @@ fn initialise(session: &Session, wire: &mut dyn Registers) -> Result<(), Ended> 
         let done = match (init.function, init.copy, &init.registers) {
             (Some((function, data)), ..) => wire.own_function(function, data),
             (None, Some((from, to, count)), _) => wire
-                .read(session, Table::Holding, from, count)
-                .and_then(|bytes| wire.write(session, Table::Holding, to, &words(&bytes))),
-            (None, None, Some((first, values))) => wire.write(session, init.table, *first, values),
+                .read(Table::Holding, from, count)
+                .and_then(|bytes| wire.write(Table::Holding, to, &words(&bytes))),
+            (None, None, Some((first, values))) => wire.write(init.table, *first, values),
             (None, None, None) => Ok(()),
         };
         match done {

@@ -85,16 +85,6 @@ impl Rtu {
         Ok(Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence: rtu::silence_s(baud) })
     }
 
-    /// Reads registers, as bytes in the order of the wire.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
-    pub fn read_registers(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
-        let request = rtu::read(self.unit, read_function(table), address, count);
-        let answer = self.ask(&request)?;
-        self.judged(rtu::registers(&request, &answer))
-    }
-
     /// Writes the safe set-points, every block of them, and needs no answer. The 'off' that is answered and read back follows.
     fn send_unanswered_off(&mut self, session: &Session) -> Result<(), Ended> {
         let profile = session.endpoint.profile();
@@ -185,7 +175,7 @@ impl Rtu {
 
     /// Starts the stream and hands over its frames until something is wrong.
     fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
-        self.start_stream(session, stream)?;
+        self.start_stream(stream)?;
         super::stream::listen(session, stream, false, &mut |buffer, deadline| {
             self.line.with(|line| line.read(buffer, deadline))
         })?;
@@ -193,11 +183,11 @@ impl Rtu {
         Err(Ended::Stopped)
     }
 
-    fn start_stream(&mut self, session: &Session, stream: &Stream) -> Result<(), Ended> {
+    fn start_stream(&mut self, stream: &Stream) -> Result<(), Ended> {
         let mut last = Ended::Io("the profile says no way to start the stream".into());
         for _ in 0..BAD_IN_A_ROW {
             let started = if let Some((address, value)) = stream.start_register {
-                self.write(session, Table::Holding, address, &[value])
+                self.write(Table::Holding, address, &[value])
             } else if let Some((function, data)) = stream.start_function {
                 self.own(function, data)
             } else {
@@ -214,23 +204,13 @@ impl Rtu {
 }
 
 impl Registers for Rtu {
-    fn read(
-        &mut self,
-        _session: &Session,
-        table: Table,
-        address: u16,
-        count: u16,
-    ) -> Result<Vec<u8>, Trouble> {
-        self.read_registers(table, address, count)
+    fn read(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
+        let request = rtu::read(self.unit, read_function(table), address, count);
+        let answer = self.ask(&request)?;
+        self.judged(rtu::registers(&request, &answer))
     }
 
-    fn write(
-        &mut self,
-        _session: &Session,
-        table: Table,
-        address: u16,
-        registers: &[u16],
-    ) -> Result<(), Trouble> {
+    fn write(&mut self, table: Table, address: u16, registers: &[u16]) -> Result<(), Trouble> {
         let request = write_request(self.unit, table, address, registers);
         let answer = self.ask(&request)?;
         let length = rtu::answer_length(&request, &answer).unwrap_or(answer.len()).min(answer.len());

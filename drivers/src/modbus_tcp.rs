@@ -118,39 +118,6 @@ impl<'a> Tcp<'a> {
         .map_err(|error: std::io::Error| Ended::from(error))?;
         Ok(Tcp { runtime, context, answer_ms })
     }
-
-    /// Reads registers, as bytes in the order of the wire.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
-    pub fn read_registers(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
-        let (runtime, limit) = (self.runtime, self.answer_ms);
-        let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
-        let registers: Vec<u16> = match table {
-            Table::Holding => {
-                part(within(runtime, limit, self.context.read_holding_registers(address, count)))?
-            }
-            Table::Input => part(within(runtime, limit, self.context.read_input_registers(address, count)))?,
-            Table::Coil => bits(part(within(runtime, limit, self.context.read_coils(address, count)))?),
-            Table::Discrete => {
-                bits(part(within(runtime, limit, self.context.read_discrete_inputs(address, count)))?)
-            }
-        };
-        Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect())
-    }
-
-    /// Writes neighbouring registers.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
-    pub fn write_registers(&mut self, table: Table, address: u16, registers: &[u16]) -> Result<(), Trouble> {
-        let (runtime, limit) = (self.runtime, self.answer_ms);
-        if table.is_bits() {
-            let coils: Vec<bool> = registers.iter().map(|register| *register != 0).collect();
-            return part(within(runtime, limit, self.context.write_multiple_coils(address, &coils)));
-        }
-        part(within(runtime, limit, self.context.write_multiple_registers(address, registers)))
-    }
 }
 
 /// What is wrong with an answer whose head does not fit its question, in words.
@@ -196,24 +163,29 @@ fn part<T>(answer: Result<tokio_modbus::Result<T>, Ended>) -> Result<T, Trouble>
 }
 
 impl Registers for Tcp<'_> {
-    fn read(
-        &mut self,
-        _session: &Session,
-        table: Table,
-        address: u16,
-        count: u16,
-    ) -> Result<Vec<u8>, Trouble> {
-        self.read_registers(table, address, count)
+    fn read(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
+        let (runtime, limit) = (self.runtime, self.answer_ms);
+        let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
+        let registers: Vec<u16> = match table {
+            Table::Holding => {
+                part(within(runtime, limit, self.context.read_holding_registers(address, count)))?
+            }
+            Table::Input => part(within(runtime, limit, self.context.read_input_registers(address, count)))?,
+            Table::Coil => bits(part(within(runtime, limit, self.context.read_coils(address, count)))?),
+            Table::Discrete => {
+                bits(part(within(runtime, limit, self.context.read_discrete_inputs(address, count)))?)
+            }
+        };
+        Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect())
     }
 
-    fn write(
-        &mut self,
-        _session: &Session,
-        table: Table,
-        address: u16,
-        registers: &[u16],
-    ) -> Result<(), Trouble> {
-        self.write_registers(table, address, registers)
+    fn write(&mut self, table: Table, address: u16, registers: &[u16]) -> Result<(), Trouble> {
+        let (runtime, limit) = (self.runtime, self.answer_ms);
+        if table.is_bits() {
+            let coils: Vec<bool> = registers.iter().map(|register| *register != 0).collect();
+            return part(within(runtime, limit, self.context.write_multiple_coils(address, &coils)));
+        }
+        part(within(runtime, limit, self.context.write_multiple_registers(address, registers)))
     }
 
     fn wait_up_to(&mut self, answer_ms: u32) {

@@ -1,7 +1,7 @@
 //! A look at an instrument that has no profile yet: registers, CAN frames or bytes. It reads, for a bounded
 //! time, and writes nothing.
 
-use super::modbus::Trouble;
+use super::modbus::{Registers, Trouble};
 use super::modbus_rtu::Rtu;
 use super::modbus_tcp::{Tcp, resolve};
 use super::remedy::advice;
@@ -32,7 +32,6 @@ pub enum Place {
 
 impl Place {
     /// The place that an address means: `rtu:PATH` or `PATH`, `tcp:HOST:PORT`, `can:NAME` or `slcan:PATH`.
-    #[must_use]
     pub fn of(address: &str) -> Self {
         let interface =
             |name: &str| name.strip_prefix("vcan").or(name.strip_prefix("can")).map(str::is_empty);
@@ -87,11 +86,11 @@ pub fn registers(
                 .map_err(|error| error.to_string())?;
             let clock = Instant::now().into();
             let connected = Tcp::connect((&runtime, &clock), address, unit, PATIENCE_MS, PATIENCE_MS);
-            connected.map_err(|ended| words(&ended))?.read_registers(table, first, count)
+            connected.map_err(|ended| words(&ended))?.read(table, first, count)
         }
         Place::Serial(path) => Rtu::open(path, speed.baud, &speed.format, unit, PATIENCE_MS)
             .map_err(|ended| words(&ended))?
-            .read_registers(table, first, count),
+            .read(table, first, count),
         Place::Can(name) => return Err(format!("{name} is a CAN bus and has no registers; leave them out")),
     };
     let bytes = read.map_err(|trouble| match trouble {

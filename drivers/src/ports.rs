@@ -57,7 +57,6 @@ pub struct StageSetPoint {
 
 impl StageSetPoint {
     /// Whether it neither moves nor loads.
-    #[must_use]
     pub fn rests(&self) -> bool {
         self.velocity_m_s == 0.0 && self.normal_force_n == 0.0
     }
@@ -74,30 +73,40 @@ impl From<StageCommand> for StageSetPoint {
     }
 }
 
-/// Takes all waiting items; the newest stays in `newest`.
-fn latest<T>(ring: &mut HeapCons<T>, newest: &mut T) {
+/// The newest of what waits in a ring, else the last one.
+fn latest<T: Copy>(ring: &mut HeapCons<T>, last: &mut T) -> T {
     while let Some(newer) = ring.try_pop() {
-        *newest = newer;
+        *last = newer;
     }
+    *last
 }
 
-/// One force instrument.
-pub struct ForcePort {
-    ring: HeapCons<Forces>,
-    last: Forces,
+/// The loop's side of an instrument that only measures.
+pub struct SensorPort<T> {
+    ring: HeapCons<T>,
+    last: T,
 }
 
-/// A force port, and the end into which the link pushes.
-#[must_use]
-pub fn force() -> (HeapProd<Forces>, ForcePort) {
+/// A port of forces.
+pub type ForcePort = SensorPort<Forces>;
+/// A port of safety contacts.
+pub type ContactsPort = SensorPort<Contacts>;
+
+/// The ring into which the link pushes, and a port that shows `none` until then.
+pub fn sensor<T>(none: T) -> (HeapProd<T>, SensorPort<T>) {
     let (producer, ring) = HeapRb::new(SAMPLES).split();
-    (producer, ForcePort { ring, last: Forces::missing(NoData::NeverRead) })
+    (producer, SensorPort { ring, last: none })
 }
 
 impl ForceSensor for ForcePort {
     fn read(&mut self, _now: Nanos) -> Forces {
-        latest(&mut self.ring, &mut self.last);
-        self.last
+        latest(&mut self.ring, &mut self.last)
+    }
+}
+
+impl SafetyInputs for ContactsPort {
+    fn read(&mut self, _now: Nanos) -> Contacts {
+        latest(&mut self.ring, &mut self.last)
     }
 }
 
@@ -134,28 +143,34 @@ pub fn compose(mut ports: Vec<(ForcePort, (bool, bool))>) -> Result<Box<dyn Forc
     }
 }
 
-/// The amplifier.
-pub struct AmplifierPort {
-    states: HeapCons<Result<AmplifierState, NoData>>,
-    commands: Mailbox<DriveSetPoint>,
-    last: Result<AmplifierState, NoData>,
+/// The loop's side of an instrument with states of type `S` that takes set-points of type `C`.
+pub struct Port<S, C> {
+    states: HeapCons<Result<S, NoData>>,
+    commands: Mailbox<C>,
+    last: Result<S, NoData>,
 }
 
-/// The ends that an amplifier's link holds.
-pub struct AmplifierLink {
+/// The ends that the link of such an instrument holds.
+pub struct Link<S, C> {
     /// Into the loop.
-    pub states: HeapProd<Result<AmplifierState, NoData>>,
+    pub states: HeapProd<Result<S, NoData>>,
     /// Out of the loop.
-    pub commands: Mailbox<DriveSetPoint>,
+    pub commands: Mailbox<C>,
 }
 
-/// An amplifier port, and the ends that the link holds.
-#[must_use]
-pub fn amplifier() -> (AmplifierLink, AmplifierPort) {
+/// The amplifier's port.
+pub type AmplifierPort = Port<AmplifierState, DriveSetPoint>;
+/// The stage's port.
+pub type StagePort = Port<StageState, StageSetPoint>;
+/// The port of the switch in the amplifier's supply.
+pub type SupplyPort = Port<SupplyState, SupplySetPoint>;
+
+/// A port, and the ends that the link holds.
+pub fn port<S, C>() -> (Link<S, C>, Port<S, C>) {
     let (into_loop, states) = HeapRb::new(SAMPLES).split();
     let commands = Mailbox::default();
-    let port = AmplifierPort { states, commands: commands.clone(), last: Err(NoData::NeverRead) };
-    (AmplifierLink { states: into_loop, commands }, port)
+    let link = Link { states: into_loop, commands: commands.clone() };
+    (link, Port { states, commands, last: Err(NoData::NeverRead) })
 }
 
 impl AmplifierPort {
@@ -171,33 +186,8 @@ impl Amplifier for AmplifierPort {
     }
 
     fn state(&mut self, _now: Nanos) -> Result<AmplifierState, NoData> {
-        latest(&mut self.states, &mut self.last);
-        self.last
+        latest(&mut self.states, &mut self.last)
     }
-}
-
-/// The stage.
-pub struct StagePort {
-    states: HeapCons<Result<StageState, NoData>>,
-    commands: Mailbox<StageSetPoint>,
-    last: Result<StageState, NoData>,
-}
-
-/// The ends that a stage's link holds.
-pub struct StageLink {
-    /// Into the loop.
-    pub states: HeapProd<Result<StageState, NoData>>,
-    /// Out of the loop.
-    pub commands: Mailbox<StageSetPoint>,
-}
-
-/// A stage port, and the ends that the link holds.
-#[must_use]
-pub fn stage() -> (StageLink, StagePort) {
-    let (into_loop, states) = HeapRb::new(SAMPLES).split();
-    let commands = Mailbox::default();
-    let port = StagePort { states, commands: commands.clone(), last: Err(NoData::NeverRead) };
-    (StageLink { states: into_loop, commands }, port)
 }
 
 impl Stage for StagePort {
@@ -207,8 +197,7 @@ impl Stage for StagePort {
     }
 
     fn state(&mut self, _now: Nanos) -> Result<StageState, NoData> {
-        latest(&mut self.states, &mut self.last);
-        self.last
+        latest(&mut self.states, &mut self.last)
     }
 }
 
@@ -224,30 +213,6 @@ pub struct SupplySetPoint {
     pub expires_at: Nanos,
 }
 
-/// The switch in the amplifier's supply.
-pub struct SupplyPort {
-    states: HeapCons<Result<SupplyState, NoData>>,
-    commands: Mailbox<SupplySetPoint>,
-    last: Result<SupplyState, NoData>,
-}
-
-/// The ends that a supply's link holds.
-pub struct SupplyLink {
-    /// Into the loop.
-    pub states: HeapProd<Result<SupplyState, NoData>>,
-    /// Out of the loop.
-    pub commands: Mailbox<SupplySetPoint>,
-}
-
-/// A supply's port, and the ends that the link holds.
-#[must_use]
-pub fn supply() -> (SupplyLink, SupplyPort) {
-    let (into_loop, states) = HeapRb::new(SAMPLES).split();
-    let commands = Mailbox::default();
-    let port = SupplyPort { states, commands: commands.clone(), last: Err(NoData::NeverRead) };
-    (SupplyLink { states: into_loop, commands }, port)
-}
-
 impl SupplySwitch for SupplyPort {
     fn command(&mut self, command: SupplyCommand, now: Nanos) {
         let closed = command == SupplyCommand::Restore;
@@ -255,27 +220,6 @@ impl SupplySwitch for SupplyPort {
     }
 
     fn state(&mut self, _now: Nanos) -> Result<SupplyState, NoData> {
-        latest(&mut self.states, &mut self.last);
-        self.last
-    }
-}
-
-/// The safety contacts.
-pub struct ContactsPort {
-    ring: HeapCons<Contacts>,
-    last: Contacts,
-}
-
-/// A port of safety contacts, and the end into which the link pushes.
-#[must_use]
-pub fn contacts() -> (HeapProd<Contacts>, ContactsPort) {
-    let (producer, ring) = HeapRb::new(SAMPLES).split();
-    (producer, ContactsPort { ring, last: Contacts::missing(NoData::NeverRead) })
-}
-
-impl SafetyInputs for ContactsPort {
-    fn read(&mut self, _now: Nanos) -> Contacts {
-        latest(&mut self.ring, &mut self.last);
-        self.last
+        latest(&mut self.states, &mut self.last)
     }
 }

@@ -6,7 +6,6 @@ use std::fmt::Write;
 const SHOWN: usize = 48;
 
 /// Bytes as text between quotes, what cannot be seen as escapes.
-#[must_use]
 pub fn shown(bytes: &[u8]) -> String {
     let mut text = String::from("\"");
     for byte in bytes.iter().take(SHOWN) {
@@ -23,7 +22,6 @@ pub fn shown(bytes: &[u8]) -> String {
 }
 
 /// Why a line did not end in time, of the bytes that did come and the question that was sent.
-#[must_use]
 pub fn unended(came: &[u8], end: &[u8], question: &str) -> String {
     let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02X}")).collect::<Vec<_>>().join(" ");
     let found =
@@ -44,7 +42,6 @@ pub fn unended(came: &[u8], end: &[u8], question: &str) -> String {
 }
 
 /// What a Modbus exception says, and what to do.
-#[must_use]
 pub fn exception(code: u8) -> String {
     let words = match code {
         1 => "it does not know this function: the table is another (holding, input, coil, discrete)",
@@ -62,7 +59,6 @@ pub fn exception(code: u8) -> String {
 }
 
 /// What to look at after a problem: the words of the problem say which of the causes it is.
-#[must_use]
 pub fn advice(problem: &str) -> &'static str {
     let has = |words: &str| problem.contains(words);
     if has("exception ") || has("another unit") || has("transaction") {

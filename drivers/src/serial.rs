@@ -171,7 +171,6 @@ fn parse_format(format: &str) -> Option<(DataBits, Parity, StopBits)> {
 
 /// The latency timer of a USB serial adapter in ms, where the port is such a one: at FTDI's default
 /// of 16 ms a sensor that sends 100 frames a second gives 62.5.
-#[must_use]
 pub fn latency_timer_ms(path: &str) -> Option<u32> {
     let name = std::fs::canonicalize(path).ok()?;
     let timer = format!("/sys/bus/usb-serial/devices/{}/latency_timer", name.file_name()?.to_str()?);

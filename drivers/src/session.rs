@@ -70,13 +70,11 @@ pub struct Periodic {
 
 impl Periodic {
     /// From `now` on, so many times a second.
-    #[must_use]
     pub fn new(rate_hz: f64, now: Nanos) -> Self {
         Self { period: Nanos::from_seconds(1.0 / rate_hz).0.max(1), due: now }
     }
 
     /// Whether it is time.
-    #[must_use]
     pub fn is_due(&self, now: Nanos) -> bool {
         self.due <= now
     }
@@ -104,7 +102,6 @@ pub struct Session {
 
 impl Session {
     /// A session whose thread is not started yet. `ready` takes the outcome of the first connection, once.
-    #[must_use]
     pub fn new(
         endpoint: Endpoint,
         clock: impl Into<Clock>,
@@ -115,7 +112,6 @@ impl Session {
     }
 
     /// Whether no connection has given a sample yet: nothing was commanded then, and nothing may be.
-    #[must_use]
     pub fn is_first(&self) -> bool {
         self.ready.is_some()
     }
@@ -127,7 +123,6 @@ impl Session {
     }
 
     /// Nanoseconds since the epoch.
-    #[must_use]
     pub fn now(&self) -> Nanos {
         self.clock.now()
     }
@@ -141,7 +136,6 @@ impl Session {
     }
 
     /// Whether the thread is to end.
-    #[must_use]
     pub fn stopping(&self) -> bool {
         self.stop.load(Ordering::Acquire)
     }

@@ -29,7 +29,6 @@ pub struct InstrumentsSetup {
 
 impl InstrumentsSetup {
     /// A rig without a second switch-off channel and without safety contacts.
-    #[must_use]
     pub const fn new(
         force: Vec<InstrumentSetup>,
         amplifier: InstrumentSetup,
@@ -57,7 +56,7 @@ impl InstrumentsSetup {
 }
 
 /// One instrument: its profile, and where it is.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSetup {
     /// Id of the profile; in a file, also the path of one.
@@ -72,42 +71,32 @@ pub struct InstrumentSetup {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub serial: Option<String>,
     /// Modbus unit, where it is not the profile's.
-    #[serde(default)]
     pub unit: Option<u8>,
     /// CAN identifier that the instrument's are counted from, or CANopen node, where it is not the profile's.
-    #[serde(default)]
     pub base: Option<u32>,
     /// Symbols per second of a serial line, where they are not the profile's.
-    #[serde(default)]
     pub baud: Option<u32>,
     /// Reads per second, where they are not the profile's.
-    #[serde(default)]
     pub rate_hz: Option<f64>,
     /// Amplifiers whose set-point is a voltage or a current: peak-to-peak metres per unit of it, from the
     /// certificate of the plate.
-    #[serde(default)]
     pub amplitude_m_per_unit: Option<f64>,
     /// The same for what they measure.
-    #[serde(default)]
     pub measured_m_per_unit: Option<f64>,
     /// Safety inputs that are wired, by their signals: `emergency_stop`, `interlock`, `dead_man`. Left out:
     /// all that the profile has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wired: Option<Vec<String>>,
     /// Stages that load nothing: the weight that does, in N.
-    #[serde(default)]
     pub dead_weight_n: Option<f64>,
     /// What gives the lateral force. Left out: the signal `lateral`, if the profile has it.
-    #[serde(default)]
     pub lateral: Option<AxisSetup>,
     /// What gives the normal force. Left out: the signal `normal`, if the profile has it.
-    #[serde(default)]
     pub normal: Option<AxisSetup>,
 }
 
 impl InstrumentSetup {
     /// Whether a contact of the instrument has a device on it.
-    #[must_use]
     pub fn is_wired(&self, contact: &str) -> bool {
         self.wired.as_ref().is_none_or(|wired| wired.iter().any(|name| name == contact))
     }
@@ -121,24 +110,8 @@ impl InstrumentSetup {
     }
 
     /// An instrument of that profile at that address, all else by the profile.
-    #[must_use]
     pub fn new(profile: &str, address: &str) -> Self {
-        Self {
-            profile: profile.into(),
-            source: None,
-            address: address.into(),
-            serial: None,
-            unit: None,
-            base: None,
-            baud: None,
-            amplitude_m_per_unit: None,
-            measured_m_per_unit: None,
-            wired: None,
-            dead_weight_n: None,
-            rate_hz: None,
-            lateral: None,
-            normal: None,
-        }
+        Self { profile: profile.into(), address: address.into(), ..Self::default() }
     }
 }
 

@@ -32,7 +32,6 @@ struct Last {
 
 impl DeviceClock {
     /// For a clock that runs round after `modulo_s` seconds.
-    #[must_use]
     pub const fn new(modulo_s: f64) -> Self {
         Self {
             modulo_s,
@@ -101,7 +100,6 @@ const OLD_MEANS_RESET: u32 = 3;
 
 impl Counter {
     /// For a counter that runs round after `modulo` counts.
-    #[must_use]
     pub const fn new(modulo: u64) -> Self {
         Self { modulo, last: None, old_in_a_row: 0 }
     }

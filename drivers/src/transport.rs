@@ -87,7 +87,6 @@ pub enum Transport {
 
 impl Transport {
     /// Whether what comes is parted already, each part whole.
-    #[must_use]
     pub fn is_parted(&self) -> bool {
         matches!(self, Self::Udp(..))
     }

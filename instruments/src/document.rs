@@ -6,7 +6,6 @@ use crate::{Profile, SignalId};
 use std::fmt::Write;
 
 /// The page, in Markdown.
-#[must_use]
 pub fn markdown(profile: &Profile) -> String {
     let d = &profile.description;
     let mut page = format!("# {}\n\n", d.profile.id);

@@ -75,13 +75,11 @@ impl Expression {
     }
 
     /// The value, with the signals' values by index (a missing one counts as not a number).
-    #[must_use]
     pub fn value(&self, signals: &[f64]) -> f64 {
         evaluate(&self.0, signals)
     }
 
     /// Whether the value is true: not zero and a number.
-    #[must_use]
     pub fn holds(&self, signals: &[f64]) -> bool {
         let value = self.value(signals);
         value != 0.0 && !value.is_nan()

@@ -89,13 +89,11 @@ pub struct Field {
 
 impl Field {
     /// The byte after the last.
-    #[must_use]
     pub const fn end(&self) -> usize {
         self.at + self.number.bytes()
     }
 
     /// The number; `None` where the frame is too short for it.
-    #[must_use]
     // The casts between equal widths are the two's complement they look like; the others only drop zeros.
     pub fn read(&self, frame: &[u8]) -> Option<f64> {
         let word = self.word(frame)?;
@@ -113,7 +111,6 @@ impl Field {
     }
 
     /// What stands in the frame, as a whole number: of floating-point numbers the bits, of the others the value.
-    #[must_use]
     // whole numbers of 32 bits are exact
     pub fn counts(&self, frame: &[u8]) -> Option<i64> {
         match self.number {

@@ -37,7 +37,6 @@ pub struct Values(Vec<f64>);
 
 impl Values {
     /// The value in the profile's unit; NaN where it was never decoded.
-    #[must_use]
     pub fn get(&self, signal: SignalId) -> f64 {
         self.0.get(signal.0).copied().unwrap_or(f64::NAN)
     }
@@ -47,7 +46,6 @@ impl Values {
     }
 
     /// All of them, by index.
-    #[must_use]
     pub fn as_slice(&self) -> &[f64] {
         &self.0
     }
@@ -177,44 +175,37 @@ impl Profile {
     }
 
     /// The name that setups use.
-    #[must_use]
     pub fn id(&self) -> &str {
         &self.description.profile.id
     }
 
     /// The signal of that name.
-    #[must_use]
     pub fn signal(&self, name: &str) -> Option<SignalId> {
         self.by_name.get(name).copied().map(SignalId)
     }
 
     /// The set-point of that name.
-    #[must_use]
     pub fn set(&self, name: &str) -> Option<SetId> {
         self.description.set.iter().position(|set| set.name.as_ref() == name).map(SetId)
     }
 
     /// The frame of that name.
-    #[must_use]
     pub fn frame(&self, name: &str) -> Option<FrameId> {
         self.frames.iter().position(|frame| frame.name == name).map(FrameId)
     }
 
     /// All frames: polls, the stream, groups of messages, queries.
-    #[must_use]
     pub fn frames(&self) -> &[Frame] {
         &self.frames
     }
 
     /// How many values a signal has before it runs round, and the SI value of one count.
-    #[must_use]
     pub fn turn(&self, signal: SignalId) -> (f64, f64) {
         let signal = &self.signals[signal.0];
         (signal.place.turns_after(), signal.scale * signal.si_factor)
     }
 
     /// The frame in which a signal stands.
-    #[must_use]
     pub fn frame_of(&self, signal: SignalId) -> FrameId {
         self.signals[signal.0].frame
     }
@@ -229,7 +220,6 @@ impl Profile {
     }
 
     /// Values of all signals, none decoded yet.
-    #[must_use]
     pub fn values(&self) -> Values {
         Values(vec![f64::NAN; self.signals.len()])
     }
@@ -296,7 +286,6 @@ impl Profile {
     /// What the instrument sent for a signal, in its own counts; for `f32` the bits of the number.
     /// Zero where the frame is too short. A signal that is worked out is given in its own smallest steps
     /// ([`Profile::lsb_si`]).
-    #[must_use]
     pub fn raw(&self, signal: SignalId, frame: &[u8], values: &Values) -> i64 {
         match &self.signals[signal.0].place {
             // saturates, and NaN gives zero
@@ -322,20 +311,17 @@ impl Profile {
     }
 
     /// Bytes of a frame.
-    #[must_use]
     pub fn frame_bytes(&self, frame: FrameId) -> usize {
         self.frames[frame.0].bytes
     }
 
     /// A value in SI units.
-    #[must_use]
     pub fn si(&self, signal: SignalId, values: &Values) -> f64 {
         values.get(signal) * self.signals[signal.0].si_factor
     }
 
     /// The smallest change that a signal shows, in SI units, at the scale that holds now: what the profile
     /// states, else one count. NaN where neither is known, as with floats.
-    #[must_use]
     pub fn lsb_si(&self, signal: SignalId, values: &Values) -> f64 {
         if let Some(stated) = self.signals[signal.0].resolution_si {
             return stated;
@@ -349,7 +335,6 @@ impl Profile {
     }
 
     /// Why a decoded value does not count, if it does not.
-    #[must_use]
     pub fn refusal(&self, signal: SignalId, values: &Values) -> Option<Refusal> {
         let value = values.get(signal);
         let signal = &self.signals[signal.0];
@@ -373,13 +358,11 @@ impl Profile {
     }
 
     /// The first signature that does not hold, by index into the description.
-    #[must_use]
     pub fn broken_signature(&self, values: &Values) -> Option<usize> {
         self.signatures.iter().position(|signature| !signature.holds(values.as_slice()))
     }
 
     /// The gravest fault that holds, by index into the description.
-    #[must_use]
     pub fn fault(&self, values: &Values) -> Option<usize> {
         let grave = |index: &usize| match self.description.fault[*index].severity {
             Severity::Stop => 0,
@@ -402,7 +385,6 @@ pub enum Refusal {
 }
 
 /// The function code that reads a table.
-#[must_use]
 pub const fn read_function(table: crate::schema::Table) -> u8 {
     match table {
         crate::schema::Table::Holding => 3,

@@ -34,7 +34,6 @@ pub struct Description {
     #[serde(default)]
     pub poll: Vec<Poll>,
     /// Frames that the instrument sends without a request, after the stream was started.
-    #[serde(default)]
     pub stream: Option<Stream>,
     /// CAN messages that together make one sample.
     #[serde(default)]
@@ -72,7 +71,6 @@ pub struct Description {
 }
 
 /// The JSON Schema of a profile, for editors.
-#[must_use]
 pub fn json_schema() -> schemars::Schema {
     schemars::schema_for!(Description)
 }

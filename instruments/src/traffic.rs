@@ -38,7 +38,6 @@ fn bits_a_byte(format: &str) -> f64 {
 impl Profile {
     /// The share of its line that an instrument's samples take: above 1 they do not fit. `None` for a line
     /// whose capacity nobody states, such as TCP.
-    #[must_use]
     pub fn line_share(&self, setup: LineSetup) -> Option<f64> {
         let d = &self.description;
         let serial = |default: u32| f64::from(setup.baud.or(d.link.baud).unwrap_or(default));

@@ -158,7 +158,6 @@ fn bytes_of(vector: &Vector) -> Result<Vec<u8>, String> {
 }
 
 /// Bytes from hexadecimal digits; spaces are allowed anywhere.
-#[must_use]
 pub fn from_hex(text: &str) -> Option<Vec<u8>> {
     let digits: Option<Vec<u8>> = text
         .chars()

@@ -77,13 +77,11 @@ impl From<Instant> for Clock {
 impl Clock {
     /// A clock for a virtual rig. It runs with the machine until [`Clock::hold_for`] finds that it may be
     /// held.
-    #[must_use]
     pub fn holdable(epoch: Instant) -> Self {
         Clock { epoch, held: Some(Arc::default()) }
     }
 
     /// Time since the epoch. Never blocks: while another thread sets the clock on, it is what it was.
-    #[must_use]
     pub fn now(&self) -> Nanos {
         match &self.held {
             None => nanos(self.epoch.elapsed()),
@@ -111,7 +109,6 @@ impl Clock {
 
     /// A thread of the run: where it may be held the clock waits for it, from now on, and passes what it
     /// promises by `slack` at most.
-    #[must_use]
     pub fn join(&self, slack: Nanos) -> Participant {
         let slot = self.held.as_ref().and_then(|held| held.take_slot());
         let participant = Participant { clock: self.clone(), slot, slack };
@@ -120,7 +117,6 @@ impl Clock {
     }
 
     /// How much time was held back; `None` for a clock that may not be held.
-    #[must_use]
     pub fn held_back(&self) -> Option<HeldBack> {
         let held = self.held.as_ref().filter(|held| held.holds.load(Ordering::Acquire))?;
         let _ = self.now();
@@ -140,19 +136,16 @@ pub struct Participant {
 
 impl Participant {
     /// Time since the epoch.
-    #[must_use]
     pub fn now(&self) -> Nanos {
         self.clock.now()
     }
 
     /// Its clock.
-    #[must_use]
     pub const fn clock(&self) -> &Clock {
         &self.clock
     }
 
     /// Whether its clock may be held.
-    #[must_use]
     pub fn is_held(&self) -> bool {
         self.clock.held.as_ref().is_some_and(|held| held.holds.load(Ordering::Acquire))
     }

@@ -43,10 +43,8 @@ pub struct PassComparison {
     #[serde(default)]
     pub judged: u32,
     /// Root mean square of their residuals in standard deviations; none before the first.
-    #[serde(default)]
     pub rms_z: Option<f64>,
     /// Departure of `mu'`, the same in all of them, that would have been seen by now with a probability of 90 %.
-    #[serde(default)]
     pub visible_departure: Option<f64>,
 }
 

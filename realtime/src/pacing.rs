@@ -48,7 +48,6 @@ pub struct LoopReport {
     /// Lateness quantiles in ns over all deadlines, skipped ones included: 0.5, 0.9, 0.99, 0.999, maximum.
     pub lateness_ns: [u64; 5],
     /// Message of a port's panic, which ended the loop with the drive off; `None` otherwise.
-    #[serde(default)]
     pub panicked: Option<String>,
     /// Lateness counts: upper bound of a bucket in ns, deadlines in it.
     pub histogram: Vec<(u64, u64)>,

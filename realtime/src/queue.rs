@@ -1,4 +1,4 @@
-//! Commands on their way to the loop: a ring that drops its oldest, and a stop that never waits in it.
+//! Commands on their way to the loop, where a stop never waits.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::cycle::Command;
@@ -35,15 +35,6 @@ impl CommandQueue {
             return Ok(());
         }
         self.ring.push(command)
-    }
-
-    /// Puts a command at the end; a full ring drops its oldest, which is returned. A stop drops nothing.
-    pub fn force_push(&self, command: Command) -> Option<Command> {
-        if command == Command::Stop {
-            self.stop();
-            return None;
-        }
-        self.ring.force_push(command)
     }
 
     /// Asks for a stop: the loop's next cycle sees it.
@@ -88,19 +79,5 @@ mod tests {
         assert_eq!((queue.pop(), queue.pop()), (Some(Command::Stop), None));
         queue.push(Command::Reset).unwrap();
         assert_eq!((queue.pop(), queue.pop()), (Some(Command::Reset), None), "one stop is delivered once");
-    }
-
-    #[test]
-    fn a_full_ring_drops_its_oldest_and_never_a_stop() {
-        let queue = CommandQueue::new(2);
-        queue.stop();
-        for held in [true, false, true] {
-            queue.force_push(Command::DeadMan(held));
-        }
-        assert_eq!(queue.pop(), Some(Command::Stop));
-        for held in [true, false, true] {
-            queue.force_push(Command::DeadMan(held));
-        }
-        assert_eq!((queue.pop(), queue.pop()), (Some(Command::DeadMan(false)), Some(Command::DeadMan(true))));
     }
 }

@@ -281,7 +281,7 @@ impl Default for Safety {
 
 impl Safety {
     /// Starts faulted: nothing drives before an explicit reset.
-    pub const fn new() -> Self {
+    pub fn new() -> Self {
         let start =
             Trip { cause: Cause::StartUp, value: 0.0, bound: 0.0, unit: Unit::Flag, cycle: 0, at: Nanos(0) };
         Safety {

@@ -82,7 +82,6 @@ pub struct Row {
     /// Both forces fit for use.
     pub usable: bool,
     /// Something is not as it should be, short of a trip.
-    #[serde(default)]
     pub remark: Option<Remark>,
 }
 

@@ -3,6 +3,7 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
+use drivers::modbus::Registers;
 use models::condition::Condition;
 use models::finger::Finger;
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider};
@@ -163,5 +164,5 @@ fn modbus_round_trip_driver(bencher: Bencher<'_, '_>) {
         link.response_timeout_ms,
     )
     .unwrap();
-    bencher.bench_local(|| wire.read_registers(table, poll.address, poll.count).unwrap());
+    bencher.bench_local(|| wire.read(table, poll.address, poll.count).unwrap());
 }

@@ -39,17 +39,6 @@ impl Embedded {
     pub fn modbus_tcp(&self) -> Option<SocketAddr> {
         self.tcp.first().map(ModbusTcpServer::address)
     }
-
-    /// How many emulators run.
-    #[must_use]
-    pub fn count(&self) -> usize {
-        self.tcp.len()
-            + self.serial.len()
-            + self.can.len()
-            + self.lines.len()
-            + self.streams.len()
-            + self.folders.len()
-    }
 }
 
 /// Serves every instrument of a setup over one world; to other machines only where `everywhere`.

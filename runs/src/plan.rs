@@ -284,10 +284,4 @@ impl Plan {
         let stated = |value: &toml::Value| value.as_str().is_none_or(|text| !text.trim().is_empty());
         self.file.protocol.iter().filter(|(_, v)| stated(v)).map(|(k, v)| (k.clone(), v.clone())).collect()
     }
-
-    /// Amplitudes of the plan, for axes of figures.
-    pub fn amplitudes(&self) -> Vec<PeakToPeak> {
-        let listed = self.file.series.iter().flat_map(|s| s.amplitude_pp_m.iter().copied());
-        listed.chain([self.file.base.amplitude_pp_m]).map(PeakToPeak::from_metres).collect()
-    }
 }

@@ -258,14 +258,6 @@ impl RunDir {
         Placed::open(&path, OpenOptions::new().create_new(true).read(true).write(true))
     }
 
-    /// The record files, oldest first.
-    ///
-    /// # Errors
-    /// Whatever the file system says.
-    pub fn records(&self) -> miette::Result<Vec<PathBuf>> {
-        records_in(&self.path)
-    }
-
     /// Puts a pass into the point table and the journal, synced: after this it is never lost.
     ///
     /// # Errors

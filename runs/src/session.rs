@@ -129,7 +129,6 @@ pub struct Summary {
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
     /// When the machine did not run ordinary threads; `None` in virtual time.
-    #[serde(default)]
     pub stalls: Option<StallReport>,
     /// Time that the clock of a virtual rig was held back while the computer did not run its threads; `None`
     /// where the clock cannot be held.

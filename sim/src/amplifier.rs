@@ -180,12 +180,6 @@ impl Amplifier {
         self.supply_closed
     }
 
-    /// Closes the supply relay again and clears a fault, by hand at the bench.
-    pub fn restore_supply(&mut self) {
-        self.supply_closed = true;
-        self.fault = false;
-    }
-
     /// Moves on to `now`; returns the drive (m peak-to-peak at resonance) and its frequency (Hz).
     pub fn step(&mut self, now: Nanos, room_c: f64, plate_warming_k: f64) -> (f64, f64) {
         if self.output_on && now.since(self.fed_at) > Nanos::from_seconds(self.config.watchdog_s) {

@@ -1,6 +1,6 @@
 //! What can be wrong with this world.
 //!
-//! A defect is a [`Kind`]: a name, a place, its parameters, and what it does at up to four points: to the
+//! A defect is a [`Kind`]: a name, a place, its parameters, and what it does at one of four points: to the
 //! world's set-up, to the plate's amplitude under the finger, to the contact, to the forces on their way to
 //! the sensor. Its formulae are this world's own. Where a library effect bears the same name, the cause is
 //! the same and the formula another.
@@ -88,17 +88,17 @@ pub struct Forces {
     pub normal_n: f64,
 }
 
-/// What a defect does; each hook may be left out.
-#[derive(Clone, Copy, Default)]
-pub struct Act {
+/// What a defect does.
+#[derive(Clone, Copy)]
+enum Act {
     /// Changes the world before it starts.
-    pub setup: Option<fn(&Values, &mut WorldConfig)>,
+    Setup(fn(&Values, &mut WorldConfig)),
     /// Peak-to-peak amplitude under the finger (m) from the one the amplifier knows of.
-    pub plate: Option<fn(&Values, &Surroundings, f64) -> f64>,
+    Plate(fn(&Values, &Surroundings, f64) -> f64),
     /// Changes the contact.
-    pub contact: Option<fn(&Values, &Surroundings, &mut Contact)>,
+    Contact(fn(&Values, &Surroundings, &mut Contact)),
     /// Changes the forces on their way to the sensor.
-    pub forces: Option<fn(&Values, &Surroundings, &mut Forces)>,
+    Forces(fn(&Values, &Surroundings, &mut Forces)),
 }
 
 /// A kind of defect.
@@ -118,11 +118,30 @@ pub struct Kind {
     pub summary: &'static str,
     /// Its parameters, the size first; at most four.
     pub parameters: &'static [Parameter],
-    /// What it does.
-    pub act: Act,
+    act: Act,
 }
 
 impl Kind {
+    /// A cause that a table of steady passes shows and the library has an effect for.
+    const fn cause(name: &'static str, place: Place, summary: &'static str) -> Self {
+        let act = Act::Setup(|_, _| {});
+        Kind {
+            name,
+            place,
+            in_library: true,
+            in_tables: true,
+            imitated: false,
+            summary,
+            parameters: &[],
+            act,
+        }
+    }
+
+    /// A fault of the rig, which is none of the causes that a table shows.
+    const fn fault(name: &'static str, place: Place, summary: &'static str) -> Self {
+        Kind { in_library: false, in_tables: false, ..Self::cause(name, place, summary) }
+    }
+
     /// The kind of a name.
     pub fn named(name: &str) -> Option<&'static Kind> {
         ALL.iter().copied().find(|kind| kind.name == name)
@@ -240,19 +259,17 @@ pub fn compatible(one: &Kind, other: &Kind) -> bool {
 
 impl Defects {
     /// Peak-to-peak amplitude under the finger (m).
-    pub fn plate(&self, at: &Surroundings, mut pp_m: f64) -> f64 {
-        for defect in &self.defects {
-            if let Some(act) = defect.kind.act.plate {
-                pp_m = act(&defect.values, at, pp_m);
-            }
-        }
-        pp_m
+    pub fn plate(&self, at: &Surroundings, pp_m: f64) -> f64 {
+        self.defects.iter().fold(pp_m, |pp_m, defect| match defect.kind.act {
+            Act::Plate(act) => act(&defect.values, at, pp_m),
+            _ => pp_m,
+        })
     }
 
     /// Changes the contact.
     pub fn contact(&self, at: &Surroundings, contact: &mut Contact) {
         for defect in &self.defects {
-            if let Some(act) = defect.kind.act.contact {
+            if let Act::Contact(act) = defect.kind.act {
                 act(&defect.values, at, contact);
             }
         }
@@ -261,7 +278,7 @@ impl Defects {
     /// Changes the forces on their way to the sensor.
     pub fn forces(&self, at: &Surroundings, forces: &mut Forces) {
         for defect in &self.defects {
-            if let Some(act) = defect.kind.act.forces {
+            if let Act::Forces(act) = defect.kind.act {
                 act(&defect.values, at, forces);
             }
         }
@@ -270,7 +287,7 @@ impl Defects {
     /// Changes the world before it starts.
     pub fn setup(&self, config: &mut WorldConfig) {
         for defect in &self.defects {
-            if let Some(act) = defect.kind.act.setup {
+            if let Act::Setup(act) = defect.kind.act {
                 act(&defect.values, config);
             }
         }

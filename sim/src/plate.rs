@@ -65,11 +65,6 @@ impl Plate {
         Self { config, re: 0.0, im: 0.0, warming_k: 0.0, map: Transition::default() }
     }
 
-    /// Time constant of the amplitude (s) at a frequency (Hz).
-    pub fn time_constant_s(&self, frequency_hz: f64) -> f64 {
-        self.config.quality_factor / (PI * frequency_hz)
-    }
-
     /// Moves on by `dt` seconds under a drive that would settle at `drive_pp_m` at resonance.
     /// Returns the peak-to-peak amplitude (m).
     pub fn step(&mut self, drive_pp_m: f64, frequency_hz: f64, dt: f64) -> f64 {

@@ -115,7 +115,6 @@ pub struct Sensor {
     filter: [LowPass; 2],
     wander: [Wander; 2],
     noise: Noise,
-    tick_s: f64,
     sequence: u32,
 }
 
@@ -125,7 +124,7 @@ impl Sensor {
         let mut noise = Noise::new(seed, "sensor");
         let filter = [LowPass::new(config.bandwidth_hz, tick_s); 2];
         let wander = config.wander_sd_n.map(|sd| Wander::new(sd, config.wander_time_s, &mut noise));
-        Self { config, filter, wander, noise, tick_s, sequence: 0 }
+        Self { config, filter, wander, noise, sequence: 0 }
     }
 
     /// Takes in the true forces (N) of one tick; returns what the filter shows.
@@ -157,11 +156,6 @@ impl Sensor {
             device_time: Nanos(now.0.saturating_add_signed((now.0 as f64 * c.clock_drift).round() as i64)),
             taken_at: now,
         }
-    }
-
-    /// Time of one tick (s).
-    pub fn tick_s(&self) -> f64 {
-        self.tick_s
     }
 }
 

@@ -32,7 +32,7 @@ use crate::sensor::{ForceSample, Sensor};
 use crate::stage::{Stage, StageInput, StageStatus};
 
 /// What is true of the world at an instant: for scoring, never for a reader on the rig.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Truth {
     /// Peak-to-peak amplitude under the finger (m).
     pub amplitude_pp_m: f64,
@@ -42,8 +42,6 @@ pub struct Truth {
     pub normal_force_n: f64,
     /// Lateral force on the sensor's side of the pad, before the sensor (N), signed.
     pub lateral_force_n: f64,
-    /// The contact's mean friction limit under steady sliding (N).
-    pub friction_n: f64,
     /// Velocity of the stage (m/s).
     pub velocity_m_s: f64,
     /// Position of the stage (m).
@@ -122,6 +120,7 @@ impl World {
             [config.sensor.sample_period_s, config.amplifier.state_period_s, config.stage.state_period_s]
                 .map(|period| (period / tick_s).round() as u64);
         let faults = &config.defects.channels;
+        let link = |of: &str| Noise::new(seed, of);
         Ok(Self {
             now: Nanos(0),
             tick_s,
@@ -143,31 +142,12 @@ impl World {
             strokes: 0,
             pass_factor: 1.0,
             contact_time_s: 0.0,
-            truth: Truth {
-                amplitude_pp_m: 0.0,
-                frequency_hz: 0.0,
-                normal_force_n: 0.0,
-                lateral_force_n: 0.0,
-                friction_n: 0.0,
-                velocity_m_s: 0.0,
-                position_m: 0.0,
-                contact_fraction: 0.0,
-            },
+            truth: Truth::default(),
             hung: Forces { lateral_n: 0.0, normal_n: 0.0 },
             known_pp_m: 0.0,
-            forces: Gate::new(
-                ChannelName::Force,
-                config.sensor.latency_s,
-                faults,
-                Noise::new(seed, "force link"),
-            ),
-            amplifier_states: Gate::new(
-                ChannelName::Amplifier,
-                0.0,
-                faults,
-                Noise::new(seed, "amplifier link"),
-            ),
-            stage_states: Gate::new(ChannelName::Stage, 0.0, faults, Noise::new(seed, "stage link")),
+            forces: Gate::new(ChannelName::Force, config.sensor.latency_s, faults, link("force link")),
+            amplifier_states: Gate::new(ChannelName::Amplifier, 0.0, faults, link("amplifier link")),
+            stage_states: Gate::new(ChannelName::Stage, 0.0, faults, link("stage link")),
             config,
         })
     }
@@ -224,7 +204,6 @@ impl World {
             frequency_hz: frequency,
             normal_force_n: normal,
             lateral_force_n: lateral,
-            friction_n: steady.lateral_force_n,
             velocity_m_s: velocity,
             position_m: at.position_m,
             contact_fraction: steady.contact_fraction,
@@ -334,11 +313,6 @@ impl World {
         self.amplifier.supply_closed()
     }
 
-    /// Closes the supply relay again and clears the amplifier's fault, by hand at the bench.
-    pub fn restore_supply(&mut self) {
-        self.amplifier.restore_supply();
-    }
-
     /// The hands at the safety contacts.
     pub fn operator(&self) -> Operator {
         self.operator
@@ -377,11 +351,6 @@ impl World {
     /// The air around the rig, to give its chamber a set-point.
     pub fn room_mut(&mut self) -> &mut Room {
         &mut self.room
-    }
-
-    /// Averages computed so far.
-    pub fn computed(&self) -> u64 {
-        self.averager.computed()
     }
 
     /// What is true now: for scoring only.

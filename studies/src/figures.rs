@@ -185,17 +185,12 @@ pub fn velocities(base: RidgeCase, reading: Reading) -> miette::Result<Reproduce
             100.0 * falling,
             100.0 * (1.0 - falling)
         )],
-        charts: vec![Chart {
-            name: reading::file(reading, "fig5"),
-            stated: Vec::new(),
-            title: "Velocity of skin and plate, dry, 1.35 um (Fig. 5)".into(),
-            x: "time_periods".into(),
-            y: "velocity_m_s".into(),
-            series: vec![
-                Series::line("skin", trace(skin, 2, 1.0)),
-                Series::line("plate", trace(&plate, 2, 1.0)),
-            ],
-        }],
+        charts: vec![Chart::new(
+            reading::file(reading, "fig5"),
+            "Velocity of skin and plate, dry, 1.35 um (Fig. 5)",
+            ["time_periods", "velocity_m_s"],
+            vec![Series::line("skin", trace(skin, 2, 1.0)), Series::line("plate", trace(&plate, 2, 1.0))],
+        )],
     })
 }
 
@@ -210,18 +205,16 @@ pub fn loading(base: RidgeCase) -> miette::Result<Reproduced> {
         lines: vec![format!(
             "press at once and settle for {press:.0} us, slide in the quasi-static slip state for {press:.0} us, then vibrate, growing over two periods; paper: this order, with waits whose lengths are not stated"
         )],
-        charts: vec![Chart {
-            name: "fig6".into(),
-            stated: Vec::new(),
-            title: "Loading (Fig. 6), relative to its final value".into(),
-            x: "time_us".into(),
-            y: "share".into(),
-            series: vec![
+        charts: vec![Chart::new(
+            "fig6",
+            "Loading (Fig. 6), relative to its final value",
+            ["time_us", "share"],
+            vec![
                 Series::line("normal load", step(0.0)),
                 Series::line("lateral velocity", step(press)),
                 Series::line("vibration amplitude", vec![(0.0, 0.0), (slide, 0.0), (full, 1.0), (end, 1.0)]),
             ],
-        }],
+        )],
     })
 }
 
@@ -270,18 +263,16 @@ pub fn lateral_force(base: RidgeCase, reading: Reading) -> miette::Result<Reprod
             100.0 * sticks as f64 / n as f64,
             100.0 * result.contact_fraction
         )],
-        charts: vec![Chart {
-            name: reading::file(reading, "fig8"),
-            stated: Vec::new(),
-            title: "Forces in one period, 1.35 um (Fig. 8)".into(),
-            x: "time_periods".into(),
-            y: "force_n".into(),
-            series: vec![
+        charts: vec![Chart::new(
+            reading::file(reading, "fig8"),
+            "Forces in one period, 1.35 um (Fig. 8)",
+            ["time_periods", "force_n"],
+            vec![
                 Series::line("F_reac", trace(normal, 1, scale)),
                 Series::line("mu_0 F_reac", trace(normal, 1, scale * case.mu0)),
                 Series::line("lateral force", trace(lateral, 1, scale)),
             ],
-        }],
+        )],
     })
 }
 
@@ -304,14 +295,12 @@ pub fn parametric_study(study: Study, out: &Path) -> miette::Result<Reproduced> 
             of.map(|(p, k)| (reading.w_m(p.case.amplitude) * 1e6, k.mu_relative)).collect()
         };
         let values = panel.values();
-        charts.push(Chart {
-            name: reading::file(reading, &format!("fig9{letter}")),
-            stated: Vec::new(),
-            title: format!("Relative friction (Fig. 9{letter})"),
-            x: reading::column(reading).into(),
-            y: "mu_relative".into(),
-            series: values.map(|v| Series::line(format!("{} {v}", panel.variable()), curve(v))).into(),
-        });
+        charts.push(Chart::new(
+            reading::file(reading, &format!("fig9{letter}")),
+            format!("Relative friction (Fig. 9{letter})"),
+            [reading::column(reading), "mu_relative"],
+            values.map(|v| Series::line(format!("{} {v}", panel.variable()), curve(v))).into(),
+        ));
         let row = |w: f64| values.map(|v| format!("{:.3}", at(panel, v, w))).join(" ");
         lines.push(format!(
             "({letter}) {} {values:?}: mu' at 1 um {}, at 2.5 um {}, at 5 um {}",

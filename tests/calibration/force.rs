@@ -7,9 +7,8 @@ use calibration::force::matrix::{ForceError, Linearity, Options, Term, fit};
 use calibration::force::series::{LoadReading, Weighing};
 use calibration::force::zero::Zero;
 use calibration::force::{AXES, Axis};
-use calibration::regression::linear;
 use calibration::uncertainty::student::coverage_factor;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 pub fn occasion() -> Occasion {
     Occasion {
@@ -54,7 +53,9 @@ fn cramer_rao(readings: &[LoadReading], bench: &ForceBench, channel: usize) -> D
             }
         }
     });
-    linear::generalised(&design, &DVector::zeros(readings.len()), &covariance).unwrap().covariance
+    // (X' V^-1 X)^-1 of generalised least squares.
+    let whitened = covariance.cholesky().unwrap().solve(&design);
+    (design.transpose() * whitened).try_inverse().unwrap()
 }
 
 #[test]

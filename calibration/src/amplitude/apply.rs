@@ -109,18 +109,18 @@ impl AmplitudeFit {
             temperature_c: None,
             range,
             budget: vec![
-                BudgetLine {
-                    source: "vibrometer, common to all points".into(),
-                    evaluation: Evaluation::B,
-                    standard_uncertainty: self.vibrometer_relative_sd,
-                    unit: "1".into(),
-                },
-                BudgetLine {
-                    source: "repeatability of the gain".into(),
-                    evaluation: Evaluation::A,
-                    standard_uncertainty: gain.fit.standard_uncertainty(0) / gain.fit.estimates[0].abs(),
-                    unit: "1".into(),
-                },
+                BudgetLine::new(
+                    "vibrometer, common to all points",
+                    Evaluation::B,
+                    self.vibrometer_relative_sd,
+                    "1",
+                ),
+                BudgetLine::new(
+                    "repeatability of the gain",
+                    Evaluation::A,
+                    gain.fit.standard_uncertainty(0) / gain.fit.estimates[0].abs(),
+                    "1",
+                ),
             ],
         }
     }
@@ -145,12 +145,6 @@ pub struct AmplitudeCalibration {
     offset: f64,
     bend: f64,
     gain_relative_sd: f64,
-    wave_number: f64,
-    antinode_at_m: f64,
-    standing_share: f64,
-    table_relative: f64,
-    droop: f64,
-    droop_exponent: f64,
 }
 
 impl AmplitudeCalibration {
@@ -181,12 +175,6 @@ impl AmplitudeCalibration {
             offset: value("offset").unwrap_or(0.0),
             bend: value("bend").unwrap_or(0.0),
             gain_relative_sd: gain.standard_uncertainty / gain.value,
-            wave_number,
-            antinode_at_m,
-            standing_share,
-            table_relative,
-            droop: value("droop").unwrap_or(0.0),
-            droop_exponent: setting("droop_exponent").unwrap_or(1.0),
         })
     }
 
@@ -199,28 +187,7 @@ impl AmplitudeCalibration {
     /// The set-point for an amplitude of the free plate at the table's place: the inverse of
     /// [`AmplitudeCalibration::free_amplitude`]. `None` beyond where a bent curve still rises.
     pub fn free_set_point(&self, amplitude: PeakToPeak) -> Option<f64> {
-        self.inverse(amplitude.metres() - self.offset)
-    }
-
-    /// Peak-to-peak amplitude under the finger for a set-point, a position and a normal force.
-    pub fn amplitude(&self, set_point: f64, position_m: f64, normal_force_n: f64) -> PeakToPeak {
-        let free = self.free_amplitude(set_point).metres();
-        PeakToPeak::from_metres(free * self.relative(position_m, normal_force_n))
-    }
-
-    /// The set-point for an amplitude under the finger: the inverse of [`AmplitudeCalibration::amplitude`].
-    /// `None` at a node, or beyond where a bent curve still rises.
-    pub fn set_point(&self, amplitude: PeakToPeak, position_m: f64, normal_force_n: f64) -> Option<f64> {
-        let relative = self.relative(position_m, normal_force_n);
-        let free = amplitude.metres() / relative - self.offset;
-        if relative < 1e-3 {
-            return None;
-        }
-        self.inverse(free)
-    }
-
-    /// The set-point for an amplitude net of the offset.
-    fn inverse(&self, free: f64) -> Option<f64> {
+        let free = amplitude.metres() - self.offset;
         if self.bend == 0.0 {
             return Some(free / self.gain);
         }
@@ -231,11 +198,5 @@ impl AmplitudeCalibration {
     /// Relative standard uncertainty of the gain: what the diagnosis takes as `amplitude_gain_sd`.
     pub fn gain_relative_sd(&self) -> f64 {
         self.gain_relative_sd
-    }
-
-    fn relative(&self, position_m: f64, normal_force_n: f64) -> f64 {
-        let wave = (self.wave_number * (position_m - self.antinode_at_m)).cos().abs();
-        let shape = (1.0 - self.standing_share * (1.0 - wave)) / self.table_relative;
-        shape / (1.0 + self.droop * normal_force_n.max(0.0).powf(self.droop_exponent))
     }
 }

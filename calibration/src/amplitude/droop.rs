@@ -27,8 +27,6 @@ impl Exponent {
 /// A fitted droop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Droop {
-    /// Peak-to-peak amplitude without load in m with its standard uncertainty.
-    pub free_pp_m: [f64; 2],
     /// `d` in 1/N^p with its standard uncertainty.
     pub coefficient: [f64; 2],
     /// The exponent.
@@ -66,9 +64,7 @@ pub fn droop(points: &[AmplitudePoint], exponent: Exponent) -> Result<Droop, Amp
             remedy: "try the other exponent, and look at the drive's limit",
         });
     }
-    let free = fit.estimates[0].exp();
     Ok(Droop {
-        free_pp_m: [free, free * fit.standard_uncertainty(0)],
         coefficient: [fit.estimates[1], fit.standard_uncertainty(1)],
         exponent,
         largest_n: points.iter().fold(0f64, |m, p| m.max(p.at)),

@@ -11,26 +11,17 @@ use std::f64::consts::PI;
 /// A fitted mode shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModeShape {
-    /// Peak-to-peak amplitude at an antinode in m with its standard uncertainty.
-    pub antinode_pp_m: [f64; 2],
     /// Position of the antinode next to the middle of the map in m with its standard uncertainty.
     pub antinode_at_m: [f64; 2],
     /// Wavelength in m (twice the distance of two nodes) with its standard uncertainty.
     pub wavelength_m: [f64; 2],
     /// Standing share `d` with its standard uncertainty.
     pub standing_share: [f64; 2],
-    /// The fit, parameters in this order; residuals relative to the amplitude.
+    /// The fit, parameters in this order after the amplitude at an antinode in m; residuals relative to the
+    /// amplitude.
     pub fit: Fit,
     /// First and last position.
     pub range_m: [f64; 2],
-}
-
-impl ModeShape {
-    /// Amplitude at a position relative to that at the antinode.
-    pub fn relative(&self, position_m: f64) -> f64 {
-        let wave = (2.0 * PI * (position_m - self.antinode_at_m[0]) / self.wavelength_m[0]).cos().abs();
-        1.0 - self.standing_share[0] * (1.0 - wave)
-    }
 }
 
 /// Fits a map: `at` is the position in m; the scatter is taken as proportional to the amplitude above a floor.
@@ -85,14 +76,7 @@ pub fn mode_shape(points: &[AmplitudePoint]) -> Result<ModeShape, AmplitudeError
     fit.covariance = &to_antinode * &fit.covariance * to_antinode.transpose();
     fit.estimates[0] *= top;
     let pair = |k: usize| [fit.estimates[k], fit.standard_uncertainty(k)];
-    Ok(ModeShape {
-        antinode_pp_m: pair(0),
-        antinode_at_m: pair(1),
-        wavelength_m: pair(2),
-        standing_share: pair(3),
-        range_m,
-        fit,
-    })
+    Ok(ModeShape { antinode_at_m: pair(1), wavelength_m: pair(2), standing_share: pair(3), range_m, fit })
 }
 
 fn misfit(model: &impl Fn(usize, &[f64], &mut [f64]) -> f64, y: &[f64], b: &[f64; 4]) -> f64 {

@@ -11,13 +11,6 @@ pub struct Resonance {
     pub frequency_hz: [f64; 2],
     /// Quality factor with its standard uncertainty.
     pub quality_factor: [f64; 2],
-    /// Peak-to-peak amplitude at resonance in m with its standard uncertainty.
-    pub peak_pp_m: [f64; 2],
-    /// Tilt of the curve with its standard uncertainty: relative change of the drive per relative change of
-    /// frequency. Near -1/2 where a constant force drives a displacement, 0 for a pure Lorentzian.
-    pub tilt: [f64; 2],
-    /// Relative residual standard deviation.
-    pub residual_relative_sd: f64,
     /// Degrees of freedom.
     pub degrees_of_freedom: f64,
 }
@@ -47,18 +40,16 @@ pub fn sweep(points: &[AmplitudePoint]) -> Result<Resonance, AmplitudeError> {
     let wide = points.iter().filter(|p| p.amplitude_pp_m > 0.707 * top.amplitude_pp_m);
     let [low, high] = wide.fold([top.at, top.at], |[a, b], p| [a.min(p.at), b.max(p.at)]);
     let fit = best(points, &top, (high - low).max(1e-5 * top.at))?;
-    let (q, w0) = (fit.estimates[1].exp(), fit.estimates[2].exp());
+    let q = fit.estimates[1].exp();
     Ok(Resonance {
         frequency_hz: [fit.estimates[0], fit.standard_uncertainty(0)],
         quality_factor: [q, q * fit.standard_uncertainty(1)],
-        peak_pp_m: [w0, w0 * fit.standard_uncertainty(2)],
-        tilt: [fit.estimates[3], fit.standard_uncertainty(3)],
-        residual_relative_sd: fit.residual_sd(),
         degrees_of_freedom: fit.degrees_of_freedom,
     })
 }
 
-/// Parameters: f0, ln Q, ln w0, tilt; amplitudes weighted by their scatter.
+/// Parameters: f0, ln Q, ln w0, tilt (near -1/2 where a constant force drives a displacement, 0 for a pure
+/// Lorentzian); amplitudes weighted by their scatter.
 fn best(points: &[AmplitudePoint], top: &AmplitudePoint, width: f64) -> Result<Fit, FitError> {
     let scatter = relative_scatter(points);
     let y: Vec<f64> = points.iter().zip(&scatter).map(|(p, s)| p.amplitude_pp_m / s).collect();

@@ -70,14 +70,8 @@ fn scaled(text: &str, unit: char) -> Option<f64> {
 pub struct Sine {
     /// Amplitude of the velocity in m/s.
     pub velocity_m_s: f64,
-    /// Its standard uncertainty from the residuals.
-    pub velocity_sd_m_s: f64,
     /// Phase in rad at the first sample, the decoder's delay taken off: `v cos(2 pi f t + phase)`.
     pub phase_rad: f64,
-    /// Its standard uncertainty in rad.
-    pub phase_sd_rad: f64,
-    /// What the sine leaves, in m/s.
-    pub residual_sd_m_s: f64,
     /// Frequency in Hz.
     pub frequency_hz: f64,
 }
@@ -101,19 +95,10 @@ pub fn sine(volts: &[f64], rate_hz: f64, frequency_hz: f64, decoder: &Decoder) -
     let design = DMatrix::from_fn(volts.len(), 3, |i, k| [angle(i).cos(), -angle(i).sin(), 1.0][k]);
     let fit: Fit = linear::ordinary(&design, &DVector::from_column_slice(volts))?;
     let (c, s) = (fit.estimates[0], fit.estimates[1]);
-    let amplitude = c.hypot(s);
-    let k = decoder.range_m_s_per_v;
     Ok(Sine {
-        velocity_m_s: amplitude * k,
-        velocity_sd_m_s: fit.standard_uncertainty_along(&[c / amplitude, s / amplitude, 0.0]) * k,
+        velocity_m_s: c.hypot(s) * decoder.range_m_s_per_v,
         // The signal shows what the surface did one delay ago.
         phase_rad: s.atan2(c) + 2.0 * PI * frequency_hz * decoder.delay_s,
-        phase_sd_rad: fit.standard_uncertainty_along(&[
-            -s / (amplitude * amplitude),
-            c / (amplitude * amplitude),
-            0.0,
-        ]),
-        residual_sd_m_s: fit.residual_sd() * k,
         frequency_hz,
     })
 }

@@ -21,7 +21,6 @@ pub struct FrictionPoint {
     /// Lateral force along the sliding in N, positive.
     pub lateral_force_n: f64,
     /// Time since the finger touched down in s.
-    #[serde(default)]
     pub contact_time_s: Option<f64>,
 }
 

@@ -48,20 +48,24 @@ impl ForceFit {
         let type_a = |a: Axis| {
             self.index(a, Term::Gain(a)).map_or(f64::NAN, |i| self.type_a[(i, i)].sqrt() / gain(a).abs())
         };
-        let line = |source: String, evaluation, standard_uncertainty, unit: &str| BudgetLine {
-            source,
-            evaluation,
-            standard_uncertainty,
-            unit: unit.into(),
-        };
         let mut budget = vec![
-            line("free fall, common to all loads".into(), Evaluation::B, weighing.gravity_relative_sd, "1"),
-            line("masses, common to all loads".into(), Evaluation::B, weighing.mass_relative_sd, "1"),
+            BudgetLine::new(
+                "free fall, common to all loads",
+                Evaluation::B,
+                weighing.gravity_relative_sd,
+                "1",
+            ),
+            BudgetLine::new("masses, common to all loads", Evaluation::B, weighing.mass_relative_sd, "1"),
         ];
         for a in AXES {
-            budget.push(line(format!("repeatability of the {a} gain"), Evaluation::A, type_a(a), "1"));
+            budget.push(BudgetLine::new(
+                format!("repeatability of the {a} gain"),
+                Evaluation::A,
+                type_a(a),
+                "1",
+            ));
             let sd = weighing.alignment_sd_rad[a as usize];
-            budget.push(line(format!("direction of the {a} pull"), Evaluation::B, sd, "rad"));
+            budget.push(BudgetLine::new(format!("direction of the {a} pull"), Evaluation::B, sd, "rad"));
         }
         Outcome {
             kind: Kind::Force,
@@ -215,11 +219,6 @@ impl ForceCalibration {
     /// Whether a force is in the range that was calibrated.
     pub fn in_range(&self, force_n: [f64; 2]) -> bool {
         (0..2).all(|a| (self.range_n[a][0]..=self.range_n[a][1]).contains(&force_n[a]))
-    }
-
-    /// Cross-talk: newtons that each axis shows for a newton on the other one, before correction.
-    pub fn cross_talk(&self) -> [f64; 2] {
-        [self.gain[(0, 1)] / self.gain[(0, 0)], self.gain[(1, 0)] / self.gain[(1, 1)]]
     }
 
     /// Relative standard uncertainty of the gains, lateral and normal, and standard uncertainty of the two

@@ -39,11 +39,8 @@ pub fn outcome(model: &str, findings: &[Finding], residuals: Residuals, remarks:
             ci95: [value - half, value + half],
         }
     };
-    let line = |f: &Finding| BudgetLine {
-        source: format!("statistics of {}", f.name),
-        evaluation: Evaluation::A,
-        standard_uncertainty: f.estimate[1],
-        unit: f.unit.into(),
+    let line = |f: &Finding| {
+        BudgetLine::new(format!("statistics of {}", f.name), Evaluation::A, f.estimate[1], f.unit)
     };
     let n = findings.len();
     Outcome {

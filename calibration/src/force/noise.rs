@@ -92,16 +92,6 @@ impl Spectrum {
         Some(Spectrum { resolution_hz: rate_hz / length as f64, density, segments })
     }
 
-    /// Variance within a band of frequencies in Hz.
-    pub fn variance(&self, low_hz: f64, high_hz: f64) -> f64 {
-        self.density
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| (low_hz..=high_hz).contains(&(*k as f64 * self.resolution_hz)))
-            .map(|(_, d)| d * self.resolution_hz)
-            .sum()
-    }
-
     /// Median density: the level of the white noise, lines and drift aside. (The median of a mean of `m`
     /// exponential variables is about `1 - 1/(3 m)` of its mean.)
     pub fn white_level(&self) -> f64 {

@@ -101,17 +101,12 @@ pub struct SeriesError {
 struct Row {
     time_s: f64,
     axis: String,
-    #[serde(default)]
     mass_kg: Option<f64>,
-    #[serde(default)]
     load_n: Option<f64>,
     lateral_counts: f64,
     normal_counts: f64,
-    #[serde(default)]
     branch: Option<Branch>,
-    #[serde(default)]
     temperature_c: Option<f64>,
-    #[serde(default)]
     saturated: Option<u8>,
 }
 

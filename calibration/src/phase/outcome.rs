@@ -69,11 +69,11 @@ pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outco
         },
         temperature_c: None,
         range: BTreeMap::from([("amplitude_pp_m".into(), range)]),
-        budget: vec![BudgetLine {
-            source: "delays of the decoders, common to all".into(),
-            evaluation: Evaluation::B,
-            standard_uncertainty: common.sqrt(),
-            unit: "deg".into(),
-        }],
+        budget: vec![BudgetLine::new(
+            "delays of the decoders, common to all",
+            Evaluation::B,
+            common.sqrt(),
+            "deg",
+        )],
     }
 }

@@ -27,15 +27,10 @@ pub struct PhasePoint {
 struct Row {
     amplitude_pp_m: f64,
     phase_shift_deg: f64,
-    #[serde(default)]
     phase_shift_sd_deg: Option<f64>,
-    #[serde(default)]
     repeats: Option<u32>,
-    #[serde(default)]
     condition: Option<String>,
-    #[serde(default)]
     frequency_hz: Option<f64>,
-    #[serde(default)]
     normal_force_n: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Linear least squares: ordinary, and generalised with a covariance of the observations.
+//! Linear least squares: ordinary, and of observations whose variance is known.
 
 use super::double_double::DoubleDouble;
 use super::{Fit, FitError};
@@ -26,29 +26,6 @@ pub fn unit_variance(design: &DMatrix<f64>, observations: &DVector<f64>) -> Resu
         return Err(FitError::TooFew { observations: design.nrows(), parameters: design.ncols() });
     }
     solve(design, observations)
-}
-
-/// Generalised least squares: the covariance of the observations is known and not rescaled by the fit.
-/// `residual_sum_of_squares` of the answer is the chi squared of the whitened residuals.
-///
-/// # Errors
-/// As [`ordinary`] (as many rows as parameters are allowed), or a covariance not positive definite.
-pub fn generalised(
-    design: &DMatrix<f64>,
-    observations: &DVector<f64>,
-    covariance: &DMatrix<f64>,
-) -> Result<Fit, FitError> {
-    if design.nrows() < design.ncols() {
-        return Err(FitError::TooFew { observations: design.nrows(), parameters: design.ncols() });
-    }
-    let lower = covariance.clone().cholesky().ok_or(FitError::Covariance)?.unpack();
-    let white = |m: &DMatrix<f64>| lower.solve_lower_triangular(m).ok_or(FitError::Covariance);
-    let white_design = white(design)?;
-    let white_observations =
-        white(&DMatrix::from_column_slice(observations.len(), 1, observations.as_slice()))?;
-    let mut fit = solve(&white_design, &white_observations.column(0).into_owned())?;
-    fit.residuals = observations - design * &fit.estimates;
-    Ok(fit)
 }
 
 /// The common part: estimates, `(X'X)^-1`, residuals.
@@ -138,26 +115,5 @@ mod tests {
         let design = DMatrix::from_fn(6, 3, |i, j| [1.0, i as f64, 2.0 * i as f64 + 3.0][j]);
         let y = DVector::from_fn(6, |i, _| i as f64);
         assert_eq!(ordinary(&design, &y), Err(FitError::Singular { parameter: 2 }));
-    }
-
-    #[test]
-    fn generalised_with_equal_variances_equals_ordinary_estimates() {
-        let design = DMatrix::from_fn(8, 2, |i, j| if j == 0 { 1.0 } else { i as f64 });
-        let y = DVector::from_fn(8, |i, _| 3.0 + 0.5 * i as f64 + if i % 2 == 0 { 0.1 } else { -0.1 });
-        let plain = ordinary(&design, &y).unwrap();
-        let known = generalised(&design, &y, &(DMatrix::identity(8, 8) * 0.01)).unwrap();
-        assert!((plain.estimates - known.estimates).norm() < 1e-12);
-        // Closed form for a line: var(slope) = sigma^2 / sum (x - mean)^2, with sum = 42.
-        assert!((known.covariance[(1, 1)] - 0.01 / 42.0).abs() < 1e-15);
-    }
-
-    #[test]
-    fn correlated_observations_give_the_closed_form_mean() {
-        // Two readings of one quantity, sds 1 and 2, correlation 0.5: weights (v2 - c, v1 - c) / (v1 + v2 - 2c).
-        let cov = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 1.0, 4.0]);
-        let fit = generalised(&DMatrix::from_element(2, 1, 1.0), &DVector::from_vec(vec![10.0, 13.0]), &cov)
-            .unwrap();
-        assert!((fit.estimates[0] - 10.0).abs() < 1e-12, "all weight on the first");
-        assert!((fit.covariance[(0, 0)] - 1.0).abs() < 1e-12);
     }
 }

@@ -1,6 +1,6 @@
-//! Coverage factors, and the binomial test by which stated coverage is judged.
+//! Coverage factors, and the F test.
 
-use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, FisherSnedecor, Normal, StudentsT};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 
 /// The factor `k` such that `value +- k u` has that coverage probability, for a t distribution.
 /// Degrees of freedom below one are taken as one; infinite ones give the Gaussian.
@@ -17,15 +17,6 @@ pub fn f_test_p_value(ratio: f64, numerator_dof: f64, denominator_dof: f64) -> f
     FisherSnedecor::new(numerator_dof, denominator_dof).map_or(f64::NAN, |f| f.sf(ratio.max(0.0)))
 }
 
-/// Two-sided p value of `hits` of `trials` at probability `p`: twice the smaller tail, at most one.
-pub fn binomial_p_value(hits: u64, trials: u64, p: f64) -> f64 {
-    Binomial::new(p, trials).map_or(f64::NAN, |b| {
-        let lower = b.cdf(hits);
-        let upper = if hits == 0 { 1.0 } else { b.sf(hits - 1) };
-        (2.0 * lower.min(upper)).min(1.0)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -39,12 +30,5 @@ mod tests {
             assert!((coverage_factor(0.99, nu) - t99).abs() < 0.006);
         }
         assert!((coverage_factor(0.95, f64::INFINITY) - 1.960).abs() < 5e-4);
-    }
-
-    #[test]
-    fn binomial_p_values_by_hand() {
-        // 10 fair coins: P(<= 1) = 11/1024, so two-sided 22/1024.
-        assert!((binomial_p_value(1, 10, 0.5) - 22.0 / 1024.0).abs() < 1e-12);
-        assert_eq!(binomial_p_value(5, 10, 0.5), 1.0);
     }
 }

@@ -2,16 +2,13 @@
 
 mod studies;
 
+use super::prelude::*;
 use ::studies::progress::Study;
 use ::studies::validation::blind::distance::by_cause;
 use ::studies::validation::blind::reliability::{diagram, identifiable};
-use ::studies::validation::blind::{Scored, confusion, figures, run as score_all};
+use ::studies::validation::blind::{Scored, Settings, confusion, figures, run as score_all};
 use diagnosis::constants::Constants;
 use diagnosis::hypotheses::Options;
-use miette::IntoDiagnostic;
-use runs::{out, say};
-use sim::sealed::Stratum;
-use std::process::ExitCode;
 use std::sync::Arc;
 
 /// Score the diagnosis on sealed sets of the independent simulation.
@@ -20,18 +17,8 @@ pub struct Args {
     /// Number of sets.
     #[arg(long, default_value_t = 100)]
     pub sets: usize,
-    /// Seed of the first set.
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
-    /// One stratum only: none, single, pair, alias or outside; all in their shares without it.
-    #[arg(long)]
-    pub stratum: Option<String>,
-    /// Try single effects only.
-    #[arg(long)]
-    pub no_pairs: bool,
-    /// Leave an effect out of the library (may be repeated).
-    #[arg(long, value_name = "EFFECT")]
-    pub without: Vec<String>,
+    #[command(flatten)]
+    pub of: Settings,
     /// Write the sets to this folder (open and sealed parts apart) for other diagnosers; none is scored.
     #[arg(long, value_name = "DIR")]
     pub write: Option<std::path::PathBuf>,
@@ -63,17 +50,9 @@ pub struct Args {
 /// Makes, diagnoses and scores the sets.
 ///
 /// # Errors
-/// An unknown stratum.
+/// No thread or no signals for Ctrl-C, a set that cannot be made or written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    let stratum = match args.stratum.as_deref() {
-        None => None,
-        Some("none") => Some(Stratum::None),
-        Some("single") => Some(Stratum::Single),
-        Some("pair") => Some(Stratum::Pair),
-        Some("alias") => Some(Stratum::Alias),
-        Some("outside") => Some(Stratum::Outside),
-        Some(other) => miette::bail!("--stratum {other}: none, single, pair, alias or outside is needed"),
-    };
+    let stratum = args.of.stratum;
     if let Some(folder) = &args.write {
         let (sets, to) = (args.sets, folder.display().to_string());
         let study = Study::begin(sets as u64, "sets", move |_: Vec<()>, done| {
@@ -83,7 +62,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 out!("partial: {done} of {sets} sets are in {to}");
             }
         })?;
-        for set in ::studies::validation::blind::sets(args.seed, sets, stratum) {
+        for set in ::studies::validation::blind::sets(args.of.seed, sets, stratum) {
             let name = format!("{:06}", set.label.seed % 1_000_003);
             set.write(&folder.join("open").join(&name), &folder.join("sealed").join(&name))
                 .into_diagnostic()?;
@@ -110,8 +89,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let options = Options {
         constants: Arc::new(constants),
-        pairs: !args.no_pairs,
-        without: args.without.clone(),
+        pairs: !args.of.no_pairs,
+        without: args.of.without.clone(),
         ..Options::default()
     };
     if let Some(kind) = args.noise.as_deref() {
@@ -120,7 +99,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(picked) = args.sensitivity.as_deref() {
         return studies::sensitivity(&args, picked, stratum, &options, json);
     }
-    let (seed, sets) = (args.seed, args.sets);
+    let (seed, sets) = (args.of.seed, args.sets);
     let study = Study::begin(sets as u64, "sets", move |scored: Vec<Scored>, done| {
         if !json {
             out!("partial: {done} of {sets} sets");

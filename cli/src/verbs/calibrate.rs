@@ -1,13 +1,10 @@
 //! `muprime calibrate force|amplitude|latency|phase|finger|creep|gravity|noise|step|tap ...`: data in, a certificate out.
 
+use super::prelude::*;
 use calibration::certificate::Certificate;
-use miette::IntoDiagnostic;
 use rig::bench::AtTheBench;
 use runs::calibrate::{Issued, What, certified, verify};
-use runs::out;
 use runs::report::human::{number, to_its_uncertainty};
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -57,7 +54,7 @@ fn write(issued: &Issued, json: bool) -> miette::Result<ExitCode> {
     } else {
         show(&issued.certificate, out);
     }
-    super::exit(super::DONE)
+    exit(DONE)
 }
 
 fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
@@ -75,7 +72,7 @@ fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
     } else {
         out!("[calibration]\n{}", toml::to_string(&priors).into_diagnostic()?.trim_end());
     }
-    super::exit(super::DONE)
+    exit(DONE)
 }
 
 fn show(certificate: &Certificate, out: &Path) {

@@ -1,11 +1,7 @@
 //! `muprime case`: one range of a study's cases.
 
-use super::{DONE, FAILED, exit};
-use miette::IntoDiagnostic;
-use runs::out;
+use super::prelude::*;
 use std::ops::Range;
-use std::path::PathBuf;
-use std::process::ExitCode;
 use studies::cases::study::{Study, program};
 use studies::cases::worker::{Done, work};
 

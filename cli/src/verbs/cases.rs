@@ -1,15 +1,10 @@
 //! `muprime cases`: writes files of cases.
 
-use super::{DONE, exit};
-use miette::{Context, IntoDiagnostic};
+use super::prelude::*;
 use models::ridge::Steady;
-use runs::out;
 use serde::Serialize;
 use serde_json::Value;
-use sim::sealed::Stratum;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use studies::cases::file::{self, Header, SCHEMA};
 use studies::cases::kinds::{self, blind, diagnose, faults, finger, noop, ridge, table};
 use studies::validation::faults::Pace;
@@ -101,18 +96,8 @@ struct Blind {
     /// Number of sets
     #[arg(long, default_value_t = 100)]
     sets: u64,
-    /// Seed of the benchmark
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// One stratum only: none, single, pair, alias or outside
-    #[arg(long, value_parser = stratum_of)]
-    stratum: Option<Stratum>,
-    /// Try single effects only
-    #[arg(long)]
-    no_pairs: bool,
-    /// Leave an effect out of the library (may be repeated)
-    #[arg(long, value_name = "EFFECT")]
-    without: Vec<String>,
+    #[command(flatten)]
+    settings: blind::Settings,
 }
 
 #[derive(Debug, clap::Args)]
@@ -127,12 +112,8 @@ struct Diagnose {
     /// One rig.toml for all; without it, that beside each table
     #[arg(long)]
     rig: Option<PathBuf>,
-    /// Try single effects only
-    #[arg(long)]
-    no_pairs: bool,
-    /// Leave an effect out of the library (may be repeated)
-    #[arg(long, value_name = "EFFECT")]
-    without: Vec<String>,
+    #[command(flatten)]
+    settings: diagnose::Settings,
 }
 
 #[derive(Debug, clap::Args)]
@@ -165,14 +146,8 @@ struct Noop {
     /// How many cases
     #[arg(long)]
     cases: u64,
-    /// Hashes of each: some five million a second
-    #[arg(long, default_value_t = 0)]
-    hashes: u64,
-}
-
-fn stratum_of(text: &str) -> Result<Stratum, String> {
-    serde_json::from_value(Value::String(text.into()))
-        .map_err(|_| "none, single, pair, alias or outside is needed".to_string())
+    #[command(flatten)]
+    settings: noop::Settings,
 }
 
 /// Files that were named, absolute: a study may stand elsewhere.
@@ -294,22 +269,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             let settings = faults::Settings { first: a.first, pairs: a.pairs, pace };
             write("faults", &a.to, a.seeds, &settings, None, json)
         }
-        What::Blind(a) => {
-            let settings = blind::Settings {
-                seed: a.seed,
-                stratum: a.stratum,
-                no_pairs: a.no_pairs,
-                without: a.without,
-            };
-            write("blind", &a.to, a.sets, &settings, None, json)
-        }
+        What::Blind(a) => write("blind", &a.to, a.sets, &a.settings, None, json),
         What::Diagnose(a) => {
             let rig = a.rig.map(|p| named(&[p], None)).transpose()?.and_then(|mut all| all.pop());
             let line = |data| serde_json::to_value(diagnose::Line { data, rig: rig.clone() });
             let lines = named(&a.data, a.list.as_deref())?.into_iter().map(|p| of(p, &line));
             let lines: Vec<Value> = lines.collect::<miette::Result<_>>()?;
-            let settings = diagnose::Settings { no_pairs: a.no_pairs, without: a.without };
-            write("diagnose", &a.to, 0, &settings, Some(&lines), json)
+            write("diagnose", &a.to, 0, &a.settings, Some(&lines), json)
         }
         What::Finger(a) => {
             let (frequency_hz, normal_force_n) = (a.frequency_hz, a.normal_force_n);
@@ -323,6 +289,6 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             };
             write("finger", &a.to, 0, &settings, Some(&lines), json)
         }
-        What::Noop(a) => write("noop", &a.to, a.cases, &noop::Settings { hashes: a.hashes }, None, json),
+        What::Noop(a) => write("noop", &a.to, a.cases, &a.settings, None, json),
     }
 }

@@ -1,10 +1,8 @@
 //! `muprime check FILE...`: says what is wrong with files of any kind, and whether a plan can run on a setup.
 
+use super::prelude::*;
 use runs::print::folded;
 use runs::setup::Setup;
-use runs::{out, say};
-use std::path::PathBuf;
-use std::process::ExitCode;
 use tables::check::{Good, On, kind_of, problems_of};
 
 /// Arguments.
@@ -50,7 +48,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         (Some(_), None) => miette::bail!(help = "name it with --setup", "--model is judged on a setup"),
     };
     let on = On { setup, model, ports: (!args.offline).then_some(rig::free_ports::free) };
-    let mut worst = super::DONE;
+    let mut worst = DONE;
     for file in &args.files {
         let verdict = tables::check::file(file, &on);
         if json {
@@ -76,10 +74,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             }
         }
         if verdict.is_err() {
-            worst = super::REFUSED;
+            worst = REFUSED;
         }
     }
-    super::exit(worst)
+    exit(worst)
 }
 
 fn causes(error: &miette::Report) -> Vec<String> {

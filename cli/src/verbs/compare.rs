@@ -1,12 +1,10 @@
 //! `muprime compare RUN_A RUN_B [RUN]...`: two runs side by side, or more of them by groups.
 
+use super::prelude::*;
 use runs::compare::Compared;
 use runs::compare::groups::{GroupBy, Grouped, MOST_COMPARED};
 use runs::print::folded;
-use runs::{out, say};
 use std::fmt::Write;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Most conditions in the table, those furthest apart first.
 const PRINTED: usize = 5;
@@ -51,7 +49,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     } else {
         out!("{}", folded(&terminal(&compared), 2));
     }
-    super::exit(super::DONE)
+    exit(DONE)
 }
 
 /// Compares more than two runs, or two groups of them.
@@ -68,7 +66,7 @@ fn run_groups(args: &Args, json: bool) -> miette::Result<ExitCode> {
     }
     if json {
         out!("{}", serde_json::json!(grouped));
-        return super::exit(super::DONE);
+        return exit(DONE);
     }
     let mut text = grouped.warnings.iter().map(|w| format!("note: {w}\n")).collect::<String>();
     let _ = writeln!(text, "{}", grouped.words());
@@ -77,7 +75,7 @@ fn run_groups(args: &Args, json: bool) -> miette::Result<ExitCode> {
         let _ = writeln!(text, "{}: runs {}, mu_0 {}", group.name, group.runs.len(), mu0.join(", "));
     }
     out!("{}", folded(text.trim_end(), 2));
-    super::exit(super::DONE)
+    exit(DONE)
 }
 
 /// The comparison for people.

@@ -1,8 +1,7 @@
 //! `muprime completions SHELL`.
 
+use super::prelude::*;
 use clap_complete::Shell;
-use runs::out;
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -19,5 +18,5 @@ pub fn run(args: &Args, command: &mut clap::Command) -> miette::Result<ExitCode>
     let mut script = Vec::new();
     clap_complete::generate(args.shell, command, "muprime", &mut script);
     out!("{}", String::from_utf8_lossy(&script).trim_end());
-    super::exit(super::DONE)
+    exit(DONE)
 }

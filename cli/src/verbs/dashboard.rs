@@ -1,11 +1,9 @@
 //! `muprime dashboard`: the rig, the catalogue and the reports in a browser.
 
+use super::prelude::*;
 use rig::dashboard::{Dashboard, LISTEN, Options};
 use runs::catalogue::runs_folder;
-use runs::{out, say};
 use std::net::SocketAddr;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]

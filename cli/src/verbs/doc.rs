@@ -1,9 +1,6 @@
 //! `muprime doc profile FILE`: what an instrument reads and writes, as a page.
 
-use miette::IntoDiagnostic;
-use runs::out;
-use std::path::Path;
-use std::process::ExitCode;
+use super::prelude::*;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -39,5 +36,5 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     } else {
         out!("{}", page.trim_end());
     }
-    super::exit(super::DONE)
+    exit(DONE)
 }

@@ -2,10 +2,10 @@
 
 mod peek;
 
+use super::prelude::*;
 use realtime::pacing;
 use rig::doctor::{Finding, Target};
 use rig::emulators::Embedded;
-use runs::out;
 use runs::plan::Plan;
 use runs::print::folded;
 use runs::setup::Setup;
@@ -13,7 +13,6 @@ use serde::Serialize;
 use sim::wire::SharedPlant;
 use sim::wire::world::WorldPlant;
 use sim::world::World;
-use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 /// Arguments.
@@ -94,7 +93,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             }
         }
     }
-    super::exit(if good { super::DONE } else { super::FAILED })
+    exit(if good { DONE } else { FAILED })
 }
 
 /// Judges the machine.
@@ -104,13 +103,12 @@ fn judge(seconds: f64) -> (Vec<Finding>, Option<Lateness>) {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let (_, loaded) = measure(seconds, cores);
     let mut findings = machine(&grants);
-    findings.push(Finding {
-        subject: "lateness under load".into(),
-        good: loaded[2] < 500.0,
-        found: format!("99.9 % {:.0} us, worst {:.0} us", loaded[2], loaded[3]),
-        advice: "use a PREEMPT_RT kernel, isolate a core (isolcpus, nohz_full), no virtual machine".into(),
-        ..Finding::default()
-    });
+    findings.push(Finding::new(
+        "lateness under load",
+        loaded[2] < 500.0,
+        format!("99.9 % {:.0} us, worst {:.0} us", loaded[2], loaded[3]),
+        "use a PREEMPT_RT kernel, isolate a core (isolcpus, nohz_full), no virtual machine",
+    ));
     (findings, Some(Lateness { idle, loaded, quantiles: [0.5, 0.99, 0.999, 1.0] }))
 }
 
@@ -156,84 +154,60 @@ fn machine(grants: &pacing::Grants) -> Vec<Finding> {
     let group = std::path::Path::new("/sys/fs/cgroup/cpu/cpu.rt_runtime_us").exists();
     let slack = read("/proc/self/timerslack_ns");
     let virtual_machine = read("/proc/cpuinfo").is_some_and(|c| c.contains("hypervisor"));
+    let class = match &grants.policy_refused {
+        None => format!("{} at priority {}, read back", grants.policy, grants.priority),
+        Some(why) => format!("{}; SCHED_FIFO was refused: {why}", grants.policy),
+    };
+    let lock = grants.lock_refused.as_ref().map_or("granted".into(), |why| format!("refused: {why}"));
+    let kernel = format!("{kernel}, {}", if preempt_rt { "PREEMPT_RT" } else { "not PREEMPT_RT" });
+    let throttled = throttle.as_deref() != Some("0");
+    let throttle = throttle.map_or("not readable".into(), |t| format!("sched_rt_runtime_us = {t}"));
+    let slack = slack.map_or("not readable".into(), |s| {
+        format!("{s} ns for ordinary threads; the loop sets its own to 1 ns")
+    });
+    let performs = governor.as_deref().is_none_or(|g| g == "performance");
+    let governor = governor.unwrap_or_else(|| "no frequency governor is visible".into());
+    let host = if virtual_machine { "yes: its host may hold it up for milliseconds" } else { "no" };
+    let can = if std::path::Path::new("/proc/net/can").exists() {
+        "the kernel has SocketCAN"
+    } else {
+        "the kernel has no SocketCAN (slcan over a serial port needs none)"
+    };
     vec![
-        Finding {
-            subject: "scheduling class".into(),
-            good: fifo,
-            found: match &grants.policy_refused {
-                None => format!("{} at priority {}, read back", grants.policy, grants.priority),
-                Some(why) => format!("{}; SCHED_FIFO was refused: {why}", grants.policy),
-            },
-            advice: "give the user RLIMIT_RTPRIO (limits.d: '@realtime - rtprio 98') or CAP_SYS_NICE".into(),
-            ..Finding::default()
-        },
-        Finding {
-            subject: "memory lock".into(),
-            good: grants.memory_locked,
-            found: match &grants.lock_refused {
-                None => "granted".into(),
-                Some(why) => format!("refused: {why}"),
-            },
-            advice: "give the user RLIMIT_MEMLOCK (limits.d: '@realtime - memlock unlimited')".into(),
-            ..Finding::default()
-        },
-        Finding {
-            subject: "kernel".into(),
-            good: preempt_rt,
-            found: format!("{kernel}, {}", if preempt_rt { "PREEMPT_RT" } else { "not PREEMPT_RT" }),
-            advice: "install a PREEMPT_RT kernel (Debian: linux-image-rt-amd64)".into(),
-            ..Finding::default()
-        },
-        Finding {
-            subject: "real-time throttling".into(),
-            good: throttle.as_deref() != Some("0"),
-            found: throttle.map_or("not readable".into(), |t| format!("sched_rt_runtime_us = {t}")),
-            advice: "0 forbids real-time threads; set kernel.sched_rt_runtime_us to 950000".into(),
-            ..Finding::default()
-        },
-        Finding {
-            subject: "real-time group scheduling".into(),
-            good: !group,
-            found: if group { "in force" } else { "not in force" }.into(),
-            advice: "outside the root group SCHED_FIFO may be taken away silently: give the group rt_runtime"
-                .into(),
-            ..Finding::default()
-        },
-        Finding {
-            subject: "timer slack".into(),
-            good: true,
-            found: slack.map_or("not readable".into(), |s| {
-                format!("{s} ns for ordinary threads; the loop sets its own to 1 ns")
-            }),
-            advice: String::new(),
-            ..Finding::default()
-        },
-        Finding {
-            subject: "CPU frequency".into(),
-            good: governor.as_deref().is_none_or(|g| g == "performance"),
-            found: governor.unwrap_or_else(|| "no frequency governor is visible".into()),
-            advice: "set the governor to 'performance'".into(),
-            ..Finding::default()
-        },
-        Finding {
-            subject: "virtual machine".into(),
-            good: !virtual_machine,
-            found: if virtual_machine { "yes: its host may hold it up for milliseconds" } else { "no" }
-                .into(),
-            advice: "run a real rig on a machine of its own".into(),
-            ..Finding::default()
-        },
-        Finding {
-            subject: "CAN".into(),
-            good: true,
-            found: if std::path::Path::new("/proc/net/can").exists() {
-                "the kernel has SocketCAN".into()
-            } else {
-                "the kernel has no SocketCAN (slcan over a serial port needs none)".into()
-            },
-            advice: String::new(),
-            ..Finding::default()
-        },
+        Finding::new(
+            "scheduling class",
+            fifo,
+            class,
+            "give the user RLIMIT_RTPRIO (limits.d: '@realtime - rtprio 98') or CAP_SYS_NICE",
+        ),
+        Finding::new(
+            "memory lock",
+            grants.memory_locked,
+            lock,
+            "give the user RLIMIT_MEMLOCK (limits.d: '@realtime - memlock unlimited')",
+        ),
+        Finding::new(
+            "kernel",
+            preempt_rt,
+            kernel,
+            "install a PREEMPT_RT kernel (Debian: linux-image-rt-amd64)",
+        ),
+        Finding::new(
+            "real-time throttling",
+            throttled,
+            throttle,
+            "0 forbids real-time threads; set kernel.sched_rt_runtime_us to 950000",
+        ),
+        Finding::new(
+            "real-time group scheduling",
+            !group,
+            if group { "in force" } else { "not in force" },
+            "outside the root group SCHED_FIFO may be taken away silently: give the group rt_runtime",
+        ),
+        Finding::new("timer slack", true, slack, ""),
+        Finding::new("CPU frequency", performs, governor, "set the governor to 'performance'"),
+        Finding::new("virtual machine", !virtual_machine, host, "run a real rig on a machine of its own"),
+        Finding::new("CAN", true, can, ""),
     ]
 }
 

@@ -1,8 +1,6 @@
 //! `muprime export RUN --to csv|parquet|arrow|hdf5|mcap|ro-crate`.
 
-use runs::{out, say};
-use std::path::PathBuf;
-use std::process::ExitCode;
+use super::prelude::*;
 use tables::export::facts::Stated;
 use tables::export::{Format, export};
 
@@ -35,5 +33,5 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         say!("{} passes: {}", run.passes.len(), out.display());
         run.damage.iter().for_each(|d| say!("{d}"));
     }
-    super::exit(super::DONE)
+    exit(DONE)
 }

@@ -1,9 +1,6 @@
 //! `muprime faults`: the fault list in virtual time, from seeds.
 
-use miette::IntoDiagnostic;
-use runs::out;
-use std::path::PathBuf;
-use std::process::ExitCode;
+use super::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 use studies::validation::faults::Pace;
 use studies::validation::faults::bench::{Scene, run as run_scene};
@@ -45,7 +42,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         let found = run_scene(&scene, true);
         out!("{}", serde_json::to_string(&found).into_diagnostic()?);
-        return super::exit(if found.wrong.is_empty() { super::DONE } else { super::FAILED });
+        return exit(if found.wrong.is_empty() { DONE } else { FAILED });
     }
     let Args { seeds, first, pairs, twice, default_limits, .. } = args;
     let pace = if default_limits { Pace::Default } else { Pace::Fast };
@@ -96,7 +93,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             out!("  again: muprime faults --scene FILE, with {}", json_of(&failure.smallest)?);
         }
     }
-    super::exit(if tally.failed == 0 { super::DONE } else { super::FAILED })
+    exit(if tally.failed == 0 { DONE } else { FAILED })
 }
 
 fn json_of(value: &impl serde::Serialize) -> miette::Result<String> {

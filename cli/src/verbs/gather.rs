@@ -1,10 +1,6 @@
 //! `muprime gather`: the results of a study as one table.
 
-use super::{DONE, exit};
-use miette::IntoDiagnostic;
-use runs::{out, say};
-use std::path::PathBuf;
-use std::process::ExitCode;
+use super::prelude::*;
 use studies::cases::gather::gather;
 use studies::cases::study::Study;
 

@@ -1,14 +1,12 @@
 //! `muprime import FILE --map '...' -o DIR`: a foreign table made into a point table.
 
-use miette::IntoDiagnostic;
+use super::prelude::*;
 use models::covariate;
 use runs::files::{make_folder, write_whole};
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
 use runs::report::human::number;
 use runs::{ask, out, say};
 use std::io::IsTerminal;
-use std::path::PathBuf;
-use std::process::ExitCode;
 use tables::import::guess::guess;
 use tables::import::map::Map;
 use tables::import::{Cut, Grid, Imported, Marks, Wanted, guessed_lines, import, read};
@@ -125,7 +123,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     write_whole(&args.out.join("import.json"), &written)?;
     if json {
         out!("{}", serde_json::to_string(&log).into_diagnostic()?);
-        return super::exit(super::DONE);
+        return exit(DONE);
     }
     say!("{source}: {}; {} rows", log.format, log.rows);
     for range in &log.ranges {
@@ -165,7 +163,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         args.out.join("points.csv").display(),
         args.out.display()
     );
-    super::exit(super::DONE)
+    exit(DONE)
 }
 
 /// The map that was stated, or the guessed one once it is confirmed.

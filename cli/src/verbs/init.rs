@@ -1,10 +1,7 @@
 //! `muprime init KIND`: a commented file to begin with.
 
-use miette::IntoDiagnostic;
+use super::prelude::*;
 use runs::files::write_whole;
-use runs::{out, say};
-use std::path::PathBuf;
-use std::process::ExitCode;
 use tables::schemas::init::{Kind, text};
 
 /// Arguments.
@@ -25,7 +22,7 @@ pub fn run(args: &Args) -> miette::Result<ExitCode> {
     let text = text(args.kind);
     let Some(path) = &args.out else {
         out!("{}", text.trim_end());
-        return super::exit(super::DONE);
+        return exit(DONE);
     };
     if path.exists() {
         miette::bail!(help = "give another name with --out", "{} is there already", path.display());
@@ -34,5 +31,5 @@ pub fn run(args: &Args) -> miette::Result<ExitCode> {
     write_whole(path, text)?;
     write_whole(&schema, serde_json::to_string_pretty(&args.kind.schema()).into_diagnostic()?)?;
     say!("{} and {}; next: muprime check {}", path.display(), schema.display(), path.display());
-    super::exit(super::DONE)
+    exit(DONE)
 }

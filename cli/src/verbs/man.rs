@@ -1,10 +1,7 @@
 //! `muprime man DIR`: manual pages.
 
-use miette::IntoDiagnostic;
+use super::prelude::*;
 use runs::files::{make_folder, write_whole};
-use runs::say;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -23,7 +20,7 @@ pub fn run(args: &Args, command: &clap::Command) -> miette::Result<ExitCode> {
     command.build();
     let count = pages(&command, "muprime", &args.folder)?;
     say!("{count} pages in {}", args.folder.display());
-    super::exit(super::DONE)
+    exit(DONE)
 }
 
 fn pages(command: &clap::Command, name: &str, folder: &Path) -> miette::Result<usize> {

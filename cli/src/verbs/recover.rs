@@ -1,13 +1,10 @@
 //! `muprime recover FILE`: makes a cut or damaged record whole in place, and keeps the original beside it.
 
-use miette::{IntoDiagnostic, WrapErr};
+use super::prelude::*;
 use realtime::recorder::{self, Integrity, Recovery};
 use runs::files::{self, Placed};
-use runs::{out, say};
 use std::fs::{self, File};
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -44,7 +41,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 say!("{}: {messages} messages saved; the original is {}", shown(), original.display());
                 tell(&found);
             }
-            super::exit(super::DONE)
+            exit(DONE)
         }
         other => {
             fs::remove_file(&part).into_diagnostic()?;
@@ -66,7 +63,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                         say!("{}: whole, nothing to do", shown());
                         tell(&found);
                     }
-                    super::exit(super::DONE)
+                    exit(DONE)
                 }
             }
         }

@@ -1,16 +1,13 @@
 //! `muprime replay`: a recorded run through the same cycle again.
 
-use miette::{IntoDiagnostic, WrapErr};
+use super::prelude::*;
 use models::prediction::{FrictionModel, SpringSlider};
 use realtime::recorder::{CYCLES, Entry, Integrity, Reader, inspect};
 use realtime::replay::{Replay, replay};
 use runs::run_dir::{missing_records, records_in};
 use runs::session::{REPLAYABLE, Replayable};
-use runs::{out, say};
 use std::fs::File;
 use std::io::BufReader;
-use std::path::PathBuf;
-use std::process::ExitCode;
 use std::sync::Arc;
 
 /// Arguments.
@@ -59,7 +56,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     for sentence in gone {
         say!("{sentence}");
     }
-    super::exit(if holds { super::DONE } else { super::FAILED })
+    exit(if holds { DONE } else { FAILED })
 }
 
 fn tell(found: &Found) {

@@ -1,11 +1,8 @@
 //! `muprime runs`: the runs of a folder, and their tags and notes.
 
-use miette::IntoDiagnostic;
+use super::prelude::*;
 use runs::catalogue::{Annotations, RunEntry, SortBy, existing, runs_folder, sort};
-use runs::out;
 use runs::print::folded;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -52,7 +49,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             out!("tags: {tags}");
             out!("note: {}", if annotations.note.is_empty() { "none" } else { &annotations.note });
         }
-        return super::exit(super::DONE);
+        return exit(DONE);
     }
     let folder = args.folder.unwrap_or_else(runs_folder);
     let mut runs = existing(&folder)?;
@@ -62,13 +59,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     sort(&mut runs, args.sort);
     if json {
         out!("{}", serde_json::to_string(&runs).into_diagnostic()?);
-        return super::exit(super::DONE);
+        return exit(DONE);
     }
     for r in runs {
         out!("{:40} {:>5}/{:<5} {}", r.folder, r.passes, r.planned, r.outcome_words());
         out!("{}", folded(&format!("  {}", details(&r)), 4));
     }
-    super::exit(super::DONE)
+    exit(DONE)
 }
 
 /// The tags and the note after the changes; written only where there are any.

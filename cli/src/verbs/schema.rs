@@ -1,8 +1,6 @@
 //! `muprime schema KIND`: the JSON Schema of a kind of file.
 
-use miette::IntoDiagnostic;
-use runs::out;
-use std::process::ExitCode;
+use super::prelude::*;
 use tables::schemas::schema::Kind;
 
 /// Arguments.
@@ -18,5 +16,5 @@ pub struct Args {
 /// None.
 pub fn run(args: &Args) -> miette::Result<ExitCode> {
     out!("{}", serde_json::to_string_pretty(&args.kind.schema()).into_diagnostic()?);
-    super::exit(super::DONE)
+    exit(DONE)
 }

@@ -2,11 +2,9 @@
 
 mod sample;
 
+use super::prelude::*;
 use runs::print::folded;
-use runs::{out, say};
 use sample::Sample;
-use std::path::PathBuf;
-use std::process::ExitCode;
 use tables::schemas::bundled::all;
 
 /// Arguments.
@@ -58,5 +56,5 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
             }
         }
     }
-    super::exit(super::DONE)
+    exit(DONE)
 }

@@ -1,18 +1,15 @@
 //! `muprime virtual-rig`: the simulated rig behind real protocols.
 
+use super::prelude::*;
 use drivers::InstrumentsSetup;
 use instruments::schema::LinkKind;
-use miette::{IntoDiagnostic, WrapErr};
 use runs::setup::Setup;
-use runs::{out, say};
 use sim::wire::serial::SerialEmulator;
 use sim::wire::world::{Hands, WorldPlant};
 use sim::wire::{Quantity, SharedPlant};
 use sim::world::World;
 use std::io::BufRead;
 use std::net::SocketAddr;
-use std::path::PathBuf;
-use std::process::ExitCode;
 use std::time::Instant;
 
 /// Arguments.
@@ -117,7 +114,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             .into_diagnostic()?;
     let _ = signals.forever().next();
     drop((line, embedded, vibrometer));
-    super::exit(super::DONE)
+    exit(DONE)
 }
 
 /// Does what the lines of the standard input say, until they end; the rig goes on.

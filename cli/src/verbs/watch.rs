@@ -1,13 +1,10 @@
 //! `muprime watch RUN`: follows a run, at a terminal with the live view, else line by line from its journal.
 
-use miette::{IntoDiagnostic, WrapErr};
+use super::prelude::*;
 use rig::watch::{Lead, Watch};
 use runs::catalogue::{existing, runs_folder};
-use runs::out;
 use runs::sequence::MeasuredPass;
 use std::io::{BufRead, BufReader, IsTerminal};
-use std::path::PathBuf;
-use std::process::ExitCode;
 use std::time::Duration;
 
 /// Arguments.
@@ -37,7 +34,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if !json && std::io::stdout().is_terminal() && rig::terminal::has_keys().is_ok() {
         leave_on_signals()?;
         Watch::begin(&run, Lead::Other, false)?.wait();
-        return super::exit(super::DONE);
+        return exit(DONE);
     }
     let mut reader = BufReader::new(file);
     let mut line = String::new();
@@ -52,7 +49,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             line.clear();
         }
         if !running {
-            return super::exit(super::DONE);
+            return exit(DONE);
         }
         std::thread::sleep(Duration::from_millis(200));
     }
@@ -64,7 +61,7 @@ fn leave_on_signals() -> miette::Result<()> {
     let mut caught = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]).into_diagnostic()?;
     let leave = move || {
         if caught.forever().next().is_some() {
-            runs::leave::leave_now(super::DONE);
+            runs::leave::leave_now(DONE);
         }
     };
     std::thread::Builder::new().name("signals".into()).spawn(leave).into_diagnostic()?;

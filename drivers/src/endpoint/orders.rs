@@ -169,13 +169,11 @@ impl Endpoint {
     }
 
     /// Whether what was handed out last drives or moves.
-    #[must_use]
     pub fn wants_on(&self) -> bool {
         self.orders.wanted.as_ref().is_some_and(|wanted| wanted.on)
     }
 
     /// The set-points that make the rig safe, those that switch off first; they may be sent at any time.
-    #[must_use]
     pub fn safe_set_points(&self) -> Vec<(SetId, f64)> {
         safe_set_points(&self.profile)
     }
@@ -202,7 +200,6 @@ impl Endpoint {
     }
 
     /// What the instrument is to the rig.
-    #[must_use]
     pub fn role(&self) -> Role {
         match self.part {
             Part::Force { .. } => Role::Force,
@@ -214,19 +211,16 @@ impl Endpoint {
     }
 
     /// Whether there is anything to switch off: a drive, a stage or a supply that takes safe set-points.
-    #[must_use]
     pub fn is_actuator(&self) -> bool {
         !self.role().only_measures() && !self.safe_set_points().is_empty()
     }
 
     /// Whether the instrument may be on: it was driven, or showed itself on, and has not shown 'off' since.
-    #[must_use]
     pub fn owes_off(&self) -> bool {
         self.is_actuator() && (self.orders.driven || self.orders.shown.is_some_and(|(on, _)| on))
     }
 
     /// Whether the instrument has shown 'off' after the last 'off' that it was sent.
-    #[must_use]
     pub fn reads_off(&self) -> bool {
         self.orders.shown_off() && !self.orders.driven
     }

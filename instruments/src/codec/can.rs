@@ -14,13 +14,11 @@ pub struct CanFrame {
 impl CanFrame {
     /// A frame with a standard identifier; `None` where the identifier has more than 11 bits or there
     /// are more than 8 bytes.
-    #[must_use]
     pub fn new(id: u32, data: &[u8]) -> Option<Self> {
         Self::build(id, false, data)
     }
 
     /// A frame of either kind; `None` where it cannot be.
-    #[must_use]
     pub fn build(id: u32, extended: bool, data: &[u8]) -> Option<Self> {
         let most = if extended { 0x1FFF_FFFF } else { 0x7FF };
         if id > most || data.len() > 8 {
@@ -32,14 +30,12 @@ impl CanFrame {
     }
 
     /// The data.
-    #[must_use]
     pub fn data(&self) -> &[u8] {
         &self.data[..usize::from(self.length)]
     }
 }
 
 /// The letter that sets an adapter's bit rate; `None` for one that the protocol does not know.
-#[must_use]
 pub fn slcan_speed(bits_per_second: u32) -> Option<u8> {
     let speeds = [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
     speeds
@@ -49,7 +45,6 @@ pub fn slcan_speed(bits_per_second: u32) -> Option<u8> {
 }
 
 /// A frame as the adapter's line, with its end.
-#[must_use]
 pub fn slcan_line(frame: &CanFrame) -> Vec<u8> {
     use std::fmt::Write;
     let mut line = if frame.extended { format!("T{:08X}", frame.id) } else { format!("t{:03X}", frame.id) };

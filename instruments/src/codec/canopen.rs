@@ -17,15 +17,8 @@ pub enum Nmt {
 }
 
 /// The frame of a network command.
-#[must_use]
 pub fn nmt(command: Nmt, node: u8) -> CanFrame {
     frame(0, &[command as u8, node])
-}
-
-/// The synchronisation frame.
-#[must_use]
-pub fn sync() -> CanFrame {
-    frame(0x80, &[])
 }
 
 fn frame(id: u32, data: &[u8]) -> CanFrame {
@@ -33,14 +26,12 @@ fn frame(id: u32, data: &[u8]) -> CanFrame {
 }
 
 /// Asks for an object.
-#[must_use]
 pub fn sdo_read(node: u8, index: u16, sub: u8) -> CanFrame {
     let [low, high] = index.to_le_bytes();
     frame(0x600 + u32::from(node), &[0x40, low, high, sub, 0, 0, 0, 0])
 }
 
 /// Writes an object of 1, 2 or 4 bytes.
-#[must_use]
 pub fn sdo_write(node: u8, index: u16, sub: u8, bytes: u8, value: i64) -> CanFrame {
     let [low, high] = index.to_le_bytes();
     let unused = 4 - bytes.clamp(1, 4);
@@ -62,7 +53,6 @@ pub enum SdoAnswer {
 }
 
 /// The answer in `frame` to a request for that object; `None` where it is something else.
-#[must_use]
 pub fn sdo_answer(frame: &CanFrame, node: u8, index: u16, sub: u8) -> Option<SdoAnswer> {
     let data: [u8; 8] = frame.data().try_into().ok()?;
     let same = frame.id == 0x580 + u32::from(node) && data[1..3] == index.to_le_bytes() && data[3] == sub;
@@ -91,7 +81,6 @@ pub enum SdoRequest {
 }
 
 /// The request in `frame`; `None` where it is none for this node, or not expedited.
-#[must_use]
 pub fn sdo_request(frame: &CanFrame, node: u8) -> Option<SdoRequest> {
     let data: [u8; 8] = frame.data().try_into().ok()?;
     if frame.id != 0x600 + u32::from(node) || frame.extended {
@@ -111,7 +100,6 @@ pub fn sdo_request(frame: &CanFrame, node: u8) -> Option<SdoRequest> {
 }
 
 /// The node's answer.
-#[must_use]
 pub fn sdo_reply(node: u8, index: u16, sub: u8, bytes: u8, answer: SdoAnswer) -> CanFrame {
     let [low, high] = index.to_le_bytes();
     let (command, value) = match answer {
@@ -125,7 +113,6 @@ pub fn sdo_reply(node: u8, index: u16, sub: u8, bytes: u8, answer: SdoAnswer) ->
 }
 
 /// The node's heartbeat: 0 boot-up, 4 stopped, 5 operational, 127 pre-operational.
-#[must_use]
 pub fn heartbeat(node: u8, state: u8) -> CanFrame {
     frame(0x700 + u32::from(node), &[state])
 }
@@ -164,7 +151,6 @@ impl DriveState {
     ];
 
     /// The state that a status word tells; `None` for a word that tells none.
-    #[must_use]
     pub fn of(status: u16) -> Option<Self> {
         Self::TABLE.iter().find(|(mask, value, _)| status & mask == *value).map(|(.., state)| *state)
     }

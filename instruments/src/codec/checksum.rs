@@ -219,7 +219,6 @@ impl Check {
 }
 
 /// CRC-16/MODBUS.
-#[must_use]
 pub fn crc16_modbus(bytes: &[u8]) -> u16 {
     CRC16_MODBUS.checksum(bytes)
 }

@@ -235,7 +235,6 @@ fn place(
 
 impl DbcMessage {
     /// The signal that says which others are there.
-    #[must_use]
     pub fn selector(&self) -> Option<DbcSignal> {
         self.signals.values().find(|signal| signal.multiplex == Multiplex::Selector).copied()
     }
@@ -243,7 +242,6 @@ impl DbcMessage {
 
 impl DbcSignal {
     /// Its bits, all set, at the low end.
-    #[must_use]
     pub const fn mask(&self) -> u64 {
         if self.size >= 64 { u64::MAX } else { (1 << self.size) - 1 }
     }
@@ -268,7 +266,6 @@ impl DbcSignal {
     }
 
     /// The value; `None` where the frame is too short.
-    #[must_use]
     // a force of more than 53 bits does not exist
     pub fn read(&self, frame: &[u8]) -> Option<f64> {
         let raw = self.raw(frame)?;
@@ -282,7 +279,6 @@ impl DbcSignal {
     }
 
     /// The raw number; `None` where the frame is too short.
-    #[must_use]
     pub fn raw(&self, frame: &[u8]) -> Option<i64> {
         let mut word: u64 = 0;
         for (significance, bit) in self.bits().enumerate() {

@@ -34,7 +34,6 @@ pub struct Object {
 
 impl Object {
     /// How it is stored; `None` for texts, domains and numbers of more than 32 bits.
-    #[must_use]
     pub const fn number(&self) -> Option<NumberType> {
         match self.data_type {
             1 | 5 => Some(NumberType::U8),
@@ -49,7 +48,6 @@ impl Object {
     }
 
     /// Whether it can be written.
-    #[must_use]
     pub fn writable(&self) -> bool {
         matches!(self.access.as_str(), "wo" | "rw" | "rwr" | "rww")
     }

@@ -59,7 +59,6 @@ fn closed(mut body: Vec<u8>) -> Vec<u8> {
 }
 
 /// Asks for registers by function 3 or 4, or for bits by function 1 or 2.
-#[must_use]
 pub fn read(unit: u8, function: u8, address: u16, count: u16) -> Request {
     let mut body = vec![unit, function];
     body.extend(address.to_be_bytes());
@@ -70,7 +69,6 @@ pub fn read(unit: u8, function: u8, address: u16, count: u16) -> Request {
 }
 
 /// Writes neighbouring coils by function 15: those whose register is not zero are closed.
-#[must_use]
 pub fn write_coils(unit: u8, address: u16, registers: &[u16]) -> Request {
     let count = u16::try_from(registers.len()).unwrap_or(u16::MAX);
     let mut body = vec![unit, 15];
@@ -82,7 +80,6 @@ pub fn write_coils(unit: u8, address: u16, registers: &[u16]) -> Request {
 }
 
 /// Registers of 0 and not 0 as bits, the first in the lowest bit of the first byte.
-#[must_use]
 pub fn to_bits(registers: &[u16]) -> Vec<u8> {
     let byte =
         |eight: &[u16]| eight.iter().rev().fold(0, |byte, register| byte << 1 | u8::from(*register != 0));
@@ -90,14 +87,12 @@ pub fn to_bits(registers: &[u16]) -> Vec<u8> {
 }
 
 /// Bits as registers of 0 and 1; as many as `count` of them.
-#[must_use]
 pub fn from_bits(bits: &[u8], count: usize) -> Vec<u16> {
     let each = bits.iter().flat_map(|byte| (0..8).map(move |bit| u16::from(byte >> bit & 1)));
     each.take(count).collect()
 }
 
 /// Writes neighbouring registers by function 16.
-#[must_use]
 pub fn write(unit: u8, address: u16, registers: &[u16]) -> Request {
     let count = u16::try_from(registers.len()).unwrap_or(u16::MAX);
     let mut body = vec![unit, 16];
@@ -109,7 +104,6 @@ pub fn write(unit: u8, address: u16, registers: &[u16]) -> Request {
 }
 
 /// A request by a function of the maker's own: `data` follows the function code.
-#[must_use]
 pub fn custom(unit: u8, function: u8, data: &[u8], answer_length: usize) -> Request {
     let mut body = vec![unit, function];
     body.extend(data);
@@ -117,7 +111,6 @@ pub fn custom(unit: u8, function: u8, data: &[u8], answer_length: usize) -> Requ
 }
 
 /// How many bytes the answer that begins with `start` has; `None` until two bytes are there.
-#[must_use]
 pub fn answer_length(request: &Request, start: &[u8]) -> Option<usize> {
     let function = *start.get(1)?;
     Some(if function == request.bytes[1] | 0x80 { EXCEPTION_LENGTH } else { request.answer_length })
@@ -219,7 +212,6 @@ pub enum Heard {
 
 /// Looks for a request at the start of `bytes`; `own` are the functions of the maker's own, whose
 /// requests have one byte of data.
-#[must_use]
 pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
     let Some(&function) = bytes.get(1) else { return Heard::Incomplete };
     let length = match function {
@@ -261,7 +253,6 @@ pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
 }
 
 /// The answer that gives registers, as bits where the function is one of bits.
-#[must_use]
 pub fn give(unit: u8, function: u8, registers: &[u16]) -> Vec<u8> {
     if function <= 2 {
         let bits = to_bits(registers);
@@ -274,7 +265,6 @@ pub fn give(unit: u8, function: u8, registers: &[u16]) -> Vec<u8> {
 }
 
 /// The answer that confirms a write: the first four bytes after the function of the request.
-#[must_use]
 pub fn confirm(unit: u8, function: u8, address: u16, second: u16) -> Vec<u8> {
     let mut body = vec![unit, function];
     body.extend(address.to_be_bytes());
@@ -283,20 +273,17 @@ pub fn confirm(unit: u8, function: u8, address: u16, second: u16) -> Vec<u8> {
 }
 
 /// The answer to a function of the maker's own.
-#[must_use]
 pub fn acknowledge(unit: u8, function: u8, data: u8) -> Vec<u8> {
     closed(vec![unit, function, data])
 }
 
 /// The answer that refuses.
-#[must_use]
 pub fn refuse(unit: u8, function: u8, exception: u8) -> Vec<u8> {
     closed(vec![unit, function | 0x80, exception])
 }
 
 /// The silence that parts two frames: 3.5 characters of 11 bits, and 1.75 ms above 19200 baud, in s
 /// (Modbus over serial line, 2.5.1.1).
-#[must_use]
 pub fn silence_s(baud: u32) -> f64 {
     if baud > 19_200 { 1.75e-3 } else { 3.5 * 11.0 / f64::from(baud.max(1)) }
 }

@@ -24,7 +24,6 @@ pub enum Form {
 
 impl Form {
     /// The smallest difference between two numbers; `None` where the form does not say.
-    #[must_use]
     pub fn step(&self) -> Option<f64> {
         match self {
             Self::Decimal(decimals) => decimals.map(|decimals| 10_f64.powi(-i32::from(decimals))),
@@ -176,7 +175,6 @@ impl Pattern {
     }
 
     /// What every such line begins with.
-    #[must_use]
     pub fn head(&self) -> &str {
         match self.0.first() {
             Some(Part::Literal(text)) => text,
@@ -185,7 +183,6 @@ impl Pattern {
     }
 
     /// Characters that a line has at the least.
-    #[must_use]
     pub fn least_length(&self) -> usize {
         let length = |part: &Part| match part {
             Part::Literal(text) => text.len(),
@@ -196,7 +193,6 @@ impl Pattern {
     }
 
     /// The numbers of a line; `None` where it is no such line. Spaces at its ends do not count.
-    #[must_use]
     pub fn read(&self, line: &str) -> Option<Vec<f64>> {
         let (mut rest, mut values) = (line.trim(), Vec::new());
         let last = self.0.len().saturating_sub(1);
@@ -224,7 +220,6 @@ impl Pattern {
 
     /// The line that has these numbers; those whose form states no decimals have `decimals` of them. A number
     /// that is missing is zero.
-    #[must_use]
     pub fn write(&self, values: &[f64], decimals: u8) -> String {
         let mut values = values.iter().copied();
         let write = |part: &Part| match part {

@@ -25,7 +25,6 @@ pub struct Shape {
 
 impl Shape {
     /// What keeps bytes from being such a frame; `None` where they are one.
-    #[must_use]
     pub fn misfit(&self, frame: &[u8]) -> Option<String> {
         let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
         if frame.len() != self.length {
@@ -60,7 +59,6 @@ const CHUNK: usize = 2048;
 
 impl Cutter {
     /// For frames of that shape.
-    #[must_use]
     pub fn new(shape: Shape) -> Self {
         Self { shape, buffer: Vec::with_capacity(2 * CHUNK), good_in_a_row: 0, skipped: 0, lost: 0 }
     }

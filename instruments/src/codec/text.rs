@@ -18,7 +18,6 @@ pub enum Form {
 
 impl Form {
     /// How many numbers a line holds.
-    #[must_use]
     pub fn numbers(&self) -> usize {
         match self {
             Self::Pattern(pattern) => pattern.fields().count(),
@@ -27,7 +26,6 @@ impl Form {
     }
 
     /// The numbers of a line; `None` where it is no such line.
-    #[must_use]
     pub fn read(&self, line: &str) -> Option<Vec<f64>> {
         match self {
             Self::Number => number(line).map(|number| vec![number]),
@@ -37,7 +35,6 @@ impl Form {
     }
 
     /// The line that holds these numbers.
-    #[must_use]
     pub fn write(&self, values: &[f64]) -> String {
         let first = values.first().copied().unwrap_or(f64::NAN);
         match self {
@@ -50,7 +47,6 @@ impl Form {
 
 /// The number that a line stands for: a decimal number, or a truth (`TRUE`, `ON`, `1` / `FALSE`, `OFF`, `0`).
 /// `None` for anything else, and for numbers that are not finite.
-#[must_use]
 pub fn number(line: &str) -> Option<f64> {
     match line.trim() {
         "TRUE" | "ON" => Some(1.0),
@@ -73,7 +69,6 @@ const PREFIXES: [(&str, f64); 8] = [
 
 /// The value in `unit` that a line such as `5mm/s/V` (0.005 m/s/V) or `8.16 us` stands for: a number, perhaps
 /// a space, an SI prefix or none, the unit. `None` for anything else, and for numbers that are not finite.
-#[must_use]
 pub fn quantity(line: &str, unit: &str) -> Option<f64> {
     let rest = line.trim().strip_suffix(unit)?;
     let (number, factor) = PREFIXES
@@ -87,7 +82,6 @@ pub fn quantity(line: &str, unit: &str) -> Option<f64> {
 }
 
 /// The line that stands for a value in `unit`, with the prefix that leaves one to three digits before the point.
-#[must_use]
 pub fn with_prefix(value: f64, unit: &str) -> String {
     let steps = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n")];
     let (factor, prefix) =

@@ -25,14 +25,12 @@ pub struct Frame {
 
 impl Frame {
     /// The bytes of a line of text; `None` where it is no such line.
-    #[must_use]
     pub fn read_line(&self, line: &str) -> Option<Vec<u8>> {
         let numbers = self.text.as_ref()?.read(line)?;
         Some(numbers.into_iter().flat_map(f64::to_be_bytes).collect())
     }
 
     /// The line of text of these bytes, its numbers times `factor`; `None` for a frame that is none of text.
-    #[must_use]
     pub fn write_line(&self, bytes: &[u8], factor: f64) -> Option<String> {
         let number = |eight: &[u8]| eight.try_into().map_or(f64::NAN, f64::from_be_bytes) * factor;
         let numbers: Vec<f64> = bytes.chunks_exact(8).map(number).collect();
@@ -58,7 +56,6 @@ impl Span {
 
     /// The fewest reads that bring all of `wanted` (first register and count of each), where so many
     /// registers between two of them may be read in vain. Each of them lies within one read.
-    #[must_use]
     pub fn cover(mut wanted: Vec<Span>, gap: u16) -> Vec<Span> {
         wanted.sort_by_key(|span| (span.address, span.count));
         let mut spans: Vec<Span> = Vec::new();
@@ -97,7 +94,6 @@ pub struct Part {
 
 impl Part {
     /// Whether the data of a message of its identifier is this one's.
-    #[must_use]
     pub fn selects(&self, data: &[u8]) -> bool {
         let unsigned = |signal: DbcSignal| signal.raw(data).map(|raw| raw as u64 & signal.mask());
         data.len() == self.length

@@ -39,7 +39,6 @@ impl Profile {
     }
 
     /// A set-point's value (in its `unit`) from its block's bytes.
-    #[must_use]
     pub fn decode_set(&self, set: SetId, block: &[u8]) -> Option<f64> {
         let compiled = &self.sets[set.0];
         compiled.block?.1.read(block).map(|raw| raw * compiled.scale)
@@ -53,7 +52,6 @@ impl Profile {
 
     /// The line of text that carries a set-point, and what its answer begins with; `None` where the
     /// set-point is no line of text. `newest` gives the values of others that stand in the line.
-    #[must_use]
     pub fn line(
         &self,
         set: SetId,
@@ -79,7 +77,6 @@ impl Profile {
 
     /// The set-point that a line of text carries, as an emulator hears it: its own value, and those of others
     /// that the line holds. A line without a number is 1.
-    #[must_use]
     pub fn heard(&self, set: SetId, line: &str) -> Option<Vec<(SetId, f64)>> {
         let (pattern, owners) = self.sets[set.0].line.as_ref()?;
         let values = pattern.read(line)?;
@@ -89,7 +86,6 @@ impl Profile {
     }
 
     /// The value of a heartbeat's count: it runs round at the end of its range, else of its register.
-    #[must_use]
     pub fn heartbeat_value(&self, set: SetId, count: u32) -> f64 {
         let last = self.sets[set.0].block.map_or(65535.0, |(_, field)| field.number.limits().1);
         let (low, high) = self.description.set[set.0].range.unwrap_or((0.0, last));
@@ -97,13 +93,11 @@ impl Profile {
     }
 
     /// What feeds the instrument's own watchdog, if it has one.
-    #[must_use]
     pub fn heartbeat(&self) -> Option<&Set> {
         self.set("heartbeat").map(|set| &self.description.set[set.0])
     }
 
     /// The value nearest to `value` that the set-point can take (both in its `unit`).
-    #[must_use]
     pub fn quantise(&self, set: SetId, value: f64) -> f64 {
         let scale = self.sets[set.0].scale;
         (value / scale).round() * scale

@@ -42,26 +42,21 @@ pub struct Poll {
     #[serde(default)]
     pub table: Table,
     /// First register; left out where the signals name theirs.
-    #[serde(default)]
     pub address: Option<u16>,
     /// How many registers: 1 to 125; left out where the signals name theirs.
-    #[serde(default)]
     pub count: Option<u16>,
     /// Where the signals name theirs: so many registers between two of them may be read although nobody wants
     /// them, to save a read.
     #[serde(default)]
     pub gap: u16,
     /// Reads per second; left out for one that is read once, at connection.
-    #[serde(default)]
     pub rate_hz: Option<f64>,
     /// Read once, at connection.
     #[serde(default)]
     pub once: bool,
     /// The signal that counts the instrument's samples, modulo its type.
-    #[serde(default)]
     pub sequence: Option<String>,
     /// The signal that holds the instrument's own time; its SI value is in seconds.
-    #[serde(default)]
     pub device_time: Option<String>,
 }
 
@@ -75,32 +70,25 @@ pub struct Stream {
     #[serde(default)]
     pub sync: Vec<u8>,
     /// Length of a frame, sync and check included; left out for lines of text.
-    #[serde(default)]
     pub length: Option<u16>,
     /// The check at its end; left out for lines of text, and for datagrams, which have one of their own.
-    #[serde(default)]
     pub check: Option<Check>,
     /// Bytes at a frame's beginning that the check leaves out, such as sync bytes.
     #[serde(default)]
     pub check_from: u16,
     /// `high_first` or `low_first`: the order of the check's bytes. Left out: low first where the check is reflected, as is usual.
-    #[serde(default)]
     pub check_order: Option<CheckOrder>,
     /// In place of length and check: the instrument sends lines of text like this one, `{lateral},{normal}`,
     /// each number by its signal's name. See [`crate::codec::pattern`].
-    #[serde(default)]
     pub line: Option<String>,
     /// Frames in a row that make an alignment believed.
     #[serde(default = "defaults::one_frame")]
     pub believed_after: u32,
     /// The register write that starts it.
-    #[serde(default)]
     pub start_register: Option<(u16, u16)>,
     /// The function of the maker's own, with its byte, that starts it.
-    #[serde(default)]
     pub start_function: Option<(u8, u8)>,
     /// Byte that stops it, and how often that is sent; left out for one that runs as long as the instrument is on.
-    #[serde(default)]
     pub stop: Option<(u8, u16)>,
     /// Silence after the stop before the instrument listens again, in ms.
     #[serde(default)]
@@ -109,7 +97,6 @@ pub struct Stream {
     #[serde(default)]
     pub stop_before_open: bool,
     /// Signal that counts samples.
-    #[serde(default)]
     pub sequence: Option<String>,
 }
 
@@ -125,7 +112,6 @@ pub enum CheckOrder {
 
 impl Stream {
     /// What its binary frames look like; `None` for lines of text and for datagrams without a check.
-    #[must_use]
     pub fn shape(&self) -> Option<Shape> {
         Some(Shape {
             sync: self.sync.clone(),
@@ -149,25 +135,19 @@ pub struct Message {
     #[serde(default)]
     pub replies: Vec<String>,
     /// The identifier that the DBC file's identifiers were written for; they move with `link.base`.
-    #[serde(default)]
     pub dbc_base: Option<u32>,
     /// Only messages whose multiplexor, by the DBC file, has this value: the signals that are there only then
     /// stand in this group.
-    #[serde(default)]
     pub multiplex: Option<u64>,
     /// CANopen: identifier less the node number.
-    #[serde(default)]
     pub cob: Option<u32>,
     /// CANopen: length in bytes.
-    #[serde(default)]
     pub length: Option<u16>,
     /// What asks for them, sent to `link.base`; left out for messages that come by themselves.
-    #[serde(default)]
     pub request: Option<Vec<u8>>,
     /// Requests per second, or messages per second where they come by themselves.
     pub rate_hz: f64,
     /// Signal that counts samples.
-    #[serde(default)]
     pub sequence: Option<String>,
 }
 
@@ -181,14 +161,11 @@ pub struct Query {
     /// The question, without its terminator.
     pub send: String,
     /// Length of a binary answer; left out for a line of text.
-    #[serde(default)]
     pub length: Option<u16>,
     /// The answer is a number, an SI prefix or none, and this unit, as `5mm/s/V`; left out for a bare number or a truth.
-    #[serde(default)]
     pub unit: Option<String>,
     /// The answer is a line like this one, `AMP={amplitude}%,F={frequency}`: each number by its signal's
     /// name. See [`crate::codec::pattern`].
-    #[serde(default)]
     pub answer: Option<String>,
     /// Questions per second.
     pub rate_hz: f64,
@@ -199,31 +176,23 @@ pub struct Query {
 #[serde(deny_unknown_fields)]
 pub struct Init {
     /// A line of text.
-    #[serde(default)]
     pub send: Option<String>,
     /// Bytes in hexadecimal, sent as they are.
-    #[serde(default)]
     pub hex: Option<String>,
     /// What the answer to `send` must begin with; left out where there is none.
-    #[serde(default)]
     pub expect: Option<Vec<String>>,
     /// A CAN frame: identifier (less the node for CANopen) and data.
-    #[serde(default)]
     pub can: Option<(u32, Vec<u8>)>,
     /// Modbus RTU: a function of the maker's own and its byte; answered by the function and 1.
-    #[serde(default)]
     pub function: Option<(u8, u8)>,
     /// Modbus: registers read from the first address and written to the second, and how many.
-    #[serde(default)]
     pub copy: Option<(u16, u16, u16)>,
     /// Modbus: first register, and the values to be written from there on.
-    #[serde(default)]
     pub registers: Option<(u16, Vec<u16>)>,
     /// Table of `registers`: holding registers, or coils.
     #[serde(default)]
     pub table: Table,
     /// CANopen: object, subindex, bytes and value to be written.
-    #[serde(default)]
     pub sdo: Option<(u16, u8, u8, i64)>,
     /// What to tell the user where the answer is another.
     #[serde(default)]
@@ -246,10 +215,8 @@ pub struct Write {
     /// How many registers: 1 to 123. CANopen: bytes in pairs.
     pub count: u16,
     /// CANopen: identifier less the node number.
-    #[serde(default)]
     pub cob: Option<u32>,
     /// The block is repeated at this rate even without news, to keep a watchdog fed; per second.
-    #[serde(default)]
     pub rate_hz: Option<f64>,
 }
 

@@ -18,7 +18,6 @@ pub struct Header {
     /// What the instrument can be in a rig.
     pub roles: Vec<Role>,
     /// Firmware that it was written for.
-    #[serde(default)]
     pub firmware: Option<String>,
     /// Manuals and sources of the facts.
     pub provenance: String,

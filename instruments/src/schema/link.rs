@@ -35,43 +35,30 @@ pub struct Link {
     /// Kind of link.
     pub kind: LinkKind,
     /// TCP or UDP port, unless the setup names one.
-    #[serde(default)]
     pub port: Option<u16>,
     /// UDP: the port of this machine that the instrument is set to send to. Left out: it sends to where an `[[init]]` comes from.
-    #[serde(default)]
     pub local_port: Option<u16>,
     /// Modbus unit, unless the setup names one.
-    #[serde(default)]
     pub unit: Option<u8>,
     /// Symbols per second on a serial line.
-    #[serde(default)]
     pub baud: Option<u32>,
     /// Bits per second on a CAN bus.
-    #[serde(default)]
     pub bitrate: Option<u32>,
     /// Data bits, parity and stop bits, as `8N1`.
-    #[serde(default)]
     pub format: Option<String>,
     /// DBC file that describes the signals of CAN messages.
-    #[serde(default)]
     pub dbc: Option<String>,
     /// CANopen: the electronic data sheet that describes the objects and the process data.
-    #[serde(default)]
     pub eds: Option<String>,
     /// CAN identifier that others are counted from, unless the setup names one.
-    #[serde(default)]
     pub base: Option<u32>,
     /// CANopen node, unless the setup names one.
-    #[serde(default)]
     pub node: Option<u8>,
     /// The node's heartbeat may stay away this long, in ms.
-    #[serde(default)]
     pub heartbeat_ms: Option<u32>,
     /// What ends a line that is sent.
-    #[serde(default)]
     pub tx_terminator: Option<String>,
     /// What ends a line that comes.
-    #[serde(default)]
     pub rx_terminator: Option<String>,
     /// Pause between two requests, in ms.
     #[serde(default)]
@@ -80,10 +67,8 @@ pub struct Link {
     #[serde(default)]
     pub unsolicited: Vec<String>,
     /// A query that is put after every set-point, and what its answer must begin with.
-    #[serde(default)]
     pub error_query: Option<ErrorQuery>,
     /// Several units of one kind, of which the setup means one by its name: `{which}` in the questions is its number.
-    #[serde(default)]
     pub choice: Option<Choice>,
     /// A connection must stand within this time, in ms.
     #[serde(default = "defaults::connect_timeout_ms")]

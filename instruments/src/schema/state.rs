@@ -68,9 +68,7 @@ pub struct Time {
     #[serde(default)]
     pub jitter_ms: f64,
     /// -3 dB bandwidth of the instrument's filter, in Hz.
-    #[serde(default)]
     pub passband_hz: Option<f64>,
     /// The instrument's own samples per second, where it has such.
-    #[serde(default)]
     pub sample_rate_hz: Option<f64>,
 }

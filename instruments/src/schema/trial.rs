@@ -30,16 +30,12 @@ pub struct Emulator {
 #[serde(deny_unknown_fields)]
 pub struct Vector {
     /// The poll or block; may be left out where there is only one.
-    #[serde(default)]
     pub frame: Option<String>,
     /// Registers, for Modbus.
-    #[serde(default)]
     pub registers: Option<Vec<u16>>,
     /// Bytes in hexadecimal, spaces allowed.
-    #[serde(default)]
     pub hex: Option<String>,
     /// A line of text.
-    #[serde(default)]
     pub line: Option<String>,
     /// Values that were read before, of signals of other frames.
     #[serde(default)]

@@ -14,28 +14,20 @@ pub struct Signal {
     #[schemars(with = "String")]
     pub name: Spanned<String>,
     /// The poll that it stands in; may be left out where there is only one.
-    #[serde(default)]
     pub frame: Option<String>,
     /// First register, counted from the start of the frame.
-    #[serde(default)]
     pub register: Option<u16>,
     /// First register by the instrument's own map, in place of `register`.
-    #[serde(default)]
     pub address: Option<u16>,
     /// First byte, counted from the start of the frame.
-    #[serde(default)]
     pub byte: Option<u16>,
     /// How many neighbours of the same type there are: they are called `name0`, `name1` and so on.
-    #[serde(default)]
     pub array: Option<u16>,
     /// Worked out from other signals, in place of register, byte and type; linear in those of its own frame.
-    #[serde(default)]
     pub value: Option<String>,
     /// CANopen: index and subindex, in place of byte and type; the data sheet says where in the process data.
-    #[serde(default)]
     pub object: Option<(u16, u8)>,
     /// `message.signal` of the DBC file, in place of register, byte and type.
-    #[serde(default)]
     pub dbc: Option<String>,
     /// Type; left out for DBC signals and for lines of text.
     #[serde(rename = "type", default)]
@@ -44,13 +36,11 @@ pub struct Signal {
     #[serde(default)]
     pub byte_order: ByteOrder,
     /// First bit and width, where only a part of the number counts.
-    #[serde(default)]
     pub bits: Option<(u32, u32)>,
     /// Counts times this are `unit`s.
     #[serde(default = "defaults::one")]
     pub scale: f64,
     /// A scale that depends on other signals, such as `pow10(-decimals)`; multiplies `scale`.
-    #[serde(default)]
     pub scale_expr: Option<String>,
     /// Added after scaling, in `unit`s.
     #[serde(default)]
@@ -62,17 +52,13 @@ pub struct Signal {
     #[serde(default)]
     pub si: Si,
     /// Smallest and largest value that the instrument can measure, in `unit`s.
-    #[serde(default)]
     pub range: Option<(f64, f64)>,
     /// The smallest change that the instrument shows, in SI units. Left out: one count, where counts are
     /// whole numbers; unknown for floats, whose type says nothing of it.
-    #[serde(default)]
     pub resolution_si: Option<f64>,
     /// Standard deviation of the noise, in `unit`s.
-    #[serde(default)]
     pub noise: Option<f64>,
     /// The value counts only where this holds.
-    #[serde(default)]
     pub valid_when: Option<String>,
     /// What it is, for the generated documentation.
     #[serde(default)]
@@ -104,26 +90,21 @@ pub struct Set {
     #[schemars(with = "String")]
     pub name: Spanned<String>,
     /// The block that it stands in; may be left out where there is only one.
-    #[serde(default)]
     pub block: Option<String>,
     /// First register, counted from the start of the block.
     #[serde(default)]
     pub register: u16,
     /// CANopen: index and subindex, in place of register and type; the data sheet says where in the process data.
-    #[serde(default)]
     pub object: Option<(u16, u8)>,
     /// Type; left out for lines of text.
     #[serde(rename = "type", default)]
     pub number: Option<NumberType>,
     /// The line of text that carries it; `{}` is the value, `{name}` the newest one of another set-point.
     /// Forms such as `{:.1}` and `{:04X}`: see [`crate::codec::pattern`].
-    #[serde(default)]
     pub send: Option<String>,
     /// The line of text where the value is zero.
-    #[serde(default)]
     pub send_zero: Option<String>,
     /// What the answer begins with: where the value is not zero, and where it is; left out where there is none.
-    #[serde(default)]
     pub answer: Option<(String, String)>,
     /// Byte order.
     #[serde(default)]
@@ -138,16 +119,12 @@ pub struct Set {
     #[serde(default)]
     pub si: Si,
     /// Smallest and largest value that may be sent, in `unit`s; others are refused.
-    #[serde(default)]
     pub range: Option<(f64, f64)>,
     /// The value that makes the rig safe, in `unit`s.
-    #[serde(default)]
     pub safe: Option<f64>,
     /// The signal that echoes what the instrument took.
-    #[serde(default)]
     pub echo: Option<String>,
     /// Of a `heartbeat`: how long the instrument waits for another value until it switches off by itself, in ms.
-    #[serde(default)]
     pub timeout_ms: Option<u32>,
     /// What it is, for the generated documentation.
     #[serde(default)]

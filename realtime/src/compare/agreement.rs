@@ -59,7 +59,6 @@ pub enum Lack {
 
 impl Agreement {
     /// The finding after the last pass that was compared; `complete` where the sweep came to its end.
-    #[must_use]
     pub fn of(last: Option<&PassComparison>, complete: bool) -> Self {
         let Some(last) = last else {
             return Agreement::TooLittle { why: Lack::Passes, judged: 0, visible_departure: None };

@@ -22,7 +22,6 @@ pub struct Grants {
     #[serde(default)]
     pub pinned_to: Vec<usize>,
     /// Why it could not be pinned, or the CPUs could not stay awake.
-    #[serde(default)]
     pub pace_refused: Option<String>,
     /// Whether deep sleep of the CPUs is held off.
     #[serde(default)]

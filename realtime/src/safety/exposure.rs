@@ -64,18 +64,15 @@ pub(super) struct Exposure {
     minutes: [Minute; MINUTES],
 }
 
-impl Exposure {
-    pub(super) const fn new() -> Self {
+impl Default for Exposure {
+    fn default() -> Self {
         let none = Minute { number: 0, driven: Nanos(0), dose_m2_s: 0.0 };
-        Exposure {
-            in_one_go: Nanos(0),
-            in_all: (Nanos(0), 0.0),
-            resting: Nanos(0),
-            before: None,
-            minutes: [none; MINUTES],
-        }
+        let (in_one_go, resting) = (Nanos(0), Nanos(0));
+        Exposure { in_one_go, in_all: (Nanos(0), 0.0), resting, before: None, minutes: [none; MINUTES] }
     }
+}
 
+impl Exposure {
     /// Takes over what was before the first cycle.
     pub(super) fn carry(&mut self, past: &Exposed) {
         (self.in_one_go, self.resting) = (past.in_one_go, past.resting);

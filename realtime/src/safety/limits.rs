@@ -53,50 +53,34 @@ struct Range {
 mod range {
     use super::{HARD, Range};
 
-    pub const FORCE_STEP_N: Range = Range {
-        low: 0.01,
-        high: HARD.normal_force_max_n,
-        why: "a larger step is an overforce, a smaller one is noise",
-    };
-    pub const FORCE_RATE_N_S: Range =
-        Range { low: 1.0, high: 500.0, why: "500 N/s reach the hard limit of 5 N in 10 ms" };
-    pub const AMPLITUDE_RATE_M_S: Range =
-        Range { low: 1e-6, high: 0.1, why: "0.1 m/s reach the hard limit of 10 um in 0.1 ms" };
-    pub const TRAVEL_M: Range = Range { low: -0.5, high: 0.5, why: "a bench-top stage" };
-    pub const STROKE_M: Range =
-        Range { low: 1e-3, high: 1.0, why: "a shorter travel has no room for a pass" };
-    pub const FROZEN: Range = Range {
-        low: 20.0,
-        high: 1000.0,
-        why: "fewer repeats come by chance, more are a second of a dead sensor at 1 kHz",
-    };
-    pub const REST_S: Range = Range { low: 10.0, high: 3600.0, why: "a shorter pause is no rest" };
-    pub const DUTY: Range =
-        Range { low: 1e-3, high: 0.5, why: "share of an hour: a finger rests half the time" };
-    pub const DOSE_M2_S: Range = Range {
-        low: 1e-3,
-        high: 100.0,
-        why: "100 m2/s are a quarter of an hour at 5 um peak-to-peak and 30 kHz",
-    };
-    pub const CYCLE_S: Range = Range { low: 2.5e-4, high: 0.1, why: "the loop runs at 10 to 4000 Hz" };
-    pub const FORCE_PERIOD_S: Range = Range {
-        low: 1e-5,
-        high: 0.05,
-        why: "a force sensor slower than 20 samples a second shows an overforce too late",
-    };
-    pub const STATE_PERIOD_S: Range = Range {
-        low: 1e-5,
-        high: 0.1,
-        why: "a state slower than 10 a second shows a refused set-point too late",
-    };
-    pub const LATENCY_S: Range =
-        Range { low: 0.0, high: 0.05, why: "an amplifier's own watchdog waits no longer than 0.05 s" };
-    pub const PERIODS: Range = Range { low: 1.0, high: 5.0, why: "periods that a channel may be silent" };
-    pub const RING_S: Range = Range {
-        low: 1e-5,
-        high: 0.05,
-        why: "Q / (pi f): a quality factor of 1500 at 10 kHz rings for 0.05 s, and a plate no longer",
-    };
+    const fn range(low: f64, high: f64, why: &'static str) -> Range {
+        Range { low, high, why }
+    }
+
+    pub const FORCE_STEP_N: Range =
+        range(0.01, HARD.normal_force_max_n, "a larger step is an overforce, a smaller one is noise");
+    pub const FORCE_RATE_N_S: Range = range(1.0, 500.0, "500 N/s reach the hard limit of 5 N in 10 ms");
+    pub const AMPLITUDE_RATE_M_S: Range = range(1e-6, 0.1, "0.1 m/s reach the hard limit of 10 um in 0.1 ms");
+    pub const TRAVEL_M: Range = range(-0.5, 0.5, "a bench-top stage");
+    pub const STROKE_M: Range = range(1e-3, 1.0, "a shorter travel has no room for a pass");
+    pub const FROZEN: Range =
+        range(20.0, 1000.0, "fewer repeats come by chance, more are a second of a dead sensor at 1 kHz");
+    pub const REST_S: Range = range(10.0, 3600.0, "a shorter pause is no rest");
+    pub const DUTY: Range = range(1e-3, 0.5, "share of an hour: a finger rests half the time");
+    pub const DOSE_M2_S: Range =
+        range(1e-3, 100.0, "100 m2/s are a quarter of an hour at 5 um peak-to-peak and 30 kHz");
+    pub const CYCLE_S: Range = range(2.5e-4, 0.1, "the loop runs at 10 to 4000 Hz");
+    pub const FORCE_PERIOD_S: Range =
+        range(1e-5, 0.05, "a force sensor slower than 20 samples a second shows an overforce too late");
+    pub const STATE_PERIOD_S: Range =
+        range(1e-5, 0.1, "a state slower than 10 a second shows a refused set-point too late");
+    pub const LATENCY_S: Range = range(0.0, 0.05, "an amplifier's own watchdog waits no longer than 0.05 s");
+    pub const PERIODS: Range = range(1.0, 5.0, "periods that a channel may be silent");
+    pub const RING_S: Range = range(
+        1e-5,
+        0.05,
+        "Q / (pi f): a quality factor of 1500 at 10 kHz rings for 0.05 s, and a plate no longer",
+    );
 }
 
 /// When a channel counts as stale: a number of its own sample periods plus its stated latency.
@@ -203,7 +187,6 @@ pub struct Limits {
     pub frozen_after: u32,
     /// Equal raw amplitudes in a row, while driven, that count as frozen; `None` where the readback has no
     /// noise to be frozen against: then only a new set-point shows it (SR-08, SR-22).
-    #[serde(default)]
     pub amplitude_frozen_after: Option<u32>,
     /// A human finger is in the rig: second channel, emergency stop, dead-man device and exposure limits apply.
     pub human_contact: bool,

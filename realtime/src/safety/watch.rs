@@ -5,7 +5,7 @@ use super::{ChannelTiming, Controls, Decision, Limits, Observation};
 use crate::ports::{Channel, Nanos, NoData, Quality, Reading, SupplyCommand};
 
 /// Memory of one force channel.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ForceWatch {
     /// The last sample that was believed.
     pub believed: Option<Reading>,
@@ -65,27 +65,8 @@ impl ForceWatch {
         (self.due, self.came, self.share_came) = (0.0, 0.0, 1.0);
     }
 
-    const fn new() -> Self {
-        ForceWatch {
-            believed: None,
-            earlier: None,
-            suspect: false,
-            equal_in_a_row: 0,
-            invalid_in_a_row: 0,
-            saturated_in_a_row: 0,
-            saturated: 0,
-            over_since: None,
-            over_value: 0.0,
-            spikes: 0,
-            rate_n_s: 0.0,
-            fast_in_a_row: 0,
-            usable: false,
-            last_sequence: 0,
-            last_raw: 0,
-            due: 0.0,
-            came: 0.0,
-            share_came: 1.0,
-        }
+    fn new() -> Self {
+        ForceWatch { share_came: 1.0, ..Self::default() }
     }
 
     pub(super) const fn spikes_in_window(&self) -> u32 {
@@ -186,7 +167,7 @@ const BUCKETS: usize = 10;
 const BUCKET_CYCLES: u32 = 100;
 
 /// Everything safety remembers. `Copy`: no heap, no lock.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Watch {
     pub lateral: ForceWatch,
     pub normal: ForceWatch,
@@ -243,39 +224,13 @@ pub(super) const STAGE_RESPONSE: Nanos = Nanos(300_000_000);
 pub(super) const CREEP_M_S: f64 = 1.5e-3;
 
 impl Watch {
-    pub(super) const fn new() -> Self {
+    pub(super) fn new() -> Self {
         Watch {
             lateral: ForceWatch::new(),
             normal: ForceWatch::new(),
-            late_in_a_row: 0,
-            late: [0; BUCKETS],
-            filled: 0,
-            bucket: 0,
-            commanded_pp_m: 0.0,
-            commanded_hz: 0.0,
-            commanded_since: Nanos(0),
-            enabled: false,
             off_since: Some(Nanos(0)),
-            exposure: Exposure::new(),
-            amplitude: None,
-            amplitude_saturated_in_a_row: 0,
-            amplitude_equal_in_a_row: 0,
-            amplitude_rate_m_s: 0.0,
-            amplitude_fast_in_a_row: 0,
-            amplifier_on: false,
-            ringing_pp_m: 0.0,
-            velocity_m_s: 0.0,
-            moving_since: None,
-            slowest_m_s: 0.0,
-            fastest_m_s: 0.0,
-            fast_stage_in_a_row: 0,
-            stage_sequence: 0,
-            load_n: 0.0,
-            load_since: Nanos(0),
             supply_told: SupplyCommand::Restore,
-            supply_since: Nanos(0),
-            hand_holds: false,
-            hand_let_go: false,
+            ..Self::default()
         }
     }
 

@@ -113,7 +113,6 @@ pub struct State {
     /// Predicted `mu'`.
     pub predicted: Option<f64>,
     /// Its standard uncertainty.
-    #[serde(default)]
     pub predicted_sd: Option<f64>,
     /// Measured less predicted.
     pub residual: Option<f64>,

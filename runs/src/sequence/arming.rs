@@ -39,7 +39,7 @@ pub(super) enum Next {
 }
 
 /// One arming.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Arming {
     since: Option<Nanos>,
     clear_since: Option<Nanos>,
@@ -61,20 +61,8 @@ pub(super) struct Arming {
 }
 
 impl Arming {
-    pub(super) const fn new() -> Self {
-        Arming {
-            since: None,
-            clear_since: None,
-            requested: None,
-            asks: 0,
-            in_the_way: None,
-            disturbed: None,
-            held_up: Nanos(0),
-            overrun: Nanos(3_000_000),
-            human_contact: false,
-            cut_told: false,
-            proving: None,
-        }
+    pub(super) fn new() -> Self {
+        Arming { overrun: Nanos(3_000_000), ..Self::default() }
     }
 
     /// The same, with the limits of the rig.

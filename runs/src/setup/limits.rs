@@ -159,32 +159,26 @@ fn forget(file: &mut SetupFile, name: &str) {
 fn of(file: &SetupFile, person: bool, cycle: Nanos) -> Result<Limits, LimitError> {
     let l = &file.limits;
     let mut limits = Limits::paper(cycle);
+    macro_rules! stated {
+        ($($name:ident)+) => { $(limits.$name = l.$name.unwrap_or(limits.$name);)+ };
+    }
+    stated!(
+        normal_force_max_n lateral_force_max_n force_step_max_n force_rate_max_n_s
+        amplitude_rate_max_m_s speed_max_m_s temperature_max_c exposure_max_s exposure_rest_s
+        exposure_duty_max exposure_dose_max_m2_s frozen_after late_cycles_max late_in_a_row_max
+        temperature_fitted
+    );
     let set = |slot: &mut f64, value: Option<f64>| *slot = value.unwrap_or(*slot);
-    set(&mut limits.normal_force_max_n, l.normal_force_max_n);
-    set(&mut limits.lateral_force_max_n, l.lateral_force_max_n);
-    set(&mut limits.force_step_max_n, l.force_step_max_n);
-    set(&mut limits.force_rate_max_n_s, l.force_rate_max_n_s);
-    set(&mut limits.amplitude_rate_max_m_s, l.amplitude_rate_max_m_s);
     set(&mut limits.frequency_hz.0, l.frequency_min_hz);
     set(&mut limits.frequency_hz.1, l.frequency_max_hz);
-    set(&mut limits.speed_max_m_s, l.speed_max_m_s);
     set(&mut limits.travel_m.0, l.travel_min_m);
     set(&mut limits.travel_m.1, l.travel_max_m);
-    set(&mut limits.temperature_max_c, l.temperature_max_c);
-    set(&mut limits.exposure_max_s, l.exposure_max_s);
-    set(&mut limits.exposure_rest_s, l.exposure_rest_s);
-    set(&mut limits.exposure_duty_max, l.exposure_duty_max);
-    set(&mut limits.exposure_dose_max_m2_s, l.exposure_dose_max_m2_s);
     limits.amplitude_max = l.amplitude_max_pp_m.map_or(limits.amplitude_max, PeakToPeak::from_metres);
-    limits.frozen_after = l.frozen_after.unwrap_or(limits.frozen_after);
-    limits.late_cycles_max = l.late_cycles_max.unwrap_or(limits.late_cycles_max);
-    limits.late_in_a_row_max = l.late_in_a_row_max.unwrap_or(limits.late_in_a_row_max);
     limits.human_contact = person;
     limits.dead_man_key = l.dead_man_key.unwrap_or(false);
     limits.supply_required = file.supply_relay.is_some();
     limits.load_commanded = file.stage.dead_weight_n.is_none();
     let profile = file.amplifier.description().ok();
-    limits.temperature_fitted = l.temperature_fitted.unwrap_or(limits.temperature_fitted);
     let (fed, supply_fed) = guards::watchdogs(file);
     limits.supply_watchdog = supply_fed;
     // A virtual rig inside this program drives nothing real: it may go without what a real one must have.

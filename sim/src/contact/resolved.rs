@@ -38,9 +38,6 @@ pub struct Resolved {
     pub normal_force_n: f64,
     /// Static compression (m).
     pub preload_m: f64,
-    /// Relative difference of the normal impulse between odd and even cycles (-): over zero where the period
-    /// has doubled.
-    pub doubling: f64,
 }
 
 /// Lightest ridge marched (kg): lighter ones move as if they had this mass.
@@ -74,24 +71,18 @@ pub fn steady(contact: &Contact, settings: Settings) -> Resolved {
     for _ in 0..settings.settle {
         march.cycle(contact);
     }
-    let (mut lateral, mut normal, mut touching, mut doubling) = (0.0, 0.0, 0.0, 0.0);
-    let mut before = f64::NAN;
+    let (mut lateral, mut normal, mut touching) = (0.0, 0.0, 0.0);
     for _ in 0..settings.average {
         let one = march.cycle(contact);
         lateral += one.lateral_n;
         normal += one.normal_n;
         touching += one.contact;
-        if before.is_finite() {
-            doubling += (one.normal_n - before).abs();
-        }
-        before = one.normal_n;
     }
     let n = settings.average as f64;
     Resolved {
         steady: Steady { lateral_force_n: lateral / n, contact_fraction: touching / n },
         normal_force_n: normal / n,
         preload_m: march.preload_m,
-        doubling: doubling / (n - 1.0).max(1.0) / contact.normal_force_n,
     }
 }
 

@@ -1,18 +1,16 @@
 //! Attraction between skin and plate adds to the load that friction feels; it is there only as far as the surfaces have
 //! been pressed into each other, Fa (1 - exp(-F/F0)), and it grows with a power of the speed, as peeling does.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "adhesion",
-    place: Place::Contact,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "attraction adds to the load that friction feels",
-    parameters: &[Parameter::log("attraction_n", 5e-4, 0.2), Parameter::log("development_n", 0.01, 0.1), Parameter::linear("speed_exponent", 0.1, 0.4)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    parameters: &[
+        Parameter::log("attraction_n", 5e-4, 0.2),
+        Parameter::log("development_n", 0.01, 0.1),
+        Parameter::linear("speed_exponent", 0.1, 0.4),
+    ],
+    act: Act::Contact(act),
+    ..Kind::cause("adhesion", Place::Contact, "attraction adds to the load that friction feels")
 };
 
 const REFERENCE_M_S: f64 = 0.02;

@@ -3,17 +3,15 @@
 //! The area of a soft sphere grows as the 2/3 power of the load (Hertz); each area of skin takes power from
 //! the plate in proportion to the square of its speed, and to how much of the cycle it touches.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "amplitude_droop",
-    place: Place::Plate,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "the plate's amplitude droops under the finger's load",
-    parameters: &[Parameter::log("load_ratio_at_1_n", 0.01, 3.0), Parameter::linear("flight_per_um", 0.1, 0.6)],
-    act: Act { setup: None, plate: Some(act), contact: None, forces: None },
+    parameters: &[
+        Parameter::log("load_ratio_at_1_n", 0.01, 3.0),
+        Parameter::linear("flight_per_um", 0.1, 0.6),
+    ],
+    act: Act::Plate(act),
+    ..Kind::cause("amplitude_droop", Place::Plate, "the plate's amplitude droops under the finger's load")
 };
 
 fn act(v: &Values, at: &Surroundings, pp_m: f64) -> f64 {

@@ -1,17 +1,15 @@
 //! The drive runs out of current and clips: the plate, a resonator, follows the fundamental of what is left,
 //! whose ceiling falls as the frequency rises, for a piezo draws current in proportion to both.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "amplitude_saturation",
-    place: Place::Plate,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "the amplitude stops growing with the set-point",
-    parameters: &[Parameter::log("inverse_ceiling_at_25_khz_per_m", 1.2e5, 1.5e6), Parameter::linear("frequency_exponent", 0.3, 1.0)],
-    act: Act { setup: None, plate: Some(act), contact: None, forces: None },
+    parameters: &[
+        Parameter::log("inverse_ceiling_at_25_khz_per_m", 1.2e5, 1.5e6),
+        Parameter::linear("frequency_exponent", 0.3, 1.0),
+    ],
+    act: Act::Plate(act),
+    ..Kind::cause("amplitude_saturation", Place::Plate, "the amplitude stops growing with the set-point")
 };
 
 fn act(v: &Values, at: &Surroundings, pp_m: f64) -> f64 {

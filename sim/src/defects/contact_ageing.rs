@@ -1,19 +1,13 @@
 //! Bonds need time: the friction limit of a fresh contact grows as t/(t + tau), second-order kinetics.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "contact_ageing",
-    place: Place::Contact,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "the friction limit of a fresh contact grows with its age",
     parameters: &[Parameter::log("half_time_s", 1e-8, 3e-5)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    act: Act::Contact(|v, _, contact| contact.limit.dwell_s = v[0]),
+    ..Kind::cause(
+        "contact_ageing",
+        Place::Contact,
+        "the friction limit of a fresh contact grows with its age",
+    )
 };
-
-fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    contact.limit.dwell_s = v[0];
-}

@@ -1,17 +1,16 @@
 //! A patch of the plate is greasy or clean: friction differs there, whatever the vibration.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "contaminated_patch",
-    place: Place::Plate,
+    parameters: &[
+        Parameter::signed("relative_change", 0.01, 0.8),
+        Parameter::linear("centre_m", -0.015, 0.015),
+        Parameter::log("width_m", 2e-3, 8e-3),
+    ],
     in_library: false,
-    in_tables: true,
-    imitated: false,
-    summary: "friction differs on a patch of the plate",
-    parameters: &[Parameter::signed("relative_change", 0.01, 0.8), Parameter::linear("centre_m", -0.015, 0.015), Parameter::log("width_m", 2e-3, 8e-3)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    act: Act::Contact(act),
+    ..Kind::cause("contaminated_patch", Place::Plate, "friction differs on a patch of the plate")
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

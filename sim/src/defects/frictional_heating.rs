@@ -1,18 +1,13 @@
 //! Rubbing warms the interface and lowers its shear strength: friction falls with the power rubbed, mu F U,
 //! found where heat made and friction left agree.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "frictional_heating",
-    place: Place::Contact,
-    in_library: false,
-    in_tables: true,
-    imitated: false,
-    summary: "friction falls with the power that it dissipates",
     parameters: &[Parameter::log("inverse_power_per_w", 1.0, 400.0)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    in_library: false,
+    act: Act::Contact(act),
+    ..Kind::cause("frictional_heating", Place::Contact, "friction falls with the power that it dissipates")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

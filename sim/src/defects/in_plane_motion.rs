@@ -1,18 +1,13 @@
 //! The plate does not move straight up and down: a share of its motion lies along the sliding direction, at
 //! the same frequency, so the ridges are dragged to and fro in every contact.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "in_plane_motion",
-    place: Place::Plate,
-    in_library: false,
-    in_tables: true,
-    imitated: false,
-    summary: "the plate also vibrates along the sliding direction",
     parameters: &[Parameter::log("share", 0.003, 0.5), Parameter::linear("phase_rad", 0.0, 6.2)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    in_library: false,
+    act: Act::Contact(act),
+    ..Kind::cause("in_plane_motion", Place::Plate, "the plate also vibrates along the sliding direction")
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

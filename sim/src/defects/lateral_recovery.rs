@@ -2,18 +2,16 @@
 //!
 //! The speed saturates for stretches beyond a knee (yielding bonds, Eyring) and is proportional to them below it.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "lateral_recovery",
-    place: Place::Contact,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "ridges recover their lateral stretch at a finite speed",
     parameters: &[Parameter::log("slowness_s_per_m", 10.0, 1000.0), Parameter::log("knee_m", 3e-8, 3e-7)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    act: Act::Contact(act),
+    ..Kind::cause(
+        "lateral_recovery",
+        Place::Contact,
+        "ridges recover their lateral stretch at a finite speed",
+    )
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -1,17 +1,16 @@
 //! The ridges have a lateral resonance near the frequencies used: their dynamic stiffness falls towards it and rises beyond.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "lateral_resonance",
-    place: Place::Finger,
-    in_library: false,
-    in_tables: true,
-    imitated: false,
-    summary: "the lateral stiffness of the ridges depends on frequency as a resonance does",
     parameters: &[Parameter::log("strength", 0.02, 1.0), Parameter::log("resonance_hz", 3e4, 5e4)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    in_library: false,
+    act: Act::Contact(act),
+    ..Kind::cause(
+        "lateral_resonance",
+        Place::Finger,
+        "the lateral stiffness of the ridges depends on frequency as a resonance does",
+    )
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

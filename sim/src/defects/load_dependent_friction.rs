@@ -2,18 +2,16 @@
 //! Hertzian junction), the rest is Coulomb's. It acts on the force of each instant, so it lowers friction
 //! under vibration even where nothing sticks.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "load_dependent_friction",
-    place: Place::Contact,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "part of the friction limit grows as the 2/3 power of the force",
     parameters: &[Parameter::log("area_share", 0.01, 0.95)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    act: Act::Contact(act),
+    ..Kind::cause(
+        "load_dependent_friction",
+        Place::Contact,
+        "part of the friction limit grows as the 2/3 power of the force",
+    )
 };
 
 /// Force at which the share leaves the friction as it was (N).

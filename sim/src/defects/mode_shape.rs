@@ -2,17 +2,17 @@
 //! on where it is, and a near field of bending at the driven edge. The half wave of a 2 mm glass plate is 14
 //! mm at 25 kHz and shortens as the square root of the frequency.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "mode_shape",
-    place: Place::Plate,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "the amplitude depends on the position along the plate",
-    parameters: &[Parameter::log("depth", 0.01, 0.95), Parameter::linear("phase_rad", 0.0, 3.1), Parameter::log("half_wave_at_25_khz_m", 8e-3, 2e-2), Parameter::linear("edge_over_wave", 0.1, 0.4)],
-    act: Act { setup: None, plate: Some(act), contact: None, forces: None },
+    parameters: &[
+        Parameter::log("depth", 0.01, 0.95),
+        Parameter::linear("phase_rad", 0.0, 3.1),
+        Parameter::log("half_wave_at_25_khz_m", 8e-3, 2e-2),
+        Parameter::linear("edge_over_wave", 0.1, 0.4),
+    ],
+    act: Act::Plate(act),
+    ..Kind::cause("mode_shape", Place::Plate, "the amplitude depends on the position along the plate")
 };
 
 /// Distance of the driven edge from the middle of the stroke (m).

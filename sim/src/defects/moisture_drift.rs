@@ -1,18 +1,16 @@
 //! Moisture gathers under the finger: friction grows with the time in contact, by a second-order uptake t/(t + tau) and a
 //! slow tail, and the ridges soften a little with it. Lifting off starts it anew; a table counts the run as one contact.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "moisture_drift",
-    place: Place::Contact,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "friction and softness change with the time in contact",
-    parameters: &[Parameter::signed("relative_gain", 0.006, 0.8), Parameter::log("half_time_s", 15.0, 400.0), Parameter::linear("softening", 0.0, 0.15)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    parameters: &[
+        Parameter::signed("relative_gain", 0.006, 0.8),
+        Parameter::log("half_time_s", 15.0, 400.0),
+        Parameter::linear("softening", 0.0, 0.15),
+    ],
+    act: Act::Contact(act),
+    ..Kind::cause("moisture_drift", Place::Contact, "friction and softness change with the time in contact")
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

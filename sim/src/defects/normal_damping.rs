@@ -3,18 +3,12 @@
 //! A light mass (0.1 mg) on spring and dashpot, landing without rebound; the damping is given by the ridge's
 //! retardation time.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "normal_damping",
-    place: Place::Contact,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "ridges are damped on their normal spring",
     parameters: &[Parameter::log("retardation_s", 3e-8, 1e-5)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    act: Act::Contact(act),
+    ..Kind::cause("normal_damping", Place::Contact, "ridges are damped on their normal spring")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -1,16 +1,15 @@
 //! The plate is tilted against the sensor, and bent: the tilt changes along the stroke.
 
-use super::{Act, Forces, Kind, Parameter, Place, Surroundings, Values};
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "plate_tilt",
-    place: Place::Instrument,
-    in_library: true,
-    in_tables: true,
+    parameters: &[
+        Parameter::signed("tilt_rad", 0.0015, 0.12),
+        Parameter::linear("bend_over_tilt", -0.6, 0.6),
+    ],
     imitated: true,
-    summary: "the plate is tilted against the sensor",
-    parameters: &[Parameter::signed("tilt_rad", 0.0015, 0.12), Parameter::linear("bend_over_tilt", -0.6, 0.6)],
-    act: Act { setup: None, plate: None, contact: None, forces: Some(act) },
+    act: Act::Forces(act),
+    ..Kind::cause("plate_tilt", Place::Instrument, "the plate is tilted against the sensor")
 };
 
 /// Distance from the middle at which the bend is stated (m).

@@ -3,18 +3,20 @@
 //! as a junction takes to pass, so U0 goes with its width: less than the cube root of the load (Hertz), as
 //! there are more junctions too. Unchanged at 20 mm/s and 0.3 N.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "rate_dependent_friction",
-    place: Place::Contact,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "the coefficient of friction depends on the sliding speed",
-    parameters: &[Parameter::signed("relative_slope", 0.004, 0.3), Parameter::log("knee_m_s", 2e-3, 2e-2), Parameter::linear("fall_per_50_mm_s", 0.0, 0.8)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    parameters: &[
+        Parameter::signed("relative_slope", 0.004, 0.3),
+        Parameter::log("knee_m_s", 2e-3, 2e-2),
+        Parameter::linear("fall_per_50_mm_s", 0.0, 0.8),
+    ],
+    act: Act::Contact(act),
+    ..Kind::cause(
+        "rate_dependent_friction",
+        Place::Contact,
+        "the coefficient of friction depends on the sliding speed",
+    )
 };
 
 const REFERENCE_M_S: f64 = 0.02;

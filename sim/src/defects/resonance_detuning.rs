@@ -2,22 +2,17 @@
 //! (a softening Duffing resonator). The amplifier does not follow. A neighbouring mode swings along, in phase on one side of
 //! the resonance and against it on the other: the fall is not the same on both, and ends on what the neighbour moves.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "resonance_detuning",
-    place: Place::Plate,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "the plate is driven off its resonance as it warms",
     parameters: &[
         Parameter::log("relative_shift_per_k", 1e-5, 4e-3),
         Parameter::linear("softening_per_um2", 0.0, 2e-4),
         Parameter::linear("neighbour_over_mode", 0.3, 0.8),
         Parameter::linear("raised_k_per_n", 1.0, 5.0),
     ],
-    act: Act { setup: None, plate: Some(act), contact: None, forces: None },
+    act: Act::Plate(act),
+    ..Kind::cause("resonance_detuning", Place::Plate, "the plate is driven off its resonance as it warms")
 };
 
 const QUALITY: f64 = 150.0;

@@ -3,18 +3,16 @@
 //! A ridge's landing takes as long as its mass needs on the skin's own stiffness, and gives back what the skin's loss
 //! leaves. Areal mass of the stratum corneum and papillary dermis over the contact area: up to some 8 mg.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "ridge_inertia",
-    place: Place::Contact,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "ridges have mass: they overshoot, fly and land",
-    parameters: &[Parameter::log("mass_kg", 1e-7, 8e-6), Parameter::log("damping_ratio", 0.3, 1.0), Parameter::log("skin_loss", 0.15, 0.6)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    parameters: &[
+        Parameter::log("mass_kg", 1e-7, 8e-6),
+        Parameter::log("damping_ratio", 0.3, 1.0),
+        Parameter::log("skin_loss", 0.15, 0.6),
+    ],
+    act: Act::Contact(act),
+    ..Kind::cause("ridge_inertia", Place::Contact, "ridges have mass: they overshoot, fly and land")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

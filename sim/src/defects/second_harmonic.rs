@@ -1,18 +1,13 @@
 //! The amplifier distorts: the plate carries a second harmonic, which sharpens or broadens each contact. It
 //! grows with the swing, as a distortion does.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "second_harmonic",
-    place: Place::Plate,
-    in_library: false,
-    in_tables: true,
-    imitated: false,
-    summary: "the plate also vibrates at twice the frequency",
     parameters: &[Parameter::log("ratio_at_2_um", 0.01, 0.6), Parameter::linear("phase_rad", 0.0, 6.2)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    in_library: false,
+    act: Act::Contact(act),
+    ..Kind::cause("second_harmonic", Place::Plate, "the plate also vibrates at twice the frequency")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -1,19 +1,10 @@
 //! The sensor is slower than its data sheet: its bandwidth is lower. A table of means does not show it.
 
-use super::{Act, Kind, Parameter, Place, Values};
-use crate::world::WorldConfig;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "sensor_lag",
-    place: Place::Instrument,
-    in_library: true,
-    in_tables: false,
-    imitated: false,
-    summary: "the bandwidth of the force sensor is lower than stated",
     parameters: &[Parameter::log("bandwidth_hz", 2.0, 80.0)],
-    act: Act { setup: Some(act), plate: None, contact: None, forces: None },
+    in_tables: false,
+    act: Act::Setup(|v, config| config.sensor.bandwidth_hz = v[0]),
+    ..Kind::cause("sensor_lag", Place::Instrument, "the bandwidth of the force sensor is lower than stated")
 };
-
-fn act(v: &Values, config: &mut WorldConfig) {
-    config.sensor.bandwidth_hz = v[0];
-}

@@ -1,17 +1,12 @@
 //! The stage does not slide as fast as it says: a scale, and a slip that grows with speed.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "speed_error",
-    place: Place::Instrument,
-    in_library: true,
-    in_tables: true,
-    imitated: true,
-    summary: "the true sliding speed is not the one stated",
     parameters: &[Parameter::factor("factor", 0.02, 0.8)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    imitated: true,
+    act: Act::Contact(act),
+    ..Kind::cause("speed_error", Place::Instrument, "the true sliding speed is not the one stated")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -1,17 +1,15 @@
 //! The spindle's eccentricity makes the speed rise and fall along the stroke, with a second harmonic.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "speed_ripple",
-    place: Place::Instrument,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "the speed rises and falls along the stroke",
-    parameters: &[Parameter::log("ripple", 0.01, 0.7), Parameter::log("pitch_m", 3e-3, 1.2e-2), Parameter::linear("phase_rad", 0.0, 6.2)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    parameters: &[
+        Parameter::log("ripple", 0.01, 0.7),
+        Parameter::log("pitch_m", 3e-3, 1.2e-2),
+        Parameter::linear("phase_rad", 0.0, 6.2),
+    ],
+    act: Act::Contact(act),
+    ..Kind::cause("speed_ripple", Place::Instrument, "the speed rises and falls along the stroke")
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

@@ -5,22 +5,20 @@
 //! given: asperities hold it open, with a force that falls as a power of the gap, so a lighter load on them
 //! opens it. Rarefaction lets the air out where its free path nears the gap. Only the rest of the load is rubbed.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "squeeze_film",
-    place: Place::Contact,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "air trapped between ridges and plate carries part of the load",
     parameters: &[
         Parameter::log("film_area_m2", 3e-8, 1.5e-5),
         Parameter::log("half_gap_m", 2e-6, 3.5e-6),
         Parameter::log("asperity_load_n", 0.5, 3.0),
     ],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    act: Act::Contact(act),
+    ..Kind::cause(
+        "squeeze_film",
+        Place::Contact,
+        "air trapped between ridges and plate carries part of the load",
+    )
 };
 
 /// Mean free path of air at one atmosphere (m).

@@ -2,18 +2,13 @@
 //! thickness) changes the lateral one by some power of it; the logarithms of both lie at an angle: the normal one
 //! alone at none, both alike at an eighth of a turn, the lateral one alone at a quarter.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "stiffness_error",
-    place: Place::Finger,
-    in_library: true,
-    in_tables: true,
-    imitated: true,
-    summary: "the true stiffnesses are far from the nominal ones",
     parameters: &[Parameter::factor("factor", 0.04, 1.8), Parameter::linear("angle_rad", -0.46, 2.0)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    imitated: true,
+    act: Act::Contact(act),
+    ..Kind::cause("stiffness_error", Place::Finger, "the true stiffnesses are far from the nominal ones")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -1,18 +1,20 @@
 //! The tissue under the ridges creeps: the compression under a given load grows with the time in contact, by a power law
 //! without any relaxation time of its own (fractional viscoelasticity, exponent 0.25); the ridges lean with it, and their lateral stiffness falls more or less along.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "subsurface_relaxation",
-    place: Place::Contact,
-    in_library: true,
-    in_tables: true,
-    imitated: false,
-    summary: "the tissue under the ridges creeps with the time in contact",
-    parameters: &[Parameter::log("creep", 0.01, 1.0), Parameter::log("time_s", 1.0, 30.0), Parameter::linear("lateral_over_normal", 0.2, 1.5)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    parameters: &[
+        Parameter::log("creep", 0.01, 1.0),
+        Parameter::log("time_s", 1.0, 30.0),
+        Parameter::linear("lateral_over_normal", 0.2, 1.5),
+    ],
+    act: Act::Contact(act),
+    ..Kind::cause(
+        "subsurface_relaxation",
+        Place::Contact,
+        "the tissue under the ridges creeps with the time in contact",
+    )
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

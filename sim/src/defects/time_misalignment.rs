@@ -1,19 +1,10 @@
 //! Forces arrive later than they are stamped: the link holds them back. A table of means does not show it.
 
-use super::{Act, Kind, Parameter, Place, Values};
-use crate::world::WorldConfig;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "time_misalignment",
-    place: Place::Instrument,
-    in_library: true,
-    in_tables: false,
-    imitated: false,
-    summary: "forces arrive later than stated",
     parameters: &[Parameter::log("delay_s", 2e-3, 0.1)],
-    act: Act { setup: Some(act), plate: None, contact: None, forces: None },
+    in_tables: false,
+    act: Act::Setup(|v, config| config.sensor.latency_s += v[0]),
+    ..Kind::cause("time_misalignment", Place::Instrument, "forces arrive later than stated")
 };
-
-fn act(v: &Values, config: &mut WorldConfig) {
-    config.sensor.latency_s += v[0];
-}

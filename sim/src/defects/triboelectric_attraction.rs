@@ -1,17 +1,16 @@
 //! Sliding charges the plate, vibration sheds the charge: an attraction that grows with speed, and is shaken off by swing.
 
-use super::{Act, Kind, Parameter, Place, Surroundings, Values};
-use crate::contact::Contact;
+use super::*;
 
 pub(super) static KIND: Kind = Kind {
-    name: "triboelectric_attraction",
-    place: Place::Contact,
-    in_library: false,
-    in_tables: true,
-    imitated: false,
-    summary: "sliding charges the plate, and the charge attracts the finger",
     parameters: &[Parameter::log("attraction_n", 1e-3, 0.15), Parameter::log("speed_m_s", 5e-3, 5e-2)],
-    act: Act { setup: None, plate: None, contact: Some(act), forces: None },
+    in_library: false,
+    act: Act::Contact(act),
+    ..Kind::cause(
+        "triboelectric_attraction",
+        Place::Contact,
+        "sliding charges the plate, and the charge attracts the finger",
+    )
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -26,13 +26,11 @@ pub struct EmulatedAdapter {
 
 impl EmulatedAdapter {
     /// An adapter on a serial port.
-    #[must_use]
     pub fn new(port: Box<dyn serialport::SerialPort>) -> Self {
         Self { port, reader: SlcanReader::default(), waiting: VecDeque::new(), damage: Arc::default() }
     }
 
     /// What is done to the next frame that is sent: 1 loses it, 2 sends it twice.
-    #[must_use]
     pub fn damage(&self) -> Arc<AtomicUsize> {
         Arc::clone(&self.damage)
     }

@@ -127,7 +127,6 @@ impl Device {
     }
 
     /// The profile.
-    #[must_use]
     pub fn profile(&self) -> &Profile {
         &self.profile
     }

@@ -37,7 +37,6 @@ pub struct Drive {
 
 impl Drive {
     /// A drive that has just been switched on.
-    #[must_use]
     pub fn new(device: Device, node: u8) -> Self {
         let objects = [
             ((0x1000, 0), (4, 0x0002_0192)),
@@ -63,7 +62,6 @@ impl Drive {
     }
 
     /// When it next has something to say.
-    #[must_use]
     pub fn due(&self) -> Option<Nanos> {
         Some(if self.operational { self.heartbeat_due.min(self.data_due) } else { self.heartbeat_due })
     }

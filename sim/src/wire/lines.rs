@@ -33,7 +33,6 @@ pub struct LineInstrument {
 
 impl LineInstrument {
     /// By its profile.
-    #[must_use]
     pub fn new(device: Device, plant: SharedPlant) -> Self {
         let commands = &device.profile().description.emulator.command;
         let has = |command: Command| commands.values().any(|name| name == command.name());
@@ -259,7 +258,6 @@ impl TcpLines {
     }
 
     /// Where it listens.
-    #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
     }

@@ -56,7 +56,6 @@ impl ModbusTcpServer {
     }
 
     /// Where it listens.
-    #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
     }

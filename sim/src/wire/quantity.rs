@@ -17,7 +17,6 @@ macro_rules! named {
             }
 
             /// The one of that name.
-            #[must_use]
             pub fn from_name(name: &str) -> Option<Self> {
                 Self::ALL.iter().copied().find(|one| one.name() == name)
             }

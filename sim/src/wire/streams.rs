@@ -61,7 +61,6 @@ impl NetworkStream {
     }
 
     /// Where it is.
-    #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
     }

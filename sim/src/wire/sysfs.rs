@@ -46,7 +46,6 @@ impl SysfsFolder {
     }
 
     /// The folder.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }

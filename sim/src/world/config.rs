@@ -170,17 +170,6 @@ impl WorldConfig {
         }
         Ok(())
     }
-
-    /// Standard deviation of a pass's mean force (N): the sensor's wander and what is left of its white
-    /// noise. `seconds` is the length of the pass's steady part.
-    pub fn pass_force_sd_n(&self, axis: usize, seconds: f64) -> f64 {
-        let s = &self.sensor;
-        // Mean of a wander with correlation time T over t: variance 2 T/t (1 - T/t (1 - exp(-t/T))).
-        let r = s.wander_time_s / seconds;
-        let share = 2.0 * r * (1.0 - r * (1.0 - (-1.0 / r).exp()));
-        let white = s.white_sd_n[axis] * (s.sample_period_s / seconds).sqrt();
-        (s.wander_sd_n[axis] * share.sqrt()).hypot(white)
-    }
 }
 
 /// The bundled rig's departure from the model: a kind of defect and the seed its parameters are drawn from.

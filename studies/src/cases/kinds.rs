@@ -70,28 +70,27 @@ impl PartialEq for Cell {
     }
 }
 
-impl From<f64> for Cell {
-    fn from(value: f64) -> Cell {
-        Cell::Number(value)
-    }
+macro_rules! cells {
+    ($($of:ty => $cell:ident $column:ident,)+) => {
+        $(
+            impl From<$of> for Cell {
+                fn from(value: $of) -> Cell {
+                    Cell::$cell(value)
+                }
+            }
+
+            const fn $column(name: &'static str, words: &'static str) -> Column {
+                Column { name, cells: Type::$cell, words }
+            }
+        )+
+    };
 }
 
-impl From<u64> for Cell {
-    fn from(value: u64) -> Cell {
-        Cell::Count(value)
-    }
-}
-
-impl From<bool> for Cell {
-    fn from(value: bool) -> Cell {
-        Cell::Flag(value)
-    }
-}
-
-impl From<String> for Cell {
-    fn from(value: String) -> Cell {
-        Cell::Text(value)
-    }
+cells! {
+    f64 => Number number,
+    u64 => Count count,
+    bool => Flag flag,
+    String => Text text,
 }
 
 impl<T: Into<Cell>> From<Option<T>> for Cell {
@@ -177,22 +176,6 @@ fn no_lines(header: &Header) -> miette::Result<()> {
         miette::bail!("cases of the kind {} follow from the settings: no line a case", header.kind);
     }
     Ok(())
-}
-
-const fn number(name: &'static str, words: &'static str) -> Column {
-    Column { name, cells: Type::Number, words }
-}
-
-const fn count(name: &'static str, words: &'static str) -> Column {
-    Column { name, cells: Type::Count, words }
-}
-
-const fn flag(name: &'static str, words: &'static str) -> Column {
-    Column { name, cells: Type::Flag, words }
-}
-
-const fn text(name: &'static str, words: &'static str) -> Column {
-    Column { name, cells: Type::Text, words }
 }
 
 /// What the names of a list come to in one cell.

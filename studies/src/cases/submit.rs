@@ -26,29 +26,53 @@ const ASK: Duration = Duration::from_secs(5);
 /// How often what an engine left undone is handed over again, where something came of the last time, or of the one before.
 const ROUNDS: usize = 4;
 
-/// How to submit.
-#[derive(Clone, Debug)]
+/// How to submit: the options of `muprime submit`.
+#[derive(Clone, Debug, clap::Args)]
 pub struct Options {
-    /// Name of the engine, or `local`.
+    /// local, slurm, hq or dask
+    #[arg(long, default_value = "local")]
     pub engine: String,
-    /// Tasks at one time; on this machine its cores if left out.
+    /// Cases at one time (local: all cores; else as many as the engine gives)
+    #[arg(long, value_name = "N")]
     pub workers: Option<u64>,
-    /// Time that a task is meant to take, s.
-    pub task_s: f64,
-    /// Time that a task may take, s; from the pilot if left out.
+    /// Time limit of one task, as in 30:00 or 2:00:00 (from a pilot if left out)
+    #[arg(long = "time", id = "time", value_name = "TIME", value_parser = seconds_of)]
     pub limit_s: Option<f64>,
-    /// Cases of the pilot at most.
+    /// Seconds that a task is meant to take
+    #[arg(long, default_value_t = 300.0, value_name = "S")]
+    pub task_s: f64,
+    /// Cases of the pilot, which is run here for 20 s at most
+    #[arg(long, default_value_t = 8, value_name = "N")]
     pub pilot: usize,
-    /// Time of a case where it is known, s: no pilot then.
+    /// Seconds of a case, where they are known: no pilot is run
+    #[arg(long, value_name = "S")]
     pub case_s: Option<f64>,
-    /// Do not wait.
+    /// Do not wait for the end
+    #[arg(long)]
     pub detach: bool,
-    /// Address or folder of the engine's server.
+    /// hq: folder of its server; dask: address of its scheduler
+    #[arg(long)]
     pub server: Option<String>,
-    /// Python for HyperQueue and Dask.
+    /// Python that has the package hyperqueue or distributed
+    #[arg(long, default_value = "python3")]
     pub python: String,
-    /// Passed on to the engine.
+    /// Passed on to sbatch (may be repeated), as in --option=--partition=short
+    #[arg(long = "option", value_name = "OPTION", allow_hyphen_values = true)]
     pub options: Vec<String>,
+}
+
+/// Seconds of MM, MM:SS, H:MM:SS or D-HH:MM:SS, as Slurm writes them.
+fn seconds_of(text: &str) -> Result<f64, String> {
+    let wrong = || "MM:SS, H:MM:SS or D-HH:MM:SS".to_string();
+    let (days, rest) = text.split_once('-').unwrap_or(("0", text));
+    let parts: Result<Vec<u64>, _> = std::iter::once(days).chain(rest.split(':')).map(str::parse).collect();
+    let seconds = match parts.map_err(|_| wrong())?[..] {
+        [0, m] => 60 * m,
+        [0, m, s] => 60 * m + s,
+        [d, h, m, s] => 86400 * d + 3600 * h + 60 * m + s,
+        _ => return Err(wrong()),
+    };
+    if seconds == 0 { Err(wrong()) } else { Ok(seconds as f64) }
 }
 
 /// What a submission came to.
@@ -312,4 +336,20 @@ pub fn cancel(out: &Path) -> miette::Result<Vec<String>> {
         ids.extend(job.ids);
     }
     Ok(ids)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::seconds_of;
+
+    #[test]
+    fn times_are_read_as_slurm_writes_them() {
+        assert_eq!(seconds_of("5"), Ok(300.0));
+        assert_eq!(seconds_of("1:30"), Ok(90.0));
+        assert_eq!(seconds_of("2:00:01"), Ok(7201.0));
+        assert_eq!(seconds_of("1-00:00:00"), Ok(86400.0));
+        for bad in ["", "0", "x", "1-5", "1:2:3:4", "-5"] {
+            assert!(seconds_of(bad).is_err(), "{bad}");
+        }
+    }
 }

@@ -112,13 +112,11 @@ pub fn collapse(study: Study, out: &Path) -> miette::Result<Reproduced> {
         let local: Vec<String> = local.collect();
         lines.push(format!("local Psi* at {} {:?}: {}", panel.variable(), panel.values(), local.join(", ")));
     }
-    let chart = Chart {
-        name: reading::file(reading, "fig12"),
-        stated: Vec::new(),
-        title: "Relative friction against Psi of Eq. 17 (Fig. 12)".into(),
-        x: "psi_eq17".into(),
-        y: "mu_relative".into(),
+    let chart = Chart::new(
+        reading::file(reading, "fig12"),
+        "Relative friction against Psi of Eq. 17 (Fig. 12)",
+        ["psi_eq17", "mu_relative"],
         series,
-    };
+    );
     Ok(Reproduced { charts: vec![chart], lines })
 }

@@ -75,6 +75,17 @@ pub struct Chart {
 }
 
 impl Chart {
+    /// A chart of which the paper states nothing but its curves. `axes` are the names of x and y.
+    pub fn new(
+        name: impl Into<String>,
+        title: impl Into<String>,
+        axes: [&str; 2],
+        series: Vec<Series>,
+    ) -> Chart {
+        let [x, y] = axes.map(String::from);
+        Chart { name: name.into(), title: title.into(), x, y, series, stated: Vec::new() }
+    }
+
     /// Writes `NAME.csv` into `out`.
     ///
     /// # Errors

@@ -30,17 +30,15 @@ pub fn forces(reading: Reading) -> miette::Result<Reproduced> {
             "2 um: t_s* = {slip}, t_c* = {:.3}, mu' = {:.3}; paper: the force rises linearly to mu_0 F_reac, then follows it to zero (drawn; no number is stated)",
             cycle.contact_fraction, cycle.mu_relative
         )],
-        charts: vec![Chart {
-            name: reading::file(reading, "fig10"),
-            stated: Vec::new(),
-            title: "Spring-slider: forces from touch-down, 2 um (Fig. 10)".into(),
-            x: "time_periods".into(),
-            y: "force_n".into(),
-            series: vec![
+        charts: vec![Chart::new(
+            reading::file(reading, "fig10"),
+            "Spring-slider: forces from touch-down, 2 um (Fig. 10)",
+            ["time_periods", "force_n"],
+            vec![
                 Series::line("mu_0 F_reac", force(|i| i.reaction_over_normal)),
                 Series::line("lateral force", force(|i| i.lateral_over_coulomb)),
             ],
-        }],
+        )],
     })
 }
 
@@ -83,14 +81,12 @@ pub fn phase_shift(reading: Reading) -> miette::Result<Reproduced> {
             }
             series.push(Series::line(format!("k_n {} MN/m", kn / 1e6), points));
         }
-        charts.push(Chart {
-            name: reading::file(reading, name),
-            stated: Vec::new(),
-            title: "Spring-slider: phase shift at 0.5 N (Fig. 11)".into(),
-            x: reading::column(reading).into(),
-            y: "phase_shift_deg".into(),
+        charts.push(Chart::new(
+            reading::file(reading, name),
+            "Spring-slider: phase shift at 0.5 N (Fig. 11)",
+            [reading::column(reading), "phase_shift_deg"],
             series,
-        });
+        ));
     }
     Ok(Reproduced {
         charts,
@@ -119,14 +115,12 @@ pub fn slow_recovery(reading: Reading) -> miette::Result<Reproduced> {
             last(&free),
             last(&held)
         )],
-        charts: vec![Chart {
-            name: reading::file(reading, "fig13"),
-            stated: Vec::new(),
-            title: "Spring-slider: slow lateral recovery (Fig. 13)".into(),
-            x: "cycle".into(),
-            y: "mu_relative".into(),
-            series: vec![Series::line("1.5 mm/s", held), Series::line("instant", free)],
-        }],
+        charts: vec![Chart::new(
+            reading::file(reading, "fig13"),
+            "Spring-slider: slow lateral recovery (Fig. 13)",
+            ["cycle", "mu_relative"],
+            vec![Series::line("1.5 mm/s", held), Series::line("instant", free)],
+        )],
     })
 }
 
@@ -148,13 +142,11 @@ pub fn steady_recovery(reading: Reading) -> miette::Result<Reproduced> {
             "steady mu' at 5 um for recovery speeds in mm/s: {}; paper: falls as the recovery gets faster, 1.5 to 15 mm/s (drawn; no value is stated)",
             at_five.join(", ")
         )],
-        charts: vec![Chart {
-            name: reading::file(reading, "fig14"),
-            stated: Vec::new(),
-            title: "Spring-slider: slow recovery, steady (Fig. 14)".into(),
-            x: reading::column(reading).into(),
-            y: "mu_relative".into(),
+        charts: vec![Chart::new(
+            reading::file(reading, "fig14"),
+            "Spring-slider: slow recovery, steady (Fig. 14)",
+            [reading::column(reading), "mu_relative"],
             series,
-        }],
+        )],
     })
 }

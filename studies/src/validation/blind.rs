@@ -17,9 +17,39 @@ use diagnosis::verdict::diagnose;
 use models::covariate;
 use rayon::prelude::*;
 use reliability::{Entry, identifiable};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sim::sealed::{Ask, DETECTABLE, PAIR_LEAVES, Set, Stratum, generate};
 use std::collections::BTreeMap;
+
+/// Which sets are made and how they are diagnosed: options of the command line, and settings of cases.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Seed of the first set
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// One stratum only: none, single, pair, alias or outside; all in their shares without it
+    #[arg(long, value_parser = stratum_of)]
+    pub stratum: Option<Stratum>,
+    /// Try single effects only
+    #[arg(long)]
+    pub no_pairs: bool,
+    /// Leave an effect out of the library (may be repeated)
+    #[arg(long, value_name = "EFFECT")]
+    pub without: Vec<String>,
+}
+
+/// A stratum by its name.
+fn stratum_of(text: &str) -> Result<Stratum, String> {
+    serde_json::from_value(serde_json::Value::String(text.into()))
+        .map_err(|_| "none, single, pair, alias or outside is needed".to_string())
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings { seed: 1, stratum: None, no_pairs: false, without: Vec::new() }
+    }
+}
 
 /// rms gap over floor on the hidden passes that the truth must leave to be detectable.
 const ABOVE_FLOOR: f64 = 1.0;

@@ -1,13 +1,12 @@
 //! The studies of `muprime blind` beside the score: other scatter, other constants, the library's own forms, further passes.
 
+use super::super::prelude::*;
 use super::Args;
 use diagnosis::constants::{Row, Stage};
 use diagnosis::hypotheses::Options;
-use runs::{out, say};
 use serde_json::Value;
 use sim::sealed::Stratum;
 use sim::sealed::rough::{RoughSet, Roughness};
-use std::process::ExitCode;
 use std::sync::Arc;
 use studies::progress::Study;
 use studies::validation::blind::further::{self, LIMIT, Race};
@@ -38,7 +37,7 @@ pub fn rough(args: &Args, kind: &str, options: &Options, json: bool) -> miette::
         let names: Vec<&str> = Roughness::ALL.iter().map(|k| k.0).collect();
         miette::bail!("--noise {kind}: {} or all is needed", names.join(", "));
     }
-    let (seed, sets, all) = (args.seed, args.sets, args.sets * TRUTHS.len() * picked.len());
+    let (seed, sets, all) = (args.of.seed, args.sets, args.sets * TRUTHS.len() * picked.len());
     let study = Study::begin(all as u64, "sets", move |found: Vec<Answers>, done| {
         cut(done, all, json);
         tell_rough(&Answers::summed(&found), seed, sets, true, json);
@@ -112,7 +111,7 @@ pub fn sensitivity(
         miette::bail!("--sensitivity {choice}: fit, decision, the name of a constant, or nothing is needed");
     }
     let tried = Arc::new(sensitivity::Study::new(options, &picked)?);
-    let (seed, sets, so_far) = (args.seed, args.sets, Arc::clone(&tried));
+    let (seed, sets, so_far) = (args.of.seed, args.sets, Arc::clone(&tried));
     let study = Study::begin(sets as u64, "sets", move |_: Vec<()>, done| {
         cut(done, sets, json);
         tell_sensitivity(&so_far.rows(), seed, sets, true, json);
@@ -153,7 +152,7 @@ pub fn same_form(args: &Args, json: bool) -> miette::Result<ExitCode> {
         cut(done, sets, json);
         tell_same_form(&found, true, json);
     })?;
-    let found = same_form::run(args.seed, sets, &|one| study.done(Some(one.clone())))?;
+    let found = same_form::run(args.of.seed, sets, &|one| study.done(Some(one.clone())))?;
     drop(study);
     tell_same_form(&found, false, json);
     Ok(ExitCode::SUCCESS)
@@ -203,7 +202,7 @@ pub fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
         }
         study.done(race.cloned());
     };
-    let races = further::run(args.seed, sets, &each)?;
+    let races = further::run(args.of.seed, sets, &each)?;
     drop(study);
     tell_further(&races, false, json);
     Ok(ExitCode::SUCCESS)

@@ -1,11 +1,10 @@
 //! `muprime doctor peek ADDRESS`: what an instrument sends, before it has a profile.
 
+use super::super::prelude::*;
 use clap::ValueEnum;
 use drivers::peek::{self, Place, Speed};
 use instruments::schema::Table;
-use runs::out;
 use serde_json::json;
-use std::process::ExitCode;
 use std::time::Duration;
 
 /// Arguments.
@@ -97,7 +96,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     } else {
         lines(&peek::bytes(&place, &speed, long).map_err(failed)?, long, json);
     }
-    super::super::exit(super::super::DONE)
+    exit(DONE)
 }
 
 /// The number of two registers in both orders of their words: high word first, low word first.

@@ -1,13 +1,12 @@
 //! `muprime show --sample NAME`: tables to try, measured on the virtual rig in virtual time.
 
+use super::super::prelude::*;
 use clap::ValueEnum;
-use miette::IntoDiagnostic;
 use models::prediction::SpringSlider;
 use runs::plan::Plan;
 use runs::session::{Job, Notes, Signals};
 use runs::setup::Setup;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Samples.

@@ -224,7 +224,7 @@ fn the_hour_has_a_share_and_a_dose() {
 /// The window forgets a minute only when all of it is an hour ago.
 #[test]
 fn the_hour_slides_and_forgets_nothing_early() {
-    let mut exposure = exposure::Exposure::new();
+    let mut exposure = exposure::Exposure::default();
     let second = 1_000_000_000;
     let rest = Nanos(60 * second);
     exposure.add(false, 0.0, rest, Nanos(0));
@@ -257,7 +257,7 @@ fn what_earlier_runs_did_is_carried_over() {
         let mut past =
             Exposed { in_one_go: Nanos(7 * second), resting: Nanos(59 * second), ..Exposed::default() };
         past.parts[part] = (Nanos(100 * second), 3.0);
-        let mut exposure = exposure::Exposure::new();
+        let mut exposure = exposure::Exposure::default();
         exposure.carry(&past);
         exposure.add(false, 0.0, rest, Nanos(0));
         assert_eq!((exposure.in_one_go, exposure.in_all), (Nanos(7 * second), (Nanos(0), 0.0)));

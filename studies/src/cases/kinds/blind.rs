@@ -2,10 +2,9 @@
 
 use super::{Case, Kind, flag, joined, no_lines, number, settings, text};
 use crate::cases::file::Header;
+pub use crate::validation::blind::Settings;
 use crate::validation::blind::{score, set};
 use diagnosis::hypotheses::Options;
-use serde::{Deserialize, Serialize};
-use sim::sealed::Stratum;
 
 /// The kind.
 pub const KIND: Kind = Kind {
@@ -27,26 +26,6 @@ pub const KIND: Kind = Kind {
     ],
     prepare,
 };
-
-/// What all cases share.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Settings {
-    /// Seed of the benchmark.
-    pub seed: u64,
-    /// One stratum only.
-    pub stratum: Option<Stratum>,
-    /// Try single effects only.
-    pub no_pairs: bool,
-    /// Effects that are left out of the library.
-    pub without: Vec<String>,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Settings { seed: 1, stratum: None, no_pairs: false, without: Vec::new() }
-    }
-}
 
 fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {
     no_lines(header)?;

@@ -41,13 +41,15 @@ pub struct Line {
     pub rig: Option<PathBuf>,
 }
 
-/// What all cases share.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// What all cases share, and options of the command line.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Try single effects only.
+    /// Try single effects only
+    #[arg(long)]
     pub no_pairs: bool,
-    /// Effects that are left out of the library.
+    /// Leave an effect out of the library (may be repeated)
+    #[arg(long, value_name = "EFFECT")]
     pub without: Vec<String>,
 }
 

@@ -14,11 +14,12 @@ pub const KIND: Kind = Kind {
     prepare,
 };
 
-/// What all cases share.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// What all cases share, and options of the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Hashes of a case after its first: its work.
+    /// Hashes of each: some five million a second
+    #[arg(long, default_value_t = 0)]
     pub hashes: u64,
 }
 

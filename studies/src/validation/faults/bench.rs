@@ -365,6 +365,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
 }
 
 /// What is noted while a scene runs.
+#[derive(Default)]
 struct Watch {
     shown: Vec<Option<u64>>,
     off_at: Option<u64>,
@@ -382,20 +383,7 @@ struct Watch {
 
 impl Watch {
     fn new(scene: &Scene) -> Self {
-        Watch {
-            shown: scene.strikes.iter().map(|_| None).collect(),
-            off_at: None,
-            trip: None,
-            quiet_at: None,
-            amplitude_at_off: 0.0,
-            remark_at: None,
-            mu_after: None,
-            armed: false,
-            last_used: [Nanos(0); 2],
-            alone_quiet_at: None,
-            alone_amplitude: 0.0,
-            wrong: Vec::new(),
-        }
+        Watch { shown: vec![None; scene.strikes.len()], ..Watch::default() }
     }
 
     /// The plate while the controller stands still.
