@@ -10,7 +10,7 @@ use models::prediction::FrictionModel;
 use models::quantity::{Direction, PeakToPeak};
 use models::rig_file::{PassNoise, RigFile};
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{RngCore, SeedableRng};
+use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
 use std::path::Path;
 use studies::cases::adaptive::{SparseGrid, place_of};
@@ -231,7 +231,7 @@ fn a_table_that_is_wrong_or_too_coarse_and_a_program_that_fails_are_refused() {
 }
 
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    (0..12).map(|_| rng.next_u32() as f64 / f64::from(u32::MAX)).sum::<f64>() - 6.0
+    (0..12).map(|_| f64::from(rng.next_u32()) / f64::from(u32::MAX)).sum::<f64>() - 6.0
 }
 
 /// Passes of a world of the foreign law with mu_0 0.6, plus what `active` changes on the spring-slider; noise
