@@ -39,7 +39,7 @@ enum ModelVerb {
     /// A surrogate over up to ten variables, its nodes chosen in rounds where the error is.
     #[cfg(feature = "parquet")]
     Adapt(Box<adapt::AdaptArgs>),
-    /// The law that a program computes, as a table for `run --model` and `diagnose --model`.
+    /// A law of your own, which a program computes, as a table for `run --model` and `diagnose --model`.
     Tabulate(tabulate::TabulateArgs),
     /// The paper's figures recomputed, as CSV and SVG with a line of comparison each.
     Reproduce(reproduce::ReproduceArgs),
