@@ -40,6 +40,7 @@ fn warming(detuning_per_kelvin: f64) -> String {
         interpolation_error: 0.0,
         baseline: BASELINE,
         design: DESIGN,
+        law: None,
         effects: vec![effect],
     };
     toml::to_string(&saved).unwrap()

@@ -61,11 +61,33 @@ fn cycles() -> u64 {
 
 #[test]
 fn no_allocation_in_a_million_cycles_of_a_sweep() {
-    let cycles = cycles();
+    let finger = Setup::load("virtual").unwrap().tip.finger;
+    no_allocation_in_a_sweep(Arc::new(SpringSlider::new(finger).unwrap()), cycles());
+}
+
+/// A table of five variables that covers the sweep, with an uncertainty: it answers in every driven cycle of
+/// a pass.
+#[test]
+fn no_allocation_with_a_law_table() {
+    use models::law_table::grid::Grid;
+    let words = [
+        "amplitude_pp_m=0.1e-6..8e-6:9:log",
+        "frequency_hz=20e3..60e3:3",
+        "speed_m_s=0.001..0.3:7:log",
+        "normal_force_n=0.01..2:5:log",
+        "mu0=0.05..3:3",
+    ];
+    let grid = Grid::parse(words).unwrap();
+    let mu = |c: &Vec<f64>| [1.0 / (1.0 + c[0] * c[1] * c[4] / c[2]), 0.02];
+    let made = grid.table(0, &grid.conditions(0).iter().map(mu).collect::<Vec<_>>()).unwrap();
+    let law = runs::model_file::load("own.csv", &made.csv).unwrap();
+    no_allocation_in_a_sweep(law, cycles() / 4);
+}
+
+fn no_allocation_in_a_sweep(model: Arc<dyn models::prediction::FrictionModel>, cycles: u64) {
     let setup = Setup::load("virtual").unwrap();
     let plan = Plan::load("first-sweep").unwrap();
-    let model: Arc<dyn models::prediction::FrictionModel> =
-        Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
+    let mut compared = 0u64;
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
     let config = setup.config;
     let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::bundled(), 3).unwrap().split();
@@ -91,6 +113,7 @@ fn no_allocation_in_a_million_cycles_of_a_sweep() {
         assert!(pushed);
         armed += u64::from(row.armed);
         driven += u64::from(row.drive_pp_m > 0.0);
+        compared += u64::from(row.online.is_some() && row.drive_pp_m > 0.0);
         // What runs beside the loop may allocate.
         let row = drain.try_pop().unwrap();
         let reaction = sequence_now.on_row(&row);
@@ -101,8 +124,13 @@ fn no_allocation_in_a_million_cycles_of_a_sweep() {
             sequence = None;
         }
     }
-    println!("{cycles} cycles, {armed} armed, {driven} driving, {} allocations", COUNT.get());
+    let name = model.name();
+    println!(
+        "{name}: {cycles} cycles, {armed} armed, {driven} driving, {compared} compared, {} allocations",
+        COUNT.get()
+    );
     assert!(driven > cycles * 3 / 10, "the cycles must be those of a real sweep: {driven}");
+    assert!(compared > driven / 4, "the law must answer in the driven cycles: {compared}");
     assert_eq!(COUNT.get(), 0);
 }
 

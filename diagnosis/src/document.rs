@@ -25,13 +25,18 @@ pub fn document(result: &Diagnosis, rig: &RigFile, damage: &[String]) -> serde_j
     serde_json::to_string(&report)
 }
 
-/// What `--predictions` holds: CSV, a row a condition.
+/// What `--predictions` holds: CSV, a row a condition; empty cells where the base law cannot tell.
 pub fn predictions(result: &Diagnosis, conditions: &Table) -> String {
     let mut text = String::from(
         "point,lateral_force_baseline_n,lateral_force_corrected_n,lateral_force_corrected_sd_n\n",
     );
     for (point, f) in conditions.points.iter().zip(result.predict(conditions)) {
-        text.push_str(&format!("{point},{:e},{:e},{:e}\n", f.baseline, f.corrected, f.corrected_sd));
+        let cells = if f.baseline.is_nan() {
+            ",,".to_string()
+        } else {
+            format!("{:e},{:e},{:e}", f.baseline, f.corrected, f.corrected_sd)
+        };
+        text.push_str(&format!("{point},{cells}\n"));
     }
     text
 }

@@ -3,6 +3,7 @@
 use crate::constants::Constants;
 use crate::data::RigFile;
 use crate::gaussian::Covariance;
+use crate::law::Law;
 use crate::layout::{Layout, NUISANCES};
 pub use crate::member::Member;
 use effects::{Active, Baseline, Design, Parameter, known, library};
@@ -47,6 +48,19 @@ pub struct Problem {
     pub rough: bool,
     /// Tunable constants of the diagnosis.
     pub constants: Arc<Constants>,
+    /// The base law; none: the spring-slider.
+    pub law: Option<Arc<Law>>,
+    /// Of each pass: force of the base law beside the nominal spring-slider's, and the law's uncertainty, N.
+    /// Empty without a law.
+    pub beside: Vec<[f64; 2]>,
+}
+
+/// mu_0 of a table before any fit. Without still passes the largest friction seen is the best first word on
+/// it.
+pub fn nominal_mu0(table: &crate::data::Table) -> f64 {
+    let seen =
+        table.passes.iter().zip(&table.lateral).map(|(p, l)| p.direction.sign() * l / p.normal_force_n);
+    table.still_coefficient().unwrap_or_else(|| seen.fold(LEAST_MU0, f64::max))
 }
 
 /// Instrument errors that no table of passes tells from another baseline, with the logarithmic change of the
@@ -64,15 +78,6 @@ impl Problem {
     /// The problem of a whole table.
     pub fn new(table: &crate::data::Table, rig: &RigFile, constants: &Arc<Constants>) -> Self {
         let mu0 = table.still_coefficient();
-        // Without still passes the largest friction seen is the best first word on mu0.
-        let guess = mu0.unwrap_or_else(|| {
-            table
-                .passes
-                .iter()
-                .zip(&table.lateral)
-                .map(|(p, l)| p.direction.sign() * l / p.normal_force_n)
-                .fold(LEAST_MU0, f64::max)
-        });
         let sd = rig.finger.stiffness_relative_sd.max(constants.stiffness_sd_floor);
         let mut certified = Vec::new();
         for (index, effect) in library().iter().enumerate() {
@@ -99,7 +104,7 @@ impl Problem {
             common: DMatrix::zeros(table.len(), 0),
             design: table.design,
             nominal: Baseline {
-                mu0: guess,
+                mu0: nominal_mu0(table),
                 normal_stiffness_n_per_m: rig.finger.normal_stiffness_n_per_m,
                 lateral_stiffness_n_per_m: rig.finger.lateral_stiffness_n_per_m,
             },
@@ -107,7 +112,31 @@ impl Problem {
             certified,
             rough: false,
             constants: constants.clone(),
+            law: None,
+            beside: Vec::new(),
         }
+    }
+
+    /// The same problem on a base law, which is read once for each pass.
+    #[must_use]
+    pub fn on(self, law: Option<&Arc<Law>>) -> Self {
+        let beside =
+            law.map_or_else(Vec::new, |law| self.passes.iter().map(|p| self.beside(law, p)).collect());
+        Problem { law: law.cloned(), beside, ..self }
+    }
+
+    fn beside(&self, law: &Law, pass: &Condition) -> [f64; 2] {
+        law.beside(&self.nominal, &self.design, pass)
+    }
+
+    /// Variance of a pass by the base law's own uncertainty, N^2.
+    pub fn law_variance(&self, row: usize) -> f64 {
+        self.beside.get(row).map_or(0.0, |b| b[1] * b[1])
+    }
+
+    /// Whether the base law can tell at a condition; the spring-slider always can.
+    pub fn tells(&self, pass: &Condition) -> bool {
+        self.law.as_ref().is_none_or(|law| law.tells(self.nominal.mu0, pass))
     }
 
     /// Full friction at each pass, N: the unit of the errors of docs/contract.md.
@@ -134,6 +163,12 @@ impl Problem {
             common: self.common.select_rows(rows.iter()),
             certified: self.certified.clone(),
             constants: self.constants.clone(),
+            law: self.law.clone(),
+            beside: if self.law.is_some() {
+                rows.iter().map(|&i| self.beside[i]).collect()
+            } else {
+                Vec::new()
+            },
             ..*self
         }
     }
@@ -153,6 +188,7 @@ impl Problem {
             common: DMatrix::zeros(n, 0),
             ..self.select(&[])
         }
+        .on(self.law.as_ref())
     }
 
     /// Covariance of the forces: scatter, and smooth parts in the columns of `phi`, whose weights come first.
@@ -243,11 +279,22 @@ impl Problem {
 
     /// Predicted lateral forces, N.
     pub fn predict(&self, members: &[Member], u: &[f64]) -> DVector<f64> {
-        self.predict_at(members, u, &self.passes)
+        let mut forces = self.slider(members, u, &self.passes);
+        forces.iter_mut().zip(&self.beside).for_each(|(force, [beside, _])| *force += beside);
+        forces
     }
 
-    /// Predicted lateral forces at other conditions, N.
+    /// Predicted lateral forces at other conditions, N; NaN where the base law cannot tell.
     pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Condition]) -> DVector<f64> {
+        let mut forces = self.slider(members, u, passes);
+        if let Some(law) = &self.law {
+            forces.iter_mut().zip(passes).for_each(|(force, p)| *force += self.beside(law, p)[0]);
+        }
+        forces
+    }
+
+    /// The spring-slider's forces, N.
+    fn slider(&self, members: &[Member], u: &[f64], passes: &[Condition]) -> DVector<f64> {
         let baseline = self.baseline(u);
         let thetas = self.thetas(members, u);
         // Effects act in the library's order, whatever the order of the hypothesis.

@@ -8,6 +8,7 @@ use crate::fit::Problem;
 pub use crate::fitted::{Candidate, Fitted};
 use crate::gaussian::log_sum_exp;
 use crate::kernel::{Coordinates, Kernel, form_lengths};
+use crate::law::Law;
 use crate::layout::{Layout, NUISANCES};
 use crate::least_squares::minimise;
 use crate::noise::settle;
@@ -32,11 +33,19 @@ pub struct Options {
     pub without: Vec<String>,
     /// Receives the progress of the diagnosis.
     pub progress: Progress,
+    /// The base law; none: the spring-slider.
+    pub law: Option<Arc<Law>>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { constants: Arc::default(), pairs: true, without: Vec::new(), progress: Progress::default() }
+        Options {
+            constants: Arc::default(),
+            pairs: true,
+            without: Vec::new(),
+            progress: Progress::default(),
+            law: None,
+        }
     }
 }
 
@@ -67,7 +76,7 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
 pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &Belief) -> Fitted {
     let (k, progress) = (&*options.constants, &options.progress);
     progress.at("the table's own scatter", 0.0);
-    let mut problem = Problem::new(table, rig, &options.constants);
+    let mut problem = Problem::new(table, rig, &options.constants).on(options.law.as_ref());
     let (discrepancy, pure, scatter) = settle(table, rig, &mut problem, belief);
     let coordinates = Coordinates::of(table);
     let places: Vec<_> = problem

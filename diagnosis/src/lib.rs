@@ -5,6 +5,7 @@
 //! | [`data`] | the table: passes in the order of measurement, and what its design can show |
 //! | [`noise`], [`scatter`] | the variance of each pass, from rig.toml, replicates and the table itself: suspects, shifts of runs |
 //! | [`constants`] | every tunable constant with its meaning and source |
+//! | [`law`] | a base law in place of the spring-slider |
 //! | [`member`], [`fit`], [`layout`], [`least_squares`] | the regression problem of a hypothesis, its vector of parameters, its fit |
 //! | [`gaussian`], [`kernel`] | Gaussian algebra of low rank; smooth functions over the operating space |
 //! | [`evidence`] | marginal likelihood by Laplace's method, with a Gaussian-process departure from the law's form |
@@ -58,6 +59,7 @@ pub mod gaussian;
 pub mod hypotheses;
 pub mod intervals;
 pub mod kernel;
+pub mod law;
 pub mod layout;
 pub mod least_squares;
 pub mod left_out;

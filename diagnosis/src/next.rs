@@ -61,7 +61,8 @@ pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Dec
         return Vec::new();
     }
     let mut list = Vec::new();
-    let grid = grid::conditions(table);
+    let mut grid = grid::conditions(table);
+    grid.retain(|c| fitted.problem.tells(c));
     let hypotheses = predictives(fitted, rig, decision, &grid);
     // Where the evidence is for an effect and the left-out regions are against it, passes that part hypotheses come back to
     // a few conditions and leave the regions as empty as they are. Every second one then goes where nothing is known.

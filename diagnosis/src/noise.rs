@@ -60,7 +60,8 @@ pub fn settle(
     let stated: Vec<f64> =
         stated(&scatter.level).iter().zip(&scatter.inflation).map(|(v, i)| v * i).collect();
     let pure = replicates(table, problem, &stated, &scatter);
-    problem.variance = stated.iter().map(|v| v * pure.used).collect();
+    problem.variance =
+        stated.iter().enumerate().map(|(i, v)| v * pure.used + problem.law_variance(i)).collect();
     scatter.scale = pure.used.sqrt();
     scatter.enter(table, problem);
     let lengths = lengths(&problem.constants, table);
@@ -93,6 +94,8 @@ pub fn variance(problem: &Problem, rig: &RigFile, center: &[f64], level: &[f64],
     (0..problem.len())
         .map(|i| {
             let slope = (more[i] - base[i]) / (LOAD_STEP * problem.passes[i].normal_force_n);
+            // Beyond the last load at which a base law can tell friction grows with the load.
+            let slope = if slope.is_nan() { base[i] / problem.passes[i].normal_force_n } else { slope };
             let relative = rig.noise.pass_relative_sd * level[i];
             factor * (relative * relative + force * force * (1.0 + slope * slope)).max(LEAST_VARIANCE)
         })

@@ -173,7 +173,7 @@ fn forecast_part(
             recalibrated: recalibrated[i],
             corrected: corrected[i],
             form: form[i],
-            corrected_sd: (spread[i] + scatter[i]).sqrt(),
+            corrected_sd: (spread[i] + scatter[i] + out.law_variance(i)).sqrt(),
             scatter_sd: scatter[i].sqrt(),
         })
         .collect()

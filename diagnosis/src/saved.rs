@@ -33,6 +33,7 @@ impl Diagnosis {
             interpolation_error: errors.fold(0.0, f64::max),
             baseline: problem.baseline(&best.u),
             design: problem.design,
+            law: problem.law.as_ref().map(|law| law.saved(problem.nominal)),
             effects: saved_effects(problem, best),
         })
     }

@@ -5,6 +5,7 @@ use crate::decision::{Decision, Verdict, decide};
 use crate::describe::{Description, at_least, description};
 use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::intervals::{Estimate, curvature, estimates};
+use crate::law::LawNote;
 use crate::locate::{Region, ledger, regions};
 use crate::next::{Experiment, experiments};
 use crate::noise::PureError;
@@ -120,6 +121,9 @@ pub struct Report {
     pub psi_reading: Option<ReadingFinding>,
     /// What to measure next.
     pub next_experiment: Vec<Experiment>,
+    /// The base law, where it is another than the spring-slider.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law: Option<LawNote>,
     /// Remarks: what is missing from the table, what was assumed.
     pub remarks: Vec<String>,
     /// The table.
@@ -165,7 +169,8 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     let next_experiment = experiments(&fitted, table, rig, &decision);
     options.progress.at("suspect passes", 0.96);
     let with_suspects = with_suspects(&fitted, table, rig, options);
-    let mut remarks = of_table(&fitted, table, &decision);
+    let mut remarks: Vec<String> = options.law.iter().map(|law| law.remark()).collect();
+    remarks.extend(of_table(&fitted, table, &decision));
     remarks.extend(of_scatter(&fitted, &decision, with_suspects.as_ref()));
     let stiffness_pulls = match decision.verdict {
         Verdict::NoGap => pulls(&fitted.problem, &fitted.none, &fitted.none),
@@ -210,6 +215,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
         seen_from,
         psi_reading,
         next_experiment,
+        law: options.law.as_ref().map(|law| law.note()),
         remarks,
         data: DataNote { points: table.len(), sha256 },
     };

@@ -4,7 +4,10 @@
 
 use muprime_models::condition::Condition;
 use muprime_models::finger::Finger;
+use muprime_models::law_table::LawTable;
+use muprime_models::law_table::grid::Grid;
 use muprime_models::prediction::{FrictionModel, SpringSlider};
+use muprime_models::quantity::PeakToPeak;
 use muprime_models::spring_slider::{half_contact_angle_rad, solve};
 use std::f64::consts::PI;
 use std::hint::black_box;
@@ -34,6 +37,36 @@ fn spring_slider_in_five_solutions(bencher: divan::Bencher) {
             };
             solve(black_box(&Condition::paper()), &finger)
         })
+    });
+}
+
+/// A law table of five variables with its uncertainty, at scattered conditions: its time over the
+/// spring-slider's is the ratio that BENCHMARKS.md states.
+#[divan::bench(sample_size = 200)]
+fn law_table(bencher: divan::Bencher) {
+    let words =
+        ["amplitude_pp_m=0.2e-6..6e-6:25:log", "frequency_hz=20e3..60e3:5", "speed_m_s=0.002..0.2:13:log"];
+    let grid = Grid::parse(words.into_iter().chain(["normal_force_n=0.1..1:7:log", "mu0=0.2..1:3"]))
+        .expect("a grid");
+    let mu = |c: &Vec<f64>| [1.0 / (1.0 + c[0] * c[1] * c[4] / c[2]), 0.02];
+    let answers: Vec<_> = grid.conditions(0).iter().map(mu).collect();
+    let law = LawTable::from_csv(&grid.table(0, &answers).expect("a table").csv).expect("a law");
+    let conditions: Vec<Condition> = (0..1024)
+        .map(|k| {
+            let part = |step: f64| (f64::from(k) * step).fract();
+            Condition {
+                amplitude: PeakToPeak::from_metres(0.3e-6 + 5e-6 * part(0.618)),
+                frequency_hz: 21e3 + 38e3 * part(0.755),
+                speed_m_s: 0.003 + 0.15 * part(0.570),
+                normal_force_n: 0.15 + 0.8 * part(0.325),
+                ..Condition::paper()
+            }
+        })
+        .collect();
+    let mut k = 0;
+    bencher.bench_local(|| {
+        k = (k + 1) & 1023;
+        law.predict(black_box(&conditions[k]))
     });
 }
 

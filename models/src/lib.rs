@@ -16,6 +16,7 @@
 //! | [`ridge`] | the finite element model of section 3 |
 //! | [`surrogate`], [`inverse`] | a table of the ridge that is quick to read; the amplitude for a wanted friction |
 //! | [`prediction`] | what every friction law answers |
+//! | [`law`], [`law_table`], [`sparse`] | laws by name; own laws as tables; the surrogate of `model adapt` |
 //! | [`pass`] | the data vocabulary: passes, the point table |
 //! | [`rig_file`] | `rig.toml`: finger, repeatability, what certificates leave open |
 //! | [`root`] | roots in a bracket |
@@ -40,6 +41,8 @@ pub mod condition;
 pub mod covariate;
 pub mod finger;
 pub mod inverse;
+pub mod law;
+pub mod law_table;
 pub mod pass;
 pub mod prediction;
 pub mod psi;
@@ -52,5 +55,6 @@ pub mod reading_evidence;
 pub mod ridge;
 pub mod rig_file;
 pub mod root;
+pub mod sparse;
 pub mod spring_slider;
 pub mod surrogate;

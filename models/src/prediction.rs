@@ -98,6 +98,16 @@ pub trait FrictionModel: Send + Sync {
         let _ = condition;
         0.0
     }
+
+    /// SHA-256 (hex) of the table that the law was read from; none for a formula.
+    fn sha256(&self) -> Option<&str> {
+        None
+    }
+
+    /// The law that a corrected model corrects, where it is another than the spring-slider.
+    fn base(&self) -> Option<&dyn FrictionModel> {
+        None
+    }
 }
 
 /// The spring-slider with a finger's stiffnesses and their uncertainty.

@@ -158,6 +158,10 @@ impl FrictionModel for Surrogate {
             validity: if point.inside { Validity::Inside } else { Validity::Extrapolated },
         })
     }
+
+    fn form_sd(&self, condition: &Condition) -> f64 {
+        self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
+    }
 }
 
 /// Error in mu' of the table's coarse mesh against a fine one (`docs/ridge.md`, convergence).

@@ -12,6 +12,7 @@ says what is wrong, where, and what to do.
 from ._muprime import MuprimeError, __version__
 from .calibration import Certificate, CertifiedParameter, Estimate, Skin, calibrate, fit_finger, load_certificate
 from .laws import Finger, Law, models, psi, ridge, spring_slider, surrogate
+from .own_law import LawTable, tabulate
 from .plans import Plan
 from .runs import Run, load, run
 from .verdict import Hypothesis, Parameter, Region, Verdict, diagnose
@@ -23,6 +24,7 @@ __all__ = [
     "Finger",
     "Hypothesis",
     "Law",
+    "LawTable",
     "MuprimeError",
     "Parameter",
     "Plan",
@@ -42,4 +44,5 @@ __all__ = [
     "run",
     "spring_slider",
     "surrogate",
+    "tabulate",
 ]

@@ -10,6 +10,7 @@ from typing import Any
 
 from . import _muprime
 from ._tables import csv_bytes
+from .own_law import Model, base_law
 from .runs import Run, load
 
 
@@ -92,12 +93,15 @@ def diagnose(
     pairs: bool = True,
     without: list[str] | tuple[str, ...] = (),
     predict: Any = None,
+    model: Model | None = None,
 ) -> Verdict:
     """Diagnoses a table of passes.
 
     ``table``: a point table's path (CSV or Parquet), a run (its folder or a :class:`Run`), or a data frame with the columns of a point
     table. ``rig``: path of the rig.toml that states what is calibrated; by default the one beside the table. ``pairs=False`` tries
-    single effects only, ``without`` leaves effects out. ``predict``: conditions, a path or a data frame.
+    single effects only, ``without`` leaves effects out. ``predict``: conditions, a path or a data frame. ``model``: the base law in place of the
+    spring-slider: ``'psi'``, ``'surrogate'``, a file, a :class:`LawTable`, or a function as :func:`tabulate` takes it. A function is
+    tabulated over the ranges of the table, for the variables that its arguments name.
 
     Bad input is a :class:`MuprimeError` with the row and the remedy.
     """
@@ -118,9 +122,10 @@ def diagnose(
             raise _muprime.MuprimeError("a data frame has no rig.toml beside it: name one with rig=")
     if predict is not None:
         predict = Path(predict).read_bytes() if isinstance(predict, (str, os.PathLike)) else csv_bytes(predict)
+    law = None if model is None else base_law(model, name, data)
     rig = Path(rig)
     text, words, page, predictions = _muprime.diagnose(
-        name, data, os.fspath(rig), rig.read_text(encoding="utf-8"), pairs, list(without), predict, damage
+        name, data, os.fspath(rig), rig.read_text(encoding="utf-8"), pairs, list(without), predict, damage, law
     )
     told = json.loads(text)
     return Verdict(

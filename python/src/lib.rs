@@ -7,6 +7,7 @@
 //! | `ridge` | cases of the finite element ridge |
 //! | `calibrate` | certificates from files; the skin of a finger from a phase table |
 //! | `plans` | plans: read, made, judged on a setup |
+//! | `tabulate` | a law of one's own as a table |
 //! | `verdict` | the diagnosis of a table |
 //! | `runs` | a run's folder; a sweep on the virtual rig in virtual time |
 
@@ -18,6 +19,7 @@ mod laws;
 mod plans;
 mod ridge;
 mod runs;
+mod tabulate;
 mod verdict;
 
 use pyo3::prelude::*;
@@ -54,6 +56,9 @@ fn _muprime(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(laws::psi_curve, m)?)?;
     m.add_function(wrap_pyfunction!(laws::fit_psi, m)?)?;
     m.add_function(wrap_pyfunction!(ridge::ridge, m)?)?;
+    m.add_function(wrap_pyfunction!(tabulate::law_grid, m)?)?;
+    m.add_function(wrap_pyfunction!(tabulate::law_conditions, m)?)?;
+    m.add_function(wrap_pyfunction!(tabulate::law_table, m)?)?;
     m.add_function(wrap_pyfunction!(verdict::diagnose, m)?)?;
     m.add_function(wrap_pyfunction!(calibrate::calibrate, m)?)?;
     m.add_function(wrap_pyfunction!(calibrate::certificate, m)?)?;

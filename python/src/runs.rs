@@ -1,8 +1,7 @@
 //! A run's folder, and a sweep on the virtual rig in virtual time.
 
 use crate::{MuprimeError, refused};
-use miette::IntoDiagnostic;
-use models::prediction::{FrictionModel, SpringSlider};
+use models::law::BuiltIn;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use runs::plan::Plan;
@@ -88,14 +87,9 @@ fn job(
             Some(read.map_err(|why| miette::miette!("{}: {why}", path.display()))?)
         }
     };
-    let model_file = match model {
-        None => None,
-        Some(path) => Some(("model.toml".to_string(), runs::input::text_of(path)?)),
-    };
-    let law: Arc<dyn FrictionModel> = match &model_file {
-        None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
-        Some((name, text)) => runs::model_file::load_for(&setup, name, text)?,
-    };
+    let slider = Path::new(BuiltIn::SpringSlider.name());
+    let tables::law::Loaded { model, file: model_file } =
+        tables::law::for_run(model.unwrap_or(slider), &setup)?;
     let seed = seed.unwrap_or(plan.file.seed);
-    Ok(Job { setup, plan, seed, model: law, model_file, defects, out, fast: true, notes, answers: None })
+    Ok(Job { setup, plan, seed, model, model_file, defects, out, fast: true, notes, answers: None })
 }

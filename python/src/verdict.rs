@@ -5,19 +5,25 @@ use calibration::certificate::sha256_hex;
 use diagnosis::data::Table;
 use diagnosis::document::{document, predictions};
 use diagnosis::hypotheses::Options;
+use diagnosis::law::Law;
 use miette::{Context, IntoDiagnostic};
 use models::pass::read_passes;
 use pyo3::prelude::*;
 use runs::verdict::words;
 use std::path::Path;
+use std::sync::Arc;
+use tables::law::{for_finger, of_text};
 use tables::passes::parse_passes;
 
 /// A diagnosis: the document of `muprime diagnose --json`, text, page, and requested predictions as CSV.
 type Texts = (String, String, String, Option<String>);
 
+/// A base law: its name or path, and its text where it is no file.
+type Model = (String, Option<String>);
+
 /// Diagnoses a point table in memory (`name` is how messages call it) under a rig.toml in memory.
 #[pyfunction]
-#[pyo3(signature = (name, table, rig_name, rig, pairs, without, predict, damage))]
+#[pyo3(signature = (name, table, rig_name, rig, pairs, without, predict, damage, model))]
 #[allow(clippy::too_many_arguments)]
 pub fn diagnose(
     py: Python<'_>,
@@ -29,11 +35,12 @@ pub fn diagnose(
     without: Vec<String>,
     predict: Option<Vec<u8>>,
     damage: Vec<String>,
+    model: Option<Model>,
 ) -> PyResult<Texts> {
     if let Some(unknown) = without.iter().find(|name| effects::by_name(name).is_none()) {
         return Err(MuprimeError::new_err(format!("without {unknown:?}: no such effect")));
     }
-    py.detach(|| texts(name, &table, rig_name, rig, pairs, without, predict, &damage)).map_err(refused)
+    py.detach(|| texts(name, &table, rig_name, rig, pairs, without, predict, &damage, model)).map_err(refused)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -46,10 +53,21 @@ fn texts(
     without: Vec<String>,
     predict: Option<Vec<u8>>,
     damage: &[String],
+    model: Option<Model>,
 ) -> miette::Result<Texts> {
     let rig = runs::input::rig_text(rig_name, rig)?;
     let passes = parse_passes(Path::new(name), bytes)?;
-    let table = Table::measured(&passes).into_diagnostic().wrap_err_with(|| name.to_string())?;
+    let mut table = Table::measured(&passes).into_diagnostic().wrap_err_with(|| name.to_string())?;
+    let mut law = None;
+    if let Some((what, text)) = model {
+        let loaded = match text {
+            Some(text) => of_text(&what, what.clone(), text, &rig.finger)?,
+            None => for_finger(Path::new(&what), &rig.finger)?,
+        };
+        let (base, within) =
+            Law::on(loaded.model, loaded.file.map(|f| f.1), &table).into_diagnostic().wrap_err(what)?;
+        (law, table) = (Some(Arc::new(base)), within);
+    }
     let conditions = match predict {
         None => None,
         Some(bytes) => {
@@ -58,7 +76,7 @@ fn texts(
             Some(Table::conditions(&rows, &origin).into_diagnostic().wrap_err("conditions to predict")?)
         }
     };
-    let options = Options { pairs, without, ..Options::default() };
+    let options = Options { pairs, without, law, ..Options::default() };
     let result = diagnosis::verdict::diagnose(&table, &rig, &options, sha256_hex(bytes));
     let about =
         [vec![("table", name.to_string()), ("rig", rig_name.to_string())], runs::report::about::of_rig(&rig)]

@@ -1,16 +1,43 @@
-//! MODEL.toml, as `muprime diagnose --save-model` writes it.
+//! A law of friction from its file to the loop: MODEL.toml, as `muprime diagnose --save-model` writes it, a
+//! law table, a ridge table or the surrogate of `muprime model adapt`. The text says which it is.
 
 use crate::setup::Setup;
+use calibration::certificate::sha256_hex;
 use effects::corrected::{Corrected, SavedModel};
+use models::finger::Finger;
+use models::law::{BuiltIn, Named};
+use models::law_table::{ANSWERS, LawTable};
 use models::prediction::FrictionModel;
+use models::sparse::Sparse;
+use models::surrogate::{DEFAULT_TABLE, Surrogate};
+use std::path::Path;
 use std::sync::Arc;
 
-/// The model of a file, made ready for the loop.
+/// What begins the comment of a law table that states the hash of what follows.
+pub const HASH_MARK: &str = "# sha256 ";
+
+/// A built-in law for a finger; `None`: no law has that name.
+///
+/// # Errors
+/// A finger outside the domain of the law.
+pub fn built_in(name: &str, finger: &Finger) -> Option<miette::Result<Arc<dyn FrictionModel>>> {
+    let law = BuiltIn::by_name(name)?;
+    Some(law.law(finger).map_err(|e| miette::miette!("{name}: {e}")).map(|built| match law {
+        BuiltIn::Surrogate => named(built, name, DEFAULT_TABLE),
+        _ => built,
+    }))
+}
+
+fn named(law: Arc<dyn FrictionModel>, name: &str, hashed: &str) -> Arc<dyn FrictionModel> {
+    Arc::new(Named { law, name: name.to_string(), sha256: sha256_hex(hashed.as_bytes()) })
+}
+
+/// The model of a file for a finger of the paper, made ready for the loop.
 ///
 /// # Errors
 /// A file that cannot be used, with the place or the reason.
 pub fn load(name: &str, text: &str) -> miette::Result<Arc<dyn FrictionModel>> {
-    Ok(Arc::new(compiled(name, text)?))
+    law(&Finger::paper(), name, text)
 }
 
 /// The same for a run of this setup: everything that the model's laws need must be known in every cycle.
@@ -18,7 +45,11 @@ pub fn load(name: &str, text: &str) -> miette::Result<Arc<dyn FrictionModel>> {
 /// # Errors
 /// As [`load`]; a law that needs what the setup does not state.
 pub fn load_for(setup: &Setup, name: &str, text: &str) -> miette::Result<Arc<dyn FrictionModel>> {
-    let model = compiled(name, text)?;
+    let finger = &setup.tip.finger;
+    if !is_corrected(text) {
+        return law(finger, name, text);
+    }
+    let model = compiled(finger, name, text)?;
     if let Some(lack) = model.lacks(&setup.ambient()) {
         miette::bail!(
             help = format!("state `{}` in the setup, as read at the bench", lack.covariate.name),
@@ -29,11 +60,63 @@ pub fn load_for(setup: &Setup, name: &str, text: &str) -> miette::Result<Arc<dyn
     Ok(Arc::new(model))
 }
 
-fn compiled(name: &str, text: &str) -> miette::Result<Corrected> {
+/// The law of a file for a finger. Its name is that of the file.
+///
+/// # Errors
+/// As [`load`].
+pub fn law(finger: &Finger, name: &str, text: &str) -> miette::Result<Arc<dyn FrictionModel>> {
+    let stem = Path::new(name).file_stem().map_or(name.into(), |s| s.to_string_lossy());
+    let refused = |why: String| miette::miette!("{name}: {why}");
+    if text.starts_with("muprime ridge table") {
+        let table = Surrogate::from_text(text).map_err(|e| refused(e.to_string()))?;
+        Ok(named(Arc::new(table.for_finger(finger)), &stem, text))
+    } else if text.trim_start().starts_with('{') {
+        Ok(named(Arc::new(Sparse::from_json(text, finger).map_err(refused)?), &stem, text))
+    } else if is_corrected(text) {
+        Ok(Arc::new(compiled(finger, name, text)?))
+    } else {
+        let table = LawTable::from_csv(text).map_err(|e| refused(e.to_string()))?;
+        let rows = hashed(text);
+        if let Some(stated) = text.lines().find_map(|line| line.strip_prefix(HASH_MARK))
+            && stated.trim() != sha256_hex(rows.as_bytes())
+        {
+            miette::bail!(
+                help = "tabulate it again; or remove its comment lines, and it is a table of your own",
+                "{name}: the table was changed after it was tabulated: its hash is another than its header states"
+            );
+        }
+        Ok(named(Arc::new(table), &stem, &rows))
+    }
+}
+
+/// What the hash of a law table is of: its lines without comments.
+pub fn hashed(table: &str) -> String {
+    let rows = table.trim_start_matches('\u{feff}').lines().filter(|line| !line.starts_with('#'));
+    rows.flat_map(|line| [line, "\n"]).collect()
+}
+
+/// Whether a text is none of a law table, a ridge table and a surrogate: then it is to be a MODEL.toml.
+pub(crate) fn is_corrected(text: &str) -> bool {
+    let rows = hashed(text);
+    let head = rows.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    let table = head.contains(',') && !head.contains('=') || head.trim() == ANSWERS[0].0;
+    !table && !text.starts_with("muprime ridge table") && !text.trim_start().starts_with('{')
+}
+
+fn compiled(finger: &Finger, name: &str, text: &str) -> miette::Result<Corrected> {
     let saved: SavedModel = crate::input::parse_toml(name, text).map_err(|why| {
         miette::Report::new(why).wrap_err(format!(
             "{name} is no model file; 'muprime diagnose DATA --save-model FILE' writes one"
         ))
     })?;
-    Corrected::compile(&saved).map_err(|e| miette::miette!("{name}: {e}"))
+    let base = match saved.law.as_ref().map(|l| (&l.name, &l.table)) {
+        None => None,
+        Some((base, Some(table))) => Some(law(finger, base, table)?),
+        Some((base, None)) => Some(built_in(base, finger).unwrap_or_else(|| {
+            Err(miette::miette!(
+                "{name}: the base law '{base}' is none that is built in, and its table is missing"
+            ))
+        })?),
+    };
+    Corrected::compile_on(&saved, base).map_err(|e| miette::miette!("{name}: {e}"))
 }

@@ -8,7 +8,7 @@ pub mod keeper;
 mod telemetry;
 
 pub use fast::{Rehearsal, rehearse, words};
-pub use keeper::{Keeper, REPLAYABLE, Replayable, unix_ns};
+pub use keeper::{Keeper, REPLAYABLE, Replayable, is_model, model_name, unix_ns};
 pub use telemetry::{Extremes, Snapshot, Snapshots};
 
 use crate::ambient::{Answers, LevelsFound};
@@ -40,7 +40,7 @@ pub struct Job {
     pub seed: u64,
     /// The model to compare with.
     pub model: Arc<dyn FrictionModel>,
-    /// Text and name of the model file, where one was given.
+    /// Name in the record and text of the model file, where one was given.
     pub model_file: Option<(String, String)>,
     /// Defects of the virtual rig in place of its own.
     pub defects: Option<sim::defects::Defects>,

@@ -70,6 +70,18 @@ fn the_package_says_what_the_command_says() {
     println!("{out}");
     assert!(tried.status.success() && out.ends_with("ok\n"), "{out}{err}");
 
+    // A law that is a Python function, led through table, run and verdict.
+    let own = python()
+        .arg(file("tests/python/own_law.py"))
+        .arg(muprime().get_program())
+        .arg(folder.path())
+        .env("PYTHONPATH", &site)
+        .output()
+        .unwrap();
+    let (out, err) = texts(&own);
+    println!("{out}");
+    assert!(own.status.success() && out.ends_with("ok\n"), "{out}{err}");
+
     // A laboratory's own controller, in pymodbus, tested against the virtual rig by way of the pytest plugin.
     let foreign = python()
         .args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "muprime.testing"])

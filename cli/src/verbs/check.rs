@@ -15,8 +15,8 @@ pub struct Args {
     /// Setup that the plans are to run on [default: the setup among the files, where there is one]
     #[arg(long)]
     setup: Option<String>,
-    /// Corrected model that they are to run with
-    #[arg(long)]
+    /// The law that they are to run with, as for 'muprime run --model'
+    #[arg(long, value_name = "LAW")]
     model: Option<PathBuf>,
     /// Away from the bench: leave out whether the instruments' ports can be opened
     #[arg(long)]
@@ -41,10 +41,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     };
     let model = match (&args.model, &setup) {
         (None, _) => None,
-        (Some(path), Some(setup)) => {
-            let name = path.display().to_string();
-            Some(runs::model_file::load_for(setup, &name, &runs::input::text_of(path)?)?)
-        }
+        (Some(what), Some(setup)) => Some(tables::law::for_run(what, setup)?.model),
         (Some(_), None) => miette::bail!(help = "name it with --setup", "--model is judged on a setup"),
     };
     let on = On { setup, model, ports: (!args.offline).then_some(rig::free_ports::free) };

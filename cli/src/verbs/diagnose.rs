@@ -5,6 +5,7 @@ use clap::Args as ClapArgs;
 use diagnosis::data::Table;
 use diagnosis::document::{document, predictions};
 use diagnosis::hypotheses::Options;
+use diagnosis::law::Law;
 use diagnosis::progress::{Progress, Stage};
 use diagnosis::verdict::diagnose;
 use indicatif::ProgressBar;
@@ -52,6 +53,10 @@ pub struct Args {
     /// Try single effects only.
     #[arg(long)]
     pub no_pairs: bool,
+    /// The base law in place of the spring-slider, as for `muprime run --model`: psi, surrogate, or a file.
+    /// Effects add the change that they make on the spring-slider.
+    #[arg(long, value_name = "LAW")]
+    pub model: Option<PathBuf>,
     /// Leave an effect out of the library (may be repeated).
     #[arg(long, value_name = "EFFECT")]
     pub without: Vec<String>,
@@ -79,8 +84,17 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let bytes = bytes_of(&table_path, MAX_TABLE_BYTES)
         .wrap_err_with(|| format!("cannot read the table {}", table_path.display()))?;
     let passes = parse_passes(&table_path, &bytes)?;
-    let table =
-        Table::measured(&passes).into_diagnostic().wrap_err_with(|| table_path.display().to_string())?;
+    let shown = || table_path.display().to_string();
+    let whole = Table::measured(&passes).into_diagnostic().wrap_err_with(shown)?;
+    let (law, table) = match &args.model {
+        None => (None, whole),
+        Some(what) => {
+            let loaded = tables::law::for_finger(what, &rig.finger)?;
+            let text = loaded.file.map(|(_, text)| text);
+            let (law, table) = Law::on(loaded.model, text, &whole).into_diagnostic().wrap_err_with(shown)?;
+            (Some(Arc::new(law)), table)
+        }
+    };
     if !args.data.is_dir() && !json {
         tables::import::remarks_of(&passes)
             .iter()
@@ -110,7 +124,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let bar = studies::progress::bar(1000, "per mille");
     let progress = follow(&bar, json)?;
     let options =
-        Options { pairs: !args.no_pairs, without: args.without.clone(), progress, ..Options::default() };
+        Options { pairs: !args.no_pairs, without: args.without.clone(), progress, law, ..Options::default() };
     let result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
     bar.finish_and_clear();
     if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {

@@ -6,7 +6,7 @@ use runs::print::{COLUMNS, folded};
 pub const EXAMPLES: &[(&str, &str)] = &[
     (
         "run",
-        "muprime run\nmuprime run my-plan.toml --setup my-setup.toml --out runs/monday\nmuprime run --tui --operator Ada\nmuprime run --fast --seed 7 --model MODEL.toml\nmuprime run part2-campaign --fast --out campaign",
+        "muprime run\nmuprime run my-plan.toml --setup my-setup.toml --out runs/monday\nmuprime run --tui --operator Ada\nmuprime run --fast --seed 7 --model MODEL.toml\nmuprime run --fast --model psi\nmuprime run part2-campaign --fast --out campaign",
     ),
     ("virtual-rig", "muprime virtual-rig --modbus-tcp 127.0.0.1:1502"),
     ("calibrate force", "muprime calibrate force weights.csv --operator 'A. Smith' --serial SN1"),
@@ -99,6 +99,10 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     (
         "model adapt",
         "muprime model adapt --out surrogate --span amplitude_pp_m=0.3e-6..5e-6:log --span mu0=0.2..1 --nodes 2000",
+    ),
+    (
+        "model tabulate",
+        "muprime model tabulate --command 'awk -F, -f law.awk' --grid amplitude_pp_m=0.2e-6..6e-6:25:log --grid speed_m_s=0.002..0.2:17:log --out law.csv",
     ),
     ("model reproduce", "muprime model reproduce fig14 --out figures"),
     ("model stiffness", "muprime model stiffness\nmuprime model stiffness --survey --elements 200"),

@@ -11,6 +11,7 @@ mod reproduce;
 mod ridge;
 mod stiffness;
 mod table;
+mod tabulate;
 
 use clap::{Args, Subcommand};
 use runs::say;
@@ -38,6 +39,8 @@ enum ModelVerb {
     /// A surrogate over up to ten variables, its nodes chosen in rounds where the error is.
     #[cfg(feature = "parquet")]
     Adapt(Box<adapt::AdaptArgs>),
+    /// A law of your own, which a program computes, as a table for `run --model` and `diagnose --model`.
+    Tabulate(tabulate::TabulateArgs),
     /// The paper's figures recomputed, as CSV and SVG with a line of comparison each.
     Reproduce(reproduce::ReproduceArgs),
     /// The candidate effects: place, parameters, units, zero, prior, source, covariates needed.
@@ -59,6 +62,7 @@ pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
         ModelVerb::Table(args) => table::run(&args, json),
         #[cfg(feature = "parquet")]
         ModelVerb::Adapt(args) => adapt::run(&args, json),
+        ModelVerb::Tabulate(args) => tabulate::run(&args, json),
         ModelVerb::Reproduce(args) => reproduce::run(&args, json),
         ModelVerb::Effects(args) => effects::run(&args, json),
         ModelVerb::AmplitudeFor(args) => amplitude_for::run(&args, json),

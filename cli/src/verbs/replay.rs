@@ -1,7 +1,8 @@
 //! `muprime replay`: a recorded run through the same cycle again.
 
 use super::prelude::*;
-use models::prediction::{FrictionModel, SpringSlider};
+use models::law::BuiltIn;
+use models::prediction::FrictionModel;
 use realtime::recorder::{CYCLES, Entry, Integrity, Reader, inspect};
 use realtime::replay::{Replay, replay};
 use runs::run_dir::{missing_records, records_in};
@@ -115,8 +116,9 @@ fn again(path: PathBuf) -> miette::Result<Found> {
 }
 
 fn model_of(files: &[(String, Vec<u8>)], built: &Replayable) -> miette::Result<Arc<dyn FrictionModel>> {
-    match files.iter().find(|f| f.0 == "model.toml") {
-        Some((name, text)) => runs::model_file::load(name, &String::from_utf8_lossy(text)),
-        None => Ok(Arc::new(SpringSlider::new(built.finger).into_diagnostic()?)),
+    let file = files.iter().find(|(name, _)| runs::session::is_model(name));
+    match (file, built.law) {
+        (Some((name, text)), _) => runs::model_file::law(&built.finger, name, &String::from_utf8_lossy(text)),
+        (None, law) => law.unwrap_or(BuiltIn::SpringSlider).law(&built.finger).into_diagnostic(),
     }
 }

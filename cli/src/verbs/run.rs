@@ -5,7 +5,8 @@ pub mod campaign;
 use super::dashboard::Place;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
-use models::prediction::{FrictionModel, SpringSlider};
+use models::condition::Condition;
+use models::law::BuiltIn;
 use realtime::ports::Nanos;
 use rig::dashboard::LISTEN;
 use rig::live::{self, Feed};
@@ -48,8 +49,9 @@ pub struct Args {
     /// Folder of the run; an unfinished run there is resumed [default: a new one in ./runs]
     #[arg(long)]
     out: Option<PathBuf>,
-    /// A corrected model, as 'muprime diagnose --save-model' writes it
-    #[arg(long)]
+    /// The law to compare with: spring-slider, psi, surrogate, or a file: a corrected model of 'muprime
+    /// diagnose --save-model', a law table, a ridge table, a surrogate.json [default: spring-slider]
+    #[arg(long, value_name = "LAW")]
     model: Option<PathBuf>,
     /// Seed of the order (and of the virtual rig) [default: the plan's]
     #[arg(long)]
@@ -105,7 +107,17 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let job = job(&args)?;
     // An address that is taken is a refusal: nothing was touched yet.
-    job.points()?;
+    let points = job.points()?;
+    let mu0 = job.setup.tip.mu0;
+    let untold = |c: &Condition| job.model.predict(&Condition { mu0, ..*c }).is_err();
+    match points.iter().filter(|p| untold(&p.condition)).count() {
+        0 => {}
+        n => report!(
+            "the law '{}' cannot tell at {n} of {} planned passes: they are measured, and not compared",
+            job.model.name(),
+            points.len()
+        ),
+    }
     if !job.fast {
         super::tell_beside(&job.out)?;
     }
@@ -290,17 +302,9 @@ fn job_of(args: &Args, setup: Setup, plan: Plan, seed: u64, out: PathBuf) -> mie
             Some(defects.map_err(|e| miette::miette!("{}: {e}", path.display()))?)
         }
     };
-    let model_file = match &args.model {
-        None => None,
-        Some(path) => Some(("model.toml".to_string(), runs::input::text_of(path)?)),
-    };
-    let model: Arc<dyn FrictionModel> = match &model_file {
-        None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
-        Some((_, text)) => {
-            let path = args.model.as_ref().map_or_else(String::new, |p| p.display().to_string());
-            runs::model_file::load_for(&setup, &path, text)?
-        }
-    };
+    let slider = PathBuf::from(BuiltIn::SpringSlider.name());
+    let tables::law::Loaded { model, file: model_file } =
+        tables::law::for_run(args.model.as_ref().unwrap_or(&slider), &setup)?;
     if out.exists() && !out.is_dir() {
         miette::bail!(help = "give a folder, or a name that is free", "--out {} is a file", out.display());
     }

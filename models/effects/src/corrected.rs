@@ -11,6 +11,7 @@ use models::condition::{Ambient, Condition, OutOfDomain};
 use models::covariate::Covariate;
 use models::prediction::{FrictionModel, Prediction, Regime, Validity};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Most effects of one model.
 const MOST_EFFECTS: usize = 4;
@@ -31,9 +32,29 @@ pub struct SavedModel {
     pub baseline: Baseline,
     /// Scales of the table that was diagnosed.
     pub design: Design,
+    /// The law that the effects correct, where it is another than the spring-slider.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<SavedLaw>,
     /// Effects; empty where there is no gap.
     #[serde(default, rename = "effect")]
     pub effects: Vec<SavedEffect>,
+}
+
+/// The base law of a saved model: the forces of the law, and beside them the change that the effects and the
+/// recalibrated baseline make on the spring-slider.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SavedLaw {
+    /// Name.
+    pub name: String,
+    /// SHA-256 of its table, hex; none for a formula. On a table with another hash the model is refused.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sha256: Option<String>,
+    /// Text of its file; none for a built-in law.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub table: Option<String>,
+    /// Baseline of the spring-slider from which the changes count.
+    pub reference: Baseline,
 }
 
 /// One effect of a saved model.
@@ -109,6 +130,19 @@ pub enum ModelError {
     /// More effects than a model may hold.
     #[error("{0} effects; at most 4 are compiled")]
     TooMany(usize),
+    /// The base law is missing or another one.
+    #[error(
+        "the model corrects the law '{name}' (SHA-256 {wanted}), and this is {found}; diagnose again with `--model` of the law \
+         that is to lead"
+    )]
+    OtherLaw {
+        /// Name of the base law.
+        name: String,
+        /// Its hash.
+        wanted: String,
+        /// What was found in its place.
+        found: String,
+    },
     /// A baseline or scale that is not positive.
     #[error("'{0}' must be a finite number above zero")]
     NotPositive(&'static str),
@@ -145,14 +179,35 @@ pub struct Corrected {
     effects: Vec<Compiled>,
     relative_sd: f64,
     interpolation_error: f64,
+    /// The base law, and the baseline from which changes count.
+    law: Option<(Arc<dyn FrictionModel>, Baseline)>,
 }
 
 impl Corrected {
-    /// Checks a saved model and makes it ready.
+    /// Checks a saved model on the spring-slider and makes it ready.
     ///
     /// # Errors
-    /// Names, ranges or a schema that the library does not know.
+    /// Names, ranges or a schema that the library does not know; a model that corrects another law.
     pub fn compile(saved: &SavedModel) -> Result<Self, ModelError> {
+        Self::compile_on(saved, None)
+    }
+
+    /// The same on the law that the model corrects; none for the spring-slider.
+    ///
+    /// # Errors
+    /// As [`Corrected::compile`]; another law than the one that was corrected.
+    pub fn compile_on(saved: &SavedModel, law: Option<Arc<dyn FrictionModel>>) -> Result<Self, ModelError> {
+        let none = || "none".to_string();
+        let wanted = saved.law.as_ref().map(|l| (l.name.clone(), l.sha256.clone().unwrap_or_else(none)));
+        let found =
+            law.as_deref().map(|l| (l.name().to_string(), l.sha256().map_or_else(none, String::from)));
+        // A table is known by its hash, a formula by its name.
+        let key = |(name, sha256): &(String, String)| [name, sha256][usize::from(*sha256 != none())].clone();
+        if wanted.as_ref().map(key) != found.as_ref().map(key) {
+            let words = |law: Option<_>| law.unwrap_or_else(|| ("spring-slider".to_string(), none()));
+            let ((name, wanted), (other, sha256)) = (words(wanted), words(found));
+            return Err(ModelError::OtherLaw { name, wanted, found: format!("'{other}' ({sha256})") });
+        }
         if saved.schema != "muprime.model/1" {
             return Err(ModelError::Schema(saved.schema.clone()));
         }
@@ -211,6 +266,7 @@ impl Corrected {
             effects,
             relative_sd: saved.relative_sd,
             interpolation_error: saved.interpolation_error,
+            law: law.zip(saved.law.as_ref().map(|l| l.reference)),
         })
     }
 
@@ -230,9 +286,19 @@ impl Corrected {
         self.interpolation_error
     }
 
-    /// Signed mean lateral force that the sensor will read at a pass, N. Allocates nothing.
+    /// Signed mean lateral force that the sensor will read at a pass, N; NaN where the base law cannot tell.
+    /// Allocates nothing.
     pub fn lateral_force(&self, pass: &Condition) -> f64 {
-        self.lateral_force_from(&self.baseline, pass)
+        let beside = self.law.as_ref().map_or(Ok(0.0), |(_, reference)| self.beside(reference.mu0, pass));
+        self.lateral_force_from(&self.baseline, pass) + beside.unwrap_or(f64::NAN)
+    }
+
+    /// Force of the base law less that of the spring-slider which stands for it, N, signed; zero without a
+    /// base law.
+    fn beside(&self, mu0: f64, pass: &Condition) -> Result<f64, OutOfDomain> {
+        let Some((law, reference)) = &self.law else { return Ok(0.0) };
+        let force = law.predict(&Condition { mu0, ..*pass })?.lateral_force_n * pass.direction.sign();
+        Ok(force - lateral_force(&Baseline { mu0, ..*reference }, &[], pass, &self.design))
     }
 
     fn lateral_force_from(&self, baseline: &Baseline, pass: &Condition) -> f64 {
@@ -251,6 +317,10 @@ impl FrictionModel for Corrected {
         "corrected"
     }
 
+    fn base(&self) -> Option<&dyn FrictionModel> {
+        self.law.as_ref().map(|(law, _)| &**law)
+    }
+
     fn form_sd(&self, condition: &Condition) -> f64 {
         self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
     }
@@ -262,9 +332,11 @@ impl FrictionModel for Corrected {
         // The finger of today may rub more or less than that of the diagnosis: the loop's mu_0 counts.
         let baseline = Baseline { mu0: condition.mu0, ..self.baseline };
         let sign = condition.direction.sign();
-        let along = sign * self.lateral_force_from(&baseline, condition);
+        let sliding = self.lateral_force_from(&baseline, condition);
+        let along = sign * (sliding + self.beside(condition.mu0, condition)?);
         let full = condition.mu0 * condition.normal_force_n;
-        let change = along - sign * lateral_force(&baseline, &[], condition, &self.design);
+        let change = sliding - lateral_force(&baseline, &[], condition, &self.design);
+        let of_law = self.law.as_ref().map_or(0.0, |(law, _)| law.form_sd(condition));
         let contact = self.baseline.contact(condition, &self.design);
         let regime = if contact.amplitude_pp < crate::contact::STILL_PLATE_M || contact.load_ratio() >= 1.0 {
             Regime::FullContact
@@ -276,7 +348,7 @@ impl FrictionModel for Corrected {
         let outside = condition.amplitude.metres() > 1.05 * self.design.largest_amplitude_m;
         Ok(Prediction {
             mu_relative: along / full,
-            mu_relative_sd: (self.relative_sd * along / full).hypot(FORM_SHARE * change / full),
+            mu_relative_sd: (self.relative_sd * along / full).hypot(FORM_SHARE * change / full).hypot(of_law),
             lateral_force_n: along,
             regime,
             validity: if outside { Validity::Extrapolated } else { Validity::Inside },

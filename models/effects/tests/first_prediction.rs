@@ -45,6 +45,7 @@ fn the_first_prediction_of_a_compiled_model_allocates_nothing() {
             stroke_m: 0.02,
             largest_amplitude_m: 3e-6,
         },
+        law: None,
         effects: Vec::new(),
     };
     let model = Corrected::compile(&saved).unwrap();

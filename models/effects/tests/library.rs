@@ -175,6 +175,7 @@ fn every_law_can_be_made_ready_for_the_loop() {
                 interpolation_error: 0.0,
                 baseline: BASELINE,
                 design: DESIGN,
+                law: None,
                 effects: vec![SavedEffect {
                     name: effect.name().into(),
                     law: form.name.into(),

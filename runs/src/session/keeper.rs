@@ -11,6 +11,8 @@ use crate::setup::Guards;
 use crate::supervisor::OffReport;
 use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
+use models::law::BuiltIn;
+use models::prediction::FrictionModel;
 use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::cycle::Config;
@@ -26,6 +28,16 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Name of the file in a record that a replay needs.
 pub const REPLAYABLE: &str = "loop.json";
 
+/// Name in a record of the model file that led the run: a corrected model, or a law's file.
+pub fn model_name(file: &str, text: &str) -> String {
+    if crate::model_file::is_corrected(text) { "model.toml".to_string() } else { format!("law/{file}") }
+}
+
+/// Whether a file of a record is the model file.
+pub fn is_model(name: &str) -> bool {
+    name == "model.toml" || name.starts_with("law/")
+}
+
 /// What the loop was built from, so that its rows can be run again; the model is that of the finger where the
 /// record holds no model file.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -34,6 +46,9 @@ pub struct Replayable {
     pub config: Config,
     /// The finger of the baseline model.
     pub finger: Finger,
+    /// The built-in law that led the run; none: the spring-slider, or the record's model file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<BuiltIn>,
 }
 
 /// The open files of a run.
@@ -72,7 +87,9 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
         ("plan.toml".to_string(), job.plan.text.clone()),
         ("rig.toml".to_string(), job.setup.rig_file().to_toml().into_diagnostic()?),
     ];
-    let replayed = Replayable { config: job.setup.config, finger: job.setup.tip.finger };
+    let law = BuiltIn::by_name(job.model.name());
+    let law = law.filter(|law| job.model_file.is_none() && *law != BuiltIn::SpringSlider);
+    let replayed = Replayable { config: job.setup.config, finger: job.setup.tip.finger, law };
     files.push((REPLAYABLE.to_string(), serde_json::to_string_pretty(&replayed).into_diagnostic()?));
     files.extend(job.model_file.clone());
     files.extend(job.setup.certificates.files.iter().cloned());
@@ -80,7 +97,15 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     let Notes { operator, subject, sample, licence } = &job.notes;
     let notes = [("operator", operator), ("subject", subject), ("sample", sample), ("licence", licence)];
     let notes = notes.into_iter().filter_map(|(k, v)| Some((k, v.clone()?)));
-    let facts = facts.into_iter().chain(job.setup.guards().facts()).chain(notes);
+    let base = job.model.base();
+    let hash = |law: &dyn FrictionModel| law.sha256().map(String::from);
+    let laws = [
+        ("model_sha256", hash(&*job.model)),
+        ("base_law", base.map(|law| law.name().to_string())),
+        ("base_law_sha256", base.and_then(hash)),
+    ];
+    let laws = laws.into_iter().filter_map(|(k, v)| Some((k, v?)));
+    let facts = facts.into_iter().chain(laws).chain(job.setup.guards().facts()).chain(notes);
     let words = |value: &toml::Value| value.as_str().map_or_else(|| value.to_string(), String::from);
     let protocol = identity.protocol.iter().map(|(key, value)| (format!("protocol.{key}"), words(value)));
     let facts = facts.map(|(k, v)| (k.to_string(), v)).chain(protocol).collect();

@@ -12,11 +12,18 @@ use std::path::Path;
 /// A point table, as a diagnosis would take it; one of conditions has no lateral force.
 pub(super) fn table(path: &Path) -> miette::Result<Good> {
     let bytes = bytes_of(path, MAX_TABLE_BYTES)?;
-    let passes = if bytes.starts_with(b"PAR1") {
-        read_passes(crate::import::parquet_as_csv(path)?.as_bytes())
-    } else {
-        read_passes(&bytes[..])
+    let bytes =
+        if bytes.starts_with(b"PAR1") { crate::import::parquet_as_csv(path)?.into_bytes() } else { bytes };
+    let law = |text: &&str| {
+        let rows = runs::model_file::hashed(text);
+        let head = rows.lines().next().unwrap_or_default().split(',').map(str::trim);
+        head.clone().any(|h| h == models::law_table::ANSWERS[0].0) && !head.clone().any(|h| h == "point")
     };
+    if let Some(text) = std::str::from_utf8(&bytes).ok().filter(law) {
+        runs::model_file::load(&path.display().to_string(), text)?;
+        return Ok(Good { kind: "law table", passes: None, remarks: Vec::new() });
+    }
+    let passes = read_passes(&bytes[..]);
     let help = remedy(Some("table"));
     let passes = passes.map_err(|e| miette::miette!(help = help.clone(), "{e}"))?;
     let mut good = Good { kind: "table", passes: Some(passes.len()), remarks: Vec::new() };

@@ -140,7 +140,8 @@ impl<'a> Overlay<'a> {
         let full = self.full(&typical);
         let of = |value: fn(&Forecast) -> f64| {
             let values = curve.iter().map(|f| (value(f) / full, f.corrected_sd / full.abs()));
-            places.iter().zip(values).map(|(x, (v, sd))| (*x, v, sd)).collect()
+            // A base law that cannot tell leaves the curve out.
+            places.iter().zip(values).map(|(x, (v, sd))| (*x, v, sd)).filter(|p| p.1.is_finite()).collect()
         };
         let points: Vec<Seen> = rows
             .iter()

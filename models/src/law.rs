@@ -1,0 +1,94 @@
+//! Laws by name, and laws from files with the hash by which records and verdicts call them.
+
+use crate::condition::{Condition, OutOfDomain};
+use crate::finger::Finger;
+use crate::prediction::{EmpiricalPsi, FrictionModel, Prediction, RelativeFriction, SpringSlider};
+use crate::surrogate::Surrogate;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// A law that needs no file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BuiltIn {
+    /// Eqs. 6-15.
+    SpringSlider,
+    /// Eqs. 16-20.
+    Psi,
+    /// The ridge table that ships with the project.
+    Surrogate,
+}
+
+impl BuiltIn {
+    /// Every one.
+    pub const ALL: [BuiltIn; 3] = [BuiltIn::SpringSlider, BuiltIn::Psi, BuiltIn::Surrogate];
+
+    /// The name that people type.
+    pub const fn name(self) -> &'static str {
+        match self {
+            BuiltIn::SpringSlider => "spring-slider",
+            BuiltIn::Psi => "psi",
+            BuiltIn::Surrogate => "surrogate",
+        }
+    }
+
+    /// The law of that name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|law| law.name() == name)
+    }
+
+    /// The law for a finger.
+    ///
+    /// # Errors
+    /// A finger outside the domain of the law, by name.
+    pub fn law(self, finger: &Finger) -> Result<Arc<dyn FrictionModel>, OutOfDomain> {
+        finger.check()?;
+        Ok(match self {
+            BuiltIn::SpringSlider => Arc::new(SpringSlider::new(*finger)?),
+            BuiltIn::Psi => Arc::new(EmpiricalPsi::paper(*finger)?),
+            BuiltIn::Surrogate => Arc::new(
+                Surrogate::shipped().expect("the shipped table reads, as a test proves").for_finger(finger),
+            ),
+        })
+    }
+}
+
+/// A law from a table, with its name and the hash of the table.
+pub struct Named {
+    /// The law.
+    pub law: Arc<dyn FrictionModel>,
+    /// Its name in records and reports.
+    pub name: String,
+    /// SHA-256 of its table, hex.
+    pub sha256: String,
+}
+
+impl FrictionModel for Named {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
+        self.law.predict(condition)
+    }
+
+    fn relative_friction(&self, condition: &Condition) -> Result<RelativeFriction, OutOfDomain> {
+        self.law.relative_friction(condition)
+    }
+
+    fn parameter_relative_sd(&self) -> [f64; 2] {
+        self.law.parameter_relative_sd()
+    }
+
+    fn mu_relative_with(&self, condition: &Condition, deviation: [f64; 2]) -> Result<f64, OutOfDomain> {
+        self.law.mu_relative_with(condition, deviation)
+    }
+
+    fn form_sd(&self, condition: &Condition) -> f64 {
+        self.law.form_sd(condition)
+    }
+
+    fn sha256(&self) -> Option<&str> {
+        Some(&self.sha256)
+    }
+}

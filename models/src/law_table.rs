@@ -1,0 +1,341 @@
+//! A law of friction as a table: a full grid over some of w, f, U, F_n and mu_0, read multilinearly.
+//!
+//! A variable without a column is one that the law does not depend on. Outside the grid the law has no
+//! answer: it never extrapolates. Without vibration mu' is one by definition (Eq. 5), whatever the grid.
+
+pub mod grid;
+
+use crate::condition::{Condition, OutOfDomain};
+use crate::prediction::{FrictionModel, Prediction, Regime, Validity};
+use crate::quantity::PeakToPeak;
+
+/// A variable that a law may depend on: a column of its table.
+#[derive(Debug)]
+pub struct Variable {
+    /// Column, with its unit.
+    pub name: &'static str,
+    /// Smallest and largest value; a wrong unit is mostly outside.
+    pub range: [f64; 2],
+    /// What is accepted, in words.
+    pub needed: &'static str,
+    get: fn(&Condition) -> f64,
+    set: fn(&mut Condition, f64),
+}
+
+impl Variable {
+    /// Its value at a condition.
+    pub fn of(&self, condition: &Condition) -> f64 {
+        (self.get)(condition)
+    }
+
+    /// Gives a condition this value.
+    pub fn put(&self, condition: &mut Condition, value: f64) {
+        (self.set)(condition, value);
+    }
+
+    /// Whether a law table can have this value.
+    pub fn admits(&self, value: f64) -> bool {
+        value >= self.range[0] && value <= self.range[1]
+    }
+
+    /// The variable of a column.
+    pub fn by_name(name: &str) -> Option<&'static Variable> {
+        VARIABLES.iter().find(|v| v.name == name)
+    }
+}
+
+/// The variables in their order.
+pub static VARIABLES: [Variable; 5] = [
+    Variable {
+        name: "amplitude_pp_m",
+        range: [0.0, 1e-3],
+        needed: "metres peak to peak, 0 to 1e-3",
+        get: |c| c.amplitude.metres(),
+        set: |c, v| c.amplitude = PeakToPeak::from_metres(v),
+    },
+    Variable {
+        name: "frequency_hz",
+        range: [1e3, 1e7],
+        needed: "hertz, 1e3 to 1e7",
+        get: |c| c.frequency_hz,
+        set: |c, v| c.frequency_hz = v,
+    },
+    Variable {
+        name: "speed_m_s",
+        range: [0.0, 10.0],
+        needed: "m/s, 0 to 10",
+        get: |c| c.speed_m_s,
+        set: |c, v| c.speed_m_s = v,
+    },
+    Variable {
+        name: "normal_force_n",
+        range: [1e-6, 100.0],
+        needed: "newtons, 1e-6 to 100",
+        get: |c| c.normal_force_n,
+        set: |c, v| c.normal_force_n = v,
+    },
+    Variable {
+        name: "mu0",
+        range: [1e-3, 10.0],
+        needed: "a number, 1e-3 to 10",
+        get: |c| c.mu0,
+        set: |c, v| c.mu0 = v,
+    },
+];
+
+/// Columns of the answer, with their ranges: mu' and its standard uncertainty.
+pub const ANSWERS: [(&str, [f64; 2]); 2] = [("mu_relative", [0.0, 2.0]), ("mu_relative_sd", [0.0, 1.0])];
+/// Most rows of a table.
+pub const MOST_ROWS: usize = 1_000_000;
+/// Departure from one that a table may show at amplitude zero.
+const STILL: f64 = 1e-3;
+/// Share of an axis by which a value may lie outside for rounding alone.
+const ROUNDING: f64 = 1e-9;
+
+/// Why a law table was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("line {line}: {problem}; {remedy}")]
+pub struct LawTableError {
+    /// Line of the file, from 1.
+    pub line: u64,
+    /// What is wrong.
+    pub problem: String,
+    /// What to do.
+    pub remedy: String,
+}
+
+/// One axis of the grid.
+#[derive(Clone, Debug)]
+struct Axis {
+    variable: &'static Variable,
+    nodes: Vec<f64>,
+    stride: usize,
+}
+
+/// The table, ready to be read.
+#[derive(Clone, Debug)]
+pub struct LawTable {
+    axes: Vec<Axis>,
+    /// mu' and its standard uncertainty, the last axis fastest.
+    values: Vec<[f64; 2]>,
+}
+
+fn bad(line: u64, problem: impl Into<String>, remedy: impl Into<String>) -> LawTableError {
+    LawTableError { line, problem: problem.into(), remedy: remedy.into() }
+}
+
+/// Where a column goes.
+enum Column {
+    Variable(&'static Variable),
+    Answer(usize),
+}
+
+fn column(name: &str, line: u64) -> Result<Column, LawTableError> {
+    let answer = ANSWERS.iter().position(|a| a.0 == name).map(Column::Answer);
+    Variable::by_name(name).map(Column::Variable).or(answer).ok_or_else(|| {
+        let names: Vec<_> = VARIABLES.iter().map(|v| v.name).chain(ANSWERS.map(|a| a.0)).collect();
+        bad(
+            line,
+            format!("a law table has no column '{name}'"),
+            format!("convert it to SI and name it, or remove it; a law table may have {}", names.join(", ")),
+        )
+    })
+}
+
+impl LawTable {
+    /// Reads a table from CSV; lines that begin with `#` are comments.
+    ///
+    /// # Errors
+    /// Columns without a meaning, cells out of range, a grid that is not full, rows that repeat: the line and
+    /// the remedy.
+    pub fn from_csv(text: &str) -> Result<LawTable, LawTableError> {
+        let text = text.trim_start_matches('\u{feff}');
+        let mut builder = csv::ReaderBuilder::new();
+        let mut reader = builder.trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+        let malformed = |e: csv::Error| {
+            let line = e.position().map_or(1, csv::Position::line);
+            bad(line, "the row has another number of cells than the header", "complete it or remove it")
+        };
+        let header = reader.headers().map_err(malformed)?.clone();
+        // The reader counts comments before the header as part of it.
+        let blank = |line: &&str| line.trim().is_empty() || line.starts_with('#');
+        let head = 1 + text.lines().take_while(blank).count() as u64;
+        let columns = header.iter().map(|name| column(name, head)).collect::<Result<Vec<_>, _>>()?;
+        if let Some(twice) = (1..header.len()).find(|&i| header.iter().take(i).any(|h| h == &header[i])) {
+            return Err(bad(head, format!("two columns are '{}'", &header[twice]), "remove one"));
+        }
+        if !columns.iter().any(|c| matches!(c, Column::Answer(0))) {
+            return Err(bad(head, "the column 'mu_relative' is missing", "add it: mu' = mu / mu0"));
+        }
+        let mut axes: Vec<Axis> = VARIABLES
+            .iter()
+            .filter(|v| header.iter().any(|h| h == v.name))
+            .map(|variable| Axis { variable, nodes: Vec::new(), stride: 1 })
+            .collect();
+        let mut rows: Vec<(u64, [f64; VARIABLES.len()], [f64; 2])> = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(malformed)?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let (mut at, mut answer) = ([0.0; VARIABLES.len()], [0.0; 2]);
+            for (cell, (name, column)) in record.iter().zip(header.iter().zip(&columns)) {
+                let refuse =
+                    |needed: &str| bad(line, format!("'{name}' is '{cell}'"), format!("needed: {needed}"));
+                let value = cell.parse::<f64>().ok().filter(|v| v.is_finite());
+                match column {
+                    Column::Variable(v) => {
+                        let value = value.filter(|x| v.admits(*x)).ok_or_else(|| refuse(v.needed))?;
+                        let place =
+                            axes.iter().position(|a| std::ptr::eq(a.variable, *v)).unwrap_or_default();
+                        at[place] = value;
+                    }
+                    Column::Answer(k) => {
+                        let [low, high] = ANSWERS[*k].1;
+                        let value = value.filter(|x| *x >= low && *x <= high);
+                        answer[*k] =
+                            value.ok_or_else(|| refuse(&format!("a number from {low} to {high}")))?;
+                    }
+                }
+            }
+            if axes.first().is_some_and(|a| a.variable.name == VARIABLES[0].name)
+                && at[0] == 0.0
+                && (answer[0] - 1.0).abs() > STILL
+            {
+                let problem = format!("mu_relative is {} without vibration", answer[0]);
+                return Err(bad(line, problem, "divide by mu0, the friction at amplitude 0: mu' is 1 there"));
+            }
+            rows.push((line, at, answer));
+            if rows.len() > MOST_ROWS {
+                return Err(bad(line, format!("more than {MOST_ROWS} rows"), "make the grid coarser"));
+            }
+        }
+        if axes.is_empty() {
+            return Err(bad(head, "no column is a variable", "add those that the law depends on"));
+        }
+        for (k, axis) in axes.iter_mut().enumerate() {
+            axis.nodes = rows.iter().map(|r| r.1[k]).collect();
+            axis.nodes.sort_by(f64::total_cmp);
+            axis.nodes.dedup();
+            if axis.nodes.len() < 2 {
+                let problem = format!("'{}' has fewer than two values", axis.variable.name);
+                return Err(bad(
+                    head,
+                    problem,
+                    "add rows, or remove the column if the law does not depend on it",
+                ));
+            }
+        }
+        Self::filled(axes, &rows, head)
+    }
+
+    fn filled(
+        mut axes: Vec<Axis>,
+        rows: &[(u64, [f64; VARIABLES.len()], [f64; 2])],
+        head: u64,
+    ) -> Result<LawTable, LawTableError> {
+        let size = axes.iter().map(|a| a.nodes.len()).fold(1_usize, usize::saturating_mul);
+        let counts: Vec<String> =
+            axes.iter().map(|a| format!("{} of {}", a.nodes.len(), a.variable.name)).collect();
+        let shape =
+            format!("the grid ({}) needs {size} rows, and there are {}", counts.join(", "), rows.len());
+        if size > MOST_ROWS {
+            return Err(bad(head, shape, "give a row for every combination of the values"));
+        }
+        for k in (1..axes.len()).rev() {
+            axes[k - 1].stride = axes[k].stride * axes[k].nodes.len();
+        }
+        let mut values = vec![[f64::NAN; 2]; size];
+        let mut lines = vec![0_u64; size];
+        for (line, at, answer) in rows {
+            let place = |(axis, v): (&Axis, &f64)| {
+                axis.stride * axis.nodes.binary_search_by(|n| n.total_cmp(v)).unwrap_or_default()
+            };
+            let index: usize = axes.iter().zip(at).map(place).sum();
+            if lines[index] > 0 {
+                let problem = format!("the conditions are those of line {}", lines[index]);
+                return Err(bad(*line, problem, "remove one of the two rows"));
+            }
+            (lines[index], values[index]) = (*line, *answer);
+        }
+        if let Some(missing) = lines.iter().position(|line| *line == 0) {
+            let at =
+                |a: &Axis| format!("{} = {}", a.variable.name, a.nodes[missing / a.stride % a.nodes.len()]);
+            let place: Vec<String> = axes.iter().map(at).collect();
+            return Err(bad(head, shape, format!("add the row for {}, and any other", place.join(", "))));
+        }
+        Ok(LawTable { axes, values })
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.values.len()
+    }
+
+    /// mu' and its standard uncertainty. Allocates nothing.
+    ///
+    /// # Errors
+    /// A condition outside the grid, by the first variable that is.
+    pub fn at(&self, condition: &Condition) -> Result<[f64; 2], OutOfDomain> {
+        let mut share = [0.0; VARIABLES.len()];
+        let mut first = 0;
+        for (axis, share) in self.axes.iter().zip(&mut share) {
+            let value = axis.variable.of(condition);
+            let (low, high) = (axis.nodes[0], axis.nodes[axis.nodes.len() - 1]);
+            let slack = ROUNDING * (high - low);
+            if !(value >= low - slack && value <= high + slack) {
+                return Err(OutOfDomain { name: axis.variable.name, value, needed: INSIDE });
+            }
+            let cell = axis.nodes.partition_point(|n| *n <= value).clamp(1, axis.nodes.len() - 1) - 1;
+            *share = ((value - axis.nodes[cell]) / (axis.nodes[cell + 1] - axis.nodes[cell])).clamp(0.0, 1.0);
+            first += cell * axis.stride;
+        }
+        let mut sum = [0.0; 2];
+        for corner in 0..1_usize << self.axes.len() {
+            let (mut weight, mut index) = (1.0, first);
+            for (k, (axis, share)) in self.axes.iter().zip(&share).enumerate() {
+                let upper = corner >> k & 1;
+                weight *= if upper == 1 { *share } else { 1.0 - share };
+                index += upper * axis.stride;
+            }
+            // A corner without weight may lie beyond the last node.
+            if weight > 0.0 {
+                sum[0] += weight * self.values[index][0];
+                sum[1] += weight * self.values[index][1];
+            }
+        }
+        Ok(sum)
+    }
+}
+
+/// What a law needs that cannot tell.
+const INSIDE: &str = "a value inside the grid of the law table, which cannot tell beyond it,";
+
+/// A prediction of a law that knows mu' alone. Such a law does not say how finger and plate meet: less
+/// friction means that contact is lost.
+pub(crate) fn prediction(condition: &Condition, [mu_relative, mu_relative_sd]: [f64; 2]) -> Prediction {
+    Prediction {
+        mu_relative,
+        mu_relative_sd,
+        lateral_force_n: mu_relative * condition.mu0 * condition.normal_force_n,
+        regime: if mu_relative > 0.998 { Regime::FullContact } else { Regime::Intermittent },
+        validity: Validity::Inside,
+    }
+}
+
+impl FrictionModel for LawTable {
+    fn name(&self) -> &str {
+        "law table"
+    }
+
+    fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
+        condition.check()?;
+        let still = condition.amplitude == PeakToPeak::ZERO;
+        Ok(prediction(condition, if still { [1.0, 0.0] } else { self.at(condition)? }))
+    }
+
+    fn form_sd(&self, condition: &Condition) -> f64 {
+        self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,141 @@
+//! A friction law by name or from a file, CSV and Parquet alike; a law that was tabulated, as the file that
+//! is written.
+
+use crate::import::parquet_as_csv;
+use calibration::certificate::sha256_hex;
+use miette::{Context, IntoDiagnostic};
+use models::finger::Finger;
+use models::law::Named;
+use models::law_table::grid::Tabulated;
+use models::law_table::{VARIABLES, Variable};
+use models::pass::{Pass, coulomb_coefficient};
+use models::prediction::FrictionModel;
+use runs::input::bytes_of;
+use runs::model_file::{HASH_MARK, built_in, hashed, law, load_for};
+use runs::session::model_name;
+use runs::setup::Setup;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Largest file of a law in bytes.
+const MOST_BYTES: u64 = 1 << 28;
+
+/// A law that is ready.
+pub struct Loaded {
+    /// The law.
+    pub model: Arc<dyn FrictionModel>,
+    /// Its name in a record and its text; none for a built-in law.
+    pub file: Option<(String, String)>,
+}
+
+/// The law that `--model` names, for a run of this setup.
+///
+/// # Errors
+/// A file that cannot be read or used, with the place and the remedy.
+pub fn for_run(what: &Path, setup: &Setup) -> miette::Result<Loaded> {
+    if let Some(model) = built_in(&what.to_string_lossy(), &setup.tip.finger) {
+        return Ok(Loaded { model: model?, file: None });
+    }
+    let (name, text) = text_of(what)?;
+    let model = load_for(setup, &what.display().to_string(), &text)?;
+    Ok(Loaded { model, file: Some((model_name(&name, &text), text)) })
+}
+
+/// The law that `--model` names, as the base of a diagnosis.
+///
+/// # Errors
+/// As [`for_run`].
+pub fn for_finger(what: &Path, finger: &Finger) -> miette::Result<Loaded> {
+    if let Some(model) = built_in(&what.to_string_lossy(), finger) {
+        return Ok(Loaded { model: model?, file: None });
+    }
+    let (name, text) = text_of(what)?;
+    of_text(&what.display().to_string(), name, text, finger)
+}
+
+/// A law from its text, as the base of a diagnosis; `shown` is how messages call it.
+///
+/// # Errors
+/// As [`for_run`].
+pub fn of_text(shown: &str, name: String, text: String, finger: &Finger) -> miette::Result<Loaded> {
+    let mut model = law(finger, shown, &text)?;
+    if model.sha256().is_none() {
+        // A corrected model may itself be corrected: it is known by the hash of its file.
+        let sha256 = sha256_hex(text.as_bytes());
+        model = Arc::new(Named { name: model.name().to_string(), law: model, sha256 });
+    }
+    Ok(Loaded { model, file: Some((name, text)) })
+}
+
+/// A law's file name and its text; Parquet as CSV.
+fn text_of(path: &Path) -> miette::Result<(String, String)> {
+    let bytes = bytes_of(path, MOST_BYTES).map_err(|e| {
+        let names = "spring-slider, psi, surrogate, or the path of a ridge table, a law table, a surrogate.json or a MODEL.toml";
+        miette::miette!(help = format!("--model takes {names}"), "{e}")
+    })?;
+    let name = path.file_name().map_or_else(|| "law".into(), |n| n.to_string_lossy());
+    if bytes.starts_with(b"PAR1") {
+        return Ok((format!("{name}.csv"), parquet_as_csv(path)?));
+    }
+    let text = String::from_utf8(bytes)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("{}: no text", path.display()))?;
+    Ok((name.into_owned(), text))
+}
+
+/// The file of a law that was tabulated, and the hash of its rows; `origin` says of what it was made.
+///
+/// # Errors
+/// An interpolation error above `tolerance`, with the place and the remedy.
+pub fn file_of(made: &Tabulated, origin: &str, tolerance: f64) -> miette::Result<(String, String)> {
+    let Tabulated { csv, greatest, place, rms, checks } = made;
+    // An error that is no number is above any tolerance.
+    if greatest.partial_cmp(&tolerance).is_none_or(std::cmp::Ordering::is_gt) {
+        miette::bail!(
+            help = "give the grid more nodes there, or equal ratios (:log); to take the table as it is, raise the tolerance",
+            "the table differs from a fresh call by {greatest:.4} of mu' at {place}; the tolerance is {tolerance}"
+        );
+    }
+    let sha256 = sha256_hex(hashed(csv).as_bytes());
+    let origin: String = origin.split_whitespace().collect::<Vec<_>>().join(" ");
+    let text = format!(
+        "# muprime.law/1, made by muprime {}\n# origin: {origin}\n# interpolation error in mu': greatest {greatest:.2e} at {place}; \
+         rms {rms:.2e} over {checks} fresh calls, in mu_relative_sd\n{HASH_MARK}{sha256}\n{csv}",
+        env!("CARGO_PKG_VERSION")
+    );
+    Ok((text, sha256))
+}
+
+/// Nodes of an amplitude, of a speed, of another variable, and of mu_0.
+const NODES: [usize; 4] = [17, 9, 5, 3];
+/// Share by which a grid goes beyond a table, and beyond its mu_0.
+const BEYOND: [f64; 2] = [0.02, 0.2];
+
+/// A grid over the passes of a table for the variables of these names, in equal ratios.
+///
+/// # Errors
+/// A name that is no variable, a table without what it takes.
+pub fn grid_over(passes: &[Pass], names: &[String]) -> miette::Result<Vec<(String, Vec<f64>)>> {
+    let mu0 = coulomb_coefficient(passes).unwrap_or(0.5);
+    let one = |name: &String| {
+        let variable = Variable::by_name(name).ok_or_else(|| {
+            let names = VARIABLES.iter().map(|v| v.name).collect::<Vec<_>>().join(", ");
+            miette::miette!(help = format!("name its arguments {names}"), "a law has no variable '{name}'")
+        })?;
+        let values = passes.iter().map(|p| variable.of(&p.condition(mu0))).filter(|v| *v > 0.0);
+        let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));
+        if low > high {
+            miette::bail!("no pass of the table has a '{name}' above zero");
+        }
+        let (count, beyond) = match name.as_str() {
+            "amplitude_pp_m" => (NODES[0], BEYOND[0]),
+            "speed_m_s" => (NODES[1], BEYOND[0]),
+            "mu0" => (NODES[3], BEYOND[1]),
+            _ => (NODES[2], BEYOND[0]),
+        };
+        let (low, high) = (low / (1.0 + beyond), high * (1.0 + beyond));
+        let node = |i: usize| low * (high / low).powf(i as f64 / (count - 1) as f64);
+        Ok((name.clone(), (0..count).map(node).collect()))
+    };
+    names.iter().map(one).collect()
+}
