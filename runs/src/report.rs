@@ -11,7 +11,7 @@ pub mod human;
 pub(crate) mod levels;
 mod page;
 pub mod plots;
-mod traces;
+pub mod traces;
 
 use crate::run_dir::{differences, missing_records, of_file, passes_in, records_in};
 use crate::sequence::MeasuredPass;

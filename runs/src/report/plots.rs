@@ -64,7 +64,7 @@ impl Span {
 
     /// Over all of these values with a margin, logarithmic where it may be and they span more than a decade:
     /// within one such an axis has a single label.
-    fn over(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
+    pub fn over(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         if logarithmic && low > 0.0 && high > 10.0 * low {
             let margin = (high / low).powf(0.04);

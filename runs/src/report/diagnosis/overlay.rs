@@ -20,11 +20,14 @@ const PLACES: u32 = 60;
 
 /// The table as the figures need it: `mu'` of every pass, measured and under both models, and who is suspect.
 pub struct Overlay<'a> {
-    result: &'a Diagnosis,
-    table: &'a Table,
+    /// What the table came to.
+    pub result: &'a Diagnosis,
+    /// The table.
+    pub table: &'a Table,
     forecasts: &'a [Forecast],
     mu0: f64,
-    suspects: Vec<usize>,
+    /// Rows of the suspect passes.
+    pub suspects: Vec<usize>,
 }
 
 impl<'a> Overlay<'a> {
@@ -36,7 +39,7 @@ impl<'a> Overlay<'a> {
     }
 
     /// Full friction of a pass along its motion, N, with the sign of the direction.
-    fn full(&self, pass: &Condition) -> f64 {
+    pub fn full(&self, pass: &Condition) -> f64 {
         pass.direction.sign() * self.mu0 * pass.normal_force_n
     }
 
