@@ -358,8 +358,8 @@ impl Diagnosis {
         forecast(&self.fitted, &self.rig, &whole, passes)
     }
 
-    /// What one hypothesis says of conditions, by the names of its effects: its law is [`Forecast::form`]. `None` for no gap, for the
-    /// open set, and for what was not fitted.
+    /// What one hypothesis says of conditions, by the names of its effects: its law is [`Forecast::form`].
+    /// `None` for no gap, for the open set, and for what was not fitted.
     pub fn hypothesis_curve(&self, effects: &[String], passes: &[Condition]) -> Option<Vec<Forecast>> {
         let candidate = self.fitted.candidates.iter().position(|c| c.names() == effects)?;
         let whole = model(&self.fitted, &self.table, Verdict::Named, Some(candidate), None);

@@ -128,17 +128,20 @@ impl<R: Read + Seek> Reader<R> {
         self
     }
 
-    /// From here on passes over chunks that lie wholly outside of these log times, in ns since 1970: they are not opened, so
-    /// [`Reader::integrity`] takes their messages for missing.
+    /// From here on passes over chunks that lie wholly outside of these log times, in ns since 1970: they are
+    /// not opened, so [`Reader::integrity`] takes their messages for missing.
     pub fn between(&mut self, window: [u64; 2]) {
         self.window = window;
     }
 
-    /// Whether the record that was read is a chunk outside of the window: its first and last log times are its first words.
+    /// Whether the record that was read is a chunk outside of the window: its first and last log times are
+    /// its first words.
     fn is_outside(&self, opcode: u8) -> bool {
         let time = |at: usize| self.body.get(at..)?.first_chunk::<8>().map(|b| u64::from_le_bytes(*b));
         opcode == op::CHUNK
-            && time(0).zip(time(8)).is_some_and(|(first, last)| last < self.window[0] || first > self.window[1])
+            && time(0)
+                .zip(time(8))
+                .is_some_and(|(first, last)| last < self.window[0] || first > self.window[1])
     }
 
     /// Checks the messages and gives none out.

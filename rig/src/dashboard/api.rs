@@ -175,7 +175,8 @@ async fn cycles(
         let why = "a window from from_s to to_s is needed, in s of loop time, the first not after the second";
         return Err((StatusCode::UNPROCESSABLE_ENTITY, why).into_response());
     }
-    let _turn = shared.windows.acquire().await.map_err(|_| StatusCode::SERVICE_UNAVAILABLE.into_response())?;
+    let _turn =
+        shared.windows.acquire().await.map_err(|_| StatusCode::SERVICE_UNAVAILABLE.into_response())?;
     let found = beside(move || runs::report::traces::within(&folder, [from_s, to_s])).await?;
     Ok(found.map_or_else(|why| failed_to(&why), |window| Json(window).into_response()))
 }

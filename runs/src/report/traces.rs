@@ -157,8 +157,9 @@ fn trace(cycles: &[Cycle], stretch: usize) -> Option<Trace> {
 /// Digits of [`packed`]: those of base 64.
 const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// Whole numbers as text: of each the difference from the one before, its sign as the last bit, plus one; 0 stands for none. Five
-/// bits a digit, the lowest first; a digit from 32 on has another behind it (as in source maps).
+/// Whole numbers as text: of each the difference from the one before, its sign as the last bit, plus one; 0
+/// stands for none. Five bits a digit, the lowest first; a digit from 32 on has another behind it (as in
+/// source maps).
 fn packed(values: impl Iterator<Item = Option<i64>>) -> String {
     let (mut text, mut before) = (String::new(), 0i64);
     for value in values {
@@ -193,7 +194,8 @@ mod tests {
             if digit < 32 {
                 all.push((left > 0).then(|| {
                     let zigzag = left - 1;
-                    before += if zigzag % 2 == 0 { (zigzag / 2) as i64 } else { -(zigzag.div_ceil(2) as i64) };
+                    before +=
+                        if zigzag % 2 == 0 { (zigzag / 2) as i64 } else { -(zigzag.div_ceil(2) as i64) };
                     before
                 }));
                 (left, shift) = (0, 0);

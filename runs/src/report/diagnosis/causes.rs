@@ -1,8 +1,9 @@
-//! Which cause: the ranking, and each cause that is left with its mechanism, its source, its size, and its law over the passes.
+//! Which cause: the ranking, and each cause that is left with its mechanism, its source, its size, and its
+//! law over the passes.
 
 use super::mechanism::drawing;
 use super::overlay::Overlay;
-use crate::report::html::{bar, escape, table};
+use crate::report::html::{bar, escape, micro, table};
 use crate::report::human::with_interval;
 use crate::verdict::plain;
 use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
@@ -84,7 +85,7 @@ fn card(h: &Hypothesis, law: &str) -> String {
             format!(
                 "<tr><th scope=\"row\">{}</th><td>{}</td></tr>",
                 escape(&p.name.replace('_', " ")),
-                escape(&with_interval(p.value, p.ci95, p.unit))
+                escape(&micro(&with_interval(p.value, p.ci95, p.unit)))
             )
         })
         .collect();

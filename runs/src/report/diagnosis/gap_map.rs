@@ -1,7 +1,7 @@
-//! The gap over the operating space as tables of cells: read without colour, by a screen reader and in print. Every pass is a mark in
-//! its cell, and leads to the numbers of the pass.
+//! The gap over the operating space as tables of cells: read without colour, by a screen reader and in print.
+//! Every pass is a mark in its cell, and leads to the numbers of the pass.
 
-use crate::report::html::{escape, note, table};
+use crate::report::html::{escape, micro, note, table};
 use crate::report::human::number;
 use diagnosis::data::Table;
 use models::covariate::{self, Covariate};
@@ -17,8 +17,8 @@ const LEAST_END: f64 = 0.005;
 /// The deepest shades, of less friction than the model says and of more: black letters are read on both.
 const DEEPEST: [[f64; 3]; 2] = [[58.0, 148.0, 207.0], [213.0, 94.0, 0.0]];
 
-/// Mean error of `mu'` in every part of the operating space, before and after, on one scale: `errors` are measured less predicted over
-/// full friction, positive where more friction was measured.
+/// Mean error of `mu'` in every part of the operating space, before and after, on one scale: `errors` are
+/// measured less predicted over full friction, positive where more friction was measured.
 pub fn section(points: &Table, errors: &[(f64, f64)]) -> String {
     let varied: Vec<&Covariate> =
         [&covariate::SPEED, &covariate::FREQUENCY, &covariate::NORMAL_FORCE, &covariate::TIME]
@@ -162,7 +162,7 @@ impl<'a> Map<'a> {
     fn html(&self, after: bool, end: f64) -> String {
         let [rows, columns] = self.covariates;
         let which = if after { "verdict's model" } else { "recalibrated baseline" };
-        let unit = |c: &Covariate| escape(&format!("{}, {}", c.words, c.shown.1));
+        let unit = |c: &Covariate| escape(&micro(&format!("{}, {}", c.words, c.shown.1)));
         let titles: String =
             self.titles[1].iter().map(|title| format!("<th scope=\"col\">{title}</th>")).collect();
         let head = format!("<th scope=\"col\">{} \\ {}</th>{titles}", unit(rows), unit(columns));
@@ -193,11 +193,18 @@ impl<'a> Map<'a> {
                 let (error, point) = (self.error(i, after), self.points.points[i]);
                 // Out of the keyboard's way: the table of all passes has the same numbers.
                 format!(
-                    "<a class=\"{}\" href=\"#pass-{point}\" tabindex=\"-1\" title=\"pass {point}: {error:+.3}\"></a>",
-                    shade(error, end)
+                    "<a class=\"{}\" href=\"#pass-{point}\" tabindex=\"-1\" title=\"pass {point}: {}\"></a>",
+                    shade(error, end),
+                    signed(error)
                 )
             })
             .collect();
-        format!("<td class=\"{}\">{mean:+.3}<div>{marks}</div></td>", shade(mean, end))
+        format!("<td class=\"{}\">{}<div>{marks}</div></td>", shade(mean, end), signed(mean))
     }
+}
+
+/// An error with its sign, where it has one with these digits.
+fn signed(error: f64) -> String {
+    let text = format!("{error:+.3}");
+    if text.ends_with("0.000") { "0.000".into() } else { text }
 }

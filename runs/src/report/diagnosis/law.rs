@@ -1,7 +1,8 @@
-//! The law of a hypothesis: what it adds to the recalibrated baseline along the setting that moves it most, over the passes.
+//! The law of a hypothesis: what it adds to the recalibrated baseline along the setting that moves it most,
+//! over the passes.
 
 use super::overlay::Overlay;
-use crate::report::html::escape;
+use crate::report::html::{escape, micro};
 use crate::report::human::number;
 use crate::report::plots::Span;
 use crate::report::plots::verdict::{LawPass, law};
@@ -53,9 +54,11 @@ impl Overlay<'_> {
             axes.iter().flat_map(|(c, places)| places.iter().map(|v| at(c, *v))).collect();
         let curves = wanted.len();
         wanted.extend(passes);
-        let Some(said) = self.result.hypothesis_curve(&h.effects, &wanted) else { return Ok(String::new()) };
+        let Some(forecasts) = self.result.hypothesis_curve(&h.effects, &wanted) else {
+            return Ok(String::new());
+        };
         let adds = |i: usize, of: fn(&Forecast) -> f64| {
-            (of(&said[i]) - said[i].recalibrated) / self.full(&wanted[i])
+            (of(&forecasts[i]) - forecasts[i].recalibrated) / self.full(&wanted[i])
         };
         let swing = |k: usize| {
             let all: Vec<f64> =
@@ -76,14 +79,15 @@ impl Overlay<'_> {
             .enumerate()
             .map(|(i, v)| {
                 let i = k * PLACES as usize + i;
-                let sd = (said[i].corrected_sd.powi(2) - said[i].scatter_sd.powi(2)).max(0.0).sqrt();
+                let sd =
+                    (forecasts[i].corrected_sd.powi(2) - forecasts[i].scatter_sd.powi(2)).max(0.0).sqrt();
                 (x(*v), adds(i, |f| f.form), sd / self.full(&wanted[i]).abs())
             })
             .collect();
         let marks: Vec<LawPass> = (0..passes.len())
             .filter_map(|i| {
                 let at = x(along.of(&passes[i])?);
-                let off = (self.table.lateral[i] - said[curves + i].form) / self.full(&passes[i]);
+                let off = (self.table.lateral[i] - forecasts[curves + i].form) / self.full(&passes[i]);
                 Some(LawPass { x: at, y: on(&curve, at) + off, suspect: self.suspects.contains(&i) })
             })
             .collect();
@@ -94,7 +98,8 @@ impl Overlay<'_> {
             .collect();
         let name = plain(&h.effects.join(" + "));
         let span = Span::over(curve.iter().map(|(x, ..)| *x), along.scale == Scale::Log);
-        let figure = law(&name, (&format!("{}, {}", along.words, along.shown.1), span), &marks, &curve)?;
+        let figure =
+            law(&name, (&micro(&format!("{}, {}", along.words, along.shown.1)), span), &marks, &curve)?;
         Ok(figure
             + &crate::report::html::note(&format!(
                 "What {} adds to the recalibrated baseline along the {}, at {}. Line: its law; band: twice the standard deviation of its \
@@ -102,7 +107,7 @@ impl Overlay<'_> {
                  passes at other conditions are on the same figure.",
                 escape(&name),
                 along.words,
-                held.join(", ")
+                micro(&held.join(", "))
             )))
     }
 
@@ -116,7 +121,8 @@ impl Overlay<'_> {
                 .map(|c| {
                     let all = || driven.iter().filter_map(|p| c.of(p));
                     let of = c.of(p).unwrap_or(0.0);
-                    (all().filter(|v| *v < of).count() as f64 - all().filter(|v| *v > of).count() as f64).abs()
+                    (all().filter(|v| *v < of).count() as f64 - all().filter(|v| *v > of).count() as f64)
+                        .abs()
                 })
                 .sum()
         };

@@ -1,4 +1,5 @@
-//! Where a cause acts, as a small drawing: finger, contact, air, plate, instruments; the part that acts is filled.
+//! Where a cause acts, as a small drawing: finger, contact, air, plate, instruments; the part that acts is
+//! filled.
 
 use effects::{Effect, Place};
 

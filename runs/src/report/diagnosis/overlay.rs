@@ -1,6 +1,6 @@
 //! What was measured, and what the models say of it.
 
-use crate::report::html::note;
+use crate::report::html::{micro, note};
 use crate::report::human::number;
 use crate::report::plots::verdict::{Seen, overlay, parity};
 use crate::report::plots::{Span, mu_axis};
@@ -158,10 +158,10 @@ impl<'a> Overlay<'a> {
             .iter()
             .filter_map(|c| Some(format!("{} {}", number(c.shown.0 * c.of(&typical)?), c.shown.1)))
             .collect();
-        let title = base.join(", ");
+        let title = micro(&base.join(", "));
         overlay(
             &title,
-            (&format!("{} {}", x.words, x.shown.1), span),
+            (&micro(&format!("{}, {}", x.words, x.shown.1)), span),
             &points,
             &of(|f| f.recalibrated),
             &of(|f| f.corrected),

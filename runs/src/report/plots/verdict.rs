@@ -114,7 +114,7 @@ pub fn law(
         let ends = [curve.first(), curve.last()].into_iter().flatten().map(|(x, ..)| (*x, 0.0));
         line(chart, ends.collect(), GREY, Some(6))?;
         chart
-            .draw_series(passes.iter().map(|p| mark(0, (p.x, cut(p.y)), size - 2, BLACK, true)))
+            .draw_series(passes.iter().map(|p| mark(0, (p.x, cut(p.y)), size - 1, BLACK, true)))
             .map_err(wrong)?;
         line(chart, edge(0.0), COLOURS[0], None)?;
         rings(chart, passes.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.y))), size)
@@ -163,7 +163,11 @@ pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
 pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Result<String> {
     let unit = c.shown.1;
     // A direction has no unit.
-    let name = if unit.is_empty() { c.words.to_string() } else { format!("{}, {unit}", c.words) };
+    let name = if unit.is_empty() {
+        c.words.to_string()
+    } else {
+        crate::report::html::micro(&format!("{}, {unit}", c.words))
+    };
     let alt = format!("Errors of {} passes against {}, before and after.", points.len(), c.words);
     let frame = Frame {
         sizes: [PANEL, NARROW],
