@@ -170,9 +170,9 @@ function cycleFigures(root, { passes, traces: cycles, events, limits }, finer) {
     charts.force.lines.level = limits ? [limits.lateral_n, -limits.lateral_n, limits.normal_n] : [];
     if (!stretch) for (const own of times) own.ends = [time[0], time.at(-1)];
     const bands = [...lateral, middle(lateral), ...normal, middle(normal)];
-    charts.force.own.chart.setData([time, ...bands]);
-    charts.ratio.own.chart.setData([time, ...mu, middle(mu)]);
-    charts.late.own.chart.setData([time, latest]);
+    charts.force.own.put([time, ...bands], [1, -1, 0, 1, -1, 0]);
+    charts.ratio.own.put([time, ...mu, middle(mu)], [1, -1, 0]);
+    charts.late.own.put([time, latest], [1]);
     for (const { plot } of [force, ratio, late]) plot.dataset.points = time.length - chosen.length;
     late.show(latest.some((v) => v > 0));
     const across = bands[2];

@@ -32,6 +32,36 @@ function axes(xTitle, yTitle, right) {
   return all;
 }
 
+// What lies between two abscissae, about a point a column of the screen: of each series the greatest (1), the least (-1), or the middle of the
+// two before it (0). Where nothing lies over more than two columns nothing is drawn.
+function thinned([time, ...all], how, from, to, columns) {
+  const place = (x) => {
+    let [a, b] = [0, time.length];
+    while (a < b) { const m = (a + b) >> 1; if (time[m] < x) a = m + 1; else b = m; }
+    return a;
+  };
+  const [first, last] = [Math.max(place(from) - 1, 0), Math.min(place(to) + 1, time.length)];
+  if (last - first <= 2 * columns) return [time, ...all].map((values) => values.slice(first, last));
+  const made = [[], ...all.map(() => [])];
+  let column = -Infinity;
+  for (let i = first; i < last; i += 1) {
+    const now = Math.floor((time[i] - from) / (to - from) * columns);
+    if (now !== column) {
+      if (now > column + 2 && i > first) { made[0].push((time[i - 1] + time[i]) / 2); for (let j = 1; j < made.length; j += 1) made[j].push(null); }
+      column = now;
+      made[0].push(time[i]);
+      for (let j = 1; j < made.length; j += 1) made[j].push(null);
+    }
+    const k = made[0].length - 1;
+    for (let j = 0; j < all.length; j += 1) {
+      const [value, best] = [all[j][i], made[j + 1][k]];
+      if (value != null && (best == null || (how[j] > 0 ? value > best : value < best))) made[j + 1][k] = value;
+    }
+  }
+  how.forEach((one, j) => { if (one === 0) made[j + 1] = made[j - 1].map((high, i) => (high == null || made[j][i] == null ? null : (high + made[j][i]) / 2)); });
+  return made;
+}
+
 // A chart that a drag enlarges, a drag with Shift moves and a double click shows whole, by keys too; whose axes may be logarithmic, and
 // which follows its frame's width. `ready` gets the chart each time it is made; `moved` the part of x that is shown, none for the whole.
 function chartOf(plot, options, ready) {
@@ -42,7 +72,12 @@ function chartOf(plot, options, ready) {
   own.see = (x) => {
     if (x) zoom.x = x;
     else for (const key of Object.keys(zoom)) delete zoom[key];
-    own.chart.setData(own.chart.data);
+    own.chart.setData(own.data?.(zoom.x) ?? own.chart.data);
+  };
+  // Data of which only what is in view is drawn: see thinned.
+  own.put = (data, how) => {
+    own.data = (x) => thinned(data, how, ...(x ?? [data[0][0], data[0].at(-1)]), Math.max(plot.clientWidth, 200));
+    own.chart.setData(own.data(zoom.x));
   };
   const seen = (x) => { own.see(x); own.moved?.(x); };
   const whole = () => seen(null);

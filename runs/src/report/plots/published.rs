@@ -78,7 +78,7 @@ const AXES: [Axis; 4] = [
     },
 ];
 
-/// The three panels; what is not drawn is said below them.
+/// The three panels; their captions state what is not drawn.
 ///
 /// # Errors
 /// Only if the drawing library fails.
