@@ -364,6 +364,14 @@ impl Diagnosis {
         forecast(&self.fitted, &self.rig, &whole, passes)
     }
 
+    /// What one hypothesis says of conditions, by the names of its effects: its law is [`Forecast::form`].
+    /// `None` for no gap, for the open set, and for what was not fitted.
+    pub fn hypothesis_curve(&self, effects: &[String], passes: &[Condition]) -> Option<Vec<Forecast>> {
+        let candidate = self.fitted.candidates.iter().position(|c| c.names() == effects)?;
+        let whole = model(&self.fitted, &self.table, Verdict::Named, Some(candidate), None);
+        Some(forecast(&self.fitted, &self.rig, &whole, passes))
+    }
+
     /// Predicts conditions with the verdict's model; those in runs that the table does not have, or after its
     /// end, with the deviations that such passes of the table needed.
     pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {

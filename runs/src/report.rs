@@ -11,7 +11,8 @@ pub mod human;
 pub(crate) mod levels;
 mod page;
 pub mod plots;
-mod traces;
+pub mod published;
+pub mod traces;
 
 use crate::run_dir::{differences, missing_records, of_file, passes_in, records_in};
 use crate::sequence::MeasuredPass;
@@ -99,14 +100,17 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
 /// # Errors
 /// A folder that holds no run.
 pub fn html(folder: &Path) -> miette::Result<String> {
-    Ok(html_and_damage(folder)?.0)
+    Ok(html_and_damage(folder, &[])?.0)
 }
 
-/// The same, and what is damaged or missing in the folder.
+/// The same with published values on its axes, and what is damaged or missing in the folder.
 ///
 /// # Errors
 /// A folder that holds no run.
-pub fn html_and_damage(folder: &Path) -> miette::Result<(String, Vec<String>)> {
+pub fn html_and_damage(
+    folder: &Path,
+    overlay: &[published::Published],
+) -> miette::Result<(String, Vec<String>)> {
     let run = read(folder)?;
-    Ok((page::page(&run, &traces::of(folder)?)?, run.damage))
+    Ok((page::page(&run, &traces::of(folder)?, overlay)?, run.damage))
 }

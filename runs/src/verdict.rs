@@ -65,7 +65,7 @@ pub fn odds_base10(log: f64) -> String {
 }
 
 /// An effect's or a parameter's name in words.
-fn plain(name: &str) -> String {
+pub(crate) fn plain(name: &str) -> String {
     name.replace('_', " ")
 }
 

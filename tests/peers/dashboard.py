@@ -35,6 +35,10 @@ def settled(page, where):
         page.frame_locator("iframe[title='report.html']").locator("h1").wait_for(timeout=WITHIN_MS)
     if where.startswith("compare/") or where == f"run/{quote(other)}":
         page.wait_for_selector(".report h1")
+        # What is far down is made when a reader comes near.
+        if page.locator(".below").count():
+            page.locator(".below").scroll_into_view_if_needed()
+            page.locator(".below").wait_for(state="detached")
         page.wait_for_timeout(500)
     elif where.startswith("run/"):
         page.wait_for_selector("dl.now dd", state="attached")
@@ -43,7 +47,7 @@ def settled(page, where):
 
 
 def views(browser):
-    for width in [360, 800, 1600]:
+    for width in [360, 1200, 1600]:
         for scheme in ["light", "dark"]:
             page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
             page.set_default_timeout(WITHIN_MS)
@@ -119,6 +123,21 @@ def work(browser):
         with page.expect_download() as got:
             page.click("button:text-is('Download')")
         got.value.save_as(out / f"fetched-{file}")
+    # An enlarged trace gets every recorded cycle of the run's folder, the other figures of time with it; the whole is that of the page again.
+    page.locator(".below").scroll_into_view_if_needed()
+    plots = page.locator("#explore figure .plot[data-points]")
+    plots.first.wait_for()
+    points = lambda: [int(n) for n in plots.evaluate_all("all => all.map(p => p.dataset.points)")]
+    before, caption = points(), page.locator("#explore figure", has=page.locator("h2", has_text="Forces")).locator("figcaption")
+    plots.first.focus()
+    for _ in range(6):
+        page.keyboard.press("+")
+    page.wait_for_function("() => [...document.querySelectorAll('#explore figcaption')].some(c => c.textContent.includes('every recorded cycle'))")
+    if not all(n > 400 for n in points()):
+        faults.append(f"enlarged: {points()} points after {before}: {caption.inner_text()}")
+    page.screenshot(path=out / "enlarged.png", full_page=True)
+    page.keyboard.press("0")
+    page.wait_for_function(f"() => [...document.querySelectorAll('#explore .plot[data-points]')].every((p, i) => p.dataset.points === String({before}[i]))")
     page.click("button:text-is('Diagnose')")
     page.wait_for_selector("button:text-is('Diagnose again')")
     words = page.inner_text("main")

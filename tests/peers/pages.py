@@ -13,7 +13,7 @@ from pathlib import Path
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import sync_playwright
 
-WIDTHS = [360, 800, 1600]
+WIDTHS = [360, 1200, 1600]
 # What a page says about itself in the browser: its overflow, its figures and the smallest letter that is shown, in CSS pixels.
 LOOK = """() => {
   const shown = e => e.getClientRects().length > 0;
@@ -64,6 +64,17 @@ def explored(browser, path):
         page.locator("#explore button[aria-pressed]").first.click()
     if not (len(rows[0]) > len(rows[1]) > 1 and {"point", "time_s", "w_um"} <= set(rows[0][0].split(","))):
         faults.append(f"the legend hides nothing: {len(rows[0])} and {len(rows[1])} rows")
+    # By the keyboard: a figure is enlarged, moved, and whole again.
+    plot = page.locator("#explore figure", has=page.locator("h2", has_text="Forces")).locator(".plot")
+    plot.focus()
+    shown = lambda: plot.screenshot()
+    views = [shown()]
+    for key in ["+", "ArrowRight", "0"]:
+        page.keyboard.press(key)
+        page.wait_for_timeout(300)
+        views.append(shown())
+    if views[1] in views[0:1] + views[2:] or views[3] != views[0]:
+        faults.append("the keys +, ArrowRight and 0 do not enlarge, move and restore the forces")
     with page.expect_download() as got:
         page.locator("button", has_text="SVG").first.click()
     if not Path(got.value.path()).read_text().startswith("<svg"):
@@ -77,6 +88,28 @@ def explored(browser, path):
     return faults
 
 
+def followed(browser, path):
+    """What is wrong with the maps of a verdict's page: a mark leads to its pass, also without scripts, and the plan is handed out."""
+    page, faults = browser.new_context(java_script_enabled=False, viewport={"width": 1200, "height": 900}, accept_downloads=True).new_page(), []
+    page.set_default_timeout(WITHIN_MS)
+    page.goto(path.as_uri())
+    for mark in [page.locator(".map a").first, page.locator(".map a").last]:
+        row = page.locator(mark.get_attribute("href"))
+        if row.is_visible():
+            page.locator("summary", has_text="All").click()
+        mark.click()
+        row.wait_for(state="visible")
+        if not mark.get_attribute("title").startswith(f"pass {row.locator('th').inner_text()}: "):
+            faults.append(f"{mark.get_attribute('title')} leads to {row.inner_text()}")
+    if page.locator("a[download]").count():
+        with page.expect_download() as got:
+            page.locator("a[download]").first.click()
+        if "[[series]]" not in Path(got.value.path()).read_text() or got.value.suggested_filename != "next-plan.toml":
+            faults.append(f"the plan is {got.value.suggested_filename}")
+    page.close()
+    return faults
+
+
 out, pages = Path(sys.argv[1]), [Path(p).resolve() for p in sys.argv[2:]]
 # A busy machine draws a page slowly: this is for one that never does.
 WITHIN_MS = 180_000
@@ -87,7 +120,7 @@ axe, seen = Axe(), []
 with sync_playwright() as p:
     browser = p.chromium.launch(executable_path=chromium, timeout=WITHIN_MS, args=["--no-sandbox", "--disable-gpu"])
     for path in pages:
-        tried = explored(browser, path) if path.name == "report.html" else []
+        tried = explored(browser, path) if path.name == "report.html" else followed(browser, path) if path.name == "verdict.html" else []
         for width in WIDTHS:
             for scheme in ["light", "dark"]:
                 page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)

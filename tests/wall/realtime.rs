@@ -79,7 +79,7 @@ fn the_loops_thread_allocates_nothing_behind_real_drivers() {
     let force = setup.certificates.calibrated(opened.force);
     let force = Box::new(Counted { inner: force, reads: 0, counted: Arc::clone(&counted) });
     let amplifier = setup.certificates.calibrated_amplifier(opened.amplifier);
-    let (rig, mut reins, record) = WallLoop::start(Parts {
+    let (rig, mut reins, mut record) = WallLoop::start(Parts {
         config: setup.config,
         model: Arc::new(SpringSlider::new(setup.tip.finger).unwrap()),
         ports: Ports::new(force, amplifier, opened.stage),

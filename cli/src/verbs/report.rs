@@ -1,5 +1,6 @@
 //! `muprime report FOLDER`: the page of a run, or of a campaign.
 
+use runs::report::published;
 use runs::{out, say};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -12,6 +13,11 @@ pub struct Args {
     /// Where to write it [default: report.html in the run's folder]
     #[arg(long)]
     out: Option<PathBuf>,
+    /// Published values on the same axes: `paper` (what the text of Vezzoli et al., part 1, states), or a
+    /// CSV file of your own with the columns `source`, `mu_relative` and `amplitude_pp_m`,
+    /// `frequency_hz` or `speed_m_s`; may be repeated
+    #[arg(long, value_name = "paper|FILE")]
+    overlay: Vec<String>,
 }
 
 /// Writes the report.
@@ -21,6 +27,13 @@ pub struct Args {
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.run, "run")?;
     if args.run.join(runs::campaign::FILE).is_file() {
+        if !args.overlay.is_empty() {
+            miette::bail!(
+                help = "give the folder of one of its runs",
+                "--overlay: {} is a campaign",
+                args.run.display()
+            );
+        }
         let (claims, made, planned) = super::run::campaign::write(&args.run)?;
         if json {
             out!(
@@ -32,7 +45,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         return super::exit(super::DONE);
     }
-    let (html, damage) = runs::report::html_and_damage(&args.run)?;
+    let overlay: miette::Result<Vec<_>> = args.overlay.iter().map(|name| published::of(name)).collect();
+    let (html, damage) = runs::report::html_and_damage(&args.run, &overlay?.concat())?;
     let out = args.out.unwrap_or_else(|| args.run.join("report.html"));
     runs::files::write_whole(&out, html)?;
     if json {

@@ -65,6 +65,8 @@ pub struct Reader<R> {
     body: Vec<u8>,
     messages: VecDeque<Message>,
     wanted: Wanted,
+    /// Log times outside of which chunks are passed over, in ns since 1970.
+    window: [u64; 2],
     /// Number of the last message of every topic.
     last: [u32; TOPICS.len()],
     /// Length of the file when reading began.
@@ -110,6 +112,7 @@ impl<R: Read + Seek> Reader<R> {
             body: Vec::new(),
             messages: VecDeque::new(),
             wanted: Wanted::All,
+            window: [0, u64::MAX],
             last: [0; TOPICS.len()],
             size: None,
             in_vain: 0,
@@ -123,6 +126,22 @@ impl<R: Read + Seek> Reader<R> {
     pub fn only(mut self, topic: &'static str) -> Self {
         self.wanted = Wanted::Only(topic);
         self
+    }
+
+    /// From here on passes over chunks that lie wholly outside of these log times, in ns since 1970: they are
+    /// not opened, so [`Reader::integrity`] takes their messages for missing.
+    pub fn between(&mut self, window: [u64; 2]) {
+        self.window = window;
+    }
+
+    /// Whether the record that was read is a chunk outside of the window: its first and last log times are
+    /// its first words.
+    fn is_outside(&self, opcode: u8) -> bool {
+        let time = |at: usize| self.body.get(at..)?.first_chunk::<8>().map(|b| u64::from_le_bytes(*b));
+        opcode == op::CHUNK
+            && time(0)
+                .zip(time(8))
+                .is_some_and(|(first, last)| last < self.window[0] || first > self.window[1])
     }
 
     /// Checks the messages and gives none out.
@@ -166,6 +185,9 @@ impl<R: Read + Seek> Reader<R> {
         }
         if at + HEAD as u64 + length > size || !self.fill(length).map_err(bad)? {
             return Err(Trouble::Short);
+        }
+        if self.is_outside(opcode) {
+            return Ok(Some((Sound::Nothing, head)));
         }
         let sound = sound(opcode, &self.body, self.wanted).map_err(Trouble::Bad);
         if sound.is_err() {

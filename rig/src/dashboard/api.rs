@@ -23,6 +23,8 @@ const BODY: usize = 256;
 const ANNOTATIONS_BODY: usize = 32 * 1024;
 /// Time that a body may take in all.
 const BODY_WITHIN: Duration = Duration::from_secs(5);
+/// Latest loop time that a window may have, s: a year.
+const LONGEST_LOOP_S: f64 = 3.2e7;
 /// What pages may load and from where: this server, and styles and pictures that stand in a report.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
                       connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -34,6 +36,7 @@ pub fn routes(shared: Arc<Shared>) -> Router {
         .route("/api/runs", get(runs))
         .route("/api/runs/{name}", get(run))
         .route("/api/runs/{name}/report", get(report))
+        .route("/api/runs/{name}/cycles", get(cycles))
         .route("/api/runs/{name}/files/{file}", get(file))
         .route("/api/runs/{name}/annotations", post(annotate))
         .route("/api/runs/{name}/diagnose", post(diagnose))
@@ -151,6 +154,31 @@ async fn report(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> 
     let folder = folder(&shared, &name)?;
     let found = beside(move || runs::report::html(&folder)).await?;
     Ok(found.map_or_else(|why| failed_to(&why), html))
+}
+
+/// A window of a run's loop time, s.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WindowS {
+    from_s: f64,
+    to_s: f64,
+}
+
+/// The recorded cycles of a window, as finely as a screen shows them. One window is read at a time: the record of hours is long.
+async fn cycles(
+    State(shared): State<Arc<Shared>>,
+    Path(name): Path<String>,
+    Query(WindowS { from_s, to_s }): Query<WindowS>,
+) -> Result<Response, Response> {
+    let folder = folder(&shared, &name)?;
+    if !(0.0..=LONGEST_LOOP_S).contains(&from_s) || !(from_s..=LONGEST_LOOP_S).contains(&to_s) {
+        let why = "a window from from_s to to_s is needed, in s of loop time, the first not after the second";
+        return Err((StatusCode::UNPROCESSABLE_ENTITY, why).into_response());
+    }
+    let _turn =
+        shared.windows.acquire().await.map_err(|_| StatusCode::SERVICE_UNAVAILABLE.into_response())?;
+    let found = beside(move || runs::report::traces::within(&folder, [from_s, to_s])).await?;
+    Ok(found.map_or_else(|why| failed_to(&why), |window| Json(window).into_response()))
 }
 
 async fn file(

@@ -9,6 +9,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicUsize;
 use std::sync::{Arc, Mutex};
+use tokio::sync::Semaphore;
 
 /// What all requests share.
 pub(super) struct Shared {
@@ -16,6 +17,8 @@ pub(super) struct Shared {
     pub guard: Guard,
     /// Live streams at present.
     pub streams: AtomicUsize,
+    /// Turns to read a window of a record.
+    pub windows: Semaphore,
     /// The diagnosis that is under way, and why others have no verdict.
     pub diagnoses: Mutex<Diagnoses>,
 }
@@ -63,8 +66,8 @@ impl Dashboard {
         let address = listener.local_addr().into_diagnostic()?;
         let guard = Guard::new(address, &options.hosts);
         let token = guard.token().to_string();
-        let shared =
-            Arc::new(Shared { options, guard, streams: AtomicUsize::new(0), diagnoses: Mutex::default() });
+        let (streams, windows) = (AtomicUsize::new(0), Semaphore::new(1));
+        let shared = Arc::new(Shared { options, guard, streams, windows, diagnoses: Mutex::default() });
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().into_diagnostic()?;
         std::thread::Builder::new()
             .name("dashboard".into())

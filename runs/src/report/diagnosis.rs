@@ -3,13 +3,17 @@
 
 mod causes;
 mod gap_map;
+mod law;
+mod mechanism;
 mod next;
 mod overlay;
+mod passes;
 
-use super::html::{bar, escape, glossary, head, list, note, shell, table};
+use super::html::{bar, escape, glossary, head, list, micro, note, shell, table};
 use super::human::number;
 use super::plots::beyond;
 use super::plots::verdict::{Seen, errors_against};
+use crate::verdict::plain;
 use diagnosis::Verdict;
 use diagnosis::data::Table;
 use diagnosis::left_out::Errors;
@@ -32,15 +36,20 @@ pub fn page(result: &Diagnosis, table: &Table, about: &[(&str, String)]) -> miet
     let body = [
         "<h1>Diagnosis</h1>".into(),
         head(about),
-        format!("<p class=\"verdict{}\">{}</p>", if departed { " departed" } else { "" }, escape(&r.text)),
+        format!(
+            "<p class=\"verdict{}\">{}</p>",
+            if departed { " departed" } else { "" },
+            escape(&micro(&r.text))
+        ),
         described(result),
         how_far(result),
         overlay.section()?,
-        causes::section(result),
+        causes::section(result, &overlay)?,
         location(result, table, &overlay.errors()),
         next::section(result),
         uncertain(result),
         residuals(result, table, &forecasts)?,
+        passes::section(table, &overlay, &forecasts),
         glossary(),
         format!("<p class=\"note\">{} passes, SHA-256 {}</p>", r.data.points, escape(&r.data.sha256)),
     ];
@@ -53,8 +62,8 @@ fn described(result: &Diagnosis) -> String {
     let lines = r.description.iter().map(|d| {
         format!("{} ({} against no gap)", d.text, crate::verdict::odds_base10(d.log10_odds_vs_no_gap))
     });
-    let sure =
-        (!r.at_least.is_empty()).then(|| format!("At least {}, beside what is open.", r.at_least.join(", ")));
+    let sure = (!r.at_least.is_empty())
+        .then(|| format!("At least {}, beside what is open.", plain(&r.at_least.join(", "))));
     let all: Vec<String> = lines.chain(sure).collect();
     if all.is_empty() {
         String::new()
@@ -105,13 +114,13 @@ fn how_far(result: &Diagnosis) -> String {
 
 fn location(result: &Diagnosis, table: &Table, errors: &[(f64, f64)]) -> String {
     let r = &result.report;
-    let listed: Vec<&str> = r
+    let listed: Vec<String> = r
         .location
         .regions
         .iter()
         .filter(|g| g.share_of_gap >= 0.01)
         .take(LISTED_REGIONS)
-        .map(|g| g.text.as_str())
+        .map(|g| micro(&g.text))
         .collect();
     let rest = r.location.regions.len() - listed.len();
     let more = if rest > 0 {
@@ -168,7 +177,8 @@ fn uncertain(result: &Diagnosis) -> String {
                     <th scope=\"col\" class=\"n\">probability not to belong</th>";
         text += &format!("<h3>Suspect passes</h3>{}", table("Suspect passes", head, &rows));
         if let Some(with) = &r.with_suspects {
-            let name = if with.effects.is_empty() { "no gap".into() } else { with.effects.join(" + ") };
+            let name =
+                if with.effects.is_empty() { "no gap".into() } else { plain(&with.effects.join(" + ")) };
             text += &format!(
                 "<p>With them counted as any other the leading answer is {} (probability {}).</p>",
                 escape(&name),
@@ -177,7 +187,7 @@ fn uncertain(result: &Diagnosis) -> String {
         }
     }
     text += &list(&r.remarks, "There is nothing to remark.");
-    let unseen = r.not_testable.iter().map(|n| format!("{}: {}", n.effect, n.because));
+    let unseen = r.not_testable.iter().map(|n| format!("{}: {}", plain(&n.effect), n.because));
     let unseen = list(unseen, "Every effect of the library can be seen on this table.");
     text += &format!(
         "<details><summary>Not testable on this table ({})</summary>{unseen}</details>",

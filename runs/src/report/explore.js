@@ -113,8 +113,32 @@ function lined(plot, title, series) {
   return { own: traces(plot, title, series, null, null, draw), lines };
 }
 
-// Forces, mu', the loop of friction over the plate and how late the cycles were: of one pass, or of all one after the other.
-function cycleFigures(root, { passes, traces: cycles, events, limits }) {
+// Whole numbers from their text: see traces.rs.
+const DIGITS = new Uint8Array(128);
+[..."ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"].forEach((c, i) => { DIGITS[c.charCodeAt(0)] = i; });
+function unpack(text) {
+  const all = [];
+  let before = 0;
+  let left = 0;
+  let scale = 1;
+  for (let i = 0; i < text.length; i += 1) {
+    const digit = DIGITS[text.charCodeAt(i)];
+    left += (digit % 32) * scale;
+    scale *= 32;
+    if (digit >= 32) continue;
+    if (left) before += left % 2 ? (left - 1) / 2 : -left / 2;
+    all.push(left ? before : null);
+    left = 0;
+    scale = 1;
+  }
+  return all;
+}
+// The cycles of a pass, read when they are first shown.
+const opened = (t) => (t.opened ??= { t_s: unpack(t.t).map((v) => v / 1e4), position: unpack(t.position), late: unpack(t.late), lateral: t.lateral.map(unpack), normal: t.normal.map(unpack), mu: t.mu.map(unpack) });
+
+// Forces, mu', the loop of friction over the plate and how late the cycles were: of one pass, or of all one after the other. `finer` gets
+// the recorded cycles of a window, where they are at hand.
+function cycleFigures(root, { passes, traces: cycles, events, limits }, finer) {
   const force = figure(root, "Forces");
   const ratio = figure(root, "Relative friction in time");
   const loop = figure(root, "Friction loop");
@@ -123,44 +147,84 @@ function cycleFigures(root, { passes, traces: cycles, events, limits }) {
   const charts = { force: lined(force.plot, "force, N", band), ratio: lined(ratio.plot, `relative friction ${MU}`, band.slice(0, 1)), late: lined(late.plot, "latest cycle, ms", [{ colour: "--a" }]) };
   const loops = marks(loop.plot, "position of the plate, mm", "lateral force, N", false);
   const select = el("select", { id: "pass", onchange: () => show(select.value) }, el("option", { value: "" }, "all passes"), ...cycles.map((t) => el("option", { value: t.point }, `pass ${t.point}`)));
-  let now = [];
-  force.plot.before(el("p", { class: "legend" }, el("label", { for: "pass" }, "Show "), select, button("CSV", () => saveCsv("forces", now)), ...tools(charts.force.own, "forces", [])));
+  const times = Object.values(charts).map(({ own }) => own);
+  let now = () => [];
+  force.plot.before(el("p", { class: "legend" }, el("label", { for: "pass" }, "Show "), select, button("CSV", () => saveCsv("forces", now())), ...tools(charts.force.own, "forces", [])));
   ratio.plot.before(el("p", { class: "legend" }, ...tools(charts.ratio.own, "mu-in-time", [])));
   loop.plot.before(el("p", { class: "legend" }, ...tools(loops.own, "friction-loop", [])));
   late.plot.before(el("p", { class: "legend" }, ...tools(charts.late.own, "lateness", [["y", "ms"]])));
 
-  function show(point) {
-    const chosen = point === "" ? cycles : cycles.filter((t) => String(t.point) === String(point));
-    const column = (of, scale) => chosen.flatMap((t) => [...of(t).map((v) => (v == null ? null : v / scale)), null]);
-    const time = chosen.flatMap((t) => [...t.t_ms.map((ms) => ms / 1e3), (t.t_ms.at(-1) + 1) / 1e3]);
+  // `all` are the cycles of the page, or finer ones of a window, each point of which is of so many.
+  function draw(point, all, stretch) {
+    const chosen = point === "" ? all : all.filter((t) => String(t.point) === String(point));
+    if (!chosen.length) return;
+    const column = (of, scale) => chosen.flatMap((t) => [...of(opened(t)).map((v) => (v == null ? null : v / scale)), null]);
+    const time = chosen.flatMap((t) => [...opened(t).t_s, opened(t).t_s.at(-1) + 1e-4]);
     const pair = (name, scale) => [1, 0].map((i) => column((t) => t[name][i], scale));
     const middle = ([high, low]) => high.map((v, i) => (v == null || low[i] == null ? null : (v + low[i]) / 2));
     const [lateral, normal, mu] = [pair("lateral", 1e4), pair("normal", 1e4), pair("mu", 1e3)];
-    const [position, latest] = [column((t) => t.position_um, 1e3), column((t) => t.late_us, 1e3)];
+    const [position, latest] = [column((t) => t.position, 1e3), column((t) => t.late, 1e3)];
     const inside = events.filter(([at]) => at >= time[0] && at <= time.at(-1));
     const from = chosen.length === 1 && chosen[0].measured_from_ms != null ? [chosen[0].measured_from_ms / 1e3] : [];
     for (const { lines } of Object.values(charts)) lines.at = [...inside.map(([at]) => at), ...from];
     charts.force.lines.level = limits ? [limits.lateral_n, -limits.lateral_n, limits.normal_n] : [];
-    charts.force.own.chart.setData([time, ...lateral, middle(lateral), ...normal, middle(normal)]);
-    charts.ratio.own.chart.setData([time, ...mu, middle(mu)]);
-    charts.late.own.chart.setData([time, latest]);
+    if (!stretch) for (const own of times) own.ends = [time[0], time.at(-1)];
+    const bands = [...lateral, middle(lateral), ...normal, middle(normal)];
+    charts.force.own.put([time, ...bands], [1, -1, 0, 1, -1, 0]);
+    charts.ratio.own.put([time, ...mu, middle(mu)], [1, -1, 0]);
+    charts.late.own.put([time, latest], [1]);
+    for (const { plot } of [force, ratio, late]) plot.dataset.points = time.length - chosen.length;
     late.show(latest.some((v) => v > 0));
-    const across = middle(lateral);
+    const across = bands[2];
     const forward = new Map(passes.map((p) => [String(p.point), p.direction]));
-    const places = chosen.flatMap((t) => t.t_ms.map(() => SERIES[forward.get(String(t.point)) < 0 ? 5 : 0]).concat(null));
+    const places = chosen.flatMap((t) => opened(t).t_s.map(() => SERIES[forward.get(String(t.point)) < 0 ? 5 : 0]).concat(null));
     const points = places.map((style, i) => style && position[i] != null && across[i] != null && { x: position[i], y: across[i], ...style, size: 1.5 }).filter(Boolean);
     loops.set(points);
     loop.show(points.length > 0);
-    now = time.map((t, i) => ({ time_s: t, position_mm: position[i], lateral_low_n: lateral[1][i], lateral_high_n: lateral[0][i], normal_low_n: normal[1][i], normal_high_n: normal[0][i], mu_relative_low: mu[1][i], mu_relative_high: mu[0][i] })).filter((row) => row.lateral_low_n != null || row.normal_low_n != null);
+    now = () => time.map((t, i) => ({ time_s: t, position_mm: position[i], lateral_low_n: lateral[1][i], lateral_high_n: lateral[0][i], normal_low_n: normal[1][i], normal_high_n: normal[0][i], mu_relative_low: mu[1][i], mu_relative_high: mu[0][i] })).filter((row) => row.lateral_low_n != null || row.normal_low_n != null);
     const pass = passes.find((p) => String(p.point) === String(point));
-    const what = pass ? words(pass) : `all ${chosen.length} passes`;
+    const what = pass ? words(pass) : `all ${cycles.length} passes`;
     const happened = inside.map(([at, event]) => `${at.toFixed(1)} s ${event.split("\n")[0]}`).join("; ");
     const bounds = limits ? ` Limits: ${limits.lateral_n} N lateral, ${limits.normal_n} N normal${point === "" ? "" : ", where they are within the axis"}.` : "";
-    force.say(`${what}. Solid: lateral; dashed: normal; bands from the least to the greatest cycle.${bounds}${from.length ? " Upright line: from here on the pass is averaged." : ""}${happened ? ` Events: ${happened}.` : ""}`);
+    const each = stretch === 1 ? "every recorded cycle" : stretch ? `bands from the least to the greatest of ${stretch} cycles` : "bands from the least to the greatest cycle, a hundred stretches a pass";
+    force.say(`${what}. Solid: lateral; dashed: normal; ${each}.${bounds}${from.length ? " Upright line: from here on the pass is averaged." : ""}${happened ? ` Events: ${happened}.` : ""}`);
     ratio.say(`${what}. Missing where no running ${MU} was known.`);
     loop.say(`${what}. Discs: forward; hollow squares: backward; each the middle of some cycles.`);
     late.say(`${what}. How late the latest cycle of each stretch began.`);
     select.value = point;
+  }
+
+  // What is shown beside its like; where finer cycles are at hand, they come when the figure has come to rest.
+  let [timer, fetched, asked] = [0, null, 0];
+  const coarse = () => { if (fetched) draw(select.value, cycles); fetched = null; };
+  async function rest(range) {
+    const mine = ++asked;
+    const half = (range[1] - range[0]) / 2;
+    const window = [Math.max(range[0] - half, 0), range[1] + half];
+    try {
+      const { stretch, traces: found } = await finer(window);
+      if (mine !== asked || !found.length) return;
+      fetched = window;
+      draw(select.value, found, stretch);
+    } catch (why) {
+      if (mine === asked) force.say(`The recorded cycles were not fetched: ${why.message}`);
+    }
+  }
+  for (const own of times) own.moved = (range) => {
+    clearTimeout(timer);
+    asked += 1;
+    if (!range || (fetched && (range[0] < fetched[0] || range[1] > fetched[1]))) coarse();
+    timer = setTimeout(() => {
+      for (const other of times) if (other !== own) other.see(range);
+      if (range && finer) rest(range);
+    }, 150);
+  };
+  function show(point) {
+    clearTimeout(timer);
+    asked += 1;
+    fetched = null;
+    draw(point, cycles);
+    for (const own of times) own.see(null);
   }
   show("");
   return (point) => {
@@ -189,15 +253,19 @@ function staticFiles(within) {
   }
 }
 
-// The part of a run's page that is worked with.
-export function explore(root, data, page) {
-  root.append(el("h2", {}, "Look closer"), el("p", { class: "note" }, "Point at a mark for its pass, click it for its forces. Drag to enlarge, double-click for the whole. The buttons show and hide series."));
+// The part of a run's page that is worked with; `finer` as in cycleFigures.
+export function explore(root, data, page, finer) {
+  root.append(el("h2", {}, "Look closer"), el("p", { class: "note" }, "Point at a mark for its pass, click it for its forces. Drag to enlarge, with Shift to move, double-click for the whole; or +, \u2212, arrows and 0. The buttons show and hide series."));
+  // The figures of cycles are far down: they are made when a reader comes near.
+  const below = el("div", { class: "below" });
   let choose = null;
-  passFigures(root, (point) => choose?.(point))(data.passes);
-  if (data.traces.length) choose = cycleFigures(root, data);
-  else root.append(el("p", {}, "The record holds no cycle of a pass."));
+  const make = () => { choose ??= cycleFigures(below, data, finer); below.className = ""; return choose; };
+  passFigures(root, (point) => data.traces.length && make()(point))(data.passes);
+  root.append(data.traces.length ? below : el("p", {}, "The record holds no cycle of a pass."));
   staticFiles(page);
   root.hidden = false;
+  const near = new IntersectionObserver((seen) => { if (seen.some((one) => one.isIntersecting)) { near.disconnect(); make(); } }, { rootMargin: "400px" });
+  if (data.traces.length) near.observe(below);
 }
 
 // The figures of groups of runs: a series a group, with the same conditions.

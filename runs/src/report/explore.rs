@@ -49,13 +49,20 @@ fn data(run: &RunData, traces: &[Trace]) -> serde_json::Value {
             let (c, pass) = (p.comparison, &p.pass);
             let friction = pass.friction_force_n();
             let still = pass.amplitude == PeakToPeak::ZERO;
+            let [mu, mu_sd] = [c.and_then(|c| c.mu_relative), c.and_then(|c| c.mu_relative_sd)].map(short);
+            let [time, w, f, u, normal] = [
+                pass.time_s,
+                pass.amplitude.micrometres(),
+                pass.frequency_hz / 1e3,
+                pass.speed_m_s * 1e3,
+                pass.normal_force_n,
+            ]
+            .map(|v| short(Some(v)));
             serde_json::json!({
-                "point": pass.point, "time_s": pass.time_s, "w_um": pass.amplitude.micrometres(), "f_khz": pass.frequency_hz / 1e3,
-                "u_mm_s": pass.speed_m_s * 1e3, "direction": i8::from(pass.direction), "normal_n": pass.normal_force_n,
-                "lateral_n": pass.lateral_force_n, "psi": p.psi_eq17,
-                "mu": c.and_then(|c| c.mu_relative), "mu_sd": c.and_then(|c| c.mu_relative_sd),
-                "predicted": c.map(|c| c.predicted), "predicted_sd": c.map(|c| c.predicted_sd), "surprise": c.map(|c| c.z),
-                "mu0": friction.filter(|_| still).map(|f| f / pass.normal_force_n),
+                "point": pass.point, "time_s": time, "w_um": w, "f_khz": f, "u_mm_s": u, "direction": i8::from(pass.direction),
+                "normal_n": normal, "lateral_n": short(pass.lateral_force_n), "psi": short(p.psi_eq17), "mu": mu, "mu_sd": mu_sd,
+                "predicted": short(c.map(|c| c.predicted)), "predicted_sd": short(c.map(|c| c.predicted_sd)),
+                "surprise": short(c.map(|c| c.z)), "mu0": short(friction.filter(|_| still).map(|f| f / pass.normal_force_n)),
             })
         })
         .collect();
@@ -74,6 +81,11 @@ fn data(run: &RunData, traces: &[Trace]) -> serde_json::Value {
         serde_json::json!({ "lateral_n": limits.lateral_force_max_n, "normal_n": limits.normal_force_max_n })
     });
     serde_json::json!({ "passes": passes, "traces": traces, "events": events, "limits": limits })
+}
+
+/// A value with the digits that a figure or its table can show.
+fn short(value: Option<f64>) -> Option<f64> {
+    value.map(|v| format!("{v:.6e}").parse().unwrap_or(v))
 }
 
 #[cfg(test)]

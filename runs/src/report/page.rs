@@ -3,13 +3,14 @@
 use super::RunData;
 use super::html::{escape, glossary, head, note, shell, table};
 use super::human::number;
+use super::published::Published;
 use super::traces::Trace;
-use super::{events, explore, plots};
+use super::{events, explore, plots, published};
 use crate::ambient::{AIR, LevelsFound, levels_of};
 use crate::sequence::Outcome;
 use std::fmt::Write;
 
-pub(super) fn page(run: &RunData, traces: &[Trace]) -> miette::Result<String> {
+pub(super) fn page(run: &RunData, traces: &[Trace], overlay: &[Published]) -> miette::Result<String> {
     let fact = |name: &str| escape(run.facts.get(name).map_or("unknown", String::as_str));
     let mut html = String::new();
     let w = &mut html;
@@ -39,6 +40,7 @@ pub(super) fn page(run: &RunData, traces: &[Trace]) -> miette::Result<String> {
              order of measurement. While the model holds it is independent from pass to pass. Dashed: &plusmn;1.96."
         ),
     );
+    w.push_str(&published::section(run, overlay)?);
     w.push_str(&levels(run));
     timing(w, run)?;
     w.push_str(&events::section(&run.events));
@@ -142,7 +144,7 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
         let _ = writeln!(w, "<h2>Loop</h2><p>No loop timing: virtual time, or no ending.</p>");
         return Ok(());
     };
-    let us = |ns: u64| format!("{:.0} us", ns as f64 / 1e3);
+    let us = |ns: u64| format!("{:.0} \u{b5}s", ns as f64 / 1e3);
     let [p50, _, p99, p999, max] = report.lateness_ns;
     let granted = &report.grants;
     let class = match &granted.policy_refused {
@@ -152,7 +154,7 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
     let locked = if granted.memory_locked { "memory locked" } else { "memory not locked" };
     let _ = write!(
         w,
-        "<h2>Loop</h2>{}{}<p>{} cycles of {} us. Lateness: median {}, 99 % {}, 99.9 % {}, worst {}. \
+        "<h2>Loop</h2>{}{}<p>{} cycles of {} \u{b5}s. Lateness: median {}, 99 % {}, 99.9 % {}, worst {}. \
          {} deadlines missed. Scheduling: {class}, {locked}. Page faults in the loop: {} minor, {} major. \
          Rows lost: {}.{}</p>",
         plots::run::lateness(report)?,
@@ -173,8 +175,8 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
 }
 
 fn passes(w: &mut String, run: &RunData) {
-    const HEAD: &str = "<th scope=\"col\">point</th><th scope=\"col\">w um</th><th scope=\"col\">f kHz</th><th scope=\"col\">U mm/s</th>\
-         <th scope=\"col\">dir</th><th scope=\"col\">F<sub>n</sub> N</th><th scope=\"col\">L N</th><th scope=\"col\">&mu;'</th>\
+    const HEAD: &str = "<th scope=\"col\">pass</th><th scope=\"col\">w, &micro;m</th><th scope=\"col\">f, kHz</th><th scope=\"col\">U, mm/s</th>\
+         <th scope=\"col\">direction</th><th scope=\"col\">load, N</th><th scope=\"col\">lateral force, N</th><th scope=\"col\">&mu;'</th>\
          <th scope=\"col\">&plusmn;</th><th scope=\"col\">predicted</th><th scope=\"col\">&plusmn;</th><th scope=\"col\">difference</th>\
          <th scope=\"col\">surprise, sd</th>";
     let mut rows = String::new();
@@ -186,9 +188,8 @@ fn passes(w: &mut String, run: &RunData) {
             |v: Option<f64>, digits: usize| v.map_or("&ndash;".to_string(), |v| format!("{v:+.digits$}"));
         let _ = writeln!(
             rows,
-            "<tr><td class=\"n\">{}{}</td><td class=\"n\">{:.3}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td>\
-             <td class=\"n\">{}</td><td class=\"n\">{:.4}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
-             <td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>",
+            "<tr><td>{}{}</td><td>{:.3}</td><td>{:.2}</td><td>{:.1}</td><td>{}</td><td>{:.4}</td><td>{}</td><td>{}</td>\
+             <td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             p.pass.point,
             if p.temperature_flags.is_empty() { "" } else { "*" },
             p.pass.amplitude.micrometres(),
@@ -205,7 +206,7 @@ fn passes(w: &mut String, run: &RunData) {
             signed(c.map(|c| c.z), 1),
         );
     }
-    let all = table("All passes", HEAD, &rows);
+    let all = table("All passes", HEAD, &rows).replacen("<table>", "<table class=\"nums\">", 1);
     let _ = writeln!(
         w,
         "<details><summary>All {} passes</summary>{}{all}</details>",

@@ -4,6 +4,7 @@
 
 pub mod campaign;
 pub mod comparison;
+pub mod published;
 pub mod run;
 pub mod verdict;
 
@@ -64,7 +65,7 @@ impl Span {
 
     /// Over all of these values with a margin, logarithmic where it may be and they span more than a decade:
     /// within one such an axis has a single label.
-    fn over(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
+    pub fn over(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         if logarithmic && low > 0.0 && high > 10.0 * low {
             let margin = (high / low).powf(0.04);
@@ -164,7 +165,7 @@ fn figure(
                 .map_err(wrong)?;
             chart
                 .configure_mesh()
-                .light_line_style(TRANSPARENT)
+                .max_light_lines(0)
                 .bold_line_style(BLACK.mix(0.12))
                 .x_labels((size.0 / 75) as usize)
                 .y_labels((size.1 / 45) as usize)
@@ -175,6 +176,10 @@ fn figure(
                 .map_err(wrong)?;
             draw(&mut chart, if size.0 < WIDE.0 { 3 } else { 4 })?;
             area.present().map_err(wrong)?;
+        }
+        // Attributes that say what holds without them are a third of a mark.
+        for default in [" opacity=\"1\"", " stroke=\"none\"", " stroke-width=\"1\""] {
+            svg = svg.replace(default, "");
         }
         let svg =
             svg.replacen("<svg ", &format!("<svg role=\"img\" aria-label=\"{}\" ", escape(frame.alt)), 1);

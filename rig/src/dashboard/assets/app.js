@@ -193,7 +193,8 @@ async function finished({ run, diagnosing, undiagnosed }) {
   const several = (words, items) => (items.length ? el("p", {}, words, ...items.flatMap((item, i) => (i ? [", ", item] : [" ", item]))) : null);
   const fileButton = (file) => button(file, () => download(`${address}/files/${part(file)}`, file, result));
   const followed = ["corrected-model.toml", "next-plan.toml"].filter((file) => run.files.includes(file));
-  const { report, start } = await made(`${address}/report`, explore);
+  const finer = async ([from, to]) => (await fetched(`${address}/cycles?from_s=${from.toFixed(6)}&to_s=${to.toFixed(6)}`)).json();
+  const { report, start } = await made(`${address}/report`, (root, data, page) => explore(root, data, page, finer));
   const parts = [
     el("p", { class: "keys" }, diagnose, el("label", { for: "file" }, "File"), choose, fetchFile, result), annotations(run),
     several("Verdict:", [run.verdict ?? "no diagnosis yet", ...run.pages.filter((page) => page !== "report.html").map((page) => el("a", { href: `#/page/${part(name)}/${part(page)}` }, page))]),

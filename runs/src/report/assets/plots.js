@@ -32,15 +32,81 @@ function axes(xTitle, yTitle, right) {
   return all;
 }
 
-// A chart that a drag enlarges and a double click shows whole, whose axes may be logarithmic, and which follows its frame's width.
-// `ready` gets the chart each time it is made.
+// What lies between two abscissae, about a point a column of the screen: of each series the greatest (1), the least (-1), or the middle of the
+// two before it (0). Where nothing lies over more than two columns nothing is drawn.
+function thinned([time, ...all], how, from, to, columns) {
+  const place = (x) => {
+    let [a, b] = [0, time.length];
+    while (a < b) { const m = (a + b) >> 1; if (time[m] < x) a = m + 1; else b = m; }
+    return a;
+  };
+  const [first, last] = [Math.max(place(from) - 1, 0), Math.min(place(to) + 1, time.length)];
+  if (last - first <= 2 * columns) return [time, ...all].map((values) => values.slice(first, last));
+  const made = [[], ...all.map(() => [])];
+  let column = -Infinity;
+  for (let i = first; i < last; i += 1) {
+    const now = Math.floor((time[i] - from) / (to - from) * columns);
+    if (now !== column) {
+      if (now > column + 2 && i > first) { made[0].push((time[i - 1] + time[i]) / 2); for (let j = 1; j < made.length; j += 1) made[j].push(null); }
+      column = now;
+      made[0].push(time[i]);
+      for (let j = 1; j < made.length; j += 1) made[j].push(null);
+    }
+    const k = made[0].length - 1;
+    for (let j = 0; j < all.length; j += 1) {
+      const [value, best] = [all[j][i], made[j + 1][k]];
+      if (value != null && (best == null || (how[j] > 0 ? value > best : value < best))) made[j + 1][k] = value;
+    }
+  }
+  how.forEach((one, j) => { if (one === 0) made[j + 1] = made[j - 1].map((high, i) => (high == null || made[j][i] == null ? null : (high + made[j][i]) / 2)); });
+  return made;
+}
+
+// A chart that a drag enlarges, a drag with Shift moves and a double click shows whole, by keys too; whose axes may be logarithmic, and
+// which follows its frame's width. `ready` gets the chart each time it is made; `moved` the part of x that is shown, none for the whole.
 function chartOf(plot, options, ready) {
   const zoom = {};
   const log = {};
-  const own = { chart: null, zoomed: () => Object.keys(zoom).length > 0 };
-  const whole = (u) => {
-    for (const key of Object.keys(zoom)) delete zoom[key];
-    u.setData(u.data);
+  const own = { chart: null, moved: null, ends: null };
+  // Shows a part of x, or everything.
+  own.see = (x) => {
+    if (x) zoom.x = x;
+    else for (const key of Object.keys(zoom)) delete zoom[key];
+    own.chart.setData(own.data?.(zoom.x) ?? own.chart.data);
+  };
+  // Data of which only what is in view is drawn: see thinned.
+  own.put = (data, how) => {
+    own.data = (x) => thinned(data, how, ...(x ?? [data[0][0], data[0].at(-1)]), Math.max(plot.clientWidth, 200));
+    own.chart.setData(own.data(zoom.x));
+  };
+  const seen = (x) => { own.see(x); own.moved?.(x); };
+  const whole = () => seen(null);
+  const part = () => zoom.x ?? [own.chart.scales.x.min, own.chart.scales.x.max];
+  // Moves the part by a share of its width and widens it, within the data.
+  const move = ([low, high], share, factor = 1) => {
+    if (low == null) return;
+    const [to, from] = log.x ? [Math.log, Math.exp] : [Number, Number];
+    const [first, last] = (own.ends ?? [own.chart.data[0][0], own.chart.data[0].at(-1)]).map((x) => to(log.x ? Math.max(x, low) : x));
+    const half = (to(high) - to(low)) * factor / 2;
+    if (2 * half >= last - first) { whole(); return; }
+    const middle = Math.min(Math.max((to(low) + to(high)) / 2 + share * (to(high) - to(low)), first + half), last - half);
+    seen([from(middle - half), from(middle + half)]);
+  };
+  const KEYS = { ArrowLeft: [-0.2], ArrowRight: [0.2], "+": [0, 0.5], "=": [0, 0.5], "-": [0, 2] };
+  plot.tabIndex = 0;
+  plot.setAttribute("aria-keyshortcuts", "ArrowLeft ArrowRight + - 0");
+  plot.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || !(event.key in KEYS || event.key === "0")) return;
+    event.preventDefault();
+    if (event.key === "0") whole();
+    else move(part(), ...KEYS[event.key]);
+  });
+  const grabbed = (u, event) => {
+    const [start, width, from] = [event.clientX, u.over.clientWidth, part()];
+    const drag = ({ clientX }) => move(from, (start - clientX) / width);
+    const done = () => { removeEventListener("mousemove", drag); removeEventListener("mouseup", done); };
+    addEventListener("mousemove", drag);
+    addEventListener("mouseup", done);
   };
   const select = (u) => {
     const { left, top, width, height } = u.select;
@@ -48,7 +114,7 @@ function chartOf(plot, options, ready) {
     zoom.x = [u.posToVal(left, "x"), u.posToVal(left + width, "x")];
     for (const key of Object.keys(u.scales)) if (key !== "x") zoom[key] = [u.posToVal(top + height, key), u.posToVal(top, key)];
     u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
-    u.setData(u.data);
+    seen(zoom.x);
   };
   const padded = (key) => (_, low, high) => {
     if (low == null) return log[key] ? [0.1, 1] : [0, 1];
@@ -63,7 +129,7 @@ function chartOf(plot, options, ready) {
       const range = Array.isArray(scale.range) ? () => scale.range : !log[key] && scale.range ? scale.range : padded(key);
       return [key, { ...scale, distr: log[key] ? 3 : 1, range: (...all) => zoom[key] ?? range(...all) }];
     }));
-    const cursor = { points: { show: false }, drag: { x: true, y: true, uni: 20, setScale: false }, bind: { dblclick: (u) => () => whole(u) }, ...options.cursor };
+    const cursor = { points: { show: false }, drag: { x: true, y: true, uni: 20, setScale: false }, bind: { dblclick: () => whole, mousedown: (u, over, plain) => (event) => (event.shiftKey ? grabbed(u, event) : plain(event)) }, ...options.cursor };
     const hooks = { ...options.hooks, setSelect: [select] };
     own.chart = new uPlot({ ...options, scales, cursor, hooks, legend: { show: false }, width: Math.max(plot.clientWidth, 200), height: HEIGHT }, data, plot);
     ready?.(own.chart);

@@ -1,6 +1,10 @@
-//! Which cause: the ranking, and each cause that is left with its mechanism, its source and its size.
+//! Which cause: the ranking, and each cause that is left with its mechanism, its source, its size, and its
+//! law over the passes.
 
-use crate::report::html::{bar, escape, table};
+use super::mechanism::drawing;
+use super::overlay::Overlay;
+use crate::report::html::{bar, escape, micro, table};
+use crate::verdict::{estimate, plain};
 use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
 
 /// Probability from which a hypothesis is listed, and from which its effects are explained.
@@ -8,11 +12,14 @@ const LISTED: f64 = 0.002;
 const EXPLAINED: f64 = 0.05;
 
 fn name(h: &Hypothesis) -> String {
-    if h.effects.is_empty() { "no gap".into() } else { h.effects.join(" + ") }
+    if h.effects.is_empty() { "no gap".into() } else { plain(&h.effects.join(" + ")) }
 }
 
 /// The section.
-pub fn section(result: &Diagnosis) -> String {
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn section(result: &Diagnosis, overlay: &Overlay<'_>) -> miette::Result<String> {
     let listed: Vec<&Hypothesis> =
         result.report.hypotheses.iter().filter(|h| h.probability > LISTED).take(12).collect();
     let rows: String = listed
@@ -20,7 +27,7 @@ pub fn section(result: &Diagnosis) -> String {
         .map(|h| {
             let alias = match h.alias_class.get(1..) {
                 Some(others) if !others.is_empty() => {
-                    format!("<br><small>not separable from {}</small>", escape(&others.join(", ")))
+                    format!("<br><small>not separable from {}</small>", escape(&plain(&others.join(", "))))
                 }
                 _ => String::new(),
             };
@@ -45,22 +52,23 @@ pub fn section(result: &Diagnosis) -> String {
         if !cause || h.effects.iter().all(|e| shown.contains(&e.as_str())) {
             continue;
         }
-        cards += &card(h);
+        cards += &card(h, &overlay.law(h)?);
         shown.extend(h.effects.iter().map(String::as_str));
     }
-    format!("<h2>Which cause</h2>{}{cards}", table("Hypotheses", head, &rows))
+    Ok(format!("<h2>Which cause</h2>{}{cards}", table("Hypotheses", head, &rows)))
 }
 
-/// What a hypothesis says, effect by effect, with its parameters.
-fn card(h: &Hypothesis) -> String {
+/// What a hypothesis says, effect by effect, with its parameters and the figure of its law.
+fn card(h: &Hypothesis, law: &str) -> String {
     if h.effects.is_empty() {
         return String::new();
     }
     let of = |effect: &String| {
         match effects::by_name(effect) {
         Some(known) => format!(
-            "<p><strong>{}</strong> (in the {}): {}</p><p class=\"note\">Source: {}</p>",
-            escape(effect),
+            "<div class=\"cause\">{}<div><p><strong>{}</strong> (in the {}): {}</p><p class=\"note\">Source: {}</p></div></div>",
+            drawing(known),
+            escape(&plain(effect)),
             known.place().name(),
             escape(known.summary()),
             escape(known.source())
@@ -76,14 +84,14 @@ fn card(h: &Hypothesis) -> String {
             format!(
                 "<tr><th scope=\"row\">{}</th><td>{}</td></tr>",
                 escape(&p.name.replace('_', " ")),
-                escape(&crate::verdict::estimate(p))
+                escape(&micro(&estimate(p)))
             )
         })
         .collect();
     let laws = if h.laws.is_empty() {
         String::new()
     } else {
-        format!("<p>Law: {}.</p>", escape(&h.laws.join(" + ")))
+        format!("<p>Law: {}.</p>", escape(&plain(&h.laws.join(" + "))))
     };
     let sizes = if rows.is_empty() {
         String::new()
@@ -95,7 +103,7 @@ fn card(h: &Hypothesis) -> String {
         )
     };
     format!(
-        "<div class=\"card\"><h3>{}, probability {}</h3>{words}{laws}{sizes}</div>",
+        "<div class=\"card\"><h3>{}, probability {}</h3>{words}{laws}{law}{sizes}</div>",
         escape(&name(h)),
         probability(h.probability)
     )

@@ -1,6 +1,7 @@
 //! The gap over the operating space as tables of cells: read without colour, by a screen reader and in print.
+//! Every pass is a mark in its cell, and leads to the numbers of the pass.
 
-use crate::report::html::{escape, note, table};
+use crate::report::html::{escape, micro, note, table};
 use crate::report::human::number;
 use diagnosis::data::Table;
 use models::covariate::{self, Covariate};
@@ -9,11 +10,15 @@ use models::covariate::{self, Covariate};
 const CELLS: usize = 6;
 /// Share of a setting's range within which values are one level.
 const LEVEL: f64 = 0.04;
-/// Shares of full friction from which a cell has a deeper shade.
-const SHADES: [f64; 3] = [0.01, 0.03, 0.08];
+/// Shades on either side of zero.
+const SHADES: i32 = 8;
+/// Least end of the colour scale, in full friction: a gap that is smaller is pale.
+const LEAST_END: f64 = 0.005;
+/// The deepest shades, of less friction than the model says and of more: black letters are read on both.
+const DEEPEST: [[f64; 3]; 2] = [[58.0, 148.0, 207.0], [213.0, 94.0, 0.0]];
 
-/// Mean error of `mu'` in every part of the operating space, before and after: `errors` are measured less predicted over full friction,
-/// positive where more friction was measured.
+/// Mean error of `mu'` in every part of the operating space, before and after, on one scale: `errors` are
+/// measured less predicted over full friction, positive where more friction was measured.
 pub fn section(points: &Table, errors: &[(f64, f64)]) -> String {
     let varied: Vec<&Covariate> =
         [&covariate::SPEED, &covariate::FREQUENCY, &covariate::NORMAL_FORCE, &covariate::TIME]
@@ -25,25 +30,53 @@ pub fn section(points: &Table, errors: &[(f64, f64)]) -> String {
     } else {
         &covariate::NORMAL_FORCE
     };
-    let maps: String = varied
+    let maps: Vec<Map<'_>> = varied
         .into_iter()
         .filter(|c| c.name != rows.name)
         .take(3)
-        .filter_map(|columns| {
-            Some(
-                [map(points, errors, rows, columns, false)?, map(points, errors, rows, columns, true)?]
-                    .concat(),
-            )
-        })
-        .map(|pair| format!("<div class=\"maps\">{pair}</div>"))
+        .filter_map(|columns| Map::of(points, errors, rows, columns))
         .collect();
     if maps.is_empty() {
         return note("The table varies no two settings: there is no map to draw.");
     }
-    maps + &note(
-        "Mean of measured less predicted relative friction in each part, with the number of its passes below. Positive (warm): more \
-         friction was measured than the model says; negative (cool): less. A cell without passes says nothing.",
+    let end = maps.iter().flat_map(Map::means).fold(LEAST_END, |end, mean| end.max(mean.abs()));
+    let pairs: String = maps
+        .iter()
+        .map(|map| format!("<div class=\"maps\">{}{}</div>", map.html(false, end), map.html(true, end)))
+        .collect();
+    let text = note(
+        "Number: mean of measured less predicted relative friction in the part, positive (warm) where more friction was measured than the \
+         model says, negative (cool) where less. Marks: its passes in the order of measurement, each in the colour of its own gap; click \
+         one for its numbers. A part without passes says nothing.",
+    );
+    format!("{}{pairs}{text}", scale(end))
+}
+
+/// The colours, and the scale that all maps share.
+fn scale(end: f64) -> String {
+    let colour = |k: i32| {
+        let deepest = DEEPEST[usize::from(k > 0)];
+        let share = f64::from(k.abs()) / f64::from(SHADES);
+        let [r, g, b] = deepest.map(|full| (255.0 + share * (full - 255.0)).round());
+        format!(".{}{{background:rgb({r},{g},{b});color:#000}}", shade_class(k))
+    };
+    let all = || -SHADES..=SHADES;
+    let style: String = all().map(colour).collect();
+    let steps: String = all().map(|k| format!("<i class=\"{}\"></i>", shade_class(k))).collect();
+    let [low, high] = [number(-end), number(end)];
+    format!(
+        "<style>{style}</style><p class=\"scale\">{low}<span aria-hidden=\"true\">{steps}</span>+{high} \
+         <small>of full friction, the same in every map</small></p>"
     )
+}
+
+fn shade_class(k: i32) -> String {
+    format!("k{}{}", if k < 0 { "m" } else { "" }, k.abs())
+}
+
+/// The shade of an error on a scale that ends there; beyond it lies the deepest.
+fn shade(error: f64, end: f64) -> String {
+    shade_class((error / end * f64::from(SHADES)).round().clamp(-f64::from(SHADES), f64::from(SHADES)) as i32)
 }
 
 /// Edges of at most [`CELLS`] parts with about as many passes each; levels that are few stay apart.
@@ -86,49 +119,92 @@ fn named(c: &Covariate, edges: &[f64], points: &Table, k: usize) -> String {
     if low == high { low } else { format!("{low} to {high}") }
 }
 
-fn map(
-    points: &Table,
-    errors: &[(f64, f64)],
-    rows: &Covariate,
-    columns: &Covariate,
-    after: bool,
-) -> Option<String> {
-    let (across, down) = (edges(points, columns)?, edges(points, rows)?);
-    let mut cells = vec![vec![(0.0, 0usize); across.len() - 1]; down.len() - 1];
-    for (pass, (first, last)) in points.passes.iter().zip(errors) {
-        let cell = &mut cells[part(&down, rows.of(pass)?)][part(&across, columns.of(pass)?)];
-        cell.0 += if after { last } else { first };
-        cell.1 += 1;
-    }
-    let which = if after { "verdict's model" } else { "recalibrated baseline" };
-    let unit = |c: &Covariate| escape(&format!("{}, {}", c.words, c.shown.1));
-    let titles: String = (0..across.len() - 1)
-        .map(|k| format!("<th scope=\"col\">{}</th>", named(columns, &across, points, k)))
-        .collect();
-    let head = format!("<th scope=\"col\">{} \\ {}</th>{titles}", unit(rows), unit(columns));
-    let body: String = cells
-        .iter()
-        .enumerate()
-        .map(|(k, row)| {
-            let cells: String = row.iter().map(|cell| shaded(*cell)).collect();
-            format!("<tr><th scope=\"row\">{}</th>{cells}</tr>", named(rows, &down, points, k))
-        })
-        .collect();
-    let label = format!("Gap of the {which} by {} and {}", rows.words, columns.words);
-    let text = table(&label, &head, &body);
-    Some(text.replacen("<table>", &format!("<table class=\"map\"><caption>Left by the {which}</caption>"), 1))
+/// The passes by their cells: a row of cells each part of one covariate, a column each of another's.
+struct Map<'a> {
+    points: &'a Table,
+    errors: &'a [(f64, f64)],
+    covariates: [&'a Covariate; 2],
+    titles: [Vec<String>; 2],
+    cells: Vec<Vec<Vec<usize>>>,
 }
 
-fn shaded((sum, n): (f64, usize)) -> String {
-    if n == 0 {
-        return "<td class=\"none\">&ndash;</td>".into();
+impl<'a> Map<'a> {
+    fn of(
+        points: &'a Table,
+        errors: &'a [(f64, f64)],
+        rows: &'a Covariate,
+        columns: &'a Covariate,
+    ) -> Option<Self> {
+        let (across, down) = (edges(points, columns)?, edges(points, rows)?);
+        let mut cells = vec![vec![Vec::new(); across.len() - 1]; down.len() - 1];
+        for (i, pass) in points.passes.iter().enumerate() {
+            cells[part(&down, rows.of(pass)?)][part(&across, columns.of(pass)?)].push(i);
+        }
+        let titles = [(rows, &down), (columns, &across)]
+            .map(|(c, edges)| (0..edges.len() - 1).map(|k| named(c, edges, points, k)).collect());
+        Some(Map { points, errors, covariates: [rows, columns], titles, cells })
     }
-    let mean = sum / n as f64;
-    let shade = SHADES.iter().filter(|s| mean.abs() >= **s).count();
-    let class = match (shade, mean > 0.0) {
-        (0, _) => String::new(),
-        (k, true) => format!(" class=\"u{k}\""),
-        (k, false) => format!(" class=\"d{k}\""),
-    };
-    format!("<td{class}>{mean:+.3}<br><small>{n}</small></td>")
+
+    fn error(&self, pass: usize, after: bool) -> f64 {
+        if after { self.errors[pass].1 } else { self.errors[pass].0 }
+    }
+
+    fn mean(&self, cell: &[usize], after: bool) -> f64 {
+        cell.iter().map(|&i| self.error(i, after)).sum::<f64>() / cell.len() as f64
+    }
+
+    /// The means of all cells with passes, before and after.
+    fn means(&self) -> impl Iterator<Item = f64> {
+        let filled = self.cells.iter().flatten().filter(|cell| !cell.is_empty());
+        filled.flat_map(|cell| [false, true].map(|after| self.mean(cell, after)))
+    }
+
+    fn html(&self, after: bool, end: f64) -> String {
+        let [rows, columns] = self.covariates;
+        let which = if after { "verdict's model" } else { "recalibrated baseline" };
+        let unit = |c: &Covariate| escape(&micro(&format!("{}, {}", c.words, c.shown.1)));
+        let titles: String =
+            self.titles[1].iter().map(|title| format!("<th scope=\"col\">{title}</th>")).collect();
+        let head = format!("<th scope=\"col\">{} \\ {}</th>{titles}", unit(rows), unit(columns));
+        let body: String = self
+            .cells
+            .iter()
+            .zip(&self.titles[0])
+            .map(|(row, title)| {
+                let cells: String = row.iter().map(|cell| self.cell(cell, after, end)).collect();
+                format!("<tr><th scope=\"row\">{title}</th>{cells}</tr>")
+            })
+            .collect();
+        let name = if after { "after" } else { "before" };
+        let label = format!("Gap {name}, left by the {which}, by {} and {}", rows.words, columns.words);
+        let text = table(&label, &head, &body);
+        let caption = format!("<table class=\"map\"><caption>Gap {name}: left by the {which}</caption>");
+        text.replacen("<table>", &caption, 1)
+    }
+
+    fn cell(&self, cell: &[usize], after: bool, end: f64) -> String {
+        if cell.is_empty() {
+            return "<td class=\"none\">&ndash;</td>".into();
+        }
+        let mean = self.mean(cell, after);
+        let marks: String = cell
+            .iter()
+            .map(|&i| {
+                let (error, point) = (self.error(i, after), self.points.points[i]);
+                // Out of the keyboard's way: the table of all passes has the same numbers.
+                format!(
+                    "<a class=\"{}\" href=\"#pass-{point}\" tabindex=\"-1\" title=\"pass {point}: {}\"></a>",
+                    shade(error, end),
+                    signed(error)
+                )
+            })
+            .collect();
+        format!("<td class=\"{}\">{}<div>{marks}</div></td>", shade(mean, end), signed(mean))
+    }
+}
+
+/// An error with its sign, where it has one with these digits.
+fn signed(error: f64) -> String {
+    let text = format!("{error:+.3}");
+    if text.ends_with("0.000") { "0.000".into() } else { text }
 }

@@ -1,7 +1,8 @@
 //! What to measure next, in physical words, with the plan beside it.
 
-use crate::report::html::{escape, table};
+use crate::report::html::{escape, micro, table};
 use crate::report::human::number;
+use crate::verdict::plain;
 use diagnosis::next::Experiment;
 use diagnosis::verdict::Diagnosis;
 use models::covariate::{self, Covariate};
@@ -21,7 +22,7 @@ pub fn section(result: &Diagnosis) -> String {
 
 /// What an experiment is expected to be worth.
 fn worth(e: &Experiment) -> String {
-    let [a, b] = &e.separates;
+    let [a, b] = [0, 1].map(|i| plain(&e.separates[i]));
     if e.expected_nats > BEYOND {
         format!("If {a} is true, odds of more than a million to one against {b} are expected.")
     } else {
@@ -44,7 +45,7 @@ fn one(e: &Experiment) -> String {
         .map(|c| {
             let (_, unit) = c.shown;
             let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
-            format!("<th scope=\"col\" class=\"n\">{}{}</th>", escape(c.words), escape(&unit))
+            format!("<th scope=\"col\" class=\"n\">{}{}</th>", escape(c.words), escape(&micro(&unit)))
         })
         .collect();
     let rows: String = e
@@ -64,9 +65,17 @@ fn one(e: &Experiment) -> String {
         .collect();
     format!(
         "<div class=\"card\"><p><strong>Measure these {} passes</strong>, those that tell most first. {worth}</p>{}\
-         <p class=\"note\"><code>muprime diagnose ... --save-plan next.toml</code> writes them as a plan, \
-         <code>muprime run next.toml</code> makes them.</p></div>",
+         <p class=\"note\"><a download=\"next-plan.toml\" href=\"{}\">Download these passes as a plan</a>; \
+         <code>muprime run next-plan.toml</code> measures them.</p></div>",
         e.conditions.len(),
-        table("Passes of the next experiment", &heads, &rows)
+        table("Passes of the next experiment", &heads, &rows),
+        as_address(&crate::verdict::plan(e))
     )
+}
+
+/// A file within an address, so that a page that stands alone can hand it out.
+fn as_address(text: &str) -> String {
+    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
+    let byte = |b: u8| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") };
+    format!("data:application/toml;charset=utf-8,{}", text.bytes().map(byte).collect::<String>())
 }

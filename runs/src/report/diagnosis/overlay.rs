@@ -1,6 +1,6 @@
 //! What was measured, and what the models say of it.
 
-use crate::report::html::note;
+use crate::report::html::{micro, note};
 use crate::report::human::number;
 use crate::report::plots::verdict::{Seen, overlay, parity};
 use crate::report::plots::{Span, mu_axis};
@@ -20,11 +20,14 @@ const PLACES: u32 = 60;
 
 /// The table as the figures need it: `mu'` of every pass, measured and under both models, and who is suspect.
 pub struct Overlay<'a> {
-    result: &'a Diagnosis,
-    table: &'a Table,
+    /// What the table came to.
+    pub result: &'a Diagnosis,
+    /// The table.
+    pub table: &'a Table,
     forecasts: &'a [Forecast],
     mu0: f64,
-    suspects: Vec<usize>,
+    /// Rows of the suspect passes.
+    pub suspects: Vec<usize>,
 }
 
 impl<'a> Overlay<'a> {
@@ -36,7 +39,7 @@ impl<'a> Overlay<'a> {
     }
 
     /// Full friction of a pass along its motion, N, with the sign of the direction.
-    fn full(&self, pass: &Condition) -> f64 {
+    pub fn full(&self, pass: &Condition) -> f64 {
         pass.direction.sign() * self.mu0 * pass.normal_force_n
     }
 
@@ -156,10 +159,10 @@ impl<'a> Overlay<'a> {
             .iter()
             .filter_map(|c| Some(format!("{} {}", number(c.shown.0 * c.of(&typical)?), c.shown.1)))
             .collect();
-        let title = base.join(", ");
+        let title = micro(&base.join(", "));
         overlay(
             &title,
-            (&format!("{} {}", x.words, x.shown.1), span),
+            (&micro(&format!("{}, {}", x.words, x.shown.1)), span),
             &points,
             &of(|f| f.recalibrated),
             &of(|f| f.corrected),

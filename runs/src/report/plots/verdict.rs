@@ -74,6 +74,55 @@ fn rings(
     Ok(())
 }
 
+/// A pass in the figure of a law.
+#[derive(Clone, Copy, Debug)]
+pub struct LawPass {
+    /// Abscissa.
+    pub x: f64,
+    /// The law there plus what the pass deviates from it.
+    pub y: f64,
+    /// Whether the pass is a suspect.
+    pub suspect: bool,
+}
+
+/// A law over the passes: its curve with a band of two standard deviations.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn law(
+    name: &str,
+    (x_name, span): (&str, Span),
+    passes: &[LawPass],
+    curve: &Curve,
+) -> miette::Result<String> {
+    let alt = format!("The law of {name} against {x_name}, with its band, over {} passes.", passes.len());
+    let all = || passes.iter().map(|p| p.y).chain(curve.iter().map(|(_, y, _)| *y)).chain([0.0]);
+    let [low, high] = all().fold([0.0f64; 2], |[l, h], v| [l.min(v), h.max(v)]);
+    let margin = 0.06 * (high - low);
+    let axis = [(low - margin).max(-1.5), (high + margin).min(1.5)];
+    let frame = Frame {
+        sizes: [PANEL, NARROW],
+        x: (span, x_name),
+        y: (Span::linear(axis[0]..axis[1]), "change of \u{3bc}'"),
+        alt: &alt,
+    };
+    let cut = |v: f64| v.clamp(axis[0], axis[1]);
+    let svg = figure(&frame, |chart, size| {
+        let edge =
+            |k: f64| -> Vec<(f64, f64)> { curve.iter().map(|(x, y, sd)| (*x, cut(y + k * sd))).collect() };
+        band(chart, &edge(-2.0), &edge(2.0), COLOURS[0])?;
+        let ends = [curve.first(), curve.last()].into_iter().flatten().map(|(x, ..)| (*x, 0.0));
+        line(chart, ends.collect(), GREY, Some(6))?;
+        chart
+            .draw_series(passes.iter().map(|p| mark(0, (p.x, cut(p.y)), size - 1, BLACK, true)))
+            .map_err(wrong)?;
+        line(chart, edge(0.0), COLOURS[0], None)?;
+        rings(chart, passes.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.y))), size)
+    })?;
+    let beyond = beyond(all(), axis);
+    Ok(format!("<figure>{svg}<figcaption>Dashed: no change of the baseline.{beyond}</figcaption></figure>"))
+}
+
 /// Measured against predicted `mu'` of every pass: left the recalibrated baseline, right the verdict's model.
 ///
 /// # Errors
@@ -114,7 +163,11 @@ pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
 pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Result<String> {
     let unit = c.shown.1;
     // A direction has no unit.
-    let name = if unit.is_empty() { c.words.to_string() } else { format!("{}, {unit}", c.words) };
+    let name = if unit.is_empty() {
+        c.words.to_string()
+    } else {
+        crate::report::html::micro(&format!("{}, {unit}", c.words))
+    };
     let alt = format!("Errors of {} passes against {}, before and after.", points.len(), c.words);
     let frame = Frame {
         sizes: [PANEL, NARROW],

@@ -1,0 +1,153 @@
+//! The law of a hypothesis: what it adds to the recalibrated baseline along the setting that moves it most,
+//! over the passes.
+
+use super::overlay::Overlay;
+use crate::report::html::{escape, micro};
+use crate::report::human::number;
+use crate::report::plots::Span;
+use crate::report::plots::verdict::{LawPass, law};
+use crate::verdict::plain;
+use diagnosis::predict::Forecast;
+use diagnosis::verdict::Hypothesis;
+use models::condition::Condition;
+use models::covariate::{self, Covariate, Scale};
+
+/// Places of a curve.
+const PLACES: u32 = 60;
+/// Share of full friction below which a law does nothing that a figure could show.
+const LEAST: f64 = 1e-4;
+
+/// The settings along which a law is drawn.
+const ALONG: [&Covariate; 6] = [
+    &covariate::AMPLITUDE,
+    &covariate::SPEED,
+    &covariate::FREQUENCY,
+    &covariate::NORMAL_FORCE,
+    &covariate::TIME,
+    &covariate::TEMPERATURE,
+];
+
+impl Overlay<'_> {
+    /// The figure of a hypothesis; nothing for one without a law, or whose law the table does not move.
+    ///
+    /// # Errors
+    /// Only if the drawing library fails.
+    pub fn law(&self, h: &Hypothesis) -> miette::Result<String> {
+        let Some(base) = self.middle() else { return Ok(String::new()) };
+        let passes = &self.table.passes;
+        let axes: Vec<(&Covariate, Vec<f64>)> = ALONG
+            .into_iter()
+            .filter_map(|c| {
+                let seen: Vec<f64> = passes.iter().map(|p| c.of(p)).collect::<Option<_>>()?;
+                let (low, high) = ends(&seen);
+                let span = Span::over([low, high].into_iter(), c.scale == Scale::Log && low > 0.0);
+                let within = |v: f64| v.clamp(low, high);
+                (high - low > 1e-3 * high.abs()).then(|| (c, span.places(PLACES).map(within).collect()))
+            })
+            .collect();
+        let at = |c: &Covariate, value: f64| {
+            let mut condition = base;
+            c.put(&mut condition, value);
+            condition
+        };
+        let mut wanted: Vec<Condition> =
+            axes.iter().flat_map(|(c, places)| places.iter().map(|v| at(c, *v))).collect();
+        let curves = wanted.len();
+        wanted.extend(passes);
+        let Some(forecasts) = self.result.hypothesis_curve(&h.effects, &wanted) else {
+            return Ok(String::new());
+        };
+        let adds = |i: usize, of: fn(&Forecast) -> f64| {
+            (of(&forecasts[i]) - forecasts[i].recalibrated) / self.full(&wanted[i])
+        };
+        let swing = |k: usize| {
+            let all: Vec<f64> =
+                (0..PLACES as usize).map(|i| adds(k * PLACES as usize + i, |f| f.form)).collect();
+            let (low, high) = ends(&all);
+            high - low
+        };
+        let Some(k) = (0..axes.len()).max_by(|a, b| swing(*a).total_cmp(&swing(*b))) else {
+            return Ok(String::new());
+        };
+        if swing(k) < LEAST {
+            return Ok(String::new());
+        }
+        let (along, places) = &axes[k];
+        let x = |v: f64| along.shown.0 * v;
+        let curve: Vec<(f64, f64, f64)> = places
+            .iter()
+            .enumerate()
+            .map(|(i, v)| {
+                let i = k * PLACES as usize + i;
+                let sd =
+                    (forecasts[i].corrected_sd.powi(2) - forecasts[i].scatter_sd.powi(2)).max(0.0).sqrt();
+                (x(*v), adds(i, |f| f.form), sd / self.full(&wanted[i]).abs())
+            })
+            .collect();
+        let marks: Vec<LawPass> = (0..passes.len())
+            .filter_map(|i| {
+                let at = x(along.of(&passes[i])?);
+                let off = (self.table.lateral[i] - forecasts[curves + i].form) / self.full(&passes[i]);
+                Some(LawPass { x: at, y: on(&curve, at) + off, suspect: self.suspects.contains(&i) })
+            })
+            .collect();
+        let held: Vec<String> = ALONG[..4]
+            .iter()
+            .filter(|c| c.name != along.name)
+            .filter_map(|c| Some(format!("{} {}", number(c.shown.0 * c.of(&base)?), c.shown.1)))
+            .collect();
+        let name = plain(&h.effects.join(" + "));
+        let span = Span::over(curve.iter().map(|(x, ..)| *x), along.scale == Scale::Log);
+        let figure =
+            law(&name, (&micro(&format!("{}, {}", along.words, along.shown.1)), span), &marks, &curve)?;
+        Ok(figure
+            + &crate::report::html::note(&format!(
+                "What {} adds to the recalibrated baseline along the {}, at {}. Line: its law; band: twice the standard deviation of its \
+                 parameters and of its departure from the law. Discs: passes, each at the law plus what it deviates from it, so that \
+                 passes at other conditions are on the same figure.",
+                escape(&name),
+                along.words,
+                micro(&held.join(", "))
+            )))
+    }
+
+    /// The pass with vibration that is nearest to the middle of every setting.
+    fn middle(&self) -> Option<Condition> {
+        let driven: Vec<Condition> =
+            self.table.passes.iter().filter(|p| p.amplitude.metres() > 0.0).copied().collect();
+        let off = |p: &Condition| -> f64 {
+            ALONG[..4]
+                .iter()
+                .map(|c| {
+                    let all = || driven.iter().filter_map(|p| c.of(p));
+                    let of = c.of(p).unwrap_or(0.0);
+                    (all().filter(|v| *v < of).count() as f64 - all().filter(|v| *v > of).count() as f64)
+                        .abs()
+                })
+                .sum()
+        };
+        driven.iter().map(|p| (off(p), *p)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, p)| p)
+    }
+}
+
+fn ends(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
+}
+
+/// A curve between its places.
+fn on(curve: &[(f64, f64, f64)], at: f64) -> f64 {
+    let k = curve.partition_point(|(x, ..)| *x < at).clamp(1, curve.len() - 1);
+    let ((x0, y0, _), (x1, y1, _)) = (curve[k - 1], curve[k]);
+    let share = if x1 > x0 { ((at - x0) / (x1 - x0)).clamp(0.0, 1.0) } else { 0.0 };
+    y0 + share * (y1 - y0)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_curve_is_followed_between_its_places() {
+        let curve = [(1.0, 0.0, 0.0), (2.0, 1.0, 0.0), (4.0, -1.0, 0.0)];
+        let at = [0.0, 1.5, 2.0, 3.0, 9.0].map(|x| super::on(&curve, x));
+        assert_eq!(at, [0.0, 0.5, 1.0, 0.0, -1.0]);
+    }
+}

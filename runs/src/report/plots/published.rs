@@ -1,0 +1,253 @@
+//! The figures of published values: the passes of a run against amplitude, frequency and speed, what others
+//! published of the same, and Eq. 20 with their `Psi*` at the conditions of the passes.
+
+use super::{
+    COLOURS, Frame, GREY, NARROW, PANEL, Span, band, beyond, figure, line, mark, mark_name, measured,
+    mu_axis, wrong,
+};
+use crate::report::RunData;
+use crate::report::html::escape;
+use crate::report::human::number;
+use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
+use crate::report::published::Published;
+use crate::sequence::MeasuredPass;
+use models::condition::Condition;
+use models::psi::{PsiEq17, relative_friction, within_fitted_range};
+use models::quantity::PeakToPeak;
+use plotters::prelude::*;
+use std::collections::BTreeMap;
+
+/// Places of a curve.
+const PLACES: u32 = 120;
+
+/// An axis: what it shows of a pass and of a published value, and how a condition gets such a value.
+struct Axis {
+    title: &'static str,
+    unit: &'static str,
+    scale: f64,
+    /// How far, as a share, the values of one setting lie apart.
+    within: f64,
+    of: fn(&Condition) -> f64,
+    put: fn(&mut Condition, f64),
+    published: fn(&Published) -> Option<f64>,
+    /// The range of the paper's data, SI.
+    papers: [f64; 2],
+}
+
+const AXES: [Axis; 4] = [
+    Axis {
+        title: "amplitude w, \u{b5}m peak to peak",
+        unit: "\u{b5}m",
+        scale: 1e6,
+        within: FREQUENCY,
+        of: |c| c.amplitude.metres(),
+        put: |c, v| c.amplitude = PeakToPeak::from_metres(v),
+        published: |p| p.amplitude_pp_m,
+        papers: [0.0, 5e-6],
+    },
+    Axis {
+        title: "frequency f, kHz",
+        unit: "kHz",
+        scale: 1e-3,
+        within: FREQUENCY,
+        of: |c| c.frequency_hz,
+        put: |c, v| c.frequency_hz = v,
+        published: |p| p.frequency_hz,
+        papers: [10e3, 100e3],
+    },
+    Axis {
+        title: "speed U, mm/s",
+        unit: "mm/s",
+        scale: 1e3,
+        within: SPEED,
+        of: |c| c.speed_m_s,
+        put: |c, v| c.speed_m_s = v,
+        published: |p| p.speed_m_s,
+        papers: [5e-3, 0.1],
+    },
+    // No panel: the load only says which passes belong together.
+    Axis {
+        title: "load, N",
+        unit: "N",
+        scale: 1.0,
+        within: FORCE,
+        of: |c| c.normal_force_n,
+        put: |c, v| c.normal_force_n = v,
+        published: |p| p.normal_force_n,
+        papers: [0.1, 1.0],
+    },
+];
+
+/// The three panels; their captions state what is not drawn.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn panels(run: &RunData, all: &[Published]) -> miette::Result<String> {
+    let passes: Vec<_> = run.passes.iter().map(|p| p.pass.clone()).collect();
+    let mu0 = models::pass::coulomb_coefficient(&passes);
+    let driven: Vec<(&MeasuredPass, Condition)> = run
+        .passes
+        .iter()
+        .filter(|p| {
+            p.pass.amplitude > PeakToPeak::ZERO && p.comparison.is_some_and(|c| c.mu_relative.is_some())
+        })
+        .map(|p| (p, p.pass.condition(mu0.unwrap_or(f64::NAN))))
+        .collect();
+    if driven.is_empty() {
+        return Ok("<p>No pass with vibration to compare with.</p>".into());
+    }
+    let figures: miette::Result<Vec<String>> = (0..3).map(|k| panel(run, all, &driven, mu0, k)).collect();
+    Ok(format!("<div class=\"panels\">{}</div>", figures?.concat()))
+}
+
+/// The passes that differ along one axis alone, those with most settings along it.
+fn along<'a>(driven: &[(&'a MeasuredPass, Condition)], k: usize) -> Vec<(&'a MeasuredPass, Condition)> {
+    let levels =
+        AXES.each_ref().map(|axis| Levels::of(driven.iter().map(|(_, c)| (axis.of)(c)), axis.within));
+    let mut groups = BTreeMap::<Vec<usize>, Vec<(&MeasuredPass, Condition)>>::new();
+    for (pass, c) in driven {
+        let others = (0..AXES.len()).filter(|i| *i != k).map(|i| levels[i].index((AXES[i].of)(c)));
+        groups.entry(others.collect()).or_default().push((*pass, *c));
+    }
+    let settings = |group: &Vec<(&MeasuredPass, Condition)>| {
+        let along: std::collections::BTreeSet<_> =
+            group.iter().map(|(_, c)| levels[k].index((AXES[k].of)(c))).collect();
+        (along.len(), group.len())
+    };
+    groups.into_values().max_by_key(settings).unwrap_or_default()
+}
+
+fn panel(
+    run: &RunData,
+    all: &[Published],
+    driven: &[(&MeasuredPass, Condition)],
+    mu0: Option<f64>,
+    k: usize,
+) -> miette::Result<String> {
+    let axis = &AXES[k];
+    let chosen = along(driven, k);
+    let base = chosen[chosen.len() / 2].1;
+    let own: Vec<(f64, f64, f64)> = chosen
+        .iter()
+        .filter_map(|(p, c)| {
+            let found = p.comparison?;
+            Some((axis.scale * (axis.of)(c), found.mu_relative?, found.mu_relative_sd.unwrap_or(0.0)))
+        })
+        .collect();
+    let laws: Vec<&Published> = all.iter().filter(|p| p.psi_star.is_some() && mu0.is_some()).collect();
+    let values: Vec<(&Published, f64, f64)> =
+        all.iter().filter_map(|p| Some((p, axis.scale * (axis.published)(p)?, p.mu_relative?))).collect();
+    let papers = axis.papers.map(|v| axis.scale * v).into_iter().filter(|_| !laws.is_empty());
+    let xs = || own.iter().map(|p| p.0).chain(values.iter().map(|v| v.1)).chain(papers.clone());
+    let span = if k == 0 { Span::from_zero(xs()) } else { Span::over(xs(), true) };
+    let ys = mu_axis(own.iter().map(|p| p.1).chain(values.iter().map(|v| v.2)));
+    let mut sources: Vec<String> = Vec::new();
+    for (p, ..) in &values {
+        if !sources.contains(&p.named()) {
+            sources.push(p.named());
+        }
+    }
+    let alt = format!(
+        "Relative friction against {}: {} passes of this run, {} published values and {} laws.",
+        axis.title,
+        own.len(),
+        values.len(),
+        laws.len()
+    );
+    let frame = Frame {
+        sizes: [PANEL, NARROW],
+        x: (span, axis.title),
+        y: (Span::linear(ys[0]..ys[1]), "relative friction \u{3bc}'"),
+        alt: &alt,
+    };
+    // Alike in every other setting that the source states.
+    let alike = |p: &Published| {
+        (0..AXES.len()).filter(|i| *i != k).all(|i| {
+            let own = (AXES[i].of)(&base);
+            (AXES[i].published)(p).is_none_or(|v| (v - own).abs() <= 0.1 * own)
+        })
+    };
+    let cut = |v: f64| v.clamp(ys[0], ys[1]);
+    let svg = figure(&frame, |chart, size| {
+        if k == 0 {
+            for (i, at) in all.iter().filter(|p| p.mu_relative.is_none()).enumerate() {
+                let Some(from) = at.amplitude_pp_m.map(|w| w * 1e6) else { continue };
+                match at.amplitude_to_m {
+                    Some(to) => {
+                        let area = Rectangle::new(
+                            [(from, ys[0]), (to * 1e6, ys[1])],
+                            COLOURS[if i % 2 == 0 { 5 } else { 4 }].mix(0.2).filled(),
+                        );
+                        chart.draw_series([area]).map_err(wrong)?;
+                    }
+                    None => line(chart, vec![(from, ys[0]), (from, ys[1])], GREY, Some(3))?,
+                }
+            }
+        }
+        for law in &laws {
+            let places: Vec<(f64, PsiEq17)> = span
+                .places(PLACES)
+                .filter_map(|x| {
+                    let mut c = base;
+                    (axis.put)(&mut c, x / axis.scale);
+                    let shown = !law.of_paper || within_fitted_range(&c);
+                    shown.then(|| (x, PsiEq17::at(&c, run.finger.poisson_ratio)))
+                })
+                .collect();
+            let star = law.psi_star.unwrap_or(f64::NAN);
+            let curve = |star: f64| -> Vec<(f64, f64)> {
+                places.iter().map(|(x, psi)| (*x, cut(relative_friction(*psi, star)))).collect()
+            };
+            if let Some(sd) = law.psi_star_sd.filter(|sd| *sd < star) {
+                band(chart, &curve(star + sd), &curve(star - sd), GREY)?;
+            }
+            line(chart, curve(star), GREY, None)?;
+        }
+        measured(chart, 0, size, COLOURS[0], &own, ys)?;
+        for (p, x, y) in &values {
+            let series = 1 + sources.iter().position(|s| *s == p.named()).unwrap_or(0);
+            let colour = COLOURS[series % COLOURS.len()];
+            let sd = p.mu_relative_sd.unwrap_or(0.0);
+            let bar = [(*x, cut(y - sd)), (*x, cut(y + sd))];
+            chart.draw_series([PathElement::new(bar.to_vec(), colour.stroke_width(1))]).map_err(wrong)?;
+            chart.draw_series([mark(series, (*x, cut(*y)), size, colour, alike(p))]).map_err(wrong)?;
+        }
+        Ok(())
+    })?;
+    let held: Vec<String> = AXES
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| *i != k)
+        .map(|(_, a)| format!("{} {}", number(a.scale * (a.of)(&base)), a.unit))
+        .collect();
+    let mut words = format!("Discs: {} passes of this run at {}.", own.len(), held.join(", "));
+    for (i, source) in sources.iter().enumerate() {
+        words += &format!(" {}: {source}.", capital(mark_name((1 + i) % 5)));
+    }
+    if !sources.is_empty() {
+        words += " Hollow where the source states other conditions.";
+    }
+    for law in &laws {
+        let sd = law.psi_star_sd.map_or(String::new(), |sd| format!(" \u{b1} {}", number(sd)));
+        let mu0 = number(mu0.unwrap_or(f64::NAN));
+        let star = number(law.psi_star.unwrap_or(f64::NAN));
+        let range = if law.of_paper { ", where the paper's data reach" } else { "" };
+        words += &format!(
+            " Line: Eq. 20 with \u{3a8}* {star}{sd} ({}) at these conditions and \u{3bc}0 {mu0}{range}.",
+            law.named()
+        );
+    }
+    if k == 0 && all.iter().any(|p| p.mu_relative.is_none() && p.amplitude_pp_m.is_some()) {
+        words += " Upright lines and areas: amplitudes of the table below.";
+    }
+    if mu0.is_none() && all.iter().any(|p| p.psi_star.is_some()) {
+        words += " Eq. 20 is not drawn: the run has no pass without vibration, so its \u{3bc}0 is not known.";
+    }
+    let cut = beyond(own.iter().map(|p| p.1).chain(values.iter().map(|v| v.2)), ys);
+    Ok(format!("<figure>{svg}<figcaption>{}{cut}</figcaption></figure>", escape(&words)))
+}
+
+fn capital(word: &str) -> String {
+    let mut letters = word.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}
