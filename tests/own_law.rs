@@ -259,7 +259,7 @@ fn world(active: Option<effects::Active<'_>>, seed: u64) -> (Vec<Pass>, RigFile)
         for speed_m_s in [0.006, 0.012, 0.03, 0.08] {
             for normal_force_n in [0.18, 0.32, 0.6] {
                 let point = passes.len() as u64 + 1;
-                let direction = if point % 2 == 0 { Direction::Forward } else { Direction::Backward };
+                let direction = if point.is_multiple_of(2) { Direction::Forward } else { Direction::Backward };
                 let c = Condition {
                     amplitude: PeakToPeak::from_metres(w),
                     speed_m_s,
@@ -394,7 +394,8 @@ fn passes_that_a_law_cannot_tell_are_left_out_and_named() {
     let slow = |p: &Pass| p.speed_m_s < 0.01 && p.amplitude > PeakToPeak::ZERO;
     let mut expected: Vec<u64> = world(None, 4).0.iter().filter(|p| slow(p)).map(|p| p.point).collect();
     let mut sorted = left_out.clone();
-    (sorted.sort_unstable(), expected.sort_unstable());
+    sorted.sort_unstable();
+    expected.sort_unstable();
     assert_eq!((sorted.len(), &sorted), (18, &expected));
     assert_eq!(verdict["data"]["points"], 84 - 18);
     assert!(verdict["remarks"][0].as_str().unwrap().contains("cannot tell at 18 passes"), "{verdict}");
