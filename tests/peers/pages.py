@@ -67,6 +67,9 @@ def explored(browser, path):
     # By the keyboard: a figure is enlarged, moved, and whole again.
     plot = page.locator("#explore figure", has=page.locator("h2", has_text="Forces")).locator(".plot")
     plot.focus()
+    # The focus is shown from the first key on.
+    page.keyboard.press("0")
+    page.wait_for_timeout(300)
     shown = lambda: plot.screenshot()
     views = [shown()]
     for key in ["+", "ArrowRight", "0"]:
