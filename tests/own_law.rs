@@ -259,7 +259,8 @@ fn world(active: Option<effects::Active<'_>>, seed: u64) -> (Vec<Pass>, RigFile)
         for speed_m_s in [0.006, 0.012, 0.03, 0.08] {
             for normal_force_n in [0.18, 0.32, 0.6] {
                 let point = passes.len() as u64 + 1;
-                let direction = if point.is_multiple_of(2) { Direction::Forward } else { Direction::Backward };
+                let direction =
+                    if point.is_multiple_of(2) { Direction::Forward } else { Direction::Backward };
                 let c = Condition {
                     amplitude: PeakToPeak::from_metres(w),
                     speed_m_s,

@@ -107,7 +107,13 @@ fn repeatability_and_pass_noise_are_those_that_the_world_states() {
     let mean = ratio.iter().sum::<f64>() / n as f64;
     let sd = (ratio.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n as f64 - 1.0)).sqrt();
     // Repeatability, and the stated scatter of either axis at 0.25 and 0.5 N.
-    let [lateral_sd, normal_sd] = [0, 1].map(|axis| config.pass_force_sd_n(axis, 0.5));
+    // Mean over t of a wander with correlation time T: its variance by 2 T/t (1 - T/t (1 - exp(-t/T))), beside white noise.
+    let [lateral_sd, normal_sd] = [0, 1].map(|axis| {
+        let (s, seconds) = (&config.sensor, 0.5);
+        let r = s.wander_time_s / seconds;
+        let share: f64 = 2.0 * r * (1.0 - r * (1.0 - (-1.0 / r).exp()));
+        (s.wander_sd_n[axis] * share.sqrt()).hypot(s.white_sd_n[axis] * (s.sample_period_s / seconds).sqrt())
+    });
     let expected = (0.015_f64.powi(2) + (lateral_sd / 0.25).powi(2) + (normal_sd / 0.5).powi(2)).sqrt();
     println!("pass-to-pass sd {sd:.4}, expected {expected:.4}, n {n}");
     assert!((sd / expected - 1.0).abs() < 0.15, "{sd} against {expected}");

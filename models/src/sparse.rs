@@ -69,8 +69,8 @@ pub struct Sparse {
     sd: f64,
 }
 
-/// Pflueger's modified linear basis.
-fn basis((level, index): (u8, u32), x: f64) -> f64 {
+/// Pflueger's modified linear basis of a sparse grid at a place between 0 and 1, by level and index.
+pub fn basis((level, index): (u8, u32), x: f64) -> f64 {
     let scaled = f64::from(1_u32 << level);
     if level == 1 {
         1.0

@@ -4,6 +4,7 @@
 //! Pflueger's modified linear one (Spatially Adaptive Sparse Grids for High-Dimensional Problems, 2010), which needs no nodes on the
 //! boundary: in eight dimensions a boundary would have most of them.
 
+use models::sparse::basis;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -37,20 +38,6 @@ pub struct SparseGrid {
     dimensions: usize,
     /// Its nodes in the order in which they came, ancestors before their descendants.
     pub nodes: Vec<Node>,
-}
-
-/// The basis function of a step.
-fn basis((level, index): Step, x: f64) -> f64 {
-    let scaled = f64::from(1_u32 << level);
-    if level == 1 {
-        1.0
-    } else if index == 1 {
-        (2.0 - scaled * x).max(0.0)
-    } else if index == (1 << level) - 1 {
-        (2.0 - scaled * (1.0 - x)).max(0.0)
-    } else {
-        (1.0 - (scaled * x - f64::from(index)).abs()).max(0.0)
-    }
 }
 
 /// The step above.
