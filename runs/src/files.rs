@@ -61,9 +61,8 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
 /// What is there and is no ordinary file, such as a terminal or a pipe, is written to as it is. A link of this user stays a link.
 ///
 /// # Errors
-/// Whatever the file system says, with the file's name; a link of another user; a file of another program.
+/// Whatever the file system says, with the file's name; a link that another user has put there.
 pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
-    replaceable(path, bytes.as_ref())?;
     let written = named(path).and_then(|path| {
         if fs::metadata(&path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
             return fs::write(path, bytes.as_ref());
@@ -71,6 +70,15 @@ pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
         put(&path, bytes.as_ref())
     });
     written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
+/// Writes a file that a person named as an output, as [`write_whole`] does, unless another program's stands there.
+///
+/// # Errors
+/// As [`write_whole`] and [`replaceable`].
+pub fn write_output(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
+    replaceable(path, bytes.as_ref())?;
+    write_whole(path, bytes)
 }
 
 /// Bytes of an earlier file in which its origin is looked for.
@@ -295,7 +303,7 @@ mod tests {
             ("", model, true),
         ] {
             fs::write(&path, there).unwrap();
-            let written = write_whole(&path, output);
+            let written = write_output(&path, output);
             assert_eq!(written.is_ok(), replaced, "{there}");
             assert_eq!(fs::read(&path).unwrap(), if replaced { output } else { there.as_bytes() });
         }

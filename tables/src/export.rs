@@ -115,6 +115,6 @@ pub fn export(
         Format::Mcap => return mcap::write(folder, run, &facts, &place).map(|()| place),
         Format::RoCrate => crate_of_run::bytes(folder, run, &facts, &place)?,
     };
-    runs::files::write_whole(&place, &bytes)?;
+    runs::files::write_output(&place, &bytes)?;
     Ok(place)
 }

@@ -41,7 +41,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     }
     let compared = Compared::of([&args.run_a, &args.run_b])?;
     if let Some(page) = &args.report {
-        runs::files::write_whole(page, runs::report::comparison::page(&compared)?)?;
+        runs::files::write_output(page, runs::report::comparison::page(&compared)?)?;
         say!("report: {} (the dashboard compares two runs by itself)", page.display());
     }
     if json {
@@ -61,7 +61,7 @@ fn run_groups(args: &Args, json: bool) -> miette::Result<ExitCode> {
     args.more.iter().try_for_each(|run| super::there(run, "run"))?;
     let grouped = Grouped::of(&folders, args.by.unwrap_or_default())?;
     if let Some(page) = &args.report {
-        runs::files::write_whole(page, runs::report::groups::page(&grouped)?)?;
+        runs::files::write_output(page, runs::report::groups::page(&grouped)?)?;
         say!("report: {}", page.display());
     }
     if json {

@@ -247,5 +247,5 @@ fn read_table(path: &Path) -> miette::Result<Vec<Pass>> {
 }
 
 fn write_text(path: &Path, text: &str) -> miette::Result<()> {
-    runs::files::write_whole(path, text)
+    runs::files::write_output(path, text)
 }

@@ -48,7 +48,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let overlay: miette::Result<Vec<_>> = args.overlay.iter().map(|name| published::of(name)).collect();
     let (html, damage) = runs::report::html_and_damage(&args.run, &overlay?.concat())?;
     let out = args.out.unwrap_or_else(|| args.run.join("report.html"));
-    runs::files::write_whole(&out, html)?;
+    runs::files::write_output(&out, html)?;
     if json {
         out!("{}", serde_json::json!({ "report": out, "damage": damage }));
     } else {

@@ -48,7 +48,7 @@ impl Grid {
                     (_, share) if log => low * (high / low).powf(share),
                     (_, share) => low + share * (high - low),
                 };
-                Some((name.trim(), (0..count.min(super::MOST_ROWS)).map(node).collect()))
+                Some((name.trim(), (0..count.min(super::MOST_ROWS + 1)).map(node).collect()))
             };
             parsed().ok_or_else(|| {
                 format!("grid '{word}': NAME=LOW..HIGH:COUNT or NAME=LOW..HIGH:COUNT:log is needed")

@@ -157,7 +157,7 @@ amplitude_pp_m = [0.5e-6, 3e-6]
         assert_eq!(judge(PLAN, &channel(Some(0.0156), None)), Ok(()));
         let refusal = judge(PLAN, &channel(Some(0.0313), None)).unwrap_err();
         for part in
-            ["series 'a'", "3e-6 m", "Fn = 0.25 N", "(point ", "`s` (fx)", "its count is 31.3 mN", "125 mN"]
+            ["series 'a'", "w = 3 µm", "Fn = 0.25 N", "(point ", "`s` (fx)", "its count is 31.3 mN", "125 mN"]
         {
             assert!(refusal.contains(part), "{part}: {refusal}");
         }

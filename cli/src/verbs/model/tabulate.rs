@@ -54,7 +54,7 @@ pub fn run(args: &TabulateArgs, json: bool) -> miette::Result<ExitCode> {
     let tolerance = if args.accept_error { f64::INFINITY } else { args.tolerance };
     let origin = format!("command {}", args.command);
     let (text, sha256) = tables::law::file_of(&made, &origin, tolerance)?;
-    runs::files::write_whole(&args.out, text)?;
+    runs::files::write_output(&args.out, text)?;
     if json {
         let made = json!({
             "file": args.out, "rows": answers.len() - made.checks, "sha256": sha256, "checks": made.checks,
