@@ -259,7 +259,7 @@ fn slipped_units_and_lost_signs_are_remarked_on() {
         "{slipped}"
     );
     assert!(
-        slipped.contains("frequency_hz is") && slipped.contains("lateral_force_n over normal_force_n"),
+        slipped.contains("frequency_hz: 0.0275") && slipped.contains("lateral over normal force"),
         "{slipped}"
     );
     let unsigned = remarks("unsigned.csv", ["um", "Hz", "lateral_force:N"], true);

@@ -1,5 +1,6 @@
-//! Files that outlive a power cut: written beside their place, synced, moved there, and their folder synced, because a name
-//! too is only safe once its folder is (POSIX `fsync`; ext4, XFS and Btrfs give more, none promises it).
+//! Files that outlive a power cut: written beside their place, synced, moved there, and their folder synced,
+//! because a name too is only safe once its folder is (POSIX `fsync`; ext4, XFS and Btrfs give more, none
+//! promises it).
 
 use miette::{Context, IntoDiagnostic};
 use std::fs::{self, File, OpenOptions};
@@ -72,7 +73,7 @@ pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
     written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
 }
 
-/// Writes a file that a person named as an output, as [`write_whole`] does, unless another program's stands there.
+/// Writes a file that a person named as an output, as [`write_whole`] does, unless another program's is there.
 ///
 /// # Errors
 /// As [`write_whole`] and [`replaceable`].

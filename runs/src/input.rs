@@ -133,7 +133,7 @@ pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String
     } else {
         [(1e3, "k"), (1e6, "M"), (1e-3, "m"), (1e-6, "u")]
     };
-    // A force a few times too large is a slip of another kind, and so is a value that was written in small units.
+    // A force a few times too large is a slip of another kind; so is a value that was written in small units.
     if value.abs() > high && (value.abs() < 1.0 || unit == "N" && value.abs() < 50.0 * high) {
         return None;
     }
