@@ -172,8 +172,8 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
         "setup" => {
             let setup = Setup::parse(name, &text, folder)?;
             complete(&setup)?;
-            // A bundled one is right or wrong on every machine alike.
-            on.ports.filter(|_| path.exists()).map_or(Ok(()), |opens| opens(&setup))?;
+            // What the virtual rig serves is opened when it runs.
+            on.ports.filter(|_| setup.file.virtual_rig.is_none()).map_or(Ok(()), |opens| opens(&setup))?;
             remarks = finger_remarks(&[
                 ("normal_stiffness_n_per_m", setup.tip.finger.normal_stiffness_n_per_m),
                 ("lateral_stiffness_n_per_m", setup.tip.finger.lateral_stiffness_n_per_m),
