@@ -15,7 +15,7 @@ const STRETCHES: usize = 100;
 /// Stretches of a window at most: about as many as a wide screen has columns.
 const STRETCHES_OF_WINDOW: usize = 2000;
 
-/// Cycles of a pass, in whole numbers as text ([`packed`]): the page stays small.
+/// Cycles of a pass, in whole numbers as text (`packed`): the page stays small.
 #[derive(Debug, PartialEq, Serialize)]
 pub struct Trace {
     /// Number of the point.
