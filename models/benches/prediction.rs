@@ -41,7 +41,7 @@ fn spring_slider_in_five_solutions(bencher: divan::Bencher) {
 }
 
 /// A law table of five variables with its uncertainty, at scattered conditions: its time over the
-/// spring-slider's is the ratio that BENCHMARKS.md states.
+/// spring-slider's is the ratio that counts.
 #[divan::bench(sample_size = 200)]
 fn law_table(bencher: divan::Bencher) {
     let words =
