@@ -44,7 +44,7 @@ fn the_page_of_a_verdict_leads_to_every_pass_and_to_the_next_plan() {
     let points = std::fs::read_to_string(out.join("points.csv")).unwrap();
     assert_eq!(rows.len(), points.lines().count() - 1, "a row a pass");
     let maps = between(&html, "<table class=\"map\">", "</table>");
-    assert!(maps.len() >= 2 && maps.len() % 2 == 0, "{} maps", maps.len());
+    assert!(maps.len() >= 2 && maps.len().is_multiple_of(2), "{} maps", maps.len());
     for (i, map) in maps.iter().enumerate() {
         assert!(map.contains(["Gap before", "Gap after"][i % 2]), "{map}");
         let marks = between(map, "href=\"#pass-", "\"");
