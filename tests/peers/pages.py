@@ -143,7 +143,7 @@ with sync_playwright() as p:
                 asked = [url for url in asked if url != path.as_uri() and not url.startswith("data:")]
                 # By the keyboard alone: what folds opens, what scrolls has the focus.
                 opened = page.evaluate("() => [...document.querySelectorAll('details')].length")
-                for _ in range(40):
+                for _ in range(120):
                     page.keyboard.press("Tab")
                     if page.evaluate("() => document.activeElement.matches('details:not([open]) > summary')"):
                         page.keyboard.press("Enter")
