@@ -1,4 +1,4 @@
-//! Laws of one's own: by name, as a table, from a program, from `model adapt`; in the loop, in the diagnosis,
+//! Users' own laws: by name, as a table, from a program, from `model adapt`; in the loop, in the diagnosis,
 //! in a corrected model.
 
 use effects::{Baseline, Design};

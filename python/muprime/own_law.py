@@ -1,4 +1,4 @@
-"""A law of one's own as a table: computed once by a function, checked against fresh calls, read by the loop and the diagnosis."""
+"""A user's own law as a table: computed once by a function, checked against fresh calls, read by the loop and the diagnosis."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def run(
     """Runs a plan (a :class:`Plan`, a file or a bundled name) on the virtual rig of a setup, in virtual time, into the folder ``out``.
 
     ``model``: the law to compare with, ``'spring-slider'``, ``'psi'``, ``'surrogate'`` or a file, as for ``muprime run --model``. An
-    unfinished run there is taken up again. A real rig is led by ``muprime run`` alone, never from here.
+    unfinished run there is resumed. A real rig is driven by ``muprime run`` alone, never from here.
     """
     plan = plan if isinstance(plan, Plan) else Plan.load(plan)
     _muprime.run(plan.name, plan.toml, os.fspath(setup), out, seed, defects, model, operator, sample, licence)

@@ -7,7 +7,7 @@
 //! | `ridge` | cases of the finite element ridge |
 //! | `calibrate` | certificates from files; the skin of a finger from a phase table |
 //! | `plans` | plans: read, made, judged on a setup |
-//! | `tabulate` | a law of one's own as a table |
+//! | `tabulate` | a user's own law as a table |
 //! | `verdict` | the diagnosis of a table |
 //! | `runs` | a run's folder; a sweep on the virtual rig in virtual time |
 

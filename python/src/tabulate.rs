@@ -1,4 +1,4 @@
-//! A law of one's own as a table.
+//! A user's own law as a table.
 
 use crate::{MuprimeError, refused};
 use models::law_table::grid::Grid;

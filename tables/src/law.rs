@@ -31,7 +31,7 @@ pub struct Loaded {
 /// The law that `--model` names, for a run of this setup.
 ///
 /// # Errors
-/// A file that cannot be read or used, with the place and the remedy.
+/// A file that cannot be read or used: says where, and what to type.
 pub fn for_run(what: &Path, setup: &Setup) -> miette::Result<Loaded> {
     if let Some(model) = built_in(&what.to_string_lossy(), &setup.tip.finger) {
         return Ok(Loaded { model: model?, file: None });
@@ -86,7 +86,7 @@ fn text_of(path: &Path) -> miette::Result<(String, String)> {
 /// The file of a law that was tabulated, and the hash of its rows; `origin` says of what it was made.
 ///
 /// # Errors
-/// An interpolation error above `tolerance`, with the place and the remedy.
+/// An interpolation error above `tolerance`: says where, and what to do.
 pub fn file_of(made: &Tabulated, origin: &str, tolerance: f64) -> miette::Result<(String, String)> {
     let Tabulated { csv, greatest, place, rms, checks } = made;
     // An error that is no number is above any tolerance.
