@@ -9,7 +9,7 @@ mod next;
 mod overlay;
 mod passes;
 
-use super::html::{bar, escape, glossary, head, list, micro, note, shell, table};
+use super::html::{bar, escape, glossary, head, list, note, shell, table};
 use super::human::number;
 use super::plots::beyond;
 use super::plots::verdict::{Seen, errors_against};
@@ -36,11 +36,7 @@ pub fn page(result: &Diagnosis, table: &Table, about: &[(&str, String)]) -> miet
     let body = [
         "<h1>Diagnosis</h1>".into(),
         head(about),
-        format!(
-            "<p class=\"verdict{}\">{}</p>",
-            if departed { " departed" } else { "" },
-            escape(&micro(&r.text))
-        ),
+        format!("<p class=\"verdict{}\">{}</p>", if departed { " departed" } else { "" }, escape(&r.text)),
         described(result),
         how_far(result),
         overlay.section()?,
@@ -120,7 +116,7 @@ fn location(result: &Diagnosis, table: &Table, errors: &[(f64, f64)]) -> String 
         .iter()
         .filter(|g| g.share_of_gap >= 0.01)
         .take(LISTED_REGIONS)
-        .map(|g| micro(&g.text))
+        .map(|g| g.text.clone())
         .collect();
     let rest = r.location.regions.len() - listed.len();
     let more = if rest > 0 {

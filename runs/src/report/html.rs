@@ -39,16 +39,6 @@ pub fn scoped_style(selector: &str) -> String {
     format!("{selector}{{{nested}}}")
 }
 
-/// Text with the sign of a millionth in its units: `um` as `\u{b5}m`.
-pub fn micro(text: &str) -> String {
-    let unit = |word: &str| match word.trim_end_matches(|c: char| !c.is_ascii_alphabetic()) {
-        "um" | "uN" | "ug" | "urad" => format!("\u{b5}{}", &word[1..]),
-        _ => word.to_string(),
-    };
-    let ratio = |word: &str| word.split('/').map(unit).collect::<Vec<_>>().join("/");
-    text.split(' ').map(ratio).collect::<Vec<_>>().join(" ")
-}
-
 /// A paragraph below a figure or a table.
 pub fn note(text: &str) -> String {
     format!("<p class=\"note\">{text}</p>\n")
@@ -129,15 +119,6 @@ pub fn glossary() -> String {
 
 #[cfg(test)]
 mod tests {
-    #[test]
-    fn units_have_their_sign_and_words_stay() {
-        let text = "0.08 [0.05, 0.11] 1/um\u{b2}, w above 2.1 um, um pp; usage of a human";
-        assert_eq!(
-            super::micro(text),
-            "0.08 [0.05, 0.11] 1/\u{b5}m\u{b2}, w above 2.1 \u{b5}m, \u{b5}m pp; usage of a human"
-        );
-    }
-
     #[test]
     fn markup_and_terminal_escapes_in_names_are_harmless() {
         let bad = "<script>alert('x')</script>\u{1b}[31m\"&";

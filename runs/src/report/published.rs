@@ -2,7 +2,7 @@
 //! user's file, each with its source.
 
 use super::RunData;
-use super::html::{escape, micro, note, table};
+use super::html::{escape, note, table};
 use super::human::number;
 use super::plots::published::panels;
 use crate::input::{MAX_TABLE_BYTES, bytes_of};
@@ -157,7 +157,7 @@ pub fn section(run: &RunData, all: &[Published]) -> miette::Result<String> {
         format!(
             "<tr><th scope=\"row\">{}</th><td>{}</td>{amplitude}{}{}{}{}{}</tr>\n",
             escape(&one.named()),
-            escape(&micro(&one.what)),
+            escape(&one.what),
             cell(one.frequency_hz, 1e-3),
             cell(one.speed_m_s, 1e3),
             cell(one.normal_force_n, 1.0),

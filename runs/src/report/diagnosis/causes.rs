@@ -3,7 +3,7 @@
 
 use super::mechanism::drawing;
 use super::overlay::Overlay;
-use crate::report::html::{bar, escape, micro, table};
+use crate::report::html::{bar, escape, table};
 use crate::verdict::{estimate, plain};
 use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
 
@@ -84,7 +84,7 @@ fn card(h: &Hypothesis, law: &str) -> String {
             format!(
                 "<tr><th scope=\"row\">{}</th><td>{}</td></tr>",
                 escape(&p.name.replace('_', " ")),
-                escape(&micro(&estimate(p)))
+                escape(&estimate(p))
             )
         })
         .collect();

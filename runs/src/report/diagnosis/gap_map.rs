@@ -1,7 +1,7 @@
 //! The gap over the operating space as tables of cells: read without colour, by a screen reader and in print.
 //! Every pass is a mark in its cell, and leads to the numbers of the pass.
 
-use crate::report::html::{escape, micro, note, table};
+use crate::report::html::{escape, note, table};
 use crate::report::human::number;
 use diagnosis::data::Table;
 use models::covariate::{self, Covariate};
@@ -162,7 +162,7 @@ impl<'a> Map<'a> {
     fn html(&self, after: bool, end: f64) -> String {
         let [rows, columns] = self.covariates;
         let which = if after { "verdict's model" } else { "recalibrated baseline" };
-        let unit = |c: &Covariate| escape(&micro(&format!("{}, {}", c.words, c.shown.1)));
+        let unit = |c: &Covariate| escape(&format!("{}, {}", c.words, c.shown.1));
         let titles: String =
             self.titles[1].iter().map(|title| format!("<th scope=\"col\">{title}</th>")).collect();
         let head = format!("<th scope=\"col\">{} \\ {}</th>{titles}", unit(rows), unit(columns));

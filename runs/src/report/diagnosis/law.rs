@@ -2,7 +2,7 @@
 //! over the passes.
 
 use super::overlay::Overlay;
-use crate::report::html::{escape, micro};
+use crate::report::html::escape;
 use crate::report::human::number;
 use crate::report::plots::Span;
 use crate::report::plots::verdict::{LawPass, law};
@@ -98,8 +98,7 @@ impl Overlay<'_> {
             .collect();
         let name = plain(&h.effects.join(" + "));
         let span = Span::over(curve.iter().map(|(x, ..)| *x), along.scale == Scale::Log);
-        let figure =
-            law(&name, (&micro(&format!("{}, {}", along.words, along.shown.1)), span), &marks, &curve)?;
+        let figure = law(&name, (&format!("{}, {}", along.words, along.shown.1), span), &marks, &curve)?;
         Ok(figure
             + &crate::report::html::note(&format!(
                 "What {} adds to the recalibrated baseline along the {}, at {}. Line: its law; band: twice the standard deviation of its \
@@ -107,7 +106,7 @@ impl Overlay<'_> {
                  passes at other conditions are on the same figure.",
                 escape(&name),
                 along.words,
-                micro(&held.join(", "))
+                held.join(", ")
             )))
     }
 

@@ -1,6 +1,6 @@
 //! What was measured, and what the models say of it.
 
-use crate::report::html::{micro, note};
+use crate::report::html::note;
 use crate::report::human::number;
 use crate::report::plots::verdict::{Seen, overlay, parity};
 use crate::report::plots::{Span, mu_axis};
@@ -159,10 +159,10 @@ impl<'a> Overlay<'a> {
             .iter()
             .filter_map(|c| Some(format!("{} {}", number(c.shown.0 * c.of(&typical)?), c.shown.1)))
             .collect();
-        let title = micro(&base.join(", "));
+        let title = base.join(", ");
         overlay(
             &title,
-            (&micro(&format!("{}, {}", x.words, x.shown.1)), span),
+            (&format!("{}, {}", x.words, x.shown.1), span),
             &points,
             &of(|f| f.recalibrated),
             &of(|f| f.corrected),

@@ -1,7 +1,7 @@
 //! Every pass of a table with its numbers: where the marks of the maps lead.
 
 use super::overlay::Overlay;
-use crate::report::html::{micro, table};
+use crate::report::html::table;
 use diagnosis::data::Table;
 use diagnosis::predict::Forecast;
 use models::covariate::{self, Covariate};
@@ -21,7 +21,7 @@ pub fn section(points: &Table, overlay: &Overlay<'_>, forecasts: &[Forecast]) ->
     let column = |name: &str| format!("<th scope=\"col\">{name}</th>");
     let settings = SETTINGS.iter().map(|(c, _)| match c.shown.1 {
         "" => column(c.words),
-        unit => column(&micro(&format!("{}, {unit}", c.words))),
+        unit => column(&format!("{}, {unit}", c.words)),
     });
     let values = ["\u{3bc}' measured", "baseline", "model", "gap before", "gap after"].map(column);
     let head = [column("pass"), settings.collect(), values.concat()].concat();

@@ -163,11 +163,7 @@ pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
 pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Result<String> {
     let unit = c.shown.1;
     // A direction has no unit.
-    let name = if unit.is_empty() {
-        c.words.to_string()
-    } else {
-        crate::report::html::micro(&format!("{}, {unit}", c.words))
-    };
+    let name = if unit.is_empty() { c.words.to_string() } else { format!("{}, {unit}", c.words) };
     let alt = format!("Errors of {} passes against {}, before and after.", points.len(), c.words);
     let frame = Frame {
         sizes: [PANEL, NARROW],
