@@ -103,7 +103,7 @@ const WRONG: &[Wrong] = &[
     ("plan.toml", "normal_force_n = 0.25", "normal_force_n = -0.25", "normal_force_n"),
     ("plan.toml", "frequency_hz = 27500", "frequency_hz = 27.5", "kHz meant?"),
     ("plan.toml", "frequency_hz = 27500", "frequency_hz = 27.5e9", "frequency_hz"),
-    ("plan.toml", "0.6e-6", "2.0", "um meant?"),
+    ("plan.toml", "0.6e-6", "2.0", "\u{b5}m meant?"),
     ("plan.toml", "0.6e-6", "nan", "amplitude_pp_m"),
     ("plan.toml", "0.6e-6", "inf", "amplitude_pp_m"),
     ("plan.toml", "normal_force_n = 0.25", "normal_force_n = 250", "mN meant?"),
@@ -352,7 +352,7 @@ fn all_problems_are_told_at_once() {
 fn units_that_slipped_are_remarked_on() {
     let made = Made::new();
     for (name, from, to, word) in [
-        ("rig.toml", "3.9e6", "3.9", "N/um meant?"),
+        ("rig.toml", "3.9e6", "3.9", "N/\u{b5}m meant?"),
         ("tip.toml", "lateral_stiffness_n_per_m = 1.5e6", "lateral_stiffness_n_per_m = 1500", "N/mm meant?"),
     ] {
         std::fs::write(made.at(name), made.text(name).replacen(from, to, 1)).unwrap();
@@ -360,6 +360,14 @@ fn units_that_slipped_are_remarked_on() {
         let said = format!("{said}");
         assert!(said.contains(word), "{name} {code:?}: {said}");
     }
+    // The air's pressure in kPa would be a vacuum in Pa.
+    let plan = PLAN.replace("speed_m_s = [0.02, 0.05]", "ambient_pressure_pa = [101.325, 50]");
+    std::fs::write(made.at("plan.toml"), plan).unwrap();
+    let (code, said) = checked(&["--setup", "virtual-ideal"], &made.at("plan.toml"));
+    assert!(
+        code == Some(2) && said.to_string().contains("kPa meant? Then write 1.01325e5"),
+        "{code:?}: {said}"
+    );
 }
 
 /// Ports that a run could not open: each is told of with its line, before anything is touched; `--offline` leaves them out.

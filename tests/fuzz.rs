@@ -25,14 +25,16 @@ use tests::file;
 
 fn setting(name: &str, otherwise: u64) -> u64 {
     std::env::var(name)
-        .map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name} is no number")))
+        .map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name} is not a number")))
 }
 
 /// The byte corpus of that name.
 fn bytes(name: &str) -> Vec<Vec<u8>> {
     let text = std::fs::read_to_string(file("tests/fuzz").join(name)).unwrap();
     let lines = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
-    lines.map(|line| from_hex(line).unwrap_or_else(|| panic!("{name}: {line} is no hexadecimal"))).collect()
+    lines
+        .map(|line| from_hex(line).unwrap_or_else(|| panic!("{name}: {line} is not a hexadecimal")))
+        .collect()
 }
 
 /// The files of a folder that end so.

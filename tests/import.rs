@@ -194,7 +194,7 @@ fn what_cannot_be_taken_is_refused_with_the_remedy() {
     );
     assert!(
         refused(folder, whole, &["--map", "t_s=time:s, w_um=amplitude_pp:N"])
-            .contains("'N' is no unit of amplitude_pp")
+            .contains("'N' is not a unit of amplitude_pp")
     );
     assert!(refused(folder, whole, &["--map", "t_s=time"]).contains("needs a unit"));
     assert!(

@@ -201,7 +201,7 @@ fn a_table_that_is_wrong_or_too_coarse_and_a_program_that_fails_are_refused() {
         coarse,
         &["differs from a fresh call by 0.0", "the tolerance is 0.02", "more nodes"],
     );
-    // One that counts its calls is no function of its variables.
+    // One that counts its calls is not a function of its variables.
     tabulate(&half.replace("0.5", "NR / 1000"), coarse, &["differs from a fresh call by"]);
 
     tabulated(at);

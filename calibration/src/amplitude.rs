@@ -84,7 +84,7 @@ pub enum AmplitudeError {
 fn check(points: &[AmplitudePoint], what: &'static str, needed: usize) -> Result<(), AmplitudeError> {
     for (i, p) in points.iter().enumerate() {
         if !p.at.is_finite() || !p.amplitude_pp_m.is_finite() || p.amplitude_pp_m < 0.0 {
-            let reason = format!("{} m at {} is no amplitude", p.amplitude_pp_m, p.at);
+            let reason = format!("{} m at {} is not an amplitude", p.amplitude_pp_m, p.at);
             return Err(AmplitudeError::Bad { row: i + 1, reason });
         }
     }

@@ -72,7 +72,7 @@ pub enum IdentifyError {
         range: &'static str,
     },
     /// A range that makes no sense.
-    #[error("moduli from {0} to {1} Pa are no range")]
+    #[error("moduli from {0} to {1} Pa do not make a range")]
     Range(f64, f64),
     /// The model gave no number anywhere.
     #[error("the model gave no phase for any modulus of the range")]

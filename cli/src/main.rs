@@ -3,7 +3,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 #![allow(
     rustdoc::broken_intra_doc_links,
-    reason = "options are documented for a terminal: [user@]host is no link"
+    reason = "options are documented for a terminal: [user@]host is not a link"
 )]
 
 mod verbs;

@@ -126,11 +126,19 @@ fn region(
         named.insert(covariate.name, [low, high]);
         let (word, (scale, unit)) = (covariate.words, covariate.shown);
         let (low, high) = (low * scale, high * scale);
-        words.push(match (b[0].is_finite(), b[1].is_finite()) {
+        let words_of = match (b[0].is_finite(), b[1].is_finite()) {
+            (forward, _) if covariate.name == covariate::DIRECTION.name => {
+                if forward {
+                    "forward".into()
+                } else {
+                    "backward".into()
+                }
+            }
             (true, true) => format!("{word} {} to {} {unit}", short(low), short(high)),
             (true, false) => format!("{word} above {} {unit}", short(low)),
             _ => format!("{word} below {} {unit}", short(high)),
-        });
+        };
+        words.push(words_of.trim_end().to_string());
     }
     let place = if words.is_empty() { "everywhere".to_string() } else { words.join(", ") };
     let percent = 100.0 * share;

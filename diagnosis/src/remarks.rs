@@ -187,14 +187,14 @@ pub fn of_scatter(fitted: &Fitted, decision: &Decision, with_suspects: Option<&W
     }
     if let Some(sd) = scatter.run_relative_sd.filter(|sd| *sd > 0.0) {
         remarks.push(format!(
-            "The level of friction shifts from run to run by {:.1} % (one standard deviation): counted as scatter of the runs, no \
-             cause is sought for it.",
+            "The level of friction shifts from run to run by {:.1} % (one standard deviation): counted as scatter of the runs, \
+             without a cause.",
             100.0 * sd
         ));
     }
     if scatter.serial_correlation > 0.0 {
         remarks.push(format!(
-            "The scatter lasts from pass to pass (correlation {:.2}): a slow change of friction must stand out of that.",
+            "Neighbouring passes scatter alike (correlation {:.2}): only a slow change of friction that is larger can be seen.",
             scatter.serial_correlation
         ));
     }

@@ -136,7 +136,7 @@ impl Master {
     fn set_up(&mut self, session: &mut Session) -> Result<(), Ended> {
         let kind = self.read(0x1000, 0)?;
         if kind & 0xFFFF != PROFILE_402 {
-            let problem = format!("node {} is no drive of CiA 402 (device type {kind:#010x})", self.node);
+            let problem = format!("node {} is not a drive of CiA 402 (device type {kind:#010x})", self.node);
             return Err(Ended::Frame(BadFrame::WrongInstrument(problem)));
         }
         let status = self.read(0x6041, 0)?;

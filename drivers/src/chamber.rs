@@ -54,7 +54,7 @@ pub struct Chamber {
 pub fn serves(profile: &Profile) -> Result<(), String> {
     let id = profile.id();
     if !profile.description.profile.roles.contains(&Role::AmbientChamber) {
-        return Err(format!("profile `{id}` is no chamber's: its roles lack `ambient.chamber`"));
+        return Err(format!("profile `{id}` is not a chamber's: its roles lack `ambient.chamber`"));
     }
     if profile.description.link.kind != LinkKind::ModbusTcp {
         return Err(format!("profile `{id}`: a chamber is read over Modbus TCP (`kind = \"modbus_tcp\"`)"));
@@ -69,7 +69,7 @@ impl Chamber {
     /// Connects and reads once.
     ///
     /// # Errors
-    /// A profile that is no chamber's, an address that makes no sense, no answer.
+    /// A profile that is not a chamber's, an address that makes no sense, no answer.
     pub fn open(setup: &InstrumentSetup) -> Result<Self, String> {
         let profile = setup.description().map_err(|error| error.to_string())?;
         serves(&profile)?;

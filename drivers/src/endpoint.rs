@@ -452,7 +452,7 @@ impl Endpoint {
                     taken_at: mark.taken_at,
                     sequence: mark.sequence,
                 };
-                // A velocity that is no number is none at rest.
+                // A velocity that is not a number is none at rest.
                 let rests = state.velocity_m_s.abs() <= AT_REST_M_S;
                 self.orders.read_back(!rests, mark.arrived);
                 link.states.try_push(Ok(state)).is_err()

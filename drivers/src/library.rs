@@ -158,7 +158,7 @@ fn foreign_text_of(path: &Path) -> Result<String, String> {
 
 fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
     if !std::fs::metadata(path).map_err(|error| error.to_string())?.is_file() {
-        return Err("it is no ordinary file".into());
+        return Err("it is not an ordinary file".into());
     }
     let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
     let mut bytes = Vec::new();

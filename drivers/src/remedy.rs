@@ -32,7 +32,7 @@ pub fn unended(came: &[u8], end: &[u8], question: &str) -> String {
     let echoed = !question.is_empty() && came.starts_with(question.as_bytes());
     let cause = match other {
         _ if 4 * text < 3 * came.len() => {
-            "that is no text: are the speed and the format of the line (baud, parity) those of the instrument?".to_string()
+            "that is not text: are the speed and the format of the line (baud, parity) those of the instrument?".to_string()
         }
         _ if echoed => "that begins with the question itself: switch the instrument's echo off".into(),
         Some(other) => format!("is rx_terminator right? This ends with {}: rx_terminator = {other:?}", hex(other.as_bytes())),

@@ -23,7 +23,7 @@ impl Line {
     /// Where the port is not there, is in use, or the format makes no sense.
     pub fn open(path: &str, baud: u32, format: &str) -> Result<Self, Ended> {
         let (data, parity, stop) = parse_format(format)
-            .ok_or_else(|| Ended::Io(format!("`{format}` is no serial format such as 8N1")))?;
+            .ok_or_else(|| Ended::Io(format!("`{format}` is not a serial format such as 8N1")))?;
         let port = serialport::new(path, baud)
             .data_bits(data)
             .parity(parity)

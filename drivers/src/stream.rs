@@ -81,7 +81,7 @@ pub fn listen(
                     buffer[..count].chunks_exact(*length).for_each(take);
                 } else {
                     health.count(&health.corrupt_frames);
-                    health.problem(format!("a datagram of {count} bytes is no frame of the stream"));
+                    health.problem(format!("a datagram of {count} bytes is not a frame of the stream"));
                 }
             }
             Framing::Lines { end, came, believed } => {
@@ -97,7 +97,7 @@ pub fn listen(
                         Some(bytes) if whole => take(&bytes),
                         None if whole => {
                             health.count(&health.corrupt_frames);
-                            health.problem(format!("`{}` is no line of the stream", text.trim()));
+                            health.problem(format!("`{}` is not a line of the stream", text.trim()));
                         }
                         _ => {}
                     }

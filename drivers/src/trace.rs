@@ -41,7 +41,7 @@ pub fn sent(port: &str, bytes: &[u8]) {
     tracing::trace!(target: "wire", "{port} ->{}", Bytes(bytes));
 }
 
-/// Bytes that came in at `port`; none is no line.
+/// Bytes that came in at `port`; none is not a line.
 pub fn received(port: &str, bytes: &[u8]) {
     if !bytes.is_empty() {
         tracing::trace!(target: "wire", "{port} <-{}", Bytes(bytes));

@@ -50,7 +50,7 @@ impl Address {
     pub fn open(&self, limit: Duration) -> Result<Transport, Ended> {
         match self {
             Self::Folder(path) if path.is_dir() => Ok(Transport::Folder(path.clone(), Vec::new())),
-            Self::Folder(path) => Err(Ended::Io(format!("{} is no folder", path.display()))),
+            Self::Folder(path) => Err(Ended::Io(format!("{} is not a folder", path.display()))),
             Self::Serial(path, baud, format) => Ok(Transport::Serial(Line::open(path, *baud, format)?)),
             Self::Tcp(address) => {
                 let stream = TcpStream::connect_timeout(address, limit)?;

@@ -13,7 +13,7 @@ pub enum CanEvent {
     Warning,
     /// The controller is passive: an error counter is at 128, and it can tell nobody of an error any more.
     Passive,
-    /// Something that is no frame for anybody here was thrown away.
+    /// Something that is not a frame for anybody here was thrown away.
     Other,
     /// The controller has left the bus, and comes back only when a person says so.
     BusOff,

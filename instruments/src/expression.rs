@@ -203,11 +203,11 @@ impl Parser<'_> {
         }
         if let Some(hex) = word.strip_prefix("0x") {
             let number = u32::from_str_radix(hex, 16)
-                .map_err(|_| format!("`{word}` is no hexadecimal number of 32 bits"))?;
+                .map_err(|_| format!("`{word}` is not a hexadecimal number of 32 bits"))?;
             return Ok(Node::Number(f64::from(number)));
         }
         if word.starts_with(|c: char| c.is_ascii_digit()) {
-            return word.parse().map(Node::Number).map_err(|_| format!("`{word}` is no number"));
+            return word.parse().map(Node::Number).map_err(|_| format!("`{word}` is not a number"));
         }
         if word == "pow10" {
             if !self.take("(") {

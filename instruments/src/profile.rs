@@ -167,7 +167,7 @@ impl Profile {
     /// The files that a profile names, such as its DBC file: what [`Profile::parse_with`] will ask for.
     ///
     /// # Errors
-    /// Where the text is no profile, with the place.
+    /// Where the text is not a profile, with the place.
     pub fn names_files(text: &str) -> Result<Vec<String>, ProfileError> {
         let description: Description =
             toml::from_str(text).map_err(|error| ProfileError::from_toml(text, &error))?;

@@ -64,13 +64,13 @@ impl Profile {
         let bytes = match (&vector.line, self.frames().get(which)) {
             (Some(line), Some(frame)) => frame
                 .read_line(line)
-                .ok_or_else(|| error(format!("`{line}` is no line of `{}`", frame.name)))?,
+                .ok_or_else(|| error(format!("`{line}` is not a line of `{}`", frame.name)))?,
             _ => bytes_of(vector).map_err(error)?,
         };
         let mut values = self.values();
         for (name, &given) in &vector.given {
             let signal = self.signal(name).filter(|&s| self.frame_of(s).0 != which);
-            let signal = signal.ok_or_else(|| error(format!("`{name}` is no signal of another frame")))?;
+            let signal = signal.ok_or_else(|| error(format!("`{name}` is not a signal of another frame")))?;
             values.set(signal, given);
         }
         if which < polls {

@@ -29,7 +29,7 @@ pub enum NoAmplitude {
     #[error(transparent)]
     Domain(#[from] OutOfDomain),
     /// Not reached by the largest amplitude.
-    #[error("mu' = {wanted} is not reached: {largest_um} um peak-to-peak gives {reached:.3} here")]
+    #[error("mu' = {wanted} is not reached: {largest_um} \u{b5}m peak-to-peak gives {reached:.3} here")]
     OutOfReach {
         /// The target.
         wanted: f64,

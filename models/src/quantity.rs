@@ -13,7 +13,7 @@ use std::fmt;
 /// use muprime_models::quantity::PeakToPeak;
 /// let w = PeakToPeak::from_metres(2e-6);
 /// assert_eq!(w.sine_amplitude_m(), 1e-6);
-/// assert_eq!(w.to_string(), "2.000 um pp");
+/// assert_eq!(w.to_string(), "2 \u{b5}m peak-to-peak");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
 #[serde(transparent)]
@@ -46,7 +46,8 @@ impl PeakToPeak {
 
 impl fmt::Display for PeakToPeak {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.3} um pp", self.micrometres())
+        let text = format!("{:.3}", self.micrometres());
+        write!(f, "{} \u{b5}m peak-to-peak", text.trim_end_matches('0').trim_end_matches('.'))
     }
 }
 

@@ -62,8 +62,7 @@ impl fmt::Display for ReadingFinding {
         let (passes, nats) = (self.judged, self.nats.abs());
         write!(
             f,
-            "Psi* = {:.2} (95 %: {:.2} to {:.2}) fits {passes} passes with vibration best; single passes give {:.2} to {} \
-             (90 % of them); ",
+            "fitted to {passes} passes with vibration: Psi* = {:.2} (95 %: {:.2} to {:.2}); 90 % of single passes give {:.2} to {}. ",
             self.psi_star,
             self.psi_star_low,
             self.psi_star_high,
@@ -72,31 +71,31 @@ impl fmt::Display for ReadingFinding {
         )?;
         match self.decision {
             Decision::PeakToPeak => {
-                write!(f, "they support that the paper's {}, {}", Reading::PeakToPeak.words(), likelier(nats))
+                write!(f, "The paper's 2.38 fits, if its w is peak-to-peak ({})", likelier(nats))
             }
             Decision::SineAmplitude => {
-                write!(f, "they support that the paper's {}, {}", Reading::SineAmplitude.words(), likelier(nats))
+                write!(f, "The paper's 1.19 fits, if its w is the amplitude of a sine ({})", likelier(nats))
             }
             Decision::Between => {
-                f.write_str("it lies between Psi* 1.19 and 2.38 and supports neither reading of the paper's w")
+                f.write_str("It lies between 1.19 and 2.38 and supports neither reading of the paper's w")
             }
-            Decision::Neither => f.write_str("neither reading of the paper's w fits (Psi* 2.38 or 1.19)"),
+            Decision::Neither => f.write_str("Neither reading of the paper's w fits (Psi* 2.38 or 1.19)"),
             Decision::TooLittle => f.write_str(
-                "too little data to support a reading of the paper's w (Psi* 2.38 or 1.19): run the plan 'psi-reading'",
+                "The data support no reading of the paper's w (Psi* 2.38 or 1.19): run the plan 'psi-reading'",
             ),
         }
     }
 }
 
-/// Evidence in words: 'which is 60 times likelier'. Beyond a million the figure means nothing more.
+/// Evidence in words: '60 times likelier'. Beyond a million the figure means nothing more.
 fn likelier(nats: f64) -> String {
     match nats.exp() {
-        odds if odds > 1e6 => "which is more than a million times likelier".into(),
+        odds if odds > 1e6 => "more than a million times likelier".into(),
         odds if odds >= 10.0 => {
             let step = 10f64.powf(odds.log10().floor() - 1.0);
-            format!("which is {:.0} times likelier", (odds / step).round() * step)
+            format!("{:.0} times likelier", (odds / step).round() * step)
         }
-        odds => format!("which is {odds:.1} times likelier"),
+        odds => format!("{odds:.1} times likelier"),
     }
 }
 

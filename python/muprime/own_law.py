@@ -84,7 +84,7 @@ Model = str | os.PathLike[str] | LawTable | Callable[..., Any]
 
 
 def base_law(model: Model, name: str, table: bytes) -> tuple[str, str | None]:
-    """A base law as the crates take it: its name or path, and its text where it is no file."""
+    """A base law as the crates take it: its name or path, and its text where it is not a file."""
     if isinstance(model, (str, os.PathLike)):
         return os.fspath(model), None
     if not isinstance(model, LawTable):

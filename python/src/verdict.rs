@@ -18,7 +18,7 @@ use tables::passes::parse_passes;
 /// A diagnosis: the document of `muprime diagnose --json`, text, page, and requested predictions as CSV.
 type Texts = (String, String, String, Option<String>);
 
-/// A base law: its name or path, and its text where it is no file.
+/// A base law: its name or path, and its text where it is not a file.
 type Model = (String, Option<String>);
 
 /// Diagnoses a point table in memory (`name` is how messages call it) under a rig.toml in memory.

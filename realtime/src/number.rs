@@ -29,7 +29,7 @@ pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<f64, D::Error> {
             "NaN" => Ok(f64::NAN),
             "inf" => Ok(f64::INFINITY),
             "-inf" => Ok(f64::NEG_INFINITY),
-            other => Err(D::Error::custom(format!("'{other}' is no number"))),
+            other => Err(D::Error::custom(format!("'{other}' is not a number"))),
         },
     }
 }

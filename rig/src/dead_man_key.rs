@@ -27,7 +27,7 @@ impl DeadManKey {
     /// Takes the terminal. What was typed before does not count.
     ///
     /// # Errors
-    /// The standard input is no terminal, or the program is not in its foreground.
+    /// The standard input is not a terminal, or the program is not in its foreground.
     pub fn open() -> miette::Result<Self> {
         let help = "run it in the foreground of a terminal, or fit a dead-man device at [safety_inputs]";
         // A run that is suspended leaves its rig alone: only its end is a key (Ctrl-C).

@@ -374,7 +374,7 @@ fn open_owned(path: &Path, owner: u32, own: bool) -> io::Result<File> {
     let plain = found.is_file() && found.nlink() == 1 && found.uid() == owner;
     match plain && found.mode() & 0o022 == 0 {
         true => Ok(file),
-        false => Err(io::Error::other("it is no plain file that its owner alone can write")),
+        false => Err(io::Error::other("it is not a plain file that its owner alone can write")),
     }
 }
 

@@ -109,7 +109,7 @@ fn line(path: &Path) -> Result<(), Closed> {
             if is_line {
                 Ok(())
             } else {
-                Err(("that is no serial line".into(), "name the device, as in /dev/ttyUSB0"))
+                Err(("that is not a serial line".into(), "name the device, as in /dev/ttyUSB0"))
             }
         }
         Err(e) if e.kind() == std::io::ErrorKind::PermissionDenied => {

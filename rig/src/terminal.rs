@@ -41,10 +41,10 @@ pub enum CtrlC {
 /// Whether this program may take keys from its terminal.
 ///
 /// # Errors
-/// The standard input is no terminal, or the program is not in its foreground: it would be stopped by the first look at a key.
+/// The standard input is not a terminal, or the program is not in its foreground: it would be stopped by the first look at a key.
 pub fn has_keys() -> Result<(), String> {
     if !isatty(stdin()) {
-        return Err("the standard input is no terminal, so no key can be pressed".into());
+        return Err("the standard input is not a terminal, so no key can be pressed".into());
     }
     let foreground = tcgetpgrp(stdin()).map_err(|e| e.to_string())?;
     if foreground != rustix::process::getpgrp() {
@@ -102,10 +102,10 @@ pub fn keys(into: &mut [u8]) -> io::Result<usize> {
 /// Puts up a picture's screen. Until it is given back remarks for the same terminal are held, also those of a panic.
 ///
 /// # Errors
-/// The standard output is no terminal.
+/// The standard output is not a terminal.
 pub fn show() -> Result<(), String> {
     if !isatty(stdout()) {
-        return Err("the standard output is no terminal".into());
+        return Err("the standard output is not a terminal".into());
     }
     PANICS.call_once(|| {
         let usual = std::panic::take_hook();

@@ -251,7 +251,7 @@ impl SetupFile {
         for name in &self.ambient.by_operator {
             if AIR.iter().all(|(covariate, _)| covariate.name != name) {
                 let names = AIR.map(|(covariate, _)| covariate.name).join(", ");
-                let problem = format!("'{name}' is no quantity of the air; there are {names}");
+                let problem = format!("'{name}' is not a quantity of the air; there are {names}");
                 wrong.add(&["ambient", "by_operator"], problem, None);
             }
         }

@@ -194,7 +194,7 @@ pub fn from_files(words: &[String]) -> miette::Result<Issued> {
 /// No amplitude, or one at the rail of the decoder's output.
 pub fn displacement(volts: f64, range_m_s_per_v: f64, frequency_hz: f64) -> Result<PeakToPeak, String> {
     if !(volts.is_finite() && volts > 0.0) {
-        return Err(format!("{volts} V is no amplitude: a number above zero is needed, zero to peak"));
+        return Err(format!("{volts} V is not an amplitude: a number above zero is needed, zero to peak"));
     }
     if volts >= FULL_SCALE_V {
         return Err(format!(

@@ -127,7 +127,7 @@ pub fn text_of(name_or_path: &str) -> miette::Result<Option<(String, PathBuf)>> 
         return Ok(None);
     }
     let text = input::text_of(&path)?;
-    // A file that is no TOML at all is refused as a plan, with its place.
+    // A file that is not TOML at all is refused as a plan, with its place.
     let is = toml::from_str::<toml::Table>(&text)
         .is_ok_and(|t| t.contains_key("cell") || t.contains_key("blocks"));
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

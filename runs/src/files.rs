@@ -29,7 +29,7 @@ pub fn open_plain(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     if found.is_file() && found.nlink() == 1 {
         return Ok(file);
     }
-    Err(io::Error::other("it is no plain file of its own: a link, a pipe or a device stands there"))
+    Err(io::Error::other("it is not a plain file of its own: a link, a pipe or a device stands there"))
 }
 
 /// Makes a new file, to be written beside its place. What an earlier program left under that name, or somebody planted there, loses the
@@ -59,7 +59,7 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
 }
 
 /// Writes a file that a person named, whole or not at all: after a crash or a power cut either the old one is there or the new one.
-/// What is there and is no ordinary file, such as a terminal or a pipe, is written to as it is. A link of this user stays a link.
+/// What is there and is not an ordinary file, such as a terminal or a pipe, is written to as it is. A link of this user stays a link.
 ///
 /// # Errors
 /// Whatever the file system says, with the file's name; a link that another user has put there.

@@ -144,7 +144,11 @@ pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String
         ("N/m", "M") => "N/um".to_string(),
         _ => format!("{prefix}{unit}"),
     };
-    Some(format!("{value} {unit}: {meant} meant? Then write {:e}, in {unit}", round(value * factor)))
+    let shown = meant.replace('u', "\u{b5}");
+    Some(format!(
+        "{value} {unit}: {shown} meant? Then write {:e}, or \"{value}{meant}\"",
+        round(value * factor)
+    ))
 }
 
 /// Without the last digits, which only the arithmetic brings in.
@@ -164,7 +168,7 @@ fn in_words(message: &str) -> String {
     ];
     let Some((found, expected)) = message.split_once(", expected ") else {
         return message
-            .replace("key with no value, expected `=`", "this is no 'key = value' (is it a TOML file?)");
+            .replace("key with no value, expected `=`", "this is not a 'key = value' (is it a TOML file?)");
     };
     let words = TYPES.iter().find(|(names, _)| names.contains(&expected)).map(|(_, words)| *words);
     let words = words.map(str::to_string).unwrap_or_else(|| match expected.strip_prefix("struct ") {
@@ -178,7 +182,7 @@ fn in_words(message: &str) -> String {
             found.replace("floating point", "number").replace("string", "text")
         )
     } else {
-        message.replace("key with no value, expected `=`", "this is no 'key = value' (is it a TOML file?)")
+        message.replace("key with no value, expected `=`", "this is not a 'key = value' (is it a TOML file?)")
     }
 }
 
@@ -210,7 +214,7 @@ pub fn bytes_of(path: &Path, most: u64) -> miette::Result<Vec<u8>> {
     }
     let there = std::fs::metadata(path).map_err(wrong)?;
     if !there.is_file() {
-        miette::bail!(help = "give an ordinary file", "{shown} is no ordinary file");
+        miette::bail!(help = "give an ordinary file", "{shown} is not an ordinary file");
     }
     let mut bytes = Vec::new();
     // It may grow while it is being read.

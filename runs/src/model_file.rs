@@ -106,7 +106,7 @@ pub(crate) fn is_corrected(text: &str) -> bool {
 fn compiled(finger: &Finger, name: &str, text: &str) -> miette::Result<Corrected> {
     let saved: SavedModel = crate::input::parse_toml(name, text).map_err(|why| {
         miette::Report::new(why).wrap_err(format!(
-            "{name} is no model file; 'muprime diagnose DATA --save-model FILE' writes one"
+            "{name} is not a model file; 'muprime diagnose DATA --save-model FILE' writes one"
         ))
     })?;
     let base = match saved.law.as_ref().map(|l| (&l.name, &l.table)) {

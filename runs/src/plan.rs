@@ -134,22 +134,31 @@ pub struct Series {
     /// Name, for reports.
     pub name: String,
     /// m, peak-to-peak.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub amplitude_pp_m: Vec<f64>,
     /// Hz.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frequency_hz: Vec<f64>,
     /// m/s.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub speed_m_s: Vec<f64>,
     /// N.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub normal_force_n: Vec<f64>,
     /// m.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub position_m: Vec<f64>,
     /// Pa: somebody sets it, a chamber or the operator; passes are grouped by the levels of the air.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ambient_pressure_pa: Vec<f64>,
     /// deg C: likewise.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub temperature_c: Vec<f64>,
     /// Per cent: likewise.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub relative_humidity_pct: Vec<f64>,
     /// Directions of this series alone, 1 and -1; empty for the plan's.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub directions: Vec<i8>,
 }
 

@@ -54,7 +54,7 @@ fn second(profile: Profile) -> Result<(), String> {
             let bytes = device.frame(frame, &mut plant, now);
             profile.decode(frame, &bytes, &mut values).map_err(|error| format!("`{name}`: {error}"))?;
             let shape = &profile.frames()[frame.0];
-            // What the world does not know yet, such as a set-point that nobody has sent, is no number of a line.
+            // What the world does not know yet, such as a set-point that nobody has sent, is not a number of a line.
             let known =
                 |eight: &[u8]| eight.try_into().is_ok_and(|eight| f64::from_be_bytes(eight).is_finite());
             let line = shape.write_line(&bytes, 1.0).filter(|_| bytes.chunks_exact(8).all(known));
@@ -94,7 +94,7 @@ fn second(profile: Profile) -> Result<(), String> {
         signal.is_some_and(|signal| profile.refusal(signal, &values) == Some(Refusal::NotANumber))
     };
     match profile.description.emulator.measure.keys().find(unread) {
-        Some(name) => Err(format!("signal `{name}` is no number in the emulator's own frames")),
+        Some(name) => Err(format!("signal `{name}` is not a number in the emulator's own frames")),
         None => Ok(()),
     }
 }

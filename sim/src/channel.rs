@@ -88,7 +88,7 @@ impl Message for ForceSample {
         for axis in 0..2 {
             let bits = noise.bits();
             self.counts[axis] = bits as i32;
-            // One message in eight carries bits that are no number.
+            // One message in eight carries bits that are not numbers.
             self.force_n[axis] = if bits >> 61 == 0 { f64::NAN } else { f64::from(bits as i32) * 1e-4 };
         }
     }

@@ -143,7 +143,7 @@ pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Res
     let mut lines = Vec::new();
     for (what, e, paper) in [("moist", 28.3e6, "0.8 to 1.3"), ("dry", 202.4e6, "0.4 to 0.8")] {
         lines.push(format!(
-            "{what} ({} MPa): the phase passes 10, 30 and 60 deg at {}, {} and {} um; paper: transition at {paper} um, plateau near 90 deg; here {:.0} deg at 2.5 um",
+            "{what} ({} MPa): the phase passes 10, 30 and 60 deg at {}, {} and {} \u{b5}m; paper: transition at {paper} \u{b5}m, plateau near 90 deg; here {:.0} deg at 2.5 \u{b5}m",
             e / 1e6,
             crossing(e, 10.0),
             crossing(e, 30.0),
@@ -178,7 +178,7 @@ pub fn velocities(base: RidgeCase, reading: Reading) -> miette::Result<Reproduce
     let falling = ((low + n - high) % n) as f64 / n as f64;
     Ok(Reproduced {
         lines: vec![format!(
-            "dry, 1.35 um: skin {:.0} to {:.0} mm/s, plate +-{:.0} mm/s; the fall takes {:.0} % of the period, the rise {:.0} %; paper: the velocity peak is asymmetric, the unloading sloping through inertia (drawn; no number is stated)",
+            "dry, 1.35 \u{b5}m: skin {:.0} to {:.0} mm/s, plate +-{:.0} mm/s; the fall takes {:.0} % of the period, the rise {:.0} %; paper: the velocity peak is asymmetric, the unloading sloping through inertia (drawn; no number is stated)",
             1e3 * trough(skin),
             1e3 * peak(skin),
             1e3 * top,
@@ -187,7 +187,7 @@ pub fn velocities(base: RidgeCase, reading: Reading) -> miette::Result<Reproduce
         )],
         charts: vec![Chart::new(
             reading::file(reading, "fig5"),
-            "Velocity of skin and plate, dry, 1.35 um (Fig. 5)",
+            "Velocity of skin and plate, dry, 1.35 \u{b5}m (Fig. 5)",
             ["time_periods", "velocity_m_s"],
             vec![Series::line("skin", trace(skin, 2, 1.0)), Series::line("plate", trace(&plate, 2, 1.0))],
         )],
@@ -225,9 +225,9 @@ pub fn reaction_force(base: RidgeCase, reading: Reading) -> miette::Result<Repro
         let case = reading.at(base, w * 1e-6);
         let result = run(&case)?;
         let scale = case.finger_per_ridge_m();
-        series.push(Series::line(format!("{w} um"), trace(&result.mean_cycle.normal, 3, scale)));
+        series.push(Series::line(format!("{w} \u{b5}m"), trace(&result.mean_cycle.normal, 3, scale)));
         lines.push(format!(
-            "{w} um: mean {:.4} N for {} N applied, N/N0 {:.3} (paper: 1, Eq. 4), greatest {:.3} N, contact {:.0} % of the time",
+            "{w} \u{b5}m: mean {:.4} N for {} N applied, N/N0 {:.3} (paper: 1, Eq. 4), greatest {:.3} N, contact {:.0} % of the time",
             result.mean_reaction_force_n,
             case.normal_force_n,
             result.mean_reaction_force_n / case.normal_force_n,
@@ -235,7 +235,7 @@ pub fn reaction_force(base: RidgeCase, reading: Reading) -> miette::Result<Repro
             100.0 * result.contact_fraction
         ));
     }
-    lines.push("paper: always positive at 0.1 um, zero for a significant time at 1 um and longer at 2 um, the greatest force growing, the mean equal to the applied 0.25 N".into());
+    lines.push("paper: always positive at 0.1 \u{b5}m, zero for a significant time at 1 \u{b5}m and longer at 2 \u{b5}m, the greatest force growing, the mean equal to the applied 0.25 N".into());
     let chart = Chart {
         name: reading::file(reading, "fig7"),
         stated: vec![Stated::Level { value: base.normal_force_n, words: "applied (paper)".into() }],
@@ -258,14 +258,14 @@ pub fn lateral_force(base: RidgeCase, reading: Reading) -> miette::Result<Reprod
     let sticks = (0..n).filter(|i| normal[*i] > 0.0 && lateral[*i] < 0.99 * case.mu0 * normal[*i]).count();
     Ok(Reproduced {
         lines: vec![format!(
-            "1.35 um, 20 mm/s: mu' = {:.3}; below Coulomb's limit for {:.0} % of the period, contact for {:.0} %; paper: after touch-down the ridge first deforms laterally, slips once mu_0 F_reac is reached, and the force then falls with it to zero (drawn; no number is stated)",
+            "1.35 \u{b5}m, 20 mm/s: mu' = {:.3}; below Coulomb's limit for {:.0} % of the period, contact for {:.0} %; paper: after touch-down the ridge first deforms laterally, slips once mu_0 F_reac is reached, and the force then falls with it to zero (drawn; no number is stated)",
             result.mu_relative,
             100.0 * sticks as f64 / n as f64,
             100.0 * result.contact_fraction
         )],
         charts: vec![Chart::new(
             reading::file(reading, "fig8"),
-            "Forces in one period, 1.35 um (Fig. 8)",
+            "Forces in one period, 1.35 \u{b5}m (Fig. 8)",
             ["time_periods", "force_n"],
             vec![
                 Series::line("F_reac", trace(normal, 1, scale)),
@@ -303,7 +303,7 @@ pub fn parametric_study(study: Study, out: &Path) -> miette::Result<Reproduced> 
         ));
         let row = |w: f64| values.map(|v| format!("{:.3}", at(panel, v, w))).join(" ");
         lines.push(format!(
-            "({letter}) {} {values:?}: mu' at 1 um {}, at 2.5 um {}, at 5 um {}",
+            "({letter}) {} {values:?}: mu' at 1 \u{b5}m {}, at 2.5 \u{b5}m {}, at 5 \u{b5}m {}",
             panel.variable(),
             row(1e-6),
             row(2.5e-6),
@@ -321,7 +321,7 @@ pub fn parametric_study(study: Study, out: &Path) -> miette::Result<Reproduced> 
         mus.iter().fold(0.0, |a: f64, b| a.max(*b))
     };
     lines.push(format!(
-        "above 2.5 um the modulus moves mu' by at most {:.3} and the normal force by {:.3}; paper: nearly independent of both there",
+        "above 2.5 \u{b5}m the modulus moves mu' by at most {:.3} and the normal force by {:.3}; paper: nearly independent of both there",
         spread(Panel::YoungModulus), spread(Panel::NormalForce)
     ));
     lines.push(format!(

@@ -169,7 +169,7 @@ pub struct Wanted<'a> {
 /// A Parquet point table as CSV text: one reader judges both formats.
 ///
 /// # Errors
-/// A file that is no Parquet table.
+/// A file that is not Parquet table.
 pub fn parquet_as_csv(path: &Path) -> miette::Result<String> {
     let grid = unharmed(|| binary::parquet(path));
     grid.unwrap_or_else(|| {

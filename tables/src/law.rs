@@ -89,7 +89,7 @@ fn text_of(path: &Path) -> miette::Result<(String, String)> {
 /// An interpolation error above `tolerance`: says where, and what to do.
 pub fn file_of(made: &Tabulated, origin: &str, tolerance: f64) -> miette::Result<(String, String)> {
     let Tabulated { csv, greatest, place, rms, checks } = made;
-    // An error that is no number is above any tolerance.
+    // An error that is not a number is above any tolerance.
     if greatest.partial_cmp(&tolerance).is_none_or(std::cmp::Ordering::is_gt) {
         miette::bail!(
             help = "give the grid more nodes there, or equal ratios (:log); to take the table as it is, raise the tolerance",

@@ -49,7 +49,7 @@ const FILES: &[(&str, &str)] = &[
     ("empty.csv", ""),
     ("words.csv", "a,b\nx,y\n"),
     ("weights.csv", "amp,F,FT,v\n1,2,3,4\n"),
-    ("noise.mcap", "this is no recording of a run, whatever its name says\n"),
+    ("noise.mcap", "this is not a recording of a run, whatever its name says\n"),
     ("rig.toml", "[finger]\nnormal_stiffness_n_per_m = 3.9\n"),
 ];
 

@@ -81,7 +81,7 @@ def explored(browser, path):
     with page.expect_download() as got:
         page.locator("button", has_text="SVG").first.click()
     if not Path(got.value.path()).read_text().startswith("<svg"):
-        faults.append("the figure's file is no SVG")
+        faults.append("the figure's file is not an SVG")
     page.close()
     quiet = browser.new_context(java_script_enabled=False).new_page()
     quiet.goto(path.as_uri())
@@ -141,6 +141,12 @@ with sync_playwright() as p:
                 look = page.evaluate(LOOK)
                 page.screenshot(path=out / f"{path.stem}-{width}-{scheme}.png", full_page=True)
                 asked = [url for url in asked if url != path.as_uri() and not url.startswith("data:")]
+                # On paper nothing is folded.
+                page.emulate_media(media="print")
+                unprinted = page.evaluate(
+                    "() => [...document.querySelectorAll('details td, details li, details p')].filter((e) => !e.checkVisibility()).length"
+                )
+                page.emulate_media(media="screen")
                 # By the keyboard alone: what folds opens, what scrolls has the focus.
                 opened = page.evaluate("() => [...document.querySelectorAll('details')].length")
                 for _ in range(120):
@@ -150,7 +156,7 @@ with sync_playwright() as p:
                 folded = page.evaluate("() => [...document.querySelectorAll('details:not([open])')].length")
                 seen.append(
                     dict(page=path.name, width=width, scheme=scheme, axe=faults, tried=tried, asked=asked, ran=ran,
-                         details=opened, folded=folded, **look)
+                         details=opened, folded=folded, unprinted=unprinted, **look)
                 )
                 page.close()
         page = browser.new_page()

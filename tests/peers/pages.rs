@@ -72,6 +72,7 @@ fn pages_are_read_at_any_width_in_the_dark_by_keyboard_and_by_ear() {
             ("has no figure", page["figures"].as_u64().is_some_and(|n| n > 0)),
             ("has letters too small", page["smallest"].as_f64().is_some_and(|px| px >= LEAST_LETTER)),
             ("folds what no key opens", page["details"].as_u64() > Some(0) && page["folded"] == 0),
+            ("leaves what is folded out of its print", page["unprinted"] == 0),
             ("has serious faults by axe-core", empty("axe")),
             ("cannot be worked with", empty("tried")),
         ];

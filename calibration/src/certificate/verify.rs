@@ -108,7 +108,7 @@ impl Certificate {
             ("validity.until", &self.validity.until),
         ] {
             if date::parse(text).is_none() {
-                return malformed(format!("`{name} = {text}` is no date like 2026-03-01T12:00:00Z"));
+                return malformed(format!("`{name} = {text}` is not a date like 2026-03-01T12:00:00Z"));
             }
         }
         let n = self.parameters.len();

@@ -36,19 +36,13 @@ pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outco
     let mut remarks: Vec<String> = found
         .iter()
         .filter(|(_, f)| f.period_doubled > 0)
-        .map(|(w, f)| {
-            format!(
-                "the period doubled at {:.3} um pp in {} of {} repeats",
-                w.micrometres(),
-                f.period_doubled,
-                f.repeats
-            )
-        })
+        .map(|(w, f)| format!("the period doubled at {w} in {} of {} repeats", f.period_doubled, f.repeats))
         .collect();
     remarks.extend(
-        found.iter().filter(|(_, f)| f.repeats < 10).map(|(w, f)| {
-            format!("{} repeats at {:.3} um pp; the paper takes 10", f.repeats, w.micrometres())
-        }),
+        found
+            .iter()
+            .filter(|(_, f)| f.repeats < 10)
+            .map(|(w, f)| format!("{} repeats at {w}; the paper takes 10", f.repeats)),
     );
     let mut settings = BTreeMap::from([("frequency_hz".to_string(), at.frequency_hz.to_string())]);
     settings.extend(at.condition.iter().map(|c| ("condition".to_string(), c.clone())));

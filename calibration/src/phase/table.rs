@@ -59,7 +59,7 @@ pub fn read_phases(input: impl Read) -> Result<Vec<PhasePoint>, TableError> {
         let fail = |reason: String| TableError { line, reason };
         let row: Row = record.deserialize(Some(&headers)).map_err(|e| fail(e.to_string()))?;
         if !(row.amplitude_pp_m.is_finite() && row.amplitude_pp_m >= 0.0) {
-            return Err(fail(format!("amplitude_pp_m = {} is no amplitude", row.amplitude_pp_m)));
+            return Err(fail(format!("amplitude_pp_m = {} is not an amplitude", row.amplitude_pp_m)));
         }
         if !(0.0..360.0).contains(&row.phase_shift_deg) {
             return Err(fail(format!("phase_shift_deg = {} is not in [0, 360)", row.phase_shift_deg)));

@@ -2,8 +2,10 @@
 
 use super::prelude::*;
 use runs::compare::Compared;
+use runs::compare::differences::Difference;
 use runs::compare::groups::{GroupBy, Grouped, MOST_COMPARED};
 use runs::print::folded;
+use runs::report::human;
 use std::fmt::Write;
 
 /// Most conditions in the table, those furthest apart first.
@@ -126,8 +128,15 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     }
     let _ =
         writeln!(w, "settings that differ: {}", if differ.is_empty() { "none in the records" } else { "" });
-    let shown = |value: &Option<String>| value.as_ref().map_or("none".to_string(), |v| shortened(v, SHOWN));
-    for d in differ {
+    let shown = |value: &Option<String>| match value.as_ref().map(|v| (v, v.parse::<f64>())) {
+        None => "none".to_string(),
+        Some((_, Ok(value))) if value.fract() != 0.0 => human::number(value),
+        Some((text, _)) => shortened(text, SHOWN),
+    };
+    // Of a model that only one run has, its keys and its hash add nothing to its name.
+    let alone = differ.iter().any(|d| d.what == "model.toml: schema");
+    let detail = |d: &&Difference| d.what.starts_with("model.toml: ") || d.what == "model_identity";
+    for d in differ.iter().filter(|d| !(alone && detail(d))) {
         let _ = writeln!(w, "  {}: {} and {}", d.what, shown(&d.a), shown(&d.b));
     }
     text

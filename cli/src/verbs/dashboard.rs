@@ -47,7 +47,7 @@ impl Place {
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let folder = args.folder.unwrap_or_else(runs_folder);
     if !folder.is_dir() {
-        miette::bail!(help = "give --folder, or make a run first", "{} is no folder", folder.display());
+        miette::bail!(help = "give --folder, or make a run first", "{} is not a folder", folder.display());
     }
     let dashboard = args.place.serve(folder)?;
     if json {

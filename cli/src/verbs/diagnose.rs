@@ -78,8 +78,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         miette::bail!(help = "give the folder of a run", "--in-folder: {} is a table", args.data.display());
     }
     let rig_path = args.rig.as_deref().unwrap_or(&beside);
-    let rig = runs::input::rig_file(rig_path)
-        .wrap_err_with(|| format!("the rig's calibration {} (name it with --rig)", rig_path.display()))?;
+    let rig = runs::input::rig_file(rig_path).wrap_err_with(|| {
+        format!("{}: noise and stiffnesses of the rig (--rig names the file)", rig_path.display())
+    })?;
     let damage = if args.data.is_dir() { runs::run_dir::damage_in(&args.data)? } else { Vec::new() };
     let bytes = bytes_of(&table_path, MAX_TABLE_BYTES)
         .wrap_err_with(|| format!("cannot read the table {}", table_path.display()))?;

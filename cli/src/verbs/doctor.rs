@@ -87,7 +87,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         if let Some(late) = &judgement.lateness_us {
             for (when, [p50, p99, p999, max]) in [("idle", late.idle), ("loaded", late.loaded)] {
                 let line = format!(
-                    "      lateness {when}: median {p50:.0} us, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} us"
+                    "      lateness {when}: median {p50:.0} \u{b5}s, 99 % {p99:.0}, 99.9 % {p999:.0}, worst {max:.0} \u{b5}s"
                 );
                 out!("{}", folded(&line, 2));
             }
@@ -106,7 +106,7 @@ fn judge(seconds: f64) -> (Vec<Finding>, Option<Lateness>) {
     findings.push(Finding::new(
         "lateness under load",
         loaded[2] < 500.0,
-        format!("99.9 % {:.0} us, worst {:.0} us", loaded[2], loaded[3]),
+        format!("99.9 % {:.0} \u{b5}s, worst {:.0} \u{b5}s", loaded[2], loaded[3]),
         "use a PREEMPT_RT kernel, isolate a core (isolcpus, nohz_full), no virtual machine",
     ));
     (findings, Some(Lateness { idle, loaded, quantiles: [0.5, 0.99, 0.999, 1.0] }))

@@ -130,7 +130,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         let known = covariate::by_name(range.column);
         let (words, (factor, unit)) = known.map_or(("lateral force", (1e3, "mN")), |c| (c.words, c.shown));
         let [low, median, high] = range.low_median_high.map(|value| number(value * factor));
-        say!("  {words:<22} {low} to {high} {unit}, median {median}");
+        say!("  {words:<22} {}, median {median}", format!("{low} to {high} {unit}").trim_end());
     }
     log.notes.iter().for_each(|note| say!("note: {note}"));
     log.assumed.iter().for_each(|what| say!("assumed in rig.toml: {what}"));

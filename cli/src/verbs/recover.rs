@@ -22,7 +22,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let shown = || file.display().to_string();
     super::there(file, "recording")?;
     if !fs::metadata(file).into_diagnostic().wrap_err_with(shown)?.is_file() {
-        miette::bail!(help = "give a record, run-1.mcap and the like", "{} is no ordinary file", shown());
+        miette::bail!(help = "give a record, run-1.mcap and the like", "{} is not an ordinary file", shown());
     }
     let damaged = BufReader::new(File::open(file).into_diagnostic().wrap_err_with(shown)?);
     let part = files::beside(file);

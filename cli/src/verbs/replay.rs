@@ -95,7 +95,7 @@ fn again(path: PathBuf) -> miette::Result<Found> {
         let found = inspect(BufReader::new(File::open(&path).into_diagnostic()?)).sentences().join("; ");
         miette::bail!(
             help = "give a run's folder, or its run-1.mcap",
-            "{shown} is no recording of a run: it holds no {REPLAYABLE} ({found})"
+            "{shown} is not a recording of a run: it holds no {REPLAYABLE} ({found})"
         );
     };
     let built: Replayable = serde_json::from_slice(built)

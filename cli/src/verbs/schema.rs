@@ -15,6 +15,6 @@ pub struct Args {
 /// # Errors
 /// None.
 pub fn run(args: &Args) -> miette::Result<ExitCode> {
-    out!("{}", serde_json::to_string_pretty(&args.kind.schema()).into_diagnostic()?);
+    out!("{}", serde_json::to_string_pretty(&args.kind.for_editors()).into_diagnostic()?);
     exit(DONE)
 }

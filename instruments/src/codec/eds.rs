@@ -92,7 +92,7 @@ fn key(section: &str) -> Option<Key> {
     Some((u16::from_str_radix(index, 16).ok()?, u8::from_str_radix(sub, 16).ok()?))
 }
 
-/// Takes a whole section; the head of a record or an array (object type 8 or 9) is no object of its own.
+/// Takes a whole section; the head of a record or an array (object type 8 or 9) is not an object of its own.
 fn close(
     objects: &mut Objects,
     section: Option<(Key, BTreeMap<String, (String, usize)>)>,

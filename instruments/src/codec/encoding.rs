@@ -24,7 +24,7 @@ pub fn decoded(bytes: &[u8]) -> Result<String, String> {
         bytes => bytes,
     };
     if let Some(at) = bytes.iter().position(|byte| *byte == 0) {
-        return Err(format!("it is no text: byte {at} is zero"));
+        return Err(format!("it is not text: byte {at} is zero"));
     }
     Ok(std::str::from_utf8(bytes).map_or_else(
         |_| {

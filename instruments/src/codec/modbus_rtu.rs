@@ -42,7 +42,7 @@ pub enum RtuError {
 pub struct Request {
     /// The whole frame.
     pub bytes: Vec<u8>,
-    /// Bytes of a whole answer that is no exception.
+    /// Bytes of a whole answer that is not an exception.
     pub answer_length: usize,
 }
 

@@ -32,7 +32,7 @@ impl Form {
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`:{text}` is no form: `.3`, `x`, `04X`, or words as in `OFF|ON`");
+        let wrong = || format!("`:{text}` is not a form: `.3`, `x`, `04X`, or words as in `OFF|ON`");
         if let Some(decimals) = text.strip_prefix('.') {
             let decimals: u8 = decimals.parse().map_err(|_| wrong())?;
             return if decimals <= 12 { Ok(Self::Decimal(Some(decimals))) } else { Err(wrong()) };
@@ -100,7 +100,7 @@ fn decimal(text: &str) -> Option<(f64, &str)> {
     if matches!(bytes.get(end), Some(b'e' | b'E')) {
         let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
         let exponent = digits(end + 1 + sign);
-        // A letter that begins a unit is no exponent.
+        // A letter that begins a unit is not an exponent.
         end += if exponent > 0 { 1 + sign + exponent } else { 0 };
     }
     let number = format!("{}{}", &text[..signed], &text[sign..end]);

@@ -57,7 +57,7 @@ impl Compiler<'_> {
         for set in &d.set {
             if let Some(echo) = set.echo.as_ref().filter(|echo| index(echo).is_none()) {
                 let message =
-                    format!("the echo of set-point `{}`, `{echo}`, is no signal", set.name.as_ref());
+                    format!("the echo of set-point `{}`, `{echo}`, is not a signal", set.name.as_ref());
                 return Err(self.at(set.name.span(), message));
             }
         }
@@ -132,7 +132,7 @@ impl Compiler<'_> {
         let at = placed.iter().find(|(key, _)| *key == object).map(|(_, at)| *at);
         let at = at.ok_or_else(|| error(format!("{:04X}sub{} is not mapped there", object.0, object.1)))?;
         let number = sheet.get(&object).and_then(eds::Object::number);
-        let number = number.ok_or_else(|| error("the object is no number of at most 32 bits".into()))?;
+        let number = number.ok_or_else(|| error("the object is not a number of at most 32 bits".into()))?;
         // CANopen is little endian throughout.
         Ok(Field { at, number, order: ByteOrder::Dcba, bits: None })
     }
@@ -234,7 +234,7 @@ impl Compiler<'_> {
         }
         let part = |reply: &String| {
             let message = messages.get(reply).ok_or_else(|| {
-                self.at(group.name.span(), format!("`{reply}` of `{name}` is no message of the DBC file"))
+                self.at(group.name.span(), format!("`{reply}` of `{name}` is not a message of the DBC file"))
             })?;
             if let Some(fault) = &message.fault {
                 return Err(
@@ -404,7 +404,7 @@ impl Compiler<'_> {
         let name = s.name.as_ref();
         if let Some(path) = &s.dbc {
             let unknown = || {
-                self.at(s.name.span(), format!("`{path}` of signal `{name}` is no signal of its messages"))
+                self.at(s.name.span(), format!("`{path}` of signal `{name}` is not a signal of its messages"))
             };
             let (message, signal) = path.split_once('.').ok_or_else(unknown)?;
             let signal = messages.get(message).and_then(|m| m.signals.get(signal)).ok_or_else(unknown)?;
@@ -568,7 +568,7 @@ impl Compiler<'_> {
             let other = sets.iter().position(|set| set.name.as_ref() == field && set.send.is_some());
             other.map(|other| Some(SetId(other))).ok_or_else(|| {
                 let why = format!(
-                    "`{{{field}}}` in the line of set-point `{}` is no set-point of text",
+                    "`{{{field}}}` in the line of set-point `{}` is not a set-point of text",
                     s.name.as_ref()
                 );
                 self.at(s.name.span(), why)

@@ -59,7 +59,7 @@ impl Compiler<'_> {
             return Err(ProfileError::at(
                 self.text,
                 place,
-                format!("`{id}` is no id: letters, digits, `-`, `_` and `.`"),
+                format!("`{id}` is not an id: letters, digits, `-`, `_` and `.`"),
             ));
         }
         let formed = |format: &String| {
@@ -269,7 +269,7 @@ impl Compiler<'_> {
                     .as_deref()
                     .is_some_and(|hex| from_hex(hex).is_none_or(|bytes| bytes.is_empty())) =>
                 {
-                    "`hex` is no bytes in hexadecimal".into()
+                    "`hex` is not bytes in hexadecimal".into()
                 }
                 _ if init.expect.is_some() && (init.send.is_none() || kind == Udp) => {
                     "only `send` has an answer to `expect`".into()
@@ -366,7 +366,7 @@ impl Compiler<'_> {
                 return Err(ProfileError::at(
                     self.text,
                     place,
-                    format!("[emulator] speaks of `{name}`, which is no signal"),
+                    format!("[emulator] speaks of `{name}`, which is not a signal"),
                 ));
             }
         }
@@ -375,7 +375,7 @@ impl Compiler<'_> {
                 return Err(ProfileError::at(
                     self.text,
                     place,
-                    format!("[emulator] speaks of `{name}`, which is no set-point"),
+                    format!("[emulator] speaks of `{name}`, which is not a set-point"),
                 ));
             }
         }

@@ -4,7 +4,7 @@ use super::{ANSWERS, LawTable, Variable};
 use crate::condition::Condition;
 use std::fmt::Write;
 
-/// Nodes that are evaluated a second time: a law that answers differently then is no function of its
+/// Nodes that are evaluated a second time: a law that answers differently then is not a function of its
 /// variables.
 const AGAIN: usize = 16;
 

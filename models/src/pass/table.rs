@@ -43,7 +43,7 @@ pub enum TableError {
         /// What would be accepted.
         needed: &'static str,
     },
-    /// A row with the wrong number of cells, or text that is no CSV or UTF-8.
+    /// A row with the wrong number of cells, or text that is not CSV or UTF-8.
     #[error("{0}")]
     Malformed(#[from] csv::Error),
 }

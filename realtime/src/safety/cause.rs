@@ -37,7 +37,7 @@ macro_rules! causes {
 
 const FORCE_LINK: &str = "Look at the force sensor's cable and power, and at `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link.";
 const FORCE_VALUES: &str =
-    "Look at the force sensor: its values are no forces. `muprime doctor --setup` shows the link.";
+    "Look at the force sensor: its values are not forces. `muprime doctor --setup` shows the link.";
 const FORCE_RANGE: &str = "Unload and zero the force sensor, or use one with a larger range.";
 const FORCE_STANDS: &str = "Switch the force sensor off and on: its value stands still. If its noise is below one count, raise `frozen_after`.";
 const FORCE_LOSES: &str =
@@ -184,7 +184,7 @@ impl Unit {
         }
         // Amplitudes and positions are read in micrometres where metres are all zeros.
         let small = self == Self::Metre && value.abs() < 1e-3 && value != 0.0;
-        let (value, symbol) = if small { (1e6 * value, "um") } else { (value, self.symbol()) };
+        let (value, symbol) = if small { (1e6 * value, "\u{b5}m") } else { (value, self.symbol()) };
         let magnitude = if value == 0.0 || !value.is_finite() { 0.0 } else { value.abs().log10().floor() };
         let digits = (3.0 - magnitude).clamp(0.0, 9.0) as usize;
         let number = format!("{value:.digits$}");

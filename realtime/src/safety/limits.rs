@@ -60,7 +60,8 @@ mod range {
     pub const FORCE_STEP_N: Range =
         range(0.01, HARD.normal_force_max_n, "a larger step is an overforce, a smaller one is noise");
     pub const FORCE_RATE_N_S: Range = range(1.0, 500.0, "500 N/s reach the hard limit of 5 N in 10 ms");
-    pub const AMPLITUDE_RATE_M_S: Range = range(1e-6, 0.1, "0.1 m/s reach the hard limit of 10 um in 0.1 ms");
+    pub const AMPLITUDE_RATE_M_S: Range =
+        range(1e-6, 0.1, "0.1 m/s reach the hard limit of 10 \u{b5}m in 0.1 ms");
     pub const TRAVEL_M: Range = range(-0.5, 0.5, "a bench-top stage");
     pub const STROKE_M: Range = range(1e-3, 1.0, "a shorter travel has no room for a pass");
     pub const FROZEN: Range =
@@ -68,7 +69,7 @@ mod range {
     pub const REST_S: Range = range(10.0, 3600.0, "a shorter pause is no rest");
     pub const DUTY: Range = range(1e-3, 0.5, "share of an hour: a finger rests half the time");
     pub const DOSE_M2_S: Range =
-        range(1e-3, 100.0, "100 m2/s are a quarter of an hour at 5 um peak-to-peak and 30 kHz");
+        range(1e-3, 100.0, "100 m2/s are a quarter of an hour at 5 \u{b5}m peak-to-peak and 30 kHz");
     pub const CYCLE_S: Range = range(2.5e-4, 0.1, "the loop runs at 10 to 4000 Hz");
     pub const FORCE_PERIOD_S: Range =
         range(1e-5, 0.05, "a force sensor slower than 20 samples a second shows an overforce too late");

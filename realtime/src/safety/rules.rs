@@ -99,7 +99,7 @@ rules! {
     "SR-05" LateralOverforce [Newton] "Lateral force stays below its limit, either sign." => |c| overforce(c, Axis::Lateral);
     "SR-06" ForceRate [NewtonPerSecond] "Normal force does not change faster than its limit over two samples in a row." => |c| broken(c.watch.normal.fast_in_a_row >= 2, c.watch.normal.rate_n_s.abs(), c.limits.force_rate_max_n_s);
     "SR-07" OverAmplitude [Metre] "Measured amplitude stays below its limit." => |c| above(amplitude_pp_m(c), c.limits.amplitude_max.metres());
-    "SR-08" AmplitudeRunaway [Metre] "Measured amplitude stays within 30 % (and 0.3 um) of what was commanded, ring-down allowed." => runaway;
+    "SR-08" AmplitudeRunaway [Metre] "Measured amplitude stays within 30 % (and 0.3 \u{b5}m) of what was commanded, ring-down allowed." => runaway;
     "SR-09" AmplitudeRate [MetrePerSecond] "Measured amplitude does not rise faster than its limit over two samples in a row." => |c| broken(c.watch.amplitude_fast_in_a_row >= 2, c.watch.amplitude_rate_m_s, c.limits.amplitude_rate_max_m_s);
     "SR-10" LateralInvalid [Count] "Three cycles without a valid lateral sample switch off." => |c| broken(c.watch.lateral.invalid_in_a_row >= 3, f64::from(c.watch.lateral.invalid_in_a_row), 3.0);
     "SR-11" NormalInvalid [Count] "Three cycles without a valid normal sample switch off." => |c| broken(c.watch.normal.invalid_in_a_row >= 3, f64::from(c.watch.normal.invalid_in_a_row), 3.0);

@@ -23,7 +23,7 @@ pub enum FaultMode {
     Off,
     /// The values stand still while counters and clocks go on.
     Stuck,
-    /// Random values over the whole range, and values that are no numbers.
+    /// Random values over the whole range, and values that are not numbers.
     Garbage,
     /// Plausible but wrong: values times the strength (default -0.5).
     Wrong,

@@ -120,7 +120,7 @@ impl Series {
         let mut lines = text.lines();
         let began = lines.next().and_then(|l| l.strip_prefix(BEGAN)).and_then(|t| t.trim().parse().ok());
         let (Some(began_unix_s), Some(HEADER)) = (began, lines.next()) else {
-            miette::bail!(help = "delete it to begin anew", "{shown} is no series of this program");
+            miette::bail!(help = "delete it to begin anew", "{shown} is not a series of this program");
         };
         let rows: Vec<String> = lines.map(String::from).collect();
         say!(

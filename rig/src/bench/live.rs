@@ -56,7 +56,7 @@ pub fn table(setup: &Setup, table: &LiveTable<'_>) -> miette::Result<String> {
 fn take(table: &LiveTable<'_>, drive: &Drive, settings: &Settings) -> miette::Result<String> {
     drive.arm()?;
     say!(
-        "The plate will vibrate at {:.1} Hz, up to {:.2} um peak-to-peak. Nothing may touch it. Each question wants the \
+        "The plate will vibrate at {:.1} Hz, up to {:.2} \u{b5}m peak-to-peak. Nothing may touch it. Each question wants the \
          amplitude of the velocity signal in V, zero to peak; an empty line asks again after another settling.",
         table.frequency_hz,
         table.set_points_pp_m.iter().fold(0.0f64, |a, b| a.max(*b)) * 1e6
@@ -90,7 +90,7 @@ fn take(table: &LiveTable<'_>, drive: &Drive, settings: &Settings) -> miette::Re
                     Err(why) => say!("  no reading: {why}"),
                 }
             };
-            say!("  {volts} V are {:.4} um peak-to-peak", w.micrometres());
+            say!("  {volts} V are {:.4} \u{b5}m peak-to-peak", w.micrometres());
             let _ = writeln!(text, "{set_point:e},{volts},{:e}", w.metres());
         }
     }

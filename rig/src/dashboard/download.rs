@@ -38,7 +38,7 @@ pub fn files_in(run: &Path) -> Vec<String> {
     NAMES.iter().filter(|name| run.join(name).is_file()).map(ToString::to_string).chain(records).collect()
 }
 
-/// One of these files; none of another name, and nothing that is no plain file.
+/// One of these files; none of another name, and nothing that is not a plain file.
 pub fn file(run: &Path, name: &str) -> Option<Response> {
     if !files_in(run).iter().any(|one| one == name) {
         return None;

@@ -89,7 +89,7 @@ pub fn page(run: &Path, name: &str) -> miette::Result<String> {
     let path = run.join(name);
     let meta = path.symlink_metadata().into_diagnostic()?;
     if !meta.is_file() || meta.len() > LARGEST {
-        miette::bail!("{name} is no file, or larger than {} MiB", LARGEST >> 20);
+        miette::bail!("{name} is not a file, or larger than {} MiB", LARGEST >> 20);
     }
     std::fs::read_to_string(&path).into_diagnostic().wrap_err_with(|| name.to_string())
 }

@@ -78,9 +78,17 @@ const UNIT: &str = "look at unit, factor, type and byte order of the signal in i
 
 /// Judges what was found: one finding an instrument, one of the sweep, one of the plan.
 pub fn judge(look: &Look, target: &Target<'_>) -> Vec<Finding> {
-    let mut findings: Vec<Finding> = look.found.iter().map(|found| instrument(found, look, target)).collect();
-    let mended = findings.iter().all(|f| f.good);
-    findings.extend(stalled(look));
+    let mut instruments: Vec<Finding> =
+        look.found.iter().map(|found| instrument(found, look, target)).collect();
+    let mended = instruments.iter().all(|f| f.good);
+    let mut findings: Vec<Finding> = stalled(look).into_iter().collect();
+    if !findings.is_empty() {
+        // Beside stalls the look cannot tell an instrument's fault from the computer's.
+        for finding in instruments.iter_mut().filter(|f| !f.good) {
+            finding.advice = format!("first this computer (above); if it stays so: {}", finding.advice);
+        }
+    }
+    findings.append(&mut instruments);
     if look.found.iter().all(|f| f.answers.is_ok()) {
         findings.push(arming(look));
     }
@@ -185,7 +193,7 @@ fn timely(c: &ChannelReport, problems: &mut Vec<Problem>) {
             format!("{name}: {:.0} % of the looks found no valid sample ({why})", c.invalid_share * 1e2);
         let advice = match c.missing {
             Some(NoData::Invalid | NoData::Corrupt) | None => {
-                "the instrument sends what is no number, or says itself that it is not valid: look at its status, and at type and byte order in its profile"
+                "the instrument sends what is not a number, or says itself that it is not valid: look at its status, and at type and byte order in its profile"
             }
             _ => LINK,
         };
@@ -458,9 +466,12 @@ mod tests {
         let setup = Setup::load("virtual-ideal").unwrap();
         let of_computer = |look: &Look| {
             let findings = judge(look, &Target { setup: &setup, plan: None });
-            assert!(findings[0].subject.starts_with("force"), "{findings:?}");
-            let finding = findings.iter().find(|f| f.subject == "this computer").cloned();
-            (findings[0].good, finding)
+            let of = |what: &str| findings.iter().find(|f| f.subject.starts_with(what)).cloned();
+            let force = of("force").unwrap();
+            let computer = of("this computer");
+            let first = !force.good && computer.is_some();
+            assert_eq!(force.advice.starts_with("first this computer"), first, "{findings:?}");
+            (force.good, computer)
         };
         let (good, finding) = of_computer(&looked(0.48, 0.0, 7));
         let finding = finding.unwrap();

@@ -76,13 +76,13 @@ impl Answers {
     /// The terminal's lines, read on a thread of their own.
     ///
     /// # Errors
-    /// The input is no terminal: nobody is there to answer.
+    /// The input is not a terminal: nobody is there to answer.
     pub fn of_terminal() -> miette::Result<Self> {
         if !std::io::stdin().is_terminal() {
             miette::bail!(
                 help =
                     "run it at a terminal, or give the answers beforehand with --answers FILE (one a line)",
-                "the plan asks a person at the rig, and the input is no terminal"
+                "the plan asks a person at the rig, and the input is not a terminal"
             );
         }
         let (into, lines) = sync_channel(1);

@@ -72,7 +72,7 @@ pub fn columns<const N: usize>(
                 continue;
             }
             row[k] = cell.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| {
-                miette::miette!("{shown}, line {line}: `{cell}` is no number for {}", names[k])
+                miette::miette!("{shown}, line {line}: `{cell}` is not a number for {}", names[k])
             })?;
         }
         rows.push(row);

@@ -68,7 +68,7 @@ impl Step {
             Action::Clean => "clean the plate",
             Action::Wash => "wash the finger",
             Action::Dry => "dry the finger",
-            Action::Equilibrate => "let finger and plate come to the state of the room",
+            Action::Equilibrate => "wait until finger and plate have the temperature of the room",
             Action::MeasureMoisture => "measure the moisture of the skin",
             Action::ChangeTip => "change the fingertip",
             Action::Contact => "hold the finger in contact with the plate",

@@ -1,5 +1,6 @@
 //! What stands first on a page: when, who, on what, with which rig and which certificates.
 
+use super::human::quantity;
 use calibration::certificate::date;
 use models::rig_file::RigFile;
 use std::collections::BTreeMap;
@@ -65,9 +66,9 @@ pub fn of_rig(rig: &RigFile) -> Vec<(&'static str, String)> {
         (
             "stiffness",
             format!(
-                "normal {:.2} N/mm, lateral {:.2} N/mm, each within {:.0} % (standard uncertainty)",
-                finger.normal_stiffness_n_per_m * 1e-3,
-                finger.lateral_stiffness_n_per_m * 1e-3,
+                "normal {}, lateral {}, each within {:.0} % (standard uncertainty)",
+                quantity(finger.normal_stiffness_n_per_m, "N/m"),
+                quantity(finger.lateral_stiffness_n_per_m, "N/m"),
                 100.0 * finger.stiffness_relative_sd
             ),
         ),

@@ -77,7 +77,7 @@ impl Published {
             return Some("amplitude_to_m ends a range; amplitude_pp_m must begin it below".into());
         }
         if self.mu_relative.is_some_and(|mu| !mu.is_finite()) {
-            return Some("mu_relative is no number".into());
+            return Some("mu_relative is not a number".into());
         }
         let placed = [self.amplitude_pp_m, self.frequency_hz, self.speed_m_s].iter().any(Option::is_some);
         if self.source.is_empty() {

@@ -143,12 +143,12 @@ fn who_touches(file: &SetupFile, tip: &Fingertip, wrong: &mut Problems<'_>) {
     let (path, problem, remedy): (&[&str], _, _) = match (human, nobody, contact) {
         (false, true, _) => (
             &["finger", "nobody_touches_the_plate"],
-            format!("nobody_touches_the_plate, and the fingertip '{}' is no person's", tip.name),
+            format!("nobody_touches_the_plate, and the fingertip '{}' is not a person's", tip.name),
             "leave it out",
         ),
         (false, _, Some(true)) => (
             &["limits", "human_contact"],
-            format!("human_contact = true, and the fingertip '{}' is no person's", tip.name),
+            format!("human_contact = true, and the fingertip '{}' is not a person's", tip.name),
             "the fingertip decides who touches the plate: name one of kind = \"human\" as finger.tip",
         ),
         (true, true, Some(true)) => (

@@ -57,7 +57,7 @@ impl CaseFile {
     /// Reads the header.
     ///
     /// # Errors
-    /// A file that cannot be read or is no file of cases, or one whose lines were cut.
+    /// A file that cannot be read or is not a file of cases, or one whose lines were cut.
     pub fn open(path: &Path) -> miette::Result<CaseFile> {
         let wrong = || format!("{}: no file of cases", path.display());
         let path = path.canonicalize().into_diagnostic().wrap_err_with(|| path.display().to_string())?;

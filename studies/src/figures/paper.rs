@@ -175,7 +175,7 @@ fn legend(name: &str) -> String {
         "normal_force_n" => ("normal force", "F", 1.0, " N"),
         "mu0" => ("\u{b5}0", "\u{b5}0", 1.0, ""),
         "young_modulus_pa" => ("Young's modulus", "E", 1e-6, " MPa"),
-        _ => return name.replace(" um", " \u{b5}m"),
+        _ => return name.to_string(),
     };
     value.map_or_else(|| words.to_string(), |v| format!("{symbol} = {}{unit}", tick(v * factor)))
 }

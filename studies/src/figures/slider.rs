@@ -27,12 +27,12 @@ pub fn forces(reading: Reading) -> miette::Result<Reproduced> {
     let slip = cycle.slip_onset_s.map_or("none".into(), |t| format!("{:.3}", t * c.frequency_hz));
     Ok(Reproduced {
         lines: vec![format!(
-            "2 um: t_s* = {slip}, t_c* = {:.3}, mu' = {:.3}; paper: the force rises linearly to mu_0 F_reac, then follows it to zero (drawn; no number is stated)",
+            "2 \u{b5}m: t_s* = {slip}, t_c* = {:.3}, mu' = {:.3}; paper: the force rises linearly to mu_0 F_reac, then follows it to zero (drawn; no number is stated)",
             cycle.contact_fraction, cycle.mu_relative
         )],
         charts: vec![Chart::new(
             reading::file(reading, "fig10"),
-            "Spring-slider: forces from touch-down, 2 um (Fig. 10)",
+            "Spring-slider: forces from touch-down, 2 \u{b5}m (Fig. 10)",
             ["time_periods", "force_n"],
             vec![
                 Series::line("mu_0 F_reac", force(|i| i.reaction_over_normal)),
@@ -57,7 +57,7 @@ pub fn phase_shift(reading: Reading) -> miette::Result<Reproduced> {
             Ok(format!("{:.0}", cycle.touch_down_deg))
         };
         lines.push(format!(
-            "k_n {} MN/m: contact is lost from {:.2} um, touch-down at {} deg at 1.35 um, {} at 2.5 um and {} at 5 um",
+            "k_n {} MN/m: contact is lost from {:.2} \u{b5}m, touch-down at {} deg at 1.35 \u{b5}m, {} at 2.5 \u{b5}m and {} at 5 \u{b5}m",
             kn / 1e6,
             1e6 * reading.w_m(first),
             touch(1.35)?,
@@ -90,7 +90,7 @@ pub fn phase_shift(reading: Reading) -> miette::Result<Reproduced> {
     }
     Ok(Reproduced {
         charts,
-        lines: lines.into_iter().chain(["paper: 0.2 to 4 MN/m give phases like the measured ones (transition at 0.4 to 1.3 um, about 90 deg beyond), rising from zero at the loss of contact, the later the softer the spring; so here with the time of touch-down, while the acceleration's peak (just before separation) starts from 360 deg".into()]).collect(),
+        lines: lines.into_iter().chain(["paper: 0.2 to 4 MN/m give phases like the measured ones (transition at 0.4 to 1.3 \u{b5}m, about 90 deg beyond), rising from zero at the loss of contact, the later the softer the spring; so here with the time of touch-down, while the acceleration's peak (just before separation) starts from 360 deg".into()]).collect(),
     })
 }
 
@@ -109,7 +109,7 @@ pub fn slow_recovery(reading: Reading) -> miette::Result<Reproduced> {
     let last = |v: &[(f64, f64)]| v.last().map_or(f64::NAN, |p| p.1);
     Ok(Reproduced {
         lines: vec![format!(
-            "5 um: mu' climbs from {:.3} to {:.3} with 1.5 mm/s, and is {:.3} with instant recovery; that is {:.3} of mu_0 F_reac in the end; paper: climbs to a value slightly less than mu_0 F_reac",
+            "5 \u{b5}m: mu' climbs from {:.3} to {:.3} with 1.5 mm/s, and is {:.3} with instant recovery; that is {:.3} of mu_0 F_reac in the end; paper: climbs to a value slightly less than mu_0 F_reac",
             held.first().map_or(f64::NAN, |p| p.1),
             last(&held),
             last(&free),
@@ -139,7 +139,7 @@ pub fn steady_recovery(reading: Reading) -> miette::Result<Reproduced> {
     }
     Ok(Reproduced {
         lines: vec![format!(
-            "steady mu' at 5 um for recovery speeds in mm/s: {}; paper: falls as the recovery gets faster, 1.5 to 15 mm/s (drawn; no value is stated)",
+            "steady mu' at 5 \u{b5}m for recovery speeds in mm/s: {}; paper: falls as the recovery gets faster, 1.5 to 15 mm/s (drawn; no value is stated)",
             at_five.join(", ")
         )],
         charts: vec![Chart::new(

@@ -51,7 +51,7 @@ pub fn with_place_and_help(report: miette::Report, name: &str, kind: Option<&str
         return report;
     }
     let Ok(text) = text_of(name) else {
-        // What is no text has no place; it may lack the remedy.
+        // What is not text has no place; it may lack the remedy.
         let help = found[0].help.clone().unwrap_or_else(|| remedy(kind));
         return if report.help().is_some() {
             report

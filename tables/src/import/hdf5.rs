@@ -141,7 +141,7 @@ impl Found {
                     "{name} is a compound table, which is not read; in Python: pandas.DataFrame(f['{name}'][:]).to_csv('{name}.csv')"
                 )));
             }
-            _ => return Ok(Some(format!("{name} is no array of numbers: passed over"))),
+            _ => return Ok(Some(format!("{name} is not an array of numbers: passed over"))),
         };
         if cells.is_empty() || cells.len() != count {
             return Ok(Some(format!("{name} is empty: passed over")));

@@ -189,7 +189,7 @@ fn names() -> String {
 fn target_of(text: &str) -> Result<(usize, Unit, String), String> {
     let (name, unit_text) =
         text.split_once(':').map_or((text.trim(), None), |(n, u)| (n.trim(), Some(u.trim())));
-    let at = Target::named(name).ok_or_else(|| format!("'{name}' is no target; there are {}", names()))?;
+    let at = Target::named(name).ok_or_else(|| format!("'{name}' is not a target; there are {}", names()))?;
     let target = &TARGETS[at];
     let Kind::Number(dimension) = target.kind else {
         return match unit_text {
@@ -201,8 +201,9 @@ fn target_of(text: &str) -> Result<(usize, Unit, String), String> {
     let bare = matches!(dimension, Dimension::Ratio) || by_column;
     match unit_text {
         Some(text) => {
-            let unit = Unit::parse(dimension, text)
-                .ok_or_else(|| format!("'{text}' is no unit of {name}; there are {}", dimension.known()))?;
+            let unit = Unit::parse(dimension, text).ok_or_else(|| {
+                format!("'{text}' is not a unit of {name}; there are {}", dimension.known())
+            })?;
             Ok((at, unit, text.to_string()))
         }
         None if bare => Ok((at, Unit::SI, dimension.si().to_string())),
@@ -261,7 +262,7 @@ fn constant(entry: &str) -> Result<Option<Constant>, String> {
             // A value without a unit is SI, as the columns of the point table are.
             let unit_text = unit.unwrap_or(dimension.si());
             let unit = Unit::parse(dimension, unit_text).ok_or_else(|| {
-                format!("--set {name}: '{unit_text}' is no unit; there are {}", dimension.known())
+                format!("--set {name}: '{unit_text}' is not a unit; there are {}", dimension.known())
             })?;
             unit.apply(number).ok_or_else(bad)?
         }

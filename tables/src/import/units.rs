@@ -225,7 +225,7 @@ impl Unit {
         })
     }
 
-    /// The value in SI of a number as it is written, a decimal point its only mark; `None` for what is no finite number.
+    /// The value in SI of a number as it is written, a decimal point its only mark; `None` for what is not a finite number.
     pub fn apply(&self, number: &str) -> Option<f64> {
         let moved = moved(number, self.ten)?;
         Some(moved * self.times / self.over + self.plus).filter(|v| v.is_finite())
@@ -242,7 +242,7 @@ impl Unit {
     }
 }
 
-/// A number before a unit (`12.5N`), which is no fraction (`1/min`).
+/// A number before a unit (`12.5N`), which is not a fraction (`1/min`).
 fn factored(text: &str) -> Option<(f64, &str)> {
     let digits = text.bytes().take_while(|b| b.is_ascii_digit() || *b == b'.').count();
     let exponent = text[digits..].strip_prefix(['e', 'E']).map_or(0, |rest| {

@@ -225,7 +225,7 @@ impl Repeats {
         self.rest.extend_from_slice(bytes);
         let whole = self.rest.iter().rposition(|b| *b == b'>').map_or(0, |at| at + 1);
         let text: Vec<u8> = self.rest.drain(..whole).collect();
-        // What is one tag of more than this is no tag.
+        // What is one tag of more than this is not a tag.
         if self.rest.len() > 1 << 16 {
             self.rest.clear();
         }

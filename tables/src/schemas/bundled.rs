@@ -15,7 +15,7 @@ pub struct Bundled {
 }
 
 impl Bundled {
-    /// The first sentences of its first comment, which say what it is; of a fingertip the material.
+    /// The first sentence of its first comment, which says what it is; of a fingertip the material.
     pub fn about(&self) -> String {
         let lines = self.text.lines().skip_while(|line| !line.starts_with("# "));
         let comment: Vec<&str> = lines.map_while(|line| line.strip_prefix("# ")).collect();
@@ -23,7 +23,7 @@ impl Bundled {
         let Some(all) = Some(comment.join(" ")).filter(|all| !all.is_empty()) else {
             return material().unwrap_or_default().trim_matches('"').to_string();
         };
-        all.split_inclusive(". ").take(2).collect::<String>().trim_end().to_string()
+        all.split_inclusive(". ").next().unwrap_or_default().trim_end().to_string()
     }
 }
 

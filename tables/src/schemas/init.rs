@@ -33,7 +33,7 @@ impl Kind {
             Kind::Fingertip => Schema::Fingertip,
             Kind::Profile => Schema::Profile,
         }
-        .schema()
+        .for_editors()
     }
 }
 

@@ -105,6 +105,43 @@ impl Kind {
         };
         schema.to_value()
     }
+
+    /// The schema for editors: a quantity may also be a text with its unit, as the readers of these files take it.
+    pub fn for_editors(self) -> Value {
+        let mut schema = self.schema();
+        if matches!(self, Kind::Plan | Kind::Campaign | Kind::Setup | Kind::Fingertip | Kind::Rig) {
+            admit_units(&mut schema, "");
+        }
+        schema
+    }
+}
+
+/// Lets each number below the key of a quantity (`speed_m_s`) be a text with a unit as well: `"20mm/s"`.
+fn admit_units(schema: &mut Value, unit: &str) {
+    let numeric =
+        schema["type"] == "number" || schema["type"].as_array().is_some_and(|t| t.contains(&json!("number")));
+    match schema {
+        Value::Object(number) if numeric && !unit.is_empty() => {
+            let description = number.remove("description");
+            let text = json!({ "type": "string", "pattern": "^[-+]?[0-9.]+([eE][-+]?[0-9]+)? *[A-Za-z%\u{b5}\u{b0}].*$" });
+            let mut both = json!({ "anyOf": [Value::Object(std::mem::take(number)), text] });
+            both["description"] =
+                description.unwrap_or_else(|| json!(format!("In {unit}, or a text with a unit.")));
+            *schema = both;
+        }
+        Value::Object(object) => {
+            for (key, below) in object {
+                match (key.as_str(), below) {
+                    ("properties", Value::Object(all)) => {
+                        all.iter_mut().for_each(|(name, of)| admit_units(of, runs::input::unit_of(name)));
+                    }
+                    (_, below) => admit_units(below, unit),
+                }
+            }
+        }
+        Value::Array(all) => all.iter_mut().for_each(|of| admit_units(of, unit)),
+        _ => {}
+    }
 }
 
 /// The row of a point table: its columns by the targets of the import, which have words for all of them, with
@@ -144,4 +181,23 @@ fn table() -> Value {
         "properties": properties,
         "required": required,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Kind;
+
+    #[test]
+    fn editors_are_offered_texts_with_units_where_the_readers_take_them() {
+        let plan = Kind::Plan.for_editors();
+        let text = |of: &serde_json::Value| of["anyOf"][1]["type"].clone();
+        assert_eq!(text(&plan["$defs"]["Base"]["properties"]["speed_m_s"]), "string", "{plan:#}");
+        assert_eq!(
+            text(&plan["$defs"]["Series"]["properties"]["frequency_hz"]["items"]),
+            "string",
+            "{plan:#}"
+        );
+        assert_eq!(plan["properties"]["seed"], Kind::Plan.schema()["properties"]["seed"]);
+        assert_eq!(Kind::Verdict.for_editors(), Kind::Verdict.schema());
+    }
 }

@@ -78,7 +78,7 @@ fn word<'a>(info: &'a str, key: &str) -> Option<&'a str> {
 fn commands(info: &str, lines: &[&str], first: usize) -> Result<Vec<Command>, String> {
     let near = match word(info, "near") {
         None => Near::LastDigit,
-        Some(share) => Near::Share(share.parse().map_err(|_| format!("near={share} is no number"))?),
+        Some(share) => Near::Share(share.parse().map_err(|_| format!("near={share} is not a number"))?),
     };
     let mut all: Vec<Command> = Vec::new();
     let mut open = false;
@@ -106,7 +106,7 @@ fn commands(info: &str, lines: &[&str], first: usize) -> Result<Vec<Command>, St
         open = (open || line.starts_with("$ ")) && line.ends_with('\\');
     }
     if let (Some(status), Some(last)) = (word(info, "status"), all.last_mut()) {
-        last.status = status.parse().map_err(|_| format!("status={status} is no number"))?;
+        last.status = status.parse().map_err(|_| format!("status={status} is not a number"))?;
     }
     Ok(all)
 }

@@ -180,10 +180,10 @@ fn a_verdict_claims_no_certainty() {
 fn a_point_that_no_rig_can_have_is_refused() {
     let point = |words: &[&str]| muprime().args(["model"]).args(words).output().unwrap();
     for (words, hint) in [
-        (["point", "--amplitude-pp-m", "2"], "um meant? Then write 2e-6"),
+        (["point", "--amplitude-pp-m", "2"], "\u{b5}m meant? Then write 2e-6"),
         (["point", "--speed-m-s", "20"], "mm/s meant? Then write 2e-2"),
         (["point", "--normal-force-n", "5000"], "0 to 1000 N"),
-        (["ridge", "--amplitude-pp-m", "2"], "um meant?"),
+        (["ridge", "--amplitude-pp-m", "2"], "\u{b5}m meant?"),
     ] {
         let ended = point(&words);
         let (said, err) = texts(&ended);
@@ -191,5 +191,5 @@ fn a_point_that_no_rig_can_have_is_refused() {
     }
     let said = done(&point(&["point"]));
     assert!(said.contains("mu' = 0.29") && !said.contains("+-"), "{said}");
-    assert!(done(&point(&["point", "--model", "surrogate"])).contains("+-"));
+    assert!(done(&point(&["point", "--model", "surrogate"])).contains("\u{b1}"));
 }

@@ -197,7 +197,7 @@ fn a_converter_of_the_kernel_is_read_by_its_attributes() {
     gone.address = folder.path().join("iio:device1").display().to_string();
     let (endpoint, _port) = drivers::endpoint::Endpoint::force(gone.description().unwrap(), &gone).unwrap();
     let said = drivers::open_one(&gone, endpoint, Instant::now()).err().unwrap().to_string();
-    assert!(said.contains("is no folder"), "{said}");
+    assert!(said.contains("is not a folder"), "{said}");
 }
 
 /// The same device by our own emulator, as the virtual rig serves it.

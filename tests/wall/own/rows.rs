@@ -115,7 +115,7 @@ rows! {
     "generator" "half" "half an answer" 1000 Trips(DRIVE_GONE, 3000.0);
     "generator" "refused" "every set-point is refused" 2500 Trips(&[AmplifierFault], 3000.0), always;
     "generator" "closed" "unplugged, it goes on vibrating" 1000 Trips(DRIVE_GONE, 3000.0);
-    "generator" "nan" "a level that is no number" 1000 Trips(DRIVE_GONE, 3000.0);
+    "generator" "nan" "a level that is not a number" 1000 Trips(DRIVE_GONE, 3000.0);
     "generator" "jump" "shows 3 um more than it was told" 1000 Trips(&[EchoMismatch, OverAmplitude], 3000.0);
     "generator" "drops" "drops its output, and shows it on" 500 Unseen("nothing measures this plate: give the rig an amplifier that does, or a vibrometer");
     "generator" "alarm" "an alarm with a number" 1000 Trips(&[AmplifierFault], 3000.0);

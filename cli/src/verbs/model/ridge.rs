@@ -36,9 +36,9 @@ pub struct RidgeArgs {
     /// Retardation time of the tissue in s (0: elastic)
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     retardation_time_s: f64,
-    /// Contact penalty over the stratum corneum's modulus
-    #[arg(long, default_value_t = case::PENALTY_RATIO, allow_negative_numbers = true)]
-    penalty_ratio: f64,
+    /// Contact penalty over the stratum corneum's modulus (3.29 if left out)
+    #[arg(long, allow_negative_numbers = true)]
+    penalty_ratio: Option<f64>,
     /// Contact penalty along the plate over that across it, up to 1
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     tangential_penalty_ratio: f64,
@@ -82,7 +82,7 @@ impl RidgeArgs {
         let mut case = self.condition.ridge_case(self.mean_pressure_pa);
         case.young_modulus_pa = self.young_modulus_pa;
         case.retardation_time_s = self.retardation_time_s;
-        case.penalty_ratio = self.penalty_ratio;
+        case.penalty_ratio = self.penalty_ratio.unwrap_or(case::PENALTY_RATIO);
         case.tangential_penalty_ratio = self.tangential_penalty_ratio;
         case.tangential_stiffness_pa_m = self.tangential_stiffness_pa_m;
         case.mass_damping_per_s = self.mass_damping_per_s;

@@ -26,9 +26,9 @@ pub struct StiffnessArgs {
     /// Young's modulus of the stratum corneum in Pa
     #[arg(long, default_value_t = 28.3e6, allow_negative_numbers = true)]
     young_modulus_pa: f64,
-    /// Contact penalty over the stratum corneum's modulus
-    #[arg(long, default_value_t = case::PENALTY_RATIO, allow_negative_numbers = true)]
-    penalty_ratio: f64,
+    /// Contact penalty over the stratum corneum's modulus (3.29 if left out)
+    #[arg(long, allow_negative_numbers = true)]
+    penalty_ratio: Option<f64>,
     /// Contact penalty along the plate over that across it, up to 1
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     tangential_penalty_ratio: f64,
@@ -47,7 +47,7 @@ impl StiffnessArgs {
             mean_pressure_pa: self.mean_pressure_pa,
             poisson_ratio: self.poisson_ratio,
             young_modulus_pa: self.young_modulus_pa,
-            penalty_ratio: self.penalty_ratio,
+            penalty_ratio: self.penalty_ratio.unwrap_or(case::PENALTY_RATIO),
             tangential_penalty_ratio: self.tangential_penalty_ratio,
             tangential_stiffness_pa_m: self.tangential_stiffness_pa_m,
             ..RidgeCase::paper()
@@ -86,9 +86,9 @@ fn table(base: RidgeCase) -> Vec<Row> {
         row("as given", base),
         row("ellipse", shaped(RidgeProfile::Ellipse)),
         row("flat slab", shaped(RidgeProfile::Flat)),
-        row("ridge 50 um high", ridge(50e-6)),
-        row("inner corneum 30 um", corneum(30e-6)),
-        row("inner corneum 300 um", corneum(300e-6)),
+        row("ridge 50 \u{b5}m high", ridge(50e-6)),
+        row("inner corneum 30 \u{b5}m", corneum(30e-6)),
+        row("inner corneum 300 \u{b5}m", corneum(300e-6)),
         row("modulus 20 MPa", RidgeCase { young_modulus_pa: 20e6, ..base }),
         row("modulus 200 MPa", RidgeCase { young_modulus_pa: 200e6, ..base }),
         row("Poisson's ratio 0.2", RidgeCase { poisson_ratio: 0.2, ..base }),
@@ -246,7 +246,7 @@ pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
         "",
         "held at",
         "load",
-        "width um",
+        "width \u{b5}m",
         "k_n MN/m",
         "secant",
         "k_l MN/m",

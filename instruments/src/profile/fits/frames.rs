@@ -48,7 +48,7 @@ impl Compiler<'_> {
                 .any(|s| s.name.as_ref() == signal && s.frame.as_ref().is_none_or(|f| f == name));
             if !stands {
                 return Err(
-                    self.at(poll.name.span(), format!("`{signal}` of poll `{name}` is no signal in it"))
+                    self.at(poll.name.span(), format!("`{signal}` of poll `{name}` is not a signal in it"))
                 );
             }
         }
@@ -159,14 +159,15 @@ impl Compiler<'_> {
             };
             if let Some(name) = named.filter(|name| !stands(name)) {
                 let place = self.text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
-                let why = format!("`sequence` of `{}`: `{name}` is no signal in it", frame.name);
+                let why = format!("`sequence` of `{}`: `{name}` is not a signal in it", frame.name);
                 return Err(ProfileError::at(self.text, place, why));
             }
             if let Some(crate::codec::text::Form::Pattern(pattern)) = &frame.text
                 && let Some((name, _)) = pattern.fields().find(|(name, _)| !stands(name))
             {
                 let place = self.text.find(&format!("{{{name}")).map(|at| at..at + name.len() + 1);
-                let why = format!("`{{{name}}}` in the line of `{}` is no signal of that frame", frame.name);
+                let why =
+                    format!("`{{{name}}}` in the line of `{}` is not a signal of that frame", frame.name);
                 return Err(ProfileError::at(self.text, place, why)
                     .with_help("`{*}` stands for what does not matter"));
             }

@@ -479,7 +479,7 @@ fn beyond_the_travel_only_the_way_back_is_let_through() {
 }
 
 /// Every value of a setup has two hard ends: at each it is taken, beyond each it is refused by its name with
-/// the range; what is no number, zero where nothing is, and what is absurd are beyond.
+/// the range; what is not a number, zero where nothing is, and what is absurd are beyond.
 #[test]
 fn every_range_is_closed_at_both_ends() {
     type Set = fn(&mut Limits, f64);

@@ -57,7 +57,7 @@ fn a_trip_is_told_in_its_unit() {
     // One rule, several units: the trip has that of what broke it.
     let much = Request { amplitude: PeakToPeak::from_metres(9e-6), frequency_hz: 27_500.0, ..slow };
     let text = tripped(much, |_| {}).to_string();
-    assert!(text.contains("9 um (limit ") && text.contains("[SR-30]"), "{text}");
+    assert!(text.contains("9 \u{b5}m (limit ") && text.contains("[SR-30]"), "{text}");
     let high = Request { amplitude: PeakToPeak::from_metres(1e-6), frequency_hz: 2e6, ..slow };
     let text = tripped(high, |_| {}).to_string();
     assert!(text.contains("2000000 Hz (limit "), "{text}");

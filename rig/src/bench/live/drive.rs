@@ -142,7 +142,7 @@ impl Drive {
         let why = seen.tripped.map(|trip| trip.cause).or(seen.row.and_then(|row| row.waits_for));
         Err(match why {
             Some(cause) => format!("the rig has tripped ({})", cause.words()),
-            None => format!("{:.3} um are not reached in {REACH_WITHIN_S} s", amplitude.micrometres()),
+            None => format!("{:.3} \u{b5}m are not reached in {REACH_WITHIN_S} s", amplitude.micrometres()),
         })
     }
 

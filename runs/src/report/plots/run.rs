@@ -221,7 +221,7 @@ pub fn lateness(report: &LoopReport) -> miette::Result<String> {
     let most = bars.iter().map(|b| b.1).fold(10.0, f64::max) * 2.0;
     let frame = Frame {
         sizes: [(WIDE.0, 300), NARROW],
-        x: (Span::logarithmic(0.5..highest), "lateness, us"),
+        x: (Span::logarithmic(0.5..highest), "lateness, \u{b5}s"),
         y: (Span::logarithmic(0.7..most), "deadlines"),
         alt: "Histogram of the lateness of the loop's cycles; the figures below say the same.",
     };

@@ -428,7 +428,7 @@ impl Watch {
             }
         }
         if row.mu_relative.is_ok_and(|mu| !mu.value.is_finite()) {
-            self.wrong.push(format!("mu' is no number in cycle {cycle}"));
+            self.wrong.push(format!("mu' is not a number in cycle {cycle}"));
         }
         let at = shown_ns / T.0 - if paused > 0 { paused.min(shown_ns / T.0) } else { 0 };
         for shown in &mut self.shown {

@@ -22,7 +22,7 @@ pub fn lines(study: Study, results: &store::Results) -> Vec<String> {
                 hit.map_or("missing".into(), |p| format!("{:.0} deg", p.1))
             };
             lines.push(format!(
-                "{} {value}: passes 30 and 60 deg at {} and {} um; at 2.5 um {}, at 5 um {}",
+                "{} {value}: passes 30 and 60 deg at {} and {} \u{b5}m; at 2.5 \u{b5}m {}, at 5 \u{b5}m {}",
                 panel.variable(),
                 figures::passing(&curve, 30.0),
                 figures::passing(&curve, 60.0),
