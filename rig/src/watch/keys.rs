@@ -85,9 +85,9 @@ pub(super) fn take_keys(shared: &Shared) {
     }
 }
 
-/// The byte of Ctrl-C where it is no signal.
+/// The byte of Ctrl-C where it is not a signal.
 const CTRL_C: u8 = 3;
-/// What a terminal's longer codes begin with: an arrow is no letter.
+/// What a terminal's longer codes begin with: an arrow is not a letter.
 const ESCAPE: u8 = 27;
 
 fn take(shared: &Shared, pressed: &[u8]) {
