@@ -145,14 +145,14 @@ fn page() -> String {
          Where a relay is fitted, a machine that is short of time leaves two things behind before arming, with nothing driven in either:\n\n\
          - A board that is not heard for its age limit (80 ms by default) is a silent emergency stop (SR-35): the supply is cut, and stays \
          cut until it is proved. An amplifier that reports its open supply then shows a fault (SR-20): only the proof clears it, so \
-         the sweep does not wait for it, and asks for its reset once nothing else has stood in the way for 50 ms. The amplifier is told \
-         nothing: its fault is gone once its supply is closed, or the proof fails after 5 s for that cause.\n\
+         the sweep does not wait for it, and asks for its reset once nothing else has stood in the way for 50 ms. The amplifier gets \
+         no command: its fault is gone once its supply is closed, or the proof fails after 5 s for that cause.\n\
          - A proof in which the loop was late (SR-29, SR-31), or was held up while a sample or a contact grew too old, trips. It is made \
-         again once no more deadlines were missed of the last thousand than an armed rig may miss, within the three resets and the ten seconds that an arming has; a relay that did not do what it was told, and what an \
+         again once no more deadlines were missed of the last thousand than an armed rig may miss, within the three resets and the ten seconds that an arming has; a relay that did not follow its command, and what an \
          instrument reports, end it at once. With a human finger no proof is made again.\n\n\
          Both are the event `arming_disturbed` with the rule and how long the loop was held up. No reset is asked for by a \
          program once the emergency stop was seen pressed or the amplifier refused 'off' (SR-24), though it be released or off since; \
-         nor after a trip of an armed rig. Where the supply stands open unasked, what stands in the way is SR-37, not its amplifier's \
+         nor after a trip of an armed rig. Where the supply is open without a command, SR-37 keeps the rig from arming, not its amplifier's \
          fault.\n",
     );
     out.push_str(

@@ -93,10 +93,10 @@ pub fn remark(list: &[SeenFrom]) -> Option<String> {
     let hidden = if unseen.is_empty() {
         String::new()
     } else {
-        format!(" Of no size would it have shown: {}.", unseen.join(", "))
+        format!(" Not detectable at any size: {}.", unseen.join(", "))
     };
     Some(format!(
-        "A gap would have been seen from {:.4} of full friction ({}) to {:.4} ({}), root mean square, by the effect; \
+        "The smallest detectable gap depends on the effect: {:.4} of full friction ({}) to {:.4} ({}), root mean square; \
          `seen_from` has each.{hidden}",
         first.gap_rmse?, first.effect, last.gap_rmse?, last.effect
     ))

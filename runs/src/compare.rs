@@ -159,7 +159,7 @@ impl Judged {
         match self.answer {
             Answer::Differ => "the runs differ by more than their uncertainty explains".into(),
             Answer::NoDifferenceSeen => format!(
-                "no difference seen; a shift of mu' above {:.3} would have been seen with 90 % probability",
+                "no difference seen; a shift of mu' above {:.3} would have been detected with 90 % probability",
                 self.visible_shift
             ),
             Answer::NotIndependent => "cannot tell: the runs are not independent of each other".into(),

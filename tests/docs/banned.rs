@@ -31,20 +31,15 @@ const BANNED: &[&str] = &[
     "nats expected",
 ];
 
-/// Sources whose strings people read at a terminal, in events and on report pages; and whole pages.
+/// Sources whose strings people read at a terminal, in events and on report pages; and pages beside those of the book.
 pub const ROOMS: &[&str] = &[
     "README.md",
     "SECURITY.md",
     "CODE_OF_CONDUCT.md",
     "examples/README.md",
-    "docs/diagnosis.md",
-    "docs/diagnosis/rules.md",
-    "docs/faq.md",
-    "docs/how-to/report-a-result.md",
-    "docs/install.md",
-    "docs/introduction.md",
-    "docs/troubleshooting.md",
-    "docs/run-folder.md",
+    "CONTRIBUTING.md",
+    "ARCHITECTURE.md",
+    "python/README.md",
     "runs/src/report/events.rs",
     "runs/src/report/page.rs",
     "runs/src/verdict.rs",
@@ -93,7 +88,14 @@ pub fn look(commands: &Commands) -> (usize, Vec<String>) {
         texts.push((format!("muprime {typed}"), out + &err));
     }
     texts.push(("errors".into(), std::fs::read_to_string(file("docs/how-to/errors.md")).unwrap_or_default()));
-    for room in ROOMS {
+    let summary = std::fs::read_to_string(file("docs/SUMMARY.md")).unwrap();
+    let pages = summary
+        .split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split_once(')'))
+        .map(|(page, _)| format!("docs/{page}"));
+    let pages: Vec<String> = pages.filter(|page| page.ends_with(".md") && !page.contains("..")).collect();
+    for room in ROOMS.iter().copied().chain(pages.iter().map(String::as_str)) {
         let text = std::fs::read_to_string(file(room)).unwrap();
         // Of a source the strings: comments are for its readers. Tests at its end are none of it.
         let text = if room.ends_with(".rs") {
@@ -102,7 +104,7 @@ pub fn look(commands: &Commands) -> (usize, Vec<String>) {
         } else {
             text
         };
-        texts.push(((*room).to_string(), text));
+        texts.push((room.to_string(), text));
     }
     let mut read = 0;
     let mut wrong = Vec::new();

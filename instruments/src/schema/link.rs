@@ -28,7 +28,7 @@ pub enum LinkKind {
     Sysfs,
 }
 
-/// `[link]`: how the instrument is reached. The address itself stands in the setup.
+/// `[link]`: how the instrument is reached. The setup has the address itself.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Link {

@@ -132,7 +132,7 @@ rows! {
     "stage" "closed" "unplugged" 1000 Trips(STAGE_GONE, 800.0);
     "stage" "wrong-unit" "another unit's answer" 1000 Trips(STAGE_GONE, 800.0);
     "stage" "jump" "300 mm further at once" 1000 Trips(&[OverTravel], 800.0);
-    "stage" "shift" "30 mm further at once, within its travel" 1000 Unseen("what a stage says of its place is not held against its speed");
+    "stage" "shift" "30 mm further at once, within its travel" 1000 Unseen("no rule compares a stage's position with its speed");
     "stage" "half" "half an answer" 1000 Trips(STAGE_GONE, 800.0);
     "stage" "fault" "status: fault" 1000 Trips(&[StageFault], 800.0), always;
     "stage" "deaf" "takes set-points and does nothing" 4000 Trips(&[StageNotFollowing], 2500.0);
