@@ -28,7 +28,7 @@ pub fn remark(finding: Option<&ReadingFinding>, verdict: Verdict) -> Option<Stri
     let finding = finding.filter(|f| f.decision != Decision::TooLittle)?;
     let as_measured = match verdict {
         Verdict::NoGap => "",
-        _ => " (of the passes as measured: what causes the gap moves Psi* too)",
+        _ => " These are the passes as measured: the cause of the gap moves Psi* too.",
     };
-    Some(format!("Eq. 20 of the paper: {finding}{as_measured}."))
+    Some(format!("Eq. 20 of the paper, {finding}.{as_measured}"))
 }

@@ -303,10 +303,10 @@ impl Need {
             Need::Temperatures => "temperature_c is missing, or does not change",
             Need::Record => "means over passes do not show it; a time-resolved run record is missing",
             Need::OutsideStandard => {
-                "it acts like a change of mu0 and lateral stiffness: calibrate the lateral axis with weights"
+                "it acts like a change of mu0 and lateral stiffness; calibrate the lateral axis with weights"
             }
             Need::NormalStandard => {
-                "it acts like a change of mu0 and normal stiffness: calibrate the normal axis with weights"
+                "it acts like a change of mu0 and normal stiffness; calibrate the normal axis with weights"
             }
         }
     }
