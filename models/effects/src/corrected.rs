@@ -289,16 +289,17 @@ impl Corrected {
     /// Signed mean lateral force that the sensor will read at a pass, N; NaN where the base law cannot tell.
     /// Allocates nothing.
     pub fn lateral_force(&self, pass: &Condition) -> f64 {
-        let beside = self.law.as_ref().map_or(Ok(0.0), |(_, reference)| self.beside(reference.mu0, pass));
-        self.lateral_force_from(&self.baseline, pass) + beside.unwrap_or(f64::NAN)
+        let beside = self.law.as_ref().map_or(Ok([0.0; 2]), |(_, reference)| self.beside(reference.mu0, pass));
+        self.lateral_force_from(&self.baseline, pass) + beside.map_or(f64::NAN, |[force, _]| force)
     }
 
-    /// Force of the base law less that of the spring-slider which stands for it, N, signed; zero without a
-    /// base law.
-    fn beside(&self, mu0: f64, pass: &Condition) -> Result<f64, OutOfDomain> {
-        let Some((law, reference)) = &self.law else { return Ok(0.0) };
-        let force = law.predict(&Condition { mu0, ..*pass })?.lateral_force_n * pass.direction.sign();
-        Ok(force - lateral_force(&Baseline { mu0, ..*reference }, &[], pass, &self.design))
+    /// Force of the base law less that of the spring-slider which stands for it, N, signed, and the standard
+    /// deviation of the law's `mu'`; zeros without a base law.
+    fn beside(&self, mu0: f64, pass: &Condition) -> Result<[f64; 2], OutOfDomain> {
+        let Some((law, reference)) = &self.law else { return Ok([0.0; 2]) };
+        let of = law.predict(&Condition { mu0, ..*pass })?;
+        let slider = lateral_force(&Baseline { mu0, ..*reference }, &[], pass, &self.design);
+        Ok([of.lateral_force_n * pass.direction.sign() - slider, law.form_sd(&of)])
     }
 
     fn lateral_force_from(&self, baseline: &Baseline, pass: &Condition) -> f64 {
@@ -321,8 +322,8 @@ impl FrictionModel for Corrected {
         self.law.as_ref().map(|(law, _)| &**law)
     }
 
-    fn form_sd(&self, condition: &Condition) -> f64 {
-        self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
+    fn form_sd(&self, of: &Prediction) -> f64 {
+        of.mu_relative_sd
     }
 
     /// The lateral force is what the sensor will read along the motion, so an effect of an instrument is in
@@ -333,10 +334,10 @@ impl FrictionModel for Corrected {
         let baseline = Baseline { mu0: condition.mu0, ..self.baseline };
         let sign = condition.direction.sign();
         let sliding = self.lateral_force_from(&baseline, condition);
-        let along = sign * (sliding + self.beside(condition.mu0, condition)?);
+        let [beside, of_law] = self.beside(condition.mu0, condition)?;
+        let along = sign * (sliding + beside);
         let full = condition.mu0 * condition.normal_force_n;
         let change = sliding - lateral_force(&baseline, &[], condition, &self.design);
-        let of_law = self.law.as_ref().map_or(0.0, |(law, _)| law.form_sd(condition));
         let contact = self.baseline.contact(condition, &self.design);
         let regime = if contact.amplitude_pp < crate::contact::STILL_PLATE_M || contact.load_ratio() >= 1.0 {
             Regime::FullContact
