@@ -100,7 +100,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
             continue;
         }
         match table.lacks(effect.needs) {
-            Some(because) => not_testable.push((effect.name, certified(*effect, rig).unwrap_or(because))),
+            Some(because) => not_testable.push((effect.name, certified(effect, rig).unwrap_or(because))),
             None => tried.push(index),
         }
     }
