@@ -86,7 +86,7 @@ fn laws_that_act_as_a_change_of_the_baseline_do_so_exactly() {
                     normal_stiffness_n_per_m: BASELINE.normal_stiffness_n_per_m * (normal * size).exp(),
                     lateral_stiffness_n_per_m: BASELINE.lateral_stiffness_n_per_m * (lateral * size).exp(),
                 };
-                let with = forces(&BASELINE, &[Active { effect: *effect, law, theta: &[size] }]);
+                let with = forces(&BASELINE, &[Active { effect, law, theta: &[size] }]);
                 let off = apart(&with, &forces(&changed, &[]));
                 assert!(off < 1e-9, "{} ({}) at {size}: off by {off:.1e}", effect.name, form.name);
                 assert!(apart(&with, &forces(&BASELINE, &[])) > 1e-3, "{}: nothing changes", effect.name);
@@ -192,7 +192,7 @@ fn every_law_can_be_made_ready_for_the_loop() {
                 }],
             };
             let model = Corrected::compile(&saved).unwrap();
-            let active = [Active { effect: *effect, law, theta: &theta }];
+            let active = [Active { effect, law, theta: &theta }];
             for (pass, force) in passes().iter().zip(forces(&BASELINE, &active)) {
                 let got = model.lateral_force(pass);
                 assert!(

@@ -52,7 +52,7 @@ fn zero_is_the_baseline() {
                 for pass in passes() {
                     let with = muprime_effects::lateral_force(
                         &baseline,
-                        &[Active { effect: *effect, law, theta: &theta }],
+                        &[Active { effect, law, theta: &theta }],
                         &pass,
                         &DESIGN,
                     );
@@ -84,7 +84,7 @@ fn small_sizes_are_continuous_and_all_predictions_finite() {
                     .map(|(i, p)| p.value(if i == 0 || (size < 1e-3 && additive) { size } else { 0.3 }))
                     .collect();
                 for pass in passes() {
-                    let active = [Active { effect: *effect, law, theta: &theta }];
+                    let active = [Active { effect, law, theta: &theta }];
                     let with = muprime_effects::lateral_force(&baseline, &active, &pass, &DESIGN);
                     assert!(with.is_finite(), "{} ({}) at {size}: {pass:?}", effect.name, form.name);
                     if size == 1e-6 {
