@@ -21,7 +21,7 @@ fn quick() -> Options {
 /// No gap: nothing is named.
 #[test]
 fn sets_without_a_cause_name_nothing() {
-    for seed in 9001..9007 {
+    for seed in 9001..9001 + tests::rounds(3, 6) {
         let scored = score(&generate(seed, Stratum::None, Ask::Gain), &quick()).unwrap();
         assert_ne!(scored.verdict, Verdict::Named, "seed {seed} named {:?}", scored.named);
     }
@@ -62,10 +62,10 @@ fn a_withheld_cause_is_no_other_cause() {
         sim::defects::ALL.iter().filter(|k| k.in_library && k.in_tables).map(|k| k.name).collect();
     let listed: BTreeSet<&str> = ONE_OF_EACH.iter().map(|(name, _)| *name).collect();
     assert_eq!(listed, wanted, "a set for each cause that tables show");
-    // Every second one, unless all are asked for.
+    // Every fourth one, unless all are wanted.
     let confident: Vec<String> = ONE_OF_EACH
         .par_iter()
-        .step_by(tests::rounds(2, 1))
+        .step_by(tests::rounds(4, 1))
         .filter_map(|&(name, seed)| {
             let imitated = sim::defects::Kind::named(name).is_some_and(|kind| kind.imitated);
             let stratum = if imitated { Stratum::Alias } else { Stratum::Single };
@@ -93,6 +93,7 @@ const LEAST_DISTANCE: f64 = 0.01;
 fn no_sealed_form_is_the_librarys_own() {
     let distances: Vec<(&str, f64)> = ONE_OF_EACH
         .par_iter()
+        .step_by(tests::rounds(2, 1))
         .map(|&(name, seed)| {
             let imitated = sim::defects::Kind::named(name).is_some_and(|kind| kind.imitated);
             let stratum = if imitated { Stratum::Alias } else { Stratum::Single };
@@ -111,7 +112,7 @@ fn no_sealed_form_is_the_librarys_own() {
 /// or harder ridge (the group `k_l U / (pi f mu0 k_n w)` of Eqs. 6-15).
 #[test]
 fn an_exact_alias_is_never_named_for_being_less_of_a_surprise() {
-    for seed in [1_680_005_040_007, 1_680_005_040_015, 1_680_005_040_023] {
+    for &seed in &[1_680_005_040_007, 1_680_005_040_015, 1_680_005_040_023][..tests::rounds(1, 3)] {
         let set = generate(seed, Stratum::Alias, Ask::Gain);
         assert_eq!(set.label.causes[0].name, "speed_error");
         let scored = score(&set, &Options::default()).unwrap();
@@ -138,7 +139,7 @@ fn a_cause_does_not_hide_in_a_certified_stiffness() {
 /// set has that form, under which one cause does what they need two for.
 #[test]
 fn friction_that_heats_up_is_not_named_as_rate_and_load() {
-    for seed in [1_710_005_130_201, 1_710_005_130_512, 1_710_005_130_543] {
+    for &seed in &[1_710_005_130_201, 1_710_005_130_512, 1_710_005_130_543][..tests::rounds(1, 3)] {
         let set = generate(seed, Stratum::Outside, Ask::Gain);
         assert_eq!(set.label.causes[0].name, "frictional_heating");
         let scored = score(&set, &Options::default()).unwrap();
@@ -172,7 +173,7 @@ fn a_vibration_in_the_plane_of_the_plate_is_no_cross_talk() {
 #[test]
 fn loss_in_the_skin_is_not_called_inertia() {
     let mut right = 0;
-    for seed in [1_710_005_130_155, 1_710_005_130_367, 1_710_005_130_836] {
+    for &seed in &[1_710_005_130_367, 1_710_005_130_836, 1_710_005_130_155][..tests::rounds(1, 3)] {
         let set = generate(seed, Stratum::Single, Ask::Gain);
         assert_eq!(set.label.causes[0].name, "normal_damping");
         let scored = score(&set, &Options::default()).unwrap();
@@ -180,8 +181,8 @@ fn loss_in_the_skin_is_not_called_inertia() {
         assert!(!scored.named.iter().any(|name| name.contains("inertia")), "seed {seed}: {:?}", scored.named);
         right += usize::from(scored.top_right);
     }
-    // The first is 'unknown': without its passes at 55 kHz the refit of its two shapes ends elsewhere.
-    assert!(right >= 2, "{right} of 3");
+    // The last is 'unknown': without its passes at 55 kHz the refit of its two shapes ends elsewhere.
+    assert!(right >= tests::rounds(1, 2), "{right} are right");
 }
 
 /// The order of rows and the numbers of points carry no meaning.
@@ -232,7 +233,8 @@ fn the_clock_may_start_anywhere() {
 /// Labels dealt to the wrong sets score as chance: the scorer does not leak.
 #[test]
 fn permuted_labels_score_as_chance() {
-    let sets: Vec<_> = (9301..9309).map(|s| generate(s, Stratum::Single, Ask::Gain)).collect();
+    let count = tests::rounds(5, 8);
+    let sets: Vec<_> = (9301..9301 + count).map(|s| generate(s, Stratum::Single, Ask::Gain)).collect();
     let mut right = 0;
     for (i, set) in sets.iter().enumerate() {
         let mut wrong = set.clone();
@@ -244,7 +246,7 @@ fn permuted_labels_score_as_chance() {
         let scored = score(&wrong, &quick()).unwrap();
         right += usize::from(scored.top_right);
     }
-    assert!(right <= 1, "{right} of 8 permuted labels were 'right'");
+    assert!(right <= 1, "{right} of {count} permuted labels were 'right'");
 }
 
 /// The saved model goes through TOML and predicts what the verdict's form predicts.
@@ -274,7 +276,7 @@ fn a_companion_that_may_be_a_form_of_its_own_is_not_named() {
         (7_700_023_100_086, "normal_offset", Verdict::Ambiguous),
         (7_701_023_103_049, "adhesion", Verdict::Named),
     ];
-    for (seed, cause, verdict) in cases {
+    for (seed, cause, verdict) in cases.into_iter().take(tests::rounds(1, 2)) {
         let set = generate(seed, Stratum::Single, Ask::Gain);
         assert_eq!(set.label.causes[0].name, cause, "the set of seed {seed} has another cause by now");
         let scored = score(&set, &Options::default()).unwrap();

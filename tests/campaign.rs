@@ -62,10 +62,12 @@ fn answers_are_right_on_three_natures() {
     ];
     let rounds = tests::rounds(1, 50);
     let (mut wrong, mut said, mut owed, mut decided) = (0, 0, 0, 0);
-    for (nature, defects) in natures {
+    let campaigns = (0..natures.len() * rounds).into_par_iter();
+    let answer = |i: usize| answers(&ideal(100 + (i % rounds) as u64, 2), natures[i / rounds].1);
+    let mut answered: Vec<Vec<Claim>> = campaigns.map(answer).collect();
+    for (nature, _) in natures {
         let mut found = BTreeMap::<&str, Vec<Claim>>::new();
-        let all: Vec<Vec<Claim>> =
-            (0..rounds as u64).into_par_iter().map(|seed| answers(&ideal(100 + seed, 2), defects)).collect();
+        let all: Vec<Vec<Claim>> = answered.drain(..rounds).collect();
         for claim in all.into_iter().flatten() {
             found.entry(claim.name).or_default().push(claim);
         }

@@ -195,7 +195,7 @@ fn absurd_values_are_refused_with_their_place_and_never_panic() {
     let good = table(
         "squeeze_film",
         0,
-        &[0.0, 0.0][..effects::by_name("squeeze_film").unwrap().laws()[0].parameters.len()],
+        &[0.0, 0.0][..effects::by_name("squeeze_film").unwrap().laws[0].parameters.len()],
     );
     for (from, to, says) in [
         ("stiffness_relative_sd = 0.05", "stiffness_relative_sd = 1e6", "stiffness_relative_sd"),

@@ -36,7 +36,7 @@ fn every_fault_in_every_phase_is_answered_within_its_bound_and_for_its_cause() {
 fn without_a_fault_nothing_trips() {
     for pace in PACES {
         for moment in [Moment::Idle, Moment::Ramp, Moment::Hold, Moment::Slide] {
-            for seed in 0..rounds(10, 40) {
+            for seed in 0..rounds(5, 40) {
                 let found = run(&Scene { moment, seed, strikes: Vec::new(), pace }, false);
                 assert!(found.wrong.is_empty() && found.trip.is_none(), "{moment:?} {seed}: {found:?}");
             }
@@ -47,7 +47,7 @@ fn without_a_fault_nothing_trips() {
 /// Two thousand seeds in `tests/run long`.
 #[test]
 fn hundreds_of_seeds_and_none_over_a_bound() {
-    let seeds = rounds(500, 2000);
+    let seeds = rounds(250, 2000);
     for pace in PACES {
         assert_clean(&search(Search { first: 1, seeds, pairs: false, twice: false, pace }, |_| {}));
     }
@@ -56,7 +56,7 @@ fn hundreds_of_seeds_and_none_over_a_bound() {
 #[test]
 fn random_pairs_of_faults() {
     let pace = Pace::Fast;
-    let seeds = rounds(250, 1000);
+    let seeds = rounds(125, 1000);
     let tally = search(Search { first: 1, seeds, pairs: true, twice: false, pace }, |_| {});
     let struck = tally.reactions.values().map(|r| r.runs).sum::<u64>();
     assert!(10 * struck > 19 * seeds, "pairs have two faults: {struck}");
@@ -89,7 +89,7 @@ fn faults_that_hide_each_other_are_off_within_the_slower_bound() {
 fn seeds_run_twice_give_equal_hashes_and_replay_to_equal_decisions() {
     let pace = Pace::Fast;
     assert_clean(&search(
-        Search { first: 1, seeds: rounds(25, 100), pairs: false, twice: true, pace },
+        Search { first: 1, seeds: rounds(12, 100), pairs: false, twice: true, pace },
         |_| {},
     ));
 }

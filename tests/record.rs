@@ -101,7 +101,7 @@ fn a_short_record_cut_at_every_byte_is_read_up_to_the_cut_and_recovered() {
 #[test]
 fn a_whole_sweep_cut_at_thousands_of_bytes_is_read_up_to_the_cut() {
     assert!(bodies(&RECORD).len() > 500);
-    cut(&RECORD, (RECORD.len() / 12_000).max(1), false);
+    cut(&RECORD, (RECORD.len() / tests::rounds(4_000, 12_000)).max(1), false);
 }
 
 #[test]
@@ -222,9 +222,11 @@ fn chunk_of(record: &[u8]) -> usize {
     4 * read.messages.len().div_ceil(most)
 }
 
-/// How many; `MUPRIME_DAMAGES` makes more: 100,000 of each take some minutes.
+/// How many: 1,000, or 3,000 in `tests/run long`; `MUPRIME_DAMAGES` makes more: 100,000 of each take some
+/// minutes.
 fn damages() -> usize {
-    std::env::var("MUPRIME_DAMAGES").map_or(3_000, |n| n.parse().expect("MUPRIME_DAMAGES is a count"))
+    let few = tests::rounds(1_000, 3_000);
+    std::env::var("MUPRIME_DAMAGES").map_or(few, |n| n.parse().expect("MUPRIME_DAMAGES is a count"))
 }
 
 #[test]
@@ -247,18 +249,19 @@ fn one_flipped_bit_anywhere_is_said_and_costs_one_chunk_at_most() {
 }
 
 #[test]
-fn every_bit_of_a_short_record_is_watched() {
+fn every_byte_of_a_short_record_is_watched() {
     let record = short();
     let whole = recorder::read(&record);
     let mut bytes = record.clone();
+    // By default one bit of each byte, another from byte to byte; all eight in `tests/run long`.
     for at in 0..record.len() {
-        for bit in 0..8 {
+        for bit in (0..8).map(|bit| (at + bit) % 8).take(tests::rounds(1, 8)) {
             bytes[at] ^= 1 << bit;
             judged(&bytes, &whole, &|| format!("byte {at} bit {bit}"));
             bytes[at] ^= 1 << bit;
         }
     }
-    println!("{} bits, each was said", 8 * record.len());
+    println!("{} bytes, each was said", record.len());
 }
 
 #[test]

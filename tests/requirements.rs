@@ -8,8 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use studies::validation::faults::bench::STEADY_AT;
 use studies::validation::faults::bench::{RING, T};
-use studies::validation::faults::{ELSEWHERE, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run};
+use studies::validation::faults::{Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run};
 use tests::file;
+
+#[path = "requirements/elsewhere.rs"]
+mod elsewhere;
+
+use elsewhere::ELSEWHERE;
 
 /// Unit tests of the safety core that name a cause.
 fn unit_tests() -> BTreeMap<String, BTreeSet<String>> {

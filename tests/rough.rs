@@ -21,7 +21,7 @@ fn report(set: &RoughSet) -> Report {
 #[test]
 fn scatter_alone_is_no_gap() {
     for kind in Roughness::ALL {
-        let answers = run(41, rounds(2, 4), kind, &["none"], &quick(), |_, _, _, _| ()).unwrap();
+        let answers = run(41, rounds(1, 4), kind, &["none"], &quick(), |_, _, _, _| ()).unwrap();
         let a = &answers[0];
         assert!(a.right == a.sets, "{a:?}");
     }
@@ -31,11 +31,15 @@ fn scatter_alone_is_no_gap() {
 #[test]
 fn scatter_hides_no_cause() {
     let truths = ["load_dependent_friction", "lateral_offset_drift"];
+    let (mut missed, mut kinds) = (0, 0);
     for kind in Roughness::ALL {
-        for a in run(43, rounds(2, 3), kind, &truths, &quick(), |_, _, _, _| ()).unwrap() {
+        for a in run(43, rounds(1, 3), kind, &truths, &quick(), |_, _, _, _| ()).unwrap() {
             assert!(a.right + 1 >= a.sets && a.wrong == 0, "{a:?}");
+            (missed, kinds) = (missed + a.sets - a.right, kinds + 1);
         }
     }
+    // One set of a kind says little: of all kinds together a quarter may be missed.
+    assert!(4 * missed <= kinds * rounds(1, 3), "{missed} causes are hidden");
 }
 
 /// One bad pass leaves the verdict as it was, and is named with how far it is off and what the verdict is
@@ -64,7 +68,7 @@ fn one_bad_pass_is_named_and_leaves_the_verdict_as_it_was() {
 /// No cliff: from no bad passes to one in ten the verdict stays, and its probability does not jump.
 #[test]
 fn the_verdict_is_smooth_in_the_share_of_bad_passes() {
-    let shares = [0.0, 0.025, 0.05, 0.075, 0.1];
+    let shares = rounds(&[0.0, 0.05, 0.1][..], &[0.0, 0.025, 0.05, 0.075, 0.1]);
     for truth in [None, Kind::named("load_dependent_friction")] {
         let curve: Vec<(Verdict, f64)> = shares
             .par_iter()

@@ -32,49 +32,26 @@ pub struct AmplitudePoint {
 
 /// Why points give no calibration.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum AmplitudeError {
     /// Not enough points, or not spread enough.
     #[error("{what}: {found} are too few, {needed} are needed")]
-    TooFew {
-        /// Of what.
-        what: &'static str,
-        /// How many there are.
-        found: usize,
-        /// How many it takes.
-        needed: usize,
-    },
+    TooFew { what: &'static str, found: usize, needed: usize },
     /// A value that cannot be.
     #[error("point {row}: {reason}")]
-    Bad {
-        /// Number of the point, from 1.
-        row: usize,
-        /// What is wrong with it.
-        reason: String,
-    },
+    Bad { row: usize, reason: String },
     /// The amplitude stops growing with the set-point.
     #[error(
         "the amplitude saturates: from set-point {from:.4e} to {to:.4e} it grows by {share:.0} % of what the points \
          below predict; leave out what lies above, or lower the range"
     )]
-    Saturated {
-        /// Last set-point that followed.
-        from: f64,
-        /// First that did not.
-        to: f64,
-        /// Share of the growth in per cent.
-        share: f64,
-    },
+    Saturated { from: f64, to: f64, share: f64 },
     /// The sweep does not reach both flanks of the resonance.
     #[error("the sweep does not hold the resonance: its maximum is at the {0} end; shift the range")]
     OffRange(&'static str),
     /// The model does not describe the points within their repeatability.
     #[error("the points do not follow the model (lack of fit p = {p:.1e}): {remedy}")]
-    LackOfFit {
-        /// p value.
-        p: f64,
-        /// What to do.
-        remedy: &'static str,
-    },
+    LackOfFit { p: f64, remedy: &'static str },
     /// The regression itself failed.
     #[error(transparent)]
     Fit(#[from] FitError),

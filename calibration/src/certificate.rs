@@ -268,16 +268,14 @@ impl Outcome {
 
 /// Why a file is no certificate.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum ReadError {
     /// Not TOML, or not of this shape; the message has the place.
     #[error("not a certificate: {0}")]
     Syntax(String),
     /// Another version of the schema.
     #[error("schema `{found}` is not known here (this version reads `{SCHEMA}`)")]
-    Schema {
-        /// What the file says.
-        found: String,
-    },
+    Schema { found: String },
 }
 
 impl Certificate {

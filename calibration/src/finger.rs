@@ -20,36 +20,20 @@ use stiffness::Stiffness;
 
 /// Why there is no finger calibration.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum FingerError {
     /// Not enough data.
     #[error("{what}: {found} are too few, {needed} are needed")]
-    TooFew {
-        /// Of what.
-        what: &'static str,
-        /// How many there are.
-        found: usize,
-        /// How many it takes.
-        needed: usize,
-    },
+    TooFew { what: &'static str, found: usize, needed: usize },
     /// A row that cannot be.
     #[error("row {row}: {reason}")]
-    Bad {
-        /// Number of the row, from 1.
-        row: usize,
-        /// What is wrong.
-        reason: String,
-    },
+    Bad { row: usize, reason: String },
     /// The plate left the finger.
     #[error(
         "at {amplitude_pp_m:.3e} m peak-to-peak the contact is lost (half of it exceeds Fn/kn = {limit_m:.3e} m): the \
          ultrasonic stiffness is defined in full contact; use smaller amplitudes or more load"
     )]
-    ContactLost {
-        /// Largest amplitude, peak-to-peak.
-        amplitude_pp_m: f64,
-        /// Static indentation in m.
-        limit_m: f64,
-    },
+    ContactLost { amplitude_pp_m: f64, limit_m: f64 },
     /// A stiffness that is not positive.
     #[error("the {0} stiffness comes out negative: check the sign of force and displacement")]
     Negative(&'static str),

@@ -50,27 +50,14 @@ pub struct Identified {
 
 /// Why nothing was identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum IdentifyError {
     /// Too little data.
     #[error("{found} usable rows: at least {needed} are needed")]
-    TooFew {
-        /// Rows found.
-        found: usize,
-        /// Rows needed.
-        needed: usize,
-    },
+    TooFew { found: usize, needed: usize },
     /// A value that makes no sense.
     #[error("row {row}: {what} is {value}: must be {range}")]
-    Row {
-        /// Row from 1.
-        row: usize,
-        /// The quantity, with its unit.
-        what: &'static str,
-        /// What was given.
-        value: f64,
-        /// What is allowed.
-        range: &'static str,
-    },
+    Row { row: usize, what: &'static str, value: f64, range: &'static str },
     /// A range that makes no sense.
     #[error("moduli from {0} to {1} Pa do not make a range")]
     Range(f64, f64),

@@ -13,30 +13,19 @@ use std::collections::BTreeMap;
 
 /// Why there is no latency.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum LatencyError {
     /// Too few edges.
     #[error(
         "channel `{channel}`: {found} edges are too few for a delay and its scatter, {needed} are needed"
     )]
-    TooFew {
-        /// The channel.
-        channel: String,
-        /// Edges given.
-        found: usize,
-        /// Edges needed.
-        needed: usize,
-    },
+    TooFew { channel: String, found: usize, needed: usize },
     /// A response before its cause.
     #[error(
         "channel `{channel}`: its mean delay is {delay_s:.2e} s, an answer before its cause: its clock is ahead, or \
          its edges are attributed to the wrong commands"
     )]
-    Acausal {
-        /// The channel.
-        channel: String,
-        /// The mean delay.
-        delay_s: f64,
-    },
+    Acausal { channel: String, delay_s: f64 },
 }
 
 /// Delay of one channel.

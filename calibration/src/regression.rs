@@ -50,31 +50,18 @@ impl Fit {
 
 /// Why a fit gave no answer.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum FitError {
     /// Fewer observations than parameters (or as many, where the scatter must be estimated).
     #[error("{observations} observations cannot determine {parameters} parameters and their scatter")]
-    TooFew {
-        /// Number of observations.
-        observations: usize,
-        /// Number of parameters.
-        parameters: usize,
-    },
+    TooFew { observations: usize, parameters: usize },
     /// Columns of the design depend on each other.
     #[error("parameter {parameter} (counted from 0) cannot be separated from those before it")]
-    Singular {
-        /// The first column that depends on those before it.
-        parameter: usize,
-    },
+    Singular { parameter: usize },
     /// A number that is not finite went in or came out.
     #[error("a value is not finite ({place})")]
-    NotFinite {
-        /// Where.
-        place: &'static str,
-    },
+    NotFinite { place: &'static str },
     /// The iteration of a non-linear fit did not settle.
     #[error("the fit did not converge in {iterations} iterations")]
-    NotConverged {
-        /// Iterations made.
-        iterations: usize,
-    },
+    NotConverged { iterations: usize },
 }

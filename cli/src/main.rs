@@ -299,13 +299,11 @@ mod tests {
     fn every_command_has_an_example_and_each_example_parses() {
         let mut there = Vec::new();
         leaves(&command(), "", &mut there);
-        for (path, lines) in cli::examples::EXAMPLES {
-            assert!(there.iter().any(|p| p == path), "{path}: no such command");
-            for line in lines.lines().map(str::trim) {
-                assert!(line.starts_with(&format!("muprime {path}")), "{line}");
-                if let Err(error) = parsed(words(line)) {
-                    panic!("{line}: {error}");
-                }
+        for line in cli::examples::EXAMPLES.lines() {
+            let known = there.iter().any(|path| format!("{line} ").starts_with(&format!("muprime {path} ")));
+            assert!(known || cfg!(not(feature = "parquet")), "{line}: no such command");
+            if let (true, Err(error)) = (known, parsed(words(line))) {
+                panic!("{line}: {error}");
             }
         }
     }

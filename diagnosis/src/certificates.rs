@@ -70,7 +70,7 @@ pub fn in_doubt(rig: &RigFile, pulls: &[Pull]) -> Vec<InDoubt> {
     let mut doubts = Vec::new();
     for pull in pulls.iter().filter(|p| p.remarkable()) {
         for &imitates in &pull.imitated_by {
-            let laws = effects::by_name(imitates).map_or(&[][..], |e| e.laws());
+            let laws = effects::by_name(imitates).map_or(&[][..], |e| e.laws);
             let Some(key) = laws.iter().find_map(|l| l.acts_as.and(l.certified_by)) else { continue };
             // Only a certificate that is there can be in doubt.
             let named = key.kind().is_some_and(|kind| rig.calibration.certificates.contains_key(&kind));

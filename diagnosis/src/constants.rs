@@ -40,18 +40,14 @@ pub struct Row {
 
 /// A constant that a study asks for and that is none, or a value that it cannot have.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum ConstantError {
     /// No such name.
     #[error("no constant is named '{0}'; docs/diagnosis/constants.md lists them")]
     Name(String),
     /// Not as many numbers as the constant has, or text that is none.
     #[error("constant '{name}' takes {needed} number(s), separated by commas")]
-    Value {
-        /// Name.
-        name: String,
-        /// How many numbers it has.
-        needed: usize,
-    },
+    Value { name: String, needed: usize },
 }
 
 macro_rules! constants {

@@ -9,22 +9,14 @@ pub use models::rig_file::RigFile;
 
 /// A table that the diagnosis refuses, and what would mend it.
 #[derive(Debug, thiserror::Error, PartialEq)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum DataError {
     /// Too few passes to say anything.
     #[error("{0} passes with a lateral force; at least 12 are needed")]
     TooFew(usize),
     /// A value no pass can have.
     #[error("point {point}: {column} = {value}; {needed} is needed")]
-    BadValue {
-        /// Number of the point.
-        point: u64,
-        /// Column.
-        column: &'static str,
-        /// The value.
-        value: f64,
-        /// What would be accepted.
-        needed: &'static str,
-    },
+    BadValue { point: u64, column: &'static str, value: f64, needed: &'static str },
     /// Forces of one sign in both directions of motion.
     #[error(
         "lateral_force_n has one sign in both directions of motion, and the same size: friction turns with the direction. \

@@ -250,7 +250,7 @@ mod tests {
     use models::quantity::PeakToPeak;
 
     fn no_effects() -> Options {
-        let without = effects::library().iter().map(|e| e.name().to_string()).collect();
+        let without = effects::library().iter().map(|e| e.name.to_string()).collect();
         Options { without, ..Options::default() }
     }
 

@@ -91,5 +91,5 @@ pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
     };
     let sure = fitted.problem.constants.name_probability;
     let library = effects::library();
-    (0..library.len()).filter(|&e| of(e) >= sure).map(|e| library[e].name().to_string()).collect()
+    (0..library.len()).filter(|&e| of(e) >= sure).map(|e| library[e].name.to_string()).collect()
 }

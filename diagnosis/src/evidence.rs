@@ -302,7 +302,7 @@ mod tests {
         let none = laplace(&problem, &[], &none.u, &basis, 0.0, 4);
         let mut tried = 0;
         for effect in 0..effects::library().len() {
-            for law in 0..effects::library()[effect].laws().len() {
+            for law in 0..effects::library()[effect].laws.len() {
                 let member = Member { effect, law };
                 // Sizes at or near zero, shapes at an end of their range: where a fit without a gap may rest.
                 for (size, end) in [(0.0, false), (0.0, true), (1e-3, false), (1e-3, true)] {
@@ -319,8 +319,7 @@ mod tests {
                     }
                     let with = laplace(&problem, &[member], &u, &basis, problem.constants.form_shares[1], 0);
                     let gain = with.log_evidence - none.log_evidence;
-                    let name =
-                        (effects::library()[effect].name(), effects::library()[effect].laws()[law].name);
+                    let name = (effects::library()[effect].name, effects::library()[effect].laws[law].name);
                     assert!(gain.is_finite() && gain < 3.0, "{name:?}: {gain:.1} nats");
                     tried += 1;
                 }

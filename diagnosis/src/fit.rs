@@ -69,8 +69,8 @@ pub fn nominal_mu0(table: &crate::data::Table) -> f64 {
 fn gains_within_the_baseline() -> impl Iterator<Item = (CertifiedKey, [f64; NUISANCES])> {
     library()
         .iter()
-        .filter(|e| e.needs().iter().any(|n| n.is_standard()))
-        .flat_map(|e| e.laws())
+        .filter(|e| e.needs.iter().any(|n| n.is_standard()))
+        .flat_map(|e| e.laws)
         .filter_map(|law| Some((law.certified_by?, law.acts_as?)))
 }
 
@@ -81,7 +81,7 @@ impl Problem {
         let sd = rig.finger.stiffness_relative_sd.max(constants.stiffness_sd_floor);
         let mut certified = Vec::new();
         for (index, effect) in library().iter().enumerate() {
-            for (law, form) in effect.laws().iter().enumerate() {
+            for (law, form) in effect.laws.iter().enumerate() {
                 if let (Some(sd), effects::Prior::Normal(wide) | effects::Prior::HalfNormal(wide)) = (
                     form.certified_by.and_then(|key| rig.calibration.sd(key)),
                     form.parameters[0].at_load(table.design.reference_load_n).prior,

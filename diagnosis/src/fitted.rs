@@ -62,7 +62,7 @@ impl Candidate {
 
     /// Names in the library's order.
     pub fn names(&self) -> Vec<&'static str> {
-        self.effects.iter().map(|&e| known()[e].name()).collect()
+        self.effects.iter().map(|&e| known()[e].name).collect()
     }
 }
 

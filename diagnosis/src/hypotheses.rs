@@ -96,11 +96,11 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     let mut not_testable = Vec::new();
     let mut tried = Vec::new();
     for (index, effect) in library().iter().enumerate() {
-        if options.without.iter().any(|n| n == effect.name()) {
+        if options.without.iter().any(|n| n == effect.name) {
             continue;
         }
-        match table.lacks(effect.needs()) {
-            Some(because) => not_testable.push((effect.name(), certified(*effect, rig).unwrap_or(because))),
+        match table.lacks(effect.needs) {
+            Some(because) => not_testable.push((effect.name, certified(effect, rig).unwrap_or(because))),
             None => tried.push(index),
         }
     }
@@ -180,9 +180,9 @@ fn explained_by(problem: &Problem, scatter: &Scatter, cause: &Posterior) -> Vec<
 }
 
 /// Why an effect is not sought that only an outside standard shows, where rig.toml states that calibration.
-fn certified(effect: &dyn Effect, rig: &RigFile) -> Option<String> {
-    let standard = effect.needs().iter().any(|n| n.is_standard());
-    let key = effect.laws().iter().filter(|_| standard).find_map(|law| law.certified_by)?;
+fn certified(effect: &Effect, rig: &RigFile) -> Option<String> {
+    let standard = effect.needs.iter().any(|n| n.is_standard());
+    let key = effect.laws.iter().filter(|_| standard).find_map(|law| law.certified_by)?;
     let sd = rig.calibration.sd(key)?;
     Some(format!(
         "an outside calibration leaves {sd:.1e} of the {} open, and that is part of the recalibrated baseline",

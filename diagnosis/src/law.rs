@@ -87,7 +87,7 @@ impl Law {
     pub(crate) fn beside(&self, nominal: &Baseline, design: &Design, pass: &Condition) -> [f64; 2] {
         let condition = Condition { mu0: nominal.mu0, ..*pass };
         self.model.predict(&condition).map_or([f64::NAN; 2], |p| {
-            let sd = self.model.form_sd(&condition) * nominal.mu0 * pass.normal_force_n;
+            let sd = self.model.form_sd(&p) * nominal.mu0 * pass.normal_force_n;
             let slider = effects::lateral_force(nominal, &[], pass, design);
             [pass.direction.sign() * p.lateral_force_n - slider, sd]
         })

@@ -14,7 +14,7 @@ pub struct Member {
 impl Member {
     /// The law.
     pub fn form(&self) -> &'static Law {
-        &known()[self.effect].laws()[self.law]
+        &known()[self.effect].laws[self.law]
     }
     /// The law's parameters, with what the loads of a table make of their priors.
     pub fn parameters(&self, design: &Design) -> Vec<Parameter> {
@@ -26,14 +26,14 @@ impl Member {
     }
     /// The effect's name.
     pub fn name(&self) -> &'static str {
-        known()[self.effect].name()
+        known()[self.effect].name
     }
     /// Largest share of its change by which it may depart from its form.
     pub fn departs_by(&self) -> f64 {
-        known()[self.effect].departs_by()
+        known()[self.effect].departs_by
     }
     /// Where the effect sits.
     pub fn place(&self) -> Place {
-        known()[self.effect].place()
+        known()[self.effect].place
     }
 }

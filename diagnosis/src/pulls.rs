@@ -72,9 +72,9 @@ const STIFFNESSES: [&str; 2] = ["normal_stiffness", "lateral_stiffness"];
 /// Errors of plate and instruments that do as a change of this parameter of the baseline does, by name.
 fn imitators(parameter: usize) -> Vec<&'static str> {
     let acts = |law: &&Law| law.acts_as.is_some_and(|e_folds| e_folds[parameter] != 0.0);
-    let outside_finger = library().iter().filter(|e| e.place() != Place::Finger);
+    let outside_finger = library().iter().filter(|e| e.place != Place::Finger);
     let mut names: Vec<&str> =
-        outside_finger.filter(|e| e.laws().iter().any(|l| acts(&l))).map(|e| e.name()).collect();
+        outside_finger.filter(|e| e.laws.iter().any(|l| acts(&l))).map(|e| e.name).collect();
     names.sort_unstable();
     names
 }

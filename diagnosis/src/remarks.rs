@@ -110,7 +110,7 @@ const PARTED: f64 = 0.8;
 fn two_levels(fitted: &Fitted, table: &Table, decision: &Decision) -> Option<String> {
     let led = matches!(decision.verdict, Verdict::Named | Verdict::Ambiguous);
     let leader = &fitted.candidates[decision.leader().filter(|_| led)?];
-    let needs = leader.effects.iter().flat_map(|e| known()[*e].needs());
+    let needs = leader.effects.iter().flat_map(|e| known()[*e].needs);
     let largest = table.design.largest_amplitude_m;
     let mut words: Vec<&str> = needs
         .filter_map(|need| need.levels_of())

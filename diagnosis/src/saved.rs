@@ -22,7 +22,7 @@ impl Diagnosis {
             Verdict::NoGap => &self.fitted.none,
             Verdict::Named | Verdict::Ambiguous => &self.fitted.candidates[self.decision.class[0]].best,
         };
-        let errors = best.members.iter().map(|m| known()[m.effect].interpolation_error());
+        let errors = best.members.iter().map(|m| known()[m.effect].interpolation_error);
         let gap = &self.report.gap;
         let square = |rmse: Option<f64>| rmse.unwrap_or(0.0).powi(2);
         let left = (square(gap.form_alone_rmse) - square(gap.noise_floor_rmse)).max(0.0).sqrt();

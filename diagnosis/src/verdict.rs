@@ -270,7 +270,7 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
             if let Some(cause) = imitated(&fitted.candidates[leader].names()) {
                 format!(
                     "{name} together, or {}, which is not in the library: this table cannot separate them; {closed}.",
-                    cause.words()
+                    cause.words.unwrap_or(cause.name)
                 )
             } else {
                 let probability = probability(decision.probabilities[leader]);

@@ -33,7 +33,7 @@ fn problem(calibration: &str) -> Problem {
 
 /// Prior deviation of the size of a law, in the law's unit.
 fn size_sd(problem: &Problem, effect: &str, law: usize) -> f64 {
-    let index = effects::library().iter().position(|e| e.name() == effect).expect("an effect");
+    let index = effects::library().iter().position(|e| e.name == effect).expect("an effect");
     let member = Member { effect: index, law };
     let precision = problem.prior_precision(&[member]);
     let effects::Prior::Normal(wide) = member.parameters(&problem.design)[0].prior else {

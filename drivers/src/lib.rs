@@ -126,65 +126,28 @@ pub struct Rig {
 
 /// Why a rig could not be connected. Nothing was commanded then.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum OpenError {
     /// The setup names a profile that does not exist.
     #[error(
         "no profile is called `{id}`; there are: {known}; looked in: {looked}; a file is named by its path, as in `my-sensor.toml`"
     )]
-    UnknownProfile {
-        /// The name.
-        id: String,
-        /// Names that exist.
-        known: String,
-        /// Folders that were looked in besides the bundled profiles.
-        looked: String,
-    },
+    UnknownProfile { id: String, known: String, looked: String },
     /// A profile, or a file that it names, cannot be read.
     #[error("{}: {problem}", file.display())]
-    Unreadable {
-        /// The file.
-        file: std::path::PathBuf,
-        /// Why not.
-        problem: String,
-    },
+    Unreadable { file: std::path::PathBuf, problem: String },
     /// One name stands for two profiles.
     #[error("two profiles are called `{id}`: {places}; {remedy}")]
-    Ambiguous {
-        /// The name.
-        id: String,
-        /// Where they are.
-        places: String,
-        /// What to do.
-        remedy: String,
-    },
+    Ambiguous { id: String, places: String, remedy: String },
     /// The profile cannot be used.
     #[error("profile `{id}`: {error}")]
-    Profile {
-        /// Its name.
-        id: String,
-        /// What is wrong.
-        error: instruments::ProfileError,
-    },
+    Profile { id: String, error: instruments::ProfileError },
     /// The setup and the profile do not fit.
     #[error("instrument `{id}` at {address}: {problem}")]
-    Mismatch {
-        /// The profile's name.
-        id: String,
-        /// The address.
-        address: String,
-        /// What does not fit.
-        problem: String,
-    },
+    Mismatch { id: String, address: String, problem: String },
     /// The instrument did not answer, or is not what the profile says.
     #[error("instrument `{id}` at {address}: {problem}")]
-    Link {
-        /// The profile's name.
-        id: String,
-        /// The address.
-        address: String,
-        /// What happened.
-        problem: String,
-    },
+    Link { id: String, address: String, problem: String },
 }
 
 /// What an instrument is to the rig.

@@ -53,15 +53,11 @@ impl Values {
 
 /// A frame was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum FrameError {
     /// Not the length that the profile states.
     #[error("the frame has {found} bytes and should have {expected}")]
-    Length {
-        /// Bytes by the profile.
-        expected: usize,
-        /// Bytes that came.
-        found: usize,
-    },
+    Length { expected: usize, found: usize },
 }
 
 /// Where a signal stands in its frame.

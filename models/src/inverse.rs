@@ -24,20 +24,14 @@ pub struct AmplitudeAnswer {
 
 /// Why there is no amplitude.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum NoAmplitude {
     /// The condition or the target makes no sense.
     #[error(transparent)]
     Domain(#[from] OutOfDomain),
     /// Not reached by the largest amplitude.
     #[error("mu' = {wanted} is not reached: {largest_um} \u{b5}m peak-to-peak gives {reached:.3} here")]
-    OutOfReach {
-        /// The target.
-        wanted: f64,
-        /// Largest amplitude that was tried, um peak-to-peak.
-        largest_um: f64,
-        /// mu' there.
-        reached: f64,
-    },
+    OutOfReach { wanted: f64, largest_um: f64, reached: f64 },
 }
 
 const STEPS: usize = 400;

@@ -84,8 +84,8 @@ impl FrictionModel for Named {
         self.law.mu_relative_with(condition, deviation)
     }
 
-    fn form_sd(&self, condition: &Condition) -> f64 {
-        self.law.form_sd(condition)
+    fn form_sd(&self, of: &Prediction) -> f64 {
+        self.law.form_sd(of)
     }
 
     fn sha256(&self) -> Option<&str> {

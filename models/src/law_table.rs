@@ -332,8 +332,8 @@ impl FrictionModel for LawTable {
         Ok(prediction(condition, if still { [1.0, 0.0] } else { self.at(condition)? }))
     }
 
-    fn form_sd(&self, condition: &Condition) -> f64 {
-        self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
+    fn form_sd(&self, of: &Prediction) -> f64 {
+        of.mu_relative_sd
     }
 }
 

@@ -93,9 +93,9 @@ pub trait FrictionModel: Send + Sync {
         self.predict(condition).map(|p| p.mu_relative)
     }
 
-    /// Standard deviation of `mu'` from the law itself: what no choice of its parameters mends.
-    fn form_sd(&self, condition: &Condition) -> f64 {
-        let _ = condition;
+    /// Standard deviation of `mu'` from the law itself, beside one of its predictions: what no choice of its parameters mends.
+    fn form_sd(&self, of: &Prediction) -> f64 {
+        let _ = of;
         0.0
     }
 
@@ -248,7 +248,7 @@ impl FrictionModel for EmpiricalPsi {
         })
     }
 
-    fn form_sd(&self, condition: &Condition) -> f64 {
-        self.relative_friction(condition).map_or(0.0, |friction| friction.sd)
+    fn form_sd(&self, of: &Prediction) -> f64 {
+        of.mu_relative_sd
     }
 }

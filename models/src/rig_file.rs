@@ -222,22 +222,14 @@ pub struct RigFile {
 
 /// A `rig.toml` that cannot be used: what is wrong and where.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum RigFileError {
     /// No TOML, a key that is missing, or one that no rig.toml has; the message names line and column.
     #[error("{0}")]
     Form(#[from] toml::de::Error),
     /// A value that cannot be meant.
     #[error("[{section}] {key} = {value}: {needed} is needed")]
-    Value {
-        /// Section of the file.
-        section: &'static str,
-        /// Key in it.
-        key: &'static str,
-        /// What stands there.
-        value: f64,
-        /// What would be accepted.
-        needed: String,
-    },
+    Value { section: &'static str, key: &'static str, value: f64, needed: String },
 }
 
 impl RigFile {

@@ -159,8 +159,8 @@ impl FrictionModel for Surrogate {
         })
     }
 
-    fn form_sd(&self, condition: &Condition) -> f64 {
-        self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
+    fn form_sd(&self, of: &Prediction) -> f64 {
+        of.mu_relative_sd
     }
 }
 

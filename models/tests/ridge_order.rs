@@ -5,6 +5,7 @@
 //! varies) before the order is formed; its standard uncertainty is the jackknife's over the cases.
 
 use muprime_models::ridge::{RidgeCase, RunSettings, run};
+use rayon::prelude::*;
 
 /// Two moduli and four amplitudes at which contact is lost and won again, each with its own contact width.
 fn cases() -> Vec<RidgeCase> {
@@ -62,16 +63,17 @@ fn order(levels: &[[f64; 3]], ratio: f64) -> Order {
 #[test]
 fn order_with_the_mesh() {
     let mut ratio = f64::NAN;
-    let levels: Vec<[f64; 3]> = cases()
-        .iter()
-        .map(|case| {
-            let runs = [200, 800, 3200]
-                .map(|elements| mu(&RidgeCase { elements, ..*case }, &RunSettings::default()));
-            // Of the element's size, which goes with the root of their number.
-            ratio = (runs[2].1 as f64 / runs[0].1 as f64).powf(0.25);
-            printed(case, runs.map(|run| run.0))
-        })
-        .collect();
+    let cases = cases();
+    let at = |case: &RidgeCase| {
+        [200, 800, 3200].map(|elements| mu(&RidgeCase { elements, ..*case }, &RunSettings::default()))
+    };
+    let runs: Vec<_> = cases.par_iter().map(at).collect();
+    let mut levels = Vec::new();
+    for (case, runs) in cases.iter().zip(runs) {
+        // Of the element's size, which goes with the root of their number.
+        ratio = (runs[2].1 as f64 / runs[0].1 as f64).powf(0.25);
+        levels.push(printed(case, runs.map(|run| run.0)));
+    }
     let found = order(&levels, ratio);
     println!(
         "order with the mesh: {:.2} +- {:.2} (size ratio {ratio:.3}); finer difference {:.4} rms; left to the limit {:.4} \
@@ -86,7 +88,7 @@ fn order_with_the_mesh() {
 #[test]
 fn order_with_the_step() {
     let levels: Vec<[f64; 3]> = cases()
-        .iter()
+        .par_iter()
         .map(|case| {
             let case = RidgeCase { elements: 200, ..*case };
             // One step for all layers: the longer ones and the added mass are held against it elsewhere.

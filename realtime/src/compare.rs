@@ -129,7 +129,7 @@ impl Comparator {
             / (2.0 * load_step);
 
         let coulomb = self.estimate[0] * c.normal_force_n;
-        let form = model.form_sd(&nominal) * coulomb;
+        let form = model.form_sd(&prediction) * coulomb;
         let noise = (self.noise.pass_relative_sd * expected).powi(2)
             + self.noise.force_sd_n.powi(2) * (1.0 + load_slope * load_slope)
             + form * form;

@@ -50,7 +50,7 @@ pub struct Models {
 
 /// Of the models that are compiled in.
 pub fn models() -> Models {
-    let effects = effects::listing::entries();
+    let effects = effects::library();
     let listed = serde_json::to_string(&effects).unwrap_or_default();
     Models {
         ridge_version: MODEL_VERSION,

@@ -36,7 +36,40 @@ pub use quantity::{Command, Quantity};
 
 use realtime::clock::Clock;
 use realtime::ports::Nanos;
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
+use std::thread::JoinHandle;
+
+/// The thread of an emulator; dropping it ends it.
+struct Service {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Service {
+    /// Begins work that ends soon after the flag is set.
+    fn start(name: &str, work: impl FnOnce(Arc<AtomicBool>) + Send + 'static) -> io::Result<Self> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::Builder::new().name(name.into()).spawn(move || work(stopped))?;
+        Ok(Service { stop, thread: Some(thread) })
+    }
+
+    /// Ends it, and waits for that.
+    fn end(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
 
 /// The world as instruments meet it. All quantities are in SI units.
 pub trait Plant: Send {

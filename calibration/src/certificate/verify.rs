@@ -29,62 +29,32 @@ impl<'a> Verified<'a> {
 
 /// Why a certificate may not be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum Refusal {
     /// The content is not what was written.
     #[error(
         "the certificate was changed after it was written (its content hashes to {found}, it says \
          {stated}): calibrate again, or restore the file"
     )]
-    Tampered {
-        /// The hash in the file, first characters.
-        stated: String,
-        /// The hash of the content, first characters.
-        found: String,
-    },
+    Tampered { stated: String, found: String },
     /// It is about another instrument.
     #[error("the certificate is for serial {found}, the instrument at hand is {expected}")]
-    Foreign {
-        /// The instrument at hand.
-        expected: String,
-        /// The instrument of the certificate.
-        found: String,
-    },
+    Foreign { expected: String, found: String },
     /// It is about another quantity.
     #[error("this is a {found} certificate; a {expected} certificate is needed")]
-    Kind {
-        /// What is needed.
-        expected: Kind,
-        /// What it is.
-        found: Kind,
-    },
+    Kind { expected: Kind, found: Kind },
     /// Its time is over.
     #[error("the certificate ran out at {until} ({days:.1} days ago): calibrate again")]
-    Stale {
-        /// End of validity.
-        until: String,
-        /// Days since then.
-        days: f64,
-    },
+    Stale { until: String, days: f64 },
     /// Its time has not begun: a clock is wrong here or there.
     #[error("the certificate begins at {from}, which is still to come: check the clocks")]
-    NotYetValid {
-        /// Start of validity.
-        from: String,
-    },
+    NotYetValid { from: String },
     /// It is too cold or too warm for it.
     #[error("the certificate holds from {} to {} degC; it is {found} degC", range[0], range[1])]
-    Temperature {
-        /// The temperature at hand.
-        found: f64,
-        /// The range.
-        range: [f64; 2],
-    },
+    Temperature { found: f64, range: [f64; 2] },
     /// Numbers or dates that cannot be.
     #[error("the certificate cannot be right: {reason}")]
-    Malformed {
-        /// What is wrong with it.
-        reason: String,
-    },
+    Malformed { reason: String },
 }
 
 impl Certificate {

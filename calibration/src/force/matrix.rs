@@ -49,33 +49,17 @@ impl Default for Options {
 
 /// Why a series gives no calibration.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum ForceError {
     /// Not enough different loads on an axis.
     #[error("{axis} axis: {found} different loads are too few for this model, {needed} are needed")]
-    TooFewLoads {
-        /// The axis.
-        axis: Axis,
-        /// Different non-zero loads.
-        found: usize,
-        /// Needed.
-        needed: usize,
-    },
+    TooFewLoads { axis: Axis, found: usize, needed: usize },
     /// Not enough zero readings.
     #[error("{found} zero readings are too few: take one before, one after and one between (3 or more)")]
-    TooFewZeros {
-        /// Zero readings.
-        found: usize,
-    },
+    TooFewZeros { found: usize },
     /// A reading at the end of the converter's range.
     #[error("reading {row} ({axis} axis, {load_n:.4} N) is saturated: use smaller weights or a larger range")]
-    Saturated {
-        /// Number of the reading, from 1.
-        row: usize,
-        /// The channel.
-        axis: Axis,
-        /// Its load.
-        load_n: f64,
-    },
+    Saturated { row: usize, axis: Axis, load_n: f64 },
     /// Each channel answers the other axis' weights.
     #[error("the axes are swapped: lateral weights move the normal channel, normal weights the lateral one")]
     SwappedAxes,
@@ -84,50 +68,22 @@ pub enum ForceError {
         "the {axis} channel answers {axis} weights less than the other channel does ({own:.4} against \
          {other:.4} counts/N): check the direction of the pull and the wiring"
     )]
-    AxisBlind {
-        /// The axis.
-        axis: Axis,
-        /// Its own sensitivity.
-        own: f64,
-        /// The other channel's.
-        other: f64,
-    },
+    AxisBlind { axis: Axis, own: f64, other: f64 },
     /// The zero moved too far while weights were read.
     #[error(
         "the zero of the {axis} channel drifted by {counts:.1} counts over the series ({percent:.2} % of the \
          span, {limit:.2} % are allowed): let it warm up, then repeat"
     )]
-    DriftingZero {
-        /// The channel.
-        axis: Axis,
-        /// The drift.
-        counts: f64,
-        /// The same as a share of the span in per cent.
-        percent: f64,
-        /// The limit in per cent.
-        limit: f64,
-    },
+    DriftingZero { axis: Axis, counts: f64, percent: f64, limit: f64 },
     /// Neighbouring readings err alike.
     #[error(
         "neighbouring readings of the {axis} channel err alike (correlation {correlation:.2}): the zero wanders \
          more slowly than you read; wait longer between readings or average longer"
     )]
-    Correlated {
-        /// The channel.
-        axis: Axis,
-        /// Correlation of neighbours.
-        correlation: f64,
-    },
+    Correlated { axis: Axis, correlation: f64 },
     /// The model does not describe the readings within their own repeatability.
     #[error("the {axis} channel does not follow the model (lack of fit p = {p:.1e}): {remedy}")]
-    LackOfFit {
-        /// The channel.
-        axis: Axis,
-        /// p value.
-        p: f64,
-        /// What to do.
-        remedy: &'static str,
-    },
+    LackOfFit { axis: Axis, p: f64, remedy: &'static str },
     /// The regression itself failed.
     #[error(transparent)]
     Fit(#[from] FitError),

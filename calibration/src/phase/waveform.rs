@@ -40,17 +40,11 @@ pub struct Shift {
 
 /// Why there is no phase shift.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum PhaseError {
     /// The record is too short or sampled too slowly.
     #[error("{samples} samples at {rate_hz} Hz: {reason}")]
-    Record {
-        /// Samples in the shorter record.
-        samples: usize,
-        /// Sample rate.
-        rate_hz: f64,
-        /// What is missing.
-        reason: &'static str,
-    },
+    Record { samples: usize, rate_hz: f64, reason: &'static str },
     /// A record at the end of the digitiser's range.
     #[error("the {0} record is clipped: its extreme value repeats; choose a larger vibrometer range")]
     Clipped(&'static str),
@@ -59,16 +53,10 @@ pub enum PhaseError {
     NoMotion(&'static str),
     /// Too few repeats.
     #[error("{found} repeats are too few: the paper takes 10, three are the least")]
-    TooFewRepeats {
-        /// Repeats given.
-        found: usize,
-    },
+    TooFewRepeats { found: usize },
     /// The repeats do not agree.
     #[error("the repeats point everywhere (mean resultant {resultant:.2}): there is no phase to state")]
-    Scattered {
-        /// Length of the mean unit vector.
-        resultant: f64,
-    },
+    Scattered { resultant: f64 },
     /// The regression failed.
     #[error(transparent)]
     Fit(#[from] FitError),

@@ -9,6 +9,7 @@ use super::checksum::crc16_modbus;
 
 /// What may come back to a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum RtuError {
     /// The instrument refused, with its exception code.
     #[error("the instrument refused the request (exception {0})")]
@@ -18,20 +19,10 @@ pub enum RtuError {
     Crc,
     /// Another unit answered.
     #[error("unit {found} answered instead of unit {expected}")]
-    Unit {
-        /// Expected.
-        expected: u8,
-        /// Found.
-        found: u8,
-    },
+    Unit { expected: u8, found: u8 },
     /// The answer is one to another request.
     #[error("the answer is to function {found}, not {expected}")]
-    Function {
-        /// Expected.
-        expected: u8,
-        /// Found.
-        found: u8,
-    },
+    Function { expected: u8, found: u8 },
     /// The answer speaks of another length or another register.
     #[error("the answer does not fit the request")]
     Mismatch,

@@ -88,6 +88,7 @@ pub struct SavedParameter {
 
 /// A saved model that cannot be used, and why.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum ModelError {
     /// Another schema.
     #[error("schema is '{0}'; this version reads 'muprime.model/1'")]
@@ -97,36 +98,13 @@ pub enum ModelError {
     Effect(String),
     /// A law that the effect does not have.
     #[error("effect '{effect}' has no law '{law}'")]
-    Law {
-        /// Effect.
-        effect: String,
-        /// Law.
-        law: String,
-    },
+    Law { effect: String, law: String },
     /// Parameters that are not the law's.
     #[error("effect '{effect}': parameter {index} should be '{expected}'")]
-    Parameter {
-        /// Effect.
-        effect: String,
-        /// Position in the list.
-        index: usize,
-        /// Name expected there.
-        expected: &'static str,
-    },
+    Parameter { effect: String, index: usize, expected: &'static str },
     /// A value outside the parameter's range.
     #[error("effect '{effect}': '{name}' = {value} is outside [{lower}, {upper}]")]
-    Range {
-        /// Effect.
-        effect: String,
-        /// Parameter.
-        name: &'static str,
-        /// Value.
-        value: f64,
-        /// Smallest value.
-        lower: f64,
-        /// Largest value.
-        upper: f64,
-    },
+    Range { effect: String, name: &'static str, value: f64, lower: f64, upper: f64 },
     /// More effects than a model may hold.
     #[error("{0} effects; at most 4 are compiled")]
     TooMany(usize),
@@ -135,14 +113,7 @@ pub enum ModelError {
         "the model corrects the law '{name}' (SHA-256 {wanted}), and this is {found}; diagnose again with `--model` of the law \
          that is to lead"
     )]
-    OtherLaw {
-        /// Name of the base law.
-        name: String,
-        /// Its hash.
-        wanted: String,
-        /// What was found in its place.
-        found: String,
-    },
+    OtherLaw { name: String, wanted: String, found: String },
     /// A baseline or scale that is not positive.
     #[error("'{0}' must be a finite number above zero")]
     NotPositive(&'static str),
@@ -162,7 +133,7 @@ pub struct Lack {
 
 #[derive(Clone)]
 struct Compiled {
-    effect: &'static dyn Effect,
+    effect: &'static Effect,
     law: usize,
     theta: Vec<f64>,
 }
@@ -230,11 +201,11 @@ impl Corrected {
         for s in &saved.effects {
             let effect = crate::by_name(&s.name).ok_or_else(|| ModelError::Effect(s.name.clone()))?;
             let law = effect
-                .laws()
+                .laws
                 .iter()
                 .position(|l| l.name == s.law)
                 .ok_or_else(|| ModelError::Law { effect: s.name.clone(), law: s.law.clone() })?;
-            let expected = effect.laws()[law].parameters;
+            let expected = effect.laws[law].parameters;
             let mut theta = Vec::with_capacity(expected.len());
             for (index, p) in expected.iter().map(|p| p.at_load(saved.design.reference_load_n)).enumerate() {
                 let given = s.parameters.get(index).filter(|g| g.name == p.name && g.unit == p.unit);
@@ -253,12 +224,12 @@ impl Corrected {
                 }
                 theta.push(value);
             }
-            effect.prepare(law, &theta);
+            (effect.prepare)(law, &theta);
             effects.push(Compiled { effect, law, theta });
         }
         crate::contact::prepare();
         effects.sort_by_key(|c| {
-            crate::library().iter().position(|e| e.name() == c.effect.name()).unwrap_or(usize::MAX)
+            crate::library().iter().position(|e| e.name == c.effect.name).unwrap_or(usize::MAX)
         });
         Ok(Self {
             baseline: saved.baseline,
@@ -274,10 +245,10 @@ impl Corrected {
     pub fn lacks(&self, ambient: &Ambient) -> Option<Lack> {
         let known = Condition::paper().within(ambient);
         self.effects.iter().find_map(|c| {
-            let law = &c.effect.laws()[c.law];
-            let needs = c.effect.needs().iter().chain(law.needs);
+            let law = &c.effect.laws[c.law];
+            let needs = c.effect.needs.iter().chain(law.needs);
             let covariate = needs.filter_map(|n| n.covariate()).find(|k| k.of(&known).is_none())?;
-            Some(Lack { effect: c.effect.name(), law: law.name, covariate })
+            Some(Lack { effect: c.effect.name, law: law.name, covariate })
         })
     }
 
@@ -289,21 +260,23 @@ impl Corrected {
     /// Signed mean lateral force that the sensor will read at a pass, N; NaN where the base law cannot tell.
     /// Allocates nothing.
     pub fn lateral_force(&self, pass: &Condition) -> f64 {
-        let beside = self.law.as_ref().map_or(Ok(0.0), |(_, reference)| self.beside(reference.mu0, pass));
-        self.lateral_force_from(&self.baseline, pass) + beside.unwrap_or(f64::NAN)
+        let beside =
+            self.law.as_ref().map_or(Ok([0.0; 2]), |(_, reference)| self.beside(reference.mu0, pass));
+        self.lateral_force_from(&self.baseline, pass) + beside.map_or(f64::NAN, |[force, _]| force)
     }
 
-    /// Force of the base law less that of the spring-slider which stands for it, N, signed; zero without a
-    /// base law.
-    fn beside(&self, mu0: f64, pass: &Condition) -> Result<f64, OutOfDomain> {
-        let Some((law, reference)) = &self.law else { return Ok(0.0) };
-        let force = law.predict(&Condition { mu0, ..*pass })?.lateral_force_n * pass.direction.sign();
-        Ok(force - lateral_force(&Baseline { mu0, ..*reference }, &[], pass, &self.design))
+    /// Force of the base law less that of the spring-slider which stands for it, N, signed, and the standard
+    /// deviation of the law's `mu'`; zeros without a base law.
+    fn beside(&self, mu0: f64, pass: &Condition) -> Result<[f64; 2], OutOfDomain> {
+        let Some((law, reference)) = &self.law else { return Ok([0.0; 2]) };
+        let of = law.predict(&Condition { mu0, ..*pass })?;
+        let slider = lateral_force(&Baseline { mu0, ..*reference }, &[], pass, &self.design);
+        Ok([of.lateral_force_n * pass.direction.sign() - slider, law.form_sd(&of)])
     }
 
     fn lateral_force_from(&self, baseline: &Baseline, pass: &Condition) -> f64 {
         let zero: [f64; 0] = [];
-        let idle = Active { effect: &crate::library::sensor_lag::SensorLag, law: 0, theta: &zero };
+        let idle = Active { effect: &Effect::NONE, law: 0, theta: &zero };
         let mut active = [idle; MOST_EFFECTS];
         for (slot, c) in active.iter_mut().zip(&self.effects) {
             *slot = Active { effect: c.effect, law: c.law, theta: &c.theta };
@@ -321,8 +294,8 @@ impl FrictionModel for Corrected {
         self.law.as_ref().map(|(law, _)| &**law)
     }
 
-    fn form_sd(&self, condition: &Condition) -> f64 {
-        self.predict(condition).map_or(0.0, |p| p.mu_relative_sd)
+    fn form_sd(&self, of: &Prediction) -> f64 {
+        of.mu_relative_sd
     }
 
     /// The lateral force is what the sensor will read along the motion, so an effect of an instrument is in
@@ -333,10 +306,10 @@ impl FrictionModel for Corrected {
         let baseline = Baseline { mu0: condition.mu0, ..self.baseline };
         let sign = condition.direction.sign();
         let sliding = self.lateral_force_from(&baseline, condition);
-        let along = sign * (sliding + self.beside(condition.mu0, condition)?);
+        let [beside, of_law] = self.beside(condition.mu0, condition)?;
+        let along = sign * (sliding + beside);
         let full = condition.mu0 * condition.normal_force_n;
         let change = sliding - lateral_force(&baseline, &[], condition, &self.design);
-        let of_law = self.law.as_ref().map_or(0.0, |(law, _)| law.form_sd(condition));
         let contact = self.baseline.contact(condition, &self.design);
         let regime = if contact.amplitude_pp < crate::contact::STILL_PLATE_M || contact.load_ratio() >= 1.0 {
             Regime::FullContact

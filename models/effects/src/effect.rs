@@ -312,55 +312,66 @@ impl Need {
     }
 }
 
-/// A candidate cause of the gap. It nests the baseline: at the zero of its size nothing changes, bit for bit.
-pub trait Effect: Sync {
+/// A candidate cause of the gap. It nests the baseline: at the zero of its size nothing changes, bit for bit. Written
+/// as JSON it is what `muprime model effects` shows of it.
+#[derive(Serialize)]
+pub struct Effect {
     /// Name as docs/contract.md has it.
-    fn name(&self) -> &'static str;
+    pub name: &'static str,
     /// Where it sits.
-    fn place(&self) -> Place;
+    pub place: Place,
     /// One sentence on the mechanism.
-    fn summary(&self) -> &'static str;
+    pub summary: &'static str,
     /// Where form and ranges come from.
-    fn source(&self) -> &'static str;
+    pub source: &'static str,
+    /// What a table must hold before it can be seen.
+    pub needs: &'static [Need],
     /// Its functional forms.
-    fn laws(&self) -> &'static [Law];
+    pub laws: &'static [Law],
     /// Largest share of its change by which it may depart smoothly from its form. A linear map of the
     /// readings has no shape of its own: what needs more is something else (a vibration in the plane of the
     /// plate looks like a cross-talk that is off by a third).
-    fn departs_by(&self) -> f64 {
-        1.0
-    }
-    /// What a table must hold before it can be seen.
-    fn needs(&self) -> &'static [Need];
+    #[serde(skip)]
+    pub departs_by: f64,
     /// Effects that nearly do the same, and stand in for it where it is missing: stated on one of each two.
-    fn near(&self) -> &'static [&'static str] {
-        &[]
-    }
+    #[serde(skip)]
+    pub near: &'static [&'static str],
     /// Effects of the library that together nearly do what this one does: as a pair they are not named.
-    fn imitated_by(&self) -> &'static [&'static str] {
-        &[]
-    }
-    /// The cause in words, as it stands in a sentence; its name where it is a name of the library.
-    fn words(&self) -> &'static str {
-        self.name()
-    }
+    #[serde(skip)]
+    pub imitated_by: &'static [&'static str],
+    /// The cause in words, as it stands in a sentence; none where its name is a name of the library.
+    #[serde(skip)]
+    pub words: Option<&'static str>,
     /// Error of mu' by interpolation, root mean square; zero for what is evaluated directly.
-    fn interpolation_error(&self) -> f64 {
-        0.0
-    }
-    /// Makes what [`Effect::change`] with these parameters will look up, so that a control loop makes nothing.
-    fn prepare(&self, _law: usize, _theta: &[f64]) {}
-    /// Changes what the contact is given. `theta` holds the parameters of the law in its order.
-    fn change(
-        &self,
-        _law: usize,
-        _theta: &[f64],
-        _pass: &Condition,
-        _design: &Design,
-        _contact: &mut Contact,
-    ) {
-    }
+    #[serde(skip)]
+    pub interpolation_error: f64,
+    /// Makes what `change` with this law and these parameters will look up, so that a control loop makes nothing.
+    #[serde(skip)]
+    pub prepare: fn(usize, &[f64]),
+    /// Changes what the contact is given: by the law, and its parameters in its order.
+    #[serde(skip)]
+    pub change: fn(usize, &[f64], &Condition, &Design, &mut Contact),
     /// Changes what the instruments make of the friction force.
-    fn read(&self, _law: usize, _theta: &[f64], _pass: &Condition, _design: &Design, _reading: &mut Reading) {
-    }
+    #[serde(skip)]
+    pub read: fn(usize, &[f64], &Condition, &Design, &mut Reading),
+}
+
+impl Effect {
+    /// A cause without a name that changes nothing: what a cause does not state is as here.
+    pub const NONE: Effect = Effect {
+        name: "",
+        place: Place::Contact,
+        summary: "",
+        source: "",
+        laws: &[],
+        departs_by: 1.0,
+        needs: &[],
+        near: &[],
+        imitated_by: &[],
+        words: None,
+        interpolation_error: 0.0,
+        prepare: |_, _| (),
+        change: |_, _, _, _, _| (),
+        read: |_, _, _, _, _| (),
+    };
 }

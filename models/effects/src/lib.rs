@@ -8,7 +8,6 @@
 //! | [`operating`] | one pass as the table has it; the baseline and the reading |
 //! | [`predict`] | the lateral force of a pass under the baseline and any effects |
 //! | [`corrected`] | the corrected model that a run loads |
-//! | [`listing`] | the library as data |
 //!
 //! An effect changes what the contact is given ([`contact::Contact`]) or what the instruments make of the
 //! force ([`operating::Reading`]); the contact itself is solved in one place. Effects therefore combine, and
@@ -41,7 +40,6 @@ pub mod contact;
 pub mod corrected;
 pub mod effect;
 pub mod library;
-pub mod listing;
 pub mod operating;
 pub mod predict;
 

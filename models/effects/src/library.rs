@@ -10,18 +10,18 @@ use crate::effect::{Effect, Law};
 mod prelude {
     pub use crate::contact::Contact;
     pub use crate::effect::{Effect, Law, Need, Parameter, Place, STATED_AT_N};
-    pub use crate::operating::{Design, LEAST_SHARE, Reading, atmospheres};
+    pub use crate::operating::{Design, LEAST_SHARE, atmospheres};
     pub use models::condition::Condition;
     pub use models::rig_file::CertifiedKey;
 }
 
 /// Declares the files of this folder and lists their causes.
 macro_rules! causes {
-    (library { $($file:ident::$cause:ident)* } open_set { $($other_file:ident::$other:ident)* }) => {
+    (library { $($file:ident)* } open_set { $($other:ident)* }) => {
         $(pub mod $file;)*
-        $(pub mod $other_file;)*
-        static LIBRARY: &[&dyn Effect] = &[$(&$file::$cause),*];
-        static KNOWN: &[&dyn Effect] = &[$(&$file::$cause,)* $(&$other_file::$other),*];
+        $(pub mod $other;)*
+        static LIBRARY: &[&Effect] = &[$(&$file::EFFECT),*];
+        static KNOWN: &[&Effect] = &[$(&$file::EFFECT,)* $(&$other::EFFECT),*];
     };
 }
 
@@ -29,69 +29,68 @@ causes! {
     // In the order in which a signal passes them: instruments that falsify the condition, plate, finger,
     // contact, instruments that read the force.
     library {
-        normal_offset::NormalOffset
-        normal_gain::NormalGain
-        speed_error::SpeedError
-        speed_ripple::SpeedRipple
-        amplitude_miscalibration::AmplitudeMiscalibration
-        amplitude_saturation::AmplitudeSaturation
-        resonance_detuning::ResonanceDetuning
-        mode_shape::ModeShape
-        amplitude_droop::AmplitudeDroop
-        stiffness_error::StiffnessError
-        subsurface_relaxation::SubsurfaceRelaxation
-        moisture_drift::MoistureDrift
-        rate_dependent_friction::RateDependentFriction
-        load_dependent_friction::LoadDependentFriction
-        adhesion::Adhesion
-        multi_asperity::MultiAsperity
-        normal_damping::NormalDamping
-        lateral_recovery::LateralRecovery
-        contact_ageing::ContactAgeing
-        ridge_inertia::RidgeInertia
-        squeeze_film::SqueezeFilm
-        plate_tilt::PlateTilt
-        force_crosstalk::ForceCrosstalk
-        lateral_gain::LateralGain
-        lateral_offset_drift::LateralOffsetDrift
-        sensor_lag::SensorLag
-        time_misalignment::TimeMisalignment
+        normal_offset
+        normal_gain
+        speed_error
+        speed_ripple
+        amplitude_miscalibration
+        amplitude_saturation
+        resonance_detuning
+        mode_shape
+        amplitude_droop
+        stiffness_error
+        subsurface_relaxation
+        moisture_drift
+        rate_dependent_friction
+        load_dependent_friction
+        adhesion
+        multi_asperity
+        normal_damping
+        lateral_recovery
+        contact_ageing
+        ridge_inertia
+        squeeze_film
+        plate_tilt
+        force_crosstalk
+        lateral_gain
+        lateral_offset_drift
+        sensor_lag
+        time_misalignment
     }
     // Causes of known form that no verdict names: the open set of a diagnosis takes them in.
     open_set {
-        frictional_heating::FrictionalHeating
+        frictional_heating
     }
 }
 
 /// Every effect that a verdict may name, in the order in which effects act.
-pub fn library() -> &'static [&'static dyn Effect] {
+pub fn library() -> &'static [&'static Effect] {
     LIBRARY
 }
 
 /// The library, and after it causes of known form that it does not name: a diagnosis' open set takes them in.
-pub fn known() -> &'static [&'static dyn Effect] {
+pub fn known() -> &'static [&'static Effect] {
     KNOWN
 }
 
 /// Whether one of two effects nearly does what the other does, so that it stands in for it where that is missing.
 pub fn near(a: &str, b: &str) -> bool {
-    let states = |one: &str, other: &str| by_name(one).is_some_and(|e| e.near().contains(&other));
+    let states = |one: &str, other: &str| by_name(one).is_some_and(|e| e.near.contains(&other));
     states(a, b) || states(b, a)
 }
 
 /// Whether two effects are one cause under two names: a law of one states that it does the same as a law of the other.
 pub fn one_cause(a: &str, b: &str) -> bool {
     let states = |one: &str, other: &str| {
-        let laws = by_name(one).map_or(&[][..], |e| e.laws());
+        let laws = by_name(one).map_or(&[][..], |e| e.laws);
         laws.iter().any(|l| l.same_as.is_some_and(|(effect, _)| effect == other))
     };
     states(a, b) || states(b, a)
 }
 
 /// The cause outside of the library that these effects of it together nearly imitate, where there is one.
-pub fn imitated(names: &[&str]) -> Option<&'static dyn Effect> {
-    let by =
-        |e: &&&dyn Effect| !e.imitated_by().is_empty() && e.imitated_by().iter().all(|n| names.contains(n));
+pub fn imitated(names: &[&str]) -> Option<&'static Effect> {
+    let by = |e: &&&Effect| !e.imitated_by.is_empty() && e.imitated_by.iter().all(|n| names.contains(n));
     known().iter().find(by).copied()
 }
 
@@ -99,10 +98,10 @@ pub fn imitated(names: &[&str]) -> Option<&'static dyn Effect> {
 /// change of the baseline, and those that say so of each other.
 pub fn twins() -> Vec<[(usize, usize); 2]> {
     let laws: Vec<(usize, usize, &Law)> = (library().iter().enumerate())
-        .flat_map(|(e, effect)| effect.laws().iter().enumerate().map(move |(l, law)| (e, l, law)))
+        .flat_map(|(e, effect)| effect.laws.iter().enumerate().map(move |(l, law)| (e, l, law)))
         .collect();
     let says = |a: &(usize, usize, &Law), b: &(usize, usize, &Law)| {
-        a.2.same_as == Some((library()[b.0].name(), b.2.name))
+        a.2.same_as == Some((library()[b.0].name, b.2.name))
     };
     let mut list = Vec::new();
     for (k, a) in laws.iter().enumerate() {
@@ -117,6 +116,6 @@ pub fn twins() -> Vec<[(usize, usize); 2]> {
 }
 
 /// The effect of that name in the library.
-pub fn by_name(name: &str) -> Option<&'static dyn Effect> {
-    library().iter().copied().find(|effect| effect.name() == name)
+pub fn by_name(name: &str) -> Option<&'static Effect> {
+    library().iter().copied().find(|effect| effect.name == name)
 }

@@ -9,7 +9,7 @@ use models::condition::Condition;
 #[derive(Clone, Copy)]
 pub struct Active<'a> {
     /// Which effect.
-    pub effect: &'static dyn Effect,
+    pub effect: &'static Effect,
     /// Index of its law.
     pub law: usize,
     /// Parameters in the law's order and units.
@@ -35,8 +35,8 @@ pub fn rough_lateral_force(
 fn read(mut contact: Contact, effects: &[Active<'_>], pass: &Condition, design: &Design) -> f64 {
     let mut reading = Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 };
     for active in effects {
-        active.effect.change(active.law, active.theta, pass, design, &mut contact);
-        active.effect.read(active.law, active.theta, pass, design, &mut reading);
+        (active.effect.change)(active.law, active.theta, pass, design, &mut contact);
+        (active.effect.read)(active.law, active.theta, pass, design, &mut reading);
     }
     let friction = pass.direction.sign() * mean_friction(&contact);
     if reading == (Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 }) {

@@ -55,21 +55,21 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 /// Every effect and law that one file names in another exists, and laws of one effect differ in name.
 #[test]
 fn every_name_referred_to_exists() {
-    let names: BTreeSet<&str> = known().iter().map(|e| e.name()).collect();
+    let names: BTreeSet<&str> = known().iter().map(|e| e.name).collect();
     assert_eq!(names.len(), known().len(), "two causes of one name");
     for effect in known() {
-        for other in effect.near().iter().chain(effect.imitated_by()) {
-            assert!(by_name(other).is_some() && *other != effect.name(), "{} names '{other}'", effect.name());
+        for other in effect.near.iter().chain(effect.imitated_by) {
+            assert!(by_name(other).is_some() && *other != effect.name, "{} names '{other}'", effect.name);
         }
-        let laws: BTreeSet<&str> = effect.laws().iter().map(|l| l.name).collect();
-        assert_eq!(laws.len(), effect.laws().len(), "{}: two laws of one name", effect.name());
-        for (other, law) in effect.laws().iter().filter_map(|l| l.same_as) {
-            let found = by_name(other).is_some_and(|e| e.laws().iter().any(|l| l.name == law));
-            assert!(found && other != effect.name(), "{} names '{other}' with '{law}'", effect.name());
+        let laws: BTreeSet<&str> = effect.laws.iter().map(|l| l.name).collect();
+        assert_eq!(laws.len(), effect.laws.len(), "{}: two laws of one name", effect.name);
+        for (other, law) in effect.laws.iter().filter_map(|l| l.same_as) {
+            let found = by_name(other).is_some_and(|e| e.laws.iter().any(|l| l.name == law));
+            assert!(found && other != effect.name, "{} names '{other}' with '{law}'", effect.name);
         }
     }
     for outside in &known()[library().len()..] {
-        assert!(by_name(outside.name()).is_none() && outside.words() != outside.name(), "{}", outside.name());
+        assert!(by_name(outside.name).is_none() && outside.words.is_some(), "{}", outside.name);
     }
 }
 
@@ -78,7 +78,7 @@ fn every_name_referred_to_exists() {
 fn laws_that_act_as_a_change_of_the_baseline_do_so_exactly() {
     let mut tried = 0;
     for effect in known() {
-        for (law, form) in effect.laws().iter().enumerate() {
+        for (law, form) in effect.laws.iter().enumerate() {
             let Some([mu0, normal, lateral]) = form.acts_as else { continue };
             for size in [-0.4, 0.1, 0.5] {
                 let changed = Baseline {
@@ -86,10 +86,10 @@ fn laws_that_act_as_a_change_of_the_baseline_do_so_exactly() {
                     normal_stiffness_n_per_m: BASELINE.normal_stiffness_n_per_m * (normal * size).exp(),
                     lateral_stiffness_n_per_m: BASELINE.lateral_stiffness_n_per_m * (lateral * size).exp(),
                 };
-                let with = forces(&BASELINE, &[Active { effect: *effect, law, theta: &[size] }]);
+                let with = forces(&BASELINE, &[Active { effect, law, theta: &[size] }]);
                 let off = apart(&with, &forces(&changed, &[]));
-                assert!(off < 1e-9, "{} ({}) at {size}: off by {off:.1e}", effect.name(), form.name);
-                assert!(apart(&with, &forces(&BASELINE, &[])) > 1e-3, "{}: nothing changes", effect.name());
+                assert!(off < 1e-9, "{} ({}) at {size}: off by {off:.1e}", effect.name, form.name);
+                assert!(apart(&with, &forces(&BASELINE, &[])) > 1e-3, "{}: nothing changes", effect.name);
                 tried += 1;
             }
         }
@@ -103,16 +103,15 @@ fn twins_do_the_same() {
     let twins = muprime_effects::twins();
     for [(a, law_a), (b, law_b)] in &twins {
         let of = |e: usize, law: usize| {
-            let effect: &'static dyn Effect = library()[e];
+            let effect: &'static Effect = library()[e];
             forces(&BASELINE, &[Active { effect, law, theta: &[0.03] }])
         };
         let (one, other) = (of(*a, *law_a), of(*b, *law_b));
         let change = apart(&one, &forces(&BASELINE, &[]));
-        let names = [library()[*a].name(), library()[*b].name()];
+        let names = [library()[*a].name, library()[*b].name];
         assert!(apart(&one, &other) < 0.35 * change, "{names:?}: {} of {change}", apart(&one, &other));
     }
-    let of =
-        |name: &str| twins.iter().filter(|t| t.iter().any(|(e, _)| library()[*e].name() == name)).count();
+    let of = |name: &str| twins.iter().filter(|t| t.iter().any(|(e, _)| library()[*e].name == name)).count();
     assert!(of("plate_tilt") == 1 && of("stiffness_error") == 2 && of("speed_error") == 1, "{twins:?}");
 }
 
@@ -121,7 +120,7 @@ fn twins_do_the_same() {
 fn every_certified_quantity_bounds_a_law() {
     for key in CertifiedKey::ALL {
         let laws: Vec<_> =
-            library().iter().flat_map(|e| e.laws()).filter(|l| l.certified_by == Some(key)).collect();
+            library().iter().flat_map(|e| e.laws).filter(|l| l.certified_by == Some(key)).collect();
         assert_eq!(laws.len(), 1, "{} bounds {} laws", key.name(), laws.len());
         let size = &laws[0].parameters[0];
         let unit = if key.name().ends_with("_n") {
@@ -139,7 +138,7 @@ fn every_certified_quantity_bounds_a_law() {
 #[test]
 fn heating_is_imitated_by_rate_and_load_together() {
     let pair = ["load_dependent_friction", "rate_dependent_friction"];
-    assert_eq!(muprime_effects::imitated(&pair).map(Effect::name), Some("frictional_heating"));
+    assert_eq!(muprime_effects::imitated(&pair).map(|e| e.name), Some("frictional_heating"));
     assert!(muprime_effects::imitated(&pair[..1]).is_none());
 }
 
@@ -148,13 +147,13 @@ fn heating_is_imitated_by_rate_and_load_together() {
 #[test]
 fn checks_measure_in_the_unit_of_the_size() {
     let mut checked = 0;
-    for (effect, law) in library().iter().flat_map(|e| e.laws().iter().map(move |l| (e, l))) {
+    for (effect, law) in library().iter().flat_map(|e| e.laws.iter().map(move |l| (e, l))) {
         let Some(check) = law.seen_by else { continue };
         let (Prior::Normal(sd) | Prior::HalfNormal(sd)) = law.parameters[0].prior else {
-            panic!("{} ({}): the size comes first", effect.name(), law.name)
+            panic!("{} ({}): the size comes first", effect.name, law.name)
         };
         let share = check.sd / sd;
-        assert!((5e-3..=0.5).contains(&share), "{} ({}): {share:.1e} of the prior", effect.name(), law.name);
+        assert!((5e-3..=0.5).contains(&share), "{} ({}): {share:.1e} of the prior", effect.name, law.name);
         checked += 1;
     }
     assert!(checked > 20, "{checked}");
@@ -164,7 +163,7 @@ fn checks_measure_in_the_unit_of_the_size() {
 #[test]
 fn every_law_can_be_made_ready_for_the_loop() {
     for effect in library() {
-        for (law, form) in effect.laws().iter().enumerate() {
+        for (law, form) in effect.laws.iter().enumerate() {
             let parameters: Vec<_> =
                 form.parameters.iter().map(|p| p.at_load(DESIGN.reference_load_n)).collect();
             let theta: Vec<f64> = parameters.iter().map(|p| p.value(0.2)).collect();
@@ -177,7 +176,7 @@ fn every_law_can_be_made_ready_for_the_loop() {
                 design: DESIGN,
                 law: None,
                 effects: vec![SavedEffect {
-                    name: effect.name().into(),
+                    name: effect.name.into(),
                     law: form.name.into(),
                     acts_on: "prediction".into(),
                     parameters: parameters
@@ -193,13 +192,13 @@ fn every_law_can_be_made_ready_for_the_loop() {
                 }],
             };
             let model = Corrected::compile(&saved).unwrap();
-            let active = [Active { effect: *effect, law, theta: &theta }];
+            let active = [Active { effect, law, theta: &theta }];
             for (pass, force) in passes().iter().zip(forces(&BASELINE, &active)) {
                 let got = model.lateral_force(pass);
                 assert!(
                     (got - force).abs() <= 1e-9 * force.abs().max(1e-3),
                     "{}: {}",
-                    effect.name(),
+                    effect.name,
                     form.name
                 );
             }

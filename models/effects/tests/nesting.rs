@@ -44,15 +44,15 @@ const DESIGN: Design = Design {
 fn zero_is_the_baseline() {
     let baseline = Baseline { mu0: 0.6, normal_stiffness_n_per_m: 2e6, lateral_stiffness_n_per_m: 0.8e6 };
     for effect in known() {
-        for (law, form) in effect.laws().iter().enumerate() {
-            assert!(form.parameters[0].zero == Some(0.0), "{}: the size comes first", effect.name());
+        for (law, form) in effect.laws.iter().enumerate() {
+            assert!(form.parameters[0].zero == Some(0.0), "{}: the size comes first", effect.name);
             for shape in [-2.0, 0.0, 1.7] {
                 let theta: Vec<f64> =
                     form.parameters.iter().map(|p| p.zero.unwrap_or_else(|| p.value(shape))).collect();
                 for pass in passes() {
                     let with = muprime_effects::lateral_force(
                         &baseline,
-                        &[Active { effect: *effect, law, theta: &theta }],
+                        &[Active { effect, law, theta: &theta }],
                         &pass,
                         &DESIGN,
                     );
@@ -60,7 +60,7 @@ fn zero_is_the_baseline() {
                     assert!(
                         with.to_bits() == without.to_bits(),
                         "{} ({}): {with} is not {without} at {pass:?}",
-                        effect.name(),
+                        effect.name,
                         form.name
                     );
                 }
@@ -73,8 +73,8 @@ fn zero_is_the_baseline() {
 fn small_sizes_are_continuous_and_all_predictions_finite() {
     let baseline = Baseline { mu0: 0.6, normal_stiffness_n_per_m: 2e6, lateral_stiffness_n_per_m: 0.8e6 };
     for effect in known() {
-        let additive = effect.name() == "lateral_offset_drift";
-        for (law, form) in effect.laws().iter().enumerate() {
+        let additive = effect.name == "lateral_offset_drift";
+        for (law, form) in effect.laws.iter().enumerate() {
             for size in [1e-6, 0.1, 1.0, 4.0, 8.0] {
                 let theta: Vec<f64> = form
                     .parameters
@@ -84,15 +84,15 @@ fn small_sizes_are_continuous_and_all_predictions_finite() {
                     .map(|(i, p)| p.value(if i == 0 || (size < 1e-3 && additive) { size } else { 0.3 }))
                     .collect();
                 for pass in passes() {
-                    let active = [Active { effect: *effect, law, theta: &theta }];
+                    let active = [Active { effect, law, theta: &theta }];
                     let with = muprime_effects::lateral_force(&baseline, &active, &pass, &DESIGN);
-                    assert!(with.is_finite(), "{} ({}) at {size}: {pass:?}", effect.name(), form.name);
+                    assert!(with.is_finite(), "{} ({}) at {size}: {pass:?}", effect.name, form.name);
                     if size == 1e-6 {
                         let without = baseline.lateral_force(&pass, &DESIGN);
                         assert!(
                             (with - without).abs() < 1.5e-2 * without.abs() + 1e-6,
                             "{} ({}): {with} {without} {pass:?}",
-                            effect.name(),
+                            effect.name,
                             form.name
                         );
                     }
@@ -112,7 +112,7 @@ fn every_name_of_the_contract_and_each_added_one_is_there_once() {
     // The contract lets further effects be added.
     let added = ["normal_gain"];
     let mut wanted: Vec<&str> = contract.split_whitespace().chain(added).collect();
-    let mut names: Vec<&str> = library().iter().map(|e| e.name()).collect();
+    let mut names: Vec<&str> = library().iter().map(|e| e.name).collect();
     wanted.sort_unstable();
     names.sort_unstable();
     assert_eq!(wanted, names);
@@ -122,13 +122,13 @@ fn every_name_of_the_contract_and_each_added_one_is_there_once() {
 #[test]
 fn bounds_of_coordinates_are_bounds_of_values() {
     for effect in known() {
-        for parameter in effect.laws().iter().flat_map(|law| law.parameters) {
+        for parameter in effect.laws.iter().flat_map(|law| law.parameters) {
             let (low, high) = parameter.coordinate_bounds();
-            assert!(low < high, "{} {}", effect.name(), parameter.name);
+            assert!(low < high, "{} {}", effect.name, parameter.name);
             for u in [low, 0.5 * (low + high), high] {
                 let value = parameter.value(u);
                 let back = parameter.coordinate(value);
-                assert!((back - u).abs() < 1e-9, "{} {}: {u} is {back}", effect.name(), parameter.name);
+                assert!((back - u).abs() < 1e-9, "{} {}: {u} is {back}", effect.name, parameter.name);
             }
         }
     }

@@ -25,7 +25,7 @@ fn a_bilinear_law_is_read_exactly_and_nothing_is_said_beyond_it() {
     for (w, u) in [(1e-6, 0.01), (5e-6, 0.1), (3.3e-6, 0.02), (1.5e-6, 0.099)] {
         let p = law.predict(&at(w, u)).unwrap();
         assert!((p.mu_relative - f(w, u)).abs() < 1e-12 && (p.mu_relative_sd - 0.02).abs() < 1e-12);
-        assert_eq!(law.form_sd(&at(w, u)), p.mu_relative_sd);
+        assert_eq!(law.form_sd(&p), p.mu_relative_sd);
     }
     for (w, u, name) in
         [(0.9e-6, 0.05, "amplitude_pp_m"), (2e-6, 0.11, "speed_m_s"), (2e-6, 0.009, "speed_m_s")]

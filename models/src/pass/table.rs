@@ -8,6 +8,7 @@ use std::io::{Read, Write};
 
 /// What is wrong with a table, and where.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum TableError {
     /// A column that every table must have is not there.
     #[error("line 1: the column '{0}' is missing; a point table needs it")]
@@ -17,32 +18,15 @@ pub enum TableError {
     DoubleColumn(String),
     /// A cell that must have a value is empty.
     #[error("line {line}: '{column}' is empty; only optional columns may be")]
-    EmptyCell {
-        /// Line in the file, the header being line 1.
-        line: u64,
-        /// Name of the column.
-        column: &'static str,
-    },
+    EmptyCell { line: u64, column: &'static str },
     /// A pass with vibration whose frequency is not stated.
     #[error(
         "line {line}: 'frequency_hz' is empty or has no column; only passes with amplitude_pp_m = 0 have none"
     )]
-    NoFrequency {
-        /// Line in the file.
-        line: u64,
-    },
+    NoFrequency { line: u64 },
     /// A cell that cannot be read as what its column holds.
     #[error("line {line}: '{column}' is '{text}'; {needed} is needed")]
-    BadCell {
-        /// Line in the file.
-        line: u64,
-        /// Name of the column.
-        column: &'static str,
-        /// What stands there.
-        text: String,
-        /// What would be accepted.
-        needed: &'static str,
-    },
+    BadCell { line: u64, column: &'static str, text: String, needed: &'static str },
     /// A row with the wrong number of cells, or text that is not CSV or UTF-8.
     #[error("{0}")]
     Malformed(#[from] csv::Error),

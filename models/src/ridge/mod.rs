@@ -53,25 +53,14 @@ pub use phase_curves::{PhaseCurves, Skin, SkinGrid};
 
 /// Why a ridge could not be built or computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum RidgeError {
     /// A value that makes no sense, with what it may be.
     #[error("{what} is {value}: must be {range}")]
-    Input {
-        /// The quantity, with its unit.
-        what: String,
-        /// What was given.
-        value: f64,
-        /// What is allowed.
-        range: String,
-    },
+    Input { what: String, value: f64, range: String },
     /// The requested time step is above the stable one.
     #[error("a time step of {asked_s:e} s is unstable here: at most {stable_s:e} s (or leave it out)")]
-    UnstableStep {
-        /// The requested step, s.
-        asked_s: f64,
-        /// The largest stable step, s.
-        stable_s: f64,
-    },
+    UnstableStep { asked_s: f64, stable_s: f64 },
     /// The run has run away; its numbers mean nothing.
     #[error("the run diverged: velocities beyond 1e6 m/s or not numbers; use a smaller time step")]
     Diverged,

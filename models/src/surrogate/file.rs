@@ -10,23 +10,14 @@ const FIELDS: [(&str, f64); 3] = [("mu_relative", 1e4), ("phase_shift_deg", 10.0
 
 /// Why a table could not be read or made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum TableError {
     /// A line that is not what it should be.
     #[error("line {line} of the ridge table: {problem}")]
-    Line {
-        /// Line number from 1.
-        line: usize,
-        /// What is wrong.
-        problem: String,
-    },
+    Line { line: usize, problem: String },
     /// A result is missing: the study is not complete.
     #[error("{missing} of {of} results are missing: let the study finish first")]
-    Incomplete {
-        /// How many are missing.
-        missing: usize,
-        /// How many the table needs.
-        of: usize,
-    },
+    Incomplete { missing: usize, of: usize },
 }
 
 /// What the table keeps of a run.

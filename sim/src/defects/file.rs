@@ -21,62 +21,26 @@ pub struct Defects {
 
 /// Why a defects file was refused.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum DefectsError {
     /// Not TOML, or a key or value that has no place there.
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
     /// No such kind of defect.
     #[error("line {line}: no defect is called '{name}'; known: {known}")]
-    UnknownKind {
-        /// Line in the file.
-        line: usize,
-        /// What stands there.
-        name: String,
-        /// The known names.
-        known: String,
-    },
+    UnknownKind { line: usize, name: String, known: String },
     /// A parameter the defect does not have.
     #[error("line {line}: '{defect}' has no parameter '{parameter}'; it has: {known}")]
-    UnknownParameter {
-        /// Line in the file.
-        line: usize,
-        /// The defect.
-        defect: &'static str,
-        /// What stands there.
-        parameter: String,
-        /// The defect's parameters.
-        known: String,
-    },
+    UnknownParameter { line: usize, defect: &'static str, parameter: String, known: String },
     /// A parameter that is missing, without a seed to draw it from.
     #[error("line {line}: '{defect}' needs its parameter '{parameter}' (or a seed to draw it from)")]
-    MissingParameter {
-        /// Line in the file.
-        line: usize,
-        /// The defect.
-        defect: &'static str,
-        /// Which one.
-        parameter: &'static str,
-    },
+    MissingParameter { line: usize, defect: &'static str, parameter: &'static str },
     /// Two defects that this world cannot solve at once.
     #[error("line {line}: '{one}' and '{other}' cannot act together in this world; leave one out")]
-    Together {
-        /// Line in the file.
-        line: usize,
-        /// One of them.
-        one: &'static str,
-        /// The other.
-        other: &'static str,
-    },
+    Together { line: usize, one: &'static str, other: &'static str },
     /// A number that cannot be.
     #[error("line {line}: '{parameter}' is {value}; a finite number is needed")]
-    NotFinite {
-        /// Line in the file.
-        line: usize,
-        /// Which one.
-        parameter: String,
-        /// What stands there.
-        value: f64,
-    },
+    NotFinite { line: usize, parameter: String, value: f64 },
 }
 
 #[derive(Deserialize)]

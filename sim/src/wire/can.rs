@@ -1,8 +1,8 @@
 //! Emulated instruments on a CAN bus: plain CAN, and a CANopen drive.
 
-use super::SharedPlant;
 use super::device::Device;
 use super::drive::Drive;
+use super::{Service, SharedPlant};
 use instruments::FrameId;
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::{CanFrame, SlcanReader, SlcanSaid, slcan_line};
@@ -13,7 +13,6 @@ use std::collections::VecDeque;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// The far side of a serial CAN adapter: the driver's end speaks to the adapter, this end is the bus.
@@ -83,8 +82,7 @@ pub struct CanDevice {
 
 /// Emulated instruments on a bus; dropping it stops them.
 pub struct CanEmulator {
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: Service,
 }
 
 impl CanEmulator {
@@ -97,9 +95,7 @@ impl CanEmulator {
         devices: Vec<CanDevice>,
         plant: SharedPlant,
     ) -> io::Result<Self> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopped = Arc::clone(&stop);
-        let thread = std::thread::Builder::new().name("can-emulator".into()).spawn(move || {
+        let work = move |stopped: Arc<AtomicBool>| {
             let instruments = devices.into_iter().map(Instrument::new).collect();
             let mut bus = Bus { port: Box::new(port), instruments, plant };
             while !stopped.load(Ordering::Acquire) {
@@ -108,17 +104,8 @@ impl CanEmulator {
                     std::thread::sleep(Duration::from_millis(5));
                 }
             }
-        })?;
-        Ok(Self { stop, thread: Some(thread) })
-    }
-}
-
-impl Drop for CanEmulator {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
+        };
+        Ok(Self { _thread: Service::start("can-emulator", work)? })
     }
 }
 

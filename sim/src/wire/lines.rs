@@ -6,7 +6,7 @@
 
 use super::device::Device;
 use super::serial::SerialEmulator;
-use super::{Command, Plant, SharedPlant};
+use super::{Command, Plant, Service, SharedPlant};
 use instruments::codec::pattern::Pattern;
 use instruments::profile::FrameKind;
 use instruments::{FrameId, SetId};
@@ -219,8 +219,7 @@ impl SerialEmulator {
 /// An instrument of lines behind TCP; dropping it stops it.
 pub struct TcpLines {
     address: SocketAddr,
-    stop: Arc<AtomicBool>,
-    thread: Option<std::thread::JoinHandle<()>>,
+    _thread: Service,
 }
 
 impl TcpLines {
@@ -232,11 +231,9 @@ impl TcpLines {
         let listener = TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopped = Arc::clone(&stop);
         let instrument = Arc::new(Mutex::new(instrument));
         let clients = Arc::new(AtomicUsize::new(0));
-        let thread = std::thread::Builder::new().name("lines".into()).spawn(move || {
+        let work = move |stopped: Arc<AtomicBool>| {
             while !stopped.load(Ordering::Acquire) {
                 instrument.lock().unwrap_or_else(PoisonError::into_inner).live();
                 match listener.accept() {
@@ -253,22 +250,13 @@ impl TcpLines {
                     Err(_) => std::thread::sleep(Duration::from_millis(2)),
                 }
             }
-        })?;
-        Ok(Self { address, stop, thread: Some(thread) })
+        };
+        Ok(Self { address, _thread: Service::start("lines", work)? })
     }
 
     /// Where it listens.
     pub fn address(&self) -> SocketAddr {
         self.address
-    }
-}
-
-impl Drop for TcpLines {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Emulated instruments on serial lines: the port, and Modbus RTU with streams on it.
 
-use super::SharedPlant;
 use super::device::{Device, Refused};
+use super::{Service, SharedPlant};
 use instruments::codec::modbus_rtu::{self as rtu, Heard, Operation};
 use instruments::schema::{Stream, Table};
 use realtime::ports::Nanos;
@@ -9,13 +9,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// An emulator on a serial line; dropping it stops it.
 pub struct SerialEmulator {
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: Service,
 }
 
 impl SerialEmulator {
@@ -28,9 +26,7 @@ impl SerialEmulator {
         mut port: Box<dyn serialport::SerialPort>,
         mut turn: impl FnMut(&[u8]) -> Vec<u8> + Send + 'static,
     ) -> io::Result<Self> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopped = Arc::clone(&stop);
-        let thread = std::thread::Builder::new().name("serial-emulator".into()).spawn(move || {
+        let work = move |stopped: Arc<AtomicBool>| {
             let _ = port.set_timeout(Duration::from_micros(500));
             let mut buffer = [0; 1024];
             while !stopped.load(Ordering::Acquire) {
@@ -47,8 +43,8 @@ impl SerialEmulator {
                     let _ = port.write_all(&answer);
                 }
             }
-        })?;
-        Ok(Self { stop, thread: Some(thread) })
+        };
+        Ok(Self { _thread: Service::start("serial-emulator", work)? })
     }
 
     /// Serves Modbus RTU units, each with its stream if its profile has one.
@@ -89,15 +85,6 @@ impl SerialEmulator {
             due = next;
             sent.concat()
         })
-    }
-}
-
-impl Drop for SerialEmulator {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
     }
 }
 

@@ -1,14 +1,13 @@
 //! Emulated instruments that send by themselves over a network: a stream over TCP to whoever connects, or in datagrams.
 
-use super::SharedPlant;
 use super::device::Device;
 use super::serial::frames;
+use super::{Service, SharedPlant};
 use instruments::schema::{LinkKind, Stream};
 use std::io::{self, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// How often what is due is sent.
@@ -19,8 +18,7 @@ const MOST_CLIENTS: usize = 8;
 /// A running emulator; dropping it stops it.
 pub struct NetworkStream {
     address: SocketAddr,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: Service,
 }
 
 /// Those who are sent to.
@@ -52,26 +50,13 @@ impl NetworkStream {
             let address = listener.local_addr()?;
             (Ears::Tcp(listener, Vec::new()), address)
         };
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopped = Arc::clone(&stop);
-        let thread = std::thread::Builder::new()
-            .name("stream-emulator".into())
-            .spawn(move || serve(ears, device, &stream, &plant, &stopped))?;
-        Ok(Self { address, stop, thread: Some(thread) })
+        let work = move |stopped: Arc<AtomicBool>| serve(ears, device, &stream, &plant, &stopped);
+        Ok(Self { address, _thread: Service::start("stream-emulator", work)? })
     }
 
     /// Where it is.
     pub fn address(&self) -> SocketAddr {
         self.address
-    }
-}
-
-impl Drop for NetworkStream {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
     }
 }
 

@@ -1,14 +1,13 @@
 //! An emulated device of the kernel's: a folder with a file for each attribute.
 
-use super::SharedPlant;
 use super::device::Device;
+use super::{Service, SharedPlant};
 use instruments::FrameId;
 use instruments::profile::FrameKind;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// How often the attributes are written anew.
@@ -17,8 +16,7 @@ const TURN: Duration = Duration::from_millis(2);
 /// A running emulator; dropping it stops it, and its folder goes.
 pub struct SysfsFolder {
     path: PathBuf,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    thread: Service,
 }
 
 impl SysfsFolder {
@@ -32,17 +30,16 @@ impl SysfsFolder {
         let path = std::env::temp_dir().join(name);
         std::fs::create_dir(&path)?;
         write(&mut device, &plant, &path)?;
-        let stop = Arc::new(AtomicBool::new(false));
-        let (stopped, folder) = (Arc::clone(&stop), path.clone());
-        let thread = std::thread::Builder::new().name("sysfs-emulator".into()).spawn(move || {
+        let folder = path.clone();
+        let work = move |stopped: Arc<AtomicBool>| {
             while !stopped.load(Ordering::Acquire) {
                 if let Err(error) = write(&mut device, &plant, &folder) {
                     tracing::debug!(%error, "the emulated attributes");
                 }
                 std::thread::sleep(TURN);
             }
-        })?;
-        Ok(Self { path, stop, thread: Some(thread) })
+        };
+        Ok(Self { path, thread: Service::start("sysfs-emulator", work)? })
     }
 
     /// The folder.
@@ -53,10 +50,7 @@ impl SysfsFolder {
 
 impl Drop for SysfsFolder {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
+        self.thread.end();
         let _ = std::fs::remove_dir_all(&self.path);
     }
 }

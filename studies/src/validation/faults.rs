@@ -9,7 +9,7 @@ pub mod search;
 mod tamper;
 
 pub use bench::{Core, Found, Scene, Strike, run, run_with};
-pub use rows::{ELSEWHERE, Expect, FaultRow, Moment, Pace, ROWS};
+pub use rows::{Expect, FaultRow, Moment, Pace, ROWS};
 pub use search::{Search, Tally, search};
 
 use runs::out;

@@ -19,7 +19,7 @@ pub struct EffectsArgs {
 /// # Errors
 /// Only if the listing cannot be written as JSON.
 pub fn run(args: &EffectsArgs, json: bool) -> miette::Result<ExitCode> {
-    let mut entries = effects::listing::entries();
+    let mut entries = effects::library().to_vec();
     if let Some(name) = &args.name {
         let known: Vec<_> = entries.iter().map(|e| e.name).collect();
         if !known.contains(&name.as_str()) {

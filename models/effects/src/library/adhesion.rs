@@ -4,46 +4,31 @@ use super::prelude::*;
 use crate::contact::Attraction;
 
 /// See the module.
-pub struct Adhesion;
-
-static LAWS: [Law; 4] = [
-    Law::new("DMT", &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)]),
-    Law::new("constant shear on the touching time", &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)]),
-    Law::new(
-        "developing with the momentary load",
-        &[
-            Parameter::positive("adhesive_force", "N", 0.06, 1.0),
-            Parameter::shape("load_of_half_attraction", "N", 0.04, 1.0),
-            // Peeling takes more force the faster it goes.
-            Parameter::signed("speed_exponent", "1", 0.1, 0.0, 0.4).bending(),
-        ],
-    ),
-    Law::new("JKR", &[Parameter::positive("pull_off_force", "N", 0.015, 0.5)]),
-];
-
-impl Effect for Adhesion {
-    fn name(&self) -> &'static str {
-        "adhesion"
-    }
-    fn place(&self) -> Place {
-        Place::Contact
-    }
-    fn summary(&self) -> &'static str {
-        "The friction limit is mu0 (F + Fa), and contact lasts until the spring pulls with Fa."
-    }
-    fn source(&self) -> &'static str {
-        "Derjaguin, Muller, Toporov 1975; Johnson, Kendall, Roberts 1971; capillary and van der Waals pull of tens of mN on a finger"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn near(&self) -> &'static [&'static str] {
-        &["normal_offset"]
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Loads]
-    }
-    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
+pub static EFFECT: Effect = Effect {
+    name: "adhesion",
+    place: Place::Contact,
+    summary: "The friction limit is mu0 (F + Fa), and contact lasts until the spring pulls with Fa.",
+    source: "Derjaguin, Muller, Toporov 1975; Johnson, Kendall, Roberts 1971; capillary and van der Waals pull of tens of mN on a finger",
+    laws: &[
+        Law::new("DMT", &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)]),
+        Law::new(
+            "constant shear on the touching time",
+            &[Parameter::positive("adhesive_force", "N", 0.06, 1.0)],
+        ),
+        Law::new(
+            "developing with the momentary load",
+            &[
+                Parameter::positive("adhesive_force", "N", 0.06, 1.0),
+                Parameter::shape("load_of_half_attraction", "N", 0.04, 1.0),
+                // Peeling takes more force the faster it goes.
+                Parameter::signed("speed_exponent", "1", 0.1, 0.0, 0.4).bending(),
+            ],
+        ),
+        Law::new("JKR", &[Parameter::positive("pull_off_force", "N", 0.015, 0.5)]),
+    ],
+    near: &["normal_offset"],
+    needs: &[Need::Loads],
+    change: |law, theta, _, design, c| {
         if law == 0 {
             c.adhesion = theta[0];
         } else if law == 2 {
@@ -65,5 +50,6 @@ impl Effect for Adhesion {
             };
             c.mu0 *= 1.0 + theta[0] * touching / c.normal_force;
         }
-    }
-}
+    },
+    ..Effect::NONE
+};

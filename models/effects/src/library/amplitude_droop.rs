@@ -2,45 +2,30 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub struct AmplitudeDroop;
-
 /// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer while the finger is pressed on it.";
 
-static LAWS: [Law; 2] = [
-    // The contact area of a sphere grows as the 2/3 power of the load, that of a flat pad hardly.
-    Law::new(
-        "impedance by a power of the load",
-        &[
-            Parameter::positive("droop_at_reference_load", "1", 0.2, 3.0),
-            Parameter::shape("load_exponent", "1", 0.8, 0.3).bending(),
-        ],
-    )
-    .seen_by(CHECK, 0.015),
-    Law::new("linear loss", &[Parameter::positive("droop_per_load", "1/N", 0.4, 3.0)]).seen_by(CHECK, 0.05),
-];
-
-impl Effect for AmplitudeDroop {
-    fn name(&self) -> &'static str {
-        "amplitude_droop"
-    }
-    fn place(&self) -> Place {
-        Place::Plate
-    }
-    fn summary(&self) -> &'static str {
-        "An amplifier without amplitude control lets w fall as the finger's impedance is pressed on the plate."
-    }
-    fn source(&self) -> &'static str {
-        "plate impedance M omega/Q of 9 N s/m against 50 to 150 N s/m of a fingertip (upper bound)"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Vibration, Need::Loads]
-    }
-    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
+/// See the module.
+pub static EFFECT: Effect = Effect {
+    name: "amplitude_droop",
+    place: Place::Plate,
+    summary: "An amplifier without amplitude control lets w fall as the finger's impedance is pressed on the plate.",
+    source: "plate impedance M omega/Q of 9 N s/m against 50 to 150 N s/m of a fingertip (upper bound)",
+    laws: &[
+        // The contact area of a sphere grows as the 2/3 power of the load, that of a flat pad hardly.
+        Law::new(
+            "impedance by a power of the load",
+            &[
+                Parameter::positive("droop_at_reference_load", "1", 0.2, 3.0),
+                Parameter::shape("load_exponent", "1", 0.8, 0.3).bending(),
+            ],
+        )
+        .seen_by(CHECK, 0.015),
+        Law::new("linear loss", &[Parameter::positive("droop_per_load", "1/N", 0.4, 3.0)])
+            .seen_by(CHECK, 0.05),
+    ],
+    needs: &[Need::Vibration, Need::Loads],
+    change: |law, theta, _, design, c| {
         c.amplitude_pp *= match law {
             0 => {
                 let relative = (c.normal_force / design.reference_load_n).max(0.0);
@@ -48,5 +33,6 @@ impl Effect for AmplitudeDroop {
             }
             _ => (1.0 - theta[0] * c.normal_force).max(0.02),
         };
-    }
-}
+    },
+    ..Effect::NONE
+};

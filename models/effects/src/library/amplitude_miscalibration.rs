@@ -2,41 +2,25 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub struct AmplitudeMiscalibration;
-
 /// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer at three drives.";
 
-static LAWS: [Law; 2] = [
-    Law::new("gain", &[Parameter::signed("log_gain", "1", 0.3, -1.5, 1.5)])
-        .certified_by(CertifiedKey::AmplitudeGain)
-        .acts_as([0.0, 1.0, 0.0])
-        .seen_by(CHECK, 0.02),
-    Law::new("dead zone", &[Parameter::signed("missing_amplitude", "m", 0.2e-6, -1e-6, 1e-6)])
-        .seen_by(CHECK, 4e-8),
-];
-
-impl Effect for AmplitudeMiscalibration {
-    fn name(&self) -> &'static str {
-        "amplitude_miscalibration"
-    }
-    fn place(&self) -> Place {
-        Place::Plate
-    }
-    fn summary(&self) -> &'static str {
-        "True amplitude is a constant factor (or a dead zone) away from the commanded one."
-    }
-    fn source(&self) -> &'static str {
-        "vibrometer calibrations of drives; confusion of peak and peak-to-peak is a factor of two"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Vibration]
-    }
-    fn change(&self, law: usize, theta: &[f64], _: &Condition, _: &Design, c: &mut Contact) {
+/// See the module.
+pub static EFFECT: Effect = Effect {
+    name: "amplitude_miscalibration",
+    place: Place::Plate,
+    summary: "True amplitude is a constant factor (or a dead zone) away from the commanded one.",
+    source: "vibrometer calibrations of drives; confusion of peak and peak-to-peak is a factor of two",
+    laws: &[
+        Law::new("gain", &[Parameter::signed("log_gain", "1", 0.3, -1.5, 1.5)])
+            .certified_by(CertifiedKey::AmplitudeGain)
+            .acts_as([0.0, 1.0, 0.0])
+            .seen_by(CHECK, 0.02),
+        Law::new("dead zone", &[Parameter::signed("missing_amplitude", "m", 0.2e-6, -1e-6, 1e-6)])
+            .seen_by(CHECK, 4e-8),
+    ],
+    needs: &[Need::Vibration],
+    change: |law, theta, _, _, c| {
         if c.amplitude_pp <= 0.0 {
             return;
         }
@@ -44,5 +28,6 @@ impl Effect for AmplitudeMiscalibration {
             0 => c.amplitude_pp *= theta[0].exp(),
             _ => c.amplitude_pp = (c.amplitude_pp - theta[0]).max(0.0),
         }
-    }
-}
+    },
+    ..Effect::NONE
+};

@@ -2,47 +2,33 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub struct AmplitudeSaturation;
-
 /// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer at the largest drives.";
 
-static LAWS: [Law; 3] = [
-    Law::new("hard limit", &[Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6)]).seen_by(CHECK, 2e4),
-    Law::new(
-        "limit with a bend",
-        &[
-            Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6),
-            Parameter::shape("sharpness", "1", 4.0, 0.6),
-            // A current that is limited drives less the higher the frequency; a voltage, the same.
-            Parameter::signed("frequency_exponent", "1", 0.5, -1.0, 2.0).bending(),
-        ],
-    )
-    .seen_by(CHECK, 2e4),
-    Law::new("compression", &[Parameter::positive("inverse_limit", "1/m", 0.2e6, 5e6)]).seen_by(CHECK, 2e4),
-];
-
-impl Effect for AmplitudeSaturation {
-    fn name(&self) -> &'static str {
-        "amplitude_saturation"
-    }
-    fn place(&self) -> Place {
-        Place::Plate
-    }
-    fn summary(&self) -> &'static str {
-        "Above some command the amplitude no longer follows."
-    }
-    fn source(&self) -> &'static str {
-        "rail voltage and depolarisation limits of piezo drives"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Vibration, Need::Amplitudes]
-    }
-    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
+/// See the module.
+pub static EFFECT: Effect = Effect {
+    name: "amplitude_saturation",
+    place: Place::Plate,
+    summary: "Above some command the amplitude no longer follows.",
+    source: "rail voltage and depolarisation limits of piezo drives",
+    laws: &[
+        Law::new("hard limit", &[Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6)])
+            .seen_by(CHECK, 2e4),
+        Law::new(
+            "limit with a bend",
+            &[
+                Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6),
+                Parameter::shape("sharpness", "1", 4.0, 0.6),
+                // A current that is limited drives less the higher the frequency; a voltage, the same.
+                Parameter::signed("frequency_exponent", "1", 0.5, -1.0, 2.0).bending(),
+            ],
+        )
+        .seen_by(CHECK, 2e4),
+        Law::new("compression", &[Parameter::positive("inverse_limit", "1/m", 0.2e6, 5e6)])
+            .seen_by(CHECK, 2e4),
+    ],
+    needs: &[Need::Vibration, Need::Amplitudes],
+    change: |law, theta, _, design, c| {
         let x = theta[0] * c.amplitude_pp;
         c.amplitude_pp *= match law {
             0 => {
@@ -64,5 +50,6 @@ impl Effect for AmplitudeSaturation {
                 }
             }
         };
-    }
-}
+    },
+    ..Effect::NONE
+};

@@ -2,66 +2,50 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub struct LateralOffsetDrift;
-
 /// What sees it without friction.
 const CHECK: &str = "Lift the finger every few passes and read the lateral force.";
 
-static LAWS: [Law; 5] = [
-    Law::new("constant", &[Parameter::signed("offset", "N", 0.01, -0.3, 0.3)])
-        .certified_by(CertifiedKey::LateralOffset)
+/// See the module.
+pub static EFFECT: Effect = Effect {
+    name: "lateral_offset_drift",
+    place: Place::Instrument,
+    summary: "An offset of the lateral force, constant or drifting, whatever the load and the direction.",
+    source: "thermal drift of 1 to 80 mN per stroke of strain-gauge and piezo cells",
+    laws: &[
+        Law::new("constant", &[Parameter::signed("offset", "N", 0.01, -0.3, 0.3)])
+            .certified_by(CertifiedKey::LateralOffset)
+            .seen_by(CHECK, 0.0005),
+        Law::new("linear drift", &[Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4)])
+            .seen_by(CHECK, 0.0005),
+        Law::new(
+            "settling",
+            &[
+                Parameter::signed("change", "N", 0.015, -0.4, 0.4),
+                Parameter::shape("time_constant_over_duration", "1", 0.3, 0.8),
+            ],
+        )
         .seen_by(CHECK, 0.0005),
-    Law::new("linear drift", &[Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4)])
+        Law::new(
+            "offset with curved drift",
+            &[
+                Parameter::signed("offset", "N", 0.01, -0.3, 0.3),
+                Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4),
+                Parameter::signed("curvature_over_table", "N", 0.015, -0.4, 0.4),
+            ],
+        )
         .seen_by(CHECK, 0.0005),
-    Law::new(
-        "settling",
-        &[
-            Parameter::signed("change", "N", 0.015, -0.4, 0.4),
-            Parameter::shape("time_constant_over_duration", "1", 0.3, 0.8),
-        ],
-    )
-    .seen_by(CHECK, 0.0005),
-    Law::new(
-        "offset with curved drift",
-        &[
-            Parameter::signed("offset", "N", 0.01, -0.3, 0.3),
-            Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4),
-            Parameter::signed("curvature_over_table", "N", 0.015, -0.4, 0.4),
-        ],
-    )
-    .seen_by(CHECK, 0.0005),
-    Law::new(
-        "offset with temperature",
-        &[
-            Parameter::signed("offset", "N", 0.01, -0.3, 0.3),
-            Parameter::signed("per_kelvin", "N/K", 0.003, -0.1, 0.1),
-        ],
-    )
-    .needs(&[Need::Temperatures])
-    .seen_by(CHECK, 0.0005),
-];
-
-impl Effect for LateralOffsetDrift {
-    fn name(&self) -> &'static str {
-        "lateral_offset_drift"
-    }
-    fn place(&self) -> Place {
-        Place::Instrument
-    }
-    fn summary(&self) -> &'static str {
-        "An offset of the lateral force, constant or drifting, whatever the load and the direction."
-    }
-    fn source(&self) -> &'static str {
-        "thermal drift of 1 to 80 mN per stroke of strain-gauge and piezo cells"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Directions]
-    }
-    fn read(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, reading: &mut Reading) {
+        Law::new(
+            "offset with temperature",
+            &[
+                Parameter::signed("offset", "N", 0.01, -0.3, 0.3),
+                Parameter::signed("per_kelvin", "N/K", 0.003, -0.1, 0.1),
+            ],
+        )
+        .needs(&[Need::Temperatures])
+        .seen_by(CHECK, 0.0005),
+    ],
+    needs: &[Need::Directions],
+    read: |law, theta, pass, design, reading| {
         let s = pass.time_s / design.duration_s.max(1e-9);
         reading.offset_n += match law {
             0 => theta[0],
@@ -73,5 +57,6 @@ impl Effect for LateralOffsetDrift {
             }
             _ => -theta[0] * (-s / theta[1]).exp_m1(),
         };
-    }
-}
+    },
+    ..Effect::NONE
+};

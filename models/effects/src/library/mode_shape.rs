@@ -3,64 +3,48 @@
 use super::prelude::*;
 use std::f64::consts::PI;
 
-/// See the module.
-pub struct ModeShape;
-
 /// What sees it without friction.
 const CHECK: &str = "Scan the plate with a vibrometer along the stroke.";
 
 /// Least square of the amplitude at a node over that at an antinode: a finger is wider than a node.
 const LEAST_SQUARE: f64 = 4e-4;
 
-static LAWS: [Law; 3] = [
-    Law::new(
-        "standing wave",
-        &[
-            Parameter::positive("depth", "1", 0.5, 1.0),
-            Parameter::between("node_spacing_at_reference", "m", 0.004, 0.03),
-            Parameter::between("phase", "1", -0.25, 1.25),
-            // Flexural waves shorten as the root of the frequency; a plate that is driven at one mode's does not.
-            Parameter::between("frequency_exponent", "1", 0.0, 1.0).bending(),
-            // At one half the root of a sum of squares, of what stands and what travels.
-            Parameter::shape("sharpness", "1", 0.5, 0.5).bending(),
-            // The amplitude was calibrated at one place, which need not be an antinode.
-            Parameter::signed("antinode_over_calibrated_e_folds", "1", 0.3, -1.0, 1.0).bending(),
-            // Waves of all frequencies are in step at an edge of the plate, which need not be where positions are counted from.
-            Parameter::signed("edge_to_origin_over_node_spacing", "1", 1.0, -4.0, 4.0).bending(),
-        ],
-    )
-    .seen_by(CHECK, 0.03),
-    Law::new(
-        "one antinode",
-        &[
-            Parameter::positive("fall_per_square", "1/m^2", 800.0, 4e4),
-            Parameter::between("centre_over_stroke", "1", -1.0, 2.0),
-        ],
-    )
-    .seen_by(CHECK, 130.0),
-    Law::new("gradient", &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)]).seen_by(CHECK, 1.0),
-];
-
-impl Effect for ModeShape {
-    fn name(&self) -> &'static str {
-        "mode_shape"
-    }
-    fn place(&self) -> Place {
-        Place::Plate
-    }
-    fn summary(&self) -> &'static str {
-        "Nodes and antinodes: the amplitude depends on where on the plate the finger is."
-    }
-    fn source(&self) -> &'static str {
-        "flexural half-wave of 6 to 14 mm for 1 to 2 mm plates at 25 to 60 kHz"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Vibration, Need::Positions]
-    }
-    fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
+/// See the module.
+pub static EFFECT: Effect = Effect {
+    name: "mode_shape",
+    place: Place::Plate,
+    summary: "Nodes and antinodes: the amplitude depends on where on the plate the finger is.",
+    source: "flexural half-wave of 6 to 14 mm for 1 to 2 mm plates at 25 to 60 kHz",
+    laws: &[
+        Law::new(
+            "standing wave",
+            &[
+                Parameter::positive("depth", "1", 0.5, 1.0),
+                Parameter::between("node_spacing_at_reference", "m", 0.004, 0.03),
+                Parameter::between("phase", "1", -0.25, 1.25),
+                // Flexural waves shorten as the root of the frequency; a plate that is driven at one mode's does not.
+                Parameter::between("frequency_exponent", "1", 0.0, 1.0).bending(),
+                // At one half the root of a sum of squares, of what stands and what travels.
+                Parameter::shape("sharpness", "1", 0.5, 0.5).bending(),
+                // The amplitude was calibrated at one place, which need not be an antinode.
+                Parameter::signed("antinode_over_calibrated_e_folds", "1", 0.3, -1.0, 1.0).bending(),
+                // Waves of all frequencies are in step at an edge of the plate, which need not be where positions are counted from.
+                Parameter::signed("edge_to_origin_over_node_spacing", "1", 1.0, -4.0, 4.0).bending(),
+            ],
+        )
+        .seen_by(CHECK, 0.03),
+        Law::new(
+            "one antinode",
+            &[
+                Parameter::positive("fall_per_square", "1/m^2", 800.0, 4e4),
+                Parameter::between("centre_over_stroke", "1", -1.0, 2.0),
+            ],
+        )
+        .seen_by(CHECK, 130.0),
+        Law::new("gradient", &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)]).seen_by(CHECK, 1.0),
+    ],
+    needs: &[Need::Vibration, Need::Positions],
+    change: |law, theta, pass, design, c| {
         let x = pass.position_m;
         c.amplitude_pp *= match law {
             0 => {
@@ -73,5 +57,6 @@ impl Effect for ModeShape {
             1 => 1.0 / (1.0 + theta[0] * (x - theta[1] * design.stroke_m).powi(2)),
             _ => (theta[0] * (x - 0.5 * design.stroke_m)).clamp(-2.0, 2.0).exp(),
         };
-    }
-}
+    },
+    ..Effect::NONE
+};

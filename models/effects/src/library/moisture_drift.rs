@@ -3,60 +3,44 @@
 use super::prelude::*;
 
 /// See the module.
-pub struct MoistureDrift;
-
-static LAWS: [Law; 4] = [
-    Law::new(
-        "exponential approach",
-        &[
-            Parameter::signed("relative_change", "1", 0.4, -0.8, 9.0),
-            Parameter::shape("time_constant", "s", 60.0, 1.4),
-        ],
-    ),
-    Law::new(
-        "approach with softening",
-        &[
-            Parameter::signed("relative_change", "1", 0.4, -0.6, 5.0),
-            Parameter::shape("time_constant", "s", 60.0, 1.4),
-        ],
-    ),
-    Law::new(
-        "logarithm of time",
-        &[
-            Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.2, 2.0),
-            Parameter::shape("onset_time", "s", 20.0, 1.2),
-        ],
-    ),
-    Law::new(
-        "exponential approach in each run",
-        &[
-            Parameter::signed("relative_change", "1", 0.4, -0.8, 9.0),
-            Parameter::shape("time_constant", "s", 60.0, 1.4),
-        ],
-    )
-    .needs(&[Need::Runs]),
-];
-
-impl Effect for MoistureDrift {
-    fn name(&self) -> &'static str {
-        "moisture_drift"
-    }
-    fn place(&self) -> Place {
-        Place::Contact
-    }
-    fn summary(&self) -> &'static str {
-        "Friction drifts as the skin under the finger takes up water, with the plate still as well as vibrating."
-    }
-    fn source(&self) -> &'static str {
-        "occlusion with a characteristic time of 20 s, up to tenfold (Dzidek 2014); 5 to 2000 s allowed"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Time]
-    }
-    fn change(&self, law: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
+pub static EFFECT: Effect = Effect {
+    name: "moisture_drift",
+    place: Place::Contact,
+    summary: "Friction drifts as the skin under the finger takes up water, with the plate still as well as vibrating.",
+    source: "occlusion with a characteristic time of 20 s, up to tenfold (Dzidek 2014); 5 to 2000 s allowed",
+    laws: &[
+        Law::new(
+            "exponential approach",
+            &[
+                Parameter::signed("relative_change", "1", 0.4, -0.8, 9.0),
+                Parameter::shape("time_constant", "s", 60.0, 1.4),
+            ],
+        ),
+        Law::new(
+            "approach with softening",
+            &[
+                Parameter::signed("relative_change", "1", 0.4, -0.6, 5.0),
+                Parameter::shape("time_constant", "s", 60.0, 1.4),
+            ],
+        ),
+        Law::new(
+            "logarithm of time",
+            &[
+                Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.2, 2.0),
+                Parameter::shape("onset_time", "s", 20.0, 1.2),
+            ],
+        ),
+        Law::new(
+            "exponential approach in each run",
+            &[
+                Parameter::signed("relative_change", "1", 0.4, -0.8, 9.0),
+                Parameter::shape("time_constant", "s", 60.0, 1.4),
+            ],
+        )
+        .needs(&[Need::Runs]),
+    ],
+    needs: &[Need::Time],
+    change: |law, theta, pass, _, c| {
         let time = if law == 3 { pass.time_in_run_s() } else { pass.time_s };
         let factor = match law {
             2 => 1.0 + theta[0] * (1.0 + time / theta[1]).ln(),
@@ -70,5 +54,6 @@ impl Effect for MoistureDrift {
             c.normal_stiffness *= softer;
             c.lateral_stiffness *= softer;
         }
-    }
-}
+    },
+    ..Effect::NONE
+};

@@ -2,54 +2,38 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub struct RateDependentFriction;
-
 /// Most by which a curve changes mu0, in e-folds: beyond the speeds of a table a polynomial runs away.
 const MOST_E_FOLDS: f64 = 2.0;
 
-static LAWS: [Law; 4] = [
-    Law::new("power", &[Parameter::signed("exponent", "1", 0.12, -0.6, 0.8)]),
-    Law::new(
-        "Stribeck",
-        &[
-            Parameter::signed("static_excess", "1", 0.4, -0.8, 3.0),
-            Parameter::shape("stribeck_speed", "m/s", 0.025, 0.8),
-        ],
-    ),
-    // Thermally activated sliding; the first term of rate-and-state friction.
-    Law::new("logarithmic", &[Parameter::signed("slope_per_log_speed", "1", 0.12, -0.4, 0.6)]),
-    // Any smooth law of speed: linear, one that rises and falls again, or bends at a speed of its own.
-    Law::new(
-        "curve",
-        &[
-            Parameter::signed("exponent", "1", 0.12, -0.6, 0.8),
-            Parameter::signed("bend_per_e_fold", "1", 0.7, -5.0, 5.0).bending(),
-            Parameter::signed("change_of_bend_per_e_fold", "1", 0.4, -3.0, 3.0).bending(),
-        ],
-    ),
-];
-
-impl Effect for RateDependentFriction {
-    fn name(&self) -> &'static str {
-        "rate_dependent_friction"
-    }
-    fn place(&self) -> Place {
-        Place::Contact
-    }
-    fn summary(&self) -> &'static str {
-        "Faster or slower sliding changes mu0 itself; seen with the plate still."
-    }
-    fn source(&self) -> &'static str {
-        "exponents of -0.2 to 0.3 on skin; Stribeck minimum near 10 mm/s on steel (Luo 2024)"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Speeds]
-    }
-    fn change(&self, law: usize, theta: &[f64], _: &Condition, design: &Design, c: &mut Contact) {
+/// See the module.
+pub static EFFECT: Effect = Effect {
+    name: "rate_dependent_friction",
+    place: Place::Contact,
+    summary: "Faster or slower sliding changes mu0 itself; seen with the plate still.",
+    source: "exponents of -0.2 to 0.3 on skin; Stribeck minimum near 10 mm/s on steel (Luo 2024)",
+    laws: &[
+        Law::new("power", &[Parameter::signed("exponent", "1", 0.12, -0.6, 0.8)]),
+        Law::new(
+            "Stribeck",
+            &[
+                Parameter::signed("static_excess", "1", 0.4, -0.8, 3.0),
+                Parameter::shape("stribeck_speed", "m/s", 0.025, 0.8),
+            ],
+        ),
+        // Thermally activated sliding; the first term of rate-and-state friction.
+        Law::new("logarithmic", &[Parameter::signed("slope_per_log_speed", "1", 0.12, -0.4, 0.6)]),
+        // Any smooth law of speed: linear, one that rises and falls again, or bends at a speed of its own.
+        Law::new(
+            "curve",
+            &[
+                Parameter::signed("exponent", "1", 0.12, -0.6, 0.8),
+                Parameter::signed("bend_per_e_fold", "1", 0.7, -5.0, 5.0).bending(),
+                Parameter::signed("change_of_bend_per_e_fold", "1", 0.4, -3.0, 3.0).bending(),
+            ],
+        ),
+    ],
+    needs: &[Need::Speeds],
+    change: |law, theta, _, design, c| {
         let reference = design.reference_speed_m_s;
         c.mu0 *= match law {
             0 => (c.speed / reference).powf(theta[0]),
@@ -65,5 +49,6 @@ impl Effect for RateDependentFriction {
                     .exp()
             }
         };
-    }
-}
+    },
+    ..Effect::NONE
+};

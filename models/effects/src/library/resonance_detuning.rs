@@ -4,84 +4,68 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub struct ResonanceDetuning;
-
 /// What sees it without friction.
 const CHECK: &str = "Retune the drive (sweep its frequency) at the start and the end of a run.";
 
-static LAWS: [Law; 6] = [
-    Law::new("warming (temperature)", &[Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0)])
+/// See the module.
+pub static EFFECT: Effect = Effect {
+    name: "resonance_detuning",
+    place: Place::Plate,
+    summary: "Off resonance the plate moves less than commanded, by the Lorentzian of its quality factor.",
+    source: "Q 100 at 27.5 kHz: 138 Hz halve the power; temperature coefficient of the plate's modulus",
+    laws: &[
+        Law::new("warming (temperature)", &[Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0)])
+            .needs(&[Need::Temperatures])
+            .seen_by(CHECK, 0.05),
+        Law::new(
+            "drift with time",
+            &[
+                Parameter::positive("detuning", "1", 1.0, 12.0),
+                Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
+            ],
+        )
+        .seen_by(CHECK, 0.05),
+        Law::new(
+            "fixed resonance",
+            &[
+                Parameter::positive("quality_factor", "1", 60.0, 600.0),
+                Parameter::between("resonance_over_reference", "1", 0.7, 1.4),
+            ],
+        )
+        .needs(&[Need::Frequencies])
+        .seen_by(CHECK, 3.0),
+        Law::new(
+            "loss with time",
+            &[
+                Parameter::positive("loss", "1", 0.5, 8.0),
+                Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
+            ],
+        )
+        .seen_by(CHECK, 0.05),
+        // The point of tuning need not be the first pass, and a softening resonator falls with its own swing.
+        Law::new(
+            "warming about a tuning point",
+            &[
+                Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0),
+                Parameter::signed("tuning_point_above_first", "K", 3.0, -20.0, 20.0),
+                Parameter::signed("softening_at_largest_amplitude", "K", 2.0, -20.0, 20.0),
+            ],
+        )
         .needs(&[Need::Temperatures])
         .seen_by(CHECK, 0.05),
-    Law::new(
-        "drift with time",
-        &[
-            Parameter::positive("detuning", "1", 1.0, 12.0),
-            Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
-        ],
-    )
-    .seen_by(CHECK, 0.05),
-    Law::new(
-        "fixed resonance",
-        &[
-            Parameter::positive("quality_factor", "1", 60.0, 600.0),
-            Parameter::between("resonance_over_reference", "1", 0.7, 1.4),
-        ],
-    )
-    .needs(&[Need::Frequencies])
-    .seen_by(CHECK, 3.0),
-    Law::new(
-        "loss with time",
-        &[
-            Parameter::positive("loss", "1", 0.5, 8.0),
-            Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
-        ],
-    )
-    .seen_by(CHECK, 0.05),
-    // The point of tuning need not be the first pass, and a softening resonator falls with its own swing.
-    Law::new(
-        "warming about a tuning point",
-        &[
-            Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0),
-            Parameter::signed("tuning_point_above_first", "K", 3.0, -20.0, 20.0),
-            Parameter::signed("softening_at_largest_amplitude", "K", 2.0, -20.0, 20.0),
-        ],
-    )
-    .needs(&[Need::Temperatures])
-    .seen_by(CHECK, 0.05),
-    Law::new(
-        "drift about a tuning point",
-        &[
-            Parameter::positive("detuning", "1", 1.0, 12.0),
-            Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
-            Parameter::signed("tuning_point", "1", 0.3, -2.0, 2.0),
-            Parameter::signed("softening_at_largest_amplitude", "1", 0.3, -3.0, 3.0),
-        ],
-    )
-    .seen_by(CHECK, 0.05),
-];
-
-impl Effect for ResonanceDetuning {
-    fn name(&self) -> &'static str {
-        "resonance_detuning"
-    }
-    fn place(&self) -> Place {
-        Place::Plate
-    }
-    fn summary(&self) -> &'static str {
-        "Off resonance the plate moves less than commanded, by the Lorentzian of its quality factor."
-    }
-    fn source(&self) -> &'static str {
-        "Q 100 at 27.5 kHz: 138 Hz halve the power; temperature coefficient of the plate's modulus"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Vibration]
-    }
-    fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
+        Law::new(
+            "drift about a tuning point",
+            &[
+                Parameter::positive("detuning", "1", 1.0, 12.0),
+                Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
+                Parameter::signed("tuning_point", "1", 0.3, -2.0, 2.0),
+                Parameter::signed("softening_at_largest_amplitude", "1", 0.3, -3.0, 3.0),
+            ],
+        )
+        .seen_by(CHECK, 0.05),
+    ],
+    needs: &[Need::Vibration],
+    change: |law, theta, pass, design, c| {
         if law == 3 {
             let tau = theta[1] * design.duration_s.max(1e-9);
             c.amplitude_pp /= 1.0 - theta[0] * (-pass.time_s / tau).exp_m1();
@@ -108,5 +92,6 @@ impl Effect for ResonanceDetuning {
             }
         };
         c.amplitude_pp /= (1.0 + off * off).sqrt();
-    }
-}
+    },
+    ..Effect::NONE
+};

@@ -2,9 +2,6 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub struct SqueezeFilm;
-
 /// Load on solid contact without air that fades by 1/e over one film thickness unit, N (physics.md 4.1).
 const SOLID_SCALE_N: f64 = 1.1;
 /// Apparent area times one atmosphere, N (34 mm2, physics.md section 2).
@@ -33,46 +30,33 @@ const POWERS: [Parameter; 6] = [
     Parameter::shape("pressure_exponent", "1", 1.0, 0.2).bending(),
 ];
 
-static LAWS: [Law; 4] = [
-    Law::new("load shared with a film", &[Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6)])
+/// See the module.
+pub static EFFECT: Effect = Effect {
+    name: "squeeze_film",
+    place: Place::Contact,
+    summary: "Compressed air carries a share of the load that grows with amplitude and ambient pressure.",
+    source: "Wiertlewski, Friesen, Colgate 2016 (partial levitation); infinite squeeze number, in its small-amplitude form and for \
+         any excursion (Langlois 1962, Salbu 1964)",
+    laws: &[
+        Law::new("load shared with a film", &[Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6)])
+            .seen_by(CHECK, 5e4),
+        Law::new(
+            "load shared with a film of finite excursion",
+            &[
+                Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6),
+                Parameter::shape("film_over_apparent_area", "1", 0.5, 1.0),
+                Parameter::shape("solid_load", "N", SOLID_SCALE_N, 0.4),
+                // How slowly the asperities let go: exponentially at zero, as the fourth power of the gap at a
+                // quarter.
+                Parameter::between("bluntness", "1", 0.0, 0.6).bending(),
+            ],
+        )
         .seen_by(CHECK, 5e4),
-    Law::new(
-        "load shared with a film of finite excursion",
-        &[
-            Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6),
-            Parameter::shape("film_over_apparent_area", "1", 0.5, 1.0),
-            Parameter::shape("solid_load", "N", SOLID_SCALE_N, 0.4),
-            // How slowly the asperities let go: exponentially at zero, as the fourth power of the gap at a
-            // quarter.
-            Parameter::between("bluntness", "1", 0.0, 0.6).bending(),
-        ],
-    )
-    .seen_by(CHECK, 5e4),
-    Law::new("share by powers", &POWERS).seen_by(CHECK, 0.1),
-    Law::new("friction by powers", &POWERS).seen_by(CHECK, 0.1),
-];
-
-impl Effect for SqueezeFilm {
-    fn name(&self) -> &'static str {
-        "squeeze_film"
-    }
-    fn place(&self) -> Place {
-        Place::Contact
-    }
-    fn summary(&self) -> &'static str {
-        "Compressed air carries a share of the load that grows with amplitude and ambient pressure."
-    }
-    fn source(&self) -> &'static str {
-        "Wiertlewski, Friesen, Colgate 2016 (partial levitation); infinite squeeze number, in its small-amplitude form and for \
-         any excursion (Langlois 1962, Salbu 1964)"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Vibration, Need::Amplitudes]
-    }
-    fn change(&self, law: usize, theta: &[f64], pass: &Condition, design: &Design, c: &mut Contact) {
+        Law::new("share by powers", &POWERS).seen_by(CHECK, 0.1),
+        Law::new("friction by powers", &POWERS).seen_by(CHECK, 0.1),
+    ],
+    needs: &[Need::Vibration, Need::Amplitudes],
+    change: |law, theta, pass, design, c| {
         let air = atmospheres(pass);
         // Area and surface are a fingertip's at a fingertip's load; a larger contact at a larger one.
         let size = design.reference_load_n / STATED_AT_N;
@@ -90,8 +74,9 @@ impl Effect for SqueezeFilm {
             2 => c.solid_share *= share_by_powers(theta, pass, design, c),
             _ => c.friction_factor *= share_by_powers(theta, pass, design, c),
         }
-    }
-}
+    },
+    ..Effect::NONE
+};
 
 /// Share of solid contact under a lift that goes with powers: `(1 + b lift)^(-1/b)`, with `b` the bluntness.
 fn share_by_powers(theta: &[f64], pass: &Condition, design: &Design, c: &Contact) -> f64 {

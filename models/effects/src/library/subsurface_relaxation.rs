@@ -3,71 +3,53 @@
 use super::prelude::*;
 
 /// See the module.
-pub struct SubsurfaceRelaxation;
-
-static LAWS: [Law; 5] = [
-    Law::new(
-        "exponential creep",
-        &[
-            Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
-            Parameter::shape("time_constant", "s", 30.0, 1.5),
-        ],
-    ),
-    Law::new(
-        "logarithmic creep",
-        &[
-            Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
-            Parameter::shape("onset_time", "s", 5.0, 1.2),
-        ],
-    ),
-    Law::new(
-        "normal stiffness alone",
-        &[
-            Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
-            Parameter::shape("time_constant", "s", 30.0, 1.5),
-        ],
-    ),
-    Law::new(
-        "normal stiffness alone, logarithmic",
-        &[
-            Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
-            Parameter::shape("onset_time", "s", 5.0, 1.2),
-        ],
-    ),
-    // Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of times.
-    Law::new(
-        "normal stiffness alone, stretched exponential",
-        &[
-            Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
-            Parameter::shape("time_constant", "s", 30.0, 1.5),
-            Parameter::shape("exponent", "1", 0.6, 0.3),
-        ],
-    ),
-];
-
-impl Effect for SubsurfaceRelaxation {
-    fn name(&self) -> &'static str {
-        "subsurface_relaxation"
-    }
-    fn place(&self) -> Place {
-        Place::Contact
-    }
-    fn summary(&self) -> &'static str {
-        "Creep of the soft tissue changes the stiffness of the contact with time, not its friction coefficient."
-    }
-    fn source(&self) -> &'static str {
-        "longest relaxation time of a finger pad about 3 s (the paper's introduction); area grows as log t"
-    }
-    fn laws(&self) -> &'static [Law] {
-        &LAWS
-    }
-    fn near(&self) -> &'static [&'static str] {
-        &["speed_error", "amplitude_miscalibration", "resonance_detuning"]
-    }
-    fn needs(&self) -> &'static [Need] {
-        &[Need::Vibration, Need::Time]
-    }
-    fn change(&self, law: usize, theta: &[f64], pass: &Condition, _: &Design, c: &mut Contact) {
+pub static EFFECT: Effect = Effect {
+    name: "subsurface_relaxation",
+    place: Place::Contact,
+    summary: "Creep of the soft tissue changes the stiffness of the contact with time, not its friction coefficient.",
+    source: "longest relaxation time of a finger pad about 3 s (the paper's introduction); area grows as log t",
+    laws: &[
+        Law::new(
+            "exponential creep",
+            &[
+                Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
+                Parameter::shape("time_constant", "s", 30.0, 1.5),
+            ],
+        ),
+        Law::new(
+            "logarithmic creep",
+            &[
+                Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
+                Parameter::shape("onset_time", "s", 5.0, 1.2),
+            ],
+        ),
+        Law::new(
+            "normal stiffness alone",
+            &[
+                Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
+                Parameter::shape("time_constant", "s", 30.0, 1.5),
+            ],
+        ),
+        Law::new(
+            "normal stiffness alone, logarithmic",
+            &[
+                Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
+                Parameter::shape("onset_time", "s", 5.0, 1.2),
+            ],
+        ),
+        // Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of times.
+        Law::new(
+            "normal stiffness alone, stretched exponential",
+            &[
+                Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
+                Parameter::shape("time_constant", "s", 30.0, 1.5),
+                Parameter::shape("exponent", "1", 0.6, 0.3),
+            ],
+        ),
+    ],
+    near: &["speed_error", "amplitude_miscalibration", "resonance_detuning"],
+    needs: &[Need::Vibration, Need::Time],
+    change: |law, theta, pass, _, c| {
         let factor = match law {
             1 | 3 => 1.0 + theta[0] * (1.0 + pass.time_s / theta[1]).ln(),
             4 => 1.0 - theta[0] * (-(pass.time_s / theta[1]).powf(theta[2])).exp_m1(),
@@ -78,5 +60,6 @@ impl Effect for SubsurfaceRelaxation {
         if law < 2 {
             c.lateral_stiffness *= factor;
         }
-    }
-}
+    },
+    ..Effect::NONE
+};

@@ -69,9 +69,9 @@ fn card(h: &Hypothesis, law: &str) -> String {
             "<div class=\"cause\">{}<div><p><strong>{}</strong> (in the {}): {}</p><p class=\"note\">Source: {}</p></div></div>",
             drawing(known),
             escape(&plain(effect)),
-            known.place().name(),
-            escape(known.summary()),
-            escape(known.source())
+            known.place.name(),
+            escape(known.summary),
+            escape(known.source)
         ),
         None => "<p>A cause that the library does not have: a smooth map over the operating space stands for it.</p>".into(),
     }

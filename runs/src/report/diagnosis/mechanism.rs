@@ -16,9 +16,9 @@ const PARTS: [(&str, &str, [u32; 2]); 5] = [
 ];
 
 /// The drawing of a cause.
-pub fn drawing(effect: &dyn Effect) -> String {
-    let place = match effect.place() {
-        Place::Contact if IN_AIR.contains(&effect.name()) => "air",
+pub fn drawing(effect: &Effect) -> String {
+    let place = match effect.place {
+        Place::Contact if IN_AIR.contains(&effect.name) => "air",
         Place::Contact => "contact",
         Place::Finger => "finger",
         Place::Plate => "plate",

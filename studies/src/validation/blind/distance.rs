@@ -36,7 +36,7 @@ pub fn distance(set: &Set) -> Option<f64> {
     let mean = set.truth_n.iter().map(|f| f.abs()).sum::<f64>() / set.truth_n.len() as f64;
     let mut rig = RigFile::parse(&set.rig_toml).ok()?;
     rig.noise = PassNoise { pass_relative_sd: EXACT, force_sd_n: EXACT * mean };
-    let without = library().iter().map(|e| e.name().to_string()).filter(|n| *n != cause.name).collect();
+    let without = library().iter().map(|e| e.name.to_string()).filter(|n| *n != cause.name).collect();
     let options = Options { pairs: false, without, ..Options::default() };
     let fitted = fit_all(&table, &rig, &options);
     let problem = &fitted.problem;

@@ -44,13 +44,13 @@ fn one(seed: u64) -> miette::Result<Covered> {
     let mut noise = Noise::new(seed, "same form");
     let seen: Vec<usize> = (0..library().len())
         .filter(|&i| {
-            let needs = library()[i].needs();
+            let needs = library()[i].needs;
             !needs.contains(&Need::Record) && clean.lacks(needs).is_none()
         })
         .collect();
     let effect = library()[seen[noise.below(seen.len())]];
-    let law = noise.below(effect.laws().len());
-    let form = &effect.laws()[law];
+    let law = noise.below(effect.laws.len());
+    let form = &effect.laws[law];
     // From the prior's upper part: a size that the table can show.
     let theta: Vec<f64> = form
         .parameters
@@ -92,11 +92,11 @@ fn one(seed: u64) -> miette::Result<Covered> {
     let result = diagnose(&table, &rig, &options, String::new());
     let first = &result.report.hypotheses[0];
     let own = result.report.verdict == Verdict::Named
-        && first.effects == [effect.name()]
+        && first.effects == [effect.name]
         && first.laws == [form.name];
     Ok(Covered {
         seed,
-        effect: effect.name(),
+        effect: effect.name,
         law: form.name,
         truth: theta[0],
         ci95: own.then(|| first.parameters[0].ci95),
