@@ -139,10 +139,10 @@ fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
     class
 }
 
-/// Members of a leading pair that may be the only cause, with a form of their own: a smooth departure from the
-/// library's form, as large as known forms depart, then leaves next to nothing of the gap, and the pair's own forms
-/// depart too, or the evidence for the second cause is small. Such a second cause is not told from another form of
-/// the first.
+/// Members of a leading pair that may be the only cause, with a form of their own: a smooth departure from
+/// the library's form, as large as known forms depart, then leaves next to nothing of the gap, and the
+/// pair's own forms depart too, or the evidence for the second cause is small. Such a second cause cannot be
+/// separated from another form of the first.
 fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
     let candidates = &fitted.candidates;
     let (k, own) = (&*fitted.problem.constants, &candidates[leader]);
