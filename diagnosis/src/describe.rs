@@ -94,8 +94,5 @@ pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
         |effect: usize| decision.class.iter().all(|&i| fitted.candidates[i].effects.contains(&effect));
     let shared = |effect: usize| decision.verdict == Verdict::Unknown || in_class(effect);
     let library = effects::library();
-    (0..library.len())
-        .filter(|&e| of(e) >= sure && shared(e))
-        .map(|e| library[e].name.to_string())
-        .collect()
+    (0..library.len()).filter(|&e| of(e) >= sure && shared(e)).map(|e| library[e].name.to_string()).collect()
 }
