@@ -20,6 +20,7 @@
 //! | [`next`] | the experiment that would part the leading hypotheses |
 //! | [`reading`] | which reading of the paper's w the passes favour |
 //! | [`describe`] | what an unknown departure looks like; causes that are sure all the same |
+//! | [`timing`] | what the edges in a run's record say of lags and shifts in time |
 //! | [`verdict`], [`remarks`], [`saved`] | the report; remarks beside it; the corrected model for a run |
 //!
 //! docs/diagnosis/model.md states the whole model once. A small table in, a verdict out:
@@ -82,6 +83,7 @@ pub mod shrinkage;
 pub mod singles;
 pub mod starts;
 pub mod structure;
+pub mod timing;
 pub mod verdict;
 
 pub use decision::Verdict;

@@ -17,7 +17,8 @@ use crate::remarks::{WithSuspects, of_scatter, of_table, with_suspects};
 use crate::run_shifts::shifted;
 use crate::scatter::Scatter;
 use crate::shrinkage::{Gap, gap};
-use effects::imitated;
+use crate::timing::RecordPart;
+use effects::{Need, imitated};
 use models::condition::Condition;
 use models::reading_evidence::ReadingFinding;
 use serde::Serialize;
@@ -119,6 +120,9 @@ pub struct Report {
     /// What the passes say of the two readings of the paper's w; none without passes with and without vibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub psi_reading: Option<ReadingFinding>,
+    /// What the edges in the run's record say of lags and shifts in time; none for a table without a record.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub record: Option<RecordPart>,
     /// What to measure next.
     pub next_experiment: Vec<Experiment>,
     /// The base law, where it is another than the spring-slider.
@@ -214,6 +218,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
             .collect(),
         seen_from,
         psi_reading,
+        record: None,
         next_experiment,
         law: options.law.as_ref().map(|law| law.note()),
         remarks,
@@ -357,6 +362,20 @@ fn hypotheses(
 }
 
 impl Diagnosis {
+    /// Adds what the run's record says: its own part of the verdict, beside the passes. What it judges is
+    /// no longer untestable, and for the rest it says why.
+    pub fn add_record(&mut self, part: RecordPart) {
+        let judged = part.is_judged();
+        let because = part.comparisons.iter().filter_map(|c| c.because.clone()).next().unwrap_or_default();
+        let timed =
+            |n: &NotTestable| effects::by_name(&n.effect).is_some_and(|e| e.needs().contains(&Need::Record));
+        self.report.not_testable.retain(|n| !(judged && timed(n)));
+        for n in self.report.not_testable.iter_mut().filter(|n| timed(n)) {
+            n.because = format!("means over passes do not show it, and {because}");
+        }
+        self.report.record = Some(part);
+    }
+
     /// What the verdict's model says of conditions that lie within the table: a curve for a figure. Unlike
     /// [`Self::predict`] it does not ask in which run they are.
     pub fn curve(&self, passes: &[Condition]) -> Vec<Forecast> {

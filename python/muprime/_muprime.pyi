@@ -50,6 +50,7 @@ def diagnose(
     predict: bytes | None,
     damage: list[str],
     model: tuple[str, str | None] | None,
+    run: str | None,
 ) -> tuple[str, str, str, str | None]: ...
 def law_grid(name: str, table: bytes, variables: list[str]) -> list[tuple[str, list[float]]]: ...
 def law_conditions(

@@ -106,12 +106,13 @@ def diagnose(
     Bad input is a :class:`MuprimeError` with the row and the remedy.
     """
     damage: list[str] = []
+    run: str | None = None
     if isinstance(table, Run):
         table = table.folder
     if isinstance(table, (str, os.PathLike)):
         path = Path(table)
         if path.is_dir():
-            damage = load(path).damage
+            damage, run = load(path).damage, os.fspath(path)
             rig = rig or path / "rig.toml"
             path = path / "points.csv"
         rig = rig or path.parent / "rig.toml"
@@ -125,7 +126,7 @@ def diagnose(
     law = None if model is None else base_law(model, name, data)
     rig = Path(rig)
     text, words, page, predictions = _muprime.diagnose(
-        name, data, os.fspath(rig), rig.read_text(encoding="utf-8"), pairs, list(without), predict, damage, law
+        name, data, os.fspath(rig), rig.read_text(encoding="utf-8"), pairs, list(without), predict, damage, law, run
     )
     told = json.loads(text)
     return Verdict(

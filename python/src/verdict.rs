@@ -21,9 +21,10 @@ type Texts = (String, String, String, Option<String>);
 /// A base law: its name or path, and its text where it is not a file.
 type Model = (String, Option<String>);
 
-/// Diagnoses a point table in memory (`name` is how messages call it) under a rig.toml in memory.
+/// Diagnoses a point table in memory (`name` is how messages call it) under a rig.toml in memory; the
+/// record in the folder `run` is read too.
 #[pyfunction]
-#[pyo3(signature = (name, table, rig_name, rig, pairs, without, predict, damage, model))]
+#[pyo3(signature = (name, table, rig_name, rig, pairs, without, predict, damage, model, run))]
 #[allow(clippy::too_many_arguments)]
 pub fn diagnose(
     py: Python<'_>,
@@ -36,11 +37,13 @@ pub fn diagnose(
     predict: Option<Vec<u8>>,
     damage: Vec<String>,
     model: Option<Model>,
+    run: Option<std::path::PathBuf>,
 ) -> PyResult<Texts> {
     if let Some(unknown) = without.iter().find(|name| effects::by_name(name).is_none()) {
         return Err(MuprimeError::new_err(format!("without {unknown:?}: no such effect")));
     }
-    py.detach(|| texts(name, &table, rig_name, rig, pairs, without, predict, &damage, model)).map_err(refused)
+    py.detach(|| texts(name, &table, rig_name, rig, pairs, without, predict, &damage, model, run.as_deref()))
+        .map_err(refused)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -54,6 +57,7 @@ fn texts(
     predict: Option<Vec<u8>>,
     damage: &[String],
     model: Option<Model>,
+    run: Option<&Path>,
 ) -> miette::Result<Texts> {
     let rig = runs::input::rig_text(rig_name, rig)?;
     let passes = parse_passes(Path::new(name), bytes)?;
@@ -77,7 +81,10 @@ fn texts(
         }
     };
     let options = Options { pairs, without, law, ..Options::default() };
-    let result = diagnosis::verdict::diagnose(&table, &rig, &options, sha256_hex(bytes));
+    let mut result = diagnosis::verdict::diagnose(&table, &rig, &options, sha256_hex(bytes));
+    if let Some(run) = run {
+        runs::verdict::add_record(&mut result, run, &rig)?;
+    }
     let about =
         [vec![("table", name.to_string()), ("rig", rig_name.to_string())], runs::report::about::of_rig(&rig)]
             .concat();

@@ -28,6 +28,8 @@ pub enum Phase {
     Settle,
     /// The steady part that is averaged.
     Measure,
+    /// Behind it: the drive goes off and on while the finger slides on, and the stage turns round.
+    Edges,
     /// Lifted off: the force zeros are read.
     Zero,
 }

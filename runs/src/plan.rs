@@ -92,6 +92,9 @@ impl PlanFile {
     }
 }
 
+/// Edges that a pass may have: more need more travel than a stage has.
+const MAX_EDGES: u32 = 20;
+
 /// Times of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -102,11 +105,26 @@ pub struct PassTimes {
     pub measure_s: f64,
     /// m/s of the lifted travel to the start of a pass. Left out: 0.15, or what the stage takes where that is less.
     pub approach_speed_m_s: f64,
+    /// s from one edge to the next, in series with `edges`; at least 0.2.
+    pub edge_s: f64,
+}
+
+impl PassTimes {
+    /// s for which a pass slides forward, and s that follow back: with `edges` the drive goes off and on so
+    /// many times after the average, off once more, and the stage turns round.
+    pub fn sliding_s(&self, edges: u32) -> [f64; 2] {
+        let average = self.settle_s + self.measure_s;
+        if edges == 0 {
+            [average, 0.0]
+        } else {
+            [average + f64::from(2 * edges + 1) * self.edge_s, self.edge_s]
+        }
+    }
 }
 
 impl Default for PassTimes {
     fn default() -> Self {
-        PassTimes { settle_s: 0.15, measure_s: 0.25, approach_speed_m_s: 0.15 }
+        PassTimes { settle_s: 0.15, measure_s: 0.25, approach_speed_m_s: 0.15, edge_s: 0.3 }
     }
 }
 
@@ -160,6 +178,10 @@ pub struct Series {
     /// Directions of this series alone, 1 and -1; empty for the plan's.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub directions: Vec<i8>,
+    /// Edges after the average of each pass with vibration: the drive goes off and on so many times while
+    /// the finger slides on, then the stage turns round. `diagnose` finds lags and shifts in time with
+    /// them. 0 for none, at most 20.
+    pub edges: u32,
 }
 
 impl Base {
@@ -272,7 +294,11 @@ impl Plan {
                 format!("the plan asks for {passes} passes; at most {MAX_PASSES} are made in one run");
             wrong.add(&["series"], problem, "shorten the lists, or make several plans of it".to_string());
         }
+        if file.series.iter().any(|series| series.edges > MAX_EDGES) {
+            wrong.add(&["series"], format!("edges are 0 to {MAX_EDGES}"), None);
+        }
         let times = [
+            ("edge_s", file.pass.edge_s),
             ("settle_s", file.pass.settle_s),
             ("measure_s", file.pass.measure_s),
             ("approach_speed_m_s", file.pass.approach_speed_m_s),
@@ -281,6 +307,9 @@ impl Plan {
             if !(value.is_finite() && value > 0.0 && value < 3600.0) {
                 wrong.add(&["pass", name], format!("{name} = {value}: a number above zero is needed"), None);
             }
+        }
+        if file.pass.edge_s < 0.2 {
+            wrong.add(&["pass", "edge_s"], "edge_s is at least 0.2: an edge needs its levels", None);
         }
         file.tolerances.check(&mut wrong);
         file.step.iter().for_each(|step| step.check(&mut wrong));

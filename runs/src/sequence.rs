@@ -74,6 +74,11 @@ enum Stage {
     Measure {
         since: Nanos,
     },
+    /// Since when, and how many requests were sent.
+    Edges {
+        since: Nanos,
+        sent: u32,
+    },
     Over,
 }
 
@@ -257,8 +262,8 @@ impl Sequence {
 
     /// Time that the rest should take in s, by the plan.
     pub fn remaining_s(&self) -> f64 {
-        let each = self.times.settle_s + self.times.measure_s + 0.15;
-        each * (self.points.len() - self.next) as f64
+        let each = |p: &Point| self.times.sliding_s(p.edges).iter().sum::<f64>() + 0.15;
+        self.points[self.next..].iter().map(each).sum()
     }
 
     /// Asks for a stop: the rig goes to its safe state with the next row.
@@ -312,6 +317,7 @@ impl Sequence {
             Stage::Approach { since } => self.approach(row, since, &mut out),
             Stage::Settle { since } => self.settle(row, since, &mut out),
             Stage::Measure { since } => self.measure(row, since, &mut out),
+            Stage::Edges { since, sent } => self.edges(row, since, sent, &mut out),
             Stage::Over => {}
         }
         out
@@ -400,8 +406,8 @@ impl Sequence {
     }
 
     /// Length of the stroke of a pass in m, half of it either side of its position.
-    fn half_stroke_m(&self, c: &Condition) -> f64 {
-        0.5 * (c.speed_m_s * (self.times.settle_s + self.times.measure_s) * 1.05)
+    fn half_stroke_m(&self, point: &Point) -> f64 {
+        0.5 * (point.condition.speed_m_s * self.times.sliding_s(point.edges)[0] * 1.05)
     }
 
     fn begin_next(&mut self, row: &Row, out: &mut Reaction) {
@@ -463,17 +469,11 @@ impl Sequence {
         let point = self.points[self.next];
         let c = &point.condition;
         let Ok(stage) = row.inputs.seen.stage else { return };
-        let start = c.position_m - c.direction.sign() * self.half_stroke_m(c);
+        let start = c.position_m - c.direction.sign() * self.half_stroke_m(&point);
         let away = start - stage.position_m;
         // Close enough, or already past the start in the sense of the pass but not by more than a millimetre.
         if away.abs() < 2e-4 {
-            let request = Request {
-                amplitude: c.amplitude,
-                frequency_hz: if c.amplitude > PeakToPeak::ZERO { c.frequency_hz } else { 0.0 },
-                velocity_m_s: c.direction.sign() * c.speed_m_s,
-                normal_force_n: c.normal_force_n,
-            };
-            out.commands.push(Command::Set(request, self.marker(Phase::Settle)));
+            out.commands.push(Command::Set(sliding(c), self.marker(Phase::Settle)));
             self.stage = Stage::Settle { since: row.now };
             return;
         }
@@ -505,17 +505,21 @@ impl Sequence {
             return;
         }
         let c = self.points[self.next].condition;
-        let request = Request {
-            amplitude: c.amplitude,
-            frequency_hz: if c.amplitude > PeakToPeak::ZERO { c.frequency_hz } else { 0.0 },
-            velocity_m_s: c.direction.sign() * c.speed_m_s,
-            normal_force_n: c.normal_force_n,
-        };
-        out.commands.push(Command::Set(request, self.marker(Phase::Measure)));
+        out.commands.push(Command::Set(sliding(&c), self.marker(Phase::Measure)));
         self.sums = Sums::default();
         self.at_rig.begin_pass();
         self.check_temperature(row, out);
         self.stage = Stage::Measure { since: row.now };
+    }
+}
+
+/// The request of a pass while it slides.
+fn sliding(c: &Condition) -> Request {
+    Request {
+        amplitude: c.amplitude,
+        frequency_hz: if c.amplitude > PeakToPeak::ZERO { c.frequency_hz } else { 0.0 },
+        velocity_m_s: c.direction.sign() * c.speed_m_s,
+        normal_force_n: c.normal_force_n,
     }
 }
 

@@ -7,7 +7,7 @@ mod fast;
 pub mod keeper;
 mod telemetry;
 
-pub use fast::{Rehearsal, rehearse, words};
+pub use fast::{Rehearsal, rehearse, rehearse_watched, words};
 pub use keeper::{Keeper, REPLAYABLE, Replayable, is_model, model_name, unix_ns};
 pub use telemetry::{Extremes, Snapshot, Snapshots};
 

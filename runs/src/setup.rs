@@ -380,6 +380,15 @@ impl Setup {
         }
     }
 
+    /// -3 dB bandwidth of the lateral channel's filter in Hz, where its profile states one.
+    pub fn lateral_passband_hz(&self) -> Option<f64> {
+        let profile = |i: &drivers::InstrumentSetup| {
+            let named = i.lateral.as_ref().map_or("lateral", |axis| axis.signal.as_str());
+            i.description().ok().filter(|profile| profile.signal(named).is_some())
+        };
+        self.file.force.iter().find_map(profile)?.description.time.passband_hz
+    }
+
     /// What reads the lateral force, by profile, setup and certificate; `None` where no instrument does.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! A verdict for people: what a terminal shows, and the plan of the experiment that tells most.
 
+pub mod edges;
 pub mod files;
 
 use crate::report::human::{quantity, with_interval};
@@ -9,9 +10,21 @@ use diagnosis::verdict::{Diagnosis, probability};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::rig_file::RigFile;
+use std::path::Path;
 
 /// Parts of the operating space that are named, the largest first.
 const PARTS: usize = 6;
+
+/// Adds what a run's record says of time to a verdict on its passes; a folder without a record adds nothing.
+///
+/// # Errors
+/// A record that cannot be opened.
+pub fn add_record(result: &mut Diagnosis, run: &Path, rig: &RigFile) -> miette::Result<()> {
+    if !crate::run_dir::records_in(run)?.is_empty() {
+        result.add_record(edges::of_run(run, rig.finger)?);
+    }
+    Ok(())
+}
 
 /// The verdict for a person, certificates included.
 pub fn words(result: &Diagnosis, rig: &RigFile) -> String {
@@ -121,6 +134,11 @@ pub fn terminal(result: &Diagnosis) -> String {
             100.0 * if s < 0.0 { -high } else { low },
             100.0 * if s < 0.0 { -low } else { high }
         ));
+    }
+    // Without edges the reason is among what cannot be tested.
+    if let Some(record) = r.record.as_ref().filter(|record| record.is_judged()) {
+        text.push_str("\nTime, by the edges in the run's record\n");
+        record.comparisons.iter().for_each(|c| text.push_str(&format!("  {}\n", c.text)));
     }
     if !r.location.regions.is_empty() {
         text.push_str("\nWhere\n");

@@ -14,6 +14,9 @@ pub struct SensorConfig {
     pub sample_period_s: f64,
     /// Time from a sample's instant to its delivery (s); at most 1 s.
     pub latency_s: f64,
+    /// How much of that the stamps of its samples leave out (s): forces that arrive later than they are
+    /// stamped.
+    pub unstated_latency_s: f64,
     /// -3 dB bandwidth of its second-order Bessel-like filter (Hz).
     pub bandwidth_hz: f64,
     /// White noise of a sample, lateral and normal (N).
@@ -39,6 +42,7 @@ impl Default for SensorConfig {
         Self {
             sample_period_s: 5e-4,
             latency_s: 5e-4,
+            unstated_latency_s: 0.0,
             bandwidth_hz: 200.0,
             white_sd_n: [2e-3, 2e-3],
             // Shorter than the time between passes: what rig.toml states of a pass's mean is independent from

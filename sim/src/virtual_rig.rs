@@ -53,14 +53,14 @@ impl VirtualRig {
     }
 }
 
-fn reading(sample: &ForceSample, axis: usize) -> Channel {
+fn reading(sample: &ForceSample, axis: usize, unstated: Nanos) -> Channel {
     if !sample.force_n[axis].is_finite() {
         return Err(NoData::Invalid);
     }
     Ok(Reading {
         value: sample.force_n[axis],
         raw: i64::from(sample.counts[axis]),
-        taken_at: sample.taken_at,
+        taken_at: sample.taken_at.plus(unstated),
         sequence: sample.sequence,
         quality: if sample.saturated[axis] { Quality::Saturated } else { Quality::Good },
     })
@@ -69,9 +69,12 @@ fn reading(sample: &ForceSample, axis: usize) -> Channel {
 impl ForceSensor for VirtualRig {
     fn read(&mut self, now: Nanos) -> Forces {
         self.world.advance_to(now);
+        let unstated = Nanos::from_seconds(self.world.config().sensor.unstated_latency_s);
         match self.world.force_sample() {
             None => Forces::missing(NoData::NeverRead),
-            Some(sample) => Forces { lateral: reading(&sample, 0), normal: reading(&sample, 1) },
+            Some(sample) => {
+                Forces { lateral: reading(&sample, 0, unstated), normal: reading(&sample, 1, unstated) }
+            }
         }
     }
 }

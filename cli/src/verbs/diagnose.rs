@@ -126,7 +126,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let progress = follow(&bar, json)?;
     let options =
         Options { pairs: !args.no_pairs, without: args.without.clone(), progress, law, ..Options::default() };
-    let result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
+    let mut result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
+    if args.data.is_dir() {
+        runs::verdict::add_record(&mut result, &args.data, &rig)?;
+    }
     bar.finish_and_clear();
     if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
         write_text(out, &predictions(&result, conditions))?;

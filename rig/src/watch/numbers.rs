@@ -45,6 +45,7 @@ pub fn phase(phase: Phase) -> &'static str {
         Phase::Approach => "approaching",
         Phase::Settle => "settling",
         Phase::Measure => "measuring",
+        Phase::Edges => "making edges",
         Phase::Zero => "reading zeros",
     }
 }
@@ -59,7 +60,7 @@ pub fn of_state(view: &View) -> Vec<(&'static str, String)> {
         return [vec![("rig", "none: no cycle was received".into())], last_pass(view)].concat();
     };
     // A running mu' is there while a pass slides only.
-    let slides = matches!(s.phase, Phase::Settle | Phase::Measure);
+    let slides = matches!(s.phase, Phase::Settle | Phase::Measure | Phase::Edges);
     let sliding = |text: String| if text == "none" && !slides { "none: nothing slides".into() } else { text };
     let now = vec![
         ("lateral force", signed(s.lateral_force_n, 4, " N (sensor frame)")),

@@ -23,6 +23,14 @@ pub struct Point {
     pub replicate: u32,
     /// A pass without vibration that anchors `mu_0`.
     pub reference: bool,
+    /// How many times the drive goes off and on after the average.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub edges: u32,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's form")]
+const fn is_zero(n: &u32) -> bool {
+    *n == 0
 }
 
 /// What the amplifier can set.
@@ -53,8 +61,8 @@ fn quantise(wanted: f64, step: f64) -> f64 {
 #[error("{0}")]
 pub struct PlanProblem(String);
 
-/// A condition of a series, and the directions in which it is visited in turn.
-pub(super) type Visit<'a> = (Condition, &'a [i8]);
+/// A condition of a series, the directions in which it is visited in turn, and its edges.
+pub(super) type Visit<'a> = (Condition, &'a [i8], u32);
 
 impl Plan {
     /// The passes in the order of measurement.
@@ -100,8 +108,8 @@ impl Plan {
         // A series' own directions are settings like others; the plan's are visited in turn.
         let visits = |c: Condition| -> Vec<Visit<'_>> {
             match &series.directions[..] {
-                [] => vec![(c, &self.file.directions[..])],
-                own => own.iter().map(|d| (c, std::slice::from_ref(d))).collect(),
+                [] => vec![(c, &self.file.directions[..], series.edges)],
+                own => own.iter().map(|d| (c, std::slice::from_ref(d), series.edges)).collect(),
             }
         };
         conditions.into_iter().map(set).flat_map(visits).collect()
@@ -109,10 +117,10 @@ impl Plan {
 
     /// Repeats, shuffles within each state of the air, interleaves references, and turns conditions into
     /// passes.
-    fn order(&self, conditions: &[Visit<'_>], seed: u64) -> Vec<Point> {
+    fn order<'a>(&'a self, conditions: &[Visit<'a>], seed: u64) -> Vec<Point> {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
         let mut states: Vec<Ambient> = Vec::new();
-        for (c, _) in conditions {
+        for (c, ..) in conditions {
             let state = Ambient::of(c);
             if !states.contains(&state) {
                 states.push(state);
@@ -125,33 +133,36 @@ impl Plan {
         states.sort_by_key(|state| sets(state).contains(&true));
         let mut points = Vec::new();
         for state in states {
-            let here = conditions.iter().filter(|(c, _)| Ambient::of(c) == state);
-            let mut visits: Vec<(&Visit<'_>, u32)> =
+            let here = conditions.iter().filter(|(c, ..)| Ambient::of(c) == state);
+            let mut visits: Vec<(&Visit<'a>, u32)> =
                 here.flat_map(|c| (0..self.file.replicates).map(move |r| (c, r))).collect();
             if self.file.randomise {
                 visits.shuffle(&mut rng);
             }
             let every = self.file.reference_every as usize;
             let mut references = 0;
-            let still = |c: &Condition| Condition { amplitude: PeakToPeak::ZERO, ..*c };
-            for (i, ((condition, directions), replicate)) in visits.iter().enumerate() {
+            let still = |(c, directions, _): &Visit<'a>| {
+                (Condition { amplitude: PeakToPeak::ZERO, ..*c }, *directions, 0)
+            };
+            for (i, (here, replicate)) in visits.iter().enumerate() {
                 if every > 0 && i % every == 0 {
-                    visit(&mut points, &still(condition), directions, references, true);
+                    visit(&mut points, &still(here), references, true);
                     references += 1;
                 }
-                let reference = condition.amplitude == PeakToPeak::ZERO;
-                visit(&mut points, condition, directions, *replicate, reference);
+                let reference = here.0.amplitude == PeakToPeak::ZERO;
+                let edges = if reference { 0 } else { here.2 };
+                visit(&mut points, &(here.0, here.1, edges), *replicate, reference);
             }
-            if let (true, Some(((last, directions), _))) = (every > 0, visits.last()) {
-                visit(&mut points, &still(last), directions, references, true);
+            if let (true, Some((last, _))) = (every > 0, visits.last()) {
+                visit(&mut points, &still(last), references, true);
             }
         }
         points
     }
 
-    /// Length of stroke that a pass needs in m: settling, averaging, and getting up to speed.
-    pub fn stroke_m(&self, speed_m_s: f64) -> f64 {
-        speed_m_s * (self.file.pass.settle_s + self.file.pass.measure_s) * 1.1 + 1e-3
+    /// Length of stroke that a pass needs in m: settling, averaging, edges, and getting up to speed.
+    pub fn stroke_m(&self, speed_m_s: f64, edges: u32) -> f64 {
+        speed_m_s * self.file.pass.sliding_s(edges)[0] * 1.1 + 1e-3
     }
 
     /// Tells of every value of a series that is outside what somebody allows.
@@ -189,15 +200,16 @@ impl Plan {
 
     fn check_travel(&self, conditions: &[Visit<'_>], limits: &Limits) -> Result<(), BadInput> {
         let (left, right) = limits.travel_m;
-        for (c, _) in conditions {
-            let half = 0.5 * self.stroke_m(c.speed_m_s);
+        for (c, _, edges) in conditions {
+            let half = 0.5 * self.stroke_m(c.speed_m_s, *edges);
             if c.position_m - half < left || c.position_m + half > right {
                 let (speed, position) = (c.speed_m_s, c.position_m);
                 let problem = format!(
                     "a pass at {speed} m/s about {position} m needs {:.4} m of stroke; the travel is {left} to {right} m",
                     2.0 * half
                 );
-                let remedy = "shorten [pass] settle_s or measure_s, or slow down".to_string();
+                let remedy = "shorten [pass] settle_s, measure_s or edge_s, have fewer edges, or slow down"
+                    .to_string();
                 let place = input::place_of(&self.text, &["pass", "measure_s"])
                     .or_else(|| input::place_of(&self.text, &["base", "speed_m_s"]));
                 return Err(BadInput::new(&self.origin, &self.text, place, problem, remedy));
@@ -208,11 +220,13 @@ impl Plan {
 }
 
 /// Makes the passes of one visit, in each of its directions.
-fn visit(points: &mut Vec<Point>, condition: &Condition, directions: &[i8], replicate: u32, reference: bool) {
+fn visit(points: &mut Vec<Point>, visit: &Visit<'_>, replicate: u32, reference: bool) {
+    let (condition, directions, edges) = *visit;
     for sign in directions {
         let direction = Direction::try_from(*sign).expect("checked when the plan was read");
         let number = points.len() as u32;
-        points.push(Point { number, condition: Condition { direction, ..*condition }, replicate, reference });
+        let condition = Condition { direction, ..condition };
+        points.push(Point { number, condition, replicate, reference, edges });
     }
 }
 

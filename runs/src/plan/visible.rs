@@ -69,7 +69,7 @@ impl Plan {
         for (index, series) in self.file.series.iter().enumerate() {
             let conditions = self.conditions_of(index, resolution);
             let expected =
-                conditions.iter().filter_map(|(c, _)| Some((c, expected_change_n(c, model, mu0)?)));
+                conditions.iter().filter_map(|(c, ..)| Some((c, expected_change_n(c, model, mu0)?)));
             let Some((best, change_n)) = expected.max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
             if change_n >= least_n {
                 continue;

@@ -8,6 +8,7 @@ mod mechanism;
 mod next;
 mod overlay;
 mod passes;
+mod timing;
 
 use super::html::{bar, escape, glossary, head, list, note, shell, table};
 use super::human::number;
@@ -42,6 +43,7 @@ pub fn page(result: &Diagnosis, table: &Table, about: &[(&str, String)]) -> miet
         overlay.section()?,
         causes::section(result, &overlay)?,
         location(result, table, &overlay.errors()),
+        timing::section(result)?,
         next::section(result),
         uncertain(result),
         residuals(result, table, &forecasts)?,

@@ -1,6 +1,6 @@
 //! A pass while it slides: its samples are summed, and what they come to is compared with the model.
 
-use super::{Event, MeasuredPass, Outcome, Reaction, Sequence, TRIES};
+use super::{Event, MeasuredPass, Outcome, Reaction, Sequence, Stage, TRIES, sliding};
 use crate::ambient::Level;
 use crate::certificates::temperature::TemperatureFlag;
 use crate::plan::Point;
@@ -11,6 +11,7 @@ use models::quantity::PeakToPeak;
 use realtime::cycle::{Command, Phase};
 use realtime::estimate::Moments;
 use realtime::ports::Nanos;
+use realtime::safety::Request;
 use realtime::turn::Row;
 
 /// Sums over the steady part of a pass.
@@ -111,8 +112,27 @@ impl Sequence {
             }
         }
         out.pass = Some(measured);
-        self.next += 1;
-        self.begin_next(row, out);
+        self.edges(row, since, 0, out);
+    }
+
+    /// The edges behind a pass: off, on, off and so on, and last a turn of the stage with the drive off.
+    pub(super) fn edges(&mut self, row: &Row, since: Nanos, sent: u32, out: &mut Reaction) {
+        let point = self.points[self.next];
+        if sent > 0 && row.now.since(since) < Nanos::from_seconds(self.times.edge_s) {
+            return;
+        }
+        if point.edges == 0 || sent == 2 * point.edges + 2 {
+            self.next += 1;
+            return self.begin_next(row, out);
+        }
+        let (on, turned) = (sent % 2 == 1 && sent < 2 * point.edges, sent == 2 * point.edges + 1);
+        let slides = sliding(&point.condition);
+        let driven =
+            if on { slides } else { Request { amplitude: PeakToPeak::ZERO, frequency_hz: 0.0, ..slides } };
+        let velocity_m_s = if turned { -slides.velocity_m_s } else { slides.velocity_m_s };
+        let request = Request { velocity_m_s, ..driven };
+        out.commands.push(Command::Set(request, self.marker(Phase::Edges)));
+        self.stage = Stage::Edges { since: row.now, sent: sent + 1 };
     }
 
     fn pass_of(&self, point: &Point, since: Nanos, normal: f64, now: Nanos) -> (Pass, Vec<Level>) {

@@ -167,6 +167,21 @@ pub fn rehearse(
     world: &sim::world::WorldConfig,
     model: Arc<dyn FrictionModel>,
 ) -> miette::Result<Rehearsal> {
+    rehearse_watched(setup, plan, seed, world, model, &mut |_| {})
+}
+
+/// The same; `each` takes every row.
+///
+/// # Errors
+/// As [`rehearse`].
+pub fn rehearse_watched(
+    setup: &Setup,
+    plan: &Plan,
+    seed: u64,
+    world: &sim::world::WorldConfig,
+    model: Arc<dyn FrictionModel>,
+    each: &mut dyn FnMut(&Row),
+) -> miette::Result<Rehearsal> {
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
     let points = plan.points(seed, &setup.config.limits, &resolution)?;
     let mut sequence =
@@ -183,6 +198,7 @@ pub fn rehearse(
     let outcome =
         supervisor::sweep(&mut rig, &mut sequence, &mut Requests::default, &mut |row, sequence, reaction| {
             bench.serve(row.now, sequence, &reaction);
+            each(row);
             passes.extend(reaction.pass);
         });
     let agreement = sequence.agreement(outcome == Outcome::Complete);

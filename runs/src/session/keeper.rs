@@ -49,6 +49,9 @@ pub struct Replayable {
     /// The built-in law that led the run; none: the spring-slider, or the record's model file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub law: Option<BuiltIn>,
+    /// -3 dB bandwidth of the lateral channel's filter in Hz, where its profile states one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lateral_passband_hz: Option<f64>,
 }
 
 /// The open files of a run.
@@ -89,7 +92,9 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     ];
     let law = BuiltIn::by_name(job.model.name());
     let law = law.filter(|law| job.model_file.is_none() && *law != BuiltIn::SpringSlider);
-    let replayed = Replayable { config: job.setup.config, finger: job.setup.tip.finger, law };
+    let (config, finger, lateral_passband_hz) =
+        (job.setup.config, job.setup.tip.finger, job.setup.lateral_passband_hz());
+    let replayed = Replayable { config, finger, law, lateral_passband_hz };
     files.push((REPLAYABLE.to_string(), serde_json::to_string_pretty(&replayed).into_diagnostic()?));
     files.extend(job.model_file.clone());
     files.extend(job.setup.certificates.files.iter().cloned());

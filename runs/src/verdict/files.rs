@@ -36,7 +36,8 @@ pub fn diagnose_run(run: &Path) -> miette::Result<()> {
     let passes = passes.wrap_err_with(|| path.display().to_string())?;
     let table = Table::measured(&passes).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
     let rig = rig_file(&run.join("rig.toml"))?;
-    let result = diagnose(&table, &rig, &Options::default(), sha256_hex(&bytes));
+    let mut result = diagnose(&table, &rig, &Options::default(), sha256_hex(&bytes));
+    super::add_record(&mut result, run, &rig)?;
     let facts = record_facts(run).unwrap_or_default();
     let html = page(&result, &table, &about::of_run(run, &facts, Some(&rig)))?;
     write(run, &result, &rig, &html, &damage_in(run)?)

@@ -130,6 +130,7 @@ impl WorldConfig {
             ("finger.lateral_recovery_m_s", self.finger.lateral_recovery_m_s),
             ("finger.ridge_table_strokes", self.finger.ridge_table_strokes),
             ("sensor.latency_s", self.sensor.latency_s),
+            ("sensor.unstated_latency_s", self.sensor.unstated_latency_s),
             ("room.ambient_pressure_pa", self.room.ambient_pressure_pa),
             ("room.chamber.leak_per_s", self.room.chamber.leak_per_s),
         ];

@@ -183,3 +183,29 @@ pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Res
     })?;
     Ok(format!("<figure>{svg}</figure>"))
 }
+
+/// The mean edge of a record: time, s, and the shares of its change that were measured, expected in time,
+/// and found.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub fn edge(title: &str, mean: &[[f64; 4]]) -> miette::Result<String> {
+    let alt = format!("{title}: the mean edge as measured, as expected in time, and with what was found.");
+    let shown = |from: &[f64; 4]| (-0.02..0.2).contains(&from[0]);
+    let frame = Frame {
+        sizes: [PANEL, NARROW],
+        x: (Span::linear(-20.0..200.0), "time from the command, ms"),
+        y: (Span::linear(-0.2..1.25), "share of the change"),
+        alt: &alt,
+    };
+    let svg = figure(&frame, |chart, size| {
+        let of = |which: usize| -> Vec<(f64, f64)> {
+            mean.iter().filter(|m| shown(m)).map(|m| (1e3 * m[0], m[which].clamp(-0.2, 1.25))).collect()
+        };
+        line(chart, of(2), COLOURS[1], Some(6))?;
+        line(chart, of(3), COLOURS[0], None)?;
+        chart.draw_series(of(1).into_iter().map(|p| mark(0, p, size - 1, BLACK, true))).map_err(wrong)?;
+        Ok(())
+    })?;
+    Ok(format!("<figure>{svg}<figcaption>{}.</figcaption></figure>", crate::report::html::escape(title)))
+}
