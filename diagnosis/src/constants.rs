@@ -195,9 +195,14 @@ constants! {
     prior_nats: f64 = 10.0, "Nats up to which such a hypothesis stays in the leader's class: priors alone make no name.", JUDGEMENT;
     claim_probability: f64 = 0.1, "Probability of no gap above which no gap is claimed.", "judgement: the complement of `name_probability`";
     pair_gain_share: f64 = 0.03, "Share of the gap's chi2 by which a second cause must raise twice the log evidence.", "development: single causes under another form gained up to 0.026 by a spurious companion, on two generators";
-    pair_nats: f64 = 25.0, "Or, where the better member leaves a misfit: nats by which it raises the log evidence.", "development: companions of 29 single causes that were named gained up to 20, second causes of 51 pairs 28 and more in 49";
-    pair_own_form: f64 = 0.1, "Root mean square share of the gap up to which what a member of a pair leaves alone, with a smooth departure from its form, makes the pair untold from it.", "development: 34 single causes and 51 pairs of which 4 were named with it that were not with 0.3";
-    pair_own_form_nats: f64 = 60.0, "Evidence for a pair over such a member from which it is named all the same, where the pair's own forms do not depart.", "development: pairs named for another form of one cause had 43 and 58 nats";
+    pair_halves: f64 = 0.5, "Or: share of what the better single cause leaves, where that is a misfit, that the second cause takes up,", JUDGEMENT;
+    pair_nats: f64 = 50.0, "and raises the log evidence by these nats.", "development: spurious companions gained up to 34";
+    pair_complete_sd: f64 = 1.0, "Or: deviations of scatter within which it leaves nothing, where the better single cause leaves a misfit,", JUDGEMENT;
+    pair_complete_nats: f64 = 20.0, "and raises the log evidence by these nats.", JUDGEMENT;
+    pair_departure: f64 = 0.3, "Root mean square share of the gap up to which what a member of a pair leaves alone, with a smooth departure from its form, makes the pair untold from it, where the pair's own forms depart too.", "development: forms of one cause that pairs were named for left up to 0.29 of the gap, true pairs from 0.31 on";
+    pair_own_form: f64 = 0.1, "The same where the pair's own forms do not depart.", "development: forms of one cause left nothing";
+    pair_own_form_nats: f64 = 60.0, "Evidence for a pair over a member alone from which the second cause is named all the same, where the pair's own forms do not depart.", "development: pairs named for another form of one cause had 43 and 58 nats";
+    pair_pull_chi2: f64 = 50.0, "Or: chi2 by which it frees the nuisances.", "development: true single causes pull them by up to 30, a gain that hides in a stiffness by hundreds";
 
     }
     Report {

@@ -139,24 +139,31 @@ fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
     class
 }
 
-/// Members of a leading pair that may be the only cause, with a form of their own: a smooth departure from
-/// the library's form, as large as known forms depart, then leaves next to nothing of the gap, and the
-/// pair's own forms depart too, or the evidence for the second cause is small. Such a second cause cannot be
-/// separated from another form of the first.
+/// Members of a leading pair that may be the only cause, with a form of their own. A smooth departure from
+/// the library's form, as large as known forms depart, then leaves next to nothing of the gap. That is enough
+/// if the pair's own forms depart too. If they do not, the evidence for the second cause must be small as
+/// well: such a second cause cannot be separated from another form of the first.
 fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
     let candidates = &fitted.candidates;
     let (k, own) = (&*fitted.problem.constants, &candidates[leader]);
     if own.effects.len() < 2 {
         return Vec::new();
     }
-    let most = k.pair_own_form.powi(2) * left(fitted, &fitted.none);
+    let gap = left(fitted, &fitted.none);
     let departs = own.best.share > k.form_shares[0];
-    let might = |c: &Candidate| {
-        let near = departs || own.log_evidence - c.log_evidence < k.pair_own_form_nats;
-        near && left_by_a_form_of_its_own(fitted, c) < most
+    let might = |i: usize| {
+        let behind = own.log_evidence - candidates[i].log_evidence;
+        let most = match (departs, behind < k.pair_own_form_nats) {
+            (true, _) => k.pair_departure,
+            (false, true) => k.pair_own_form,
+            (false, false) => return false,
+        };
+        left_by_a_form_of_its_own(fitted, &candidates[i]) < most.powi(2) * gap
     };
-    let member = |c: &Candidate| c.effects.len() == 1 && own.effects.contains(&c.effects[0]);
-    (0..candidates.len()).filter(|&i| member(&candidates[i]) && might(&candidates[i])).collect()
+    (0..candidates.len())
+        .filter(|&i| candidates[i].effects.len() == 1 && own.effects.contains(&candidates[i].effects[0]))
+        .filter(|&i| might(i))
+        .collect()
 }
 
 /// chi2 beyond scatter that the best of a cause's laws leaves with a smooth departure of the largest share.
@@ -189,22 +196,35 @@ fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
 /// A pair that says little more than one of its members alone is that single with a form of its own: its
 /// weight goes to such members, and to singles that do better than they, in proportion to their evidence.
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
-    let k = &fitted.problem.constants;
+    let problem = &fitted.problem;
+    let k = &problem.constants;
     let gap = left(fitted, &fitted.none);
-    let misfit = k.misfit_sd * (2.0 * fitted.problem.len() as f64).sqrt();
     let candidates = &fitted.candidates;
     for pair in 0..candidates.len() {
         let own = &candidates[pair];
         if own.effects.len() < 2 || probabilities[pair] < LEAST_PROBABILITY {
             continue;
         }
-        let cheap = |c: &Candidate| {
-            let member = c.effects.len() == 1 && own.effects.contains(&c.effects[0]);
-            let gain = own.log_evidence - c.log_evidence;
-            let needed = || gain > k.pair_nats && left(fitted, &c.best) > misfit;
-            member && 2.0 * gain < k.pair_gain_share * gap && !needed()
-        };
-        let alone: Vec<usize> = (0..candidates.len()).filter(|&i| cheap(&candidates[i])).collect();
+        let own_left = left(fitted, &own.best);
+        let alone: Vec<usize> = (0..candidates.len())
+            .filter(|&i| {
+                let c = &candidates[i];
+                if c.effects.len() != 1 || !own.effects.contains(&c.effects[0]) {
+                    return false;
+                }
+                let gain = own.log_evidence - c.log_evidence;
+                let c_left = left(fitted, &c.best);
+                let scatter = (2.0 * problem.len() as f64).sqrt();
+                let needed =
+                    c_left > k.misfit_sd * scatter && own_left < k.pair_halves * c_left && gain > k.pair_nats;
+                // Or the pair leaves nothing that the scatter does not, and the single cause does.
+                let complete = own_left < k.pair_complete_sd * scatter
+                    && c_left > k.misfit_sd * scatter
+                    && gain > k.pair_complete_nats;
+                let pulled = c.best.pull() > own.best.pull() + k.pair_pull_chi2;
+                2.0 * gain < k.pair_gain_share * gap && !needed && !complete && !pulled
+            })
+            .collect();
         let Some(best) = alone.iter().map(|&i| candidates[i].log_evidence).reduce(f64::max) else { continue };
         // Another single that does better than these is the better short word for what the pair says.
         let mut heirs = alone;

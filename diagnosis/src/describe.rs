@@ -80,7 +80,7 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
 }
 
 /// Causes that are sure though the verdict is open: those of which the hypotheses together have the
-/// probability of a name, and that none of a class that cannot be separated does without.
+/// probability of a name.
 pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
     if !matches!(decision.verdict, Verdict::Ambiguous | Verdict::Unknown) {
         return Vec::new();
@@ -90,9 +90,6 @@ pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
         with.filter(|(c, _)| c.effects.contains(&effect)).map(|(_, p)| p).sum()
     };
     let sure = fitted.problem.constants.name_probability;
-    let in_class =
-        |effect: usize| decision.class.iter().all(|&i| fitted.candidates[i].effects.contains(&effect));
-    let shared = |effect: usize| decision.verdict == Verdict::Unknown || in_class(effect);
     let library = effects::library();
-    (0..library.len()).filter(|&e| of(e) >= sure && shared(e)).map(|e| library[e].name.to_string()).collect()
+    (0..library.len()).filter(|&e| of(e) >= sure).map(|e| library[e].name.to_string()).collect()
 }
