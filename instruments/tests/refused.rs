@@ -131,7 +131,7 @@ fn each_wrong_profile_is_refused_with_place_and_cause() {
             changed(RTU, "type = \"i16\"", "type = \"i16\"\nresolution_si = 0.0"),
             "resolution_si",
         ),
-        ("an id with a path in it", changed(RTU, "id = \"robotiq-ft300\"", "id = \"../ft300\""), "no id"),
+        ("an id with a path in it", changed(RTU, "id = \"robotiq-ft300\"", "id = \"../ft300\""), "not an id"),
         (
             "a file elsewhere",
             changed(CAN, "dbc = \"muprime-can.dbc\"", "dbc = \"../muprime-can.dbc\""),
