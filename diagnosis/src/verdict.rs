@@ -368,7 +368,7 @@ impl Diagnosis {
         let judged = part.is_judged();
         let because = part.comparisons.iter().filter_map(|c| c.because.clone()).next().unwrap_or_default();
         let timed =
-            |n: &NotTestable| effects::by_name(&n.effect).is_some_and(|e| e.needs().contains(&Need::Record));
+            |n: &NotTestable| effects::by_name(&n.effect).is_some_and(|e| e.needs.contains(&Need::Record));
         self.report.not_testable.retain(|n| !(judged && timed(n)));
         for n in self.report.not_testable.iter_mut().filter(|n| timed(n)) {
             n.because = format!("means over passes do not show it, and {because}");
