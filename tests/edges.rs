@@ -14,8 +14,8 @@ use sim::world::WorldConfig;
 use std::sync::Arc;
 use tests::rounds;
 
-/// Seeds are fixed here, before any run.
-const FIRST_SEED: u64 = 41_000;
+/// Fixed before any run with them; the method was made on 41000 to 41700.
+const FIRST_SEED: u64 = 47_000;
 
 const PLAN: &str = r#"
 name = "edges"
@@ -113,7 +113,7 @@ fn none_is_claimed_where_there_is_none_whatever_else_acts() {
             .into_par_iter()
             .map(|i| {
                 let found =
-                    run(FIRST_SEED + 500 + i, &world(&defects.replace("SEED", &(700 + i).to_string())));
+                    run(FIRST_SEED + 500 + i, &world(&defects.replace("SEED", &(900 + i).to_string())));
                 for c in &found {
                     println!("{what}: {} {:?}", c.text, c.log10_odds_vs_none);
                 }
