@@ -249,7 +249,7 @@ fn text(
             "{title}: no lag or shift in time is shown by {edges} edges (95 %: {low:.2} to {high:.2} ms beyond the stated filter)"
         );
     }
-    let odds = if odds > 6.0 { "above 1e6".into() } else { format!("{:.0}", 10f64.powf(odds)) };
+    let odds = if odds > 6.0 { "above 10^6".into() } else { format!("{:.0}", 10f64.powf(odds)) };
     let causes = causes.join(" or ").replace('_', " ");
     format!(
         "{title}: {late:.2} ms late (95 %: {low:.2} to {high:.2}), {causes}; odds {odds} to 1 against none, from {edges} edges"

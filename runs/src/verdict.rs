@@ -14,6 +14,8 @@ use std::path::Path;
 
 /// Parts of the operating space that are named, the largest first.
 const PARTS: usize = 6;
+/// Causes that a hypothesis cannot be separated from, by name; of more the number.
+const ALIASES: usize = 4;
 
 /// Adds what a run's record says of time to a verdict on its passes; a folder without a record adds nothing.
 ///
@@ -99,11 +101,15 @@ pub fn terminal(result: &Diagnosis) -> String {
     for h in r.hypotheses.iter().filter(|h| h.probability > 0.005).take(8) {
         let name = if h.effects.is_empty() { "no gap".to_string() } else { plain(&h.effects.join(" + ")) };
         text.push_str(&format!("  {:>7}  {name}", probability(h.probability)));
-        if h.alias_class.len() > 1 {
-            text.push_str(&format!("  (cannot be separated from {})", plain(&h.alias_class[1..].join(", "))));
+        let likely = h.probability > 0.05;
+        if let (true, [_, others @ ..]) = (likely && h.alias_class.len() > 1, &h.alias_class[..]) {
+            let more = others.len().saturating_sub(ALIASES);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let named = others[..others.len().min(ALIASES)].join(", ");
+            text.push_str(&format!("  (cannot be separated from {}{more})", plain(&named)));
         }
         text.push('\n');
-        if h.probability > 0.05 {
+        if likely {
             for p in &h.parameters {
                 text.push_str(&format!("         {} = {}\n", plain(p.name), estimate(p)));
             }

@@ -203,10 +203,11 @@ impl Plan {
         for (c, _, edges) in conditions {
             let half = 0.5 * self.stroke_m(c.speed_m_s, *edges);
             if c.position_m - half < left || c.position_m + half > right {
-                let (speed, position) = (c.speed_m_s, c.position_m);
+                let [speed, position, stroke, left, right] =
+                    [(c.speed_m_s, "m/s"), (c.position_m, "m"), (2.0 * half, "m"), (left, "m"), (right, "m")]
+                        .map(|(value, unit)| quantity(value, unit));
                 let problem = format!(
-                    "a pass at {speed} m/s about {position} m needs {:.4} m of stroke; the travel is {left} to {right} m",
-                    2.0 * half
+                    "a pass at {speed} about {position} needs {stroke} of stroke; the travel is {left} to {right}"
                 );
                 let remedy = "shorten [pass] settle_s, measure_s or edge_s, have fewer edges, or slow down"
                     .to_string();
