@@ -6,7 +6,7 @@ pub mod files;
 use crate::report::human::{quantity, with_interval};
 use diagnosis::certificates;
 use diagnosis::intervals::{Estimate, Shape};
-use diagnosis::verdict::{Diagnosis, probability};
+use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::rig_file::RigFile;
@@ -16,6 +16,8 @@ use std::path::Path;
 const PARTS: usize = 6;
 /// Causes that a hypothesis cannot be separated from, by name; of more the number.
 const ALIASES: usize = 4;
+/// Probability from which a hypothesis is explained: its parameters, and what it cannot be separated from.
+pub const EXPLAINED: f64 = 0.05;
 
 /// Adds what a run's record says of time to a verdict on its passes; a folder without a record adds nothing.
 ///
@@ -76,7 +78,7 @@ pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
 
 /// Odds in words, from their logarithm to the base 10.
 pub fn odds_base10(log: f64) -> String {
-    if log > 6.0 { "odds above 1e6 to 1".into() } else { format!("odds of {:.0} to 1", 10f64.powf(log)) }
+    if log > 6.0 { "odds above 10^6 to 1".into() } else { format!("odds of {:.0} to 1", 10f64.powf(log)) }
 }
 
 /// An effect's or a parameter's name in words.
@@ -94,6 +96,14 @@ pub fn estimate(p: &Estimate) -> String {
     }
 }
 
+/// What a likely hypothesis cannot be separated from, the first few by name; `None` where nothing is.
+pub fn aliases(h: &Hypothesis) -> Option<String> {
+    let others = h.alias_class.get(1..).filter(|others| !others.is_empty() && h.probability > EXPLAINED)?;
+    let more = others.len().saturating_sub(ALIASES);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    Some(plain(&others[..others.len().min(ALIASES)].join(", ")) + &more)
+}
+
 /// What a terminal shows.
 pub fn terminal(result: &Diagnosis) -> String {
     let r = &result.report;
@@ -101,15 +111,11 @@ pub fn terminal(result: &Diagnosis) -> String {
     for h in r.hypotheses.iter().filter(|h| h.probability > 0.005).take(8) {
         let name = if h.effects.is_empty() { "no gap".to_string() } else { plain(&h.effects.join(" + ")) };
         text.push_str(&format!("  {:>7}  {name}", probability(h.probability)));
-        let likely = h.probability > 0.05;
-        if let (true, [_, others @ ..]) = (likely && h.alias_class.len() > 1, &h.alias_class[..]) {
-            let more = others.len().saturating_sub(ALIASES);
-            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            let named = others[..others.len().min(ALIASES)].join(", ");
-            text.push_str(&format!("  (cannot be separated from {}{more})", plain(&named)));
+        if let Some(others) = aliases(h) {
+            text.push_str(&format!("  (cannot be separated from {others})"));
         }
         text.push('\n');
-        if likely {
+        if h.probability > EXPLAINED {
             for p in &h.parameters {
                 text.push_str(&format!("         {} = {}\n", plain(p.name), estimate(p)));
             }

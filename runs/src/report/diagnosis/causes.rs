@@ -4,12 +4,11 @@
 use super::mechanism::drawing;
 use super::overlay::Overlay;
 use crate::report::html::{bar, escape, table};
-use crate::verdict::{estimate, plain};
+use crate::verdict::{EXPLAINED, aliases, estimate, plain};
 use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
 
-/// Probability from which a hypothesis is listed, and from which its effects are explained.
+/// Probability from which a hypothesis is listed.
 const LISTED: f64 = 0.002;
-const EXPLAINED: f64 = 0.05;
 
 fn name(h: &Hypothesis) -> String {
     if h.effects.is_empty() { "no gap".into() } else { plain(&h.effects.join(" + ")) }
@@ -25,12 +24,9 @@ pub fn section(result: &Diagnosis, overlay: &Overlay<'_>) -> miette::Result<Stri
     let rows: String = listed
         .iter()
         .map(|h| {
-            let alias = match h.alias_class.get(1..) {
-                Some(others) if !others.is_empty() => {
-                    format!("<br><small>not separable from {}</small>", escape(&plain(&others.join(", "))))
-                }
-                _ => String::new(),
-            };
+            let alias = aliases(h).map_or_else(String::new, |others| {
+                format!("<br><small>cannot be separated from {}</small>", escape(&others))
+            });
             format!(
                 "<tr><th scope=\"row\">{}{alias}</th><td class=\"n\">{}</td><td>{}</td></tr>",
                 escape(&name(h)),
