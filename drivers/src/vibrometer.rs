@@ -106,8 +106,8 @@ impl std::fmt::Display for Settings {
 /// Asks a controller for the settings of the decoder that the setup names.
 ///
 /// # Errors
-/// A profile that is not a vibrometer's, a line that cannot be opened, a decoder that is not there, answers that
-/// make no sense, settings that changed while they were read; in words.
+/// A profile that is not a vibrometer's, a line that cannot be opened, a decoder that is not there, answers
+/// that make no sense, settings that changed while they were read; in words.
 pub fn settings(setup: &VibrometerSetup) -> Result<Settings, String> {
     let profile = setup.description().map_err(|error| error.to_string())?;
     let link = profile.description.link.clone();

@@ -120,8 +120,8 @@ impl Field {
     }
 
     /// Stores `value`, rounded to the nearest and limited to the type's range, as an instrument's converter
-    /// does. Other bits of the same word stay unchanged. A value that is not a number is stored as one only in
-    /// floating point; integers take zero. Returns `false` where the frame is too short.
+    /// does. Other bits of the same word stay unchanged. A value that is not a number is stored as one only
+    /// in floating point; integers take zero. Returns `false` where the frame is too short.
     pub fn write(&self, frame: &mut [u8], value: f64) -> bool {
         let Some(old) = self.word(frame) else { return false };
         let word = if let Some((first, width)) = self.bits {

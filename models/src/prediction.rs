@@ -93,7 +93,8 @@ pub trait FrictionModel: Send + Sync {
         self.predict(condition).map(|p| p.mu_relative)
     }
 
-    /// Standard deviation of `mu'` from the law itself, beside one of its predictions: what no choice of its parameters mends.
+    /// Standard deviation of `mu'` from the law itself, beside one of its predictions: what no choice of its
+    /// parameters mends.
     fn form_sd(&self, of: &Prediction) -> f64 {
         let _ = of;
         0.0

@@ -41,7 +41,8 @@ pub enum CtrlC {
 /// Whether this program may take keys from its terminal.
 ///
 /// # Errors
-/// The standard input is not a terminal, or the program is not in its foreground: it would be stopped by the first look at a key.
+/// The standard input is not a terminal, or the program is not in its foreground: it would be stopped by the
+/// first look at a key.
 pub fn has_keys() -> Result<(), String> {
     if !isatty(stdin()) {
         return Err("the standard input is not a terminal, so no key can be pressed".into());

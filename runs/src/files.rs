@@ -59,7 +59,8 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
 }
 
 /// Writes a file that a person named, whole or not at all: after a crash or a power cut either the old one is there or the new one.
-/// What is there and is not an ordinary file, such as a terminal or a pipe, is written to as it is. A link of this user stays a link.
+/// What is there and is not an ordinary file, such as a terminal or a pipe, is written to as it is. A link
+/// of this user stays a link.
 ///
 /// # Errors
 /// Whatever the file system says, with the file's name; a link that another user has put there.

@@ -43,8 +43,8 @@ pub enum Kind {
 pub struct FingertipSetup {
     /// Name in the library, or path of a file, relative to the setup.
     pub tip: String,
-    /// The numbers of a human fingertip are used and nobody touches the plate: the guards for a finger are off.
-    /// Record, report and every page of a run say so.
+    /// The numbers of a human fingertip are used and nobody touches the plate: the guards for a finger are
+    /// off. Record, report and every page of a run say so.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub nobody_touches_the_plate: bool,
     /// Overrides, N/m.

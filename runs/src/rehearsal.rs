@@ -54,7 +54,8 @@ fn second(profile: Profile) -> Result<(), String> {
             let bytes = device.frame(frame, &mut plant, now);
             profile.decode(frame, &bytes, &mut values).map_err(|error| format!("`{name}`: {error}"))?;
             let shape = &profile.frames()[frame.0];
-            // What the world does not know yet, such as a set-point that nobody has sent, is not a number of a line.
+            // What the world does not know yet, such as a set-point that nobody has sent, is not a number of
+            // a line.
             let known =
                 |eight: &[u8]| eight.try_into().is_ok_and(|eight| f64::from_be_bytes(eight).is_finite());
             let line = shape.write_line(&bytes, 1.0).filter(|_| bytes.chunks_exact(8).all(known));

@@ -26,7 +26,8 @@ pub struct FingerConfig {
     pub ridge_damping_ratio: f64,
     /// Lateral recovery speed (m/s); 0: at once.
     pub lateral_recovery_m_s: f64,
-    /// Where above zero, the fingertip is not a slider on springs but the paper's finite element ridge, by its table, on a plate that moves by so
+    /// Where above zero, the fingertip is not a slider on springs but the paper's finite element ridge, by
+    /// its table, on a plate that moves by so
     /// many times its stroke (-): 1 is the ridge as it is; 2 makes the paper's w its sine's amplitude.
     pub ridge_table_strokes: f64,
     /// Lateral stiffness of the pad at the stage's pace (N/m).

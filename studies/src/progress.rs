@@ -10,7 +10,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Status of what Ctrl-C ended: 128 and the number of the signal.
 pub const INTERRUPTED: u8 = 130;
 
-/// A bar on standard error with the time that is left, hidden where that is not a terminal: a log holds no bars.
+/// A bar on standard error with the time that is left, hidden where that is not a terminal: a log holds no
+/// bars.
 pub fn bar(length: u64, what: &str) -> ProgressBar {
     let target = if std::io::stderr().is_terminal() {
         ProgressDrawTarget::stderr()

@@ -31,7 +31,8 @@ const BANNED: &[&str] = &[
     "nats expected",
 ];
 
-/// Sources whose strings people read at a terminal, in events and on report pages; and pages beside those of the book.
+/// Sources whose strings people read at a terminal, in events and on report pages; and pages beside those of
+/// the book.
 pub const ROOMS: &[&str] = &[
     "README.md",
     "SECURITY.md",

@@ -37,7 +37,8 @@ impl Cyclic {
     }
 }
 
-/// Other names that the catalogue gives, as they are compared: capitals, `_` for what is not a letter or digit.
+/// Other names that the catalogue gives, as they are compared: capitals, `_` for what is not a letter or
+/// digit.
 const ALIASES: &[(&str, &str)] = &[
     ("CRC_8", "CRC_8_SMBUS"),
     ("CRC_8_ITU", "CRC_8_I_432_1"),

@@ -312,8 +312,8 @@ impl Need {
     }
 }
 
-/// A candidate cause of the gap. It nests the baseline: at the zero of its size nothing changes, bit for bit. Written
-/// as JSON it is what `muprime model effects` shows of it.
+/// A candidate cause of the gap. It nests the baseline: at the zero of its size nothing changes, bit for
+/// bit. Written as JSON it is what `muprime model effects` shows of it.
 #[derive(Serialize)]
 pub struct Effect {
     /// Name as docs/contract.md has it.
@@ -345,7 +345,8 @@ pub struct Effect {
     /// Error of mu' by interpolation, root mean square; zero for what is evaluated directly.
     #[serde(skip)]
     pub interpolation_error: f64,
-    /// Makes what `change` with this law and these parameters will look up, so that a control loop makes nothing.
+    /// Makes what `change` with this law and these parameters will look up, so that a control loop makes
+    /// nothing.
     #[serde(skip)]
     pub prepare: fn(usize, &[f64]),
     /// Changes what the contact is given: by the law, and its parameters in its order.

@@ -107,7 +107,8 @@ fn every_identity_counts_and_the_worst_holds() {
     assert_eq!((left.hour_s, left.dose_m2_s, left.in_one_go_s), (750.0, 21.5, 0.0));
 }
 
-/// What others may write, or what is another's under this user's name, is not a ledger; what other users drove is added.
+/// What others may write, or what is another's under this user's name, is not a ledger; what other users
+/// drove is added.
 #[test]
 fn nobody_else_can_write_a_ledger_and_what_others_drove_counts() {
     let folder = Folder::new("users");

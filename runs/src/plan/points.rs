@@ -244,8 +244,8 @@ fn allowed(covariate: &Covariate, limits: &Limits) -> [f64; 2] {
     }
 }
 
-/// Pressures that a plan may ask a chamber for, Pa. The least is what the largest would be if it were written in kPa, so that no
-/// value in kPa passes for one in Pa.
+/// Pressures that a plan may ask a chamber for, Pa. The least is what the largest would be if it were
+/// written in kPa, so that no value in kPa passes for one in Pa.
 const CHAMBER_PA: [f64; 2] = [200.0, 200_000.0];
 
 pub(crate) fn series_place(text: &str, index: usize, name: &str) -> Option<std::ops::Range<usize>> {

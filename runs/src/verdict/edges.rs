@@ -152,7 +152,8 @@ pub fn of_run(folder: &Path, finger: Finger) -> miette::Result<RecordPart> {
                 Entry::Message { text, .. } => {
                     serde_json::from_slice::<Row>(&text).iter().for_each(|row| found.row(row));
                 }
-                // A plan that makes none need not be looked through, which takes seconds for minutes of cycles.
+                // A plan that makes none need not be looked through, which takes seconds for minutes of
+                // cycles.
                 Entry::File { name, bytes, .. } if name == "plan.toml" && without_edges(&bytes) => break,
                 Entry::File { name, bytes, .. } if name == REPLAYABLE => {
                     let built = serde_json::from_slice::<Replayable>(&bytes).ok();

@@ -80,7 +80,8 @@ fn all_wrong(schema: &Value, text: &str) -> Option<Vec<Wrong>> {
     Some(wrong)
 }
 
-/// Tells of everything in a TOML text that its schema does not admit. Nothing where the text is not TOML: its reader says that best.
+/// Tells of everything in a TOML text that its schema does not admit. Nothing where the text is not TOML:
+/// its reader says that best.
 pub fn toml(schema: &Value, text: &str, problems: &mut Problems<'_>) {
     let wrong = all_wrong(schema, text).unwrap_or_default();
     wrong.into_iter().for_each(|w| problems.add_at(w.place, w.problem, w.remedy));

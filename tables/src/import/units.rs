@@ -225,7 +225,8 @@ impl Unit {
         })
     }
 
-    /// The value in SI of a number as it is written, a decimal point its only mark; `None` for what is not a finite number.
+    /// The value in SI of a number as it is written, a decimal point its only mark; `None` for what is not a
+    /// finite number.
     pub fn apply(&self, number: &str) -> Option<f64> {
         let moved = moved(number, self.ten)?;
         Some(moved * self.times / self.over + self.plus).filter(|v| v.is_finite())

@@ -106,7 +106,8 @@ impl Kind {
         schema.to_value()
     }
 
-    /// The schema for editors: a quantity may also be a text with its unit, as the readers of these files take it.
+    /// The schema for editors: a quantity may also be a text with its unit, as the readers of these files
+    /// take it.
     pub fn for_editors(self) -> Value {
         let mut schema = self.schema();
         if matches!(self, Kind::Plan | Kind::Campaign | Kind::Setup | Kind::Fingertip | Kind::Rig) {

@@ -22,13 +22,15 @@ pub static EFFECT: Effect = Effect {
                 Parameter::positive("depth", "1", 0.5, 1.0),
                 Parameter::between("node_spacing_at_reference", "m", 0.004, 0.03),
                 Parameter::between("phase", "1", -0.25, 1.25),
-                // Flexural waves shorten as the root of the frequency; a plate that is driven at one mode's does not.
+                // Flexural waves shorten as the root of the frequency; a plate that is driven at one mode's
+                // does not.
                 Parameter::between("frequency_exponent", "1", 0.0, 1.0).bending(),
                 // At one half the root of a sum of squares, of what stands and what travels.
                 Parameter::shape("sharpness", "1", 0.5, 0.5).bending(),
                 // The amplitude was calibrated at one place, which need not be an antinode.
                 Parameter::signed("antinode_over_calibrated_e_folds", "1", 0.3, -1.0, 1.0).bending(),
-                // Waves of all frequencies are in step at an edge of the plate, which need not be where positions are counted from.
+                // Waves of all frequencies are in step at an edge of the plate, which need not be where
+                // positions are counted from.
                 Parameter::signed("edge_to_origin_over_node_spacing", "1", 1.0, -4.0, 4.0).bending(),
             ],
         )

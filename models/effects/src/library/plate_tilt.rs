@@ -8,8 +8,8 @@ pub static EFFECT: Effect = Effect {
     place: Place::Instrument,
     summary: "A component of the load is read as lateral force, and one of the friction as normal force.",
     source: "rotation of the frame by the angle: Fx' = Fx cos + Fz sin, Fz' = Fz cos - Fx sin",
-    // A plate that turns shows in both axes. A lateral cell that is askew by itself reads a share of the normal
-    // force: that is a cross-talk by its definition.
+    // A plate that turns shows in both axes. A lateral cell that is askew by itself reads a share of the
+    // normal force: that is a cross-talk by its definition.
     laws: &[Law::new("rotation", &[Parameter::signed("angle", "rad", 0.03, -0.3, 0.3)])
         .certified_by(CertifiedKey::Tilt)
         .seen_by(

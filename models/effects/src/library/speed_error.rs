@@ -17,7 +17,8 @@ pub static EFFECT: Effect = Effect {
             .acts_as([0.0, 0.0, 1.0])
             .seen_by(CHECK, 0.003),
         Law::new("constant", &[Parameter::signed("excess", "m/s", 0.003, -0.02, 0.05)]).seen_by(CHECK, 6e-5),
-        // Slip and lag of a drive change with its speed: the error of the gain by this share for each factor of e.
+        // Slip and lag of a drive change with its speed: the error of the gain by this share for each factor
+        // of e.
         Law::new(
             "gain that changes with speed",
             &[

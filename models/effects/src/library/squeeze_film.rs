@@ -46,8 +46,8 @@ pub static EFFECT: Effect = Effect {
                 Parameter::positive("inverse_roughness", "1/m", 0.6e6, 4e6),
                 Parameter::shape("film_over_apparent_area", "1", 0.5, 1.0),
                 Parameter::shape("solid_load", "N", SOLID_SCALE_N, 0.4),
-                // How slowly the asperities let go: exponentially at zero, as the fourth power of the gap at a
-                // quarter.
+                // How slowly the asperities let go: exponentially at zero, as the fourth power of the gap at
+                // a quarter.
                 Parameter::between("bluntness", "1", 0.0, 0.6).bending(),
             ],
         )

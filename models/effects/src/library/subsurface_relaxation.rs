@@ -37,7 +37,8 @@ pub static EFFECT: Effect = Effect {
                 Parameter::shape("onset_time", "s", 5.0, 1.2),
             ],
         ),
-        // Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of times.
+        // Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of
+        // times.
         Law::new(
             "normal stiffness alone, stretched exponential",
             &[
