@@ -133,7 +133,7 @@ assert np.allclose(mine.pandas()["amplitude_pp_m"], order["amplitude_pp_m"], ato
 assert muprime.Plan.load(FOLDER / "mine.toml").document == made.document == muprime.Plan.parse(made.toml).document
 refusal(lambda: muprime.Plan.make("none"), "[[series]]")
 refusal(lambda: muprime.Plan.make("typo", {"amplitude_m": [1e-6]}), "amplitude_m")
-refusal(lambda: muprime.Plan.make("far", {"amplitude_pp_m": [1e-3]}).passes(), "amplitude_pp_m = 1e-3", "outside")
+refusal(lambda: muprime.Plan.make("far", {"amplitude_pp_m": [1e-3]}).passes(), "amplitude_pp_m = 1 mm", "outside")
 refusal(lambda: muprime.Plan.load("no-such-plan"), "bundled plans")
 
 # Certificates: the same parameters as the command's from the same files; the date and so the hash are each one's own.
