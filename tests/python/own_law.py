@@ -14,7 +14,9 @@ import muprime
 import numpy as np
 import polars
 
-MUPRIME, FOLDER = sys.argv[1], Path(sys.argv[2])
+# Other scripts of this test make runs in the same folder.
+MUPRIME, FOLDER = sys.argv[1], Path(sys.argv[2]) / "own-law"
+FOLDER.mkdir()
 
 
 def command(*words: str) -> str:
