@@ -194,7 +194,7 @@ impl Master {
                 Some(CanEvent::Frame(frame, _)) if frame.id == 0x700 + u32::from(self.node) => {
                     alive = Instant::now();
                     if frame.data() == [0] {
-                        return Err(Ended::Io("the drive started anew".into()));
+                        return Err(Ended::Io("the drive restarted".into()));
                     }
                 }
                 Some(CanEvent::Frame(frame, _)) if frame.id == 0x80 + u32::from(self.node) => {

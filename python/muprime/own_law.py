@@ -63,13 +63,13 @@ def tabulate(
     answer = law(**{column: np.array(own) for column, own in zip(columns, values, strict=True)})
     pair: Sequence[Any] = answer if isinstance(answer, tuple) else (answer, 0.0)
     mu, sd = (np.broadcast_to(np.asarray(part, dtype=np.float64), (len(values[0]),)) for part in pair)
-    name = name or getattr(law, "__name__", type(law).__name__).strip("<>")
+    called: str = name or getattr(law, "__name__", type(law).__name__).strip("<>")
     module = getattr(law, "__module__", None)
     answers = list(zip(mu.tolist(), sd.tolist(), strict=True))
-    text, about = _muprime.law_table(nodes, checks, answers, f"Python function {module}.{name}", tolerance)
+    text, about = _muprime.law_table(nodes, checks, answers, f"Python function {module}.{called}", tolerance)
     found = json.loads(about)
     return LawTable(
-        name=name,
+        name=called,
         text=text,
         sha256=found["sha256"],
         error_greatest=found["error_greatest"],

@@ -198,7 +198,7 @@ pub fn displacement(volts: f64, range_m_s_per_v: f64, frequency_hz: f64) -> Resu
     }
     if volts >= FULL_SCALE_V {
         return Err(format!(
-            "{volts} V is at the rail of the decoder's output ({FULL_SCALE_V} V): choose a larger range and begin anew"
+            "{volts} V is at the rail of the decoder's output ({FULL_SCALE_V} V): choose a larger range and start over"
         ));
     }
     // v = 2 pi f (w/2), so w = v / (pi f).

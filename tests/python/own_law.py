@@ -70,7 +70,10 @@ print(f"run: {len(passes)} passes, predictions within {worst:.4f} of the functio
 
 # The same table as Parquet is the same law, but for the digits that a float takes.
 frame = polars.read_csv(path, comment_prefix="#")
-frame.write_parquet(FOLDER / "columns.parquet")
+frame.write_parquet(FOLDER / "zstd.parquet", compression="zstd")
+refused = subprocess.run([MUPRIME, "check", "zstd.parquet"], capture_output=True, text=True, cwd=FOLDER)
+assert refused.returncode == 2 and "with snappy, or as CSV" in refused.stderr, refused.stderr
+frame.write_parquet(FOLDER / "columns.parquet", compression="snappy")
 assert "OK: law table" in subprocess.run(
     [MUPRIME, "check", "columns.parquet"], check=True, capture_output=True, text=True, cwd=FOLDER
 ).stderr

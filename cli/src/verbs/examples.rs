@@ -2,7 +2,7 @@
 
 use runs::print::{COLUMNS, folded};
 
-/// The examples, a command a line; those of one command stand in their order. Add one with every subcommand.
+/// The examples, a command a line; those of one command in the order of their reading. Add one with every subcommand.
 pub const EXAMPLES: &str = include_str!("examples.txt");
 
 /// The examples of a command, as the end of its help. Where it has subcommands, theirs are not its own.

@@ -51,7 +51,7 @@ impl Profile {
     }
 
     /// The line of text that carries a set-point, and what its answer begins with; `None` where the
-    /// set-point is not a line of text. `newest` gives the values of others that stand in the line.
+    /// set-point is not a line of text. `newest` gives the values of others in the line.
     pub fn line(
         &self,
         set: SetId,

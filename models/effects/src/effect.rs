@@ -339,7 +339,7 @@ pub struct Effect {
     /// Effects of the library that together nearly do what this one does: as a pair they are not named.
     #[serde(skip)]
     pub imitated_by: &'static [&'static str],
-    /// The cause in words, as it stands in a sentence; none where its name is a name of the library.
+    /// The cause in words, for a sentence; none where its name is a name of the library.
     #[serde(skip)]
     pub words: Option<&'static str>,
     /// Error of mu' by interpolation, root mean square; zero for what is evaluated directly.

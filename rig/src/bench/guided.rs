@@ -46,7 +46,7 @@ pub fn series(way: &SeriesOptions<'_>) -> miette::Result<String> {
         ask!("reading {}> ", series.rows.len() + 1);
         let Some(line) = lines.next() else {
             miette::bail!(
-                help = "the same command goes on with them; delete that file to begin anew",
+                help = "repeat the command to resume; delete that file to start over",
                 "the input ended before `done`: no series, no certificate. {} readings are in {}",
                 series.rows.len(),
                 series.part.display()
@@ -120,12 +120,11 @@ impl Series {
         let mut lines = text.lines();
         let began = lines.next().and_then(|l| l.strip_prefix(BEGAN)).and_then(|t| t.trim().parse().ok());
         let (Some(began_unix_s), Some(HEADER)) = (began, lines.next()) else {
-            miette::bail!(help = "delete it to begin anew", "{shown} is not a series of this program");
+            miette::bail!(help = "delete it to start over", "{shown} is not a series of this program");
         };
         let rows: Vec<String> = lines.map(String::from).collect();
         say!(
-            "{} readings of an earlier session are taken up from {shown} (begun {:.0} s ago); delete that file to begin \
-             anew",
+            "resumes with {} readings of an earlier session from {shown} (begun {:.0} s ago); to start over, delete that file",
             rows.len(),
             unix_s() - began_unix_s
         );
@@ -191,7 +190,7 @@ fn read(rig: &mut Rig, epoch: Instant, way: &SeriesOptions<'_>) -> Result<Taken,
             let now = Nanos(u64::try_from(epoch.elapsed().as_nanos()).unwrap_or(u64::MAX));
             let forces = rig.force.read(now);
             if forces.lateral.is_ok() && forces.normal.is_ok() {
-                say!("  the link is back: the reading begins anew");
+                say!("  the link is back: the reading starts over");
                 break;
             }
         }

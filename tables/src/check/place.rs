@@ -143,7 +143,7 @@ pub(super) fn remedy(kind: Option<&str>) -> String {
         }
         Some("rig.toml") => "docs/contract.md shows one; `muprime run` and `muprime import` write it".into(),
         Some("certificate") => "a certificate is not edited: make a new one with `muprime calibrate`".into(),
-        Some("model") => "let `muprime diagnose --save-model` write it anew".into(),
+        Some("model") => "write a new one with `muprime diagnose --save-model`".into(),
         Some("defects file") => "docs/setup.md names the defects and their parameters".into(),
         Some("table") => {
             "`muprime import` makes a point table of a foreign one; docs/contract.md lists the columns".into()

@@ -23,7 +23,7 @@ const COMPLEX: u8 = 0x08;
 /// A file that is cut or is none, and what [`table`] says.
 pub fn read(bytes: &[u8], sheet: Option<&str>, wanted: &[String]) -> miette::Result<Grid> {
     let cut =
-        || miette::miette!(help = "save it anew, with `save -v7`", "the MAT file is cut short or damaged");
+        || miette::miette!(help = "save it again with `save -v7`", "the MAT file is cut short or damaged");
     let big = match bytes.get(126..128) {
         Some(b"IM") => false,
         Some(b"MI") => true,

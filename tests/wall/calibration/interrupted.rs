@@ -150,7 +150,7 @@ fn a_link_that_goes_down_is_waited_for_and_nothing_weighed_is_lost() {
     guided.child.kill().unwrap();
     guided.child.wait().unwrap();
     let mut again = Guided::start(folder.path(), &["--setup", "rig.toml"]);
-    again.hear("3 readings of an earlier session are taken up");
+    again.hear("resumes with 3 readings of an earlier session");
     again.type_in("zero");
     again.hear(" counts");
     again.type_in("undo");
