@@ -93,7 +93,7 @@ impl std::fmt::Display for Settings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "decoder {} (number {}) at {} mm/s/V, delay {:.3} us, to {:.1} kHz",
+            "decoder {} (number {}) at {} mm/s/V, delay {:.3} \u{b5}s, to {:.1} kHz",
             self.decoder,
             self.number,
             self.range_m_s_per_v * 1e3,

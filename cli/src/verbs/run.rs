@@ -370,7 +370,7 @@ fn tell(summary: &Summary, json: bool) {
     if let Some(report) = &summary.loop_report {
         let [p50, _, p99, _, max] = report.lateness_ns.map(|ns| ns as f64 / 1e3);
         report!(
-            "loop: {} cycles, lateness median {p50:.0} us, 99 % {p99:.0} us, worst {max:.0} us; {} overruns, {} rows lost; CPUs {}",
+            "loop: {} cycles, lateness median {p50:.0} \u{b5}s, 99 % {p99:.0} \u{b5}s, worst {max:.0} \u{b5}s; {} overruns, {} rows lost; CPUs {}",
             report.cycles,
             report.overruns,
             summary.record_lost,

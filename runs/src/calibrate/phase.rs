@@ -134,7 +134,7 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
     };
     let mut outcome = outcome(&found, &acquisition);
     outcome.remarks.push(format!(
-        "decoders: plate {:e} m/s/V and {:.3} us, skin {:e} m/s/V and {:.3} us{}",
+        "decoders: plate {:e} m/s/V and {:.3} \u{b5}s, skin {:e} m/s/V and {:.3} \u{b5}s{}",
         plate.range_m_s_per_v,
         plate.delay_s * 1e6,
         skin.range_m_s_per_v,

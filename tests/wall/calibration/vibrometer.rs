@@ -167,7 +167,7 @@ fn an_amplitude_table_taken_live_finds_the_withheld_scale() {
     let done = child.wait_with_output().unwrap();
     assert!(done.status.success(), "{all}");
     assert!(readings >= 11 && trips >= 1, "{readings} readings, {trips} trips: {all}");
-    assert!(all.contains("decoder VD-02 (number 0) at 25 mm/s/V, delay 8.160 us"), "{all}");
+    assert!(all.contains("decoder VD-02 (number 0) at 25 mm/s/V, delay 8.160 \u{b5}s"), "{all}");
     let document = &tests::documents(&done)[0];
     let [gain, u] = parameter(document, "gain");
     println!("live: scale {gain:.4} +- {u:.4}, withheld {factor:.4}; {readings} readings");
@@ -239,7 +239,7 @@ fn settings_are_read_back_or_refused_with_the_reason() {
     let vibrometer =
         found.as_array().unwrap().iter().find(|f| f["subject"].to_string().contains("vibrometer")).unwrap();
     assert_eq!(vibrometer["good"], true, "{vibrometer}");
-    assert!(vibrometer["found"].to_string().contains("delay 8.160 us"), "{vibrometer}");
+    assert!(vibrometer["found"].to_string().contains("delay 8.160 \u{b5}s"), "{vibrometer}");
     changed(at, "decoder = \"VD-02\"", "decoder = \"VD-07\"");
     let doctor = calibrate(at, "doctor --instruments-only --json --setup other.toml");
     assert_eq!(doctor.status.code(), Some(1));
