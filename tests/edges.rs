@@ -124,3 +124,30 @@ fn none_is_claimed_where_there_is_none_whatever_else_acts() {
         assert_eq!(claimed, 0, "{what}");
     }
 }
+
+/// Means over passes hardly show a lag: the verdict's first sentences must not hide one that the record shows.
+#[test]
+fn the_first_sentences_of_a_verdict_name_a_lag_that_the_record_shows() {
+    let folder = tempfile::tempdir().unwrap();
+    let series =
+        "[[series]]\namplitude_pp_m = [0.0, 0.5e-6, 1e-6, 2e-6, 3e-6]\nspeed_m_s = [0.01, 0.02, 0.04]\n";
+    std::fs::write(folder.path().join("plan.toml"), format!("{PLAN}{series}")).unwrap();
+    let lag = "[[defect]]\nname = \"sensor_lag\"\nparameters = { bandwidth_hz = 12 }\n";
+    std::fs::write(folder.path().join("lag.toml"), lag).unwrap();
+    let answer = |words: &str| {
+        let mut command = tests::muprime();
+        command.current_dir(folder.path()).env("MUPRIME_RUNS", folder.path());
+        let ended = command.args(words.split(' ')).output().unwrap();
+        assert!(ended.status.success(), "{}", tests::texts(&ended).1);
+        tests::documents(&ended)
+    };
+    for (out, defects, shown) in [("late", " --defects lag.toml", true), ("sound", "", false)] {
+        answer(&format!(
+            "--json run plan.toml --setup virtual-ideal --seed 47600 --fast --out {out}{defects}"
+        ));
+        let verdict = answer(&format!("--json diagnose {out}")).remove(0);
+        let text = verdict["text"].as_str().unwrap();
+        println!("{text}");
+        assert_eq!(text.contains("The run's record shows sensor lag: the lateral force is"), shown, "{text}");
+    }
+}

@@ -148,7 +148,7 @@ fn page() -> String {
     out.push_str(
         "\n## A stall before the rig is armed\n\n\
          Where a relay is fitted, a machine that is short of time leaves two things behind before arming, with nothing driven in either:\n\n\
-         - A board that is not heard for its age limit (80 ms by default) is a silent emergency stop (SR-35): the supply is cut, and stays \
+         - A board that is silent for longer than its age limit (80 ms by default) is a silent emergency stop (SR-35): the supply is cut, and stays \
          cut until it is proved. An amplifier that reports its open supply then shows a fault (SR-20): only the proof clears it, so \
          the sweep does not wait for it, and asks for its reset once nothing else has stood in the way for 50 ms. The amplifier gets \
          no command: its fault is gone once its supply is closed, or the proof fails after 5 s for that cause.\n\

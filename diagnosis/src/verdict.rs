@@ -17,7 +17,7 @@ use crate::remarks::{WithSuspects, of_scatter, of_table, with_suspects};
 use crate::run_shifts::shifted;
 use crate::scatter::Scatter;
 use crate::shrinkage::{Gap, gap};
-use crate::timing::RecordPart;
+use crate::timing::{Comparison, RecordPart};
 use effects::{Need, imitated};
 use models::condition::Condition;
 use models::reading_evidence::ReadingFinding;
@@ -372,6 +372,16 @@ impl Diagnosis {
         self.report.not_testable.retain(|n| !(judged && timed(n)));
         for n in self.report.not_testable.iter_mut().filter(|n| timed(n)) {
             n.because = format!("means over passes do not show it, and {because}");
+        }
+        // The first sentences are of the passes alone, and may say 'no gap' beside it.
+        let late = part.comparisons.iter().filter(|c| !c.causes.is_empty());
+        let odds = |c: &&Comparison| c.log10_odds_vs_none.unwrap_or_default();
+        if let Some(late) = late.max_by(|a, b| odds(a).total_cmp(&odds(b))) {
+            let causes = late.causes.join(" or ").replace('_', " ");
+            let late_ms = 1e3 * late.late_s.unwrap_or_default();
+            let more =
+                format!(" The run's record shows {causes}: the lateral force is {late_ms:.1} ms late.");
+            self.report.text.push_str(&more);
         }
         self.report.record = Some(part);
     }

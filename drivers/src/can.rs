@@ -22,9 +22,8 @@ use std::time::{Duration, Instant};
 /// The message for a controller whose error counters are at 96, or at 128: then no node hears of a broken
 /// frame any more, and the link ends.
 pub(super) const WARNS: &str =
-    "the CAN controller warns: its error counters are high; look at cable and termination";
-pub(super) const PASSIVE: &str =
-    "the CAN controller is error passive; look at cable, termination and bit rate";
+    "the CAN controller warns: its error counters are high; check cable and termination";
+pub(super) const PASSIVE: &str = "the CAN controller is error passive; check cable, termination and bit rate";
 
 /// Opens the bus at an address: an interface of the kernel's (`can0`), or `slcan:PATH`.
 ///

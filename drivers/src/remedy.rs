@@ -49,7 +49,7 @@ pub fn exception(code: u8) -> String {
             "it has no such register: check address, count and table of the profile; some manuals count from 1"
         }
         3 => "it does not take this value or this many registers: check range and count",
-        4 => "it failed: look at its display or its error register",
+        4 => "it failed: check its display or its error register",
         5 | 6 => "it is busy: lower the rate, or end what else talks to it",
         10 => "the gateway has no way to the unit: check its settings",
         11 => "no unit answers behind the gateway: check `unit`, the wiring and the speed behind it",

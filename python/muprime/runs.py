@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     import pandas
     import polars
     import pyarrow  # type: ignore[import-untyped]
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -33,10 +35,14 @@ class Run:
 
     def arrow(self) -> pyarrow.Table:
         """The passes as an Arrow table, without copies; units and meanings in the fields' metadata."""
-        import pyarrow
+        return _table(self._arrow)
 
-        with pyarrow.ipc.open_file(pyarrow.BufferReader(self._arrow)) as reader:
-            return reader.read_all()
+    def cycles(self, points: Iterable[int] = ()) -> pyarrow.Table:
+        """The recorded cycles as an Arrow table: session, loop time, forces, ``mu'``, drive, stage, safety.
+
+        ``points``: numbers of passes; none: every cycle, also those between passes (some 200 bytes each in memory).
+        """
+        return _table(_muprime.cycles(self.folder, list(points)))
 
     def polars(self) -> polars.DataFrame:
         """The passes as a polars data frame."""
@@ -51,10 +57,46 @@ class Run:
         frame: pandas.DataFrame = self.arrow().to_pandas()
         return frame
 
+    def to_xarray(self, points: Iterable[int] | None = ()) -> xarray.DataTree:
+        """Passes and cycles as an xarray tree with the groups ``passes`` and ``cycles``; units, meanings and facts as attributes.
+
+        ``points`` as for :meth:`cycles`; ``None``: the passes alone. ``to_netcdf`` of the tree writes one NetCDF file.
+        """
+        import xarray
+
+        groups = {"passes": _dataset(self.arrow(), "pass")}
+        if points is not None:
+            groups["cycles"] = _dataset(self.cycles(points), "cycle")
+        tree = xarray.DataTree.from_dict(groups)
+        tree.attrs = dict(self.facts)
+        return tree
+
     def units(self) -> dict[str, str]:
         """The unit of each column that has one."""
         fields = self.arrow().schema
         return {f.name: f.metadata[b"unit"].decode() for f in fields if f.metadata and b"unit" in f.metadata}
+
+
+def _table(held: bytes) -> pyarrow.Table:
+    import pyarrow
+
+    with pyarrow.ipc.open_file(pyarrow.BufferReader(held)) as reader:
+        return reader.read_all()
+
+
+def _dataset(table: pyarrow.Table, dimension: str) -> xarray.Dataset:
+    """Columns that hold a value somewhere; a number that is missing is NaN, a text that is missing is empty."""
+    import xarray
+
+    held = {}
+    for field, column in zip(table.schema, table.columns, strict=True):
+        about = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+        attributes = {"long_name": about.get("description", field.name), "units": about.get("unit", "")}
+        if column.null_count < len(column):
+            text = str(field.type) == "string"
+            values = column.fill_null("").to_numpy().astype("U") if text else column.to_numpy().astype("f8")
+            held[field.name] = (dimension, values, {k: v for k, v in attributes.items() if v})
+    return xarray.Dataset(held)
 
 
 def load(run: str | os.PathLike[str]) -> Run:

@@ -68,6 +68,7 @@ fn _muprime(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(plans::plan_made, m)?)?;
     m.add_function(wrap_pyfunction!(plans::plan_passes, m)?)?;
     m.add_function(wrap_pyfunction!(runs::load, m)?)?;
+    m.add_function(wrap_pyfunction!(runs::cycles, m)?)?;
     m.add_function(wrap_pyfunction!(runs::run, m)?)?;
     Ok(())
 }

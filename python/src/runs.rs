@@ -23,6 +23,15 @@ pub fn load(py: Python<'_>, folder: PathBuf) -> PyResult<(Py<PyBytes>, String)> 
     Ok((PyBytes::new(py, &bytes).unbind(), about))
 }
 
+/// The cycles of a run's records as an Arrow IPC file; `points`: of these passes alone, of all where it is empty.
+#[pyfunction]
+pub fn cycles(py: Python<'_>, folder: PathBuf, points: Vec<u32>) -> PyResult<Py<PyBytes>> {
+    let bytes = py
+        .detach(|| tables::export::cycles_bytes(&folder, &runs::report::read(&folder)?, &points))
+        .map_err(refused)?;
+    Ok(PyBytes::new(py, &bytes).unbind())
+}
+
 /// A sweep of a plan (its name and its text) on the virtual rig of a setup, in virtual time, into `out`; the summary as JSON.
 #[pyfunction]
 #[pyo3(signature = (plan, text, setup, out, seed, defects, model, operator, sample, licence))]

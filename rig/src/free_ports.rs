@@ -83,7 +83,7 @@ fn opens(instrument: &InstrumentSetup) -> Result<(), Closed> {
         accepted.map(drop).map_err(|e| {
             (
                 format!("nobody accepts there: {e}"),
-                "switch it on, look at cable and address; `--offline` leaves the ports out",
+                "switch it on, check cable and address; `--offline` leaves the ports out",
             )
         })
     };

@@ -8,6 +8,7 @@ mod arrow;
 mod columns;
 mod crate_of_run;
 mod csv;
+mod cycles;
 pub mod facts;
 #[cfg(feature = "matlab")]
 mod hdf5;
@@ -20,7 +21,7 @@ pub mod unit;
 #[cfg(not(feature = "arrow"))]
 mod arrow {
     pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
-        Err(super::absent("arrow"))
+        Err(crate::built_without("arrow", "take CSV"))
     }
 }
 
@@ -28,7 +29,7 @@ mod arrow {
 #[cfg(not(feature = "matlab"))]
 mod hdf5 {
     pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
-        Err(super::absent("matlab"))
+        Err(crate::built_without("matlab", "take CSV"))
     }
 }
 
@@ -36,7 +37,7 @@ mod hdf5 {
 #[cfg(not(feature = "parquet"))]
 mod parquet {
     pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
-        Err(super::absent("parquet"))
+        Err(crate::built_without("parquet", "take CSV"))
     }
 }
 
@@ -75,20 +76,21 @@ impl Format {
     }
 }
 
-#[cfg(not(all(feature = "arrow", feature = "matlab", feature = "parquet")))]
-fn absent(feature: &str) -> miette::Report {
-    miette::miette!(
-        help = "build it with `cargo install --path rig` (the feature is on by default), or take CSV",
-        "this muprime was built without its feature `{feature}`"
-    )
-}
-
 /// The passes of a run as an Arrow IPC file in memory, with units and facts.
 ///
 /// # Errors
 /// Whatever the format's library says; a build without Arrow.
 pub fn arrow_bytes(run: &RunData) -> miette::Result<Vec<u8>> {
     arrow::bytes(&columns::of(&run.passes), &facts::of(run, &facts::Stated::default()))
+}
+
+/// The cycles of a run's records as an Arrow IPC file in memory: session, loop time, and a column for each curve that
+/// [`Format::Mcap`] has, with units and facts. `points`: those passes alone; all where it is empty.
+///
+/// # Errors
+/// A record that cannot be read; a build without Arrow.
+pub fn cycles_bytes(folder: &Path, run: &RunData, points: &[u32]) -> miette::Result<Vec<u8>> {
+    arrow::bytes(&cycles::of(folder, points)?, &facts::of(run, &facts::Stated::default()))
 }
 
 /// Exports the run in `folder` and returns where it stands: `to`, or the format's own name in the folder. A

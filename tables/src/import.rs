@@ -45,10 +45,7 @@ mod mat {
     /// # Errors
     /// Always.
     pub fn read(_: &[u8], _: Option<&str>, _: &[String]) -> miette::Result<super::Grid> {
-        miette::bail!(
-            help = "build it with `cargo install --path rig` (the feature is on by default), or take CSV",
-            "this muprime was built without its feature `matlab`"
-        )
+        Err(crate::built_without("matlab", "take CSV"))
     }
 }
 #[cfg(not(feature = "matlab"))]
@@ -62,10 +59,7 @@ mod workbook {
     /// # Errors
     /// Always.
     pub fn read(_: &[u8], _: Option<&str>) -> miette::Result<super::Grid> {
-        miette::bail!(
-            help = "build it with `cargo install --path rig` (the feature is on by default), or save the sheet as CSV",
-            "this muprime was built without its feature `excel`"
-        )
+        Err(crate::built_without("excel", "save the sheet as CSV"))
     }
 }
 
@@ -479,9 +473,9 @@ fn mostly_dropped(
     } else if 2 * padded > dropped.len() {
         format!("the last {padded} rows are zeros in every column: --accept padding leaves them out")
     } else if grid.format.starts_with("text") {
-        "look at the map and its units; --decimal and --delimiter say how text is read".to_string()
+        "check the map and its units; --decimal and --delimiter say how text is read".to_string()
     } else {
-        "look at the map and its units".to_string()
+        "check the map and its units".to_string()
     };
     miette::miette!(help = help, "{source}: {passes} passes of {rows} rows can be taken\n{}", list.join("\n"))
 }

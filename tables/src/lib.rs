@@ -17,3 +17,26 @@ pub mod import;
 pub mod law;
 pub mod passes;
 pub mod schemas;
+
+/// The answer of a build without a feature. `instead`: what serves in its place.
+pub fn built_without(feature: &str, instead: &str) -> miette::Report {
+    miette::miette!(
+        help =
+            format!("build it with `cargo install --path cli` (the feature is on by default), or {instead}"),
+        "this muprime was built without its feature `{feature}`"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    #[test]
+    fn a_build_without_a_feature_names_the_folder_that_holds_the_command() {
+        let help = super::built_without("mqtt", "leave out --publish").help().expect("a remedy").to_string();
+        let folder = help.split("--path ").nth(1).and_then(|rest| rest.split('`').next()).expect("a folder");
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder).join("Cargo.toml");
+        let manifest = std::fs::read_to_string(manifest).expect("the manifest of a package");
+        assert!(manifest.contains("\nname = \"muprime\"\n"), "{folder} does not build the command");
+    }
+}

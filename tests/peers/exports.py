@@ -221,10 +221,9 @@ def crate():
     requests.adapters.HTTPAdapter.send = send
     document_loader._fetch_json_ld = lambda address: requests.get(address).json()
     settings = ValidationSettings(
-        rocrate_uri=str(RUN), profile_identifier="ro-crate-1.1", requirement_severity=Severity.RECOMMENDED
+        rocrate_uri=str(RUN), profile_identifier="ro-crate-1.3", requirement_severity=Severity.RECOMMENDED
     )
-    result = services.validate(settings)
-    issues = [f"{i.severity.name}: {i.message}" for i in result.get_issues(Severity.RECOMMENDED)]
+    issues = [f"{i.severity.name}: {i.message}" for i in services.validate(settings).get_issues(Severity.RECOMMENDED)]
     read = rocrate.rocrate.ROCrate(RUN)
     files = {e.id: e for e in read.data_entities}
     for name, entity in files.items():
@@ -232,7 +231,7 @@ def crate():
         assert entity["sha256"] == hashlib.sha256(held).hexdigest() and entity["contentSize"] == str(len(held))
     return {
         "issues": issues, "asked": asked, "files": sorted(files), "licence": read.root_dataset["license"].id,
-        "author": read.root_dataset["author"]["name"], "passed": result.passed(Severity.RECOMMENDED),
+        "author": read.root_dataset["author"]["name"], "orcid": read.root_dataset["author"].id,
     }
 
 

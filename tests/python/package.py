@@ -14,6 +14,8 @@ import threading
 import time
 from pathlib import Path
 
+import h5py
+import mcap.reader
 import numpy as np
 import pandas
 import polars
@@ -54,6 +56,26 @@ first = table["lateral_force_n"].chunk(0).buffers()[1].address
 held = pyarrow.py_buffer(run._arrow)
 assert held.address <= first < held.address + held.size, "the column was copied"
 assert run.units()["lateral_force_n"] == "N" and run.polars().height == run.pandas().shape[0] == table.num_rows == 98
+
+# Cycles as the record has them, and a tree that NetCDF holds: read back by another library.
+tree = run.to_xarray()
+assert tree["passes"]["lateral_force_n"].attrs["units"] == "N" and tree.attrs["operator"] == "A. Nother"
+assert np.array_equal(tree["passes"]["lateral_force_n"].values, table["lateral_force_n"].to_numpy())
+cycles = tree["cycles"].to_dataset()
+told("export", str(FOLDER / "here"), "--to", "mcap")
+with open(FOLDER / "here/signals.mcap", "rb") as stream:
+    published = [m for _, c, m in mcap.reader.make_reader(stream).iter_messages(topics=["/force/lateral_force_n"])]
+forces = cycles["lateral_force_n"].values
+assert len(published) == np.count_nonzero(~np.isnan(forces)), (len(published), len(forces))
+assert [json.loads(m.data)["value"] for m in published[:500]] == list(forces[~np.isnan(forces)][:500])
+one = run.cycles(points=[2])
+assert 0 < one.num_rows < len(forces) and set(one["point"].to_pylist()) == {2.0}
+assert (cycles["point"] == 2).sum() == one.num_rows and "cycles" not in run.to_xarray(points=None)
+tree.to_netcdf(FOLDER / "run.nc", engine="h5netcdf")
+with h5py.File(FOLDER / "run.nc") as held_in:
+    assert np.array_equal(held_in["cycles/lateral_force_n"][()], forces, equal_nan=True)
+    assert held_in["passes/speed_m_s"].attrs["units"] == "m/s"
+print(f"cycles: {len(forces)} of {len(cycles)} curves; NetCDF {(FOLDER / 'run.nc').stat().st_size / 1e6:.1f} MB")
 
 # The verdict is the command's, byte for byte: of a run, of a path, and of frames whose text is the table's.
 began = time.perf_counter()

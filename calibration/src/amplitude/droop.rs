@@ -61,7 +61,7 @@ pub fn droop(points: &[AmplitudePoint], exponent: Exponent) -> Result<Droop, Amp
     if let Some(p) = lack_of_fit(points, fit.residuals.as_slice(), 2).filter(|p| *p < 1e-3) {
         return Err(AmplitudeError::LackOfFit {
             p,
-            remedy: "try the other exponent, and look at the drive's limit",
+            remedy: "try the other exponent, and check the drive's limit",
         });
     }
     Ok(Droop {

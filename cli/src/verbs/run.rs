@@ -62,7 +62,7 @@ pub struct Args {
     /// In virtual time: a minute's sweep in a second or so
     #[arg(long)]
     fast: bool,
-    /// Operator's name, for record and report
+    /// Operator: NAME, or NAME with an ORCID's address in angle brackets; for record and report
     #[arg(long, value_name = "NAME")]
     operator: Option<String>,
     /// Code of the person whose finger is measured; exposure is counted for this code on every rig [default: the operator]

@@ -35,13 +35,13 @@ macro_rules! causes {
     };
 }
 
-const FORCE_LINK: &str = "Look at the force sensor's cable and power, and at `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link.";
+const FORCE_LINK: &str = "Check the force sensor's cable and power, and `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link.";
 const FORCE_VALUES: &str =
-    "Look at the force sensor: its values are not forces. `muprime doctor --setup` shows the link.";
+    "Check the force sensor: its values are not forces. `muprime doctor --setup` shows the link.";
 const FORCE_RANGE: &str = "Unload and zero the force sensor, or use one with a larger range.";
 const FORCE_STANDS: &str = "Switch the force sensor off and on: its value stands still. If its noise is below one count, raise `frozen_after`.";
 const FORCE_LOSES: &str =
-    "Look at the force sensor's link: most samples are lost. State the true rate as `rate_hz`.";
+    "Check the force sensor's link: most samples are lost. State the true rate as `rate_hz`.";
 const AMPLITUDE_UP: &str =
     "Look for a resonance, a wrong calibration or another controller; ask for less amplitude.";
 
@@ -53,7 +53,7 @@ causes! {
     DeadMan "the dead-man device was released" => "Release the dead-man device, grip it again, and start the run again.";
     /// Vibration on a human finger lasted too long.
     Exposure "vibration on the finger lasted too long without a rest" => "Take the finger off and rest as long as `exposure_rest_s` says; plan shorter passes.";
-    NormalOverforce "the normal force is above its limit" => "Lift the finger off and look at load, stage and sensor before it is loaded again.";
+    NormalOverforce "the normal force is above its limit" => "Lift the finger off and check load, stage and sensor before it is loaded again.";
     LateralOverforce "the lateral force is above its limit" => "Look for what holds the finger or the plate; ask for a smaller load.";
     ForceRate "the normal force changes too fast" => "Look for a blow or a loose sensor; load more slowly.";
     /// A lateral sample is older than its age limit, or there is none.
@@ -69,24 +69,24 @@ causes! {
     LateralFrozen "the lateral force sensor repeats one value" => FORCE_STANDS;
     NormalFrozen "the normal force sensor repeats one value" => FORCE_STANDS;
     /// Five spikes within fifty cycles on either force.
-    Noisy "too many spikes in a force" => "Look at the force sensor's cable, shield and ground; keep it away from the drive's cable.";
+    Noisy "too many spikes in a force" => "Check the force sensor's cable, shield and ground; keep it away from the drive's cable.";
     /// The amplifier's state is older than its age limit, or there is none.
-    AmplifierStale "the amplifier's state is too old" => "Look at the amplifier's cable and power, and at `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link.";
+    AmplifierStale "the amplifier's state is too old" => "Check the amplifier's cable and power, and `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link.";
     AmplifierFault "the amplifier reports a fault" => "Read the fault on the amplifier, remove its cause and reset it there.";
     /// The amplifier's own watchdog has switched it off while it was to be on.
-    AmplifierWatchdog "the amplifier's watchdog switched it off" => "The amplifier heard nothing for longer than its watchdog waits: look at its link and at what else runs on this machine.";
+    AmplifierWatchdog "the amplifier's watchdog switched it off" => "No command reached the amplifier within its watchdog's time: check its link, and what else runs on this machine.";
     OverAmplitude "the measured amplitude is above its limit" => AMPLITUDE_UP;
     AmplitudeRunaway "the measured amplitude is above the commanded one" => AMPLITUDE_UP;
     AmplitudeRate "the measured amplitude rises too fast" => "Look for a resonance or another controller; ask for smaller steps of amplitude.";
-    DriveNoResponse "the plate does not respond to the drive" => "Look at the plate's cable, at the amplitude's sensor and at the drive frequency: the plate is driven and does not vibrate.";
+    DriveNoResponse "the plate does not respond to the drive" => "Check the plate's cable, the amplitude's sensor and the drive frequency: the plate is driven and does not vibrate.";
     EchoMismatch "the amplifier echoes another set-point than it was given" => "Find who else writes to the amplifier, and end it; if nobody does, the amplifier does not take its set-points.";
-    RefusesOff "the amplifier stays on after 'off'" => "Switch the amplifier's supply off by hand; use the amplifier no more until it has been repaired.";
+    RefusesOff "the amplifier stays on after 'off'" => "Switch the amplifier's supply off by hand; do not use the amplifier until it has been repaired.";
     /// Too hot, or the temperature is not known where it must be.
-    OverTemperature "too hot, or the temperature is unknown" => "Let the plate and the amplifier cool; with no temperature shown, look at its sensor.";
+    OverTemperature "too hot, or the temperature is unknown" => "Let the plate and the amplifier cool; with no temperature shown, check its sensor.";
     /// The stage's state is older than its age limit, or there is none.
-    StageStale "the stage's state is too old" => "Look at the stage's cable and power, and at `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link.";
+    StageStale "the stage's state is too old" => "Check the stage's cable and power, and `rate_hz` and `link_stall_s`; `muprime doctor --setup` shows the link.";
     StageFault "the stage reports a fault" => "Read the fault on the stage, remove its cause and reset it there.";
-    OverTravel "the stage is outside its travel" => "Move the stage back between its ends by hand; look at `travel_min_m` and `travel_max_m`.";
+    OverTravel "the stage is outside its travel" => "Move the stage back between its ends by hand; check `travel_min_m` and `travel_max_m`.";
     /// The loop missed too many deadlines in a row, or of a thousand.
     Overrun "the loop missed too many deadlines" => "End what else runs on this machine and give the loop its rights: `muprime doctor` says which.";
     RequestRefused "a request is beyond the limits" => "Ask for what the limits of the setup allow: `muprime check` shows the value and its place in the plan.";
@@ -97,11 +97,11 @@ causes! {
     LateralLossy "the lateral force channel loses most of its samples" => FORCE_LOSES;
     NormalLossy "the normal force channel loses most of its samples" => FORCE_LOSES;
     /// The emergency stop is pressed, or nothing is known of it.
-    EmergencyStop "the emergency stop is pressed, or its contact is not heard" => "Make the rig safe, release the emergency stop and start the run again; if it was not pressed, look at its wire and its input.";
+    EmergencyStop "the emergency stop is pressed, or its contact does not answer" => "Make the rig safe, release the emergency stop and start the run again; if it was not pressed, check its wire and its input.";
     /// The guard is open, or nothing is known of it.
-    Interlock "the guard is open, or its contact is not heard" => "Close the guard and start the run again; if it was closed, look at its wire and its input.";
+    Interlock "the guard is open, or its contact does not answer" => "Close the guard and start the run again; if it was closed, check its wire and its input.";
     /// The second switch-off channel does not follow its command, or nothing is known of it.
-    SupplySwitch "the supply relay does not do what it is commanded" => "Look at the relay in the supply, its mirror contact and their wires: it does not follow its commands.";
+    SupplySwitch "the supply relay does not do what it is commanded" => "Check the relay in the supply, its mirror contact and their wires: it does not follow its commands.";
     /// What must be there to switch off is not fitted: 1 a second channel beside an amplifier without
     /// watchdog; with a human finger 2 a second channel, 3 an emergency stop, 4 a dead-man device.
     Unguarded "a guard that this rig needs is missing" => "Fit what is missing and state it in the setup: [supply_relay], [safety_inputs].";
@@ -109,9 +109,9 @@ causes! {
     ExposureDose "the vibration of the last hour was too strong for the finger" => "Remove the finger: the hourly dose of vibration is reached. Resume after a rest, with less amplitude.";
     AmplitudeSaturated "the amplitude sensor is at the end of its range" => "Ask for less amplitude, or set a larger range of the amplitude's sensor.";
     /// The amplitude's channel repeats itself while the plate is driven.
-    AmplitudeFrozen "the amplitude sensor repeats one value" => "Look at the amplitude's sensor: its value stands still. If its noise is below one count, raise `amplitude_frozen_after`.";
+    AmplitudeFrozen "the amplitude sensor repeats one value" => "Check the amplitude's sensor: its value stands still. If its noise is below one count, raise `amplitude_frozen_after`.";
     /// The normal force is not that of the load that the stage was commanded to apply, or to lift off.
-    LoadImplausible "the normal force is not the commanded load" => "Look at the loading axis and zero the force sensor: the normal force is not the requested load.";
+    LoadImplausible "the normal force is not the commanded load" => "Check the loading axis and zero the force sensor: the normal force is not the requested load.";
 }
 
 impl Cause {

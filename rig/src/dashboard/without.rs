@@ -15,10 +15,7 @@ impl Dashboard {
     /// # Errors
     /// Always.
     pub fn start(_: Options) -> miette::Result<Self> {
-        miette::bail!(
-            help = "build it with `cargo install --path rig` (the feature is on by default), or use `muprime watch`",
-            "this muprime was built without its feature `dashboard`"
-        )
+        Err(tables::built_without("dashboard", "use `muprime watch`"))
     }
 
     /// Nowhere.

@@ -73,8 +73,8 @@ const OFF_AMPLITUDE_PP_M: f64 = 0.3e-6;
 /// A problem and what to do about it.
 type Problem = (String, &'static str);
 
-const LINK: &str = "look at cable and power, and at what else talks on this line";
-const UNIT: &str = "look at unit, factor, type and byte order of the signal in its profile, and at `gain`";
+const LINK: &str = "check cable and power, and what else talks on this line";
+const UNIT: &str = "check unit, factor, type and byte order of the signal in its profile, and `gain`";
 
 /// Judges what was found: one finding an instrument, one of the sweep, one of the plan.
 pub fn judge(look: &Look, target: &Target<'_>) -> Vec<Finding> {
@@ -193,7 +193,7 @@ fn timely(c: &ChannelReport, problems: &mut Vec<Problem>) {
             format!("{name}: {:.0} % of the looks found no valid sample ({why})", c.invalid_share * 1e2);
         let advice = match c.missing {
             Some(NoData::Invalid | NoData::Corrupt) | None => {
-                "the instrument sends what is not a number, or says itself that it is not valid: look at its status, and at type and byte order in its profile"
+                "the instrument sends what is not a number, or says itself that it is not valid: check its status, and type and byte order in its profile"
             }
             _ => LINK,
         };
@@ -273,7 +273,7 @@ fn force(c: &ChannelReport, target: &Target<'_>, problems: &mut Vec<Problem>) {
             format!("{name}: its noise is {:.1} mN, and {:.1} mN are stated", noise * 1e3, stated * 1e3);
         problems.push((
             problem,
-            "look at cable, shield and ground, at the unit in its profile, and that nothing moves",
+            "check cable, shield and ground, the unit in its profile, and that nothing moves",
         ));
     }
 }
@@ -317,7 +317,7 @@ fn amplifier(
         && w.value.abs() > OFF_AMPLITUDE_PP_M
     {
         let problem = format!("it is off, and its plate is read at {} peak-to-peak", quantity(w.value, "m"));
-        problems.push((problem, "look at the amplitude's zero, unit and `measured_m_per_unit`"));
+        problems.push((problem, "check the amplitude's zero, unit and `measured_m_per_unit`"));
     }
     format!(
         "output {}, set to {} peak-to-peak at {}",
@@ -338,10 +338,10 @@ fn stage(state: Result<StageState, NoData>, setup: &Setup, problems: &mut Vec<Pr
     }
     if !(s.position_m >= left && s.position_m <= right) || s.at_limit {
         let problem = format!("outside its travel, {left} to {right} m");
-        problems.push((problem, "move it between its ends by hand; look at `travel_min_m`, `travel_max_m` and at the unit of its position"));
+        problems.push((problem, "move it between its ends by hand; check `travel_min_m`, `travel_max_m` and the unit of its position"));
     }
     if s.velocity_m_s.is_nan() || s.velocity_m_s.abs() > AT_REST_M_S {
-        problems.push(("it moves at rest".into(), "find who moves it; look at the unit of its velocity"));
+        problems.push(("it moves at rest".into(), "find who moves it; check the unit of its velocity"));
     }
     format!("at {}, {}", quantity(s.position_m, "m"), quantity(s.velocity_m_s, "m/s"))
 }
@@ -354,7 +354,7 @@ fn contacts(look: &Look, states: &mut Vec<String>, problems: &mut Vec<Problem>) 
         Ok(contact) => {
             states.push(format!("{name} {}", if contact.closed { "closed" } else { "open" }));
             if needed && !contact.closed {
-                let advice = "release the emergency stop and close the guard; else look at wire and input";
+                let advice = "release the emergency stop and close the guard; else check wire and input";
                 problems.push((format!("{name} is open: nothing is armed so"), advice));
             }
         }
@@ -410,7 +410,7 @@ fn planned(look: &Look, setup: &Setup, plan: &Plan, mended: bool) -> Finding {
     if let Some(rest) = channel("normal").and_then(|c| c.mean).filter(loaded) {
         let found =
             format!("{rest:+.3} N stand on the normal axis at rest, and its smallest load is {least} N");
-        let advice = "lift the finger off and zero the sensor; look at sign, unit and factor of its signal";
+        let advice = "lift the finger off and zero the sensor; check sign, unit and factor of its signal";
         return Finding::new(subject, false, found, advice);
     }
     let found = if mended { "" } else { ", once the problems above are solved" };

@@ -12,10 +12,7 @@ impl Publisher {
     /// # Errors
     /// Always.
     pub fn start(_: &Broker) -> miette::Result<Self> {
-        miette::bail!(
-            help = "build it with `cargo install --path rig` (the feature is on by default), or leave out --publish",
-            "this muprime was built without its feature `mqtt`"
-        )
+        Err(tables::built_without("mqtt", "leave out --publish"))
     }
 
     /// Nothing.

@@ -103,7 +103,7 @@ fn end_of(folder: &Path) -> Ended {
         Some(summary) => Ended::of(&Ok(summary)),
         None => {
             let error = "it has no summary: its process ended without one".to_string();
-            let off = Some("nobody has seen whether the drive is off: look at the amplifier".into());
+            let off = Some("nobody has seen whether the drive is off: check the amplifier".into());
             Ended { outcome: None, remedy: None, error: Some(error), off, agreement: None }
         }
     }

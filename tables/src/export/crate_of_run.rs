@@ -1,18 +1,19 @@
 //! The run's folder described as a Research Object Crate: `ro-crate-metadata.json` beside its files, by which
-//! repositories and search engines read what it holds (RO-Crate 1.1, <https://w3id.org/ro/crate/1.1>). Every
+//! repositories and search engines read what it holds (RO-Crate 1.3, <https://w3id.org/ro/crate/1.3>). Every
 //! file is listed with its size, its SHA-256 and what it is.
 
 use super::facts::Facts;
-use calibration::certificate::sha256_hex;
+use calibration::certificate::{date, sha256_hex};
 use miette::{Context, IntoDiagnostic};
 use runs::report::RunData;
+use runs::sequence::Outcome;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Name of the description, which the format prescribes.
 pub const FILE: &str = "ro-crate-metadata.json";
-const CONTEXT: &str = "https://w3id.org/ro/crate/1.1/context";
-const CONFORMS: &str = "https://w3id.org/ro/crate/1.1";
+const CONTEXT: &str = "https://w3id.org/ro/crate/1.3/context";
+const CONFORMS: &str = "https://w3id.org/ro/crate/1.3";
 
 /// The description, for `place`, which must be [`FILE`] in the run's `folder`.
 ///
@@ -33,7 +34,7 @@ pub fn bytes(folder: &Path, run: &RunData, facts: &Facts, place: &Path) -> miett
             "an RO-Crate says under which licence its data are, and the run does not state one"
         );
     };
-    let Some(date) = facts.get("date").filter(|date| date.starts_with(|c: char| c.is_ascii_digit())) else {
+    let Some(began) = facts.get("date").filter(|date| date.starts_with(|c: char| c.is_ascii_digit())) else {
         miette::bail!("the folder does not say when the run began: {} has no sessions", folder.display());
     };
     let address = address_of(licence);
@@ -43,26 +44,39 @@ pub fn bytes(folder: &Path, run: &RunData, facts: &Facts, place: &Path) -> miett
     let mut root = json!({
         "@id": "./",
         "@type": "Dataset",
-        "name": format!("Friction sweep '{plan}' of {date}"),
+        "name": format!("Friction sweep '{plan}' of {began}"),
         "description": description(run, facts),
-        "datePublished": date,
+        "datePublished": began,
         "license": { "@id": address },
         "hasPart": ids,
         "mentions": { "@id": "#run" },
         "keywords": "friction, ultrasonic lubrication, tribology, haptics",
         "additionalProperty": facts.keys().map(|name| json!({ "@id": id_of(name) })).collect::<Vec<_>>(),
     });
+    // RO-Crate 1.3 wants an address of a SoftwareApplication: the project has none yet (packaging/home).
     let muprime = json!({
-        "@id": "#muprime", "@type": "SoftwareApplication", "name": "muprime",
-        "softwareVersion": facts.get("muprime_version"),
+        "@id": "#muprime", "@type": "Product", "name": "muprime", "version": facts.get("muprime_version"),
     });
     let mut action = json!({
         "@id": "#run", "@type": "CreateAction", "name": format!("Run of '{plan}'"),
-        "startTime": date, "instrument": { "@id": "#muprime" }, "result": ids,
+        "description": description(run, facts), "startTime": began,
+        "instrument": { "@id": "#muprime" }, "result": ids,
     });
+    if let Some(ended) = ended(run).filter(|ended| ended.as_str() >= began.as_str()) {
+        action["endTime"] = json!(ended);
+    }
+    // A run that was stopped neither failed nor is complete: the vocabulary has no word for it.
+    let status = run.summary.as_ref().and_then(|summary| match summary.outcome {
+        Outcome::Complete => Some("Completed"),
+        Outcome::Stopped => None,
+        _ => Some("Failed"),
+    });
+    if let Some(status) = status {
+        action["actionStatus"] = json!(format!("http://schema.org/{status}ActionStatus"));
+    }
     let mut graph = Vec::new();
     if let Some(organisation) = facts.get("organisation") {
-        let (id, name) = organisation_of(organisation);
+        let (id, name) = addressed(organisation, "#organisation");
         let mut whole = json!({ "@id": id, "@type": "Organization", "name": name });
         if id.contains("://") {
             whole["url"] = json!(id);
@@ -71,34 +85,42 @@ pub fn bytes(folder: &Path, run: &RunData, facts: &Facts, place: &Path) -> miett
         root["publisher"] = json!({ "@id": id });
     }
     if let Some(operator) = facts.get("operator") {
-        let mut person = json!({ "@id": "#operator", "@type": "Person", "name": operator });
+        let (id, name) = addressed(operator, "#operator");
+        let mut person = json!({ "@id": id, "@type": "Person", "name": name });
         if let Some(organisation) = facts.get("organisation") {
-            person["affiliation"] = json!({ "@id": organisation_of(organisation).0 });
+            person["affiliation"] = json!({ "@id": addressed(organisation, "#organisation").0 });
         }
         graph.push(person);
-        root["author"] = json!({ "@id": "#operator" });
-        action["agent"] = json!({ "@id": "#operator" });
+        root["author"] = json!({ "@id": id });
+        action["agent"] = json!({ "@id": id });
     }
     graph.extend(facts.iter().map(
         |(name, value)| json!({ "@id": id_of(name), "@type": "PropertyValue", "name": name, "value": value }),
     ));
-    graph.push(json!({ "@id": address, "@type": "CreativeWork", "name": licence }));
+    let about = format!("The licence of the data, {licence}");
+    graph.push(json!({ "@id": address, "@type": "CreativeWork", "name": licence, "description": about }));
     graph.extend([muprime, action]);
     let descriptor = json!({
         "@id": FILE, "@type": "CreativeWork",
         "conformsTo": { "@id": CONFORMS }, "about": { "@id": "./" },
     });
     let whole: Vec<Value> = [descriptor, root].into_iter().chain(files).chain(graph).collect();
-    // The vocabulary of RO-Crate 1.1 is older than schema.org's word for the checksum.
-    let context = json!([CONTEXT, { "sha256": "https://schema.org/sha256" }]);
-    serde_json::to_vec_pretty(&json!({ "@context": context, "@graph": whole })).into_diagnostic()
+    serde_json::to_vec_pretty(&json!({ "@context": CONTEXT, "@graph": whole })).into_diagnostic()
 }
 
-/// Address and name of an organisation that is stated as `NAME` or `NAME <ADDRESS>`.
-fn organisation_of(stated: &str) -> (&str, &str) {
+/// When the last event of the record was; in virtual time by the clock of the virtual rig, which begins in 2000.
+fn ended(run: &RunData) -> Option<String> {
+    let start_s = run.facts.get("start_unix_ns")?.parse::<i64>().ok()? / 1_000_000_000;
+    let (last_s, _) = run.events.last()?;
+    Some(date::format(start_s + *last_s as i64))
+}
+
+/// Address and name of a person or an organisation that is stated as `NAME` or `NAME <ADDRESS>`; of one without an
+/// address its name within the crate.
+fn addressed<'a>(stated: &'a str, within: &'a str) -> (&'a str, &'a str) {
     match stated.strip_suffix('>').and_then(|rest| rest.split_once('<')) {
         Some((name, address)) => (address.trim(), name.trim()),
-        None => ("#organisation", stated),
+        None => (within, stated),
     }
 }
 

@@ -6,7 +6,7 @@
 //! `/pass/COLUMN` one a pass, for every column of the point table and of the comparison that holds numbers; `/event` holds the
 //! events as they are in the record. The record itself keeps everything that a cycle saw, nested: it is what a replay reads.
 
-mod signals;
+pub(super) mod signals;
 
 use super::columns::{self, Cells, Column};
 use super::facts::Facts;

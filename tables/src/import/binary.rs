@@ -125,10 +125,7 @@ pub fn arrow(bytes: &[u8]) -> miette::Result<Grid> {
 /// Always.
 #[cfg(not(feature = "arrow"))]
 pub fn arrow(_: &[u8]) -> miette::Result<Grid> {
-    miette::bail!(
-        help = "build it with `cargo install --path rig` (the feature is on by default), or take CSV",
-        "this muprime was built without its feature `arrow`"
-    )
+    Err(crate::built_without("arrow", "take CSV"))
 }
 
 /// Refuses: built without Parquet.
@@ -137,10 +134,7 @@ pub fn arrow(_: &[u8]) -> miette::Result<Grid> {
 /// Always.
 #[cfg(not(feature = "parquet"))]
 pub fn parquet(_: &std::path::Path) -> miette::Result<Grid> {
-    miette::bail!(
-        help = "build it with `cargo install --path rig` (the feature is on by default), or take CSV",
-        "this muprime was built without its feature `parquet`"
-    )
+    Err(crate::built_without("parquet", "take CSV"))
 }
 
 /// A NumPy array: two-dimensional, or of records with named fields (numpy/lib/format.py, versions 1 to 3).

@@ -201,7 +201,7 @@ pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
             return Ok(ExitCode::SUCCESS);
         }
         out!(
-            "{:<28} {:>8} {:>8} {:>16} {:>7} {:>9} {:>8}",
+            "{:<25} {:>7} {:>7} {:>14} {:>5} {:>8} {:>6}",
             "",
             "k_l/k_n",
             "at 3 F",
@@ -211,14 +211,14 @@ pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
             "Eq. 16"
         );
         for r in rows {
-            let number = |v: Option<f64>| v.map_or("none".into(), |v| format!("{v:.3}"));
+            let number = |v: Option<f64>| v.map_or("none".into(), |v| format!("{v:.2}"));
             out!(
-                "{:<28} {:>8.3} {:>8.3} {:>16} {:>7} {:>9} {:>8}",
+                "{:<25} {:>7.3} {:>7.3} {:>14} {:>5} {:>8} {:>6}",
                 r.what,
                 r.lateral_over_normal,
                 r.lateral_over_normal_at_3_loads,
                 format!("{} +- {}", number(r.psi_star), number(r.psi_star_sd)),
-                number(r.rmse),
+                r.rmse.map_or("none".into(), |v| format!("{v:.3}")),
                 number(r.slider_psi_star),
                 number(r.psi_star_eq16)
             );
@@ -234,35 +234,37 @@ pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let nu = args.poisson_ratio;
+    out!("Closed forms of k_l/k_n at Poisson's ratio {nu}:");
+    for (of, ratio) in [
+        ("wide slab bonded at its base", (1.0 - 2.0 * nu) / (2.0 * (1.0 - nu))),
+        ("G/E", 0.5 / (1.0 + nu)),
+        ("circle on a half space (Mindlin)", 2.0 * (1.0 - nu) / (2.0 - nu)),
+        ("Eq. 17", 1.0 / (1.0 + nu)),
+    ] {
+        out!("  {of:<32} {ratio:.3}");
+    }
+    out!("\nBy finite elements; stiffnesses of the whole finger in MN/m, load in multiples of the mean:");
     out!(
-        "closed forms of k_l/k_n at nu {nu}: wide slab bonded at its base {:.3}, G/E {:.3}, Mindlin's circle on a half space {:.3}; Eq. 17 has {:.3}",
-        (1.0 - 2.0 * nu) / (2.0 * (1.0 - nu)),
-        0.5 / (1.0 + nu),
-        2.0 * (1.0 - nu) / (2.0 - nu),
-        1.0 / (1.0 + nu)
-    );
-    out!(
-        "{:<28} {:<13} {:>5} {:>9} {:>11} {:>11} {:>11} {:>8}",
+        "{:<25} {:<7} {:>4} {:>8} {:>7} {:>7} {:>7} {:>8}",
         "",
         "held at",
         "load",
         "width \u{b5}m",
-        "k_n MN/m",
+        "k_n",
         "secant",
-        "k_l MN/m",
+        "k_l",
         "k_l/k_n"
     );
     for r in &rows {
         let finger = 1e-6 * r.finger_per_ridge_m;
         let held = match r.held_at {
-            HeldAt::CorneumBase => "corneum base",
-            HeldAt::DermisBase => "dermis base",
+            HeldAt::CorneumBase => "corneum",
+            HeldAt::DermisBase => "dermis",
             HeldAt::Top => "top",
         };
         out!(
-            "{:<28} {:<13} {:>5} {:>9.2} {:>11.4} {:>11.4} {:>11.4} {:>8.3}",
+            "{:<25} {held:<7} {:>4} {:>8.1} {:>7.3} {:>7.3} {:>7.3} {:>8.3}",
             r.what,
-            held,
             r.load_over_mean,
             1e6 * r.found.contact_width_m,
             finger * r.found.normal_pa,

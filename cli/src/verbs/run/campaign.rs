@@ -100,6 +100,11 @@ pub fn write(folder: &Path) -> miette::Result<(Vec<Claim>, usize, usize)> {
 /// The answers for a person.
 pub fn tell(claims: &[Claim], made: usize, planned: usize, folder: &Path) {
     say!("{made} of {planned} sessions are complete");
+    if claims.iter().any(|claim| claim.effect.is_some()) {
+        say!(
+            "the paper's statements; in brackets the change of mu' between the ends of a range, with its 95 % interval:"
+        );
+    }
     for claim in claims {
         let change = claim.effect.map_or_else(
             || claim.of.clone(),
