@@ -9,7 +9,7 @@ use studies::cases::crash_points::{STEPS, VARIABLE};
 use studies::cases::kinds::Cell;
 use studies::cases::shard::{Reader, Writer};
 use studies::cases::study::Study;
-use tests::study::{gathered, here, noop, refusal, ridge_cases, run, said, text, worker};
+use tests::study::{gathered, here, noop, refusal, ridge_cases, run, said, submitted, text, worker};
 use tests::waiting::pause;
 use tests::{muprime, rounds, texts};
 
@@ -23,7 +23,7 @@ fn a_worker_that_is_killed_at_any_step_leaves_nothing_torn_and_is_run_again() {
         let killed = run(worker(&cases, &out, "0..40").env(VARIABLE, step));
         assert_eq!(killed.status.code(), None, "{step}: {:?}", texts(&killed));
         // What is there by then is whole, or nothing is.
-        let there = out.join("shards/000000000000-000000000040.parquet").exists();
+        let there = out.join("shards/0000/000000000000-000000000040.parquet").exists();
         assert_eq!(there, matches!(step, "moved" | "folder-synced"), "{step}");
         if there {
             assert_eq!(gathered(&out), wanted, "{step}");
@@ -92,6 +92,31 @@ fn the_bytes_know_no_engine_no_order_no_ranges_and_no_threads() {
         assert_eq!(whole["sha256"], wanted, "{}", cases.display());
         assert_eq!((&whole["shards"], &whole["agreeing_duplicates"]), (&4.into(), &1.into()));
     }
+}
+
+#[test]
+fn folders_of_shards_stay_small_and_the_former_layout_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    for (cases, step) in [(2_500, 1), (100_000_000, 400)] {
+        let study =
+            Study::begin(&noop(folder.path(), cases, 0), &folder.path().join(cases.to_string())).unwrap();
+        let mut count = std::collections::BTreeMap::new();
+        for start in (0..cases).step_by(step as usize) {
+            let place = study.shard(&(start..start + step));
+            *count.entry(place.parent().unwrap().to_path_buf()).or_insert(0) += 1;
+        }
+        assert!(count.len() <= 1000 && count.values().all(|n| *n <= 1000), "{} folders", count.len());
+    }
+    let (cases, out) = (noop(folder.path(), 40, 0), folder.path().join("former"));
+    let wanted = here(&cases, &out);
+    let within = out.join("shards/0000");
+    for entry in std::fs::read_dir(&within).unwrap().map(Result::unwrap) {
+        std::fs::rename(entry.path(), out.join("shards").join(entry.file_name())).unwrap();
+    }
+    std::fs::remove_dir(&within).unwrap();
+    assert_eq!(gathered(&out), wanted);
+    let again = submitted(&cases, &out, &[]);
+    assert_eq!((&again["there"], &again["tasks"]), (&40.into(), &0.into()));
 }
 
 #[test]
@@ -226,7 +251,7 @@ fn a_surrogate_grows_in_rounds_until_held_out_cases_are_met() {
     );
     // The same command goes on from what is there: it runs no case, and comes to the same bytes.
     let surrogate = out.join("surrogate.json");
-    let (kept, shards) = (std::fs::read(&surrogate).unwrap(), out.join("round-000/shards"));
+    let (kept, shards) = (std::fs::read(&surrogate).unwrap(), out.join("round-000/shards/0000"));
     let made = || {
         std::fs::read_dir(&shards).unwrap().map(|e| e.unwrap().metadata().unwrap().modified().unwrap()).max()
     };

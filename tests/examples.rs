@@ -26,7 +26,7 @@ fn run(arguments: &[&str]) {
 #[test]
 fn every_file_is_good() {
     let page = std::fs::read_to_string(file("examples/README.md")).unwrap();
-    for name in ["", "plans", "setups", "profiles"].into_iter().flat_map(of) {
+    for name in ["", "plans", "setups", "profiles", "studies"].into_iter().flat_map(of) {
         assert!(
             name == "README.md" || page.contains(&format!("]({name})")),
             "examples/README.md lacks {name}"

@@ -15,6 +15,7 @@ from .laws import Finger, Law, models, psi, ridge, spring_slider, surrogate
 from .own_law import LawTable, tabulate
 from .plans import Plan
 from .runs import Run, load, run
+from .studies import Gathered, Study, study
 from .verdict import Hypothesis, Parameter, Region, Verdict, diagnose
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "CertifiedParameter",
     "Estimate",
     "Finger",
+    "Gathered",
     "Hypothesis",
     "Law",
     "LawTable",
@@ -31,6 +33,7 @@ __all__ = [
     "Region",
     "Run",
     "Skin",
+    "Study",
     "Verdict",
     "__version__",
     "calibrate",
@@ -43,6 +46,7 @@ __all__ = [
     "ridge",
     "run",
     "spring_slider",
+    "study",
     "surrogate",
     "tabulate",
 ]

@@ -17,7 +17,6 @@ from __future__ import annotations
 import asyncio
 import json
 import os
-import shutil
 import signal
 import time
 from collections.abc import AsyncIterator
@@ -30,6 +29,8 @@ from bluesky.protocols import Reading
 from bluesky.utils import MsgGenerator
 from event_model import DataKey, PartialEvent
 from ophyd_async.core import AsyncStatus, Device
+
+from ._binary import binary
 
 COLUMNS: dict[str, tuple[str, str, str]] = {
     "point": ("integer", "", "number of the pass in the plan"),
@@ -96,13 +97,11 @@ class Sweep(Device):
         """Starts the run; done at its first word. What it refuses fails here, with nothing touched."""
         if self._process is not None and self._process.returncode is None:
             raise SweepError("the sweep is still going on")
-        binary = os.environ.get("MUPRIME_BINARY") or shutil.which("muprime")
-        if binary is None:
-            raise FileNotFoundError("no muprime on the path: install it, or name it in MUPRIME_BINARY")
+        command = binary()
         self.summary, self._error, self._passes, self._stopped = None, None, [], False
         # A session of its own: Ctrl-C goes to the engine, which says what becomes of the run.
         self._process = await asyncio.create_subprocess_exec(
-            binary,
+            command,
             *self.words,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,

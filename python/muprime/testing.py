@@ -12,8 +12,6 @@ Each call starts a ``muprime virtual-rig`` of its own on a free port of loopback
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator
@@ -23,6 +21,8 @@ from typing import Protocol
 
 import pytest
 
+from ._binary import binary
+
 
 class VirtualRig:
     """A running virtual rig; it ends with :meth:`close` or at the end of a ``with``."""
@@ -31,10 +31,7 @@ class VirtualRig:
     """Host and port of its Modbus TCP server."""
 
     def __init__(self, seed: int = 1, defects: str | None = None, setup: str = "virtual-ideal") -> None:
-        binary = os.environ.get("MUPRIME_BINARY") or shutil.which("muprime")
-        if binary is None:
-            raise FileNotFoundError("no muprime on the path: install it, or name it in MUPRIME_BINARY")
-        command = [binary, "--json", "virtual-rig", "--setup", setup, "--modbus-tcp", "127.0.0.1:0", "--seed", str(seed)]
+        command = [binary(), "--json", "virtual-rig", "--setup", setup, "--modbus-tcp", "127.0.0.1:0", "--seed", str(seed)]
         self._folder = tempfile.TemporaryDirectory(prefix="muprime-")
         if defects is not None:
             path = Path(self._folder.name) / "defects.toml"

@@ -9,7 +9,8 @@
 //! | [`worker`] | runs a range of cases: skipped where it is there, else temporary file, fsync, rename, fsync of the folder |
 //! | [`shard`] | the one format of results: Parquet with its schema and its provenance |
 //! | [`gather`] | all shards as one table, the same bytes whoever ran them; refuses holes, contradictions, mixed versions |
-//! | [`plan`] | what is missing, measured and cut into ranges |
+//! | [`plan`] | what is missing, measured and cut into ranges; how much memory a task needs |
+//! | [`share`] | the part of one task of an engine that knows nothing of cases |
 //! | [`submit`] | hands ranges to an engine, follows what comes into the folder, goes on, cancels |
 //! | [`engines`] | one file an engine |
 //! | [`adaptive`] | a surrogate whose nodes are chosen where the error is |
@@ -23,6 +24,7 @@ pub mod gather;
 pub mod kinds;
 pub mod plan;
 pub mod shard;
+pub mod share;
 pub mod study;
 pub mod submit;
 pub mod worker;

@@ -1,5 +1,9 @@
 //! Studies of many cases: clocks that are wrong, a disk that is full, and the same bytes from this machine, from a real Slurm, a real HyperQueue and a real Dask.
 
+#[path = "slurm.rs"]
+mod slurm;
+
+use slurm::{Slurm, kill};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -134,42 +138,6 @@ fn hyperqueue_and_dask_gather_the_bytes_of_this_machine() {
     }
 }
 
-/// A Slurm in a folder, ended with its tests.
-struct Slurm(PathBuf);
-
-impl Slurm {
-    fn asked(&self, verb: &str, more: &[&str]) {
-        let done = run(Command::new(file("tests/studies/slurm")).args([verb, text(&self.0)]).args(more));
-        assert!(done.status.success(), "{verb}: {:?}", texts(&done));
-    }
-
-    /// Kills a daemon by the number in its file, and waits until it is gone.
-    fn kill(&self, daemon: &str) {
-        let number = std::fs::read_to_string(self.0.join(format!("{daemon}.pid"))).unwrap();
-        kill(number.trim().parse().unwrap());
-    }
-}
-
-impl Drop for Slurm {
-    fn drop(&mut self) {
-        let _ = run(Command::new(file("tests/studies/slurm")).args(["stop", text(&self.0)]));
-    }
-}
-
-fn kill(pid: i32) {
-    // SAFETY: kill() takes two numbers and touches no memory of ours.
-    unsafe { libc::kill(pid, libc::SIGKILL) };
-    let begun = Instant::now();
-    let gone = || {
-        let state = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-        state.is_empty() || state.rsplit(')').next().is_some_and(|s| s.trim().starts_with('Z'))
-    };
-    while !gone() {
-        assert!(begun.elapsed() < Duration::from_secs(20), "{pid} does not die");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
-
 /// Processes whose command or environment names the folder: those of a node that goes down with it.
 fn processes_of(folder: &Path, words: &[&str]) -> Vec<i32> {
     let named = |pid: &i32| {
@@ -193,10 +161,7 @@ fn submit_goes_on(out: &Path) -> bool {
 fn slurm_gathers_the_bytes_of_this_machine_though_controller_and_node_die() {
     let folder = tempfile::tempdir().unwrap();
     let studies = studies(folder.path());
-    let slurm = Slurm(folder.path().join("slurm"));
-    std::fs::create_dir(&slurm.0).unwrap();
-    let port = 20_000 + std::process::id() % 20_000;
-    slurm.asked("start", &[&port.to_string()]);
+    let slurm = Slurm::start(folder.path());
     let conf = slurm.0.join("slurm.conf");
     for (n, (cases, wanted)) in studies.iter().enumerate() {
         let out = folder.path().join(format!("slurm-{n}"));
@@ -218,7 +183,7 @@ fn slurm_gathers_the_bytes_of_this_machine_though_controller_and_node_die() {
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
-        let shards = || std::fs::read_dir(out.join("shards")).map_or(0, Iterator::count);
+        let shards = || std::fs::read_dir(out.join("shards/0000")).map_or(0, Iterator::count);
         let wait = |more: usize| {
             let until = shards() + more;
             while shards() < until && submit_goes_on(&out) && begun.elapsed() < Duration::from_secs(60) {

@@ -120,6 +120,18 @@ fn the_package_says_what_the_command_says() {
     println!("{out}");
     assert!(ecosystem.status.success() && out.ends_with("ok\n"), "{out}{err}");
 
+    // A study by executors of Python.
+    let studies = python()
+        .arg(file("tests/python/studies.py"))
+        .arg(muprime().get_program())
+        .arg(folder.path())
+        .env("PYTHONPATH", &site)
+        .env("MUPRIME_BINARY", muprime().get_program())
+        .output()
+        .unwrap();
+    let (out, err) = texts(&studies);
+    assert!(studies.status.success() && out.ends_with("ok\n"), "{out}{err}");
+
     // Types, by two checkers: the package itself, and what its users write.
     let checked = python()
         .args(["-m", "mypy", "--strict", "--no-incremental", "--python-executable"])

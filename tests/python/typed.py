@@ -1,5 +1,7 @@
 """What a checker of types must accept, and what it must not: run by mypy --strict."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import muprime
 import numpy as np
 from numpy.typing import NDArray
@@ -18,3 +20,6 @@ again: muprime.Run = muprime.run(plan, out="runs/y")
 certificate: muprime.Certificate = muprime.calibrate("finger", "phases.csv", operator="x", serial="y", modulus_only=True)
 modulus: float = muprime.fit_finger("phases.csv").young_modulus_pa.value
 muprime.calibrate("finger", operator="x")  # type: ignore[call-arg]
+study: muprime.Study = muprime.study("ridge.jsonl", "study", ThreadPoolExecutor(), workers=2)
+digest: str = study.gather().sha256
+muprime.study("ridge.jsonl", "study")  # type: ignore[call-arg]

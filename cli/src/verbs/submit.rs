@@ -1,8 +1,9 @@
 //! `muprime submit`: runs what is missing of a study, here or on an engine.
 
 use super::prelude::*;
+use studies::cases::engines::quoted;
 use studies::cases::study::Study;
-use studies::cases::submit::{Options, cancel, submit};
+use studies::cases::submit::{Options, cancel, submit, tasks};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -15,12 +16,15 @@ pub struct Args {
     out: PathBuf,
     #[command(flatten)]
     options: Options,
+    /// Print what is missing as a command a task, for any engine; nothing is handed over
+    #[arg(long, conflicts_with_all = ["cancel", "detach"])]
+    plan: bool,
     /// End what runs and what waits; results that are there stay
     #[arg(long)]
     cancel: bool,
 }
 
-/// Submits, follows, says what is missing.
+/// Submits, follows, says what is missing; or prints the plan.
 ///
 /// # Errors
 /// Bad cases, an engine that takes nothing.
@@ -50,7 +54,21 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             "--engine dask needs --server, the address of its scheduler, and cannot be detached from: it drops what waits when its client leaves"
         );
     }
+    if options.cores_a_task > 1 && options.engine != "slurm" {
+        miette::bail!("--cores-a-task is for slurm: the other engines share a node among tasks of one core");
+    }
     let study = Study::begin(args.cases.as_deref().unwrap_or(&args.out), &args.out)?;
+    if args.plan {
+        let planned = tasks(&study, options)?;
+        if json {
+            out!("{planned}");
+        }
+        for argv in planned["tasks"].as_array().into_iter().flatten().filter(|_| !json) {
+            let words = argv["argv"].as_array().into_iter().flatten().filter_map(|word| word.as_str());
+            out!("{}", words.map(quoted).collect::<Vec<_>>().join(" "));
+        }
+        return exit(DONE);
+    }
     let submitted = submit(&study, options)?;
     let whole = submitted.missing == 0 || options.detach;
     if json {

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::Child;
+use std::time::Instant;
 
 /// All engines but this machine itself.
 pub const ENGINES: [&Engine; 3] = [&slurm::ENGINE, &python::HYPERQUEUE, &python::DASK];
@@ -21,8 +22,8 @@ pub struct Engine {
     pub submit: fn(&Path, &Job) -> miette::Result<Handed>,
     /// Takes up a job that an earlier command handed over.
     pub again: fn(&Path, &Job) -> miette::Result<Handed>,
-    /// Whether tasks may still be run.
-    pub alive: fn(&mut Handed) -> bool,
+    /// Whether tasks may still be run; hands over more where not all are.
+    pub alive: fn(&Path, &Job, &mut Handed) -> miette::Result<bool>,
     /// Ends what runs and what waits.
     pub cancel: fn(&Job) -> miette::Result<()>,
 }
@@ -38,8 +39,17 @@ pub struct Job {
     pub kind: String,
     /// The worker's command but for its range.
     pub command: Vec<String>,
-    /// Ranges, one a task.
+    /// Ranges, one a core of a task.
     pub ranges: Vec<Range<u64>>,
+    /// Cores of a task.
+    #[serde(default = "one")]
+    pub cores_a_task: u64,
+    /// Tasks that wait or run at one time at most.
+    #[serde(default = "one")]
+    pub window: u64,
+    /// Memory that a task may take, bytes; as the engine has it if left out.
+    #[serde(default)]
+    pub memory_bytes: Option<u64>,
     /// Time that a task may take, s.
     pub limit_s: f64,
     /// Tasks at one time at most; as many as the engine gives if left out.
@@ -52,12 +62,31 @@ pub struct Job {
     pub options: Vec<String>,
 }
 
-/// What an engine has taken.
+/// What an engine has accepted.
 pub struct Handed {
     /// Its names.
     pub ids: Vec<String>,
     /// The process that stands between, where there is one.
     pub child: Option<Child>,
+    /// Tasks that it has accepted.
+    pub tasks: u64,
+    /// Tasks of the next submission.
+    pub array: u64,
+    /// Refusals since the last submission that was accepted.
+    pub refusals: u32,
+    /// When the next submission is due.
+    pub pause_until: Option<Instant>,
+}
+
+fn one() -> u64 {
+    1
+}
+
+impl Handed {
+    /// What `job.json` states.
+    pub fn of(job: &Job) -> Handed {
+        Handed { ids: job.ids.clone(), child: None, tasks: 0, array: 1, refusals: 0, pause_until: None }
+    }
 }
 
 impl Job {

@@ -9,7 +9,13 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 /// Cases that a shard has at most: what is lost where its worker is killed, and held by who reads it.
-const MOST: u64 = 100_000;
+pub(super) const MOST: u64 = 100_000;
+/// Tasks of a study at most, about: the folders of its shards then stay small.
+const TASKS: u64 = 1_000_000;
+/// Memory that a task gets for each byte that the pilot took at most: cases differ.
+const MEMORY_FACTOR: u64 = 2;
+/// Memory that a core of a task gets at least, bytes: shells and libraries need it beside the program.
+const LEAST_MEMORY: u64 = 64 << 20;
 /// Tasks for each worker at least, so that none waits long for the last.
 const TASKS_A_WORKER: u64 = 4;
 
@@ -22,6 +28,23 @@ pub struct Pilot {
     pub mean_s: f64,
     /// The longest, s.
     pub longest_s: f64,
+    /// Greatest resident memory of this program up to the pilot's end, bytes; none where the system lacks it.
+    pub peak_bytes: Option<u64>,
+}
+
+impl Pilot {
+    /// Memory that a task of so many cores may take, bytes: twice the peak for each core, at least 64 MiB, and the
+    /// double in each round after the first, for tasks that a lack of memory ended.
+    pub fn memory_bytes(&self, cores: u64, round: u32) -> Option<u64> {
+        self.peak_bytes.map(|peak| ((peak * MEMORY_FACTOR).max(LEAST_MEMORY) * cores) << round)
+    }
+}
+
+/// `VmHWM` of this process.
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(1024 * line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?)
 }
 
 /// Ranges for an engine.
@@ -61,7 +84,8 @@ pub fn measure(study: &Study, holes: &[Range<u64>], cases: usize, budget: Durati
         }
     }
     let mean_s = times.iter().sum::<f64>() / times.len().max(1) as f64;
-    Ok(Pilot { cases: times.len(), mean_s, longest_s: times.iter().fold(0.0, |a, b| a.max(*b)) })
+    let longest_s = times.iter().fold(0.0, |a, b| f64::max(a, *b));
+    Ok(Pilot { cases: times.len(), mean_s, longest_s, peak_bytes: peak_bytes() })
 }
 
 /// The `n`th index of what is missing.
@@ -82,7 +106,7 @@ pub fn cut(holes: &[Range<u64>], pilot: &Pilot, workers: u64, task_s: f64, limit
     let wanted = limit_s.map_or(task_s, |limit| task_s.min(limit / 3.0));
     let by_time = (wanted / pilot.mean_s.max(1e-6)) as u64;
     let by_share = missing.div_ceil(TASKS_A_WORKER * workers.max(1));
-    let cases_a_task = by_time.min(by_share).clamp(1, MOST);
+    let cases_a_task = by_time.min(by_share).min(MOST).max(missing.div_ceil(TASKS)).max(1);
     let mut ranges = Vec::new();
     for hole in holes {
         let mut start = hole.start;
@@ -107,7 +131,7 @@ mod tests {
 
     #[test]
     fn tasks_cover_what_is_missing_once_and_fit_their_limit() {
-        let pilot = Pilot { cases: 5, mean_s: 0.5, longest_s: 2.0 };
+        let pilot = Pilot { cases: 5, mean_s: 0.5, longest_s: 2.0, peak_bytes: Some(40_000_000) };
         for (holes, workers, limit) in [
             (Vec::from([(0, 1000)]), 2, None),
             (Vec::from([(3, 4), (10, 5000)]), 8, Some(60.0)),
@@ -124,6 +148,8 @@ mod tests {
             );
             assert!(plan.limit_s >= plan.task_s || plan.cases_a_task == 1);
         }
+        assert_eq!(pilot.memory_bytes(4, 1), Some(640_000_000));
+        assert!(peak_bytes().is_some_and(|bytes| bytes > 1_000_000) || !cfg!(target_os = "linux"));
         assert_eq!(nth(&[3..4, 10..12], 0), 3);
         assert_eq!(nth(&[3..4, 10..12], 2), 11);
     }

@@ -1,5 +1,5 @@
 //! A file of cases and the folder of its results. `study.json` in the folder says of which cases they are;
-//! `shards/` holds them, `parts/` what is being written, `jobs/` what was handed to engines.
+//! `shards/` holds them in subfolders, `parts/` what is being written, `jobs/` what was handed to engines.
 
 use super::crash_points;
 use super::file::CaseFile;
@@ -9,12 +9,17 @@ use miette::{Context, IntoDiagnostic};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Schema of `study.json`.
 const SCHEMA: &str = "muprime.study/1";
+
+/// Folders that the shards of a study are in, at most.
+const FOLDERS: u64 = 1000;
+/// Shards in one of them at most, unless a shard has fewer cases than a millionth of the study.
+const SHARDS: u64 = 1000;
 
 /// `study.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -80,7 +85,7 @@ impl Study {
         let place = study.out.join("study.json");
         match fs::read(&place) {
             Ok(bytes) => study.same(&bytes)?,
-            Err(why) if why.kind() == std::io::ErrorKind::NotFound => {
+            Err(why) if why.kind() == ErrorKind::NotFound => {
                 let (part, mut file) = study.part("study.json")?;
                 let text = serde_json::to_vec(&manifest).into_diagnostic()?;
                 file.write_all(&text)
@@ -139,31 +144,30 @@ impl Study {
         self.out.join("shards")
     }
 
-    /// Where the shard of a range stands.
+    /// Where the shard of a range is: in one of at most [`FOLDERS`] folders, or beside them, where earlier
+    /// versions wrote it.
     pub fn shard(&self, range: &Range<u64>) -> PathBuf {
-        self.shards().join(format!("{:012}-{:012}.parquet", range.start, range.end))
+        let name = format!("{:012}-{:012}.parquet", range.start, range.end);
+        let beside = self.shards().join(&name);
+        if beside.exists() {
+            return beside;
+        }
+        let cases_a_folder = self.file.header.cases.div_ceil(FOLDERS).max(SHARDS);
+        self.shards().join(format!("{:04}", range.start / cases_a_folder)).join(name)
     }
 
-    /// The ranges of which there is a shard, by their beginning, the longer first. Names alone are looked at.
+    /// The ranges of which there is a shard, by their beginning, the longer first. Names alone are read.
     ///
     /// # Errors
     /// A folder that cannot be read.
     pub fn ranges_there(&self) -> miette::Result<Vec<Range<u64>>> {
         let mut there = Vec::new();
-        let entries = match fs::read_dir(self.shards()) {
-            Ok(entries) => entries,
-            Err(why) if why.kind() == std::io::ErrorKind::NotFound => return Ok(there),
-            Err(why) => {
-                return Err(why).into_diagnostic().wrap_err_with(|| self.shards().display().to_string());
+        for folder in names(&self.shards())? {
+            if folder.ends_with(".parquet") {
+                there.extend(range_of(&folder));
+            } else {
+                there.extend(names(&self.shards().join(folder))?.iter().filter_map(|name| range_of(name)));
             }
-        };
-        for entry in entries {
-            let name = entry.into_diagnostic()?.file_name();
-            let range = name.to_str().and_then(|name| {
-                let (a, b) = name.strip_suffix(".parquet")?.split_once('-')?;
-                Some(a.parse().ok()?..b.parse().ok()?)
-            });
-            there.extend(range);
         }
         there.sort_by_key(|r: &Range<u64>| (r.start, std::cmp::Reverse(r.end)));
         Ok(there)
@@ -201,6 +205,24 @@ impl Study {
             Ok(self.kind.key(&self.case(index, line.as_ref())?.inputs))
         }))
     }
+}
+
+/// Names in a folder; none where it is no folder.
+fn names(folder: &Path) -> miette::Result<Vec<String>> {
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(why) if matches!(why.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            return Ok(Vec::new());
+        }
+        Err(why) => return Err(why).into_diagnostic().wrap_err_with(|| folder.display().to_string()),
+    };
+    entries.map(|entry| Ok(entry.into_diagnostic()?.file_name().to_string_lossy().into_owned())).collect()
+}
+
+/// The range that a shard's name states.
+fn range_of(name: &str) -> Option<Range<u64>> {
+    let (start, end) = name.strip_suffix(".parquet")?.split_once('-')?;
+    Some(start.parse().ok()?..end.parse().ok()?)
 }
 
 /// SHA-256 of the running program: two builds of one version are two programs.

@@ -14,17 +14,18 @@ use rayon::prelude::*;
 use runs::say;
 use runs::session::Unfinished;
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// How often the folder is looked at.
-const LOOK: Duration = Duration::from_millis(500);
+/// Periods between two looks into the folder: a hundredth of the time that has passed, within these bounds.
+const LOOK_S: [f64; 2] = [0.5, 10.0];
 /// Period of the queries whether the engine is still at work: schedulers limit them.
 const ASK: Duration = Duration::from_secs(5);
 /// How often what an engine left undone is handed over again, where something came of the last time, or of the one before.
-const ROUNDS: usize = 4;
+const ROUNDS: u32 = 4;
 
 /// How to submit: the options of `muprime submit`.
 #[derive(Clone, Debug, clap::Args)]
@@ -56,6 +57,12 @@ pub struct Options {
     /// Python that has the package hyperqueue or distributed
     #[arg(long, default_value = "python3")]
     pub python: String,
+    /// slurm: cores of a task, each with a range of its own
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=4096))]
+    pub cores_a_task: u64,
+    /// slurm: tasks that wait or run at one time at most
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..))]
+    pub window: u64,
     /// Passed on to sbatch (may be repeated), as in --option=--partition=short
     #[arg(long = "option", value_name = "OPTION", allow_hyphen_values = true)]
     pub options: Vec<String>,
@@ -151,13 +158,13 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
                 let (server, python) = (options.server.clone(), options.python.clone());
                 let job = Job { server, python, command: Vec::new(), options: Vec::new(), ..job };
                 let Ok(handed) = (engine.again)(&folder, &job) else { continue };
-                follow(study, engine, &folder, handed, &bar)?;
+                follow(study, engine, &folder, &job, handed, &bar)?;
             }
             None => say!("{}: handed to another engine; --engine says which one to follow", folder.display()),
         }
     }
     let (mut before, mut in_vain) = (u64::MAX, 0);
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let holes = missing()?;
         submitted.missing = length(&holes);
         in_vain += u32::from(submitted.missing >= before);
@@ -166,26 +173,27 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
         }
         before = submitted.missing;
         if submitted.pilot.is_none() {
-            submitted.pilot = Some(match options.case_s {
-                Some(mean_s) => Pilot { cases: 0, mean_s, longest_s: mean_s },
-                None => plan::measure(study, &holes, options.pilot, Duration::from_secs(20))?,
-            });
+            submitted.pilot = Some(pilot(study, &holes, options)?);
         }
         let Some(pilot) = submitted.pilot else { break };
-        let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
-        let plan =
-            plan::cut(&holes, &pilot, options.workers.unwrap_or(cores), options.task_s, options.limit_s);
-        submitted.tasks += plan.ranges.len();
+        let plan = cut(&holes, &pilot, options);
+        let tasks = plan.ranges.len().div_ceil(options.cores_a_task as usize);
+        submitted.tasks += tasks;
         (submitted.cases_a_task, submitted.limit_s) = (plan.cases_a_task, plan.limit_s);
         match engine {
-            None => here(study, &plan, options.workers.unwrap_or(cores), &bar)?,
+            None => here(study, &plan, options.workers.unwrap_or_else(cores), &bar)?,
             Some(engine) => {
-                let (folder, handed) = hand_over(study, engine, &plan, options)?;
-                submitted.ids.extend(handed.ids.clone());
+                let memory_bytes = pilot.memory_bytes(options.cores_a_task, round);
+                let (folder, job, handed) = hand_over(study, engine, &plan, memory_bytes, options)?;
                 if options.detach {
+                    submitted.ids.extend(handed.ids);
+                    let accepted = handed.tasks as usize;
+                    if accepted < tasks {
+                        say!("{accepted} of {tasks} tasks are accepted: repeat the command for the others");
+                    }
                     break;
                 }
-                follow(study, engine, &folder, handed, &bar)?;
+                submitted.ids.extend(follow(study, engine, &folder, &job, handed, &bar)?);
             }
         }
         submitted.missing = length(&missing()?);
@@ -193,6 +201,58 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     bar.finish_and_clear();
     submitted.wall_seconds = begun.elapsed().as_secs_f64();
     Ok(submitted)
+}
+
+/// Cores of this machine.
+fn cores() -> u64 {
+    std::thread::available_parallelism().map_or(1, |n| n.get() as u64)
+}
+
+/// How long a case takes: as the user states, or measured.
+fn pilot(study: &Study, holes: &[Range<u64>], options: &Options) -> miette::Result<Pilot> {
+    match options.case_s {
+        Some(mean_s) => Ok(Pilot { cases: 0, mean_s, longest_s: mean_s, peak_bytes: None }),
+        None => plan::measure(study, holes, options.pilot, Duration::from_secs(20)),
+    }
+}
+
+/// The ranges of what is missing.
+fn cut(holes: &[Range<u64>], pilot: &Pilot, options: &Options) -> Plan {
+    plan::cut(holes, pilot, options.workers.unwrap_or_else(cores), options.task_s, options.limit_s)
+}
+
+/// What is missing of a study as tasks for any engine, `muprime.study_plan/1`; nothing is handed over.
+///
+/// # Errors
+/// A case that cannot be made, a folder that cannot be read.
+pub fn tasks(study: &Study, options: &Options) -> miette::Result<Value> {
+    let cases = study.file.header.cases;
+    let (holes, command) = (holes(&study.ranges_there()?, cases), command(study)?);
+    let pilot = if holes.is_empty() { None } else { Some(pilot(study, &holes, options)?) };
+    let task = |pilot: &Pilot, range: &Range<u64>, limit_s: f64| {
+        let argv = [&command[..], &["--range".into(), format!("{}..{}", range.start, range.end)]].concat();
+        let expected_s = (range.end - range.start) as f64 * pilot.mean_s;
+        let (range, memory_bytes) = ([range.start, range.end], pilot.memory_bytes(1, 0));
+        json!({ "range": range, "argv": argv, "expected_s": expected_s, "limit_s": limit_s, "memory_bytes": memory_bytes })
+    };
+    let tasks: Vec<Value> = pilot.map_or_else(Vec::new, |pilot| {
+        let plan = cut(&holes, &pilot, options);
+        plan.ranges.iter().map(|range| task(&pilot, range, plan.limit_s)).collect()
+    });
+    let missing = length(&holes);
+    let schema = "muprime.study_plan/1";
+    let mut plan =
+        json!({ "schema": schema, "out": study.out, "cases": cases, "missing": missing, "pilot": pilot });
+    plan["tasks"] = tasks.into();
+    Ok(plan)
+}
+
+/// The worker's command but for its cases.
+fn command(study: &Study) -> miette::Result<Vec<String>> {
+    let exe = std::env::current_exe().into_diagnostic()?;
+    let (cases, out) = (study.file.path.display().to_string(), study.out.display().to_string());
+    let words = ["case", "--cases", &cases, "--out", &out, "--threads", "1"].map(String::from);
+    Ok(std::iter::once(exe.display().to_string()).chain(words).collect())
 }
 
 /// Runs a plan on this machine: the same worker, on the threads of a pool. A case that cannot be made leaves
@@ -223,29 +283,22 @@ fn hand_over(
     study: &Study,
     engine: &Engine,
     plan: &Plan,
+    memory_bytes: Option<u64>,
     options: &Options,
-) -> miette::Result<(PathBuf, Handed)> {
+) -> miette::Result<(PathBuf, Job, Handed)> {
     let folder = new_folder(&study.out.join("jobs"))?;
-    let exe = std::env::current_exe().into_diagnostic()?;
-    let text = |path: &Path| path.display().to_string();
-    let command = [
-        text(&exe),
-        "case".into(),
-        "--cases".into(),
-        text(&study.file.path),
-        "--out".into(),
-        text(&study.out),
-        "--threads".into(),
-        "1".into(),
-        "--job".into(),
-        text(&folder),
-    ];
+    let mut command = command(study)?;
+    command.extend(["--job".into(), folder.display().to_string()]);
     let mut job = Job {
         engine: engine.name.into(),
         ids: Vec::new(),
         kind: study.kind.name.into(),
-        command: command.into(),
+        command,
         ranges: plan.ranges.clone(),
+        cores_a_task: options.cores_a_task,
+        // Nobody is there later to hand over the rest.
+        window: if options.detach { u64::MAX } else { options.window },
+        memory_bytes,
         limit_s: plan.limit_s,
         workers: options.workers,
         server: options.server.clone(),
@@ -256,13 +309,16 @@ fn hand_over(
     let handed = match (engine.submit)(&folder, &job) {
         Ok(handed) => handed,
         Err(why) => {
-            runs::files::write_plain(&folder.join("ended"), "")?;
+            // Arrays that were accepted before the refusal go on: the next call follows them.
+            if Job::read(&folder).is_ok_and(|job| job.ids.is_empty()) {
+                runs::files::write_plain(&folder.join("ended"), "")?;
+            }
             return Err(why);
         }
     };
     job.ids.clone_from(&handed.ids);
     job.write(&folder)?;
-    Ok((folder, handed))
+    Ok((folder, job, handed))
 }
 
 /// A folder of a new job, which nobody else has made.
@@ -286,15 +342,16 @@ fn new_folder(jobs: &Path) -> miette::Result<PathBuf> {
     }
 }
 
-/// Looks at the folder until nothing is missing or the engine has nothing left to run.
+/// Looks at the folder until nothing is missing or the engine has nothing left to run; returns its names.
 fn follow(
     study: &Study,
     engine: &Engine,
     folder: &Path,
+    job: &Job,
     mut handed: Handed,
     bar: &ProgressBar,
-) -> miette::Result<()> {
-    let (cases, mut last_query) = (study.file.header.cases, Instant::now());
+) -> miette::Result<Vec<String>> {
+    let (cases, begun, mut last_query) = (study.file.header.cases, Instant::now(), Instant::now());
     let mut over = false;
     loop {
         let missing = length(&holes(&study.ranges_there()?, cases));
@@ -302,17 +359,19 @@ fn follow(
         if missing == 0 || over {
             break;
         }
-        std::thread::sleep(LOOK);
+        let pause_s = (0.01 * begun.elapsed().as_secs_f64()).clamp(LOOK_S[0], LOOK_S[1]);
+        std::thread::sleep(Duration::from_secs_f64(pause_s));
         if last_query.elapsed() >= ASK || handed.child.is_some() {
             // What ended a moment ago may not be seen in the folder yet: it is looked at once more.
-            over = !(engine.alive)(&mut handed);
+            over = !(engine.alive)(folder, job, &mut handed)?;
             last_query = Instant::now();
         }
     }
     if let Some(child) = &mut handed.child {
         let _ = child.wait();
     }
-    runs::files::write_plain(&folder.join("ended"), "")
+    runs::files::write_plain(&folder.join("ended"), "")?;
+    Ok(handed.ids)
 }
 
 /// Jobs that nobody has seen the end of.

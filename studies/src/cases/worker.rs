@@ -55,6 +55,7 @@ pub fn work(study: &Study, range: Range<u64>, program: &str, job: Option<&Path>)
     let moved = written.and_then(|failed| match failed {
         None => Ok(None),
         Some(failed) => {
+            runs::files::make_folder(place.parent().unwrap_or(&study.out)).wrap_err(Unfinished::NotKept)?;
             fs::rename(&part, &place).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
             Ok(Some(failed))
         }

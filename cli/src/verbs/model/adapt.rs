@@ -53,21 +53,8 @@ pub struct AdaptArgs {
     /// Held-out cases, which no node is chosen by
     #[arg(long, default_value_t = 200)]
     held_out: u64,
-    /// local, slurm, hq or dask, as for `muprime submit`
-    #[arg(long, default_value = "local")]
-    engine: String,
-    /// Cases at one time
-    #[arg(long, value_name = "N")]
-    workers: Option<u64>,
-    /// hq: folder of its server; dask: address of its scheduler
-    #[arg(long)]
-    server: Option<String>,
-    /// Python that has the package hyperqueue or distributed
-    #[arg(long, default_value = "python3")]
-    python: String,
-    /// Passed on to sbatch (may be repeated)
-    #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
-    option: Vec<String>,
+    #[command(flatten)]
+    rounds: Options,
 }
 
 /// Runs one study of the surrogate; mu' of each of its cases, none where a case failed.
@@ -80,19 +67,7 @@ fn run_study(
     let cases = args.out.join(format!("{name}.jsonl"));
     file::write(&cases, header, lines)?;
     let study = Study::begin(&cases, &args.out.join(name))?;
-    let options = Options {
-        engine: args.engine.clone(),
-        workers: args.workers,
-        task_s: 300.0,
-        limit_s: None,
-        pilot: 4,
-        case_s: None,
-        detach: false,
-        server: args.server.clone(),
-        python: args.python.clone(),
-        options: args.option.clone(),
-    };
-    let submitted = submit(&study, &options)?;
+    let submitted = submit(&study, &args.rounds)?;
     if submitted.missing > 0 {
         miette::bail!("{name}: {} cases have no result; the same command goes on", submitted.missing);
     }
@@ -111,6 +86,9 @@ fn run_study(
 /// # Errors
 /// Bad variables, a folder of another surrogate, an engine that takes nothing.
 pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
+    if args.rounds.detach {
+        miette::bail!("--detach: a round follows from the results of the one before it");
+    }
     let (spans, base) = (spans(&args.span)?, values(&args.set)?);
     let steady = Steady { tolerance: args.tolerance, at_most: args.at_most, ..Steady::default() };
     let header = |spans: BTreeMap<String, ridge::Span>, cases: u64| {

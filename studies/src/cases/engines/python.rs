@@ -26,7 +26,7 @@ fn again(folder: &Path, job: &Job) -> miette::Result<Handed> {
 }
 
 fn gone(_: &Path, job: &Job) -> miette::Result<Handed> {
-    Ok(Handed { ids: job.ids.clone(), child: None })
+    Ok(Handed::of(job))
 }
 
 /// Starts the script; its first line names the job, or what is wrong.
@@ -67,11 +67,11 @@ fn begun(folder: &Path, job: &Job, ids: &[String]) -> miette::Result<Handed> {
             folder.join("log.txt").display()
         ));
     };
-    Ok(Handed { ids, child: Some(child) })
+    Ok(Handed { ids, child: Some(child), tasks: job.ranges.len() as u64, ..Handed::of(job) })
 }
 
-fn alive(handed: &mut Handed) -> bool {
-    handed.child.as_mut().is_some_and(|child| matches!(child.try_wait(), Ok(None)))
+fn alive(_: &Path, _: &Job, handed: &mut Handed) -> miette::Result<bool> {
+    Ok(handed.child.as_mut().is_some_and(|child| matches!(child.try_wait(), Ok(None))))
 }
 
 /// Their workers look for the file `cancelled` in the job's folder, which is there by now: those that wait
