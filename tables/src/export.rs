@@ -14,6 +14,7 @@ mod hdf5;
 mod mcap;
 #[cfg(feature = "parquet")]
 mod parquet;
+pub mod topics;
 pub mod unit;
 
 /// Stands in where the feature is off: every call says how to get it.
