@@ -2,7 +2,6 @@
 //
 //   foxglove.cjs read ADDRESS TOKEN SECONDS     what is advertised and sent, as one JSON document
 //   foxglove.cjs late ADDRESS TOKEN SECONDS     the same, with subscriptions that begin in the middle of that time
-//   foxglove.cjs deaf ADDRESS TOKEN SECONDS     subscribes to everything and reads nothing
 //   foxglove.cjs doors ADDRESS TOKEN ORIGIN     the status of handshakes, right and wrong; ORIGIN is one that is admitted
 const { FoxgloveClient } = require("@foxglove/ws-protocol");
 const { WebSocket } = require("ws");
@@ -11,7 +10,7 @@ const [what, address, token, last] = process.argv.slice(2);
 const text = new TextDecoder();
 const url = `ws://${address}/foxglove?token=${token}`;
 
-function read(seconds, after, deaf) {
+function read(seconds, after) {
   const seen = { info: null, topics: [], statuses: [], messages: {}, errors: [] };
   const socket = new WebSocket(url, [FoxgloveClient.SUPPORTED_SUBPROTOCOL]);
   const client = new FoxgloveClient({ ws: socket });
@@ -23,7 +22,6 @@ function read(seconds, after, deaf) {
     seen.topics.push(...channels);
     setTimeout(() => {
       for (const channel of channels) names.set(client.subscribe(channel.id), channel.topic);
-      if (deaf) socket.pause();
     }, after);
   });
   client.on("message", ({ subscriptionId, timestamp, data }) => {
@@ -71,4 +69,4 @@ async function doors(origin) {
 }
 
 if (what === "doors") doors(last);
-else read(Number(last), what === "late" ? 500 * Number(last) : 0, what === "deaf");
+else read(Number(last), what === "late" ? 500 * Number(last) : 0);
