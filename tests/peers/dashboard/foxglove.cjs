@@ -29,8 +29,8 @@ function read(seconds, after) {
     (seen.messages[topic] ??= []).push([String(timestamp), JSON.parse(text.decode(data))]);
   });
   setTimeout(() => {
-    console.log(JSON.stringify(seen));
-    process.exit(0);
+    // A pipe takes a long document piece by piece.
+    process.stdout.write(JSON.stringify(seen), () => process.exit(0));
   }, 1000 * seconds);
 }
 
