@@ -125,7 +125,8 @@ fn none_is_claimed_where_there_is_none_whatever_else_acts() {
     }
 }
 
-/// Means over passes hardly show a lag: the verdict's first sentences must not hide one that the record shows.
+/// Means over passes hardly show a lag: the verdict's first sentences must not hide one that the record
+/// shows.
 #[test]
 fn the_first_sentences_of_a_verdict_name_a_lag_that_the_record_shows() {
     let folder = tempfile::tempdir().unwrap();

@@ -173,3 +173,33 @@ fn everything_bundled_passes_its_own_check() {
     assert_eq!(output.status.code(), Some(0), "{}", texts(&output).0);
     assert_eq!(documents(&output).len(), files.len());
 }
+
+/// A missed deadline counts with its own lateness, as in the loop's report: 0.3 ms late, then 2.4 ms late
+/// with two deadlines missed.
+#[test]
+fn deadlines_that_were_missed_are_counted_with_their_lateness() {
+    use realtime::ports::Nanos;
+    use runs::session::{LATENESS_BOUNDS_S, Snapshots, rehearse_watched};
+    let setup = runs::setup::Setup::load("virtual-ideal").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let plan = runs::plan::Plan::load(&short_plan(folder.path())).unwrap();
+    let model = std::sync::Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
+    let mut first = None;
+    let world = sim::world::WorldConfig::ideal();
+    rehearse_watched(&setup, &plan, 3, &world, model, &mut |row| first = first.or(Some(*row))).unwrap();
+    let mut snapshots = Snapshots::of(5, Nanos(1_000_000));
+    let mut late = |ns, at| {
+        let mut row = first.unwrap();
+        (row.inputs.seen.lateness, row.now) = (Nanos(ns), Nanos(at));
+        snapshots.take(&row)
+    };
+    assert_eq!(late(300_000, 10_000_000), None);
+    let seen = late(2_400_000, 200_000_000).unwrap();
+    assert_eq!((seen.unix_ns, seen.deadlines.cycles, seen.deadlines.missed), (200_000_005, 2, 2));
+    assert!((seen.deadlines.lateness_sum_s - 4.5e-3).abs() < 1e-12, "0.3, 2.4, 1.4 and 0.4 ms");
+    let upto = |bound_s: f64| -> u64 {
+        let below = LATENESS_BOUNDS_S.iter().zip(seen.deadlines.lateness_classes);
+        below.filter(|(bound, _)| **bound <= bound_s).map(|(_, count)| count).sum()
+    };
+    assert_eq!([2e-4, 5e-4, 1e-3, 2e-3, 5e-3].map(upto), [0, 2, 2, 3, 4]);
+}

@@ -1,4 +1,5 @@
-//! Studies on engines that count their tasks and know nothing of cases: the share of a task, and the plan of what is missing.
+//! Studies on engines that count their tasks and know nothing of cases: the share of a task, and the plan
+//! of what is missing.
 
 use serde_json::Value;
 use std::path::Path;

@@ -81,7 +81,7 @@ fn what_is_sudden_periodic_or_local_is_a_gap() {
 #[test]
 fn scatter_has_no_structure() {
     for (name, kind) in Roughness::ALL {
-        let claimed = (0..tests::rounds(3, 8u64))
+        let claimed = (0..tests::rounds(1, 8u64))
             .into_par_iter()
             .filter(|k| with(890_000 + k, kind, 0.0, &|_, _| 0.0, &quick()).verdict != Verdict::NoGap)
             .count();

@@ -155,7 +155,9 @@ impl Session {
         mut converse: impl FnMut(&mut Session) -> Result<Infallible, Ended> + Send + 'static,
     ) -> Result<JoinHandle<Closed>, String> {
         let name: String = self.endpoint.profile().id().chars().take(15).collect();
-        let run = move || self.keep_up(&mut converse);
+        // At the level of the terminal's default, so that what is shown has its instrument.
+        let span = tracing::warn_span!("instrument", id = self.endpoint.profile().id());
+        let run = move || span.in_scope(|| self.keep_up(&mut converse));
         std::thread::Builder::new().name(name).spawn(run).map_err(|error| error.to_string())
     }
 
@@ -184,7 +186,7 @@ impl Session {
             }
             last_words = ended.to_string();
             health.problem(last_words.clone());
-            tracing::info!(instrument = self.endpoint.profile().id(), %ended, "the link went down");
+            tracing::info!(%ended, "the link went down");
             if self.tell(Err(last_words.clone())) {
                 return self.closed(last_words); // whoever opened the rig wants to know, not to wait
             }

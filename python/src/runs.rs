@@ -23,7 +23,8 @@ pub fn load(py: Python<'_>, folder: PathBuf) -> PyResult<(Py<PyBytes>, String)> 
     Ok((PyBytes::new(py, &bytes).unbind(), about))
 }
 
-/// The cycles of a run's records as an Arrow IPC file; `points`: of these passes alone, of all where it is empty.
+/// The cycles of a run's records as an Arrow IPC file; `points`: of these passes alone, of all where it is
+/// empty.
 #[pyfunction]
 pub fn cycles(py: Python<'_>, folder: PathBuf, points: Vec<u32>) -> PyResult<Py<PyBytes>> {
     let bytes = py

@@ -66,6 +66,14 @@ pub struct Lifeline {
     pub dose_bits: AtomicU64,
 }
 
+impl Lifeline {
+    /// Time that the plate was driven in this run, and its dose in m2/s.
+    pub fn driven(&self) -> (Nanos, f64) {
+        let dose = f64::from_bits(self.dose_bits.load(Ordering::Relaxed));
+        (Nanos(self.driven_ns.load(Ordering::Relaxed)), dose)
+    }
+}
+
 /// What the loop needs besides its ports.
 pub struct LoopParts {
     /// Limits, timing, estimate.

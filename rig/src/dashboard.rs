@@ -9,6 +9,7 @@
 //! |---|---|
 //! | the empty page and its script | a `Host` that is on the list |
 //! | data, live messages | that, an `Origin` on the list where there is one, and the token |
+//! | `/foxglove`, `/metrics` | the same; the token may be in the address, and `/foxglove` takes `--origin` |
 //! | stop a run | the same |
 //! | write tags and notes, diagnose a run that is over | the same |
 //! | pause, go on | the same, and a server that was started with `--allow-control` |
@@ -21,7 +22,11 @@ mod api;
 #[cfg(feature = "dashboard")]
 mod download;
 #[cfg(feature = "dashboard")]
+mod foxglove;
+#[cfg(feature = "dashboard")]
 mod guard;
+#[cfg(feature = "dashboard")]
+mod metrics;
 #[cfg(feature = "dashboard")]
 mod pages;
 #[cfg(feature = "dashboard")]
@@ -53,6 +58,10 @@ pub struct Options {
     pub listen: SocketAddr,
     /// Further names by which browsers may ask for it, as `rig-1.lab:8417`.
     pub hosts: Vec<String>,
+    /// Further origins whose pages may read live streams, and nothing else, as `https://app.foxglove.dev`.
+    pub origins: Vec<String>,
+    /// A file of its user alone that takes the token, for a scraper.
+    pub token_file: Option<PathBuf>,
     /// Whether runs may be paused and resumed. A stop is always allowed.
     pub control: bool,
 }

@@ -213,7 +213,9 @@ impl Ledger {
         let state = Arc::new(State::default());
         state.written(machine_time()?.1);
         let shown = Arc::clone(&state);
+        let session = tracing::Span::current();
         let keep = move || {
+            let _session = session.enter();
             let mut ledger = self;
             let mut before = (0, 0.0);
             loop {
@@ -223,8 +225,7 @@ impl Ledger {
                     Err(RecvTimeoutError::Disconnected) => Some(false),
                 };
                 let written = machine_time().and_then(|(_, now_ns)| {
-                    let driven = life.driven_ns.load(Ordering::Relaxed);
-                    let dose = f64::from_bits(life.dose_bits.load(Ordering::Relaxed));
+                    let (Nanos(driven), dose) = life.driven();
                     ledger.add(driven.saturating_sub(before.0), (dose - before.1).max(0.0), now_ns);
                     before = (driven, dose);
                     match last {

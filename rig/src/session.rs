@@ -47,6 +47,9 @@ struct Note {
 /// Whatever prevents it before anything was commanded (a refusal), or a fault of this program.
 pub fn run(job: Job, signals: &Signals, update: &mut dyn FnMut(Update<'_>)) -> miette::Result<Summary> {
     let mut job = job;
+    // The loop's thread is in no span: nothing there formats. Threads that write log lines of the session
+    // enter it.
+    let _session = tracing::warn_span!("session", run = %job.out.display()).entered();
     if job.fast {
         return job.run_in_virtual_time(signals, update);
     }
@@ -121,10 +124,13 @@ fn over_instruments(
 
     let (note_in, note_out) = channel::<Note>();
     let mut unkept = None;
+    let (life, period) = (rig.life(), job.setup.config.limits.timing.cycle);
     let (outcome, panicked) = std::thread::scope(|scope| {
         let (following_sequence, lost, stop) = (&mut sequence, &*lost, handle.stopper());
         let keeping = keeping.as_ref();
+        let session = tracing::Span::current();
         let following = scope.spawn(move || {
+            let _session = session.enter();
             let (mut stops, mut knows) = (0, false);
             let mut ends = || {
                 let requested = signals.stops.load(Ordering::Relaxed);
@@ -142,10 +148,11 @@ fn over_instruments(
                 end
             };
             let mut ask = || Requests { end: ends(), pause: signals.paused.load(Ordering::Relaxed) };
-            let mut snapshots = Snapshots::default();
+            let mut snapshots = Snapshots::of(start_unix_ns, period);
             supervisor::sweep(&mut handle, following_sequence, &mut ask, &mut |row, sequence, reaction| {
                 bench.serve(row.now, sequence, &reaction);
-                let state = snapshots.take(row);
+                let state =
+                    snapshots.take(row).map(|state| Snapshot { driven: Some(life.driven()), ..state });
                 if state.is_some() || !reaction.events.is_empty() || reaction.pass.is_some() {
                     let (done, all) = sequence.progress();
                     let progress = (done, all, sequence.remaining_s());

@@ -260,6 +260,15 @@ impl Sequence {
         (self.next, self.points.len())
     }
 
+    /// Number of the point whose pass is under way; none between passes.
+    pub fn pass_under_way(&self) -> Option<u32> {
+        let stages = matches!(
+            self.stage,
+            Stage::Approach { .. } | Stage::Settle { .. } | Stage::Measure { .. } | Stage::Edges { .. }
+        );
+        self.points.get(self.next).filter(|_| stages).map(|point| point.number)
+    }
+
     /// Time that the rest should take in s, by the plan.
     pub fn remaining_s(&self) -> f64 {
         let each = |p: &Point| self.times.sliding_s(p.edges).iter().sum::<f64>() + 0.15;

@@ -9,7 +9,7 @@ mod telemetry;
 
 pub use fast::{Rehearsal, rehearse, rehearse_watched, words};
 pub use keeper::{Keeper, REPLAYABLE, Replayable, is_model, model_name, unix_ns};
-pub use telemetry::{Extremes, Snapshot, Snapshots};
+pub use telemetry::{Deadlines, Extremes, LATENESS_BOUNDS_S, Snapshot, Snapshots};
 
 use crate::ambient::{Answers, LevelsFound};
 use crate::plan::{Plan, Point, Resolution};

@@ -61,6 +61,8 @@ pub fn sweep(
     each: &mut dyn FnMut(&Row, &mut Sequence, Reaction),
 ) -> Outcome {
     let mut instead = None;
+    // Entered once for each pass and not for each row: in virtual time a row takes some microseconds.
+    let (mut point, mut span) = (None, None);
     loop {
         let requests = ask();
         if let Some(end) = requests.end {
@@ -81,6 +83,12 @@ pub fn sweep(
             }
             continue;
         };
+        if sequence.pass_under_way() != point {
+            // The one before is left first.
+            drop(span.take());
+            point = sequence.pass_under_way();
+            span = point.map(|point| tracing::warn_span!("pass", point).entered());
+        }
         let mut reaction = sequence.on_row(&row);
         for command in reaction.commands.drain(..) {
             if !rig.send(command) {

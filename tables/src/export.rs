@@ -15,6 +15,7 @@ mod hdf5;
 mod mcap;
 #[cfg(feature = "parquet")]
 mod parquet;
+pub mod topics;
 pub mod unit;
 
 /// Stands in where the feature is off: every call says how to get it.
@@ -84,8 +85,9 @@ pub fn arrow_bytes(run: &RunData) -> miette::Result<Vec<u8>> {
     arrow::bytes(&columns::of(&run.passes), &facts::of(run, &facts::Stated::default()))
 }
 
-/// The cycles of a run's records as an Arrow IPC file in memory: session, loop time, and a column for each curve that
-/// [`Format::Mcap`] has, with units and facts. `points`: those passes alone; all where it is empty.
+/// The cycles of a run's records as an Arrow IPC file in memory: session, loop time, and a column for each
+/// curve that [`Format::Mcap`] has, with units and facts. `points`: those passes alone; all where it is
+/// empty.
 ///
 /// # Errors
 /// A record that cannot be read; a build without Arrow.

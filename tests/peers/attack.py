@@ -83,6 +83,7 @@ evil = ["evil.example", f"evil.example:{port}", "127.0.0.1", "127.0.0.1:1", f"12
 for name in evil:
     tried("host", ask(lines={"Host": name}))
     tried("host", stream({"Host": name}))
+    tried("host", stream({"Host": name}, "foxglove.sdk.v1", f"/foxglove?token={token}"))
     tried("host", f"GET / HTTP/1.1\r\nHost: {name}\r\nConnection: close\r\n\r\n".encode())
 tried("host", ask().replace(b"Host:", b"Host: evil.example\r\nHost:", 1))
 tried("host", ask(lines={"Host": None}))
@@ -90,19 +91,23 @@ tried("host", ask(address=f"http://evil.example/api/runs/{run}/ask", lines={"Hos
 for origin in ["http://evil.example", "null", "https://" + place, f"http://evil.example:{port}", f"http://{place}.evil.example", f"http://127.0.0.1:{int(port) + 1}", "file://", f"http://{place}/", f"http://{place} http://evil.example"]:
     tried("origin", ask(lines={"Origin": origin}))
     tried("origin", stream({"Origin": origin}))
+    tried("origin", stream({"Origin": origin}, "foxglove.sdk.v1", f"/foxglove?token={token}"))
+    tried("origin", f"GET /metrics?token={token} HTTP/1.1\r\nHost: {place}\r\nOrigin: {origin}\r\nConnection: close\r\n\r\n".encode())
     tried("origin", ask("stop", "OPTIONS", lines={"Origin": origin, "Access-Control-Request-Method": "POST"}, body=b""))
 wrong = ["", "0" * 64, token[:-1], token + "0", token.upper() if token.upper() != token else "x", token[::-1], "Bearer", "null", "undefined"]
 for one in wrong:
     tried("token", ask(lines={"Authorization": f"Bearer {one}"}))
     tried("token", ask(lines={"Authorization": one}))
     tried("token", stream(protocols=f"muprime, {one}" if one else "muprime"))
+    tried("token", stream(protocols="foxglove.sdk.v1", address=f"/foxglove?token={one}"))
+    tried("token", f"GET /metrics?token={one} HTTP/1.1\r\nHost: {place}\r\nConnection: close\r\n\r\n".encode())
 tried("token", ask(lines={"Authorization": None}))
 tried("token", ask(lines={"Authorization": None, "Cookie": f"token={token}"}))
 tried("token", ask(lines={"Authorization": None}, address=f"/api/runs/{run}/ask?token={token}"))
 tried("token", ask(lines={"Authorization": f"Basic {base64.b64encode(token.encode()).decode()}"}))
 tried("token", stream({"Sec-WebSocket-Protocol": None}))
 tried("token", stream(protocols=token))
-for address in ["/api/runs", "/api/about", f"/api/runs/{run}", f"/api/runs/{run}/report", f"/api/runs/{run}/files/points.csv", f"/api/runs/{run}/pages/report.html", f"/api/compare?runs={run}/{run}"]:
+for address in ["/api/runs", "/api/about", f"/api/runs/{run}", f"/api/runs/{run}/report", f"/api/runs/{run}/files/points.csv", f"/api/runs/{run}/pages/report.html", f"/api/compare?runs={run}/{run}", f"/api/runs?token={token}", f"/api/runs/{run}/files/points.csv?token={token}", "/metrics"]:
     tried("token", f"GET {address} HTTP/1.1\r\nHost: {place}\r\nConnection: close\r\n\r\n".encode())
 # What writes has the same guard, and takes no more than its bounds.
 noted = b'{"tags":["x"],"note":"y"}'

@@ -18,7 +18,8 @@ fn path_with(folder: &Path) -> String {
     format!("{}:{own}:{}", folder.display(), std::env::var("PATH").unwrap())
 }
 
-/// In front of the real `sbatch`: refuses every second submission as a site's limit does, and notes its arguments.
+/// In front of the real `sbatch`: refuses every second submission as a site's limit does, and notes its
+/// arguments.
 const REFUSES: &str = r#"#!/bin/sh
 calls=$(cat "$0.calls" 2>/dev/null || echo 0)
 echo $((calls + 1)) >"$0.calls"

@@ -121,8 +121,8 @@ fn tables_carry_units_and_facts() {
     }
 }
 
-/// The folder as a repository takes it: an independent validator finds nothing that RO-Crate 1.3 requires missing, and of what it
-/// recommends a contact alone.
+/// The folder as a repository takes it: an independent validator finds nothing that RO-Crate 1.3 requires
+/// missing, and of what it recommends a contact alone.
 #[test]
 fn the_folder_is_a_crate() {
     let folder = tempfile::tempdir().unwrap();

@@ -24,6 +24,13 @@ pub struct Place {
     /// A further name that browsers ask for it by, with its port, as rig-1.lab:8417 (may be repeated)
     #[arg(long = "host", value_name = "NAME:PORT")]
     pub hosts: Vec<String>,
+    /// A further page that may read live streams, and nothing else, as https://app.foxglove.dev (may be
+    /// repeated)
+    #[arg(long = "origin", value_name = "ORIGIN")]
+    pub origins: Vec<String>,
+    /// Write the token to this file, readable by you alone: for a scraper of /metrics
+    #[arg(long, value_name = "FILE")]
+    pub token_file: Option<PathBuf>,
     /// Runs may be paused and resumed from a browser; a stop is always allowed
     #[arg(long)]
     pub allow_control: bool,
@@ -35,8 +42,8 @@ impl Place {
     /// # Errors
     /// The address cannot be had.
     pub fn serve(self, runs: PathBuf) -> miette::Result<Dashboard> {
-        let Place { listen, hosts, allow_control } = self;
-        Dashboard::start(Options { runs, listen, hosts, control: allow_control })
+        let Place { listen, hosts, origins, token_file, allow_control } = self;
+        Dashboard::start(Options { runs, listen, hosts, origins, token_file, control: allow_control })
     }
 }
 

@@ -86,6 +86,13 @@ pub struct Args {
     /// Show this run and its folder of runs in a browser, at this address [without one: 127.0.0.1:8417]
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = LISTEN, conflicts_with = "tui")]
     dashboard: Option<SocketAddr>,
+    /// A further page that may read the live stream of the dashboard, as https://app.foxglove.dev (may be
+    /// repeated)
+    #[arg(long = "origin", value_name = "ORIGIN", requires = "dashboard")]
+    origins: Vec<String>,
+    /// Write the dashboard's token to this file, readable by you alone: for a scraper of /metrics
+    #[arg(long, value_name = "FILE", requires = "dashboard")]
+    token_file: Option<PathBuf>,
     /// Allow pause and resume from the browser; stop is always allowed
     #[arg(long, requires = "dashboard")]
     allow_control: bool,
@@ -136,7 +143,13 @@ impl Watching {
     /// As the arguments say; a dashboard is served from here on, over a folder of runs.
     fn begin(args: &mut Args, runs: &Path) -> miette::Result<Self> {
         if let Some(listen) = args.dashboard.take() {
-            let place = Place { listen, hosts: Vec::new(), allow_control: args.allow_control };
+            let place = Place {
+                listen,
+                hosts: Vec::new(),
+                origins: std::mem::take(&mut args.origins),
+                token_file: args.token_file.take(),
+                allow_control: args.allow_control,
+            };
             report!("dashboard: {}", place.serve(runs.to_path_buf())?.link());
         }
         Ok(Watching { tui: args.tui, broker: args.publish.clone() })

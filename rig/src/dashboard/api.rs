@@ -1,7 +1,7 @@
 //! The handlers of the addresses.
 
 use super::server::Shared;
-use super::{download, pages, stream};
+use super::{download, foxglove, metrics, pages, stream};
 use crate::live::{self, Ask, Viewer};
 use axum::extract::{Path, Query, Request, State};
 use axum::http::{StatusCode, header};
@@ -44,6 +44,9 @@ pub fn routes(shared: Arc<Shared>) -> Router {
         .route("/api/runs/{name}/ask", post(ask))
         .route("/api/compare", get(compare))
         .route("/api/live/{name}", get(stream::stream))
+        .route("/foxglove", get(foxglove::newest))
+        .route("/foxglove/{name}", get(foxglove::one))
+        .route("/metrics", get(metrics::metrics))
         .layer(middleware::from_fn_with_state(Arc::clone(&shared), with_token));
     Router::new()
         .route("/", get(|| asset("text/html; charset=utf-8", include_str!("assets/index.html"))))
@@ -69,7 +72,8 @@ async fn asset(kind: &'static str, text: &str) -> Response {
 
 /// Before everything else: the right host, and no foreign page; after everything, what a browser is to keep to.
 async fn at_this_place(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
-    let mut response = match shared.guard.place(request.headers()) {
+    let stream = request.uri().path().starts_with("/foxglove");
+    let mut response = match shared.guard.place(request.headers(), stream) {
         Ok(()) => next.run(request).await,
         Err(status) => refused(status, &request),
     };
@@ -98,14 +102,18 @@ async fn with_body(request: Request, next: Next) -> Response {
 
 /// Before data: the token.
 async fn with_token(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
-    match shared.guard.token_of(request.headers()) {
+    // Foxglove has an address alone to give, and Prometheus may have a header or an address.
+    let uri = request.uri();
+    let programs = uri.path() == "/metrics" || uri.path().starts_with("/foxglove");
+    match shared.guard.token_of(request.headers(), uri.query().filter(|_| programs)) {
         Ok(()) => next.run(request).await,
         Err(status) => refused(status, &request),
     }
 }
 
 fn refused(status: StatusCode, request: &Request) -> Response {
-    tracing::info!(%status, method = %request.method(), "the dashboard refused a request");
+    let origin = request.headers().get(header::ORIGIN);
+    tracing::info!(%status, method = %request.method(), ?origin, "the dashboard refused a request");
     status.into_response()
 }
 
@@ -115,7 +123,7 @@ fn failed_to(why: &miette::Report) -> Response {
 }
 
 /// Reads of the disk, beside the streams.
-async fn beside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Response> {
+pub async fn beside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Response> {
     tokio::task::spawn_blocking(work).await.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR.into_response())
 }
 
@@ -212,7 +220,7 @@ async fn diagnose(
     let folder = folder(&shared, &name)?;
     let refused = |why: &str| (StatusCode::CONFLICT, why.to_string()).into_response();
     let runs = shared.options.runs.clone();
-    if beside(move || pages::any_live(&runs)).await? {
+    if beside(move || !pages::live(&runs).is_empty()).await? {
         return Err(refused("a run goes on: diagnose when it is over"));
     }
     {

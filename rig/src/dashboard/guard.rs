@@ -17,13 +17,15 @@ const WITHIN: Duration = Duration::from_secs(10);
 /// Checks requests.
 pub struct Guard {
     hosts: Vec<String>,
+    /// Further origins that may read streams, and nothing else.
+    origins: Vec<String>,
     token: String,
     recent: Mutex<Vec<Instant>>,
 }
 
 impl Guard {
     /// A guard of a server, with a new token.
-    pub fn new(address: SocketAddr, more: &[String]) -> Self {
+    pub fn new(address: SocketAddr, more: &[String], origins: &[String]) -> Self {
         let port = address.port();
         let mut hosts =
             vec![format!("127.0.0.1:{port}"), format!("localhost:{port}"), format!("[::1]:{port}")];
@@ -34,7 +36,8 @@ impl Guard {
         let mut bytes = [0u8; 32];
         rand::rngs::SysRng.try_fill_bytes(&mut bytes).expect("the system gives random bytes");
         let token = bytes.iter().map(|b| format!("{b:02x}")).collect();
-        Guard { hosts, token, recent: Mutex::default() }
+        let origins = origins.iter().map(|origin| origin.to_ascii_lowercase()).collect();
+        Guard { hosts, origins, token, recent: Mutex::default() }
     }
 
     /// The token.
@@ -42,11 +45,12 @@ impl Guard {
         &self.token
     }
 
-    /// Whether a request names this server by a name that it has, and comes from one of its own pages or from no page at all.
+    /// Whether a request names this server by a name that it has, and comes from one of its own pages or
+    /// from no page at all; a `stream` may also be read from the further origins.
     ///
     /// # Errors
     /// The status to answer with.
-    pub fn place(&self, headers: &HeaderMap) -> Result<(), StatusCode> {
+    pub fn place(&self, headers: &HeaderMap, stream: bool) -> Result<(), StatusCode> {
         let one = |name| {
             let mut all = headers.get_all(name).iter();
             (all.next().map(|v| v.to_str().unwrap_or("?").to_ascii_lowercase()), all.next().is_some())
@@ -58,6 +62,7 @@ impl Guard {
         let (origin, twice) = one(header::ORIGIN);
         let known = |origin: &String| {
             origin.strip_prefix("http://").is_some_and(|o| self.hosts.iter().any(|h| h == o))
+                || (stream && self.origins.contains(origin))
         };
         if twice || origin.as_ref().is_some_and(|origin| !known(origin)) {
             return Err(StatusCode::FORBIDDEN);
@@ -65,18 +70,20 @@ impl Guard {
         Ok(())
     }
 
-    /// Whether a request has the token, in `Authorization: Bearer` or beside [`PROTOCOL`] among the protocols of a live stream.
+    /// Whether a request has the token: in `Authorization: Bearer`, beside [`PROTOCOL`] among the protocols
+    /// of a live stream, or as `token` in the `query` of an address that may have it there.
     ///
     /// # Errors
     /// The status to answer with.
-    pub fn token_of(&self, headers: &HeaderMap) -> Result<(), StatusCode> {
+    pub fn token_of(&self, headers: &HeaderMap, query: Option<&str>) -> Result<(), StatusCode> {
         let text = |name| headers.get(name).and_then(|v| v.to_str().ok());
         let bearer = text(header::AUTHORIZATION).and_then(|v| v.strip_prefix("Bearer "));
         let beside = || {
             let mut all = text(header::SEC_WEBSOCKET_PROTOCOL)?.split(',').map(str::trim);
             (all.next() == Some(PROTOCOL)).then(|| all.next())?
         };
-        let given = bearer.or_else(beside);
+        let in_query = || query?.split('&').find_map(|pair| pair.strip_prefix("token="));
+        let given = bearer.or_else(beside).or_else(in_query);
         if given.is_some_and(|given| same(given, &self.token)) {
             Ok(())
         } else {

@@ -62,9 +62,16 @@ pub fn run(folder: &Path, name: &str) -> miette::Result<Described> {
     Ok(Described { listed: listed(folder, entry), files: files_in(&folder.join(name)), lineage })
 }
 
-/// Whether a process drives any run of a folder.
-pub fn any_live(folder: &Path) -> bool {
-    std::fs::read_dir(folder).is_ok_and(|all| all.flatten().any(|entry| is_held(&entry.path())))
+/// The runs of a folder that a process drives, the newest session first.
+pub fn live(folder: &Path) -> Vec<String> {
+    let began = |run: &Path| run.join("sessions.jsonl").metadata().and_then(|meta| meta.modified()).ok();
+    let held =
+        std::fs::read_dir(folder).into_iter().flatten().flatten().filter(|entry| is_held(&entry.path()));
+    let mut live: Vec<_> = held
+        .filter_map(|entry| Some((began(&entry.path()), entry.file_name().into_string().ok()?)))
+        .collect();
+    live.sort_by(|a, b| b.cmp(a));
+    live.into_iter().map(|(_, name)| name).collect()
 }
 
 fn pages_in(run: &Path) -> Vec<String> {

@@ -1,13 +1,18 @@
 //! The server: what its parts share, and its beginning.
 
 use super::guard::Guard;
+use super::metrics::Followed;
 use super::{Options, api, serve};
 use crate::live::Ask;
 use miette::{IntoDiagnostic, WrapErr};
+use runs::files::open_plain;
 use std::collections::BTreeMap;
+use std::fs::OpenOptions;
+use std::io::Read;
 use std::net::{SocketAddr, TcpListener};
-use std::path::PathBuf;
-use std::sync::atomic::AtomicUsize;
+use std::os::unix::fs::{FileExt, OpenOptionsExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, AtomicUsize};
 use std::sync::{Arc, Mutex};
 use tokio::sync::Semaphore;
 
@@ -17,6 +22,10 @@ pub(super) struct Shared {
     pub guard: Guard,
     /// Live streams at present.
     pub streams: AtomicUsize,
+    /// States that were left out for slow clients.
+    pub dropped: AtomicU64,
+    /// Runs that are followed since they were scraped, by name.
+    pub followed: Mutex<BTreeMap<String, Followed>>,
     /// Turns to read a window of a record.
     pub windows: Semaphore,
     /// The diagnosis that is under way, and why others have no verdict.
@@ -64,10 +73,20 @@ impl Dashboard {
         })?;
         listener.set_nonblocking(true).into_diagnostic()?;
         let address = listener.local_addr().into_diagnostic()?;
-        let guard = Guard::new(address, &options.hosts);
+        let guard = Guard::new(address, &options.hosts, &options.origins);
         let token = guard.token().to_string();
-        let (streams, windows) = (AtomicUsize::new(0), Semaphore::new(1));
-        let shared = Arc::new(Shared { options, guard, streams, windows, diagnoses: Mutex::default() });
+        if let Some(file) = &options.token_file {
+            write_token(file, &token).wrap_err_with(|| format!("--token-file {}", file.display()))?;
+        }
+        let shared = Arc::new(Shared {
+            options,
+            guard,
+            streams: AtomicUsize::new(0),
+            dropped: AtomicU64::new(0),
+            followed: Mutex::default(),
+            windows: Semaphore::new(1),
+            diagnoses: Mutex::default(),
+        });
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().into_diagnostic()?;
         std::thread::Builder::new()
             .name("dashboard".into())
@@ -80,4 +99,21 @@ impl Dashboard {
     pub fn link(&self) -> String {
         format!("http://{}/#token={}", self.address, self.token)
     }
+}
+
+/// Writes the token to a file that its user alone can read. Only an earlier token is replaced.
+fn write_token(path: &Path, token: &str) -> miette::Result<()> {
+    let mut options = OpenOptions::new();
+    let mut file = open_plain(path, options.read(true).write(true).create(true).truncate(false).mode(0o600))
+        .into_diagnostic()?;
+    let mut before = String::new();
+    file.by_ref().take(1024).read_to_string(&mut before).into_diagnostic()?;
+    let a_token = before.len() == token.len() && before.bytes().all(|byte| byte.is_ascii_hexdigit());
+    if !(before.is_empty() || a_token) {
+        miette::bail!(help = "name another file", "the file holds something else than a token");
+    }
+    if file.metadata().into_diagnostic()?.permissions().mode() & 0o077 != 0 {
+        miette::bail!(help = "chmod 600 it, or remove it", "other users may read the file");
+    }
+    file.write_all_at(token.as_bytes(), 0).into_diagnostic()
 }

@@ -1,5 +1,6 @@
-//! A live stream to a browser. What a viewer hears is passed on line by line. A browser that reads nothing is
-//! disconnected; a slow one gets fewer states, never fewer passes or events.
+//! Live streams: each is a viewer of a run, in a queue that ends a client that reads nothing and gives a
+//! slow one fewer states, never fewer passes or events. A browser gets the messages line by line;
+//! [`super::foxglove`] gets them in the same way.
 
 use super::guard::PROTOCOL;
 use super::server::Shared;
@@ -8,7 +9,6 @@ use axum::extract::ws::{self, WebSocket, WebSocketUpgrade};
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -16,43 +16,43 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 
 /// Streams at once.
 const STREAMS: usize = 16;
-/// Lines that wait for a browser at most: passes and events of hours. A run ends soon after its last pass and
-/// waits for no viewer, so a slow browser's lines wait here.
+/// Messages that wait for a client at most: passes and events of hours. A run ends soon after its last pass
+/// and waits for no viewer, so a slow client's messages wait here.
 const QUEUE: usize = 4096;
-/// Lines that wait from which on states are left out.
+/// Messages that wait from which on states are left out.
 const WITHOUT_STATES: usize = 128;
-/// A browser that takes nothing for so long is let go.
+/// A client that takes nothing for so long is let go.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Largest message from a browser in bytes: it has nothing to say here.
 const LARGEST: usize = 256;
-/// How long a viewer waits for a message before it looks whether the browser is still there.
+/// How long a viewer waits for a message before it looks whether the client is still there.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
-/// Answers a request for a stream.
+/// Answers a browser's request for a stream.
 pub async fn stream(
     State(shared): State<Arc<Shared>>,
     Path(name): Path<String>,
     upgrade: WebSocketUpgrade,
 ) -> Response {
     let Some(folder) = shared.folder(&name) else { return StatusCode::NOT_FOUND.into_response() };
-    if shared.streams.fetch_add(1, Ordering::Relaxed) >= STREAMS {
-        shared.streams.fetch_sub(1, Ordering::Relaxed);
-        return StatusCode::SERVICE_UNAVAILABLE.into_response();
-    }
-    let place = Place(shared);
-    upgrade
-        .protocols([PROTOCOL])
-        .max_message_size(LARGEST)
-        .max_frame_size(LARGEST)
-        .write_buffer_size(0)
-        .on_upgrade(move |socket| async move {
-            follow(socket, folder).await;
-            drop(place);
-        })
+    let upgrade = upgrade.protocols([PROTOCOL]);
+    let source = move |shared: &Shared, to: &Sender<Message>| hear(&folder, shared, to);
+    accept(shared, upgrade, LARGEST, source, async |_, mut socket, mut messages| {
+        pass_on(&mut socket, &mut messages).await;
+        socket
+    })
 }
 
 /// A place among the streams.
 struct Place(Arc<Shared>);
+
+impl Place {
+    fn take(shared: Arc<Shared>) -> Result<Self, StatusCode> {
+        let place = Place(shared);
+        let before = place.0.streams.fetch_add(1, Ordering::Relaxed);
+        if before < STREAMS { Ok(place) } else { Err(StatusCode::SERVICE_UNAVAILABLE) }
+    }
+}
 
 impl Drop for Place {
     fn drop(&mut self) {
@@ -60,42 +60,67 @@ impl Drop for Place {
     }
 }
 
-async fn follow(mut socket: WebSocket, folder: PathBuf) {
-    let (to, mut from) = channel(QUEUE);
-    // The viewer's reads wait: a thread of its own, which ends with the channel or the run.
-    let viewer = std::thread::Builder::new().name("stream".into()).spawn(move || hear(&folder, &to));
-    if viewer.is_ok() {
-        pass_on(&mut socket, &mut from).await;
-    }
-    let _ = tokio::time::timeout(PATIENCE, socket.send(ws::Message::Close(None))).await;
+/// Gives a client a place, and a thread of its own that hears for it: a viewer's reads wait. `talk` gives
+/// the socket back to close.
+pub fn accept<F>(
+    shared: Arc<Shared>,
+    upgrade: WebSocketUpgrade,
+    largest: usize,
+    source: impl FnOnce(&Shared, &Sender<Message>) + Send + 'static,
+    talk: impl FnOnce(Arc<Shared>, WebSocket, Receiver<Message>) -> F + Send + 'static,
+) -> Response
+where
+    F: Future<Output = WebSocket> + Send + 'static,
+{
+    let place = match Place::take(shared) {
+        Ok(place) => place,
+        Err(status) => return status.into_response(),
+    };
+    let upgrade = upgrade.max_message_size(largest).max_frame_size(largest).write_buffer_size(0);
+    upgrade.on_upgrade(move |socket| async move {
+        let (to, messages) = channel(QUEUE);
+        let hearing = Arc::clone(&place.0);
+        let work = move || source(&hearing, &to);
+        // It ends with the channel or the run.
+        if std::thread::Builder::new().name("stream".into()).spawn(work).is_ok() {
+            let mut socket = talk(Arc::clone(&place.0), socket, messages).await;
+            let _ = tokio::time::timeout(PATIENCE, socket.send(ws::Message::Close(None))).await;
+        }
+        drop(place);
+    })
 }
 
-/// Hears a run and puts its lines into the queue, until either end is gone.
-fn hear(folder: &std::path::Path, to: &Sender<String>) {
+/// Hears a run and puts its messages into the queue, until either end is gone.
+pub fn hear(folder: &std::path::Path, shared: &Shared, to: &Sender<Message>) {
     let Ok(mut viewer) = Viewer::connect(folder) else { return };
     while !to.is_closed() {
         let message = match viewer.hear(LOOK_EVERY) {
-            Heard::Message(message) => message,
+            Heard::Message(message) => *message,
             Heard::Nothing => continue,
             Heard::Gone => return,
         };
-        if matches!(*message, Message::State(_)) && to.max_capacity() - to.capacity() >= WITHOUT_STATES {
+        if matches!(message, Message::State(_)) && to.max_capacity() - to.capacity() >= WITHOUT_STATES {
+            shared.dropped.fetch_add(1, Ordering::Relaxed);
             continue;
         }
-        let Ok(line) = serde_json::to_string(&message) else { continue };
-        if to.blocking_send(line).is_err() {
+        if to.blocking_send(message).is_err() {
             return;
         }
     }
 }
 
-async fn pass_on(socket: &mut WebSocket, lines: &mut Receiver<String>) {
+/// Sends, within a bound; whether the client took it.
+pub async fn send(socket: &mut WebSocket, message: ws::Message) -> bool {
+    matches!(tokio::time::timeout(PATIENCE, socket.send(message)).await, Ok(Ok(())))
+}
+
+async fn pass_on(socket: &mut WebSocket, messages: &mut Receiver<Message>) {
     loop {
         tokio::select! {
-            line = lines.recv() => {
-                let Some(line) = line else { return };
-                let sent = tokio::time::timeout(PATIENCE, socket.send(ws::Message::Text(line.into()))).await;
-                if !matches!(sent, Ok(Ok(()))) {
+            message = messages.recv() => {
+                let Some(message) = message else { return };
+                let Ok(line) = serde_json::to_string(&message) else { continue };
+                if !send(socket, ws::Message::Text(line.into())).await {
                     return;
                 }
             }

@@ -14,6 +14,7 @@ use std::sync::mpsc::{
 };
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use tables::export::topics;
 
 /// Messages that wait to be sent at most: several minutes of states in wall-clock time.
 const QUEUE: usize = 4096;
@@ -62,7 +63,8 @@ impl Feed {
             Update::Event(event) => Message::Event(TimedEvent::of(self.now_s, (*event).clone())),
             Update::State(snapshot) => {
                 self.now_s = snapshot.row.now.seconds();
-                Message::State(Box::new(State::of(snapshot)))
+                let signals = topics::of_row(&snapshot.row);
+                Message::State(Box::new(State { signals, ..State::of(snapshot) }))
             }
             Update::Off(off) if off.read_back => return,
             Update::Off(off) => Message::Off(off.words()),
@@ -120,7 +122,8 @@ impl Feed {
         let (queue, messages) = sync_channel(QUEUE);
         let (signals, viewers) = (self.signals.clone(), Vec::new());
         let teller = Teller { listener, signals, view, viewers, left_behind: 0 };
-        let tell = move || teller.tell(&messages);
+        let session = tracing::Span::current();
+        let tell = move || session.in_scope(|| teller.tell(&messages));
         let teller = std::thread::Builder::new().name("viewers".into()).spawn(tell)?;
         Ok(Open { queue, teller })
     }

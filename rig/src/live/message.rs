@@ -4,7 +4,7 @@ use realtime::cycle::Phase;
 use realtime::ports::Channel;
 use realtime::safety::Cause;
 use runs::sequence::{Event, MeasuredPass, Outcome};
-use runs::session::{Extremes, Job, Snapshot, unix_ns};
+use runs::session::{Deadlines, Extremes, Job, Snapshot, unix_ns};
 use runs::setup::Guards;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -123,6 +123,21 @@ pub struct State {
     /// Of all cycles since the last state.
     #[serde(default)]
     pub extremes: Extremes,
+    /// Time of the cycle in the record, in ns since 1970.
+    #[serde(default)]
+    pub unix_ns: u64,
+    /// The deadlines of this session so far.
+    #[serde(default)]
+    pub deadlines: Deadlines,
+    /// Time in s that the plate was driven in this session; none in virtual time.
+    #[serde(default)]
+    pub driven_s: Option<f64>,
+    /// The squared rms velocity summed over that, in m2/s.
+    #[serde(default)]
+    pub dose_m2_s: Option<f64>,
+    /// The cycle as every topic of an export shows it, in the order of [`tables::export::topics::SIGNALS`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub signals: Vec<Option<f64>>,
 }
 
 impl State {
@@ -153,6 +168,11 @@ impl State {
             z: row.online.map(|o| o.z),
             blocking: row.waits_for,
             extremes: snapshot.extremes,
+            unix_ns: snapshot.unix_ns,
+            deadlines: snapshot.deadlines,
+            driven_s: snapshot.driven.map(|(time, _)| time.seconds()),
+            dose_m2_s: snapshot.driven.map(|(_, dose)| dose),
+            signals: Vec::new(),
         }
     }
 }

@@ -60,6 +60,11 @@ fn state(time_s: f64) -> State {
             mu_relative: None,
             lateness_s: if time_s == 59.5 { 1.25e-3 } else { 1e-5 },
         },
+        unix_ns: 0,
+        deadlines: Default::default(),
+        driven_s: None,
+        dose_m2_s: None,
+        signals: Vec::new(),
     }
 }
 

@@ -101,7 +101,7 @@ fn sweep(
         }
         ends((signals.stops.swap(0, Ordering::Relaxed) > 0).then_some(End::Requested))
     };
-    let mut snapshots = Snapshots::default();
+    let mut snapshots = Snapshots::of(EPOCH_UNIX_NS, rig.period());
     let mut keep = |row: &Row, sequence: &Sequence, reaction: Reaction| -> miette::Result<()> {
         recorder.row(row).into_diagnostic()?;
         if let Some(snapshot) = snapshots.take(row) {

@@ -59,6 +59,11 @@ impl VirtualLoop {
         row
     }
 
+    /// Time from one cycle to the next.
+    pub fn period(&self) -> Nanos {
+        self.config.limits.timing.cycle
+    }
+
     /// Cycles run.
     pub fn cycles(&self) -> u64 {
         self.number

@@ -1,6 +1,6 @@
 //! The share of one task where an engine counts its tasks and knows nothing of cases: Slurm, PBS, Kubernetes,
-//! Snakemake, Nextflow. It is contiguous and follows from the number of cases, the task and the number of tasks
-//! alone. So a task that an engine starts again, on whatever machine, has the same cases.
+//! Snakemake, Nextflow. It is contiguous and follows from the number of cases, the task and the number of
+//! tasks alone. So a task that an engine starts again, on whatever machine, has the same cases.
 
 use super::gather::holes;
 use super::plan::MOST;

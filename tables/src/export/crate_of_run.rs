@@ -108,15 +108,16 @@ pub fn bytes(folder: &Path, run: &RunData, facts: &Facts, place: &Path) -> miett
     serde_json::to_vec_pretty(&json!({ "@context": CONTEXT, "@graph": whole })).into_diagnostic()
 }
 
-/// When the last event of the record was; in virtual time by the clock of the virtual rig, which begins in 2000.
+/// When the last event of the record was; in virtual time by the clock of the virtual rig, which begins in
+/// 2000.
 fn ended(run: &RunData) -> Option<String> {
     let start_s = run.facts.get("start_unix_ns")?.parse::<i64>().ok()? / 1_000_000_000;
     let (last_s, _) = run.events.last()?;
     Some(date::format(start_s + *last_s as i64))
 }
 
-/// Address and name of a person or an organisation that is stated as `NAME` or `NAME <ADDRESS>`; of one without an
-/// address its name within the crate.
+/// Address and name of a person or an organisation that is stated as `NAME` or `NAME <ADDRESS>`; of one
+/// without an address its name within the crate.
 fn addressed<'a>(stated: &'a str, within: &'a str) -> (&'a str, &'a str) {
     match stated.strip_suffix('>').and_then(|rest| rest.split_once('<')) {
         Some((name, address)) => (address.trim(), name.trim()),

@@ -1,7 +1,8 @@
-//! The cycles of a run's passes as columns: the curves of the flat record ([`SIGNALS`]) with their session and time.
+//! The cycles of a run's passes as columns: the curves of the flat record ([`SIGNALS`]) with their session
+//! and time.
 
 use super::columns::{Cells, Column, Table};
-use super::mcap::signals::SIGNALS;
+use super::topics::SIGNALS;
 use miette::{Context, IntoDiagnostic};
 use realtime::recorder::{self, Entry, Reader};
 use realtime::turn::Row;
@@ -13,7 +14,8 @@ use std::path::Path;
 /// The curve that numbers the point of a cycle; it has no value between passes.
 const POINT: &str = "/sweep/point";
 
-/// The cycles of these points, of every point where none is given. What lies between passes belongs to no point.
+/// The cycles of these points, of every point where none is given. What lies between passes belongs to no
+/// point.
 ///
 /// # Errors
 /// A record that cannot be opened or read.

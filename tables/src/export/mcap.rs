@@ -1,16 +1,12 @@
-//! A run's record as viewers plot it at once: MCAP with a flat topic for every quantity, its unit at the end of the topic's name,
-//! and a schema that says what it is. A message is `{"value": NUMBER}`; where there is no value there is no message.
+//! A run's record as viewers plot it at once: MCAP with the flat [`topics`].
 //!
 //! `/force/..`, `/friction/..`, `/drive/..`, `/stage/..`, `/loop/..`, `/safety/..` and `/sweep/..` follow the cycles: what is measured
 //! has a message a cycle, what holds from one change to the next (set-points, echoes, flags) one before and one at each change;
 //! `/pass/COLUMN` one a pass, for every column of the point table and of the comparison that holds numbers; `/event` holds the
 //! events as they are in the record. The record itself keeps everything that a cycle saw, nested: it is what a replay reads.
 
-pub(super) mod signals;
-
-use super::columns::{self, Cells, Column};
 use super::facts::Facts;
-use super::unit;
+use super::topics::{self, SIGNALS, Signal};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use miette::{Context, IntoDiagnostic};
@@ -20,8 +16,6 @@ use runs::files::{beside, fresh, sync_folder_of};
 use runs::report::RunData;
 use runs::run_dir::records_in;
 use runs::sequence::MeasuredPass;
-use serde_json::json;
-use signals::{SIGNALS, Signal};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -103,26 +97,15 @@ impl Flat {
                 data: Cow::Borrowed(bytes),
             })?;
         }
-        let mut signals = Vec::new();
-        for signal in SIGNALS {
-            let topic = curve(&mut to, signal.topic, signal.words)?;
-            signals.push((signal, topic, Held::default()));
-        }
-        let of_passes = columns::of(&[]);
-        let passes = of_passes
-            .iter()
-            .filter(|column| column.unit().is_some())
-            .map(|column| curve(&mut to, &format!("/pass/{}", column.name), column.words));
-        let passes = passes.collect::<Result<_, _>>()?;
-        let events = topic(
-            &mut to,
-            EVENTS,
-            &json!({
-                "title": EVENTS, "type": "object", "required": ["event"],
-                "description": "trips, arming, zeros, pauses and what else is worth a line",
-                "properties": { "event": { "type": "string", "description": "what happened" } },
-            }),
-        )?;
+        let mut all = |topics: Vec<topics::Topic>| {
+            topics.iter().map(|one| Topic::add(&mut to, one)).collect::<Result<Vec<_>, _>>()
+        };
+        let of_cycles = all(topics::of_cycles())?;
+        let passes = all(topics::of_passes())?;
+        let events = Topic::add(&mut to, &topics::of_events())?;
+        let signals =
+            SIGNALS.into_iter().zip(of_cycles).map(|(signal, topic)| (signal, topic, Held::default()));
+        let signals = signals.collect();
         Ok(Flat { to, signals, passes, events, text: Vec::with_capacity(64) })
     }
 
@@ -161,13 +144,7 @@ impl Flat {
     }
 
     fn pass(&mut self, log_time: u64, pass: &MeasuredPass) -> miette::Result<()> {
-        let table = columns::of(std::slice::from_ref(pass));
-        let value = |column: &Column| match &column.cells {
-            Cells::Numbers(v) => Some(v[0]),
-            Cells::Counts(v) => Some(v[0].map(|count| count as f64)),
-            Cells::Texts(_) => None,
-        };
-        for (value, topic) in table.iter().filter_map(value).zip(&mut self.passes) {
+        for (value, topic) in topics::of_pass(pass).into_iter().zip(&mut self.passes) {
             topic.value(&mut self.to, log_time, value, &mut self.text).into_diagnostic()?;
         }
         Ok(())
@@ -180,6 +157,11 @@ impl Flat {
 }
 
 impl Topic {
+    fn add(to: &mut Writer<BufWriter<File>>, topic: &topics::Topic) -> mcap::McapResult<Self> {
+        let schema = to.add_schema(&topic.schema_name(), "jsonschema", topic.schema().as_bytes())?;
+        Ok(Topic { channel: to.add_channel(schema, &topic.name, "json", &BTreeMap::new())?, written: 0 })
+    }
+
     fn put(&mut self, to: &mut Writer<BufWriter<File>>, log_time: u64, text: &[u8]) -> mcap::McapResult<()> {
         self.written = self.written.wrapping_add(1);
         let (channel_id, sequence) = (self.channel, self.written);
@@ -195,33 +177,7 @@ impl Topic {
         value: Option<f64>,
         text: &mut Vec<u8>,
     ) -> mcap::McapResult<()> {
-        let Some(value) = value.filter(|value| value.is_finite()) else { return Ok(()) };
         text.clear();
-        write!(text, "{{\"value\":{value:?}}}")?;
-        self.put(to, log_time, text)
+        topics::message(value, text).map_or(Ok(()), |()| self.put(to, log_time, text))
     }
-}
-
-/// A topic of `{"value": NUMBER}`.
-fn curve(to: &mut Writer<BufWriter<File>>, name: &str, words: &str) -> mcap::McapResult<Topic> {
-    let unit = unit::of(name);
-    topic(
-        to,
-        name,
-        &json!({
-            "title": name, "type": "object", "required": ["value"], "additionalProperties": false,
-            "description": format!("{words}, in {}", if unit == "1" { "numbers without a unit" } else { unit }),
-            "properties": { "value": { "type": "number", "description": words, "unit": unit } },
-        }),
-    )
-}
-
-fn topic(
-    to: &mut Writer<BufWriter<File>>,
-    name: &str,
-    schema: &serde_json::Value,
-) -> mcap::McapResult<Topic> {
-    let named = format!("muprime{}", name.replace('/', "."));
-    let schema = to.add_schema(&named, "jsonschema", schema.to_string().as_bytes())?;
-    Ok(Topic { channel: to.add_channel(schema, name, "json", &BTreeMap::new())?, written: 0 })
 }

@@ -1,7 +1,7 @@
 //! Slurm: array jobs by `sbatch`. A task that a node's failure ends is queued again by Slurm (`--requeue`).
 //!
-//! Arrays are handed over one after another, so that no more than a window of tasks waits. Where a limit of the
-//! site refuses one, what runs goes on and the rest is tried again later, in smaller arrays.
+//! Arrays are handed over one after another, so that no more than a window of tasks waits. Where a limit of
+//! the site refuses one, what runs goes on and the rest is tried again later, in smaller arrays.
 #![allow(clippy::disallowed_methods, reason = "a refused submission is repeated in wall-clock time")]
 
 use super::{Engine, Handed, Job, numbers, quoted};
@@ -128,7 +128,8 @@ fn more(folder: &Path, job: &Job, handed: &mut Handed, mut queued: u64) -> miett
     Ok(())
 }
 
-/// The command that hands over `count` tasks from `first` on. The user's options come last, so that they count.
+/// The command that hands over `count` tasks from `first` on. The user's options come last, so that they
+/// count.
 fn array(folder: &Path, job: &Job, first: u64, count: u64) -> Command {
     let at_once = job.workers.map(|n| format!("%{}", (n / job.cores_a_task).max(1))).unwrap_or_default();
     let mut command = Command::new("sbatch");
