@@ -24,7 +24,7 @@ pub struct Place {
     /// A further name that browsers ask for it by, with its port, as rig-1.lab:8417 (may be repeated)
     #[arg(long = "host", value_name = "NAME:PORT")]
     pub hosts: Vec<String>,
-    /// A further page that may read live streams, and nothing else, as https://app.foxglove.dev (may be
+    /// A further page that may read live streams, and nothing else, as `https://app.foxglove.dev` (may be
     /// repeated)
     #[arg(long = "origin", value_name = "ORIGIN")]
     pub origins: Vec<String>,

@@ -86,7 +86,7 @@ pub struct Args {
     /// Show this run and its folder of runs in a browser, at this address [without one: 127.0.0.1:8417]
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = LISTEN, conflicts_with = "tui")]
     dashboard: Option<SocketAddr>,
-    /// A further page that may read the live stream of the dashboard, as https://app.foxglove.dev (may be
+    /// A further page that may read the live stream of the dashboard, as `https://app.foxglove.dev` (may be
     /// repeated)
     #[arg(long = "origin", value_name = "ORIGIN", requires = "dashboard")]
     origins: Vec<String>,

@@ -144,7 +144,7 @@ impl Study {
         self.out.join("shards")
     }
 
-    /// Where the shard of a range is: in one of at most [`FOLDERS`] folders, or beside them, where earlier
+    /// Where the shard of a range is: in one of at most `FOLDERS` folders, or beside them, where earlier
     /// versions wrote it.
     pub fn shard(&self, range: &Range<u64>) -> PathBuf {
         let name = format!("{:012}-{:012}.parquet", range.start, range.end);
