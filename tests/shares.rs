@@ -51,7 +51,7 @@ fn each_engine_names_a_task_and_what_is_unclear_is_refused() {
     for name in [NAMES[0], NAMES[5], NAMES[6], NAMES[7]] {
         assert_eq!(share(Some(4), &[(name, "3")]), is(3, 4));
         assert!(share(Some(4), &[(name, "4")]).unwrap_err().contains("no such task"));
-        assert!(share(Some(4), &[(name, "x")]).unwrap_err().contains("no number"));
+        assert!(share(Some(4), &[(name, "x")]).unwrap_err().contains("not a number"));
     }
     assert!(share(None, &[("PBS_ARRAY_INDEX", "3")]).unwrap_err().contains("of how many"));
     assert_eq!(share(Some(4), &[("PBS_ARRAYID", "3"), ("PBS_ARRAY_INDEX", "3")]), is(3, 4));
@@ -116,6 +116,27 @@ fn an_engine_that_counts_its_tasks_alone_runs_every_case_once() {
         assert_eq!(refused.status.code(), Some(2), "{words:?} {variables:?}");
         let error = documents(&refused).pop().unwrap()["error"].to_string();
         assert!(error.contains(wanted) && !out.exists(), "{error}");
+    }
+}
+
+/// An option that an engine does not have is refused wherever it may be given, and no folder is made.
+#[test]
+fn options_that_an_engine_does_not_have_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cases, out) = (noop(folder.path(), 50, 10), folder.path().join("study"));
+    let submit = ["submit", text(&cases), "--out", text(&out)];
+    let adapt = ["model", "adapt", "--out", text(&out), "--span", "amplitude_pp_m=0.3e-6..5e-6"];
+    for words in [&submit[..], &adapt] {
+        for (more, wanted) in [
+            (["--cores-a-task", "2"], "--cores-a-task is for slurm"),
+            (["--workers", "0"], "at least one is needed"),
+            (["--task-s", "0"], "above 0"),
+            (["--engine", "dask"], "needs --server"),
+        ] {
+            let refused = run(muprime().args(words).args(more));
+            assert_eq!(refused.status.code(), Some(2), "{words:?} {more:?}");
+            assert!(texts(&refused).1.contains(wanted) && !out.exists(), "{words:?} {more:?}");
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::prelude::*;
 use studies::cases::engines::quoted;
 use studies::cases::study::Study;
-use studies::cases::submit::{Options, cancel, submit, tasks};
+use studies::cases::submit::{Options, cancel, checked, submit, tasks};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -38,25 +38,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         return exit(DONE);
     }
-    let positive = |name: &str, value: Option<f64>| match value {
-        Some(v) if !(v > 0.0 && v.is_finite()) => Err(miette::miette!("--{name} {v}: above 0")),
-        _ => Ok(()),
-    };
     let options = &args.options;
-    positive("task-s", Some(options.task_s))?;
-    positive("case-s", options.case_s)?;
-    if options.workers == Some(0) {
-        miette::bail!("--workers 0: at least one is needed");
-    }
-    studies::cases::engines::by_name(&options.engine)?;
-    if options.engine == "dask" && (options.server.is_none() || options.detach) {
-        miette::bail!(
-            "--engine dask needs --server, the address of its scheduler, and cannot be detached from: it drops what waits when its client leaves"
-        );
-    }
-    if options.cores_a_task > 1 && options.engine != "slurm" {
-        miette::bail!("--cores-a-task is for slurm: the other engines share a node among tasks of one core");
-    }
+    checked(options)?;
     let study = Study::begin(args.cases.as_deref().unwrap_or(&args.out), &args.out)?;
     if args.plan {
         let planned = tasks(&study, options)?;

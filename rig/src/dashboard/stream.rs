@@ -21,7 +21,7 @@ const STREAMS: usize = 16;
 const QUEUE: usize = 4096;
 /// Messages that wait from which on states are left out.
 const WITHOUT_STATES: usize = 128;
-/// A client that takes nothing for so long is let go.
+/// A client that takes nothing for so long is disconnected.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Largest message from a browser in bytes: it has nothing to say here.
 const LARGEST: usize = 256;

@@ -34,7 +34,7 @@ pub struct Pilot {
 
 impl Pilot {
     /// Memory that a task of so many cores may take, bytes: twice the peak for each core, at least 64 MiB,
-    /// and the double in each round after the first, for tasks that a lack of memory ended.
+    /// doubled in each round after the first, for tasks that a lack of memory ended.
     pub fn memory_bytes(&self, cores: u64, round: u32) -> Option<u64> {
         self.peak_bytes.map(|peak| ((peak * MEMORY_FACTOR).max(LEAST_MEMORY) * cores) << round)
     }

@@ -43,7 +43,7 @@ impl Share {
     pub fn from_environment(of: Option<u64>, get: &dyn Fn(&str) -> Option<String>) -> miette::Result<Share> {
         let number = |name: &str| {
             let parsed = |text: String| {
-                text.trim().parse::<u64>().map_err(|_| miette!("{name} is '{text}': no number"))
+                text.trim().parse::<u64>().map_err(|_| miette!("{name} is '{text}', which is not a number"))
             };
             get(name).map(parsed).transpose()
         };

@@ -119,7 +119,7 @@ fn length(ranges: &[Range<u64>]) -> u64 {
 /// An engine that takes nothing; on this machine whatever the worker says.
 pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     let begun = Instant::now();
-    let engine = engines::by_name(&options.engine)?;
+    let engine = checked(options)?;
     let cases = study.file.header.cases;
     let missing = || Ok::<_, miette::Report>(holes(&study.ranges_there()?, cases));
     let first = length(&missing()?);
@@ -201,6 +201,31 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     bar.finish_and_clear();
     submitted.wall_seconds = begun.elapsed().as_secs_f64();
     Ok(submitted)
+}
+
+/// Refuses options that no engine or not this one has, before a folder is made; gives the engine, none for this
+/// machine.
+///
+/// # Errors
+/// Whatever is wrong with the options.
+pub fn checked(options: &Options) -> miette::Result<Option<&'static engines::Engine>> {
+    for (name, value) in [("task-s", Some(options.task_s)), ("case-s", options.case_s)] {
+        if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
+            miette::bail!("--{name} {value}: above 0");
+        }
+    }
+    if options.workers == Some(0) {
+        miette::bail!("--workers 0: at least one is needed");
+    }
+    if options.cores_a_task > 1 && options.engine != "slurm" {
+        miette::bail!("--cores-a-task is for slurm: the other engines share a node among tasks of one core");
+    }
+    if options.engine == "dask" && (options.server.is_none() || options.detach) {
+        miette::bail!(
+            "--engine dask needs --server, the address of its scheduler, and cannot be detached from: it drops what waits when its client leaves"
+        );
+    }
+    engines::by_name(&options.engine)
 }
 
 /// Cores of this machine.

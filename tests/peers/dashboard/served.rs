@@ -1,4 +1,4 @@
-//! A dashboard that is served, and a run that is told at the pace of a clock.
+//! A dashboard that is served, and a run whose messages come at the pace of a clock.
 
 use rig::live::{Ended, Feed, Run};
 use runs::plan::Plan;

@@ -15,7 +15,7 @@ use studies::cases::gather::gather;
 use studies::cases::kinds::{Cell, ridge};
 use studies::cases::shard::Reader;
 use studies::cases::study::Study;
-use studies::cases::submit::{Options, submit};
+use studies::cases::submit::{Options, checked, submit};
 
 /// Number of the first held-out draw.
 const HELD_OUT_FROM: u64 = 1_000_000_007;
@@ -89,6 +89,7 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
     if args.rounds.detach {
         miette::bail!("--detach: a round follows from the results of the one before it");
     }
+    checked(&args.rounds)?;
     let (spans, base) = (spans(&args.span)?, values(&args.set)?);
     let steady = Steady { tolerance: args.tolerance, at_most: args.at_most, ..Steady::default() };
     let header = |spans: BTreeMap<String, ridge::Span>, cases: u64| {
