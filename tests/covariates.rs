@@ -32,6 +32,7 @@ fn warming(detuning_per_kelvin: f64) -> String {
         acts_on: "prediction".into(),
         parameters: vec![parameter("detuning_per_kelvin", "1/K", detuning_per_kelvin)],
         covariance: Vec::new(),
+        table: None,
     };
     let saved = SavedModel {
         schema: "muprime.model/1".into(),

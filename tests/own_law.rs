@@ -14,7 +14,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
 use std::path::Path;
 use studies::cases::adaptive::{SparseGrid, place_of};
-use tests::{documents, file, muprime, short_plan, texts};
+use tests::{documents, file, muprime, rounds, short_plan, texts};
 
 /// What the program below computes: a law that is nobody's here.
 fn foreign(c: &Condition) -> f64 {
@@ -491,4 +491,95 @@ fn the_surrogate_of_model_adapt_is_read_as_it_was_grown() {
     ];
     let output = muprime().current_dir(folder.path()).args(words).output().unwrap();
     assert_eq!(documents(&output).last().unwrap()["summary"]["outcome"], "complete", "{:?}", texts(&output));
+}
+
+/// A change of friction with speed that is nobody's here, at size 1: as a table of a user.
+fn dip(speed_m_s: f64) -> f64 {
+    -(-(speed_m_s / 0.02).ln().powi(2)).exp()
+}
+
+fn dip_table(low: f64, high: f64) -> String {
+    let mut text = String::from(
+        "# place: contact\n# summary: A film that is thickest at one speed.\nspeed_m_s,friction_change\n",
+    );
+    for i in 0..60 {
+        let speed = low * (high / low).powf(f64::from(i) / 59.0);
+        text += &format!("{speed:e},{:e}\n", dip(speed));
+    }
+    text
+}
+
+/// A sealed set of the outside simulation without a cause; the forces of `size` times the dip come on top, noise
+/// included.
+fn dipped(at: &Path, seed: u64, size: f64) -> sim::sealed::Set {
+    let mut set = sim::sealed::generate(seed, sim::sealed::Stratum::None, sim::sealed::Ask::Gain);
+    for pass in &mut set.passes {
+        let factor = 1.0 + size * dip(pass.speed_m_s);
+        pass.lateral_force_n = pass.lateral_force_n.map(|force| factor * force);
+    }
+    std::fs::create_dir_all(at).unwrap();
+    write_passes(&set.passes, std::fs::File::create(at.join("points.csv")).unwrap()).unwrap();
+    write_passes(&set.conditions, std::fs::File::create(at.join("conditions.csv")).unwrap()).unwrap();
+    std::fs::write(at.join("rig.toml"), &set.rig_toml).unwrap();
+    set
+}
+
+/// An effect of one's own, as a table, on data of another simulation: named with its size where it is there, not
+/// named where it is not, in a corrected model and its predictions.
+#[test]
+fn an_effect_of_ones_own_is_one_more_hypothesis() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("thick_film.csv"), dip_table(1e-4, 1.0)).unwrap();
+    assert!(done(at, &["check", "thick_film.csv"]).is_empty());
+    let (mut named, mut inside, mut claimed, trials) = (0, 0, 0, rounds(6, 30));
+    for seed in 0..trials {
+        let (with, without) = (at.join(format!("with{seed}")), at.join(format!("without{seed}")));
+        let size = 0.2 + 0.02 * seed as f64;
+        let set = dipped(&with, 90_200 + seed, size);
+        let verdict = diagnosed(&with, &["--effect", "../thick_film.csv", "--save-model", "model.toml"]);
+        let leader = &verdict["hypotheses"][0];
+        if leader["effects"] == json!(["thick_film"]) && verdict["verdict"] == "named" {
+            named += 1;
+            let ends: Vec<f64> = serde_json::from_value(leader["parameters"][0]["ci95"].clone()).unwrap();
+            inside += usize::from(ends[0] <= size && size <= ends[1]);
+            let saved = std::fs::read_to_string(with.join("model.toml")).unwrap();
+            let model = runs::model_file::load("model.toml", &saved).unwrap();
+            let c = Condition { speed_m_s: 0.02, ..set.passes[0].condition(0.5) };
+            let base = Condition { speed_m_s: 0.9, ..c };
+            assert!(model.predict(&c).is_ok() && model.predict(&base).is_ok());
+            assert!(
+                model.predict(&Condition { speed_m_s: 1.5, ..c }).is_err(),
+                "beyond the table nothing is said"
+            );
+        }
+        assert_eq!(verdict["own_effects"][0]["name"], "thick_film");
+        dipped(&without, 90_200 + seed, 0.0);
+        let verdict = diagnosed(&without, &["--effect", "../thick_film.csv"]);
+        claimed += usize::from(verdict["verdict"] == "named");
+    }
+    eprintln!("named {named} of {trials}, truth inside the interval {inside}; without it named {claimed}");
+    assert!(10 * named >= 8 * trials && 10 * inside >= 8 * named as usize && claimed == 0);
+
+    // The verdict is checked as any other; one whose table does not reach every pass is not tried.
+    let clean = at.join("with0");
+    let verdict = diagnosed(&clean, &["--effect", "../thick_film.csv"]);
+    std::fs::write(clean.join("verdict.json"), verdict.to_string()).unwrap();
+    assert!(done(&clean, &["check", "verdict.json"]).is_empty());
+    std::fs::write(clean.join("narrow.csv"), dip_table(0.019, 0.021)).unwrap();
+    let verdict = diagnosed(&clean, &["--effect", "narrow.csv"]);
+    let why = verdict["not_testable"].as_array().unwrap().iter().find(|n| n["effect"] == "narrow").unwrap();
+    assert!(why["because"].as_str().unwrap().contains("does not reach point"), "{why}");
+
+    for (name, text, part) in [
+        ("squeeze_film", dip_table(1e-4, 1.0), "is an effect of the library"),
+        ("Film", dip_table(1e-4, 1.0), "is not a name of an effect"),
+        ("film", "speed_m_s,mu_relative\n0.1,1\n".into(), "an effect table has no column 'mu_relative'"),
+        ("film", "speed_m_s\n0.1\n".into(), "'friction_change' is missing"),
+        ("film", format!("# size_sd: -1\n{}", dip_table(1e-4, 1.0)), "a number above zero"),
+        ("film", format!("# place: skin\n{}", dip_table(1e-4, 1.0)), "contact, finger, plate or instrument"),
+    ] {
+        std::fs::write(clean.join(format!("{name}.csv")), text).unwrap();
+        refused(&clean, &["diagnose", "points.csv", "--effect", &format!("{name}.csv")], &[part]);
+    }
 }

@@ -7,7 +7,7 @@ use effects::imitated;
 use rayon::prelude::*;
 
 /// The four answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The recalibrated baseline explains the table.

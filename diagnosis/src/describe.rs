@@ -90,6 +90,7 @@ pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
         with.filter(|(c, _)| c.effects.contains(&effect)).map(|(_, p)| p).sum()
     };
     let sure = fitted.problem.constants.name_probability;
-    let library = effects::library();
-    (0..library.len()).filter(|&e| of(e) >= sure).map(|e| library[e].name.to_string()).collect()
+    let tried: std::collections::BTreeSet<usize> =
+        fitted.candidates.iter().flat_map(|c| c.effects.iter().copied()).collect();
+    tried.into_iter().filter(|&e| of(e) >= sure).map(|e| effects::at(e).name.to_string()).collect()
 }

@@ -6,7 +6,7 @@ use crate::gaussian::Covariance;
 use crate::law::Law;
 use crate::layout::{Layout, NUISANCES};
 pub use crate::member::Member;
-use effects::{Active, Baseline, Design, Parameter, known, library};
+use effects::{Active, Baseline, Design, Parameter, library};
 use models::condition::Condition;
 use models::rig_file::CertifiedKey;
 use nalgebra::{DMatrix, DVector};
@@ -50,6 +50,8 @@ pub struct Problem {
     pub constants: Arc<Constants>,
     /// The base law; none: the spring-slider.
     pub law: Option<Arc<Law>>,
+    /// Effects of the user's own that are tried; beyond their tables there is no prediction.
+    pub own: Vec<usize>,
     /// Of each pass: force of the base law beside the nominal spring-slider's, and the law's uncertainty, N.
     /// Empty without a law.
     pub beside: Vec<[f64; 2]>,
@@ -113,6 +115,7 @@ impl Problem {
             rough: false,
             constants: constants.clone(),
             law: None,
+            own: Vec::new(),
             beside: Vec::new(),
         }
     }
@@ -134,9 +137,11 @@ impl Problem {
         self.beside.get(row).map_or(0.0, |b| b[1] * b[1])
     }
 
-    /// Whether the base law can tell at a condition; the spring-slider always can.
+    /// Whether the base law and the user's own effects can tell at a condition; spring-slider and library always can.
     pub fn tells(&self, pass: &Condition) -> bool {
-        self.law.as_ref().is_none_or(|law| law.tells(self.nominal.mu0, pass))
+        let at = Condition { mu0: self.nominal.mu0, ..*pass };
+        let reached = |e: &usize| effects::at(*e).own.is_none_or(|own| own.reaches(&at).is_ok());
+        self.law.as_ref().is_none_or(|law| law.tells(at.mu0, pass)) && self.own.iter().all(reached)
     }
 
     /// Full friction at each pass, N: the unit of the errors of docs/contract.md.
@@ -164,6 +169,7 @@ impl Problem {
             certified: self.certified.clone(),
             constants: self.constants.clone(),
             law: self.law.clone(),
+            own: self.own.clone(),
             beside: if self.law.is_some() {
                 rows.iter().map(|&i| self.beside[i]).collect()
             } else {
@@ -302,7 +308,11 @@ impl Problem {
         order.sort_by_key(|&k| members[k]);
         let active: Vec<Active<'_>> = order
             .into_iter()
-            .map(|k| Active { effect: known()[members[k].effect], law: members[k].law, theta: &thetas[k] })
+            .map(|k| Active {
+                effect: effects::at(members[k].effect),
+                law: members[k].law,
+                theta: &thetas[k],
+            })
             .collect();
         let force = if self.rough { effects::rough_lateral_force } else { effects::lateral_force };
         DVector::from_iterator(

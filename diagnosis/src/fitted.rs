@@ -11,7 +11,6 @@ use crate::noise::{PureError, variance};
 use crate::scatter::Scatter;
 use crate::structure::Structure;
 use crate::structure::shapes::{self, Shape};
-use effects::known;
 use nalgebra::DMatrix;
 
 /// One hypothesis with effects: its evidence over laws and shares, and its best law.
@@ -62,7 +61,7 @@ impl Candidate {
 
     /// Names in the library's order.
     pub fn names(&self) -> Vec<&'static str> {
-        self.effects.iter().map(|&e| known()[e].name).collect()
+        self.effects.iter().map(|&e| effects::at(e).name).collect()
     }
 }
 

@@ -19,6 +19,7 @@ use crate::singles::{SINGLES_END, Search, lapsed, singles, sort, unlisted};
 use crate::starts::{nuisances_of, tempered};
 use crate::structure::{shapes, structure};
 use effects::{Effect, library};
+use models::condition::Condition;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -31,6 +32,8 @@ pub struct Options {
     pub pairs: bool,
     /// Effects that are left out of the library (for leave-one-effect-out tests).
     pub without: Vec<String>,
+    /// Effects of the user's own that are tried beside the library, by their numbers ([`effects::own`]).
+    pub own: Vec<usize>,
     /// Receives the progress of the diagnosis.
     pub progress: Progress,
     /// The base law; none: the spring-slider.
@@ -43,6 +46,7 @@ impl Default for Options {
             constants: Arc::default(),
             pairs: true,
             without: Vec::new(),
+            own: Vec::new(),
             progress: Progress::default(),
             law: None,
         }
@@ -95,16 +99,21 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
 
     let mut not_testable = Vec::new();
     let mut tried = Vec::new();
-    for (index, effect) in library().iter().enumerate() {
+    for index in (0..library().len()).chain(options.own.iter().copied()) {
+        let effect = effects::at(index);
         if options.without.iter().any(|n| n == effect.name) {
             continue;
         }
         match table.lacks(effect.needs) {
             Some(because) => not_testable.push((effect.name, certified(effect, rig).unwrap_or(because))),
-            None => tried.push(index),
+            None => match beyond(&problem, table, effect) {
+                Some(because) => not_testable.push((effect.name, because)),
+                None => tried.push(index),
+            },
         }
     }
 
+    problem.own = tried.iter().copied().filter(|e| options.own.contains(e)).collect();
     let search = Search { nuisances: &nuisances, loose: &loose, basis: &basis, progress };
     let mut candidates = singles(&problem, table, &tried, &search);
     let lapsed = lapsed(&mut problem, table, &mut candidates, &search);
@@ -177,6 +186,16 @@ fn explained_by(problem: &Problem, scatter: &Scatter, cause: &Posterior) -> Vec<
             < problem.constants.explained_sd.powi(2) * own
     };
     scatter.suspects.iter().map(|s| s.row).filter(explains).collect()
+}
+
+/// Why an effect of the user's own is not sought: its table does not reach every pass.
+fn beyond(problem: &Problem, table: &Table, effect: &Effect) -> Option<String> {
+    let own = effect.own?;
+    let mu0 = problem.nominal.mu0;
+    let why = |i: usize| own.reaches(&Condition { mu0, ..problem.passes[i] }).err().map(|why| (i, why));
+    let (first, why) = (0..problem.len()).find_map(why)?;
+    let value = if why.value.is_nan() { "not measured".into() } else { format!("{:.4e}", why.value) };
+    Some(format!("its table does not reach point {}, where {} is {value}", table.points[first], why.name))
 }
 
 /// Why an effect is not sought that only an outside standard shows, where rig.toml states that calibration.

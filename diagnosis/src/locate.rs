@@ -7,7 +7,7 @@ use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::fitted::Fitted;
 use crate::predict::{Forecast, Model, forecast};
-use effects::{Place, library};
+use effects::Place;
 use models::condition::Condition;
 use models::covariate;
 use models::quantity::PeakToPeak;
@@ -35,7 +35,7 @@ pub fn ledger(fitted: &Fitted, probabilities: &[f64], unknown: f64) -> BTreeMap<
     map.insert("unknown", unknown);
     for (c, p) in fitted.candidates.iter().zip(probabilities) {
         for &e in &c.effects {
-            *map.entry(library()[e].place.name()).or_insert(0.0) += p / c.effects.len() as f64;
+            *map.entry(effects::at(e).place.name()).or_insert(0.0) += p / c.effects.len() as f64;
         }
     }
     let total: f64 = map.values().sum();

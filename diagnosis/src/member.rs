@@ -1,11 +1,11 @@
 //! One cause in one of its laws: the letter from which hypotheses are spelled.
 
-use effects::{Design, Law, Parameter, Place, known};
+use effects::{Design, Law, Parameter, Place};
 
-/// One member of a hypothesis: index of the effect among the known ones, and of its law.
+/// One member of a hypothesis: number of the effect, and index of its law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Member {
-    /// Index among [`known`] causes, the library first.
+    /// Number of the effect, see [`effects::at`]: the library comes first.
     pub effect: usize,
     /// Index of the law.
     pub law: usize,
@@ -14,7 +14,7 @@ pub struct Member {
 impl Member {
     /// The law.
     pub fn form(&self) -> &'static Law {
-        &known()[self.effect].laws[self.law]
+        &effects::at(self.effect).laws[self.law]
     }
     /// The law's parameters, with what the loads of a table make of their priors.
     pub fn parameters(&self, design: &Design) -> Vec<Parameter> {
@@ -26,14 +26,14 @@ impl Member {
     }
     /// The effect's name.
     pub fn name(&self) -> &'static str {
-        known()[self.effect].name
+        effects::at(self.effect).name
     }
     /// Largest share of its change by which it may depart from its form.
     pub fn departs_by(&self) -> f64 {
-        known()[self.effect].departs_by
+        effects::at(self.effect).departs_by
     }
     /// Where the effect sits.
     pub fn place(&self) -> Place {
-        known()[self.effect].place
+        effects::at(self.effect).place
     }
 }

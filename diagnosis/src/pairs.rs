@@ -6,7 +6,7 @@ use crate::fitted::Candidate;
 use crate::layout::{Layout, NUISANCES};
 use crate::least_squares::Fit;
 use crate::starts::{coarse_scan, full_scan, nuisance_starts, refine_from};
-use effects::{library, one_cause};
+use effects::one_cause;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -261,7 +261,7 @@ fn weighed(problem: &Problem, pairs: Vec<Pair>, basis: &DMatrix<f64>) -> Vec<Can
         .collect();
     let mut list: Vec<Candidate> = Vec::new();
     for (effects, evidence, best) in weighed {
-        let laws: f64 = best.members.iter().map(|m| library()[m.effect].laws.len() as f64).product();
+        let laws: f64 = best.members.iter().map(|m| effects::at(m.effect).laws.len() as f64).product();
         // Only the best pair of laws was fitted: the others are taken to add nothing.
         let log_evidence = evidence - laws.ln();
         match list.iter_mut().find(|c| c.effects == effects) {

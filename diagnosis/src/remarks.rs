@@ -5,7 +5,6 @@ use crate::decision::{Decision, Verdict, decide};
 use crate::hypotheses::{Fitted, Options, fit_believing};
 use crate::scatter::{Belief, Scatter};
 use crate::verdict::probability;
-use effects::known;
 use models::covariate::{AMPLITUDE, Role, SMOOTH};
 use models::quantity::PeakToPeak;
 use serde::Serialize;
@@ -110,7 +109,7 @@ const PARTED: f64 = 0.8;
 fn two_levels(fitted: &Fitted, table: &Table, decision: &Decision) -> Option<String> {
     let led = matches!(decision.verdict, Verdict::Named | Verdict::Ambiguous);
     let leader = &fitted.candidates[decision.leader().filter(|_| led)?];
-    let needs = leader.effects.iter().flat_map(|e| known()[*e].needs);
+    let needs = leader.effects.iter().flat_map(|e| effects::at(*e).needs);
     let largest = table.design.largest_amplitude_m;
     let mut words: Vec<&str> = needs
         .filter_map(|need| need.levels_of())

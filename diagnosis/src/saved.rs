@@ -5,8 +5,8 @@ use crate::evidence::Posterior;
 use crate::fit::{Member, Problem};
 use crate::layout::Layout;
 use crate::verdict::Diagnosis;
+use effects::Place;
 use effects::corrected::{SavedEffect, SavedModel, SavedParameter};
-use effects::{Place, known};
 
 /// Least relative uncertainty that a model states.
 const LEAST_RELATIVE_SD: f64 = 0.005;
@@ -22,7 +22,7 @@ impl Diagnosis {
             Verdict::NoGap => &self.fitted.none,
             Verdict::Named | Verdict::Ambiguous => &self.fitted.candidates[self.decision.class[0]].best,
         };
-        let errors = best.members.iter().map(|m| known()[m.effect].interpolation_error);
+        let errors = best.members.iter().map(|m| effects::at(m.effect).interpolation_error);
         let gap = &self.report.gap;
         let square = |rmse: Option<f64>| rmse.unwrap_or(0.0).powi(2);
         let left = (square(gap.form_alone_rmse) - square(gap.noise_floor_rmse)).max(0.0).sqrt();
@@ -73,5 +73,6 @@ fn saved_effect(
             .map(|(p, v)| SavedParameter { name: p.name.to_string(), value: *v, unit: p.unit.to_string() })
             .collect(),
         covariance: all.clone().map(|i| all.clone().map(|j| entry(i, j)).collect()).collect(),
+        table: effects::at(member.effect).own.map(|own| own.text.clone()),
     }
 }

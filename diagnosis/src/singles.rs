@@ -43,7 +43,7 @@ pub(crate) fn singles(
 ) -> Vec<Candidate> {
     let usable = |&effect: &usize| {
         // Laws whose covariate this table lacks are not tried.
-        let laws = known()[effect].laws.iter().enumerate();
+        let laws = effects::at(effect).laws.iter().enumerate();
         let shown = laws.filter(|(_, form)| table.lacks(form.needs).is_none());
         shown.map(move |(law, _)| Member { effect, law })
     };
@@ -57,7 +57,7 @@ pub(crate) fn singles(
 
 /// Causes of known form that the library does not name, best first.
 pub(crate) fn unlisted(problem: &Problem, table: &Table, search: &Search<'_>) -> Vec<Candidate> {
-    let testable = |&e: &usize| table.lacks(known()[e].needs).is_none();
+    let testable = |&e: &usize| table.lacks(effects::at(e).needs).is_none();
     let effects: Vec<usize> = (library().len()..known().len()).filter(testable).collect();
     let mut list = singles(problem, table, &effects, search);
     sort(&mut list);

@@ -18,7 +18,7 @@ use crate::run_shifts::shifted;
 use crate::scatter::Scatter;
 use crate::shrinkage::{Gap, gap};
 use crate::timing::{Comparison, RecordPart};
-use effects::{Need, imitated};
+use effects::{Effect, Need, imitated};
 use models::condition::Condition;
 use models::reading_evidence::ReadingFinding;
 use serde::Serialize;
@@ -128,10 +128,29 @@ pub struct Report {
     /// The base law, where it is another than the spring-slider.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub law: Option<LawNote>,
+    /// Effects of the user's own that were among the candidates.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub own_effects: Vec<OwnNote>,
     /// Remarks: what is missing from the table, what was assumed.
     pub remarks: Vec<String>,
     /// The table.
     pub data: DataNote,
+}
+
+/// An effect of the user's own.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct OwnNote {
+    /// Its name.
+    pub name: &'static str,
+    /// SHA-256 of its file, hex.
+    pub sha256: String,
+}
+
+impl OwnNote {
+    fn of(effect: &'static Effect) -> OwnNote {
+        let text = effect.own.map_or("", |own| &own.text);
+        OwnNote { name: effect.name, sha256: calibration::certificate::sha256_hex(text.as_bytes()) }
+    }
 }
 
 /// A diagnosis: the report, and what it takes to predict with it.
@@ -221,6 +240,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
         record: None,
         next_experiment,
         law: options.law.as_ref().map(|law| law.note()),
+        own_effects: options.own.iter().map(|e| OwnNote::of(effects::at(*e))).collect(),
         remarks,
         data: DataNote { points: table.len(), sha256 },
     };

@@ -38,14 +38,17 @@ impl Variable {
         value >= self.range[0] && value <= self.range[1]
     }
 
-    /// The variable of a column.
+    /// The variable of a column of a law.
     pub fn by_name(name: &str) -> Option<&'static Variable> {
-        VARIABLES.iter().find(|v| v.name == name)
+        VARIABLES[..OF_LAWS].iter().find(|v| v.name == name)
     }
 }
 
+/// So many of the variables, the first, are those that a law may depend on; a candidate effect may depend on all.
+pub const OF_LAWS: usize = 5;
+
 /// The variables in their order.
-pub static VARIABLES: [Variable; 5] = [
+pub static VARIABLES: [Variable; 9] = [
     Variable {
         name: "amplitude_pp_m",
         range: [0.0, 1e-3],
@@ -81,9 +84,60 @@ pub static VARIABLES: [Variable; 5] = [
         get: |c| c.mu0,
         set: |c, v| c.mu0 = v,
     },
+    Variable {
+        name: "temperature_c",
+        range: [-50.0, 150.0],
+        needed: "degrees Celsius, -50 to 150",
+        get: |c| c.temperature_c.unwrap_or(f64::NAN),
+        set: |c, v| c.temperature_c = Some(v),
+    },
+    Variable {
+        name: "ambient_pressure_pa",
+        range: [1.0, 1e6],
+        needed: "pascals, 1 to 1e6",
+        get: |c| c.ambient_pressure_pa.unwrap_or(f64::NAN),
+        set: |c, v| c.ambient_pressure_pa = Some(v),
+    },
+    Variable {
+        name: "position_m",
+        range: [-1.0, 1.0],
+        needed: "metres, -1 to 1",
+        get: |c| c.position_m,
+        set: |c, v| c.position_m = v,
+    },
+    Variable {
+        name: "time_s",
+        range: [0.0, 1e7],
+        needed: "seconds, 0 to 1e7",
+        get: |c| c.time_s,
+        set: |c, v| c.time_s = v,
+    },
 ];
 
-/// Columns of the answer, with their ranges: mu' and its standard uncertainty.
+/// What a table answers, and over what.
+pub struct Answers {
+    /// The kind of table, in words with an article.
+    pub what: &'static str,
+    /// How many of [`VARIABLES`] it may have.
+    pub variables: usize,
+    /// Columns of the answer, with their ranges; the first is needed.
+    pub columns: &'static [(&'static str, [f64; 2])],
+    /// What the first one is.
+    pub meaning: &'static str,
+    /// The first one without vibration, where it is one by definition.
+    pub still: Option<f64>,
+}
+
+/// What a law answers.
+const LAW: Answers = Answers {
+    what: "a law table",
+    variables: OF_LAWS,
+    columns: &ANSWERS,
+    meaning: "mu' = mu / mu0",
+    still: Some(1.0),
+};
+
+/// Columns of a law's answer, with their ranges: mu' and its standard uncertainty.
 pub const ANSWERS: [(&str, [f64; 2]); 2] = [("mu_relative", [0.0, 2.0]), ("mu_relative_sd", [0.0, 1.0])];
 /// Most rows of a table.
 pub const MOST_ROWS: usize = 1_000_000;
@@ -130,14 +184,16 @@ enum Column {
     Answer(usize),
 }
 
-fn column(name: &str, line: u64) -> Result<Column, LawTableError> {
-    let answer = ANSWERS.iter().position(|a| a.0 == name).map(Column::Answer);
-    Variable::by_name(name).map(Column::Variable).or(answer).ok_or_else(|| {
-        let names: Vec<_> = VARIABLES.iter().map(|v| v.name).chain(ANSWERS.map(|a| a.0)).collect();
+fn column(of: &Answers, name: &str, line: u64) -> Result<Column, LawTableError> {
+    let variables = &VARIABLES[..of.variables];
+    let answer = of.columns.iter().position(|a| a.0 == name).map(Column::Answer);
+    variables.iter().find(|v| v.name == name).map(Column::Variable).or(answer).ok_or_else(|| {
+        let names = variables.iter().map(|v| v.name).chain(of.columns.iter().map(|a| a.0));
+        let names = names.collect::<Vec<_>>().join(", ");
         bad(
             line,
-            format!("a law table has no column '{name}'"),
-            format!("convert it to SI and name it, or remove it; a law table may have {}", names.join(", ")),
+            format!("{} has no column '{name}'", of.what),
+            format!("convert it to SI and name it, or remove it; {} may have {names}", of.what),
         )
     })
 }
@@ -149,6 +205,14 @@ impl LawTable {
     /// Columns without a meaning, cells out of range, a grid that is not full, rows that repeat: the line and
     /// the remedy.
     pub fn from_csv(text: &str) -> Result<LawTable, LawTableError> {
+        Self::answering(&LAW, text)
+    }
+
+    /// The same of a table that answers something else.
+    ///
+    /// # Errors
+    /// As [`LawTable::from_csv`].
+    pub fn answering(of: &Answers, text: &str) -> Result<LawTable, LawTableError> {
         let text = text.trim_start_matches('\u{feff}');
         let mut builder = csv::ReaderBuilder::new();
         let mut reader = builder.trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
@@ -160,12 +224,13 @@ impl LawTable {
         // The reader counts comments before the header as part of it.
         let blank = |line: &&str| line.trim().is_empty() || line.starts_with('#');
         let head = 1 + text.lines().take_while(blank).count() as u64;
-        let columns = header.iter().map(|name| column(name, head)).collect::<Result<Vec<_>, _>>()?;
+        let columns = header.iter().map(|name| column(of, name, head)).collect::<Result<Vec<_>, _>>()?;
         if let Some(twice) = (1..header.len()).find(|&i| header.iter().take(i).any(|h| h == &header[i])) {
             return Err(bad(head, format!("two columns are '{}'", &header[twice]), "remove one"));
         }
         if !columns.iter().any(|c| matches!(c, Column::Answer(0))) {
-            return Err(bad(head, "the column 'mu_relative' is missing", "add it: mu' = mu / mu0"));
+            let problem = format!("the column '{}' is missing", of.columns[0].0);
+            return Err(bad(head, problem, format!("add it: {}", of.meaning)));
         }
         let mut axes: Vec<Axis> = VARIABLES
             .iter()
@@ -189,7 +254,7 @@ impl LawTable {
                         at[place] = value;
                     }
                     Column::Answer(k) => {
-                        let [low, high] = ANSWERS[*k].1;
+                        let [low, high] = of.columns[*k].1;
                         let value = value.filter(|x| *x >= low && *x <= high);
                         answer[*k] =
                             value.ok_or_else(|| refuse(&format!("a number from {low} to {high}")))?;
@@ -198,7 +263,7 @@ impl LawTable {
             }
             if axes.first().is_some_and(|a| a.variable.name == VARIABLES[0].name)
                 && at[0] == 0.0
-                && (answer[0] - 1.0).abs() > STILL
+                && of.still.is_some_and(|still| (answer[0] - still).abs() > STILL)
             {
                 let problem = format!("mu_relative is {} without vibration", answer[0]);
                 return Err(bad(line, problem, "divide by mu0, the friction at amplitude 0: mu' is 1 there"));
@@ -209,7 +274,7 @@ impl LawTable {
             }
         }
         if axes.is_empty() {
-            return Err(bad(head, "no column is a variable", "add those that the law depends on"));
+            return Err(bad(head, "no column is a variable", "add those that it depends on"));
         }
         for (k, axis) in axes.iter_mut().enumerate() {
             axis.nodes = rows.iter().map(|r| r.1[k]).collect();
@@ -217,11 +282,7 @@ impl LawTable {
             axis.nodes.dedup();
             if axis.nodes.len() < 2 {
                 let problem = format!("'{}' has fewer than two values", axis.variable.name);
-                return Err(bad(
-                    head,
-                    problem,
-                    "add rows, or remove the column if the law does not depend on it",
-                ));
+                return Err(bad(head, problem, "add rows, or remove the column if nothing depends on it"));
             }
         }
         Self::filled(axes, &rows, head)

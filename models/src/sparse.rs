@@ -5,7 +5,7 @@
 
 use crate::condition::{Condition, OutOfDomain};
 use crate::finger::Finger;
-use crate::law_table::{VARIABLES, prediction};
+use crate::law_table::{OF_LAWS, VARIABLES, prediction};
 use crate::prediction::{FrictionModel, Prediction};
 use crate::quantity::PeakToPeak;
 use crate::surrogate::MESH_ERROR;
@@ -105,7 +105,7 @@ impl Sparse {
                 "{count} nodes; 1 to {MOST_NODES} are read, as the loop waits for each (--nodes)"
             ));
         }
-        let place = |name: &str| VARIABLES.iter().position(|v| v.name == name);
+        let place = |name: &str| VARIABLES[..OF_LAWS].iter().position(|v| v.name == name);
         let mut axes = Vec::new();
         for (name, span) in document.variables {
             let source = match (place(&name), finger.young_modulus_pa) {
@@ -134,7 +134,7 @@ impl Sparse {
         let spanned = |k: usize| axes.iter().any(|(s, _)| matches!(s, Source::Variable(v) if *v == k));
         let value =
             |k: usize| document.set.get(VARIABLES[k].name).copied().unwrap_or(VARIABLES[k].of(&nominal));
-        let fixed = (0..VARIABLES.len()).filter(|k| !spanned(*k)).map(|k| (k, value(k))).collect();
+        let fixed = (0..OF_LAWS).filter(|k| !spanned(*k)).map(|k| (k, value(k))).collect();
         let (mut steps, mut surplus) = (Vec::new(), Vec::new());
         for node in document.grid.nodes {
             let odd = |s: &(u8, u32)| (1..=20).contains(&s.0) && s.1 % 2 == 1 && s.1 < 1 << s.0;
@@ -159,7 +159,7 @@ impl Sparse {
                 return Err(OutOfDomain { name: VARIABLES[*k].name, value: found, needed });
             }
         }
-        let mut place = [0.0; VARIABLES.len() + 1];
+        let mut place = [0.0; OF_LAWS + 1];
         for ((source, span), place) in self.axes.iter().zip(&mut place) {
             let (value, name) = match source {
                 Source::Variable(k) => (VARIABLES[*k].of(condition), VARIABLES[*k].name),

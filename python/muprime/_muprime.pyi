@@ -51,6 +51,7 @@ def diagnose(
     damage: list[str],
     model: tuple[str, str | None] | None,
     run: str | None,
+    effects: list[str],
 ) -> tuple[str, str, str, str | None]: ...
 def law_grid(name: str, table: bytes, variables: list[str]) -> list[tuple[str, list[float]]]: ...
 def law_conditions(

@@ -94,6 +94,7 @@ def diagnose(
     without: list[str] | tuple[str, ...] = (),
     predict: Any = None,
     model: Model | None = None,
+    effects: list[str | os.PathLike[str]] | tuple[str | os.PathLike[str], ...] = (),
 ) -> Verdict:
     """Diagnoses a table of passes.
 
@@ -101,7 +102,8 @@ def diagnose(
     table. ``rig``: path of the rig.toml that states what is calibrated; by default the one beside the table. ``pairs=False`` tries
     single effects only, ``without`` leaves effects out. ``predict``: conditions, a path or a data frame. ``model``: the base law in place of the
     spring-slider: ``'psi'``, ``'surrogate'``, a file, a :class:`LawTable`, or a function as :func:`tabulate` takes it. A function is
-    tabulated over the ranges of the table, for the variables that its arguments name.
+    tabulated over the ranges of the table, for the variables that its arguments name. ``effects``: tables of candidate effects of your
+    own, CSV or Parquet, each named by its file.
 
     Bad input is a :class:`MuprimeError` with the row and the remedy.
     """
@@ -126,7 +128,8 @@ def diagnose(
     law = None if model is None else base_law(model, name, data)
     rig = Path(rig)
     text, words, page, predictions = _muprime.diagnose(
-        name, data, os.fspath(rig), rig.read_text(encoding="utf-8"), pairs, list(without), predict, damage, law, run
+        name, data, os.fspath(rig), rig.read_text(encoding="utf-8"), pairs, list(without), predict, damage, law, run,
+        [os.fspath(effect) for effect in effects],
     )
     told = json.loads(text)
     return Verdict(

@@ -24,7 +24,7 @@ type Model = (String, Option<String>);
 /// Diagnoses a point table in memory (`name` is how messages call it) under a rig.toml in memory; the
 /// record in the folder `run` is read too.
 #[pyfunction]
-#[pyo3(signature = (name, table, rig_name, rig, pairs, without, predict, damage, model, run))]
+#[pyo3(signature = (name, table, rig_name, rig, pairs, without, predict, damage, model, run, effects))]
 #[allow(clippy::too_many_arguments)]
 pub fn diagnose(
     py: Python<'_>,
@@ -38,12 +38,17 @@ pub fn diagnose(
     damage: Vec<String>,
     model: Option<Model>,
     run: Option<std::path::PathBuf>,
+    effects: Vec<std::path::PathBuf>,
 ) -> PyResult<Texts> {
-    if let Some(unknown) = without.iter().find(|name| effects::by_name(name).is_none()) {
+    if let Some(unknown) = without.iter().find(|name| ::effects::by_name(name).is_none()) {
         return Err(MuprimeError::new_err(format!("without {unknown:?}: no such effect")));
     }
-    py.detach(|| texts(name, &table, rig_name, rig, pairs, without, predict, &damage, model, run.as_deref()))
-        .map_err(refused)
+    py.detach(|| {
+        let own = tables::law::own_effects(&effects)?;
+        let choice = Options { pairs, without, own, ..Options::default() };
+        texts(name, &table, rig_name, rig, choice, predict, &damage, model, run.as_deref())
+    })
+    .map_err(refused)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -52,8 +57,7 @@ fn texts(
     bytes: &[u8],
     rig_name: &str,
     rig: &str,
-    pairs: bool,
-    without: Vec<String>,
+    choice: Options,
     predict: Option<Vec<u8>>,
     damage: &[String],
     model: Option<Model>,
@@ -80,7 +84,7 @@ fn texts(
             Some(Table::conditions(&rows, &origin).into_diagnostic().wrap_err("conditions to predict")?)
         }
     };
-    let options = Options { pairs, without, law, ..Options::default() };
+    let options = Options { law, ..choice };
     let mut result = diagnosis::verdict::diagnose(&table, &rig, &options, sha256_hex(bytes));
     if let Some(run) = run {
         runs::verdict::add_record(&mut result, run, &rig)?;

@@ -7,7 +7,7 @@ use miette::{Context, IntoDiagnostic};
 use models::finger::Finger;
 use models::law::Named;
 use models::law_table::grid::Tabulated;
-use models::law_table::{VARIABLES, Variable};
+use models::law_table::{OF_LAWS, VARIABLES, Variable};
 use models::pass::{Pass, coulomb_coefficient};
 use models::prediction::FrictionModel;
 use runs::input::bytes_of;
@@ -83,6 +83,24 @@ fn text_of(path: &Path) -> miette::Result<(String, String)> {
     Ok((name.into_owned(), text))
 }
 
+/// The candidate effects of the user's own in these files, by their numbers; the name of each is that of its file.
+///
+/// # Errors
+/// A file that cannot be read or is no table of an effect: says where, and what to do.
+pub fn own_effects(files: &[std::path::PathBuf]) -> miette::Result<Vec<usize>> {
+    let one = |path: &std::path::PathBuf| {
+        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let text = text_of(path)
+            .map_err(|why| miette::miette!(help = "--effect takes a CSV or Parquet file", "{why}"))?
+            .1;
+        effects::own(&name, &text).map_err(|why| miette::miette!("{}: {why}", path.display()))
+    };
+    let mut numbers: Vec<usize> = files.iter().map(one).collect::<miette::Result<_>>()?;
+    numbers.sort_unstable();
+    numbers.dedup();
+    Ok(numbers)
+}
+
 /// The file of a law that was tabulated, and the hash of its rows; `origin` says of what it was made.
 ///
 /// # Errors
@@ -119,7 +137,7 @@ pub fn grid_over(passes: &[Pass], names: &[String]) -> miette::Result<Vec<(Strin
     let mu0 = coulomb_coefficient(passes).unwrap_or(0.5);
     let one = |name: &String| {
         let variable = Variable::by_name(name).ok_or_else(|| {
-            let names = VARIABLES.iter().map(|v| v.name).collect::<Vec<_>>().join(", ");
+            let names = VARIABLES[..OF_LAWS].iter().map(|v| v.name).collect::<Vec<_>>().join(", ");
             miette::miette!(help = format!("name its arguments {names}"), "a law has no variable '{name}'")
         })?;
         let values = passes.iter().map(|p| variable.of(&p.condition(mu0))).filter(|v| *v > 0.0);

@@ -57,6 +57,9 @@ pub struct Args {
     /// Effects add the change that they make on the spring-slider.
     #[arg(long, value_name = "LAW")]
     pub model: Option<PathBuf>,
+    /// One candidate effect more, of your own: a table of the change of friction over the conditions (may be repeated).
+    #[arg(long, value_name = "FILE")]
+    pub effect: Vec<PathBuf>,
     /// Leave an effect out of the library (may be repeated).
     #[arg(long, value_name = "EFFECT")]
     pub without: Vec<String>,
@@ -106,6 +109,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             miette::bail!("--without {name}: no such effect; `muprime model effects` lists them");
         }
     }
+    let own = tables::law::own_effects(&args.effect)?;
     let conditions = match &args.predict {
         Some(path) => {
             let rows = read_table(path)?;
@@ -124,8 +128,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let bar = studies::progress::bar(1000, "per mille");
     let progress = follow(&bar, json)?;
-    let options =
-        Options { pairs: !args.no_pairs, without: args.without.clone(), progress, law, ..Options::default() };
+    let (pairs, without) = (!args.no_pairs, args.without.clone());
+    let options = Options { pairs, without, own, progress, law, ..Options::default() };
     let mut result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
     if args.data.is_dir() {
         runs::verdict::add_record(&mut result, &args.data, &rig)?;

@@ -72,6 +72,9 @@ pub struct SavedEffect {
     /// Covariance of the parameters, row by row.
     #[serde(default)]
     pub covariance: Vec<Vec<f64>>,
+    /// Text of its table, where it is an effect of the user's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub table: Option<String>,
 }
 
 /// One parameter of a saved effect.
@@ -96,6 +99,9 @@ pub enum ModelError {
     /// An effect that the library does not have.
     #[error("effect '{0}' is not in the library; `muprime model effects` lists those that are")]
     Effect(String),
+    /// A table of an effect that cannot be used.
+    #[error("the table of an effect: {0}")]
+    Table(String),
     /// A law that the effect does not have.
     #[error("effect '{effect}' has no law '{law}'")]
     Law { effect: String, law: String },
@@ -199,7 +205,11 @@ impl Corrected {
         }
         let mut effects = Vec::with_capacity(saved.effects.len());
         for s in &saved.effects {
-            let effect = crate::by_name(&s.name).ok_or_else(|| ModelError::Effect(s.name.clone()))?;
+            let effect = match &s.table {
+                None => crate::library().iter().copied().find(|e| e.name == s.name),
+                Some(text) => Some(crate::at(crate::own(&s.name, text).map_err(ModelError::Table)?)),
+            };
+            let effect = effect.ok_or_else(|| ModelError::Effect(s.name.clone()))?;
             let law = effect
                 .laws
                 .iter()
@@ -302,6 +312,7 @@ impl FrictionModel for Corrected {
     /// it; the relative friction is that force over `mu_0 F_n` with the loop's own `mu_0`.
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
         condition.check()?;
+        self.effects.iter().filter_map(|c| c.effect.own).try_for_each(|own| own.reaches(condition))?;
         // The finger of today may rub more or less than that of the diagnosis: the loop's mu_0 counts.
         let baseline = Baseline { mu0: condition.mu0, ..self.baseline };
         let sign = condition.direction.sign();

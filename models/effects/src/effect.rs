@@ -2,6 +2,7 @@
 
 use crate::contact::Contact;
 use crate::operating::{Design, Reading};
+use crate::own::OwnTable;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::rig_file::CertifiedKey;
@@ -345,6 +346,9 @@ pub struct Effect {
     /// Error of mu' by interpolation, root mean square; zero for what is evaluated directly.
     #[serde(skip)]
     pub interpolation_error: f64,
+    /// The table of an effect that a user gave as data.
+    #[serde(skip)]
+    pub own: Option<&'static OwnTable>,
     /// Makes what `change` with this law and these parameters will look up, so that a control loop makes
     /// nothing.
     #[serde(skip)]
@@ -371,6 +375,7 @@ impl Effect {
         imitated_by: &[],
         words: None,
         interpolation_error: 0.0,
+        own: None,
         prepare: |_, _| (),
         change: |_, _, _, _, _| (),
         read: |_, _, _, _, _| (),

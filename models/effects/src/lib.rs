@@ -5,6 +5,7 @@
 //! | [`mod@library`] | the candidate causes, one file each, with the facts that others need of them |
 //! | [`effect`] | what a cause is: place, laws, parameters with their priors, needs, aliases, checks |
 //! | [`contact`] | the one contact that every cause acts on, and its solvers |
+//! | [`mod@own`] | a candidate cause of a user's own, as a table |
 //! | [`operating`] | one pass as the table has it; the baseline and the reading |
 //! | [`predict`] | the lateral force of a pass under the baseline and any effects |
 //! | [`corrected`] | the corrected model that a run loads |
@@ -41,9 +42,11 @@ pub mod corrected;
 pub mod effect;
 pub mod library;
 pub mod operating;
+pub mod own;
 pub mod predict;
 
 pub use effect::{Check, Effect, Law, Need, Parameter, Place, Prior, STATED_AT_N};
-pub use library::{by_name, imitated, known, library, near, one_cause, twins};
+pub use library::{imitated, known, library, near, one_cause, twins};
 pub use operating::{Baseline, Design, Reading};
+pub use own::{at, by_name, own};
 pub use predict::{Active, lateral_force, rough_lateral_force};

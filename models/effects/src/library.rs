@@ -5,6 +5,7 @@
 //! friction. Nothing of that stands anywhere else. To add a cause: its file, and its line in the list below.
 
 use crate::effect::{Effect, Law};
+use crate::own::by_name;
 
 /// What every cause's file needs.
 mod prelude {
@@ -21,7 +22,7 @@ macro_rules! causes {
         $(pub mod $file;)*
         $(pub mod $other;)*
         static LIBRARY: &[&Effect] = &[$(&$file::EFFECT),*];
-        static KNOWN: &[&Effect] = &[$(&$file::EFFECT,)* $(&$other::EFFECT),*];
+        pub(crate) static KNOWN: &[&Effect] = &[$(&$file::EFFECT,)* $(&$other::EFFECT),*];
     };
 }
 
@@ -113,9 +114,4 @@ pub fn twins() -> Vec<[(usize, usize); 2]> {
         }
     }
     list
-}
-
-/// The effect of that name in the library.
-pub fn by_name(name: &str) -> Option<&'static Effect> {
-    library().iter().copied().find(|effect| effect.name == name)
 }

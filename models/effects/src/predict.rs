@@ -37,6 +37,10 @@ fn read(mut contact: Contact, effects: &[Active<'_>], pass: &Condition, design: 
     for active in effects {
         (active.effect.change)(active.law, active.theta, pass, design, &mut contact);
         (active.effect.read)(active.law, active.theta, pass, design, &mut reading);
+        if let Some(own) = active.effect.own {
+            let at = Condition { mu0: contact.mu0, ..*pass };
+            reading.gain *= own.factor(active.theta[0], &at).unwrap_or(f64::NAN);
+        }
     }
     let friction = pass.direction.sign() * mean_friction(&contact);
     if reading == (Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 }) {

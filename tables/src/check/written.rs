@@ -23,6 +23,14 @@ pub(super) fn table(path: &Path) -> miette::Result<Good> {
         runs::model_file::load(&path.display().to_string(), text)?;
         return Ok(Good { kind: "law table", passes: None, remarks: Vec::new() });
     }
+    let effect = |text: &&str| {
+        let rows = runs::model_file::hashed(text);
+        rows.lines().next().unwrap_or_default().split(',').any(|h| h.trim() == effects::own::COLUMN)
+    };
+    if std::str::from_utf8(&bytes).ok().filter(effect).is_some() {
+        crate::law::own_effects(&[path.to_path_buf()])?;
+        return Ok(Good { kind: "effect table", passes: None, remarks: Vec::new() });
+    }
     let passes = read_passes(&bytes[..]);
     let help = remedy(Some("table"));
     let passes = passes.map_err(|e| miette::miette!(help = help.clone(), "{e}"))?;

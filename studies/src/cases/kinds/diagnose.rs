@@ -51,6 +51,10 @@ pub struct Settings {
     /// Leave an effect out of the library (may be repeated)
     #[arg(long, value_name = "EFFECT")]
     pub without: Vec<String>,
+    /// One candidate effect more, of your own, as for `muprime diagnose` (may be repeated)
+    #[arg(long, value_name = "FILE")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effect: Vec<PathBuf>,
 }
 
 impl Line {
@@ -74,7 +78,10 @@ fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
             miette::bail!("without {name}: no such effect; `muprime model effects` lists them");
         }
     }
-    let rest = serde_json::to_string(&settings).unwrap_or_default();
+    let files: Vec<PathBuf> = settings.effect.iter().map(|file| folder.join(file)).collect();
+    let own = tables::law::own_effects(&files)?;
+    let tables = own.iter().filter_map(|e| effects::at(*e).own).map(|own| sha256_hex(own.text.as_bytes()));
+    let rest = serde_json::to_string(&settings).unwrap_or_default() + &tables.collect::<String>();
     let folder = folder.to_path_buf();
     Ok(Box::new(move |index, given| {
         let case: Line = line(index, given)?;
@@ -90,7 +97,7 @@ fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
             Vec::new()
         };
         let inputs = format!("{} {} {rest} {damage:?}", sha256_hex(&bytes), sha256_hex(rig.as_bytes()));
-        let settings = settings.clone();
+        let (settings, own) = (settings.clone(), own.clone());
         let run = move || {
             // The file's own name says nothing of its contents: a reason holds none.
             let plain =
@@ -102,6 +109,7 @@ fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
             let options = Options {
                 pairs: !settings.no_pairs,
                 without: settings.without.clone(),
+                own,
                 ..Options::default()
             };
             let result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
