@@ -172,7 +172,7 @@ fn gathering_refuses_holes_contradictions_and_mixed_versions() {
     let study = Study::in_folder(&out, None).unwrap();
     let whole = study.shard(&(10..20));
     let kept = std::fs::read(&whole).unwrap();
-    let changed = |to: &Path, facts: &[(&str, &str)], change: &dyn Fn(&mut studies::cases::shard::Entry)| {
+    let changed = |to: &Path, facts: &[(&str, &str)], change: &dyn Fn(&mut studies::cases::run::Entry)| {
         std::fs::write(&whole, &kept).unwrap();
         let reader = Reader::open(study.kind, &whole).unwrap();
         let mut told = reader.facts.clone();

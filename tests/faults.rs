@@ -1,10 +1,9 @@
 //! The fault list in virtual time: each fault in each phase, its worst reaction beside its bound, and its cause.
 
+use studies::cases::kinds::faults::{Settings, search};
 use studies::validation::faults::bench::STEADY_AT;
 use studies::validation::faults::rows::What;
-use studies::validation::faults::{
-    Core, Expect, Moment, Pace, ROWS, Scene, Search, Strike, Tally, run, run_with, search,
-};
+use studies::validation::faults::{Core, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run, run_with};
 use tests::rounds;
 
 const PACES: [Pace; 2] = [Pace::Fast, Pace::Default];
@@ -44,20 +43,23 @@ fn without_a_fault_nothing_trips() {
     }
 }
 
+fn many(settings: Settings, seeds: u64) -> Tally {
+    search(&settings, seeds, &mut |_| {}).unwrap()
+}
+
 /// Two thousand seeds in `tests/run long`.
 #[test]
 fn hundreds_of_seeds_and_none_over_a_bound() {
     let seeds = rounds(250, 2000);
     for pace in PACES {
-        assert_clean(&search(Search { first: 1, seeds, pairs: false, twice: false, pace }, |_| {}));
+        assert_clean(&many(Settings { pace, ..Settings::default() }, seeds));
     }
 }
 
 #[test]
 fn random_pairs_of_faults() {
-    let pace = Pace::Fast;
     let seeds = rounds(125, 1000);
-    let tally = search(Search { first: 1, seeds, pairs: true, twice: false, pace }, |_| {});
+    let tally = many(Settings { pairs: true, ..Settings::default() }, seeds);
     let struck = tally.reactions.values().map(|r| r.runs).sum::<u64>();
     assert!(10 * struck > 19 * seeds, "pairs have two faults: {struck}");
     assert_clean(&tally);
@@ -87,11 +89,7 @@ fn faults_that_hide_each_other_are_off_within_the_slower_bound() {
 
 #[test]
 fn seeds_run_twice_give_equal_hashes_and_replay_to_equal_decisions() {
-    let pace = Pace::Fast;
-    assert_clean(&search(
-        Search { first: 1, seeds: rounds(12, 100), pairs: false, twice: true, pace },
-        |_| {},
-    ));
+    assert_clean(&many(Settings { twice: true, ..Settings::default() }, rounds(12, 100)));
 }
 
 /// Negative controls: a core that sleeps, that is deaf, or that trips for a wrong cause, and the bench says

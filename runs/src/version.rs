@@ -1,6 +1,6 @@
 //! This program's version, its exact build, and the models that it holds, to trace results.
 
-use calibration::certificate::sha256_hex;
+use calibration::certificate::{sha256_hex, sha256_of};
 use models::ridge::study::MODEL_VERSION;
 use models::surrogate::DEFAULT_TABLE;
 use serde::Serialize;
@@ -60,9 +60,16 @@ pub fn models() -> Models {
     }
 }
 
+/// SHA-256 of the running program's file: two builds of one version are two programs.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn program_sha256() -> std::io::Result<String> {
+    std::fs::File::open(std::env::current_exe()?).and_then(sha256_of)
+}
+
 /// Of this program, built with these features; its file is read for its hash.
 pub fn of_this_program(features: Vec<&'static str>) -> Version {
-    let own = std::env::current_exe().and_then(std::fs::read);
     let libc = match () {
         () if cfg!(target_env = "gnu") => "-gnu",
         () if cfg!(target_env = "musl") => "-musl",
@@ -72,7 +79,7 @@ pub fn of_this_program(features: Vec<&'static str>) -> Version {
     Version {
         version: env!("CARGO_PKG_VERSION"),
         build: Build {
-            program_sha256: own.ok().map(|bytes| sha256_hex(&bytes)),
+            program_sha256: program_sha256().ok(),
             commit: COMMIT.filter(|commit| !commit.is_empty()),
             target: format!("{}-{}{libc}", std::env::consts::ARCH, std::env::consts::OS),
             profile: if cfg!(debug_assertions) { "debug" } else { "release" },

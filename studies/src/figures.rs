@@ -52,7 +52,7 @@ impl Study {
     /// # Errors
     /// Whatever the file system says.
     pub fn results(&self, out: &Path) -> miette::Result<(store::Results, usize)> {
-        store::complete(&out.join("ridge.jsonl"), self.points().into_iter().map(|p| p.case), &settings())
+        store::complete(out, self.points().into_iter().map(|p| p.case))
     }
 
     /// Each point with its result.
@@ -118,7 +118,7 @@ pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Res
         |young_modulus_pa: f64, w: f64| reading.at(RidgeCase { young_modulus_pa, speed_m_s: 0.0, ..base }, w);
     let moduli = || MOIST_PA.into_iter().chain(DRY_PA);
     let cases = moduli().flat_map(|e| FIG_4_AMPLITUDES_M.map(|w| at(e, w)));
-    let (results, failed) = store::complete(&out.join("ridge.jsonl"), cases, &settings())?;
+    let (results, failed) = store::complete(out, cases)?;
     let curve = |e: f64| -> Vec<(f64, f64)> {
         let points = FIG_4_AMPLITUDES_M.iter().filter_map(|w| {
             let phase = results.get(&content_key(&at(e, *w), &settings()))?.phase_shift_deg?;

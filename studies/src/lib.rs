@@ -2,14 +2,13 @@
 //!
 //! | room | purpose |
 //! |---|---|
-//! | `cases` | studies past one machine: cases, an idempotent worker, engines, one table (feature `cases`) |
+//! | [`cases`] | many cases: here at once, or an idempotent worker, engines, one table (feature `cases`) |
 //! | [`validation`] | the blind score of the diagnosis, and the fault bench of the controller |
 //! | [`figures`] | the paper's figures recomputed |
 //! | [`progress`] | long computations at a terminal: bars, and what there is so far on Ctrl-C |
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
-#[cfg(feature = "cases")]
 pub mod cases;
 pub mod figures;
 pub mod progress;

@@ -86,7 +86,7 @@ fn ctrl_c_tells_what_there_is_so_far() {
             assert!(err.contains("what follows is partial"), "{words:?}: {err}");
             assert!(!err.contains('\u{1b}') && !err.contains('\r'), "{words:?}: no bar in a file: {err}");
             match (json, words[words.len().min(2) - 1]) {
-                (_, "table") => assert!(err.contains("cases are stored in"), "{err}"),
+                (_, "table") => assert!(err.contains("cases are in"), "{err}"),
                 (true, _) => assert_eq!(documents(&ended)[0]["partial"], true, "{out}"),
                 (false, _) => assert!(out.contains(told), "{words:?}: {out}{err}"),
             }

@@ -3,13 +3,11 @@
 mod studies;
 
 use super::prelude::*;
+use ::studies::cases::kinds::blind::run as score_all;
 use ::studies::progress::Study;
 use ::studies::validation::blind::distance::by_cause;
 use ::studies::validation::blind::reliability::{diagram, identifiable};
-use ::studies::validation::blind::{Scored, Settings, confusion, figures, run as score_all};
-use diagnosis::constants::Constants;
-use diagnosis::hypotheses::Options;
-use std::sync::Arc;
+use ::studies::validation::blind::{Scored, Settings, confusion, figures};
 
 /// Score the diagnosis on sealed sets of the independent simulation.
 #[derive(Debug, clap::Args)]
@@ -32,9 +30,6 @@ pub struct Args {
     /// many of each truth (none, a squeeze film, friction that depends on load, an offset).
     #[arg(long, value_name = "KIND", conflicts_with_all = ["further", "write", "same_form", "stratum"])]
     pub noise: Option<String>,
-    /// Set a constant of the diagnosis for this study (may be repeated); docs/diagnosis/constants.md lists them.
-    #[arg(long, value_name = "NAME=VALUE", hide = true)]
-    pub constant: Vec<String>,
     /// Instead: the verdicts with each constant halved and doubled. `fit`, `decision` or a name restricts it.
     #[arg(long, value_name = "WHICH", num_args = 0..=1, default_missing_value = "all", hide = true,
           conflicts_with_all = ["further", "write", "same_form"])]
@@ -80,19 +75,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if args.further {
         return studies::further(&args, json);
     }
-    let mut constants = Constants::default();
-    for setting in &args.constant {
-        let (name, value) = setting
-            .split_once('=')
-            .ok_or_else(|| miette::miette!("--constant {setting}: NAME=VALUE is needed"))?;
-        constants.set(name.trim(), value).map_err(|e| miette::miette!("--constant {setting}: {e}"))?;
-    }
-    let options = Options {
-        constants: Arc::new(constants),
-        pairs: !args.of.no_pairs,
-        without: args.of.without.clone(),
-        ..Options::default()
-    };
+    let options = args.of.options()?;
     if let Some(kind) = args.noise.as_deref() {
         return studies::rough(&args, kind, &options, json);
     }
@@ -108,7 +91,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             say!("{why}");
         }
     })?;
-    let scored = score_all(seed, sets, stratum, &options, |s| {
+    let scored = score_all(&args.of, sets as u64, &mut |s| {
         if args.verbose {
             study.bar.suspend(|| say!("{}", serde_json::to_string(s).unwrap_or_default()));
         }

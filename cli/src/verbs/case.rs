@@ -3,7 +3,7 @@
 use super::prelude::*;
 use std::ops::Range;
 use studies::cases::share::Share;
-use studies::cases::study::{Study, program};
+use studies::cases::study::Study;
 use studies::cases::worker::{Done, work};
 
 /// Arguments.
@@ -60,7 +60,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let study = Study::begin(&args.cases, &args.out)?;
     let threads = args.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().into_diagnostic()?;
-    let program = program()?;
+    let program = runs::version::program_sha256().into_diagnostic()?;
     let ranges = match (share, args.range.or(args.index.map(|n| n..n.saturating_add(1)))) {
         (Some(share), _) => share.missing(&study)?,
         (None, range) => range.into_iter().collect(),

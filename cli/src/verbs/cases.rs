@@ -1,13 +1,13 @@
 //! `muprime cases`: writes files of cases.
 
+use super::faults::Scenes;
 use super::prelude::*;
 use models::ridge::Steady;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use studies::cases::file::{self, Header, SCHEMA};
-use studies::cases::kinds::{self, blind, diagnose, faults, finger, noop, ridge, table};
-use studies::validation::faults::Pace;
+use studies::cases::file::{self, Header};
+use studies::cases::kinds::{self, blind, diagnose, finger, noop, ridge, table};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -75,18 +75,8 @@ struct Ridge {
 struct Faults {
     #[command(flatten)]
     to: To,
-    /// How many seeds
-    #[arg(long, default_value_t = 2000)]
-    seeds: u64,
-    /// First seed
-    #[arg(long, default_value_t = 1)]
-    first: u64,
-    /// Two faults in each run
-    #[arg(long)]
-    pairs: bool,
-    /// At the limits that a setup has by default
-    #[arg(long)]
-    default_limits: bool,
+    #[command(flatten)]
+    scenes: Scenes,
 }
 
 #[derive(Debug, clap::Args)]
@@ -217,15 +207,8 @@ fn write(
     json: bool,
 ) -> miette::Result<ExitCode> {
     let kind = kinds::by_name(kind)?;
-    let header = Header {
-        schema: SCHEMA.into(),
-        kind: kind.name.into(),
-        version: kind.version(),
-        cases: lines.map_or(cases, |lines| lines.len() as u64),
-        listed: lines.is_some(),
-        line_bytes: None,
-        settings: serde_json::to_value(settings).into_diagnostic()?,
-    };
+    let count = lines.map_or(cases, |lines| lines.len() as u64);
+    let header = Header { listed: lines.is_some(), ..Header::of(kind, settings, count)? };
     if header.cases == 0 {
         miette::bail!("no cases");
     }
@@ -259,16 +242,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 base: values(&a.set)?,
                 spans: spans(&a.span)?,
                 first: a.first,
+                case: None,
             };
             let lines = a.from.as_deref().map(rows).transpose()?;
             write("ridge", &a.to, a.draw.unwrap_or(0), &settings, lines.as_deref(), json)
         }
         What::Table(to) => write("table", &to, table::points().len() as u64, &Value::Null, None, json),
-        What::Faults(a) => {
-            let pace = if a.default_limits { Pace::Default } else { Pace::Fast };
-            let settings = faults::Settings { first: a.first, pairs: a.pairs, pace };
-            write("faults", &a.to, a.seeds, &settings, None, json)
-        }
+        What::Faults(a) => write("faults", &a.to, a.scenes.seeds, &a.scenes.settings(), None, json),
         What::Blind(a) => write("blind", &a.to, a.sets, &a.settings, None, json),
         What::Diagnose(a) => {
             let rig = a.rig.map(|p| named(&[p], None)).transpose()?.and_then(|mut all| all.pop());

@@ -2,16 +2,16 @@
 
 use super::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
-use studies::validation::faults::Pace;
+use studies::cases::kinds::faults::{Settings, search};
 use studies::validation::faults::bench::{Scene, run as run_scene};
-use studies::validation::faults::search::{Search, Tally, search};
+use studies::validation::faults::{Pace, Tally};
 
-/// Arguments.
-#[derive(Debug, clap::Args)]
-pub struct Args {
+/// Scenes of the bench, run here or as cases.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct Scenes {
     /// How many seeds to run; each is one fault of the list in one phase
     #[arg(long, default_value_t = 2000)]
-    seeds: u64,
+    pub seeds: u64,
     /// First seed
     #[arg(long, default_value_t = 1)]
     first: u64,
@@ -24,6 +24,21 @@ pub struct Args {
     /// At the limits that a setup has by default (links held up for 20 ms), not at those of fast links
     #[arg(long)]
     default_limits: bool,
+}
+
+impl Scenes {
+    /// What all of them share.
+    pub fn settings(self) -> Settings {
+        let pace = if self.default_limits { Pace::Default } else { Pace::Fast };
+        Settings { first: self.first, pairs: self.pairs, twice: self.twice, pace }
+    }
+}
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    scenes: Scenes,
     /// Run one scene again, as a failure printed it
     #[arg(long, value_name = "SCENE.json")]
     scene: Option<PathBuf>,
@@ -44,8 +59,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         out!("{}", serde_json::to_string(&found).into_diagnostic()?);
         return exit(if found.wrong.is_empty() { DONE } else { FAILED });
     }
-    let Args { seeds, first, pairs, twice, default_limits, .. } = args;
-    let pace = if default_limits { Pace::Default } else { Pace::Fast };
+    let seeds = args.scenes.seeds;
     let (begun, cpu_ns) = (std::time::Instant::now(), realtime::pacing::process_cpu_ns());
     let bar = studies::progress::bar(seeds, "scenes");
     let so_far: Arc<Mutex<Tally>> = Arc::default();
@@ -66,11 +80,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             );
         }
     })?;
-    let tally = search(Search { first, seeds, pairs, twice, pace }, |chunk| {
-        bar.inc(chunk.scenes);
-        let mut so_far = shared.lock().unwrap_or_else(PoisonError::into_inner);
-        *so_far = std::mem::take(&mut *so_far).with(chunk.clone());
-    });
+    let tally = search(&args.scenes.settings(), seeds, &mut |tally| {
+        bar.inc(1);
+        shared.lock().unwrap_or_else(PoisonError::into_inner).clone_from(tally);
+    })?;
     bar.finish_and_clear();
     let cpu_s = (realtime::pacing::process_cpu_ns() - cpu_ns) as f64 * 1e-9;
     let simulated_s = tally.cycles as f64 * studies::validation::faults::bench::T.seconds();

@@ -3,6 +3,7 @@
 //! Lines that `muprime cases` writes are padded to one length, which the header states: the millionth case is
 //! then found without reading those before it. A file from elsewhere need not be.
 
+use super::kinds::Kind;
 use miette::{Context, IntoDiagnostic};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -39,6 +40,24 @@ pub struct Header {
     /// What all cases share.
     #[serde(default)]
     pub settings: Value,
+}
+
+impl Header {
+    /// Cases of a kind that follow from settings.
+    ///
+    /// # Errors
+    /// Settings that JSON cannot hold.
+    pub fn of(kind: &Kind, settings: &impl Serialize, cases: u64) -> miette::Result<Header> {
+        Ok(Header {
+            schema: SCHEMA.into(),
+            kind: kind.name.into(),
+            version: kind.version(),
+            cases,
+            listed: false,
+            line_bytes: None,
+            settings: serde_json::to_value(settings).into_diagnostic()?,
+        })
+    }
 }
 
 /// An open file of cases.

@@ -2,7 +2,8 @@
 //! order, the ranges, the machine or the number of threads. It is streamed: what is in memory does not grow with the number of cases.
 
 use super::file::hex;
-use super::shard::{Entry, Facts, Reader, Writer};
+use super::run::Entry;
+use super::shard::{Facts, Reader, Writer};
 use super::study::Study;
 use miette::{Context, IntoDiagnostic};
 use serde::Serialize;

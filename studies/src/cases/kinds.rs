@@ -9,6 +9,7 @@ pub mod ridge;
 pub mod table;
 
 use super::file::Header;
+use miette::IntoDiagnostic;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -181,4 +182,10 @@ fn no_lines(header: &Header) -> miette::Result<()> {
 /// What the names of a list come to in one cell.
 fn joined(names: &[String]) -> String {
     names.join("+")
+}
+
+/// What the last cell of a kind with a column `document` holds.
+fn document<T: serde::de::DeserializeOwned>(cells: &[Cell]) -> miette::Result<T> {
+    let Some(Cell::Text(text)) = cells.last() else { miette::bail!("a result without its document") };
+    serde_json::from_str(text).into_diagnostic()
 }

@@ -1,7 +1,8 @@
 //! Results in Parquet: `index`, `key` (SHA-256), `failed` (why there is no result), then the columns of the kind. The file's own
 //! metadata say of which study it is, and who made it; what is gathered holds the first and not the second.
 
-use super::kinds::{Cell, Kind, Outcome, Type};
+use super::kinds::{Cell, Kind, Type};
+use super::run::Entry;
 use arrow_array::builder::{
     BooleanBuilder, FixedSizeBinaryBuilder, Float64Builder, StringBuilder, UInt64Builder,
 };
@@ -23,21 +24,10 @@ use std::sync::Arc;
 use tables::export::unit;
 
 /// Rows of a row group, in shards and in what is gathered: what is held in memory at once.
-pub const ROWS: usize = 4096;
+pub const ROWS: usize = super::run::PORTION;
 
 /// What a file says of itself, sorted by name.
 pub type Facts = BTreeMap<String, String>;
-
-/// One row.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
-    /// Index of the case.
-    pub index: u64,
-    /// Its key.
-    pub key: [u8; 32],
-    /// What came of it.
-    pub outcome: Outcome,
-}
 
 /// The schema of a kind's results.
 pub fn schema(kind: &Kind) -> Arc<Schema> {

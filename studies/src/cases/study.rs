@@ -4,7 +4,6 @@
 use super::crash_points;
 use super::file::CaseFile;
 use super::kinds::{self, Case, Kind, Make};
-use calibration::certificate::sha256_hex;
 use miette::{Context, IntoDiagnostic};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -223,13 +222,4 @@ fn names(folder: &Path) -> miette::Result<Vec<String>> {
 fn range_of(name: &str) -> Option<Range<u64>> {
     let (start, end) = name.strip_suffix(".parquet")?.split_once('-')?;
     Some(start.parse().ok()?..end.parse().ok()?)
-}
-
-/// SHA-256 of the running program: two builds of one version are two programs.
-///
-/// # Errors
-/// The program's file cannot be read.
-pub fn program() -> miette::Result<String> {
-    let exe = std::env::current_exe().into_diagnostic()?;
-    Ok(sha256_hex(&fs::read(exe).into_diagnostic()?))
 }

@@ -3,9 +3,12 @@
 #![allow(clippy::disallowed_methods, reason = "somebody waits in wall-clock time")]
 
 use super::engines::{self, Engine, Handed, Job};
-use super::gather::holes;
+use super::file::{self, Header};
+use super::gather::{gather, holes};
 use super::plan::{self, Pilot, Plan};
-use super::study::{Study, program};
+use super::run::Entry;
+use super::shard::Reader;
+use super::study::Study;
 use super::worker::{Done, work};
 use crate::progress;
 use indicatif::ProgressBar;
@@ -66,6 +69,26 @@ pub struct Options {
     /// Passed on to sbatch (may be repeated), as in --option=--partition=short
     #[arg(long = "option", value_name = "OPTION", allow_hyphen_values = true)]
     pub options: Vec<String>,
+}
+
+impl Options {
+    /// On so many cores of this machine, without a pilot; a shard takes some seconds.
+    pub fn local(workers: usize) -> Options {
+        Options {
+            engine: "local".into(),
+            workers: Some(workers as u64),
+            limit_s: None,
+            task_s: 4.0,
+            pilot: 0,
+            case_s: Some(0.5),
+            detach: false,
+            server: None,
+            python: String::new(),
+            cores_a_task: 1,
+            window: 1,
+            options: Vec::new(),
+        }
+    }
 }
 
 /// Seconds of MM, MM:SS, H:MM:SS or D-HH:MM:SS, as Slurm writes them.
@@ -131,9 +154,11 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     let first_time = !SUBMITTED.is_completed();
     SUBMITTED.call_once(|| ());
     let report = move |done| {
-        let goes_on = if by == "local" || by == "dask" { "is over" } else { "goes on without this command" };
+        let ended = by == "local" || by == "dask";
+        let goes_on = if ended { "is over" } else { "goes on without this command" };
         say!("{done} of {cases} cases are in {out}; what was at work {goes_on}");
-        say!("the same command goes on from there; `muprime submit --cancel --out {out}` ends what runs");
+        let end = format!("; `muprime submit --cancel --out {out}` ends what runs");
+        say!("the same command goes on from there{}", if ended { "" } else { &end });
     };
     if first_time {
         progress::on_interrupt(&bar, report)?;
@@ -201,6 +226,30 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     bar.finish_and_clear();
     submitted.wall_seconds = begun.elapsed().as_secs_f64();
     Ok(submitted)
+}
+
+/// Cases of one name in a folder, run where they have no result, and read: `NAME.jsonl` are the cases, `NAME/` is the
+/// study, `NAME.parquet` its table.
+///
+/// # Errors
+/// A folder that holds other cases of that name, cases that are left without a result, whatever [`submit`] says.
+pub fn whole(
+    out: &Path,
+    name: &str,
+    header: Header,
+    lines: Option<&[Value]>,
+    options: &Options,
+) -> miette::Result<Vec<Entry>> {
+    let cases = out.join(format!("{name}.jsonl"));
+    file::write(&cases, header, lines)?;
+    let study = Study::begin(&cases, &out.join(name))?;
+    let submitted = submit(&study, options)?;
+    if submitted.missing > 0 {
+        miette::bail!("{name}: {} cases have no result; the same command goes on", submitted.missing);
+    }
+    let table = out.join(format!("{name}.parquet"));
+    gather(&study, &table, false)?;
+    Reader::open(study.kind, &table)?.collect()
 }
 
 /// Refuses options that no engine or not this one has, before a folder is made; gives the engine, none for this
@@ -284,7 +333,7 @@ fn command(study: &Study) -> miette::Result<Vec<String>> {
 /// its range undone and the others not; a disk that is full ends it.
 fn here(study: &Study, plan: &Plan, threads: u64, bar: &ProgressBar) -> miette::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build().into_diagnostic()?;
-    let program = program()?;
+    let program = runs::version::program_sha256().into_diagnostic()?;
     let first = Mutex::new(None);
     pool.install(|| {
         plan.ranges.par_iter().try_for_each(|range| match work(study, range.clone(), &program, None) {

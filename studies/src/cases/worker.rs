@@ -3,18 +3,17 @@
 
 use super::crash_points;
 use super::file::hex;
-use super::kinds::{Case, Outcome};
-use super::shard::{Entry, Facts, ROWS, Reader, Writer};
+use super::run::{Entry, portions};
+use super::shard::{Facts, Reader, Writer};
 use super::study::Study;
 use miette::{Context, IntoDiagnostic};
-use rayon::prelude::*;
 use runs::say;
 use runs::session::Unfinished;
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::io::BufWriter;
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// What a worker found or made.
@@ -115,28 +114,20 @@ fn write(
     cancelled: &dyn Fn() -> bool,
 ) -> miette::Result<Option<u64>> {
     let mut writer = Writer::new(study.kind, to).wrap_err(Unfinished::NotKept)?;
-    let (mut keys, mut failed, mut lines) = (Sha256::new(), 0, study.file.lines(range.clone())?);
-    let portion = ROWS.min(8 * rayon::current_num_threads());
-    loop {
-        let cases: Vec<(u64, Case)> = lines
-            .by_ref()
-            .take(portion)
-            .map(|line| line.and_then(|(index, line)| Ok((index, study.case(index, line.as_ref())?))))
-            .collect::<miette::Result<_>>()?;
-        if cases.is_empty() {
-            break;
-        }
-        if cancelled() {
-            return Ok(None);
-        }
-        let entries: Vec<Entry> =
-            cases.into_par_iter().map(|(index, case)| entry(study, index, case)).collect();
-        for entry in entries {
+    let (mut keys, mut failed) = (Sha256::new(), 0);
+    let line = |line: miette::Result<(u64, Option<Value>)>| {
+        line.and_then(|(index, line)| Ok((index, study.case(index, line.as_ref())?)))
+    };
+    let whole =
+        portions(study.kind, study.file.lines(range.clone())?.map(line), cancelled, &mut |entry: Entry| {
             keys.update(entry.key);
             failed += u64::from(entry.outcome.is_err());
             writer.push(entry).wrap_err(Unfinished::NotKept)?;
-        }
-        crash_points::here("half-written");
+            crash_points::here("half-written");
+            Ok(())
+        })?;
+    if !whole {
+        return Ok(None);
     }
     let facts = facts(study, range, program, hex(&keys.finalize()));
     let to = writer.end(&facts).wrap_err(Unfinished::NotKept)?;
@@ -146,18 +137,6 @@ fn write(
     file.sync_all().into_diagnostic().wrap_err(Unfinished::NotKept)?;
     crash_points::here("synced");
     Ok(Some(failed))
-}
-
-/// Runs one case. A fault of the program in one case is that case's reason: the others stand.
-pub fn entry(study: &Study, index: u64, case: Case) -> Entry {
-    let key = study.kind.key(&case.inputs);
-    let ran = catch_unwind(AssertUnwindSafe(case.run));
-    let outcome: Outcome = ran.unwrap_or_else(|panic| {
-        let message =
-            panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
-        Err(format!("a fault of the program: {}", message.unwrap_or("no message")))
-    });
-    Entry { index, key, outcome }
 }
 
 /// What a shard says of itself: of which study it is, then who made it.

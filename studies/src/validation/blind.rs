@@ -11,15 +11,16 @@ pub mod same_form;
 pub mod sensitivity;
 
 use diagnosis::Verdict;
+use diagnosis::constants::Constants;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use models::covariate;
-use rayon::prelude::*;
 use reliability::{Entry, identifiable};
 use serde::{Deserialize, Serialize};
 use sim::sealed::{Ask, DETECTABLE, PAIR_LEAVES, Set, Stratum, generate};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Which sets are made and how they are diagnosed: options of the command line, and settings of cases.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
@@ -37,6 +38,32 @@ pub struct Settings {
     /// Leave an effect out of the library (may be repeated)
     #[arg(long, value_name = "EFFECT")]
     pub without: Vec<String>,
+    /// Set a constant of the diagnosis for this study (may be repeated); docs/diagnosis/constants.md lists them.
+    #[arg(long, value_name = "NAME=VALUE", hide = true)]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub constant: Vec<String>,
+}
+
+impl Settings {
+    /// How the sets are diagnosed.
+    ///
+    /// # Errors
+    /// A constant that there is not.
+    pub fn options(&self) -> miette::Result<Options> {
+        let mut constants = Constants::default();
+        for setting in &self.constant {
+            let (name, value) = setting
+                .split_once('=')
+                .ok_or_else(|| miette::miette!("--constant {setting}: NAME=VALUE is needed"))?;
+            constants.set(name.trim(), value).map_err(|e| miette::miette!("--constant {setting}: {e}"))?;
+        }
+        Ok(Options {
+            constants: Arc::new(constants),
+            pairs: !self.no_pairs,
+            without: self.without.clone(),
+            ..Options::default()
+        })
+    }
 }
 
 /// A stratum by its name.
@@ -47,14 +74,14 @@ fn stratum_of(text: &str) -> Result<Stratum, String> {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { seed: 1, stratum: None, no_pairs: false, without: Vec::new() }
+        Settings { seed: 1, stratum: None, no_pairs: false, without: Vec::new(), constant: Vec::new() }
     }
 }
 
 /// rms gap over floor on the hidden passes that the truth must leave to be detectable.
 const ABOVE_FLOOR: f64 = 1.0;
 /// A diagnoser's answer on one set, beside the truth.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Scored {
     /// Seed of the set.
     pub seed: u64,
@@ -212,28 +239,7 @@ fn inside(mean: f64, sd: f64, reach: f64) -> f64 {
     below(reach) - below(-reach)
 }
 
-/// Makes and scores `count` sets of a stratum (all strata in their shares where none is given).
-///
-/// # Errors
-/// A set that the diagnosis refuses.
-pub fn run(
-    seed: u64,
-    count: usize,
-    stratum: Option<Stratum>,
-    options: &Options,
-    progress: impl Fn(&Scored) + Sync,
-) -> miette::Result<Vec<Scored>> {
-    (0..count as u64)
-        .into_par_iter()
-        .map(|k| {
-            let scored = score(&set(seed, k, stratum), options)?;
-            progress(&scored);
-            Ok(scored)
-        })
-        .collect()
-}
-
-/// The sets that [`run`] scores, one after another.
+/// The sets of a study, one after another.
 pub fn sets(seed: u64, count: usize, stratum: Option<Stratum>) -> impl Iterator<Item = Set> {
     (0..count as u64).map(move |k| set(seed, k, stratum))
 }

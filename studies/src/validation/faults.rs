@@ -1,7 +1,8 @@
 //! Controller, virtual rig and faults in virtual time, from one seed: each fault of the list strikes in each
 //! phase, and the reaction is compared with its bound.
 //!
-//! `rows` is the list, `bench` runs one scene, `search` runs many seeds over all cores and makes a failure small.
+//! `rows` is the list, `bench` runs one scene, `search` draws scenes, tallies many of them
+//! and makes a failure small.
 
 pub mod bench;
 pub mod rows;
@@ -10,7 +11,7 @@ mod tamper;
 
 pub use bench::{Core, Found, Scene, Strike, run, run_with};
 pub use rows::{Expect, FaultRow, Moment, Pace, ROWS};
-pub use search::{Search, Tally, search};
+pub use search::Tally;
 
 use runs::out;
 

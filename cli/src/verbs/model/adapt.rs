@@ -2,7 +2,6 @@
 
 use crate::verbs::cases::{spans, values};
 use clap::Args;
-use miette::IntoDiagnostic;
 use models::ridge::Steady;
 use runs::{out, say};
 use serde_json::{Value, json};
@@ -10,12 +9,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use studies::cases::adaptive::{SparseGrid, place_of};
-use studies::cases::file::{self, Header, SCHEMA};
-use studies::cases::gather::gather;
+use studies::cases::file::Header;
 use studies::cases::kinds::{Cell, ridge};
-use studies::cases::shard::Reader;
-use studies::cases::study::Study;
-use studies::cases::submit::{Options, checked, submit};
+use studies::cases::run::Entry;
+use studies::cases::submit::{Options, checked, whole};
 
 /// Number of the first held-out draw.
 const HELD_OUT_FROM: u64 = 1_000_000_007;
@@ -64,21 +61,12 @@ fn run_study(
     header: Header,
     lines: Option<&[Value]>,
 ) -> miette::Result<Vec<Option<f64>>> {
-    let cases = args.out.join(format!("{name}.jsonl"));
-    file::write(&cases, header, lines)?;
-    let study = Study::begin(&cases, &args.out.join(name))?;
-    let submitted = submit(&study, &args.rounds)?;
-    if submitted.missing > 0 {
-        miette::bail!("{name}: {} cases have no result; the same command goes on", submitted.missing);
-    }
-    let table = args.out.join(format!("{name}.parquet"));
-    gather(&study, &table, false)?;
-    let column = study.kind.columns.iter().position(|c| c.name == "mu_relative").unwrap_or_default();
-    let mu = |entry: studies::cases::shard::Entry| match entry.outcome.ok()?.get(column) {
+    let column = ridge::KIND.columns.iter().position(|c| c.name == "mu_relative").unwrap_or_default();
+    let mu = |entry: Entry| match entry.outcome.ok()?.get(column) {
         Some(Cell::Number(mu)) => Some(*mu),
         _ => None,
     };
-    Reader::open(study.kind, &table)?.map(|entry| Ok(mu(entry?))).collect()
+    Ok(whole(&args.out, name, header, lines, &args.rounds)?.into_iter().map(mu).collect())
 }
 
 /// Grows the surrogate round by round.
@@ -99,16 +87,9 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
             base: base.clone(),
             spans,
             first: HELD_OUT_FROM,
+            case: None,
         };
-        Ok::<_, miette::Report>(Header {
-            schema: SCHEMA.into(),
-            kind: ridge::KIND.name.into(),
-            version: ridge::KIND.version(),
-            cases,
-            listed: false,
-            line_bytes: None,
-            settings: serde_json::to_value(settings).into_diagnostic()?,
-        })
+        Header::of(&ridge::KIND, &settings, cases)
     };
     // Looked at before anything is written.
     drop((ridge::KIND.prepare)(&header(spans.clone(), args.held_out)?, Path::new("/"))?);

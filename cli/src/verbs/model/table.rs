@@ -9,15 +9,15 @@ use models::ridge::study::content_key;
 use models::ridge::{RidgeCase, case};
 use models::surrogate::{Grid, GridPoint, InterpolationError, Surrogate, TableResult};
 use runs::{out, say};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
+use studies::cases::file::Header;
+use studies::cases::kinds::table::{self, HELD_OUT};
+use studies::cases::run::all;
 use studies::figures::Study;
 use studies::figures::reading::{self, Reading};
-use studies::figures::store::{self, StoredRun};
-
-/// Cases that are not in the table, on which its interpolation is judged.
-const HELD_OUT: usize = 200;
 
 /// Arguments of `muprime model table`.
 #[derive(Args)]
@@ -111,10 +111,15 @@ fn fig_9_study(out: &Path, study: Study) -> miette::Result<(PathBuf, usize, usiz
 fn surrogate(out: &Path) -> miette::Result<(PathBuf, usize, usize)> {
     let grid = Grid::SHIPPED;
     let (points, held_out) = (grid.points(), grid.held_out(HELD_OUT));
-    let cases = points.iter().chain(&held_out).map(|p| p.case);
     let settings = Grid::settings();
-    let (results, failed) = store::complete(&out.join("surrogate.jsonl"), cases, &settings)?;
-    let result = |p: &GridPoint| results.get(&content_key(&p.case, &settings)).map(table_result);
+    let header = Header::of(&table::KIND, &serde_json::Value::Null, (points.len() + HELD_OUT) as u64)?;
+    let entries = all(out, "surrogate-table", header, None)?;
+    let key = |p: &GridPoint| content_key(&p.case, &settings);
+    let found: HashMap<String, TableResult> = (points.iter().chain(&held_out).zip(&entries))
+        .filter_map(|(point, entry)| Some((key(point), table::result(entry)?)))
+        .collect();
+    let failed = entries.iter().filter(|entry| entry.outcome.is_err()).count();
+    let result = |p: &GridPoint| found.get(&key(p)).copied();
     // Twice: the error is that of the table as it is read.
     let bare = Surrogate::table_text(&grid, result, InterpolationError::default()).into_diagnostic()?;
     let judged = held_out.iter().filter_map(|p| result(p).map(|r| (p, r)));
@@ -130,12 +135,4 @@ fn surrogate(out: &Path) -> miette::Result<(PathBuf, usize, usize)> {
         error.phase_rms_deg
     );
     Ok((file, points.len() + held_out.len(), failed))
-}
-
-fn table_result(run: &StoredRun) -> TableResult {
-    TableResult {
-        mu_relative: run.mu_relative,
-        phase_shift_deg: run.phase_shift_deg.unwrap_or(0.0),
-        contact_fraction: run.contact_fraction,
-    }
 }

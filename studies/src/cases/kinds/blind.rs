@@ -1,10 +1,9 @@
 //! One sealed set a case, made, diagnosed and scored: case `i` is the `i`th set that `muprime blind --seed SEED` scores.
 
-use super::{Case, Kind, flag, joined, no_lines, number, settings, text};
-use crate::cases::file::Header;
+use super::{Case, Kind, document, flag, joined, no_lines, number, settings, text};
+use crate::cases::{file::Header, run::here};
 pub use crate::validation::blind::Settings;
-use crate::validation::blind::{score, set};
-use diagnosis::hypotheses::Options;
+use crate::validation::blind::{Scored, score, set};
 
 /// The kind.
 pub const KIND: Kind = Kind {
@@ -31,14 +30,10 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
     no_lines(header)?;
     let settings: Settings = settings(header)?;
     let inputs = serde_json::to_string(&settings).unwrap_or_default();
+    let options = settings.options()?;
     Ok(Box::new(move |index, _| {
-        let settings = settings.clone();
+        let (settings, options) = (settings.clone(), options.clone());
         let run = move || {
-            let options = Options {
-                pairs: !settings.no_pairs,
-                without: settings.without.clone(),
-                ..Options::default()
-            };
             let scored = score(&set(settings.seed, index, settings.stratum), &options)
                 .map_err(|why| format!("{why:#}"))?;
             let word = |v: serde_json::Result<serde_json::Value>| {
@@ -60,4 +55,19 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
         };
         Ok(Case { inputs: format!("{index} {inputs}"), run: Box::new(run) })
     }))
+}
+
+/// Makes and scores so many sets here; `watch` gets each.
+///
+/// # Errors
+/// A constant that there is not, or a set that the diagnosis refuses.
+pub fn run(settings: &Settings, sets: u64, watch: &mut dyn FnMut(&Scored)) -> miette::Result<Vec<Scored>> {
+    let mut all = Vec::new();
+    here(&KIND, settings, sets, &mut |cells| {
+        let scored = document(&cells)?;
+        watch(&scored);
+        all.push(scored);
+        Ok(())
+    })?;
+    Ok(all)
 }

@@ -1,16 +1,16 @@
 //! One scene of the fault bench a case: case `i` is the seed `first + i`.
 
-use super::{Case, Cell, Kind, count, no_lines, settings, text};
-use crate::cases::file::Header;
-use crate::validation::faults::search::scene_of;
-use crate::validation::faults::{Pace, ROWS, run};
+use super::{Case, Cell, Kind, count, document, no_lines, settings, text};
+use crate::cases::{file::Header, run::here};
+use crate::validation::faults::search::{judged, scene_of};
+use crate::validation::faults::{Found, Pace, ROWS, Tally};
 use serde::{Deserialize, Serialize};
 
 /// The kind.
 pub const KIND: Kind = Kind {
     name: "faults",
     words: "a scene of the fault bench a seed, as `muprime faults` runs them",
-    model: 1,
+    model: 2,
     columns: &[
         count("seed", "seed of the scene"),
         text("phase", "what the rig did"),
@@ -21,6 +21,7 @@ pub const KIND: Kind = Kind {
         count("measured_off_cycles", "cycles from the command until the plate was quiet"),
         count("wrong", "how much was not as it must be: 0 is good"),
         text("what", "what was wrong"),
+        text("document", "all that was found, as JSON"),
     ],
     prepare,
 };
@@ -35,24 +36,27 @@ pub struct Settings {
     pub pairs: bool,
     /// The limits that the scenes run at.
     pub pace: Pace,
+    /// Each scene twice, with equal hashes and a replay of its rows.
+    pub twice: bool,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { first: 1, pairs: false, pace: Pace::Fast }
+        Settings { first: 1, pairs: false, pace: Pace::Fast, twice: false }
     }
 }
 
 fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {
     no_lines(header)?;
-    let Settings { first, pairs, pace } = settings(header)?;
+    let Settings { first, pairs, pace, twice } = settings(header)?;
     Ok(Box::new(move |index, _| {
         let seed = first.wrapping_add(index);
         let run = move || {
             let scene = scene_of(seed, pairs, pace);
-            let found = run(&scene, false);
+            let found = judged(&scene, twice);
             let struck: Vec<String> = scene.strikes.iter().map(|s| ROWS[s.row].name.to_string()).collect();
             let moment = serde_json::to_value(scene.moment).map_err(|e| e.to_string())?;
+            let whole = serde_json::to_string(&found).map_err(|e| e.to_string())?;
             let trip = found.trip.map(|trip| serde_json::to_value(trip.cause).map_err(|e| e.to_string()));
             let plain = |v: serde_json::Value| v.as_str().map_or_else(|| v.to_string(), str::to_string);
             Ok(vec![
@@ -65,8 +69,25 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
                 found.measured_off.into(),
                 (found.wrong.len() as u64).into(),
                 if found.wrong.is_empty() { Cell::Missing } else { found.wrong.join("; ").into() },
+                whole.into(),
             ])
         };
-        Ok(Case { inputs: format!("{seed} {pairs} {pace:?}"), run: Box::new(run) })
+        Ok(Case { inputs: format!("{seed} {pairs} {pace:?} {twice}"), run: Box::new(run) })
     }))
+}
+
+/// Runs so many scenes here, and tallies them; `watch` gets the tally after each.
+///
+/// # Errors
+/// A fault of the program in a scene.
+pub fn search(settings: &Settings, seeds: u64, watch: &mut dyn FnMut(&Tally)) -> miette::Result<Tally> {
+    let (mut tally, mut next) = (Tally::default(), settings.first);
+    here(&KIND, settings, seeds, &mut |cells| {
+        let found: Found = document(&cells)?;
+        tally.count(&scene_of(next, settings.pairs, settings.pace), found, settings.twice);
+        next = next.wrapping_add(1);
+        watch(&tally);
+        Ok(())
+    })?;
+    Ok(tally)
 }

@@ -90,6 +90,9 @@ pub struct Settings {
     pub spans: BTreeMap<String, Span>,
     /// Number of the first draw, from 1: other draws are other cases of the same box.
     pub first: u64,
+    /// What all cases start from where that is not the paper's nominal case; `elements` is then of it too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub case: Option<RidgeCase>,
 }
 
 impl Default for Settings {
@@ -100,6 +103,7 @@ impl Default for Settings {
             base: BTreeMap::new(),
             spans: BTreeMap::new(),
             first: 1,
+            case: None,
         }
     }
 }
@@ -128,6 +132,15 @@ pub fn set(mut case: RidgeCase, values: &BTreeMap<String, f64>) -> miette::Resul
         }
     }
     Ok(case)
+}
+
+/// What a line states of a case: each of [`VARIABLES`].
+pub fn line_of(case: &RidgeCase) -> serde_json::Value {
+    VARIABLES
+        .into_iter()
+        .zip(values(case))
+        .map(|(name, value)| (name.to_string(), serde_json::Value::from(value)))
+        .collect()
 }
 
 /// The values of [`VARIABLES`] in a case.
@@ -168,7 +181,8 @@ pub fn kronecker(n: u64, dimensions: usize) -> Vec<f64> {
 
 fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {
     let settings: Settings = super::settings(header)?;
-    let base = set(RidgeCase { elements: settings.elements, ..RidgeCase::paper() }, &settings.base)?;
+    let start = settings.case.unwrap_or(RidgeCase { elements: settings.elements, ..RidgeCase::paper() });
+    let base = set(start, &settings.base)?;
     if header.listed != settings.spans.is_empty() {
         miette::bail!("ridge cases are either listed or drawn from `spans`");
     }

@@ -1,10 +1,11 @@
 //! One node of the shipped surrogate's table a case, then those held out to judge it.
 
-use super::{Case, Kind, flag, no_lines, number};
+use super::{Case, Cell, Kind, flag, no_lines, number};
 use crate::cases::file::Header;
+use crate::cases::run::Entry;
 use miette::bail;
 use models::ridge::{self, study};
-use models::surrogate::{Grid, GridPoint};
+use models::surrogate::{Grid, GridPoint, TableResult};
 
 /// The kind.
 pub const KIND: Kind = Kind {
@@ -54,4 +55,15 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
         let inputs = format!("{at_rest} {}", super::ridge::inputs_of(&case, &settings));
         Ok(Case { inputs, run: Box::new(run) })
     }))
+}
+
+/// What the surrogate's table holds of a case; none where it has no result.
+pub fn result(entry: &Entry) -> Option<TableResult> {
+    let [_, Cell::Number(mu_relative), phase, Cell::Number(contact_fraction), _] =
+        entry.outcome.as_ref().ok()?.as_slice()
+    else {
+        return None;
+    };
+    let phase_shift_deg = if let Cell::Number(degrees) = phase { *degrees } else { 0.0 };
+    Some(TableResult { mu_relative: *mu_relative, phase_shift_deg, contact_fraction: *contact_fraction })
 }

@@ -1,11 +1,11 @@
 //! Whether probabilities are what they say: every entry of every list of hypotheses, `unknown` and no gap among them.
 
 use super::{ABOVE_FLOOR, Scored};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sim::sealed::{DETECTABLE, PAIR_LEAVES, Stratum};
 
 /// One entry of a list.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Entry {
     /// Stated probability.
     pub probability: f64,

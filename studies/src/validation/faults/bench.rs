@@ -73,7 +73,7 @@ pub enum Core {
 }
 
 /// What came of a scene.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Found {
     /// Cycles that were simulated.
     pub cycles: u64,

@@ -1,27 +1,11 @@
-//! Many seeds over all cores, the tally of their reactions, and a failure made small.
+//! The scene of a seed, the tally of many scenes' reactions, and a failure made small.
 
 use super::bench::{Found, RING, STEADY_AT, Scene, Strike, T, measured_bound, run};
 use super::rows::{Expect, Moment, Pace, ROWS};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// What is searched.
-#[derive(Clone, Copy, Debug)]
-pub struct Search {
-    /// First seed.
-    pub first: u64,
-    /// How many.
-    pub seeds: u64,
-    /// Two faults in each scene, of different channels.
-    pub pairs: bool,
-    /// Each seed twice, with hashes and a replay of its rows.
-    pub twice: bool,
-    /// The limits that the scenes run at.
-    pub pace: Pace,
-}
 
 /// Reactions to one fault in one moment.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -102,26 +86,14 @@ fn compatible(a: usize, b: usize) -> bool {
     share && apart
 }
 
-/// Runs the seeds; `report` gets each part.
-pub fn search(what: Search, report: impl Fn(&Tally) + Sync) -> Tally {
-    let seeds: Vec<u64> = (what.first..what.first.saturating_add(what.seeds)).collect();
-    seeds
-        .par_chunks(64)
-        .map(|chunk| {
-            let mut tally = Tally::default();
-            for seed in chunk {
-                tally.take(&scene_of(*seed, what.pairs, what.pace), what.twice);
-            }
-            report(&tally);
-            tally
-        })
-        .reduce(Tally::default, Tally::with)
-}
-
 impl Tally {
     /// Runs a scene and counts it.
     pub fn take(&mut self, scene: &Scene, twice: bool) {
-        let found = judged(scene, twice);
+        self.count(scene, judged(scene, twice), twice);
+    }
+
+    /// Counts what came of a scene.
+    pub fn count(&mut self, scene: &Scene, found: Found, twice: bool) {
         self.scenes += 1;
         self.cycles += found.cycles * if twice { 2 } else { 1 };
         for (i, strike) in scene.strikes.iter().enumerate() {
@@ -144,29 +116,10 @@ impl Tally {
             }
         }
     }
-
-    /// Both together.
-    pub fn with(mut self, other: Tally) -> Tally {
-        self.scenes += other.scenes;
-        self.cycles += other.cycles;
-        self.failed += other.failed;
-        self.failures.extend(other.failures);
-        self.failures.sort_by_key(|f| f.seed);
-        self.failures.truncate(100);
-        for (key, theirs) in other.reactions {
-            let ours = self.reactions.entry(key).or_default();
-            ours.runs += theirs.runs;
-            ours.command_off = ours.command_off.max(theirs.command_off);
-            ours.command_bound = ours.command_bound.max(theirs.command_bound);
-            ours.measured_off = ours.measured_off.max(theirs.measured_off);
-            ours.measured_bound = ours.measured_bound.max(theirs.measured_bound);
-        }
-        self
-    }
 }
 
 /// Runs a scene; with `twice` two runs must leave equal hashes.
-fn judged(scene: &Scene, twice: bool) -> Found {
+pub fn judged(scene: &Scene, twice: bool) -> Found {
     let mut found = run(scene, twice);
     if twice && run(scene, true).hash != found.hash {
         found.wrong.push("two runs of one seed differ".into());
