@@ -179,6 +179,7 @@ fn every_law_can_be_made_ready_for_the_loop() {
                     name: effect.name.into(),
                     law: form.name.into(),
                     acts_on: "prediction".into(),
+                    table: None,
                     parameters: parameters
                         .iter()
                         .zip(&theta)
