@@ -554,6 +554,7 @@ fn an_effect_of_ones_own_is_one_more_hypothesis() {
             );
         }
         assert_eq!(verdict["own_effects"][0]["name"], "thick_film");
+        assert!(verdict["remarks"][0].as_str().unwrap().ends_with("own were candidates: thick_film."));
         dipped(&without, 90_200 + seed, 0.0);
         let verdict = diagnosed(&without, &["--effect", "../thick_film.csv"]);
         claimed += usize::from(verdict["verdict"] == "named");
