@@ -263,7 +263,6 @@ impl Compiler<'_> {
         Ok(parts)
     }
 
-    /// The reads of a poll.
     fn spans(&self, poll: &Poll) -> Result<Vec<Span>, ProfileError> {
         if let (Some(address), Some(count)) = (poll.address, poll.count) {
             return Ok(vec![Span { address, count }]);
@@ -394,7 +393,6 @@ impl Compiler<'_> {
         })
     }
 
-    /// Where a signal stands in its frame.
     fn place(
         &self,
         s: &crate::schema::Signal,

@@ -7,9 +7,6 @@ use std::fmt::Write;
 use std::path::Path;
 
 /// The page.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn page(compared: &Compared) -> miette::Result<String> {
     let result = &compared.comparison;
     let name = |run: &Path| {

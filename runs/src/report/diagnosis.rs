@@ -26,9 +26,6 @@ use models::covariate;
 const LISTED_REGIONS: usize = 3;
 
 /// The page; `about` is what is known of the table's run, and stands first.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn page(result: &Diagnosis, table: &Table, about: &[(&str, String)]) -> miette::Result<String> {
     let r = &result.report;
     let forecasts = result.predict(table);

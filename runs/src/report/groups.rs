@@ -7,9 +7,6 @@ use crate::compare::groups::{AtCondition, GroupBy, Grouped};
 use std::fmt::Write;
 
 /// The page.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn page(compared: &Grouped) -> miette::Result<String> {
     let runs: usize = compared.groups.iter().map(|g| g.runs.len()).sum();
     let title = match compared.by {

@@ -1,6 +1,6 @@
 //! The figures, as SVG text: what all of them share. Each is drawn twice, wide for a page and narrow for a
 //! telephone, with its own letters in both; the page shows one of them. Series differ by mark and dash as
-//! well as by colour.
+//! well as by colour. An error of a figure is one of the drawing library.
 
 pub mod campaign;
 pub mod comparison;

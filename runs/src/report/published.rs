@@ -132,9 +132,6 @@ fn parse(bytes: &[u8], name: &str) -> miette::Result<Vec<Published>> {
 
 /// The section: the run's passes with the published values against amplitude, frequency and speed, and all of
 /// them in a table.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn section(run: &RunData, all: &[Published]) -> miette::Result<String> {
     if all.is_empty() {
         return Ok(String::new());

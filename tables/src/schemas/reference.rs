@@ -164,7 +164,6 @@ fn named(kind: Kind, name: &str, object: &Map<String, Value>) -> String {
     }
 }
 
-/// The targets of an import.
 fn targets() -> String {
     let mut page = String::from(
         "\n## import: targets\n\nWhat a column of a foreign table can stand for in `muprime import --map HEADER=TARGET:UNIT` and `--set \

@@ -15,9 +15,6 @@ fn name(h: &Hypothesis) -> String {
 }
 
 /// The section.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn section(result: &Diagnosis, overlay: &Overlay<'_>) -> miette::Result<String> {
     let listed: Vec<&Hypothesis> =
         result.report.hypotheses.iter().filter(|h| h.probability > LISTED).take(12).collect();

@@ -20,7 +20,6 @@ pub fn section(result: &Diagnosis) -> String {
     format!("<h2>What to do next</h2>{all}")
 }
 
-/// What an experiment is expected to be worth.
 fn worth(e: &Experiment) -> String {
     let [a, b] = [0, 1].map(|i| plain(&e.separates[i]));
     if e.expected_nats > BEYOND {

@@ -7,9 +7,6 @@ use diagnosis::timing::{Comparison, Form, title};
 use diagnosis::verdict::Diagnosis;
 
 /// The section; empty for a table without a record.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn section(result: &Diagnosis) -> miette::Result<String> {
     let Some(record) = &result.report.record else { return Ok(String::new()) };
     let mut text = String::from("<h2>Does the force come in time?</h2>");

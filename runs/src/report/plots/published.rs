@@ -17,7 +17,6 @@ use models::quantity::PeakToPeak;
 use plotters::prelude::*;
 use std::collections::BTreeMap;
 
-/// Places of a curve.
 const PLACES: u32 = 120;
 
 /// An axis: what it shows of a pass and of a published value, and how a condition gets such a value.
@@ -79,9 +78,6 @@ const AXES: [Axis; 4] = [
 ];
 
 /// The three panels; their captions state what is not drawn.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn panels(run: &RunData, all: &[Published]) -> miette::Result<String> {
     let passes: Vec<_> = run.passes.iter().map(|p| p.pass.clone()).collect();
     let mu0 = models::pass::coulomb_coefficient(&passes);
