@@ -354,7 +354,7 @@ mod tests {
     #[test]
     fn no_bundled_file_is_misshapen() {
         for bundled in crate::schemas::bundled::all() {
-            let kind = Kind::ALL.into_iter().find(|k| k.name() == bundled.kind).unwrap();
+            let kind = Kind::all().find(|k| k.name() == bundled.kind).unwrap();
             assert_eq!(problems_of(kind, bundled.text), "", "{}", bundled.name);
         }
     }

@@ -12,7 +12,7 @@ pub fn page() -> String {
          Generated from the code: `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test words`. `muprime schema KIND` prints the \
          same as JSON Schema, for editors and programs; `muprime init KIND` prints a commented beginning, `muprime show` what is bundled.\n",
     );
-    for kind in Kind::ALL {
+    for kind in Kind::all() {
         let schema = kind.schema();
         let _ = write!(page, "\n## {}\n\n{}\n", kind.name(), kind.words());
         for (name, object) in objects(&schema) {

@@ -1,6 +1,7 @@
 //! A JSON Schema for every kind of file, from the types that read it.
 
 use crate::import::targets::{Kind as Cell, TARGETS};
+use clap::ValueEnum;
 use models::covariate;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};
@@ -32,33 +33,13 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Kind; 10] = [
-        Kind::Plan,
-        Kind::Campaign,
-        Kind::Setup,
-        Kind::Fingertip,
-        Kind::Rig,
-        Kind::Table,
-        Kind::Certificate,
-        Kind::Model,
-        Kind::Profile,
-        Kind::Verdict,
-    ];
+    pub fn all() -> impl Iterator<Item = Kind> {
+        Kind::value_variants().iter().copied()
+    }
 
     /// Its name on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Kind::Plan => "plan",
-            Kind::Campaign => "campaign",
-            Kind::Setup => "setup",
-            Kind::Fingertip => "fingertip",
-            Kind::Rig => "rig",
-            Kind::Table => "table",
-            Kind::Certificate => "certificate",
-            Kind::Model => "model",
-            Kind::Profile => "profile",
-            Kind::Verdict => "verdict",
-        }
+    pub fn name(self) -> String {
+        typed(self)
     }
 
     /// What it is and where it is used.
@@ -115,6 +96,11 @@ impl Kind {
         }
         schema
     }
+}
+
+/// A choice of the command line, as it is typed.
+pub(super) fn typed(choice: impl clap::ValueEnum) -> String {
+    choice.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
 /// Lets each number below the key of a quantity (`speed_m_s`) be a text with a unit as well: `"20mm/s"`.
