@@ -28,7 +28,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let all = all();
     match (&args.name, args.sample) {
         (_, Some(sample)) => {
-            let folder = args.out.clone().unwrap_or_else(|| sample.name().into());
+            let folder = args.out.clone().unwrap_or_else(|| tables::schemas::schema::typed(sample).into());
             let table = sample::write(sample, &folder)?;
             if json {
                 answer_json(&json!({ "table": table }));

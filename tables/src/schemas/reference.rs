@@ -14,7 +14,7 @@ pub fn page() -> String {
     );
     for kind in Kind::all() {
         let schema = kind.schema();
-        let _ = write!(page, "\n## {}\n\n{}\n", kind.name(), kind.words());
+        let _ = write!(page, "\n## {}\n\n{}.\n", kind.name(), kind.words());
         for (name, object) in objects(&schema) {
             if !name.is_empty() {
                 let _ = write!(page, "\n### {} `{name}`\n", kind.name());

@@ -9,25 +9,25 @@ use serde_json::{Map, Value, json};
 /// A kind of file or document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
-    /// A plan of passes
+    /// A plan of passes (TOML), for `muprime run PLAN`
     Plan,
-    /// A campaign: one plan with several tips, conditions and days
+    /// A campaign (TOML): one plan with several tips, conditions and days, for `muprime run CAMPAIGN`
     Campaign,
-    /// A rig: instruments, limits, fingertip
+    /// A rig (TOML), for `--setup`; the defaults and hard ranges of its limits stand in setup.md as well
     Setup,
-    /// A fingertip of the library
+    /// A fingertip (TOML), for `[finger] tip` of a setup
     Fingertip,
-    /// rig.toml: what is known of a rig beside a table
+    /// `rig.toml` beside a point table, for `muprime diagnose`
     Rig,
-    /// A row of a point table
+    /// A row of a point table (CSV or Parquet), for `muprime diagnose`
     Table,
-    /// A calibration's certificate
+    /// What `muprime calibrate` writes (TOML) and a setup names under `certificates`
     Certificate,
-    /// MODEL.toml of a diagnosis
+    /// MODEL.toml, what `muprime diagnose --save-model` writes and `muprime run --model` reads
     Model,
-    /// An instrument's description
+    /// An instrument's description (TOML), for `profile` of an instrument in a setup
     Profile,
-    /// What `muprime diagnose --json` prints
+    /// What `muprime diagnose --json` prints (JSON)
     Verdict,
 }
 
@@ -43,27 +43,9 @@ impl Kind {
     }
 
     /// What it is and where it is used.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Kind::Plan => "A plan of passes (TOML), for `muprime run PLAN`.",
-            Kind::Campaign => {
-                "A campaign (TOML): one plan with several tips, conditions and days, for `muprime run CAMPAIGN`."
-            }
-            Kind::Setup => {
-                "A rig (TOML), for `--setup`; the defaults and hard ranges of its limits stand in setup.md as well."
-            }
-            Kind::Fingertip => "A fingertip (TOML), for `[finger] tip` of a setup.",
-            Kind::Rig => "`rig.toml` beside a point table, for `muprime diagnose`.",
-            Kind::Table => "A row of a point table (CSV or Parquet), for `muprime diagnose`.",
-            Kind::Certificate => {
-                "What `muprime calibrate` writes (TOML) and a setup names under `certificates`."
-            }
-            Kind::Model => {
-                "MODEL.toml, what `muprime diagnose --save-model` writes and `muprime run --model` reads."
-            }
-            Kind::Profile => "An instrument's description (TOML), for `profile` of an instrument in a setup.",
-            Kind::Verdict => "What `muprime diagnose --json` prints (JSON).",
-        }
+    pub fn words(self) -> String {
+        let help = self.to_possible_value().and_then(|value| value.get_help().map(ToString::to_string));
+        help.unwrap_or_default()
     }
 
     /// The schema, JSON Schema 2020-12.
@@ -99,7 +81,7 @@ impl Kind {
 }
 
 /// A choice of the command line, as it is typed.
-pub(super) fn typed(choice: impl clap::ValueEnum) -> String {
+pub fn typed(choice: impl clap::ValueEnum) -> String {
     choice.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 

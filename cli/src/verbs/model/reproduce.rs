@@ -106,7 +106,7 @@ pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
     };
     let readings = args.reading.map_or(Reading::ALL.to_vec(), |one| vec![one]);
     for figure in wanted {
-        let name = figure.to_possible_value().map_or(String::new(), |v| v.get_name().to_string());
+        let name = tables::schemas::schema::typed(figure);
         for reading in &readings {
             // Fig. 6 has no amplitude to read.
             if figure == Figure::Fig6 && *reading != readings[0] {

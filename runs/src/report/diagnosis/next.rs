@@ -1,6 +1,6 @@
 //! What to measure next, in physical words, with the plan beside it.
 
-use crate::report::html::{escape, table};
+use crate::report::html::{column, escape, table};
 use crate::report::human::number;
 use crate::verdict::plain;
 use diagnosis::next::Experiment;
@@ -44,7 +44,7 @@ fn one(e: &Experiment) -> String {
         .map(|c| {
             let (_, unit) = c.shown;
             let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
-            format!("<th scope=\"col\" class=\"n\">{}{}</th>", escape(c.words), escape(&unit))
+            column(&format!("#{}{}", escape(c.words), escape(&unit)))
         })
         .collect();
     let rows: String = e

@@ -1,8 +1,8 @@
 //! The figures of two runs and of more.
 
 use super::{
-    COLOURS, Frame, GREY, NARROW, SERIES, Span, WIDE, band, beyond, figure, line, mark_name, measured,
-    mu_axis, series_key,
+    COLOURS, Frame, GREY, NARROW, SERIES, Span, WIDE, band, beyond, capital, figure, line, mark_name,
+    measured, mu_axis, series_key,
 };
 use crate::compare::groups::{GroupDifference, Grouped};
 use crate::compare::{Comparison, Mean, Paired};
@@ -108,11 +108,6 @@ pub fn differences(result: &Comparison) -> miette::Result<String> {
 
 fn widest(result: &Comparison) -> f64 {
     1.05 * result.pairs.iter().map(|p| p.amplitude_pp_m * 1e6).fold(0.1, f64::max)
-}
-
-fn capital(word: &str) -> String {
-    let mut all = word.chars();
-    all.next().map_or_else(String::new, |first| first.to_uppercase().chain(all).collect())
 }
 
 /// The mean `mu'` of each group against amplitude, a mark a group, a little beside each other.

@@ -2,8 +2,8 @@
 //! published of the same, and Eq. 20 with their `Psi*` at the conditions of the passes.
 
 use super::{
-    COLOURS, Frame, GREY, NARROW, PANEL, Span, band, beyond, figure, line, mark, mark_name, measured,
-    mu_axis, wrong,
+    COLOURS, Frame, GREY, NARROW, PANEL, Span, band, beyond, capital, figure, line, mark, mark_name,
+    measured, mu_axis, wrong,
 };
 use crate::report::RunData;
 use crate::report::html::escape;
@@ -241,9 +241,4 @@ fn panel(
     }
     let cut = beyond(own.iter().map(|p| p.1).chain(values.iter().map(|v| v.2)), ys);
     Ok(format!("<figure>{svg}<figcaption>{}{cut}</figcaption></figure>", escape(&words)))
-}
-
-fn capital(word: &str) -> String {
-    let mut letters = word.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().collect::<String>() + letters.as_str())
 }
